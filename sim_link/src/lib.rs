@@ -1,1 +1,5 @@
-//! x
+//! CoppeliaSim's ZeroMQ remote API: the wire, a client, and a built-in simulated cell that serves it.
+
+pub mod cell;
+pub mod client;
+pub mod wire;

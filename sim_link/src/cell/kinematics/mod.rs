@@ -1,0 +1,1 @@
+//! kinematics of the cell.

@@ -1,0 +1,7 @@
+//! The built-in simulated cell: a UR5 with an RGB-D camera and a board, served over the ZeroMQ remote API.
+
+pub mod kinematics;
+pub mod motion;
+pub mod render;
+pub mod scene;
+pub mod server;

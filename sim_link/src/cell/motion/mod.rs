@@ -1,0 +1,1 @@
+//! motion of the cell.
