@@ -8,8 +8,9 @@ use nalgebra::{
     Isometry3, Matrix3, Matrix6, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3, Vector6,
 };
 
-/// Below this angle [rad] the series are used: their next term is then under the rounding of an `f64`.
-const SMALL_ANGLE: f64 = 1e-4;
+/// Below this angle [rad] the series are used: the next term of each is then under the rounding of an `f64`, while
+/// above it the cancellation in the closed forms, scaled by the squared angle that multiplies it, is too.
+const SMALL_ANGLE: f64 = 1e-2;
 
 /// The matrix `[v]×` with `[v]× w = v × w`.
 pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
@@ -49,12 +50,18 @@ pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
     let angle_sq = phi.norm_squared();
     let angle = angle_sq.sqrt();
     let k = skew(phi);
-    let (a, b) = if angle < SMALL_ANGLE {
-        (0.5 - angle_sq / 24.0, 1.0 / 6.0 - angle_sq / 120.0)
+    // (1 - cos x) / x² as a squared sinc, which does not cancel.
+    let sinc = if angle < SMALL_ANGLE {
+        1.0 - angle_sq / 24.0 * (1.0 - angle_sq / 80.0)
     } else {
-        ((1.0 - angle.cos()) / angle_sq, (angle - angle.sin()) / (angle_sq * angle))
+        (0.5 * angle).sin() / (0.5 * angle)
     };
-    Matrix3::identity() + a * k + b * k * k
+    let b = if angle < SMALL_ANGLE {
+        1.0 / 6.0 - angle_sq / 120.0 * (1.0 - angle_sq / 42.0)
+    } else {
+        (angle - angle.sin()) / (angle_sq * angle)
+    };
+    Matrix3::identity() + 0.5 * sinc * sinc * k + b * k * k
 }
 
 /// Inverse of [`left_jacobian`], defined for angles below 2π.
@@ -63,7 +70,7 @@ pub fn left_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
     let angle = angle_sq.sqrt();
     let k = skew(phi);
     let c = if angle < SMALL_ANGLE {
-        1.0 / 12.0 + angle_sq / 720.0
+        1.0 / 12.0 + angle_sq / 720.0 * (1.0 + angle_sq / 42.0)
     } else {
         let half = 0.5 * angle;
         (1.0 - half * half.cos() / half.sin()) / angle_sq

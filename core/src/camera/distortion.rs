@@ -312,9 +312,9 @@ fn invert_fisheye_angle(theta_d: f64, k: &[f64; 4]) -> Option<f64> {
             return Some(theta);
         }
         if residual > 0.0 {
-            high = theta
+            high = theta;
         } else {
-            low = theta
+            low = theta;
         }
         let newton = theta - residual / slope;
         theta = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
