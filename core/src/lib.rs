@@ -7,6 +7,7 @@ pub mod camera;
 pub mod frames;
 pub mod handeye;
 pub mod observation;
+pub mod progress;
 pub mod se3;
 pub mod target;
 

@@ -12,6 +12,7 @@
 //! `anchor_from_mount_i * mount_from_camera * camera_from_target_i = anchor_from_target` for every view `i`.
 
 pub mod closed_form;
+pub mod joint;
 
 use serde::{Deserialize, Serialize};
 
@@ -148,6 +149,9 @@ pub enum HandEyeError {
         /// Which view, counted from 0.
         index: usize,
     },
+    /// The caller asked the work to end.
+    #[error("cancelled")]
+    Cancelled,
     /// The linear algebra found no solution although the views look sufficient.
     #[error("{method} found no solution for these {views} views: {reason}")]
     NoSolution {

@@ -1,0 +1,125 @@
+//! Levenberg–Marquardt on the joint cost at given noise levels.
+
+use nalgebra::{DVector, Point3, Vector6};
+
+use super::chain::Chain;
+use super::normal::System;
+use super::{JointProblem, JointStart, Noise};
+use crate::camera::Intrinsics;
+use crate::frames::{Anchor, Camera, Mount, Pose, Target};
+use crate::handeye::HandEyeError;
+use crate::progress::CancelToken;
+
+/// Steps of one minimisation; a handful is usual.
+const MAX_STEPS: usize = 100;
+/// Ends when the quadratic model promises less than this part of the cost.
+const COST_TOLERANCE: f64 = 1e-12;
+/// First damping relative to the diagonal.
+const FIRST_DAMPING: f64 = 1e-4;
+/// Past this damping a step is too small to matter.
+const LARGEST_DAMPING: f64 = 1e12;
+
+/// The current values of all unknowns.
+#[derive(Debug, Clone)]
+pub struct State {
+    pub mount_from_camera: Pose<Mount, Camera>,
+    pub anchor_from_target: Pose<Anchor, Target>,
+    pub intrinsics: Intrinsics,
+    pub corrections: Vec<Vector6<f64>>,
+}
+
+impl State {
+    pub fn new(problem: &JointProblem<'_>, start: &JointStart) -> Self {
+        Self {
+            mount_from_camera: start.mount_from_camera,
+            anchor_from_target: start.anchor_from_target,
+            intrinsics: start.intrinsics,
+            corrections: vec![Vector6::zeros(); problem.views.len()],
+        }
+    }
+
+    fn stepped(&self, problem: &JointProblem<'_>, shared: &DVector<f64>, own: &[Vector6<f64>]) -> Self {
+        let mut next = self.clone();
+        next.mount_from_camera = self.mount_from_camera.perturbed(&shared.fixed_rows::<6>(0).into_owned());
+        next.anchor_from_target = self.anchor_from_target.perturbed(&shared.fixed_rows::<6>(6).into_owned());
+        if problem.free_intrinsics {
+            let parameters: Vec<f64> =
+                self.intrinsics.parameters().iter().zip(shared.iter().skip(12)).map(|(p, d)| p + d).collect();
+            next.intrinsics = self.intrinsics.with_parameters(&parameters);
+        }
+        for (correction, step) in next.corrections.iter_mut().zip(own) {
+            *correction += step;
+        }
+        next
+    }
+
+    /// Mean over the views of the target's middle in camera coordinates.
+    pub fn mean_target_centre(&self, problem: &JointProblem<'_>) -> Point3<f64> {
+        let points = problem.points.len().max(1) as f64;
+        let centre = Point3::from(problem.points.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / points);
+        let sum: nalgebra::Vector3<f64> = problem
+            .views
+            .iter()
+            .zip(&self.corrections)
+            .map(|(view, correction)| {
+                let chain = Chain::new(
+                    problem.mode,
+                    &view.base_from_tip,
+                    correction,
+                    &self.mount_from_camera,
+                    &self.anchor_from_target,
+                );
+                (chain.camera_from_target * centre).coords
+            })
+            .sum();
+        Point3::from(sum / problem.views.len().max(1) as f64)
+    }
+}
+
+/// Minimises the cost from `state`, which holds the best point found afterwards. Returns the number of steps.
+pub fn minimise(
+    problem: &JointProblem<'_>,
+    state: &mut State,
+    noise: &Noise,
+    cancel: &CancelToken,
+) -> Result<usize, HandEyeError> {
+    let mut system = System::new(problem, state)?;
+    let mut cost = system.cost(noise);
+    let mut damping = FIRST_DAMPING;
+    for step in 0..MAX_STEPS {
+        if cancel.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        loop {
+            let trial = system.reduce_damped(noise, damping).map(|reduced| {
+                let shared = reduced.shared_step();
+                let own = reduced.own_steps(&shared);
+                (state.stepped(problem, &shared, &own), reduced.decrease())
+            });
+            let (next, promised) = match trial {
+                Ok(trial) => trial,
+                Err(error) if damping >= LARGEST_DAMPING => return Err(error),
+                Err(_) => {
+                    damping = (damping * 10.0).max(1e-9);
+                    continue;
+                }
+            };
+            if promised <= COST_TOLERANCE * cost.max(f64::MIN_POSITIVE) {
+                return Ok(step);
+            }
+            // A step that puts the target behind the camera is as bad as one that raises the cost.
+            let next_system = System::new(problem, &next).ok();
+            let next_cost = next_system.as_ref().map_or(f64::INFINITY, |s| s.cost(noise));
+            if let (Some(next_system), true) = (next_system, next_cost < cost) {
+                (*state, system, cost) = (next, next_system, next_cost);
+                damping = (damping * 0.1).max(1e-12);
+                break;
+            }
+            damping *= 10.0;
+            if damping > LARGEST_DAMPING {
+                return Ok(step);
+            }
+        }
+    }
+    Ok(MAX_STEPS)
+}
