@@ -13,6 +13,8 @@
 
 pub mod closed_form;
 pub mod joint;
+pub mod pose_graph;
+pub mod quality;
 
 use serde::{Deserialize, Serialize};
 
