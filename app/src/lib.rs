@@ -1,1 +1,3 @@
-//! x
+//! The Handeye Workbench: a window and a command line over [`handeye_core`] and [`handeye_sim_link`].
+
+pub mod cli;

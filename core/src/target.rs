@@ -1,5 +1,7 @@
 //! Calibration targets: what is printed, and where its points are.
 
+use std::fmt;
+
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
@@ -74,6 +76,17 @@ impl TargetSpec {
             Self::Chessboard(grid) => (grid.columns + grid.rows) % 2 == 0,
             Self::Circles(_) => true,
         }
+    }
+}
+
+impl fmt::Display for TargetSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kind, what) = match self {
+            Self::Chessboard(_) => ("chessboard", "inner corners"),
+            Self::Circles(_) => ("circle grid", "dots"),
+        };
+        let grid = self.grid();
+        write!(f, "{kind} of {}×{} {what}, {} mm apart", grid.columns, grid.rows, grid.square_m * 1e3)
     }
 }
 

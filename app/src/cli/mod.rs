@@ -1,0 +1,103 @@
+//! The command line. Other programs call it: names, options and exit codes are a contract.
+//!
+//! Results go to standard output, progress and messages to standard error. Exit code 0: done, 1: failed, 2: wrong usage
+//! or unreadable input.
+
+mod auto;
+mod calibrate;
+mod cell;
+mod export;
+mod failure;
+mod report;
+mod solve;
+
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+pub use failure::Failure;
+
+/// Calibrates a robot's camera: live in a window, or from the command line.
+#[derive(Debug, Parser)]
+#[command(name = "handeye", version, about, max_term_width = 100)]
+struct Cli {
+    /// Say nothing but results and errors.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Open the workbench (the default).
+    #[command(after_help = "Example:\n  handeye gui --connect tcp://192.168.0.7:23000")]
+    Gui(GuiArgs),
+    /// Serve the built-in cell over the ZeroMQ remote API until Ctrl-C.
+    #[command(after_help = "Example:\n  handeye cell --port 0 --scene assets/scenes/realistic.toml --seed 7")]
+    Cell(cell::CellArgs),
+    /// Drive the robot through poses, capture, solve, and write a session with its exports.
+    #[command(after_help = "Example:\n  handeye auto --poses seed10 --out session --json result.json")]
+    Auto(auto::AutoArgs),
+    /// Solve a session or a dataset folder.
+    #[command(after_help = "Example:\n  handeye calibrate my_robot_images --json result.json")]
+    Calibrate(calibrate::CalibrateArgs),
+    /// Write calibration files from a solved session or a result JSON.
+    #[command(after_help = "Example:\n  handeye export session --format ros_camera_info easy_handeye2 --out files")]
+    Export(export::ExportArgs),
+}
+
+/// Options of the workbench.
+#[derive(Debug, Args, Default)]
+pub struct GuiArgs {
+    /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
+    #[arg(long, value_name = "ADDR")]
+    pub connect: Option<String>,
+    /// Session folder to open, or to create.
+    #[arg(long, value_name = "DIR")]
+    pub session: Option<std::path::PathBuf>,
+}
+
+/// Runs the program with the arguments of the process.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // `--help` and `--version` are answers, not errors; clap prints each to its proper stream.
+            let code = if error.use_stderr() { 2 } else { 0 };
+            if error.print().is_err() {
+                return ExitCode::from(1);
+            }
+            return ExitCode::from(code);
+        }
+    };
+    start_logging(cli.quiet);
+    let result = match cli.command.unwrap_or_else(|| Command::Gui(GuiArgs::default())) {
+        Command::Gui(args) => crate::gui::run(args).map_err(Failure::failed),
+        Command::Cell(args) => cell::run(&args),
+        Command::Auto(args) => auto::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
+        Command::Export(args) => export::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+/// Messages of level INFO and above to standard error, errors only with `--quiet`; `RUST_LOG` overrides.
+fn start_logging(quiet: bool) {
+    let default = if quiet { "error" } else { "warn,handeye_app=info,handeye_core=info,handeye_sim_link=info" };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .without_time()
+        .compact()
+        .init();
+}

@@ -1,0 +1,234 @@
+//! Calibration from corners.
+
+use super::{
+    CalibrateError, Calibration, CameraKnowledge, Method, MethodResult, Observations, ViewResult, ViewStatus,
+    best_start, chosen, closed_forms,
+};
+use crate::camera::Intrinsics;
+use crate::frames::{Camera, Pose, Target};
+use crate::handeye::closed_form::ClosedFormSolution;
+use crate::handeye::joint::{self, JointProblem, JointStart, camera_from_target};
+use crate::handeye::{HandEye, Mode, PosePair, quality};
+use crate::observation::View;
+use crate::progress::CancelToken;
+use crate::vision::{intrinsics, pnp};
+
+/// Least number of views with the target in sight.
+const NEED: usize = 3;
+
+pub fn calibrate(
+    observations: &Observations,
+    method: Method,
+    cancel: &CancelToken,
+) -> Result<Calibration, CalibrateError> {
+    let seen: Vec<Seen<'_>> = observations.views.iter().enumerate().filter_map(Seen::new).collect();
+    if seen.len() < NEED {
+        return Err(CalibrateError::TargetNotFound {
+            found: seen.len(),
+            images: observations.views.len(),
+            need: NEED,
+            target: observations.target.to_string(),
+        });
+    }
+    let lens = Lens::find(observations, &seen)?;
+    let mut calibration = without_hand_eye(observations, &seen, &lens);
+    let Some(mode) = observations.mode else { return Ok(calibration) };
+
+    let (views, pairs) = with_robot(mode, &seen, &lens)?;
+    calibration.methods = closed_forms(&pairs);
+    let points = observations.target.points();
+    let problem = JointProblem { mode, points: &points, views: &views, free_intrinsics: lens.free, noise: None };
+    match method {
+        Method::ClosedForm(name) => {
+            take_closed_form(&mut calibration, &chosen(&calibration.methods, name)?, &problem, &seen, &lens);
+        }
+        Method::Joint => take_joint(&mut calibration, &problem, &seen, &lens, cancel)?,
+    }
+    Ok(calibration)
+}
+
+/// A view in which the target was found.
+struct Seen<'a> {
+    /// Its index among all views.
+    index: usize,
+    view: &'a super::ObservedView,
+    corners: &'a [crate::observation::Corner],
+}
+
+impl<'a> Seen<'a> {
+    fn new((index, view): (usize, &'a super::ObservedView)) -> Option<Self> {
+        Some(Self { index, view, corners: view.corners.as_deref()? })
+    }
+}
+
+/// The camera and the target pose in every view that goes with it.
+struct Lens {
+    intrinsics: Intrinsics,
+    free: bool,
+    sigma: Option<[f64; 4]>,
+    camera_from_target: Vec<Pose<Camera, Target>>,
+    rms_px: Vec<f64>,
+}
+
+impl Lens {
+    fn find(observations: &Observations, seen: &[Seen<'_>]) -> Result<Self, CalibrateError> {
+        let (intrinsics, free, sigma) = match observations.camera {
+            CameraKnowledge::Fixed(intrinsics) => (intrinsics, false, None),
+            CameraKnowledge::Estimate { model, start } => {
+                let corners: Vec<_> = seen.iter().map(|s| s.corners).collect();
+                let found =
+                    intrinsics::calibrate(&corners, &observations.target, observations.image_size, model, start)?;
+                (found.intrinsics, true, Some(found.sigma))
+            }
+        };
+        let mut camera_from_target = Vec::with_capacity(seen.len());
+        let mut rms_px = Vec::with_capacity(seen.len());
+        for s in seen {
+            let pose = pnp::camera_from_target(s.corners, &observations.target, &intrinsics)?;
+            camera_from_target.push(pose.camera_from_target);
+            rms_px.push(pose.rms_px);
+        }
+        Ok(Self { intrinsics, free, sigma, camera_from_target, rms_px })
+    }
+}
+
+/// RMS over all corners from the RMS of each view.
+fn total_rms(per_view: impl Iterator<Item = (f64, usize)>) -> f64 {
+    let (squared, corners) = per_view.fold((0.0, 0usize), |(s, n), (rms, k)| (s + rms * rms * k as f64, n + k));
+    (squared / corners.max(1) as f64).sqrt()
+}
+
+fn without_hand_eye(observations: &Observations, seen: &[Seen<'_>], lens: &Lens) -> Calibration {
+    let mut views: Vec<ViewResult> = observations
+        .views
+        .iter()
+        .map(|v| ViewResult { name: v.name.clone(), status: ViewStatus::NoTarget, rms_px: None, influence_m: None })
+        .collect();
+    for (s, rms) in seen.iter().zip(&lens.rms_px) {
+        views[s.index].status = ViewStatus::Used;
+        views[s.index].rms_px = Some(*rms);
+    }
+    Calibration {
+        hand_eye: None,
+        hand_eye_covariance: None,
+        target_covariance: None,
+        intrinsics: Some(lens.intrinsics),
+        intrinsics_fixed: !lens.free,
+        intrinsics_sigma: lens.sigma,
+        noise: None,
+        rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(seen.iter().map(|s| s.corners.len())))),
+        heldout_rms_px: None,
+        tip_error_95_m: None,
+        reference_point: None,
+        methods: Vec::new(),
+        views,
+    }
+}
+
+/// Views and pose pairs of the robot; a view without a robot pose cannot stand in a set with a mode.
+fn with_robot(mode: Mode, seen: &[Seen<'_>], lens: &Lens) -> Result<(Vec<View>, Vec<PosePair>), CalibrateError> {
+    let mut views = Vec::with_capacity(seen.len());
+    let mut pairs = Vec::with_capacity(seen.len());
+    for (s, camera_from_target) in seen.iter().zip(&lens.camera_from_target) {
+        let Some(base_from_tip) = s.view.base_from_tip else {
+            return Err(CalibrateError::NoRobotPose { name: s.view.name.clone() });
+        };
+        views.push(View { name: s.view.name.clone(), base_from_tip, corners: s.corners.to_vec() });
+        pairs.push(PosePair {
+            anchor_from_mount: mode.anchor_from_mount(&base_from_tip),
+            camera_from_target: *camera_from_target,
+        });
+    }
+    Ok((views, pairs))
+}
+
+fn take_joint(
+    calibration: &mut Calibration,
+    problem: &JointProblem<'_>,
+    seen: &[Seen<'_>],
+    lens: &Lens,
+    cancel: &CancelToken,
+) -> Result<(), CalibrateError> {
+    let start = best_start(&calibration.methods, |s| capped_misfit(problem, lens, s))?;
+    let start = JointStart {
+        mount_from_camera: start.mount_from_camera,
+        anchor_from_target: start.anchor_from_target,
+        intrinsics: lens.intrinsics,
+    };
+    let solution = joint::estimate(problem, &start, cancel)?;
+    let from_solution = JointStart {
+        mount_from_camera: solution.hand_eye.mount_from_camera(),
+        anchor_from_target: solution.hand_eye.anchor_from_target(),
+        intrinsics: solution.intrinsics,
+    };
+    calibration.heldout_rms_px = quality::held_out_rms_px(problem, &from_solution, cancel)?;
+    calibration.hand_eye_covariance = Some(solution.hand_eye_covariance());
+    calibration.target_covariance = Some(solution.target_covariance());
+    if let Some(sigma) = solution.intrinsics_sigma().first_chunk::<4>() {
+        calibration.intrinsics_sigma = Some(*sigma);
+    }
+    calibration.tip_error_95_m = Some(quality::tip_error_95_m(&solution));
+    calibration.reference_point = Some(solution.reference_point);
+    calibration.noise = Some(solution.noise);
+    calibration.rms_px = Some(solution.rms_px);
+    calibration.intrinsics = Some(solution.intrinsics);
+    calibration.hand_eye = Some(solution.hand_eye);
+    for (s, fit) in seen.iter().zip(&solution.views) {
+        calibration.views[s.index].rms_px = Some(fit.rms_px);
+        calibration.views[s.index].influence_m = fit.influence_m;
+    }
+    Ok(())
+}
+
+/// A closed form has no correction of robot poses: its residuals are those of the bare chain.
+fn take_closed_form(
+    calibration: &mut Calibration,
+    solution: &ClosedFormSolution,
+    problem: &JointProblem<'_>,
+    seen: &[Seen<'_>],
+    lens: &Lens,
+) {
+    let mut rms = Vec::with_capacity(seen.len());
+    for (s, view) in seen.iter().zip(problem.views) {
+        let squared = squared_residuals(problem, &lens.intrinsics, solution, view, f64::INFINITY);
+        let view_rms = (squared / view.corners.len() as f64).sqrt();
+        calibration.views[s.index].rms_px = view_rms.is_finite().then_some(view_rms);
+        rms.push((view_rms, view.corners.len()));
+    }
+    let all = total_rms(rms.into_iter());
+    calibration.rms_px = all.is_finite().then_some(all);
+    calibration.hand_eye =
+        Some(HandEye::new(problem.mode, solution.mount_from_camera, solution.anchor_from_target));
+}
+
+/// Residual [px] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.
+const CAP_PX: f64 = 50.0;
+
+fn capped_misfit(problem: &JointProblem<'_>, lens: &Lens, solution: &ClosedFormSolution) -> f64 {
+    problem.views.iter().map(|view| squared_residuals(problem, &lens.intrinsics, solution, view, CAP_PX)).sum()
+}
+
+/// Sum of squared residuals of one view by the bare chain; a point without an image counts as the cap.
+fn squared_residuals(
+    problem: &JointProblem<'_>,
+    intrinsics: &Intrinsics,
+    solution: &ClosedFormSolution,
+    view: &View,
+    cap_px: f64,
+) -> f64 {
+    let chain = camera_from_target(
+        problem.mode,
+        &view.base_from_tip,
+        &solution.mount_from_camera,
+        &solution.anchor_from_target,
+    );
+    view.corners
+        .iter()
+        .map(|corner| {
+            let residual = intrinsics
+                .project(&(chain.isometry() * problem.points[corner.index]))
+                .map_or(cap_px, |px| (px - corner.px).norm());
+            residual.min(cap_px).powi(2)
+        })
+        .sum()
+}

@@ -1,0 +1,81 @@
+//! Calibration from robot and target poses alone.
+
+use super::{
+    CalibrateError, Calibration, CameraKnowledge, Method, Observations, ViewResult, ViewStatus, best_start, chosen,
+    closed_forms,
+};
+use crate::handeye::closed_form::ClosedFormSolution;
+use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, pose_graph};
+use crate::se3;
+
+pub fn calibrate(observations: &Observations, method: Method) -> Result<Calibration, CalibrateError> {
+    let mode = observations.mode.unwrap_or(Mode::EyeInHand);
+    let pairs: Vec<PosePair> = observations
+        .views
+        .iter()
+        .map(|view| match (view.base_from_tip, view.camera_from_target) {
+            (Some(base_from_tip), Some(camera_from_target)) => {
+                Ok(PosePair { anchor_from_mount: mode.anchor_from_mount(&base_from_tip), camera_from_target })
+            }
+            _ => Err(CalibrateError::NothingObserved { name: view.name.clone() }),
+        })
+        .collect::<Result<_, _>>()?;
+    let methods = closed_forms(&pairs);
+    let mut calibration = Calibration {
+        hand_eye: None,
+        hand_eye_covariance: None,
+        target_covariance: None,
+        intrinsics: match observations.camera {
+            CameraKnowledge::Fixed(intrinsics) => Some(intrinsics),
+            CameraKnowledge::Estimate { .. } => None,
+        },
+        intrinsics_fixed: true,
+        intrinsics_sigma: None,
+        noise: None,
+        rms_px: None,
+        heldout_rms_px: None,
+        tip_error_95_m: None,
+        reference_point: None,
+        methods,
+        views: observations
+            .views
+            .iter()
+            .map(|v| ViewResult { name: v.name.clone(), status: ViewStatus::Used, rms_px: None, influence_m: None })
+            .collect(),
+    };
+    let (x, y) = match method {
+        Method::ClosedForm(name) => {
+            let solution = chosen(&calibration.methods, name)?;
+            (solution.mount_from_camera, solution.anchor_from_target)
+        }
+        Method::Joint => {
+            let start = best_start(&calibration.methods, |s| misfit(&pairs, s))?;
+            let solution = pose_graph::refine(&pairs, &start)?;
+            calibration.hand_eye_covariance = Some(solution.covariance.fixed_view::<6, 6>(0, 0).into_owned());
+            calibration.target_covariance = Some(solution.covariance.fixed_view::<6, 6>(6, 6).into_owned());
+            (solution.mount_from_camera, solution.anchor_from_target)
+        }
+    };
+    if !(x.is_finite() && y.is_finite()) {
+        return Err(CalibrateError::HandEye(HandEyeError::NoSolution {
+            method: "the pose graph",
+            views: pairs.len(),
+            reason: "it diverged",
+        }));
+    }
+    calibration.hand_eye = Some(HandEye::new(mode, x, y));
+    Ok(calibration)
+}
+
+/// Sum of squared disagreements, a radian counted as a metre: enough to rank starts.
+fn misfit(pairs: &[PosePair], solution: &ClosedFormSolution) -> f64 {
+    pairs
+        .iter()
+        .map(|pair| {
+            let predicted = solution.mount_from_camera.inverse()
+                * pair.anchor_from_mount.inverse()
+                * solution.anchor_from_target;
+            se3::log((pair.camera_from_target.inverse() * predicted).isometry()).norm_squared()
+        })
+        .sum()
+}
