@@ -10,8 +10,8 @@ pub fn workspace_root() -> &'static Path {
 /// Folder of the reference data sets: `$HANDEYE_DATA`, else `../shared/data` beside the workspace. `None`, and a line
 /// that says so, when there is none.
 pub fn reference_data(test: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("HANDEYE_DATA")
-        .map_or_else(|| workspace_root().join("../shared/data"), PathBuf::from);
+    let folder =
+        std::env::var_os("HANDEYE_DATA").map_or_else(|| workspace_root().join("../shared/data"), PathBuf::from);
     if folder.is_dir() {
         return Some(folder);
     }
