@@ -3,9 +3,12 @@
 //! Conventions (frames, units, pixel origin, order of tangent vectors) are in `docs/conventions.md`.
 //! Everything here is deterministic: no clock, no thread, no hidden seed.
 
+pub mod atomic_file;
 pub mod camera;
+pub mod dataset;
 pub mod frames;
 pub mod handeye;
+pub mod image_file;
 pub mod observation;
 pub mod progress;
 pub mod se3;
