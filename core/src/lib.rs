@@ -4,6 +4,8 @@
 //! Everything here is deterministic: no clock, no thread, no hidden seed.
 
 pub mod atomic_file;
+#[cfg(feature = "opencv")]
+mod calibrate_off {}
 pub mod camera;
 pub mod dataset;
 pub mod frames;
@@ -13,5 +15,8 @@ pub mod observation;
 pub mod progress;
 pub mod se3;
 pub mod target;
+
+#[cfg(feature = "opencv")]
+pub mod vision;
 
 pub use image;
