@@ -12,6 +12,7 @@
 //! `anchor_from_mount_i * mount_from_camera * camera_from_target_i = anchor_from_target` for every view `i`.
 
 pub mod closed_form;
+pub mod motion;
 
 use serde::{Deserialize, Serialize};
 
