@@ -5,7 +5,7 @@
 
 pub mod atomic_file;
 #[cfg(feature = "opencv")]
-mod calibrate_off {}
+pub mod calibrate;
 pub mod camera;
 pub mod dataset;
 pub mod frames;

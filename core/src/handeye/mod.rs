@@ -13,6 +13,7 @@
 
 pub mod closed_form;
 pub mod joint;
+pub mod motion;
 pub mod pose_graph;
 pub mod quality;
 
