@@ -121,7 +121,7 @@ proptest! {
         // Beside a singularity two branches are as near as the nudge; there is nothing to choose between them.
         prop_assume!(jacobian(&joints).determinant().abs() > 1e-3);
         let goal = forward(&joints).arm_from_connection;
-        let seed: JointAngles = std::array::from_fn(|i| (joints[i] + nudge[i]).clamp(-TAU, TAU));
+        let seed: JointAngles = std::array::from_fn(|i| f64::clamp(joints[i] + nudge[i], -TAU, TAU));
         let found = inverse_nearest(&goal, &seed, &JointLimits::default())?;
         for (a, b) in found.iter().zip(&joints) {
             prop_assert!((a - b).abs() < 1e-9, "{found:?} is not {joints:?}");
@@ -149,10 +149,10 @@ proptest! {
     fn damped_least_squares_stops_within_its_precision(
         joints in any_joints(), nudge in proptest::array::uniform6(-0.05..0.05),
     ) {
-        prop_assume!(jacobian(&joints).determinant().abs() > 1e-2);
+        prop_assume!(jacobian(&joints).determinant().abs() > 3e-3);
         let tool = Isometry3::translation(0.0, 0.0, 0.017);
         let goal = forward(&joints).arm_from_connection * tool;
-        let seed: JointAngles = std::array::from_fn(|i| (joints[i] + nudge[i]).clamp(-TAU, TAU));
+        let seed: JointAngles = std::array::from_fn(|i| f64::clamp(joints[i] + nudge[i], -TAU, TAU));
         let options = DlsOptions::default();
         let found = damped_least_squares(&goal, &tool, &seed, &options, &JointLimits::default());
         prop_assert!(found.is_some());
@@ -256,7 +256,9 @@ fn a_joint_range_of_its_own_is_filled_by_a_full_turn() {
     let goal = forward(&joints).arm_from_connection;
     let mut limits = JointLimits::default();
     (limits.min_rad[5], limits.max_rad[5]) = (0.0, 2.0 * TAU);
-    let found = inverse_nearest(&goal, &joints, &limits).unwrap();
+    let mut seed = joints;
+    seed[5] = 5.0;
+    let found = inverse_nearest(&goal, &seed, &limits).unwrap();
     assert!((found[5] - (TAU - 0.7)).abs() < 1e-9, "{found:?}");
 }
 
