@@ -2,6 +2,7 @@ use super::*;
 use crate::cell::kinematics::inverse::{pose_error, wrap};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Rounding of a chain of a dozen products of numbers around one.
@@ -94,7 +95,7 @@ fn the_start_configuration_agrees_with_a_product_of_exponentials() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2000, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]
     fn every_branch_reaches_the_pose_and_one_is_the_way_it_was_made(joints in any_joints()) {
