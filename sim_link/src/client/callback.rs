@@ -2,8 +2,9 @@
 
 use ciborium::Value;
 
-use super::connection::{CallOptions, Connection};
+use super::connection::Connection;
 use super::error::LinkError;
+use super::options::CallOptions;
 use super::returned::Returned;
 
 /// A registered closure.

@@ -9,6 +9,7 @@ use super::callback::{Callback, CallbackName, CallbackScope};
 use super::cancel::CancelToken;
 use super::endpoint::Endpoint;
 use super::error::LinkError;
+use super::options::{CallOptions, ConnectionOptions};
 use super::protocol::{
     self, CALLBACK_SUFFIX, ClientIds, END, EXECUTED, Introduction, ProtocolVersion, REPEAT, ReplyError, ServerMessage,
     WAIT,
@@ -18,65 +19,6 @@ use super::transport::{Transport, TransportFault, ZmqTransport};
 
 /// Longest stretch of waiting without a look at the cancel token.
 const SLICE: Duration = Duration::from_millis(20);
-
-/// Deepest nesting of calls inside callbacks inside calls; a real script needs one or two.
-const MAX_DEPTH: u32 = 16;
-
-/// How a connection behaves unless a call says otherwise.
-#[derive(Debug, Clone)]
-pub struct ConnectionOptions {
-    /// Longest silence of the server within a call.
-    pub reply_timeout: Duration,
-    /// Longest duration of a whole call, however lively the server is.
-    pub total_timeout: Duration,
-    /// A host that has been silent for so long counts as gone, even if its connection was never closed; `None` relies
-    /// on the connection alone.
-    pub heartbeat: Option<Duration>,
-    /// After so many seconds without a message the server may forget this client, with its stepping mode and locks: it
-    /// bounds how long a client that crashed can hold the simulation.
-    pub idle_timeout_s: u32,
-    /// Seed of the client ids; `None` draws them from the system. Two clients of one server must not share a seed.
-    pub seed: Option<u64>,
-    /// Ends every wait of this connection, for the end of the program.
-    pub shutdown: CancelToken,
-}
-
-impl Default for ConnectionOptions {
-    fn default() -> Self {
-        Self {
-            reply_timeout: Duration::from_secs(5),
-            total_timeout: Duration::from_secs(60),
-            heartbeat: Some(Duration::from_millis(1500)),
-            idle_timeout_s: 60,
-            seed: None,
-            shutdown: CancelToken::new(),
-        }
-    }
-}
-
-/// Limits of one call.
-#[derive(Debug, Clone, Default)]
-pub struct CallOptions {
-    /// Longest silence of the server; `None` takes the connection's.
-    pub reply_timeout: Option<Duration>,
-    /// Longest duration of the call; `None` takes the connection's.
-    pub total_timeout: Option<Duration>,
-    /// Ends the wait within 50 ms when raised.
-    pub cancel: Option<CancelToken>,
-}
-
-impl CallOptions {
-    /// For a call that may take `total`, in silence: a server that defers its reply says nothing until it is done.
-    /// That it is alive is watched by the connection itself.
-    pub fn long(total: Duration, cancel: &CancelToken) -> Self {
-        Self { reply_timeout: Some(total), total_timeout: Some(total), cancel: Some(cancel.clone()) }
-    }
-
-    /// The usual limits, and a cancel token.
-    pub fn cancelled_by(cancel: &CancelToken) -> Self {
-        Self { cancel: Some(cancel.clone()), ..Self::default() }
-    }
-}
 
 /// A client of one server. Belongs to one thread at a time: it can be sent to another, not shared.
 ///
@@ -218,6 +160,7 @@ impl Connection {
 
     /// Has the server forget this client, its stepping mode and its locks, and goes on as a new one.
     pub fn renew(&mut self) {
+        self.contacted |= self.transport.connected();
         if self.version != Some(ProtocolVersion::V1) && self.contacted {
             let farewell = protocol::request(END, Vec::new(), &self.uuid, None);
             self.transport.send_last(&farewell);
@@ -230,9 +173,6 @@ impl Connection {
     }
 
     fn converse(&mut self, exchange: &mut Exchange<'_>, args: Vec<Value>) -> Result<Vec<Value>, LinkError> {
-        if self.depth >= MAX_DEPTH {
-            return Err(self.unexpected(exchange, "callbacks that end", format!("{MAX_DEPTH} levels of them")));
-        }
         let mut callback_error = None;
         // Kept for a server that turns out to speak the other version by now.
         let mut retry = (self.version == Some(ProtocolVersion::V1)).then(|| args.clone());
@@ -285,7 +225,11 @@ impl Connection {
         loop {
             self.check_limits(exchange, true)?;
             let waited = sent.elapsed();
-            let Some(left) = exchange.reply_timeout.checked_sub(waited).filter(|left| !left.is_zero()) else {
+            // A call may be allowed a long silence, but that is of a server, not of nobody.
+            let connected = self.transport.connected();
+            let limit =
+                if connected { exchange.reply_timeout } else { exchange.reply_timeout.min(self.options.reply_timeout) };
+            let Some(left) = limit.checked_sub(waited).filter(|left| !left.is_zero()) else {
                 let late = self.late(exchange, waited);
                 return Err(self.give_up(exchange, late));
             };
@@ -338,7 +282,8 @@ impl Connection {
         args: &[Value],
         first_error: &mut Option<LinkError>,
     ) -> Result<Vec<Value>, LinkError> {
-        // Out of the map while it runs, so that it can be given the connection.
+        // Out of the map while it runs, so that it can be given the connection. It cannot be entered again meanwhile,
+        // which also bounds the nesting.
         let Some(mut callback) = self.callbacks.remove(name) else {
             tracing::debug!(callback = name, "the server asked for a callback that is not here, or runs already");
             return Ok(Vec::new());

@@ -15,6 +15,7 @@ pub mod constants;
 pub mod convert;
 mod endpoint;
 mod error;
+mod options;
 mod protocol;
 mod returned;
 mod sim;
@@ -24,9 +25,10 @@ mod transport;
 
 pub use callback::{CallbackName, CallbackScope};
 pub use cancel::CancelToken;
-pub use connection::{CallOptions, Connection, ConnectionOptions};
+pub use connection::Connection;
 pub use endpoint::{DEFAULT_PORT, Endpoint};
 pub use error::LinkError;
+pub use options::{CallOptions, ConnectionOptions};
 pub use protocol::ProtocolVersion;
 pub use returned::Returned;
 pub use sim::{

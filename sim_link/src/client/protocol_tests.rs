@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::wire::Reader;
 
 const UUID: &str = "c06b3832-5008-4cbb-b372-46ff92cacfe5";
 /// The `uuid` entry of every recorded request.
@@ -71,7 +72,8 @@ fn a_pose_goes_out_with_the_numbers_and_the_order_that_were_recorded() {
     let pose = wire::floats([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
     let ours = request("sim.setObjectPose", vec![Value::from(45), Value::from(-1), pose], UUID, None);
     let ours = wire::decode(&ours).expect("valid");
-    let (ours, recorded) = (ours.get("args").and_then(Value::as_array).expect("args"), recorded.as_array().expect("args"));
+    let (ours, recorded) =
+        (ours.get("args").and_then(Value::as_array).expect("args"), recorded.as_array().expect("args"));
     assert_eq!(ours[..2], recorded[..2]);
     assert_eq!(ours[2].numbers(), recorded[2].numbers());
 }
@@ -105,7 +107,7 @@ fn the_recorded_info_map_is_read() {
     let info = returned(
         "a1 63726574 81 a2 69 6765744f626a656374 a1 64 66756e63 a0 6c 68616e646c655f776f726c64 a1 65 636f6e7374 20",
     );
-    assert_eq!(info[0].get("handle_world").and_then(|c| c.get("const")).and_then(|c| c.integer()), Some(-1));
+    assert_eq!(info[0].get("handle_world").and_then(|c| c.get("const")).and_then(Reader::integer), Some(-1));
 }
 
 #[test]

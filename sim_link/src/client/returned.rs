@@ -4,7 +4,7 @@ use ciborium::Value;
 
 use super::convert::{self, ConvertError};
 use super::error::LinkError;
-use crate::wire::{self, Reader as _};
+use crate::wire::{self, Reader};
 use handeye_core::frames::Pose;
 
 /// The values that a call returned, in order.
@@ -34,7 +34,7 @@ impl Returned {
     /// # Errors
     /// [`LinkError::UnexpectedReply`], as for all readers here, when it cannot be read so.
     pub fn number(&self, index: usize) -> Result<f64, LinkError> {
-        self.read(index, "a number", |value| value.number())
+        self.read(index, "a number", Reader::number)
     }
 
     /// An integer at `index`.
@@ -42,7 +42,7 @@ impl Returned {
     /// # Errors
     /// As [`Self::number`].
     pub fn integer(&self, index: usize) -> Result<i64, LinkError> {
-        self.read(index, "an integer", |value| value.integer())
+        self.read(index, "an integer", Reader::integer)
     }
 
     /// A boolean at `index`; a number counts as true unless it is zero.
@@ -74,7 +74,7 @@ impl Returned {
     /// # Errors
     /// As [`Self::number`].
     pub fn numbers(&self, index: usize) -> Result<Vec<f64>, LinkError> {
-        self.read(index, "an array of numbers", |value| value.numbers())
+        self.read(index, "an array of numbers", Reader::numbers)
     }
 
     /// An array of `N` numbers at `index`.

@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use ciborium::Value;
 
-use super::connection::{Connection, ConnectionOptions};
+use super::connection::Connection;
 use super::endpoint::Endpoint;
+use super::options::ConnectionOptions;
 use super::transport::{Transport, TransportFault};
 use crate::wire::{self, Reader as _};
 
@@ -83,7 +84,8 @@ impl Transport for Fake {
         Ok(())
     }
 
-    fn receive(&mut self, _wait: Duration) -> Result<Option<Vec<u8>>, TransportFault> {
+    fn receive(&mut self, wait: Duration) -> Result<Option<Vec<u8>>, TransportFault> {
+        assert!(wait <= Duration::from_millis(50), "nobody looks at the cancel token for {wait:?}");
         match self.pending.take().expect("nothing is received before something is sent") {
             Answer::Say(value) => Ok(Some(wire::encode(&value))),
             Answer::Raw(bytes) => Ok(Some(bytes)),

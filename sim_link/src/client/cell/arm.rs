@@ -7,12 +7,12 @@ use handeye_core::frames::{Base, Pose, Tip};
 
 use super::{CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles, require_running};
 use crate::client::cancel::CancelToken;
-use crate::client::connection::CallOptions;
 use crate::client::error::LinkError;
+use crate::client::options::CallOptions;
 use crate::client::sim::{JointMotion, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, Sim};
 
 /// Longest motion, in real time. The slowest sensible one takes a minute; a simulation may run slower than real time.
-const LONGEST_MOTION: Duration = Duration::from_secs(600);
+const LONGEST_MOTION: Duration = Duration::from_mins(10);
 
 /// Passes in a row that have to be at rest: one alone may be the turning point of an oscillation.
 const RESTING_PASSES: u32 = 3;

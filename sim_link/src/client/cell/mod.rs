@@ -28,9 +28,9 @@ pub use camera::{CameraFeed, Frame};
 pub use truth::{GroundTruth, PublishedTruth, TRUTH_NAME};
 
 use super::cancel::CancelToken;
-use super::connection::ConnectionOptions;
 use super::endpoint::Endpoint;
 use super::error::LinkError;
+use super::options::ConnectionOptions;
 use super::protocol::ProtocolVersion;
 use super::sim::{JointInterval, MotionLimits, ObjectHandle, SensorOptics, Sim, SimulationState};
 

@@ -3,11 +3,11 @@
 use ciborium::Value;
 
 use super::Sim;
-use crate::client::connection::CallOptions;
 use crate::client::constants::{
     INT_IDLE_FPS, INT_PROGRAM_VERSION, SIMULATION_ADVANCING, SIMULATION_PAUSED, SIMULATION_STOPPED,
 };
 use crate::client::error::LinkError;
+use crate::client::options::CallOptions;
 use crate::client::protocol::ProtocolVersion;
 
 /// Whether time advances.

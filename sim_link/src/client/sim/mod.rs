@@ -14,10 +14,11 @@ pub use control::SimulationState;
 pub use motion::{JointMotion, MotionLimits, MotionState, MotionStatus, PoseMotion};
 pub use sensors::SensorOptics;
 
-use super::connection::{CallOptions, Connection, ConnectionOptions};
+use super::connection::Connection;
 use super::constants;
 use super::endpoint::Endpoint;
 use super::error::LinkError;
+use super::options::{CallOptions, ConnectionOptions};
 use super::returned::Returned;
 
 /// An object of the scene, as the simulator numbers it.

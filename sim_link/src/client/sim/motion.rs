@@ -4,10 +4,10 @@ use ciborium::Value;
 use handeye_core::frames::{Base, Pose, Tip};
 
 use super::{ObjectHandle, Sim};
-use crate::client::connection::CallOptions;
 use crate::client::constants::{MOTION_DONE, MOTION_RUNNING};
 use crate::client::convert::seven_from_pose;
 use crate::client::error::LinkError;
+use crate::client::options::CallOptions;
 use crate::client::protocol::ProtocolVersion;
 use crate::wire;
 
