@@ -1,8 +1,8 @@
 //! Calibration from corners.
 
 use super::{
-    CalibrateError, Calibration, CameraKnowledge, Method, MethodResult, Observations, ViewResult, ViewStatus,
-    best_start, chosen, closed_forms,
+    CalibrateError, Calibration, CameraKnowledge, Method, Observations, ViewResult, ViewStatus, best_start,
+    check_motion, chosen, closed_forms,
 };
 use crate::camera::Intrinsics;
 use crate::frames::{Camera, Pose, Target};
@@ -35,12 +35,14 @@ pub fn calibrate(
     let Some(mode) = observations.mode else { return Ok(calibration) };
 
     let (views, pairs) = with_robot(mode, &seen, &lens)?;
+    check_motion(&pairs)?;
     calibration.methods = closed_forms(&pairs);
     let points = observations.target.points();
     let problem = JointProblem { mode, points: &points, views: &views, free_intrinsics: lens.free, noise: None };
     match method {
         Method::ClosedForm(name) => {
-            take_closed_form(&mut calibration, &chosen(&calibration.methods, name)?, &problem, &seen, &lens);
+            let solution = chosen(&calibration.methods, name)?;
+            take_closed_form(&mut calibration, &solution, &problem, &seen, &lens);
         }
         Method::Joint => take_joint(&mut calibration, &problem, &seen, &lens, cancel)?,
     }
@@ -78,7 +80,7 @@ impl Lens {
                 let corners: Vec<_> = seen.iter().map(|s| s.corners).collect();
                 let found =
                     intrinsics::calibrate(&corners, &observations.target, observations.image_size, model, start)?;
-                (found.intrinsics, true, Some(found.sigma))
+                (found.intrinsics, true, found.sigma)
             }
         };
         let mut camera_from_target = Vec::with_capacity(seen.len());
@@ -197,8 +199,7 @@ fn take_closed_form(
     }
     let all = total_rms(rms.into_iter());
     calibration.rms_px = all.is_finite().then_some(all);
-    calibration.hand_eye =
-        Some(HandEye::new(problem.mode, solution.mount_from_camera, solution.anchor_from_target));
+    calibration.hand_eye = Some(HandEye::new(problem.mode, solution.mount_from_camera, solution.anchor_from_target));
 }
 
 /// Residual [px] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.

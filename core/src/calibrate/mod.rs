@@ -198,19 +198,15 @@ pub fn calibrate(
     method: Method,
     cancel: &CancelToken,
 ) -> Result<Calibration, CalibrateError> {
-    if let Some(mode) = observations.mode {
-        let poses: Vec<_> = observations
-            .views
-            .iter()
-            .filter(|v| v.corners.is_some() || v.camera_from_target.is_some())
-            .filter_map(|v| v.base_from_tip.map(|p| mode.anchor_from_mount(&p)))
-            .collect();
-        // Before anything is solved: a robot that never turned is better named than a singular matrix.
-        motion::analyse(&poses)?;
-    }
     let only_poses = observations.views.iter().all(|v| v.corners.is_none())
         && observations.views.iter().any(|v| v.camera_from_target.is_some());
     if only_poses { pairs::calibrate(observations, method) } else { corners::calibrate(observations, method, cancel) }
+}
+
+/// A robot that never turned is better named than a singular matrix.
+fn check_motion(pairs: &[PosePair]) -> Result<(), HandEyeError> {
+    let poses: Vec<_> = pairs.iter().map(|pair| pair.anchor_from_mount).collect();
+    motion::analyse(&poses).map(drop)
 }
 
 /// Runs every closed form.

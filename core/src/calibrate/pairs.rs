@@ -1,8 +1,8 @@
 //! Calibration from robot and target poses alone.
 
 use super::{
-    CalibrateError, Calibration, CameraKnowledge, Method, Observations, ViewResult, ViewStatus, best_start, chosen,
-    closed_forms,
+    CalibrateError, Calibration, CameraKnowledge, Method, Observations, ViewResult, ViewStatus, best_start,
+    check_motion, chosen, closed_forms,
 };
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, pose_graph};
@@ -20,6 +20,7 @@ pub fn calibrate(observations: &Observations, method: Method) -> Result<Calibrat
             _ => Err(CalibrateError::NothingObserved { name: view.name.clone() }),
         })
         .collect::<Result<_, _>>()?;
+    check_motion(&pairs)?;
     let methods = closed_forms(&pairs);
     let mut calibration = Calibration {
         hand_eye: None,
@@ -72,9 +73,8 @@ fn misfit(pairs: &[PosePair], solution: &ClosedFormSolution) -> f64 {
     pairs
         .iter()
         .map(|pair| {
-            let predicted = solution.mount_from_camera.inverse()
-                * pair.anchor_from_mount.inverse()
-                * solution.anchor_from_target;
+            let predicted =
+                solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
             se3::log((pair.camera_from_target.inverse() * predicted).isometry()).norm_squared()
         })
         .sum()
