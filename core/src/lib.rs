@@ -6,10 +6,13 @@
 pub mod atomic_file;
 pub mod camera;
 pub mod dataset;
+pub mod export;
 pub mod frames;
 pub mod handeye;
 pub mod image_file;
+mod json_text;
 pub mod observation;
+pub mod result;
 pub mod se3;
 pub mod target;
 
