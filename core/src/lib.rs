@@ -8,11 +8,14 @@ pub mod atomic_file;
 pub mod calibrate;
 pub mod camera;
 pub mod dataset;
+pub mod export;
 pub mod frames;
 pub mod handeye;
 pub mod image_file;
+mod json_text;
 pub mod observation;
 pub mod progress;
+pub mod result;
 pub mod se3;
 pub mod target;
 
