@@ -1,3 +1,5 @@
 //! The Handeye Workbench: a window and a command line over [`handeye_core`] and [`handeye_sim_link`].
 
 pub mod cli;
+pub mod observe;
+pub mod parallel;

@@ -5,6 +5,7 @@
 
 mod corners;
 mod pairs;
+mod to_result;
 
 use nalgebra::{Matrix6, Point3};
 

@@ -1,0 +1,166 @@
+//! The result as a page of text for a person.
+
+use std::fmt::Write as _;
+
+use handeye_core::handeye::Mode;
+use handeye_core::result::{CalibrationResult, MethodStatus, TransformEstimate, ViewStatus};
+
+/// The report. It ends with a newline.
+pub fn text(result: &CalibrationResult) -> String {
+    let mut out = String::new();
+    headline(&mut out, result);
+    if let Some(hand_eye) = &result.hand_eye {
+        transform(&mut out, hand_eye);
+    }
+    if let Some(target) = &result.target {
+        transform(&mut out, target);
+    }
+    camera(&mut out, result);
+    fit(&mut out, result);
+    truth(&mut out, result);
+    methods(&mut out, result);
+    views(&mut out, result);
+    out
+}
+
+/// Writing into a `String` cannot fail.
+macro_rules! line {
+    ($out:expr, $($arg:tt)*) => {{
+        let _infallible = writeln!($out, $($arg)*);
+    }};
+}
+
+fn headline(out: &mut String, result: &CalibrationResult) {
+    let what = match result.mode {
+        Some(Mode::EyeInHand) => "Hand-eye calibration, camera on the tip",
+        Some(Mode::EyeToHand) => "Hand-eye calibration, camera beside the robot",
+        None => "Intrinsic calibration, no robot poses",
+    };
+    line!(out, "{what}");
+    match result.quality.tip_error_95_mm {
+        Some(error) => {
+            line!(
+                out,
+                "  expected error of a measured point: below {error:.3} mm in 95 % of cases, where the target was seen"
+            );
+        }
+        None if result.mode.is_some() => line!(out, "  expected error: not known for this method"),
+        None => {}
+    }
+}
+
+fn transform(out: &mut String, t: &TransformEstimate) {
+    let [x, y, z] = t.translation_m.map(|v| v * 1e3);
+    let [qx, qy, qz, qw] = t.rotation_xyzw;
+    line!(out, "{}_from_{}", t.parent_frame, t.child_frame);
+    match t.covariance {
+        Some(c) => {
+            let sigma: Vec<f64> = (0..6).map(|i| c[i][i].max(0.0).sqrt()).collect();
+            line!(
+                out,
+                "  t  [{x:.3} {y:.3} {z:.3}] mm, standard deviation [{:.3} {:.3} {:.3}] mm",
+                sigma[0] * 1e3,
+                sigma[1] * 1e3,
+                sigma[2] * 1e3
+            );
+            line!(
+                out,
+                "  q  [{qx:.6} {qy:.6} {qz:.6} {qw:.6}] xyzw, standard deviation [{:.4} {:.4} {:.4}]°",
+                sigma[3].to_degrees(),
+                sigma[4].to_degrees(),
+                sigma[5].to_degrees()
+            );
+        }
+        None => {
+            line!(out, "  t  [{x:.3} {y:.3} {z:.3}] mm");
+            line!(out, "  q  [{qx:.6} {qy:.6} {qz:.6} {qw:.6}] xyzw");
+        }
+    }
+}
+
+fn camera(out: &mut String, result: &CalibrationResult) {
+    let Some(i) = &result.intrinsics else { return };
+    let how = if i.fixed { "given" } else { "estimated" };
+    line!(out, "camera {}×{}, {}, {how}", i.width, i.height, i.model);
+    let with_sigma = |value: f64, sigma: Option<f64>| match sigma {
+        Some(sigma) => format!("{value:.3} ± {sigma:.3}"),
+        None => format!("{value:.3}"),
+    };
+    line!(
+        out,
+        "  fx {}  fy {}  cx {}  cy {} px{}",
+        with_sigma(i.fx, i.sigma.fx),
+        with_sigma(i.fy, i.sigma.fy),
+        with_sigma(i.cx, i.sigma.cx),
+        with_sigma(i.cy, i.sigma.cy),
+        if i.sigma.fx.is_some() { " (± one standard deviation)" } else { "" }
+    );
+    if !i.distortion.is_empty() {
+        let k: Vec<String> = i.distortion.iter().map(|k| format!("{k:.6}")).collect();
+        line!(out, "  distortion [{}]", k.join(" "));
+    }
+}
+
+fn fit(out: &mut String, result: &CalibrationResult) {
+    let q = &result.quality;
+    let mut parts = Vec::new();
+    if let Some(rms) = q.rms_px {
+        parts.push(format!("residual {rms:.4} px RMS"));
+    }
+    if let Some(rms) = q.heldout_rms_px {
+        parts.push(format!("{rms:.4} px on views held out"));
+    }
+    if let Some(sigma) = q.sigma_px {
+        parts.push(format!("corner noise {sigma:.4} px per axis"));
+    }
+    if let (Some(mm), Some(deg)) = (q.robot_sigma_mm, q.robot_sigma_deg) {
+        parts.push(format!("robot noise {mm:.4} mm and {deg:.4}° per axis"));
+    }
+    if !parts.is_empty() {
+        line!(out, "fit: {}", parts.join(", "));
+    }
+}
+
+fn truth(out: &mut String, result: &CalibrationResult) {
+    let Some(truth) = &result.truth else { return };
+    let show = |value: Option<f64>, unit: &str| value.map_or_else(|| "unknown".to_owned(), |v| format!("{v:.4}{unit}"));
+    line!(
+        out,
+        "against the truth of the cell: translation {}, rotation {}, focal length {}",
+        show(truth.translation_error_mm, " mm"),
+        show(truth.rotation_error_deg, "°"),
+        show(truth.focal_error_percent, " %")
+    );
+}
+
+fn methods(out: &mut String, result: &CalibrationResult) {
+    if result.methods.is_empty() {
+        return;
+    }
+    line!(out, "closed forms, for comparison");
+    for m in &result.methods {
+        match (&m.status, m.translation_m) {
+            (MethodStatus::Ok, Some(t)) => {
+                let [x, y, z] = t.map(|v| v * 1e3);
+                line!(out, "  {:<12} [{x:9.3} {y:9.3} {z:9.3}] mm", m.name);
+            }
+            (MethodStatus::Failed(why), _) => line!(out, "  {:<12} {why}", m.name),
+            (MethodStatus::Ok, None) => {}
+        }
+    }
+}
+
+fn views(out: &mut String, result: &CalibrationResult) {
+    line!(out, "views");
+    for view in &result.views {
+        let status = match view.status {
+            ViewStatus::Used => "used",
+            ViewStatus::Excluded => "excluded",
+            ViewStatus::Outlier => "outlier",
+            ViewStatus::NoTarget => "target not found",
+        };
+        let rms = view.rms_px.map_or_else(String::new, |v| format!("  {v:.4} px"));
+        let influence = view.influence_mm.map_or_else(String::new, |v| format!("  influence {v:.3} mm"));
+        line!(out, "  {:<24} {status}{rms}{influence}", view.name);
+    }
+}
