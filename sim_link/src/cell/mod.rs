@@ -5,3 +5,4 @@ pub mod motion;
 pub mod render;
 pub mod scene;
 pub mod server;
+pub mod world;
