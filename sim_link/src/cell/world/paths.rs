@@ -77,11 +77,13 @@ impl Search<'_> {
             if !matches_wildcards(&segment.pattern, &object.alias) {
                 continue;
             }
-            let position = std::mem::replace(&mut on_this_level, on_this_level + 1);
+            let position = on_this_level;
+            on_this_level += 1;
             if segment.on_level.is_some_and(|wanted| wanted != position) {
                 continue;
             }
-            let order = std::mem::replace(seen, *seen + 1);
+            let order = *seen;
+            *seen += 1;
             if segment.in_order.is_some_and(|wanted| wanted != order) {
                 continue;
             }
