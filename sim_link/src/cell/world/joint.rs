@@ -19,8 +19,6 @@ pub struct Joint {
     min_rad: f64,
     max_rad: f64,
     position_rad: f64,
-    /// Angle that the joint really has beyond the one it reports.
-    pub error_rad: f64,
     target_rad: f64,
     limits: DriveLimits,
     drive: Option<JointMotion>,
@@ -35,7 +33,6 @@ impl Joint {
             min_rad,
             max_rad,
             position_rad,
-            error_rad: 0.0,
             target_rad: position_rad,
             limits: DEFAULT_LIMITS,
             drive: None,

@@ -20,14 +20,12 @@ pub use joint::{DriveLimits, Joint};
 pub use poses::Flagged;
 pub use sensor::{Moment, Shown, VisionSensor};
 pub use simulation::{Simulation, State};
-pub use tree::{Chain, Handle, Kind, Object, Tree};
+pub use tree::{Chain, Handle, Kind, Object, Tree, turn_z};
 
-/// What the sensing phase of a pass asks of the robot: angles that its joints really have beyond the reported ones.
-///
-/// It is called with the reported angles of the joints it was registered for, once per pass, after they have moved.
-pub trait JointErrors: std::fmt::Debug + Send {
-    /// The errors in radians, in the order of `reported_rad`; missing ones count as zero.
-    fn errors_rad(&mut self, reported_rad: &[f64]) -> Vec<f64>;
+/// The faults of a robot: how it really stands, given how it believes to stand.
+pub trait Faults: std::fmt::Debug + Send {
+    /// Sets the displacements of the objects. Called once per pass, after the joints have moved.
+    fn apply(&mut self, tree: &mut Tree);
 }
 
 /// The object tree with its simulation.
@@ -38,15 +36,15 @@ pub struct World {
     simulation: Simulation,
     /// Passes over the life of the world.
     pass: u64,
-    errors: Option<(Vec<Handle>, Box<dyn JointErrors>)>,
+    faults: Option<Box<dyn Faults>>,
     latest: Option<Arc<Moment>>,
 }
 
 impl World {
-    /// Gives some joints errors that only the cameras see.
-    pub fn set_joint_errors(&mut self, joints: Vec<Handle>, errors: Box<dyn JointErrors>) {
-        self.errors = Some((joints, errors));
-        self.apply_joint_errors();
+    /// Gives the robot faults that only the cameras see.
+    pub fn set_faults(&mut self, faults: Box<dyn Faults>) {
+        self.faults = Some(faults);
+        self.apply_faults();
     }
 
     /// The simulation's state and time.
@@ -90,7 +88,7 @@ impl World {
             }
         }
         self.pass += 1;
-        self.apply_joint_errors();
+        self.apply_faults();
         let shown = self.look();
         for (_, object) in self.tree.iter_mut() {
             if let Kind::VisionSensor(sensor) = &mut object.kind
@@ -101,7 +99,7 @@ impl World {
         }
         if self.simulation.end_pass() {
             self.simulation.restore(&mut self.tree);
-            self.apply_joint_errors();
+            self.apply_faults();
             for (_, object) in self.tree.iter_mut() {
                 if let Kind::VisionSensor(sensor) = &mut object.kind {
                     sensor.shown = None;
@@ -148,15 +146,9 @@ impl World {
         Shown { pass: self.pass, moment }
     }
 
-    fn apply_joint_errors(&mut self) {
-        let Some((joints, errors)) = &mut self.errors else { return };
-        let reported: Vec<f64> =
-            joints.iter().map(|&handle| self.tree.joint(handle).map_or(0.0, Joint::position_rad)).collect();
-        let errors = errors.errors_rad(&reported);
-        for (&handle, error_rad) in joints.iter().zip(errors) {
-            if let Ok(joint) = self.tree.joint_mut(handle) {
-                joint.error_rad = error_rad;
-            }
+    fn apply_faults(&mut self) {
+        if let Some(faults) = &mut self.faults {
+            faults.apply(&mut self.tree);
         }
     }
 }

@@ -114,18 +114,18 @@ fn explicitly_handled_sensors_wait_for_the_request() {
 }
 
 #[derive(Debug)]
-struct Bent;
+struct Bent(Handle);
 
-impl JointErrors for Bent {
-    fn errors_rad(&mut self, _reported_rad: &[f64]) -> Vec<f64> {
-        vec![0.1]
+impl Faults for Bent {
+    fn apply(&mut self, tree: &mut Tree) {
+        tree.get_mut(self.0).expect("exists").displacement = turn_z(0.1);
     }
 }
 
 #[test]
-fn cameras_see_the_robot_with_its_errors_and_clients_without() {
+fn cameras_see_the_robot_with_its_faults_and_clients_without() {
     let (mut world, joint, sensor) = world();
-    world.set_joint_errors(vec![joint], Box::new(Bent));
+    world.set_faults(Box::new(Bent(joint)));
     world.start_simulation();
     world.run_pass();
     let shown = world.tree.sensor(sensor).expect("sensor").shown().cloned().expect("a pass was run");

@@ -25,7 +25,7 @@ pub const MAX_DEPTH: usize = 128;
 pub enum Chain {
     /// The robot as its controller believes it to be: encoder angles through the nominal geometry.
     Reported,
-    /// The robot as it stands: with joint offsets and positioning noise. Cameras and boards live here.
+    /// The robot as it stands: with joint offsets and positioning noise. This is what cameras see.
     Actual,
 }
 
@@ -73,6 +73,8 @@ pub struct Object {
     children: Vec<Handle>,
     /// Pose in the parent's frame; in the frame that moves, if the parent is a joint.
     pub(super) local: Isometry3<f64>,
+    /// Where it really is in the frame that it reports: what [`Chain::Actual`] adds.
+    pub displacement: Isometry3<f64>,
 }
 
 impl Object {
@@ -131,7 +133,15 @@ impl Tree {
         let alias = alias.to_owned();
         self.objects.insert(
             handle,
-            Object { alias, kind, model_base: false, parent, children: Vec::new(), local: parent_from_object },
+            Object {
+                alias,
+                kind,
+                model_base: false,
+                parent,
+                children: Vec::new(),
+                local: parent_from_object,
+                displacement: Isometry3::identity(),
+            },
         );
         self.siblings_mut(parent).push(handle);
         Ok(handle)
@@ -264,11 +274,11 @@ impl Tree {
     /// [`WorldError::NoSuchObject`].
     pub fn world_pose(&self, handle: Handle, chain: Chain) -> Result<Isometry3<f64>, WorldError> {
         let object = self.get(handle)?;
-        let mut pose = object.local;
+        let mut pose = placed(object, chain);
         let mut above = object.parent;
         while let Some(parent) = above {
             let object = self.get(parent)?;
-            pose = object.local * turn(object, chain) * pose;
+            pose = placed(object, chain) * turn(object) * pose;
             above = object.parent;
         }
         Ok(pose)
@@ -279,7 +289,7 @@ impl Tree {
     /// # Errors
     /// [`WorldError::NoSuchObject`].
     pub fn moving_pose(&self, handle: Handle, chain: Chain) -> Result<Isometry3<f64>, WorldError> {
-        Ok(self.world_pose(handle, chain)? * turn(self.get(handle)?, chain))
+        Ok(self.world_pose(handle, chain)? * turn(self.get(handle)?))
     }
 
     /// Puts an object to `world_from_object`; whatever hangs on it comes along.
@@ -371,19 +381,26 @@ impl Tree {
     }
 }
 
+/// An object in its parent's frame, as the robot believes or as it is.
+fn placed(object: &Object, chain: Chain) -> Isometry3<f64> {
+    match chain {
+        Chain::Reported => object.local,
+        Chain::Actual => object.local * object.displacement,
+    }
+}
+
 /// The rotation that a joint adds between its base frame and what hangs on it.
-fn turn(object: &Object, chain: Chain) -> Isometry3<f64> {
+fn turn(object: &Object) -> Isometry3<f64> {
     match &object.kind {
-        Kind::Joint(joint) => {
-            let angle_rad = match chain {
-                Chain::Reported => joint.position_rad(),
-                Chain::Actual => joint.position_rad() + joint.error_rad,
-            };
-            let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad);
-            Isometry3::from_parts(Translation3::identity(), rotation)
-        }
+        Kind::Joint(joint) => turn_z(joint.position_rad()),
         _ => Isometry3::identity(),
     }
+}
+
+/// A rotation about z.
+pub fn turn_z(angle_rad: f64) -> Isometry3<f64> {
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad);
+    Isometry3::from_parts(Translation3::identity(), rotation)
 }
 
 #[cfg(test)]

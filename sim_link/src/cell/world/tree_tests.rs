@@ -31,9 +31,9 @@ fn what_hangs_on_a_joint_turns_with_it_and_the_joint_itself_does_not() {
 }
 
 #[test]
-fn joint_errors_move_the_actual_chain_and_leave_the_reported_one() {
+fn displacements_move_the_actual_chain_and_leave_the_reported_one() {
     let (mut tree, joint, tip) = arm();
-    tree.joint_mut(joint).expect("joint").error_rad = 0.01;
+    tree.get_mut(joint).expect("exists").displacement = turn_z(0.01);
     let reported = tree.world_pose(tip, Chain::Reported).expect("exists");
     let actual = tree.world_pose(tip, Chain::Actual).expect("exists");
     assert_eq!(reported.translation.vector, Vector3::new(1.0, 0.0, 1.0));
