@@ -2,6 +2,7 @@
 
 pub mod kinematics;
 pub mod motion;
+pub mod planning;
 pub mod render;
 pub mod scene;
 pub mod server;

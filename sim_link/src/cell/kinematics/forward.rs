@@ -27,7 +27,7 @@ pub(super) fn link_tail(i: usize) -> Isometry3<f64> {
     )
 }
 
-/// Poses of joints, links and connection for the given joint values [rad].
+/// Poses of joints, links and connection for the given joint values in radians.
 ///
 /// # Frames and units
 /// Everything is in the arm frame, metres. With all joints at zero the connection is at (−0.18495, 0, 0.98655) and

@@ -255,10 +255,10 @@ fn easier(a: Obstacle, b: Obstacle) -> Obstacle {
 fn pan_angles(base_from_flange: &Isometry3<f64>) -> Result<[f64; 2], Obstacle> {
     let wrist = base_from_flange * Point3::new(0.0, 0.0, -dh::D[5]);
     let distance_m = wrist.x.hypot(wrist.y);
-    let ratio = dh::D[3] / distance_m;
-    if !(ratio <= 1.0 + REACH_SLACK) {
+    if distance_m * (1.0 + REACH_SLACK) < dh::D[3] {
         return Err(Obstacle::InColumn { distance_m, least_m: dh::D[3] });
     }
+    let ratio = dh::D[3] / distance_m;
     let towards = wrist.y.atan2(wrist.x) + FRAC_PI_2;
     let side = ratio.min(1.0).acos();
     Ok([towards + side, towards - side])
@@ -286,7 +286,7 @@ fn elbow_angles(base_from_flange: &Isometry3<f64>, pan: f64, wrist: f64, roll: f
     if cosine > 1.0 + REACH_SLACK {
         return Err(Obstacle::TooFar { needed_m, reach_m: upper.abs() + lower.abs() });
     }
-    if !(cosine >= -1.0 - REACH_SLACK) {
+    if cosine < -1.0 - REACH_SLACK {
         return Err(Obstacle::TooNear { needed_m, least_m: (upper.abs() - lower.abs()).abs() });
     }
     let turned = shoulder_from_pitch.rotation * Vector3::x();
@@ -310,7 +310,7 @@ fn polish(start: JointAngles, goal: &Isometry3<f64>) -> (JointAngles, f64) {
         let Ok(step) = jacobian(&joints).svd(true, true).solve(&error, 1e-9) else { break };
         let candidate: JointAngles = std::array::from_fn(|i| wrap(joints[i] + step[i]));
         let candidate_error = pose_error(&forward(&candidate).arm_from_connection, goal);
-        if !(candidate_error.norm() < error.norm()) {
+        if candidate_error.norm() >= error.norm() {
             break;
         }
         (joints, error) = (candidate, candidate_error);

@@ -94,11 +94,11 @@ impl JointMotion {
     pub fn at(&self, time_s: f64) -> MotionStep {
         let time_left = self.duration_s - time_s;
         // Without a trajectory there is no time to arrive in: any step does, even one of zero length.
-        if time_left > END_SLACK_S {
-            if let Some(trajectory) = &self.trajectory {
-                let MotionState { pos, vel, accel } = sample(trajectory, self.start.pos.len(), time_s);
-                return MotionStep { pos, vel, accel, finished: false, time_left };
-            }
+        if time_left > END_SLACK_S
+            && let Some(trajectory) = &self.trajectory
+        {
+            let MotionState { pos, vel, accel } = sample(trajectory, self.start.pos.len(), time_s);
+            return MotionStep { pos, vel, accel, finished: false, time_left };
         }
         let past = (-time_left).max(0.0);
         let pos = self.target_pos.iter().zip(&self.target_vel).map(|(p, v)| p + v * past).collect();

@@ -72,10 +72,10 @@ impl PoseMotion {
         let shift = goal.translation.vector - start.translation.vector;
         let turn = rotation_vector(&(start.rotation.inverse() * goal.rotation));
         let way = Vector4::new(shift.x, shift.y, shift.z, turn.norm());
-        if let Some(metric) = metric {
-            if let Some(dof) = metric.iter().position(|m| !(m.is_finite() && *m >= 0.0)) {
-                return Err(MotionError::BadLimit { what: "metric", dof, value: metric[dof], sign: "not negative" });
-            }
+        if let Some(metric) = metric
+            && let Some(dof) = metric.iter().position(|m| !(m.is_finite() && *m >= 0.0))
+        {
+            return Err(MotionError::BadLimit { what: "metric", dof, value: metric[dof], sign: "not negative" });
         }
         let distance = metric.map(|metric| Vector4::from(metric).component_mul(&way).norm());
         let target: Vec<f64> = distance.map_or_else(|| way.iter().copied().collect(), |d| vec![d]);

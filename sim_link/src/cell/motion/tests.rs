@@ -72,9 +72,8 @@ fn phase_synchronisation_is_straight_and_time_synchronisation_arrives_together()
     let plan = |sync| JointMotion::new(start.clone(), &target, &[0.0; 3], Some(&limits), sync).unwrap();
     for step in run(&mut plan(Sync::Phase), 0.01) {
         let part = (step.pos[0] - start.pos[0]) / (target[0] - start.pos[0]);
-        for i in 1..3 {
-            let expected = start.pos[i] + part * (target[i] - start.pos[i]);
-            assert!((step.pos[i] - expected).abs() < 1e-9);
+        for ((pos, from), to) in step.pos.iter().zip(&start.pos).zip(&target) {
+            assert!((pos - from - part * (to - from)).abs() < 1e-9);
         }
     }
     // Alone the first joint arrives early; together all of them still move just before the end.

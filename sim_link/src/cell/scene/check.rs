@@ -32,7 +32,7 @@ pub(super) fn check(scene: &Scene) -> Check {
     solids.iter().enumerate().try_for_each(|(index, solid)| check_solid(&format!("solids[{index}]"), solid))
 }
 
-fn violation(field: &str, value: impl ToString, need: impl Into<String>) -> Check {
+fn violation(field: &str, value: &impl ToString, need: impl Into<String>) -> Check {
     Err(Violation { field: field.to_owned(), value: value.to_string(), need: need.into() })
 }
 
@@ -40,7 +40,7 @@ fn in_range(field: &str, value: f64, low: f64, high: f64) -> Check {
     if value >= low && value <= high {
         Ok(())
     } else {
-        violation(field, value, format!("a number from {low} to {high}"))
+        violation(field, &value, format!("a number from {low} to {high}"))
     }
 }
 
@@ -54,7 +54,7 @@ fn position(field: &str, value: &[f64; 3]) -> Check {
     if value.iter().all(|v| v.abs() <= 100.0) {
         Ok(())
     } else {
-        violation(field, format!("{value:?}"), "within 100 m of the origin")
+        violation(field, &format!("{value:?}"), "within 100 m of the origin")
     }
 }
 
@@ -63,7 +63,7 @@ fn rotation(field: &str, value: &[f64; 4]) -> Check {
     if (length - 1.0).abs() <= QUATERNION_SLACK {
         Ok(())
     } else {
-        violation(field, format!("{value:?} of length {length}"), "a unit quaternion x, y, z, w")
+        violation(field, &format!("{value:?} of length {length}"), "a unit quaternion x, y, z, w")
     }
 }
 
@@ -91,7 +91,7 @@ fn check_robot(robot: &RobotSpec) -> Check {
         in_range(&format!("robot.min_joints_deg[{i}]"), low, -720.0, 720.0)?;
         in_range(&format!("robot.max_joints_deg[{i}]"), high, -720.0, 720.0)?;
         if low >= high {
-            return violation(&format!("robot.max_joints_deg[{i}]"), high, format!("above the minimum of {low}"));
+            return violation(&format!("robot.max_joints_deg[{i}]"), &high, format!("above the minimum of {low}"));
         }
         in_range(&format!("robot.start_joints_deg[{i}]"), start_joints_deg[i], low, high)?;
         in_range(&format!("robot.joint_offset_deg[{i}]"), joint_offset_deg[i], -10.0, 10.0)?;
@@ -120,15 +120,19 @@ fn check_camera(camera: &CameraSpec) -> Check {
         in_range(field, f64::from(value), 16.0, 8192.0)?;
     }
     if u64::from(*width) * u64::from(*height) > MAX_PIXELS {
-        return violation("camera.width", format!("{width} × {height} pixels"), format!("at most {MAX_PIXELS} pixels"));
+        return violation(
+            "camera.width",
+            &format!("{width} × {height} pixels"),
+            format!("at most {MAX_PIXELS} pixels"),
+        );
     }
     let pinhole = [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)];
     if let Some((given, _)) = pinhole.iter().find(|(_, value)| value.is_some()) {
         if let Some((missing, _)) = pinhole.iter().find(|(_, value)| value.is_none()) {
-            return violation(&format!("camera.{missing}"), "absent", format!("given, because `{given}` is"));
+            return violation(&format!("camera.{missing}"), &"absent", format!("given, because `{given}` is"));
         }
         if view_angle_deg.is_some() {
-            return violation("camera.view_angle_deg", "given", format!("absent, because `{given}` is given"));
+            return violation("camera.view_angle_deg", &"given", format!("absent, because `{given}` is given"));
         }
     }
     if let Some(angle) = view_angle_deg {
@@ -141,7 +145,7 @@ fn check_camera(camera: &CameraSpec) -> Check {
     in_range("camera.near_m", *near_m, 1e-4, 10.0)?;
     in_range("camera.far_m", *far_m, 1e-3, 1000.0)?;
     if near_m >= far_m {
-        return violation("camera.far_m", far_m, format!("above near_m = {near_m}"));
+        return violation("camera.far_m", &far_m, format!("above near_m = {near_m}"));
     }
     pose("camera.sensor", sensor)?;
     in_range("camera.random_offset_mm", *random_offset_mm, 0.0, 100.0)?;
@@ -152,7 +156,7 @@ fn check_camera(camera: &CameraSpec) -> Check {
 /// Every pixel must see something, or the renderer has nothing to draw there.
 fn check_lens(intrinsics: &Intrinsics) -> Check {
     if let Err(error) = intrinsics.validate() {
-        return violation("camera.distortion", error, "made of finite numbers");
+        return violation("camera.distortion", &error, "made of finite numbers");
     }
     let (right, bottom) = (f64::from(intrinsics.width) - 0.5, f64::from(intrinsics.height) - 0.5);
     for i in 0..=16 {
@@ -162,7 +166,7 @@ fn check_lens(intrinsics: &Intrinsics) -> Check {
             if intrinsics.unproject(&Vector2::new(px.0, px.1)).is_err() {
                 let coefficients = intrinsics.distortion.coefficients();
                 let need = format!("weak enough that pixel ({}, {}) still sees a ray", px.0, px.1);
-                return violation("camera.distortion", format!("{coefficients:?}"), need);
+                return violation("camera.distortion", &format!("{coefficients:?}"), need);
             }
         }
     }
@@ -173,7 +177,7 @@ fn check_board(board: &BoardSpec) -> Check {
     let BoardSpec { columns, rows, square_m, paper_m, plane, random_offset_mm, random_offset_deg } = board;
     for (field, value) in [("board.columns", *columns), ("board.rows", *rows)] {
         if !(2..=MAX_CORNERS).contains(&value) {
-            return violation(field, value, format!("from 2 to {MAX_CORNERS} inner corners"));
+            return violation(field, &value, format!("from 2 to {MAX_CORNERS} inner corners"));
         }
     }
     in_range("board.square_m", *square_m, 1e-4, 1.0)?;
@@ -183,7 +187,7 @@ fn check_board(board: &BoardSpec) -> Check {
         // A micrometre is rounding of the product, not a sheet too small.
         if paper < printed - 1e-6 {
             let need = format!("at least {printed:.4} m: {} squares of {square_m} m", count + 1);
-            return violation(&format!("board.paper_m[{axis}]"), paper, need);
+            return violation(&format!("board.paper_m[{axis}]"), &paper, need);
         }
     }
     pose("board.plane", plane)?;
@@ -208,7 +212,7 @@ fn check_light(light: &LightSpec) -> Check {
     let LightSpec { direction, ambient, diffuse, background: _ } = light;
     let length = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
     if !(length.is_finite() && length > 1e-6) {
-        return violation("light.direction", format!("{direction:?}"), "a direction: not zero, finite");
+        return violation("light.direction", &format!("{direction:?}"), "a direction: not zero, finite");
     }
     in_range("light.ambient", *ambient, 0.0, 10.0)?;
     in_range("light.diffuse", *diffuse, 0.0, 10.0)

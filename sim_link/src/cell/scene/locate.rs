@@ -5,8 +5,7 @@ use toml::de::{DeTable, DeValue};
 
 /// Line, counted from 1, of a byte offset.
 pub(super) fn line_at(text: &str, offset: usize) -> usize {
-    let end = offset.min(text.len());
-    text.as_bytes()[..end].iter().filter(|&&byte| byte == b'\n').count() + 1
+    text.bytes().take(offset).filter(|&byte| byte == b'\n').count() + 1
 }
 
 /// Line of the value of a dotted field such as `camera.near_m` or `solids[2].size_m`; of the nearest parent that is
