@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use super::plans::Plans;
 use super::task::Task;
-use crate::cell::plans::Plans;
 
 /// Clients with different ids that are remembered at a time.
 pub const MAX_CLIENTS: usize = 64;
@@ -98,7 +98,7 @@ impl Connection {
     }
 
     /// The innermost call that waits for a callback.
-    pub fn take_callback(&mut self) -> Option<usize> {
+    pub fn waiting_for_callback(&self) -> Option<usize> {
         self.calls.iter().rposition(|call| call.waiting == Waiting::Callback)
     }
 }

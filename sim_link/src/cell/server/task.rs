@@ -15,6 +15,8 @@ pub enum Answer {
     Values(Vec<Value>),
     /// A reply that is already bytes.
     Encoded(Vec<u8>),
+    /// The list of what a namespace offers, or an error if there is none of that name.
+    Info(String),
     /// Something that takes longer.
     Later(Box<dyn Task>),
 }

@@ -49,6 +49,11 @@ impl Joint {
         self.target_rad
     }
 
+    /// Velocity of the motion towards a target position; zero where it is only put from place to place.
+    pub fn velocity_rad_s(&self) -> f64 {
+        self.drive.as_ref().and_then(|drive| drive.at(drive.time_s()).vel.first().copied()).unwrap_or(0.0)
+    }
+
     /// Smallest and largest position.
     pub fn interval_rad(&self) -> (f64, f64) {
         (self.min_rad, self.max_rad)

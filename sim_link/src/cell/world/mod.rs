@@ -130,12 +130,13 @@ impl World {
         }
     }
 
-    /// Where everything really is. The moment is the same one as long as nothing has moved, so that what was computed
-    /// from it stays valid.
+    /// Where everything that can see or be seen really is. The moment is the same one as long as nothing of that has
+    /// moved, so that what was computed from it stays valid; dummies come and go unseen.
     fn look(&mut self) -> Shown {
         let poses: Vec<(Handle, Isometry3<f64>)> = self
             .tree
             .iter()
+            .filter(|(_, object)| matches!(object.kind, Kind::Shape | Kind::VisionSensor(_)))
             .filter_map(|(handle, _)| Some((handle, self.tree.world_pose(handle, Chain::Actual).ok()?)))
             .collect();
         let moment = match &self.latest {

@@ -10,7 +10,7 @@ use super::tree::Handle;
 /// Where everything was at one sensing phase, as the robot really stood.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moment {
-    /// `world_from_object` of every object.
+    /// `world_from_object` of everything that can see or be seen.
     pub poses: Vec<(Handle, Isometry3<f64>)>,
 }
 
