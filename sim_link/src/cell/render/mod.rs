@@ -7,7 +7,14 @@
 //! Pixel (0, 0) is the centre of the top left pixel and row 0 is the top row. Colours are linear reflectances from
 //! 0 to 1; there is no gamma. Lengths are metres.
 
+mod board;
+mod imaging;
+pub mod props;
+mod rays;
 mod renderer;
+mod shade;
+mod shapes;
+mod stage;
 
 use handeye_core::image::RgbImage;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
