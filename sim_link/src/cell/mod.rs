@@ -6,3 +6,4 @@ pub mod planning;
 pub mod render;
 pub mod scene;
 pub mod server;
+pub mod world;

@@ -276,6 +276,18 @@ fn expansion_lists_every_full_turn_within_the_limits() {
     }
 }
 
+/// One pass of the simulation moves the goal by little; the arm must keep up with it in a few iterations.
+#[test]
+fn damped_least_squares_converges_at_once_when_the_goal_is_near() {
+    let seed = [0.0_f64, 45.0, -60.0, 0.0, 90.0, 0.0].map(f64::to_radians);
+    let tool = Isometry3::translation(0.0, 0.0, 0.017);
+    let turn = UnitQuaternion::from_euler_angles(0.02, -0.03, 0.02);
+    let start = forward(&seed).arm_from_connection * tool;
+    let goal = start * Isometry3::from_parts(Translation3::new(0.01, -0.02, 0.01), turn);
+    let options = DlsOptions { iterations: 3, precision_m: 1e-4, precision_rad: 1e-3, ..DlsOptions::default() };
+    assert!(damped_least_squares(&goal, &tool, &seed, &options, &JointLimits::default()).is_some());
+}
+
 #[test]
 fn damped_least_squares_gives_up_on_a_goal_out_of_reach() {
     let goal = Isometry3::translation(1.5, 0.0, 0.3);

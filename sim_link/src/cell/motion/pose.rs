@@ -91,6 +91,17 @@ impl PoseMotion {
         PoseStep { pose, vel, accel, finished, time_left }
     }
 
+    /// The fastest way to rest from where this motion is, within the limits of acceleration and jerk; each degree of
+    /// freedom on its own, so without a metric the end of the path may bend.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn stop(&self, limits: &MotionLimits) -> Result<Self, MotionError> {
+        let motion = JointMotion::stop(self.motion.at(self.motion.time_s()).state(), limits)?;
+        let goal = self.pose_at(motion.target_pos());
+        Ok(Self { goal, motion, ..self.clone() })
+    }
+
     /// Length of the whole motion in seconds.
     pub fn duration_s(&self) -> f64 {
         self.motion.duration_s()

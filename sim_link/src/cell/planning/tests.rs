@@ -80,6 +80,41 @@ fn moves_between_any_two_views_keep_tip_and_camera_out_of_floor_and_board() {
     }
 }
 
+/// A rod that hangs into the room in front of the board: it blocks some ways, not all.
+#[test]
+fn an_obstacle_is_driven_around_between_all_views() {
+    let [free, _] = scenes();
+    let rod = Obstacle { world_from_centre: Isometry3::translation(-0.35, -0.05, 1.2), size_m: [0.03, 0.03, 0.8] };
+    let mut blocked = free.clone();
+    blocked.obstacles.push(rod);
+    let options = ViewOptions { count: 12, ..ViewOptions::default() };
+    // Pairs between which the tip or the camera would come within a centimetre of the rod.
+    let hits = |setup: &ViewSetup| {
+        let views = poses_looking_at(setup, &options).unwrap();
+        let mut hits = 0;
+        for (i, from) in views.iter().enumerate() {
+            for to in &views[i + 1..] {
+                let touched = (0..=400).any(|step| {
+                    let part = f64::from(step) / 400.0;
+                    let joints: JointAngles =
+                        std::array::from_fn(|k| from.joints[k] + part * (to.joints[k] - from.joints[k]));
+                    let tip = setup.arm.world_from_arm
+                        * crate::cell::kinematics::forward(&joints).arm_from_connection
+                        * setup.arm.connection_from_tip;
+                    [tip, tip * setup.arm.tip_from_camera].iter().any(|place| {
+                        let beside = (rod.world_from_centre.inverse() * place).translation.vector.abs();
+                        beside.x < 0.025 && beside.y < 0.025 && beside.z < 0.41
+                    })
+                });
+                hits += usize::from(touched);
+            }
+        }
+        hits
+    };
+    assert!(hits(&free) > 0, "the rod is in nobody's way: this test asserts nothing");
+    assert_eq!(hits(&blocked), 0);
+}
+
 fn assert_keeps_away(setup: &ViewSetup, joints: &JointAngles) {
     let connection = setup.arm.world_from_arm * crate::cell::kinematics::forward(joints).arm_from_connection;
     let tip = connection * setup.arm.connection_from_tip;
