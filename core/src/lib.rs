@@ -14,6 +14,7 @@ mod json_text;
 pub mod observation;
 pub mod result;
 pub mod se3;
+pub mod session;
 pub mod target;
 
 pub use image;
