@@ -12,6 +12,7 @@ pub mod handeye;
 pub mod image_file;
 mod json_text;
 pub mod observation;
+pub mod poses_file;
 pub mod result;
 pub mod se3;
 pub mod session;
