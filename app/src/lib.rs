@@ -3,3 +3,4 @@
 pub mod cli;
 pub mod observe;
 pub mod parallel;
+pub mod truth;

@@ -15,8 +15,10 @@ pub mod image_file;
 mod json_text;
 pub mod observation;
 pub mod progress;
+pub mod poses_file;
 pub mod result;
 pub mod se3;
+pub mod session;
 pub mod target;
 
 #[cfg(feature = "opencv")]

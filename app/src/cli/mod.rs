@@ -3,7 +3,9 @@
 //! Results go to standard output, progress and messages to standard error. Exit code 0: done, 1: failed, 2: wrong usage
 //! or unreadable input.
 
+mod auto;
 mod calibrate;
+mod cell;
 mod export;
 mod failure;
 mod report;
@@ -32,6 +34,12 @@ enum Command {
     /// Open the workbench (the default).
     #[command(after_help = "Example:\n  handeye gui --connect tcp://192.168.0.7:23000")]
     Gui(GuiArgs),
+    /// Serve the built-in cell over the ZeroMQ remote API until Ctrl-C.
+    #[command(after_help = "Example:\n  handeye cell --port 0 --scene assets/scenes/realistic.toml --seed 7")]
+    Cell(cell::CellArgs),
+    /// Drive the robot through poses, capture, solve, and write a session with its exports.
+    #[command(after_help = "Example:\n  handeye auto --poses seed10 --out session --json result.json")]
+    Auto(auto::AutoArgs),
     /// Solve a session or a dataset folder.
     #[command(after_help = "Example:\n  handeye calibrate my_robot_images --json result.json")]
     Calibrate(calibrate::CalibrateArgs),
@@ -67,6 +75,8 @@ pub fn main() -> ExitCode {
     start_logging(cli.quiet);
     let result = match cli.command.unwrap_or_else(|| Command::Gui(GuiArgs::default())) {
         Command::Gui(_) => Ok(()),
+        Command::Cell(args) => cell::run(&args),
+        Command::Auto(args) => auto::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Export(args) => export::run(&args),
     };

@@ -30,6 +30,7 @@ use std::path::{Path, PathBuf};
 
 use image::{GrayImage, RgbImage};
 use nalgebra::Isometry3;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use crate::camera::{Distortion, Intrinsics};
@@ -69,7 +70,7 @@ pub struct Dataset {
 }
 
 /// What `[camera]` says.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CameraInput {
     /// Whether the intrinsics are known and stay as they are.
     pub fixed: bool,

@@ -13,6 +13,8 @@ use crate::se3;
 /// How far the length of a quaternion may be from 1. Three printed decimals stay within it; swapped columns or
 /// another convention do not.
 pub(super) const UNIT_TOLERANCE: f64 = 1e-3;
+/// A length within this of 1 is 1 up to rounding.
+const ROUNDING: f64 = 1e-12;
 /// How far `RᵀR` may be from the identity: a length off by [`UNIT_TOLERANCE`] is off by twice as much squared.
 const ORTHONORMAL_TOLERANCE: f64 = 2.0 * UNIT_TOLERANCE;
 /// Largest angle that a controller reports, in radians: joints turn up to two full turns either way.
@@ -116,7 +118,9 @@ fn unit_quaternion(q: Quaternion<f64>) -> Result<UnitQuaternion<f64>, DatasetPro
     if (length - 1.0).abs() > UNIT_TOLERANCE {
         return Err(DatasetProblem::NotUnit { length, tolerance: UNIT_TOLERANCE });
     }
-    Ok(UnitQuaternion::from_quaternion(q))
+    // What is exact stays as it is, bit for bit: a session solves to the same numbers live and from its files.
+    let is_exact = (length - 1.0).abs() < ROUNDING;
+    Ok(if is_exact { UnitQuaternion::new_unchecked(q) } else { UnitQuaternion::from_quaternion(q) })
 }
 
 fn rotation_matrix(m: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, DatasetProblem> {

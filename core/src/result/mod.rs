@@ -82,6 +82,22 @@ impl TransformEstimate {
         }
     }
 
+    /// Both links of a calibration: the hand-eye and the target.
+    pub fn of_links(
+        links: &HandEye,
+        hand_eye_covariance: Option<&Matrix6<f64>>,
+        target_covariance: Option<&Matrix6<f64>>,
+    ) -> (Self, Self) {
+        match links {
+            HandEye::EyeInHand { tip_from_camera, base_from_target } => {
+                (Self::new(tip_from_camera, hand_eye_covariance), Self::new(base_from_target, target_covariance))
+            }
+            HandEye::EyeToHand { base_from_camera, tip_from_target } => {
+                (Self::new(base_from_camera, hand_eye_covariance), Self::new(tip_from_target, target_covariance))
+            }
+        }
+    }
+
     /// The pose in the frames that the caller states; `None` when the names say otherwise.
     pub fn pose<Parent: Frame, Child: Frame>(&self) -> Option<Pose<Parent, Child>> {
         let fits = self.parent_frame == Parent::NAME && self.child_frame == Child::NAME;
@@ -315,16 +331,7 @@ impl CalibrationResult {
         target_covariance: Option<&Matrix6<f64>>,
     ) {
         self.mode = Some(links.mode());
-        let (hand_eye, target) = match links {
-            HandEye::EyeInHand { tip_from_camera, base_from_target } => (
-                TransformEstimate::new(tip_from_camera, hand_eye_covariance),
-                TransformEstimate::new(base_from_target, target_covariance),
-            ),
-            HandEye::EyeToHand { base_from_camera, tip_from_target } => (
-                TransformEstimate::new(base_from_camera, hand_eye_covariance),
-                TransformEstimate::new(tip_from_target, target_covariance),
-            ),
-        };
+        let (hand_eye, target) = TransformEstimate::of_links(links, hand_eye_covariance, target_covariance);
         self.hand_eye = Some(hand_eye);
         self.target = Some(target);
     }

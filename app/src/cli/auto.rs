@@ -1,0 +1,199 @@
+//! `handeye auto`: poses, captures, result and exports from one command.
+
+mod poses;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use handeye_core::calibrate::Method;
+use handeye_core::handeye::{HandEye, Mode};
+use handeye_core::image::{ImageBuffer, Luma};
+use handeye_core::poses_file::Goal;
+use handeye_core::progress::CancelToken;
+use handeye_core::result::CalibrationResult;
+use handeye_core::session::{Capture, GroundTruth, SessionMeta, SessionWriter};
+use handeye_core::target::{Grid, TargetSpec};
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::cell::{CellClient, CellPaths, Frame, MotionTolerance};
+use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError, MotionLimits};
+use time::OffsetDateTime;
+use time::macros::format_description;
+
+use super::cell::SceneArg;
+use super::{Failure, report, solve};
+use crate::observe::DEFAULT_MODEL;
+use crate::truth;
+use poses::Plan;
+
+/// Options of `handeye auto`.
+#[derive(Debug, Args)]
+pub struct AutoArgs {
+    /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
+    #[arg(long, value_name = "ADDR")]
+    connect: Option<String>,
+    /// `seed10` (the ten reference poses), a pose file, or `auto` (planned views of the board).
+    #[arg(long, value_name = "seed10|FILE|auto", default_value = "seed10")]
+    poses: String,
+    /// Folder of the session; a new one under `sessions` if not given.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write the result as JSON to this file too.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArg,
+    /// Seed of everything random in the built-in cell, and of planned poses.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Run the built-in cell like real time instead of as fast as it can.
+    #[arg(long)]
+    real_time: bool,
+}
+
+/// The board of the reference scene.
+const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
+
+pub fn run(args: &AutoArgs) -> Result<(), Failure> {
+    let cancel = solve::cancel_on_ctrl_c();
+    if args.connect.is_some() && args.scene.is_given() {
+        return Err(Failure::unusable(anyhow::anyhow!(
+            "--scene describes the built-in cell and --connect takes another: give one of them"
+        )));
+    }
+    let scene = args.scene.load()?;
+    let plan = Plan::find(&args.poses, &scene, args.seed)?;
+    let server = match args.connect {
+        Some(_) => None,
+        None => Some(
+            CellServer::start(CellConfig {
+                seed: args.seed,
+                real_time: Some(args.real_time),
+                ..CellConfig::new(scene)
+            })
+            .map_err(Failure::failed)?,
+        ),
+    };
+    let address = match (&args.connect, &server) {
+        (Some(address), _) => address.clone(),
+        (None, Some(server)) => server.endpoint(),
+        (None, None) => String::new(),
+    };
+    let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
+    let folder = args.out.clone().map_or_else(new_session_folder, Ok)?;
+    let mut cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())
+        .map_err(Failure::failed)?;
+    let truth = cell.ground_truth().map_err(Failure::failed)?;
+
+    let mut session = SessionWriter::create(&folder, meta(&truth, args.seed)?).map_err(Failure::failed)?;
+    let captured = capture_all(&mut cell, &plan, &mut session, &cancel);
+    // Whatever happened on the way, the arm is not left moving and the simulation not running.
+    let ended = cell.stop().and_then(|()| cell.arm().sim().stop_simulation());
+    captured?;
+    if let Err(error) = ended {
+        tracing::warn!(%error, "the simulation could not be stopped");
+    }
+    drop(cell);
+    drop(server);
+
+    let mut result = solve::folder(&folder, Method::Joint)?;
+    result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
+    finish(&folder, args.json.as_deref(), &result)
+}
+
+fn finish(folder: &Path, json: Option<&Path>, result: &CalibrationResult) -> Result<(), Failure> {
+    result.write(&folder.join(solve::RESULT_FILE)).map_err(Failure::failed)?;
+    solve::write_exports(&folder.join("exports"), result)?;
+    if let Some(file) = json {
+        result.write(file).map_err(Failure::failed)?;
+    }
+    print!("{}", report::text(result));
+    println!("session: {}", folder.display());
+    Ok(())
+}
+
+/// `sessions/2026-05-02T10-11-12`, under the current folder.
+fn new_session_folder() -> Result<PathBuf, Failure> {
+    let name = OffsetDateTime::now_utc()
+        .format(format_description!("[year]-[month]-[day]T[hour]-[minute]-[second]"))
+        .map_err(Failure::failed)?;
+    Ok(Path::new("sessions").join(name))
+}
+
+fn meta(
+    truth: &handeye_sim_link::client::cell::GroundTruth,
+    seed: Option<u64>,
+) -> Result<SessionMeta, Failure> {
+    let created = OffsetDateTime::now_utc()
+        .format(&time::format_description::well_known::Rfc3339)
+        .map_err(Failure::failed)?;
+    Ok(SessionMeta {
+        created,
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        mode: Mode::EyeInHand,
+        target: BOARD,
+        camera: None,
+        seeds: seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
+        ground_truth: truth.base_from_target.map(|base_from_target| {
+            let links = HandEye::EyeInHand { tip_from_camera: truth.tip_from_camera, base_from_target };
+            GroundTruth::new(&links, Some(truth.intrinsics))
+        }),
+    })
+}
+
+/// Visits every pose and captures there. A pose that the arm cannot reach is named and left out; anything else ends it.
+fn capture_all(
+    cell: &mut CellClient,
+    plan: &Plan,
+    session: &mut SessionWriter,
+    cancel: &CancelToken,
+) -> Result<(), Failure> {
+    let stop = cancel.clone();
+    cell.arm().sim().start_simulation().map_err(Failure::failed)?;
+    if let Some(start) = &plan.start_joints {
+        cell.move_to_joints(start, &plan.joint_limits, &stop).map_err(Failure::failed)?;
+    }
+    for (index, (name, goal)) in plan.goals.iter().enumerate() {
+        let moved = match goal {
+            Goal::Tip(pose) => cell.move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), &stop),
+            Goal::Joints(joints) => joints.as_slice().try_into().map_or_else(
+                |_wrong_length| Err(LinkError::BadMotion { what: "the goal", expected: "six joints", value: joints.len() as f64 }),
+                |joints| cell.move_to_joints(joints, &plan.joint_limits, &stop),
+            ),
+        };
+        match moved {
+            Ok(()) => {}
+            Err(error @ LinkError::Unreached { .. }) => {
+                tracing::warn!("pose {name:?} is left out: {error}");
+                continue;
+            }
+            Err(error) => return Err(Failure::failed(error)),
+        }
+        let frame = cell.grab().map_err(Failure::failed)?;
+        store(session, &frame)?;
+        tracing::info!("pose {} of {} captured ({name})", index + 1, plan.goals.len());
+    }
+    Ok(())
+}
+
+fn store(session: &mut SessionWriter, frame: &Frame) -> Result<(), Failure> {
+    let depth = ImageBuffer::<Luma<f32>, _>::from_raw(
+        frame.depth.width,
+        frame.depth.height,
+        frame.depth.metres.clone(),
+    );
+    session
+        .add_capture(&Capture {
+            image: &frame.rgb,
+            depth_m: depth.as_ref(),
+            base_from_tip: frame.base_from_tip,
+            joints_rad: Some(&frame.joints),
+            sim_time_s: Some(frame.sim_time_s),
+        })
+        .map_err(Failure::failed)?;
+    Ok(())
+}
+
+/// Limits of the client from those of a pose file.
+fn limits(count: usize, velocity: f64, acceleration: f64, jerk: f64) -> MotionLimits {
+    MotionLimits::uniform(count, velocity, acceleration, jerk)
+}

@@ -1,0 +1,90 @@
+//! Which poses `handeye auto` visits, and how fast.
+
+use std::path::Path;
+
+use handeye_core::poses_file::{self, Goal, TaughtPoses};
+use handeye_sim_link::cell::planning::{ViewOptions, ViewSetup, poses_looking_at};
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::client::MotionLimits;
+
+use super::super::Failure;
+use super::limits;
+
+/// The ten reference poses, so that they are there wherever the binary is.
+const SEED10: &str = include_str!("../../../../assets/poses/seed10.toml");
+
+/// How many views `--poses auto` plans.
+const PLANNED_VIEWS: usize = 20;
+
+/// A tour of poses.
+pub struct Plan {
+    /// Where the arm begins.
+    pub start_joints: Option<[f64; 6]>,
+    /// Names and goals in order.
+    pub goals: Vec<(String, Goal)>,
+    /// For motions of joints.
+    pub joint_limits: MotionLimits,
+    /// For motions of the tip: x, y, z, angle.
+    pub tip_limits: MotionLimits,
+}
+
+impl Plan {
+    /// The poses of that name or file; `auto` plans views of the scene's board.
+    pub fn find(what: &str, scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
+        match what {
+            "seed10" => Self::taught(&TaughtPoses::parse(Path::new("seed10"), SEED10).map_err(Failure::failed)?),
+            "auto" => Self::planned(scene, seed),
+            file => Self::taught(&TaughtPoses::read(Path::new(file)).map_err(Failure::unusable)?),
+        }
+    }
+
+    fn taught(taught: &TaughtPoses) -> Result<Self, Failure> {
+        let start_joints = taught
+            .start_joints_rad
+            .as_deref()
+            .map(<[f64; 6]>::try_from)
+            .transpose()
+            .map_err(|_wrong_length| Failure::unusable(anyhow::anyhow!("the start needs six joint angles")))?;
+        let l = taught.limits.unwrap_or(DEFAULT_LIMITS);
+        Ok(Self {
+            start_joints,
+            goals: taught.poses.iter().map(|p| (p.name.clone(), p.goal.clone())).collect(),
+            joint_limits: limits(6, l.joint_velocity, l.joint_acceleration, l.joint_jerk),
+            tip_limits: limits(4, l.tip_velocity, l.tip_acceleration, l.tip_jerk),
+        })
+    }
+
+    /// Views from where the scene says that board and camera are *meant* to be: what a person planning a tour knows.
+    fn planned(scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
+        let mut meant = scene.clone();
+        meant.camera.random_offset_mm = 0.0;
+        meant.camera.random_offset_deg = 0.0;
+        meant.board.random_offset_mm = 0.0;
+        meant.board.random_offset_deg = 0.0;
+        let seed = seed.unwrap_or(scene.seed);
+        let resolved = meant.resolve(seed).map_err(Failure::unusable)?;
+        let options = ViewOptions { count: PLANNED_VIEWS, seed, ..ViewOptions::default() };
+        let views = poses_looking_at(&ViewSetup::of(&resolved), &options).map_err(Failure::failed)?;
+        let l = DEFAULT_LIMITS;
+        Ok(Self {
+            start_joints: Some(resolved.start_joints),
+            goals: views
+                .iter()
+                .enumerate()
+                .map(|(i, view)| (format!("planned {}", i + 1), Goal::Joints(view.joints.to_vec())))
+                .collect(),
+            joint_limits: limits(6, l.joint_velocity, l.joint_acceleration, l.joint_jerk),
+            tip_limits: limits(4, l.tip_velocity, l.tip_acceleration, l.tip_jerk),
+        })
+    }
+}
+
+/// Limits of the reference poses, for pose files without their own.
+const DEFAULT_LIMITS: poses_file::MotionLimits = poses_file::MotionLimits {
+    joint_velocity: 310.0 * std::f64::consts::PI / 180.0,
+    joint_acceleration: 100.0 * std::f64::consts::PI / 180.0,
+    joint_jerk: 80.0 * std::f64::consts::PI / 180.0,
+    tip_velocity: 30.0,
+    tip_acceleration: 1.0,
+    tip_jerk: 1.0,
+};
