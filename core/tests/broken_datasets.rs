@@ -362,7 +362,8 @@ fn a_table_cut_or_garbled_anywhere_never_panics() {
         for i in 0..good.len() {
             folder.write(name, &good[..i]);
             check_message(&folder);
-            for byte in [0u8, b'"', b',', b'\n', b'[', 0xff] {
+            // One of the bytes at each place, all of them all over the file: the disk is the slow part.
+            for byte in [[0u8, b'"', b','], [b'\n', b'[', 0xff]][i % 2] {
                 let mut bad = good.clone();
                 bad[i] = byte;
                 folder.write(name, &bad);
