@@ -131,7 +131,7 @@ fn nobody_at_the_address_is_told_from_a_silent_server() {
     let limit = Duration::from_millis(200);
     let mut connection = connect(&endpoint, ConnectionOptions { reply_timeout: limit, ..options() });
     // However long the call may take: there is nobody to take it.
-    let limits = CallOptions::long(PATIENCE, &CancelToken::new());
+    let limits = CallOptions::long(PATIENCE, &CancelToken::default());
     let error = connection.call_with("sim.moveToConfig", vec![], &limits).expect_err("nobody");
     assert!(matches!(&error, LinkError::Unreachable { .. }), "{error}");
     let text = error.to_string();
@@ -206,7 +206,7 @@ fn a_server_that_dies_in_a_long_silent_call_is_noticed_at_once_and_found_again()
     let port = endpoint.port();
     let client = std::thread::spawn(move || {
         let mut connection = connect(&endpoint, options());
-        let cancel = CancelToken::new();
+        let cancel = CancelToken::default();
         let move_options = CallOptions::long(Duration::from_secs(30), &cancel);
         let error = connection.call_with("sim.moveToConfig", vec![], &move_options).expect_err("died");
         let noticed = Instant::now();
@@ -251,7 +251,7 @@ fn a_host_that_vanishes_without_a_word_is_noticed_within_two_seconds() {
     });
     let mut connection = connect(&endpoint, options());
     let started = Instant::now();
-    let cancel = CancelToken::new();
+    let cancel = CancelToken::default();
     let error = connection
         .call_with("sim.moveToConfig", vec![], &CallOptions::long(Duration::from_secs(30), &cancel))
         .expect_err("vanished");
@@ -272,7 +272,7 @@ fn cancelling_ends_a_long_silent_call_and_tells_the_server() {
         assert_eq!(func(&farewell), "_*end*_");
         assert_eq!(farewell.get("uuid"), request.get("uuid"));
     });
-    let cancel = CancelToken::new();
+    let cancel = CancelToken::default();
     let token = cancel.clone();
     let client = std::thread::spawn(move || {
         let mut connection = connect(&endpoint, options());

@@ -11,7 +11,7 @@ use handeye_core::image::{ImageBuffer, Luma};
 use handeye_core::poses_file::Goal;
 use handeye_core::progress::CancelToken;
 use handeye_core::result::CalibrationResult;
-use handeye_core::session::{Capture, GroundTruth, SessionMeta, SessionWriter};
+use handeye_core::session::{Capture, GroundTruth, Session, SessionMeta, SessionWriter};
 use handeye_core::target::{Grid, TargetSpec};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths, Frame, MotionTolerance};
@@ -21,7 +21,6 @@ use time::macros::format_description;
 
 use super::cell::SceneArg;
 use super::{Failure, report, solve};
-use crate::observe::DEFAULT_MODEL;
 use crate::truth;
 use poses::Plan;
 
@@ -84,6 +83,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         .map_err(Failure::failed)?;
     let truth = cell.ground_truth().map_err(Failure::failed)?;
 
+    keep_earlier_session(&folder)?;
     let mut session = SessionWriter::create(&folder, meta(&truth, args.seed)?).map_err(Failure::failed)?;
     let captured = capture_all(&mut cell, &plan, &mut session, &cancel);
     // Whatever happened on the way, the arm is not left moving and the simulation not running.
@@ -111,6 +111,23 @@ fn finish(folder: &Path, json: Option<&Path>, result: &CalibrationResult) -> Res
     Ok(())
 }
 
+/// Moves a session that is already there out of the way: nothing captured is ever overwritten.
+fn keep_earlier_session(folder: &Path) -> Result<(), Failure> {
+    if !Session::is_session(folder) {
+        return Ok(());
+    }
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let kept = (1..)
+        .map(|n| folder.with_file_name(format!("{name}.earlier-{n}")))
+        .find(|path| !path.exists())
+        .unwrap_or_else(|| folder.with_file_name(format!("{name}.earlier")));
+    std::fs::rename(folder, &kept).map_err(|error| {
+        Failure::failed(anyhow::anyhow!("the earlier session {} cannot be moved aside: {error}", folder.display()))
+    })?;
+    tracing::warn!("{} held a session already; it is now {}", folder.display(), kept.display());
+    Ok(())
+}
+
 /// `sessions/2026-05-02T10-11-12`, under the current folder.
 fn new_session_folder() -> Result<PathBuf, Failure> {
     let name = OffsetDateTime::now_utc()
@@ -119,13 +136,9 @@ fn new_session_folder() -> Result<PathBuf, Failure> {
     Ok(Path::new("sessions").join(name))
 }
 
-fn meta(
-    truth: &handeye_sim_link::client::cell::GroundTruth,
-    seed: Option<u64>,
-) -> Result<SessionMeta, Failure> {
-    let created = OffsetDateTime::now_utc()
-        .format(&time::format_description::well_known::Rfc3339)
-        .map_err(Failure::failed)?;
+fn meta(truth: &handeye_sim_link::client::cell::GroundTruth, seed: Option<u64>) -> Result<SessionMeta, Failure> {
+    let created =
+        OffsetDateTime::now_utc().format(&time::format_description::well_known::Rfc3339).map_err(Failure::failed)?;
     Ok(SessionMeta {
         created,
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -156,7 +169,9 @@ fn capture_all(
         let moved = match goal {
             Goal::Tip(pose) => cell.move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), &stop),
             Goal::Joints(joints) => joints.as_slice().try_into().map_or_else(
-                |_wrong_length| Err(LinkError::BadMotion { what: "the goal", expected: "six joints", value: joints.len() as f64 }),
+                |_wrong_length| {
+                    Err(LinkError::BadMotion { what: "the goal", expected: "six joints", value: joints.len() as f64 })
+                },
                 |joints| cell.move_to_joints(joints, &plan.joint_limits, &stop),
             ),
         };
@@ -176,11 +191,8 @@ fn capture_all(
 }
 
 fn store(session: &mut SessionWriter, frame: &Frame) -> Result<(), Failure> {
-    let depth = ImageBuffer::<Luma<f32>, _>::from_raw(
-        frame.depth.width,
-        frame.depth.height,
-        frame.depth.metres.clone(),
-    );
+    let depth =
+        ImageBuffer::<Luma<f32>, _>::from_raw(frame.depth.width, frame.depth.height, frame.depth.metres.clone());
     session
         .add_capture(&Capture {
             image: &frame.rgb,

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use ciborium::Value;
 
 use super::callback::{Callback, CallbackName, CallbackScope};
-use super::cancel::CancelToken;
 use super::endpoint::Endpoint;
 use super::error::LinkError;
 use super::options::{CallOptions, ConnectionOptions};
@@ -16,6 +15,7 @@ use super::protocol::{
 };
 use super::returned::Returned;
 use super::transport::{Transport, TransportFault, ZmqTransport};
+use handeye_core::progress::CancelToken;
 
 /// Longest stretch of waiting without a look at the cancel token.
 const SLICE: Duration = Duration::from_millis(20);

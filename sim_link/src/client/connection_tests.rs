@@ -201,7 +201,7 @@ fn a_server_that_always_waits_is_stopped_by_the_total_time() {
 
 #[test]
 fn cancelling_ends_a_wait_and_the_clients_record() {
-    let cancel = CancelToken::new();
+    let cancel = CancelToken::default();
     let flag = cancel.clone();
     let (mut connection, log) = connection(move |_| {
         flag.cancel();
@@ -215,7 +215,7 @@ fn cancelling_ends_a_wait_and_the_clients_record() {
 
 #[test]
 fn a_call_that_was_cancelled_before_it_began_is_not_sent() {
-    let cancel = CancelToken::new();
+    let cancel = CancelToken::default();
     cancel.cancel();
     let (mut connection, log) = connection(|_| ret([]));
     let options = CallOptions::cancelled_by(&cancel);

@@ -8,7 +8,6 @@
 //! | [`cell`] | an arm with a camera: move, stop, look, and the truth of a simulated cell |
 
 mod callback;
-mod cancel;
 pub mod cell;
 mod connection;
 pub mod constants;
@@ -24,10 +23,10 @@ mod testing;
 mod transport;
 
 pub use callback::{CallbackName, CallbackScope};
-pub use cancel::CancelToken;
 pub use connection::Connection;
 pub use endpoint::{DEFAULT_PORT, Endpoint};
 pub use error::LinkError;
+pub use handeye_core::progress::CancelToken;
 pub use options::{CallOptions, ConnectionOptions};
 pub use protocol::ProtocolVersion;
 pub use returned::Returned;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::cancel::CancelToken;
+use handeye_core::progress::CancelToken;
 
 /// How a connection behaves unless a call says otherwise.
 #[derive(Debug, Clone)]
@@ -31,7 +31,7 @@ impl Default for ConnectionOptions {
             heartbeat: Some(Duration::from_millis(1500)),
             idle_timeout_s: 60,
             seed: None,
-            shutdown: CancelToken::new(),
+            shutdown: CancelToken::default(),
         }
     }
 }

@@ -167,13 +167,15 @@ impl Clients {
     /// Whether a pass has to wait for somebody.
     pub fn hold_pass(&self, step: u64) -> bool {
         let waits_for_pass = |uuid: &str| {
-            self.connections.values().flat_map(|connection| &connection.calls).any(|call| {
-                call.uuid == uuid && matches!(call.waiting, Waiting::Pass(_))
-            })
+            self.connections
+                .values()
+                .flat_map(|connection| &connection.calls)
+                .any(|call| call.uuid == uuid && matches!(call.waiting, Waiting::Pass(_)))
         };
         self.connections.values().any(Connection::runs_callback)
             || self.records.iter().any(|(uuid, client)| {
-                (client.stepping_level > 0 && client.desired_step <= step) || (client.locks > 0 && !waits_for_pass(uuid))
+                (client.stepping_level > 0 && client.desired_step <= step)
+                    || (client.locks > 0 && !waits_for_pass(uuid))
             })
     }
 

@@ -89,7 +89,8 @@ impl Engine {
                 if self.clients.meet(&uuid, idle_limit, now).is_some() {
                     self.call(peer, uuid, func, Args::new(args));
                 } else {
-                    let text = format!("the built-in cell serves {MAX_CLIENTS} clients at a time: close one and try again.");
+                    let text =
+                        format!("the built-in cell serves {MAX_CLIENTS} clients at a time: close one and try again.");
                     self.send(peer, message::failed(&text));
                 }
             }
@@ -270,7 +271,10 @@ impl Engine {
                         call.task.brake(&self.cell);
                     }
                 }
-                self.clients.records_mut().flat_map(|client| client.plans.iter_mut()).for_each(super::plans::Motion::brake);
+                self.clients
+                    .records_mut()
+                    .flat_map(|client| client.plans.iter_mut())
+                    .for_each(super::plans::Motion::brake);
                 self.cell.world.brake_joints();
             }
         }

@@ -283,7 +283,19 @@ fn a_move_ends_exactly_at_its_target_and_others_are_served_meanwhile() {
     let state = &done.get("ret").and_then(|ret| ret.list()).expect("a map")[0];
     assert_eq!(state.get("pos").and_then(|v| v.numbers()), Some(GOAL.to_vec()));
     assert_eq!(state.get("vel").and_then(|v| v.numbers()), Some(vec![0.0; 6]));
-    for field in ["joints", "accel", "targetPos", "targetVel", "maxVel", "minVel", "maxJerk", "minAccel", "flags", "timeStep", "timeLeft"] {
+    for field in [
+        "joints",
+        "accel",
+        "targetPos",
+        "targetVel",
+        "maxVel",
+        "minVel",
+        "maxJerk",
+        "minAccel",
+        "flags",
+        "timeStep",
+        "timeLeft",
+    ] {
         assert!(state.get(field).is_some(), "{field}");
     }
     assert!(state.get("callback").is_none() && state.get("ruckigObj").is_none());
@@ -756,7 +768,8 @@ fn buffers_are_background_before_the_first_pass_and_come_with_the_full_resolutio
 fn a_vision_sensor_tells_its_lens_by_parameters_and_properties() {
     let mut bench = Bench::new();
     let camera = Value::from(bench.engine.cell.stage.camera);
-    let angle = bench.get("sim.getObjectFloatParam", vec![camera.clone(), Value::from(1004)]).number().expect("a number");
+    let angle =
+        bench.get("sim.getObjectFloatParam", vec![camera.clone(), Value::from(1004)]).number().expect("a number");
     assert!((angle - 57.0_f64.to_radians()).abs() < 1e-12);
     assert_eq!(bench.get("sim.getObjectInt32Param", vec![camera.clone(), Value::from(1002)]), Value::from(640));
     let planes = bench.get("sim.getFloatArrayProperty", vec![camera.clone(), Value::from("clippingPlanes")]);
@@ -800,7 +813,11 @@ fn twenty_thousand_mutated_requests_break_nothing() {
         request(A, "sim.setObjectParent", vec![Value::from(18), Value::from(20), Value::from(true)]),
         request(A, "sim.moveToConfig", vec![to_config(&bench, GOAL, 1.0)]),
         request(A, "sim.moveToPose", vec![params]),
-        request(A, "sim.getVisionSensorImg", vec![Value::from(15), Value::from(3), Value::from(0.5), floats(&[0.0, 1.0]), floats(&[9.0, 9.0])]),
+        request(
+            A,
+            "sim.getVisionSensorImg",
+            vec![Value::from(15), Value::from(3), Value::from(0.5), floats(&[0.0, 1.0]), floats(&[9.0, 9.0])],
+        ),
         request(A, "sim.removeObjects", vec![wire::integers([15, 16, 17])]),
         request(A, "sim.createDummy", vec![Value::from(0.01)]),
         request(A, "sim.setJointTargetPosition", vec![Value::from(16), Value::from(1.0), floats(&[1.0, 1.0, 1.0])]),

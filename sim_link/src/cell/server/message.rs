@@ -221,8 +221,7 @@ mod tests {
     }
 
     /// The id's 43 bytes as the Python client writes them.
-    const ID: &str =
-        "6475756964 7824 63303662333833322d353030382d346362622d623337322d343666663932636163666535";
+    const ID: &str = "6475756964 7824 63303662333833322d353030382d346362622d623337322d343666663932636163666535";
 
     fn call(func: &str, args: Vec<Value>) -> Request {
         let idle_limit = Duration::from_secs(600);
@@ -254,7 +253,10 @@ mod tests {
     fn replies_are_the_recorded_bytes() {
         assert_eq!(returned(vec![]), hex("a1 63726574 a0"));
         assert_eq!(returned(vec![Value::from(28)]), hex("a1 63726574 81 181c"));
-        assert_eq!(failed("No such function: sim.nope"), hex("a1 63657272 781a 4e6f20737563682066756e6374696f6e3a2073696d2e6e6f7065"));
+        assert_eq!(
+            failed("No such function: sim.nope"),
+            hex("a1 63657272 781a 4e6f20737563682066756e6374696f6e3a2073696d2e6e6f7065")
+        );
         assert_eq!(returned_image(&hex("000102fffefd"), [2, 1]), hex("a1 63726574 82 46 000102fffefd 82 02 01"));
         let image = returned_image(&vec![7; 921_600], [640, 480]);
         assert!(image.starts_with(&hex("a1 63726574 82 5a000e1000")) && image.ends_with(&hex("82 190280 1901e0")));

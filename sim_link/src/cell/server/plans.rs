@@ -125,9 +125,7 @@ impl Task for MotionTask {
             Wake::Started | Wake::PassOver | Wake::TimeReached => {
                 self.motion.advance(cell)?;
                 match &self.motion.callback {
-                    Some(name) => {
-                        Ok(Next::Callback { name: name.clone(), args: self.motion.plan.callback_args() })
-                    }
+                    Some(name) => Ok(Next::Callback { name: name.clone(), args: self.motion.plan.callback_args() }),
                     None => Ok(Next::Pass),
                 }
             }
@@ -157,7 +155,8 @@ impl Plans {
     /// The client has too many.
     pub fn keep(&mut self, motion: Motion) -> Result<i64, ApiError> {
         if self.plans.len() >= MAX_PLANS {
-            let text = format!("a client may prepare {MAX_PLANS} motions: call the _cleanup function of those that are done.");
+            let text =
+                format!("a client may prepare {MAX_PLANS} motions: call the _cleanup function of those that are done.");
             return Err(ApiError::Other(text));
         }
         self.next += 1;

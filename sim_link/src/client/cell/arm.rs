@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use handeye_core::frames::{Base, Pose, Tip};
 
 use super::{CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles, require_running};
-use crate::client::cancel::CancelToken;
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::sim::{JointMotion, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, Sim};
+use handeye_core::progress::CancelToken;
 
 /// Longest motion, in real time. The slowest sensible one takes a minute; a simulation may run slower than real time.
 const LONGEST_MOTION: Duration = Duration::from_mins(10);

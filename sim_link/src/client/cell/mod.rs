@@ -27,12 +27,12 @@ pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use camera::{CameraFeed, Frame};
 pub use truth::{GroundTruth, PublishedTruth, TRUTH_NAME};
 
-use super::cancel::CancelToken;
 use super::endpoint::Endpoint;
 use super::error::LinkError;
 use super::options::ConnectionOptions;
 use super::protocol::ProtocolVersion;
 use super::sim::{JointInterval, MotionLimits, ObjectHandle, SensorOptics, Sim, SimulationState};
+use handeye_core::progress::CancelToken;
 
 /// Number of joints of the arm.
 pub const JOINTS: usize = 6;

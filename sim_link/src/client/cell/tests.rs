@@ -251,16 +251,16 @@ fn a_scene_without_a_target_can_do_everything_but_motions_to_a_pose() {
     let world = world();
     edit(&world, |w| w.missing.push("/UR5/Target"));
     let mut cell = cell(world);
-    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect("joints need no target");
+    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("joints need no target");
     let goal = Pose::identity();
-    let error = cell.client.move_to_pose(&goal, &pose_limits(), &MotionTolerance::default(), &CancelToken::new());
+    let error = cell.client.move_to_pose(&goal, &pose_limits(), &MotionTolerance::default(), &CancelToken::default());
     assert!(matches!(error, Err(LinkError::NoSuchObject { path, .. }) if path == "/UR5/Target"));
 }
 
 #[test]
 fn a_motion_is_stepped_to_its_end_and_tidied_up() {
     let mut cell = cell(world());
-    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect("arrived");
+    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
     assert_eq!(cell.client.joint_angles(), Ok(GOAL));
     let functions = cell.control.functions();
     let steps = functions.iter().filter(|f| *f == "sim.step").count();
@@ -272,7 +272,7 @@ fn a_motion_is_stepped_to_its_end_and_tidied_up() {
 #[test]
 fn cancelling_between_steps_stops_the_arm_where_it_is() {
     let world = world();
-    let cancel = CancelToken::new();
+    let cancel = CancelToken::default();
     edit(&world, |w| {
         w.cancel_at_step = Some((2, cancel.clone()));
         w.follow = 0.5;
@@ -289,7 +289,7 @@ fn cancelling_between_steps_stops_the_arm_where_it_is() {
 #[test]
 fn a_motion_that_is_cancelled_before_it_begins_does_not_begin() {
     let mut cell = cell(world());
-    let cancel = CancelToken::new();
+    let cancel = CancelToken::default();
     cancel.cancel();
     assert!(matches!(cell.client.move_to_joints(&GOAL, &limits(), &cancel), Err(LinkError::Cancelled { .. })));
     assert!(!cell.control.functions().contains(&"sim.moveToConfig_init".to_owned()));
@@ -300,7 +300,7 @@ fn a_server_without_steps_gets_the_whole_motion() {
     let world = world();
     edit(&world, |w| w.missing.push("sim.moveToConfig_init"));
     let mut cell = cell(world);
-    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect("arrived");
+    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
     assert_eq!(cell.client.joint_angles(), Ok(GOAL));
 }
 
@@ -309,7 +309,7 @@ fn a_server_that_dies_in_a_motion_is_reported_without_further_calls() {
     let world = world();
     let mut cell = cell(Arc::clone(&world));
     edit(&world, |w| w.die_in = Some("sim.step"));
-    let error = cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect_err("died");
+    let error = cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect_err("died");
     assert_eq!(error, LinkError::Disconnected { call: "sim.step".to_owned() });
     assert_eq!(cell.control.functions().last().map(String::as_str), Some("sim.step"));
 }
@@ -320,7 +320,7 @@ fn nothing_moves_while_the_simulation_does_not_run() {
         let world = world();
         edit(&world, |w| w.state = state);
         let mut cell = cell(world);
-        let error = cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect_err("not running");
+        let error = cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect_err("not running");
         assert_eq!(error, LinkError::NotRunning { task: "moving the joints", state: expected });
     }
 }
@@ -330,17 +330,17 @@ fn a_goal_out_of_range_is_refused_with_joint_and_range() {
     let mut cell = cell(world());
     let mut goal = GOAL;
     goal[3] = 7.0;
-    let error = cell.client.move_to_joints(&goal, &limits(), &CancelToken::new()).expect_err("out of range");
+    let error = cell.client.move_to_joints(&goal, &limits(), &CancelToken::default()).expect_err("out of range");
     assert!(matches!(error, LinkError::JointOutOfRange { joint: 4, .. }), "{error}");
     goal[3] = f64::NAN;
-    let error = cell.client.move_to_joints(&goal, &limits(), &CancelToken::new()).expect_err("not a number");
+    let error = cell.client.move_to_joints(&goal, &limits(), &CancelToken::default()).expect_err("not a number");
     assert!(matches!(error, LinkError::BadMotion { .. }), "{error}");
 }
 
 #[test]
 fn a_tip_that_did_not_arrive_is_an_error_with_the_distance() {
     let mut cell = cell(world());
-    let (tolerance, cancel) = (MotionTolerance::default(), CancelToken::new());
+    let (tolerance, cancel) = (MotionTolerance::default(), CancelToken::default());
     let here = cell.client.base_from_tip().expect("a pose");
     cell.client.move_to_pose(&here, &pose_limits(), &tolerance, &cancel).expect("already there");
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.1);
@@ -360,12 +360,12 @@ fn settling_waits_for_the_joints_and_tells_how_long() {
     });
     let mut cell = cell(world);
     let options = SettleOptions { rate_rad_s: 1e-3, limit_s: 5.0 };
-    let after_s = cell.client.arm().settle(&options, &CancelToken::new()).expect("settles");
+    let after_s = cell.client.arm().settle(&options, &CancelToken::default()).expect("settles");
     // The travel of pass n is 0.1 / 2ⁿ rad, which is under 5e-5 rad from pass 11 on; two more passes confirm it.
     assert_relative_eq!(after_s, 13.0 * 0.05, epsilon = 1e-9);
     let options = SettleOptions { limit_s: 0.2, ..options };
     cell.world().targets = [1.0; JOINTS];
-    let error = cell.client.arm().settle(&options, &CancelToken::new()).expect_err("too short");
+    let error = cell.client.arm().settle(&options, &CancelToken::default()).expect_err("too short");
     assert!(matches!(error, LinkError::NotSettled { .. }), "{error}");
 }
 
@@ -413,7 +413,7 @@ fn frames_and_motions_go_over_two_connections() {
     assert!(!cell.control.functions().contains(&"sim.getVisionSensorImg".to_owned()));
     assert!(cell.camera.functions().contains(&"sim.getVisionSensorImg".to_owned()));
     let (mut arm, mut camera) = cell.client.split();
-    let moving = std::thread::spawn(move || arm.move_to_joints(&GOAL, &limits(), &CancelToken::new()));
+    let moving = std::thread::spawn(move || arm.move_to_joints(&GOAL, &limits(), &CancelToken::default()));
     camera.grab().expect("a frame");
     moving.join().expect("no panic").expect("arrived");
 }

@@ -224,7 +224,8 @@ fn mover(call: &mut Call<'_>, fields: &Fields<'_>) -> Result<(Mover, Isometry3<f
         Some(pose) => Some(pose),
         None => twelve(fields, "matrix")?,
     };
-    let start = start.ok_or_else(|| ApiError::Other("missing field: 'pose', 'object' or 'ik' is required.".to_owned()))?;
+    let start =
+        start.ok_or_else(|| ApiError::Other("missing field: 'pose', 'object' or 'ik' is required.".to_owned()))?;
     Ok((Mover::Nobody, start))
 }
 

@@ -85,8 +85,7 @@ fn wait(call: &mut Call<'_>) -> Outcome {
     if !seconds.is_finite() {
         return Err(WorldError::InvalidArguments.into());
     }
-    let since_s =
-        if simulated { call.cell.world.simulation().time_s() } else { call.cell.now.as_secs_f64() };
+    let since_s = if simulated { call.cell.world.simulation().time_s() } else { call.cell.now.as_secs_f64() };
     Ok(Answer::Later(Box::new(WaitTask { seconds, simulated, since_s })))
 }
 
