@@ -85,9 +85,13 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
 
     keep_earlier_session(&folder)?;
     let mut session = SessionWriter::create(&folder, meta(&truth, args.seed)?).map_err(Failure::failed)?;
-    let captured = capture_all(&mut cell, &plan, &mut session, &cancel);
-    // Whatever happened on the way, the arm is not left moving and the simulation not running.
-    let ended = cell.stop().and_then(|()| cell.arm().sim().stop_simulation());
+    let captured = capture_all(&mut cell, &plan, args.real_time, &mut session, &cancel);
+    // Whatever happened on the way, the arm is not left moving and the simulation not running or waiting for steps.
+    let ended = cell.stop().and_then(|()| {
+        let sim = cell.arm().sim();
+        sim.set_stepping(false)?;
+        sim.stop_simulation()
+    });
     captured?;
     if let Err(error) = ended {
         tracing::warn!(%error, "the simulation could not be stopped");
@@ -157,22 +161,24 @@ fn meta(truth: &handeye_sim_link::client::cell::GroundTruth, seed: Option<u64>) 
 fn capture_all(
     cell: &mut CellClient,
     plan: &Plan,
+    real_time: bool,
     session: &mut SessionWriter,
     cancel: &CancelToken,
 ) -> Result<(), Failure> {
-    let stop = cancel.clone();
-    cell.arm().sim().start_simulation().map_err(Failure::failed)?;
+    // Stepped, a pass takes as long as it takes, and the same command gives the same pictures on every machine.
+    let sim = cell.arm().sim();
+    sim.set_stepping(!real_time).and_then(|()| sim.start_simulation()).map_err(Failure::failed)?;
     if let Some(start) = &plan.start_joints {
-        cell.move_to_joints(start, &plan.joint_limits, &stop).map_err(Failure::failed)?;
+        cell.move_to_joints(start, &plan.joint_limits, cancel).map_err(Failure::failed)?;
     }
     for (index, (name, goal)) in plan.goals.iter().enumerate() {
         let moved = match goal {
-            Goal::Tip(pose) => cell.move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), &stop),
+            Goal::Tip(pose) => cell.move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), cancel),
             Goal::Joints(joints) => joints.as_slice().try_into().map_or_else(
                 |_wrong_length| {
                     Err(LinkError::BadMotion { what: "the goal", expected: "six joints", value: joints.len() as f64 })
                 },
-                |joints| cell.move_to_joints(joints, &plan.joint_limits, &stop),
+                |joints| cell.move_to_joints(joints, &plan.joint_limits, cancel),
             ),
         };
         match moved {
