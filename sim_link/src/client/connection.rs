@@ -169,6 +169,8 @@ impl Connection {
         }
         self.uuid = self.ids.draw();
         self.introduced = false;
+        // The server knows nothing of the new client yet.
+        self.contacted = false;
         self.epoch += 1;
     }
 
@@ -317,7 +319,7 @@ impl Connection {
         protocol::request(func, args, &self.uuid, introduction)
     }
 
-    fn late(&self, exchange: &Exchange<'_>, after: Duration) -> LinkError {
+    fn late(&mut self, exchange: &Exchange<'_>, after: Duration) -> LinkError {
         let call = exchange.func.to_owned();
         if self.transport.connected() {
             LinkError::Timeout { call, after }
