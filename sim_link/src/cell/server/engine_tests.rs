@@ -5,7 +5,7 @@ use proptest::prelude::{any, proptest};
 
 use super::*;
 use crate::cell::scene::Scene;
-use crate::wire::{self, Reader as _};
+use crate::wire::{self, Reader};
 
 /// An engine with its clock and what it has answered.
 struct Bench {
@@ -89,7 +89,7 @@ impl Bench {
     fn error(&mut self, func: &str, args: Vec<Value>) -> String {
         self.send(A, func, args);
         let reply = self.await_reply(A).expect("answered");
-        reply.get("err").and_then(|text| text.text()).unwrap_or_else(|| panic!("{func} gave {reply:?}")).to_owned()
+        reply.get("err").and_then(Reader::text).unwrap_or_else(|| panic!("{func} gave {reply:?}")).to_owned()
     }
 
     fn time_s(&self) -> f64 {
@@ -240,7 +240,7 @@ fn in_real_time_a_pass_comes_every_time_step_and_a_pause_is_not_made_up_for() {
         bench.now += Duration::from_millis(10);
         bench.engine.turn(bench.now);
     }
-    assert_eq!(bench.now - start, Duration::from_millis(200));
+    assert_eq!(bench.now, start + Duration::from_millis(200));
     assert!((bench.time_s() - 0.25).abs() < 1e-12, "{}", bench.time_s());
     bench.now += Duration::from_secs(10);
     for _ in 0..10 {
@@ -280,10 +280,22 @@ fn a_move_ends_exactly_at_its_target_and_others_are_served_meanwhile() {
     };
     assert_eq!(bench.joints(), GOAL);
     assert!(seen.len() > 10, "only {} looks during the move", seen.len());
-    let state = &done.get("ret").and_then(|ret| ret.list()).expect("a map")[0];
-    assert_eq!(state.get("pos").and_then(|v| v.numbers()), Some(GOAL.to_vec()));
-    assert_eq!(state.get("vel").and_then(|v| v.numbers()), Some(vec![0.0; 6]));
-    for field in ["joints", "accel", "targetPos", "targetVel", "maxVel", "minVel", "maxJerk", "minAccel", "flags", "timeStep", "timeLeft"] {
+    let state = &done.get("ret").and_then(Reader::list).expect("a map")[0];
+    assert_eq!(state.get("pos").and_then(Reader::numbers), Some(GOAL.to_vec()));
+    assert_eq!(state.get("vel").and_then(Reader::numbers), Some(vec![0.0; 6]));
+    for field in [
+        "joints",
+        "accel",
+        "targetPos",
+        "targetVel",
+        "maxVel",
+        "minVel",
+        "maxJerk",
+        "minAccel",
+        "flags",
+        "timeStep",
+        "timeLeft",
+    ] {
         assert!(state.get(field).is_some(), "{field}");
     }
     assert!(state.get("callback").is_none() && state.get("ruckigObj").is_none());
@@ -337,7 +349,7 @@ fn a_callback_moves_instead_of_the_server_may_call_back_and_holds_time() {
         if reply.get("ret").is_some() {
             break;
         }
-        assert_eq!(reply.get("func").and_then(|f| f.text()), Some("cb_7f"));
+        assert_eq!(reply.get("func").and_then(Reader::text), Some("cb_7f"));
         let before = bench.time_s();
         for _ in 0..5 {
             bench.engine.turn(bench.now);
@@ -393,7 +405,7 @@ fn the_positional_form_calls_back_with_three_lists_and_returns_four_values() {
     bench.send(A, "sim.moveToConfig", args);
     let end = loop {
         let reply = bench.await_reply(A).expect("goes on");
-        match reply.get("args").and_then(|args| args.list()) {
+        match reply.get("args").and_then(Reader::list) {
             None => break reply,
             Some([pos, vel, accel, aux]) => {
                 assert!(pos.numbers().is_some() && vel.numbers().is_some() && accel.numbers().is_some());
@@ -403,7 +415,7 @@ fn the_positional_form_calls_back_with_three_lists_and_returns_four_values() {
         }
         bench.send(A, "_*executed*_", vec![]);
     };
-    let ret = end.get("ret").and_then(|ret| ret.list()).expect("values").to_vec();
+    let ret = end.get("ret").and_then(Reader::list).expect("values").to_vec();
     assert_eq!((ret.len(), ret[0].numbers()), (4, Some(vec![1.0])));
 }
 
@@ -515,7 +527,7 @@ fn an_object_moves_relative_to_another() {
         ("maxJerk", floats(&[50.0])),
     ]);
     let state = bench.get("sim.moveToPose", vec![params]);
-    assert!(state.get("dist").and_then(|d| d.number()).expect("there") > 0.3);
+    assert!(state.get("dist").and_then(Reader::number).expect("there") > 0.3);
     let position = bench.get("sim.getObjectPosition", vec![dummy]).numbers().expect("three numbers");
     // The arm stands at 0.025 m.
     for (a, b) in position.iter().zip([0.1, 0.2, 0.325]) {
@@ -547,8 +559,8 @@ fn a_stop_brakes_within_the_limits_and_the_call_returns_where_the_arm_rests() {
     assert!(speeds.windows(2).all(|pair| (pair[1] - pair[0]).abs() / 0.05 <= 4.0 + 1e-6), "{speeds:?}");
     let rest = *path.last().expect("moved");
     assert!(rest < 1.5, "went on to {rest}");
-    let state = &reply.get("ret").and_then(|ret| ret.list()).expect("a map")[0];
-    assert_eq!(state.get("pos").and_then(|p| p.numbers()).expect("numbers")[0], rest);
+    let state = &reply.get("ret").and_then(Reader::list).expect("a map")[0];
+    assert_eq!(state.get("pos").and_then(Reader::numbers).expect("numbers")[0], rest);
 }
 
 #[test]
@@ -601,7 +613,7 @@ fn a_client_that_comes_back_with_a_new_socket_keeps_its_stepping() {
     bench.engine.disconnected(&peer(A), bench.now);
     bench.now += Duration::from_millis(500);
     bench.engine.receive(&b"new socket".to_vec(), &request(A, "sim.getSimulationTime", vec![]), bench.now);
-    bench.now += Duration::from_secs(60);
+    bench.now += Duration::from_mins(1);
     for _ in 0..5 {
         bench.engine.turn(bench.now);
     }
@@ -678,7 +690,7 @@ fn requests_without_id_without_function_and_with_code_have_their_own_answers() {
     };
     let mismatch = answer(wire::map([("func", Value::from("sim.step")), ("args", Value::Array(vec![]))]));
     assert_eq!(mismatch.get("success"), Some(&Value::from(false)));
-    assert!(mismatch.get("error").and_then(|e| e.text()).expect("text").contains("version does not match"));
+    assert!(mismatch.get("error").and_then(Reader::text).expect("text").contains("version does not match"));
     let uuid = || ("uuid", Value::from(A));
     assert_eq!(answer(wire::map([uuid()])), Value::Map(vec![]));
     assert!(answer(wire::map([uuid(), ("eval", Value::from("return 1"))])).get("err").is_some());
@@ -693,7 +705,7 @@ fn clients_and_their_calls_are_limited_and_idle_ones_make_room() {
         bench.now += Duration::from_millis(1);
         bench.call(&format!("idle {index}"), "sim.getSimulationState", vec![]);
     }
-    assert_eq!(bench.engine.clients.len(), MAX_CLIENTS);
+    assert_eq!(bench.engine.clients.records.len(), MAX_CLIENTS);
     for index in 0..MAX_CLIENTS {
         bench.call(&format!("busy {index}"), "sim.setStepping", vec![Value::from(true)]);
     }
@@ -712,17 +724,17 @@ fn clients_and_their_calls_are_limited_and_idle_ones_make_room() {
 fn truth_is_what_the_objects_say_in_opencvs_axes() {
     let mut bench = Bench::new();
     let truth = bench.get("handeye.truth", vec![]);
-    let numbers = |name: &str| truth.get(name).and_then(|v| v.numbers()).expect("numbers");
+    let numbers = |name: &str| truth.get(name).and_then(Reader::numbers).expect("numbers");
     let half = std::f64::consts::FRAC_1_SQRT_2;
     for (a, b) in numbers("tip_from_camera").iter().zip([0.05, 0.0, 0.0, 0.0, 0.0, half, half]) {
         assert!((a - b).abs() < 1e-12);
     }
-    let focal = truth.get("intrinsics").and_then(|i| i.get("fx")).and_then(|f| f.number()).expect("a number");
+    let focal = truth.get("intrinsics").and_then(|i| i.get("fx")).and_then(Reader::number).expect("a number");
     assert!((focal - 589.3667).abs() < 1e-4);
     let mut moved = numbers("base_from_target");
     moved[1] -= 0.1;
     bench.call(A, "handeye.setBoardPose", vec![floats(&moved)]);
-    let read = bench.get("handeye.truth", vec![]).get("base_from_target").and_then(|v| v.numbers()).expect("numbers");
+    let read = bench.get("handeye.truth", vec![]).get("base_from_target").and_then(Reader::numbers).expect("numbers");
     for (a, b) in read.iter().zip(&moved) {
         assert!((a - b).abs() < 1e-12);
     }
@@ -756,7 +768,8 @@ fn buffers_are_background_before_the_first_pass_and_come_with_the_full_resolutio
 fn a_vision_sensor_tells_its_lens_by_parameters_and_properties() {
     let mut bench = Bench::new();
     let camera = Value::from(bench.engine.cell.stage.camera);
-    let angle = bench.get("sim.getObjectFloatParam", vec![camera.clone(), Value::from(1004)]).number().expect("a number");
+    let angle =
+        bench.get("sim.getObjectFloatParam", vec![camera.clone(), Value::from(1004)]).number().expect("a number");
     assert!((angle - 57.0_f64.to_radians()).abs() < 1e-12);
     assert_eq!(bench.get("sim.getObjectInt32Param", vec![camera.clone(), Value::from(1002)]), Value::from(640));
     let planes = bench.get("sim.getFloatArrayProperty", vec![camera.clone(), Value::from("clippingPlanes")]);
@@ -780,7 +793,7 @@ fn signals_and_logs_are_kept_within_bounds() {
     for line in 0..1000 {
         bench.call(A, "sim.addLog", vec![Value::from(450), Value::from(format!("{line}"))]);
     }
-    assert_eq!(bench.engine.cell().log.len(), 200);
+    assert_eq!(bench.engine.cell.log.len(), 200);
     bench.call(A, "sim.addLog", vec![Value::from(450), Value::Null]);
     assert!(bench.error("sim.addLog", vec![Value::from(420), Value::from("oh")]).ends_with("oh"));
 }
@@ -800,7 +813,11 @@ fn twenty_thousand_mutated_requests_break_nothing() {
         request(A, "sim.setObjectParent", vec![Value::from(18), Value::from(20), Value::from(true)]),
         request(A, "sim.moveToConfig", vec![to_config(&bench, GOAL, 1.0)]),
         request(A, "sim.moveToPose", vec![params]),
-        request(A, "sim.getVisionSensorImg", vec![Value::from(15), Value::from(3), Value::from(0.5), floats(&[0.0, 1.0]), floats(&[9.0, 9.0])]),
+        request(
+            A,
+            "sim.getVisionSensorImg",
+            vec![Value::from(15), Value::from(3), Value::from(0.5), floats(&[0.0, 1.0]), floats(&[9.0, 9.0])],
+        ),
         request(A, "sim.removeObjects", vec![wire::integers([15, 16, 17])]),
         request(A, "sim.createDummy", vec![Value::from(0.01)]),
         request(A, "sim.setJointTargetPosition", vec![Value::from(16), Value::from(1.0), floats(&[1.0, 1.0, 1.0])]),

@@ -60,7 +60,9 @@ pub enum CellError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// Another program listens there, most likely CoppeliaSim or another cell.
-    #[error("port {port} on {bind} is in use: end the program that listens there, or choose another port (0 finds a free one)")]
+    #[error(
+        "port {port} on {bind} is in use: end the program that listens there, or choose another port (0 finds a free one)"
+    )]
     PortInUse {
         /// Address asked for.
         bind: String,

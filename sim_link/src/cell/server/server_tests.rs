@@ -4,7 +4,7 @@ use std::time::Duration;
 use ciborium::Value;
 
 use super::*;
-use crate::wire::{self, Reader as _};
+use crate::wire::{self, Reader};
 
 /// How long a reply may take on a machine that is busy with other tests.
 const PATIENCE_MS: i32 = 20_000;
@@ -45,7 +45,7 @@ impl Client {
 
     fn time_s(&self) -> f64 {
         let reply = self.call("sim.getSimulationTime", vec![]);
-        reply.get("ret").and_then(|ret| ret.numbers()).expect("a time")[0]
+        reply.get("ret").and_then(Reader::numbers).expect("a time")[0]
     }
 
     /// Asks until simulated time has passed a mark.
