@@ -8,6 +8,7 @@ use super::cell::Cell;
 use super::clients::{Client, Clients, MAX_CALLS, MAX_CLIENTS, Peer, Running, Waiting};
 use super::message::{self, Request};
 use super::task::{Answer, Next, Task, Wake};
+use crate::cell::world::State;
 
 /// Steps that calls may take in one turn before requests are looked at again. A motion in a stopped simulation has no
 /// pass to wait for and would otherwise keep everybody waiting until it is over.
@@ -283,7 +284,9 @@ impl Engine {
 
     /// Brings what a vanished client was moving to rest.
     fn adopt(&mut self, mut call: Running) {
-        if call.task.is_moving() && matches!(call.waiting, Waiting::Pass(_)) {
+        let is_on_its_way =
+            matches!(call.waiting, Waiting::Pass(_)) && self.cell.world.simulation().state() != State::Stopped;
+        if call.task.is_moving() && is_on_its_way {
             tracing::warn!(uuid = call.uuid, func = call.func, "a client vanished during a motion: braking");
             call.task.brake(&self.cell);
             self.orphans.push(call.task);
@@ -318,5 +321,5 @@ impl Client {
 }
 
 #[cfg(test)]
-#[path = "engine_tests.rs"]
+#[path = "engine_tests/mod.rs"]
 mod tests;

@@ -182,3 +182,9 @@ fn dropping_the_server_closes_its_socket_at_once() {
     drop(server);
     assert!(before.elapsed() < Duration::from_secs(2));
 }
+
+#[test]
+fn a_server_can_be_shared_between_threads() {
+    fn shared<T: Send + Sync>() {}
+    shared::<CellServer>();
+}
