@@ -106,7 +106,7 @@ impl Connection {
 /// All clients and connections.
 #[derive(Debug, Default)]
 pub struct Clients {
-    records: BTreeMap<String, Client>,
+    pub(super) records: BTreeMap<String, Client>,
     connections: BTreeMap<Peer, Connection>,
 }
 
@@ -133,11 +133,6 @@ impl Clients {
     /// All records.
     pub fn records_mut(&mut self) -> impl Iterator<Item = &mut Client> {
         self.records.values_mut()
-    }
-
-    /// Number of clients that are remembered.
-    pub fn len(&self) -> usize {
-        self.records.len()
     }
 
     /// The connection, made if it is new, now used by `uuid`.

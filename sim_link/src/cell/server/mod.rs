@@ -26,7 +26,8 @@ mod task;
 use std::thread::JoinHandle;
 
 use crate::cell::scene::Scene;
-use cell::{BuildError, Cell};
+pub use cell::BuildError;
+use cell::Cell;
 use engine::Engine;
 use socket::{Loop, Stopper};
 

@@ -259,11 +259,12 @@ pub fn entry(name: &str, value: Value) -> (Value, Value) {
 }
 
 /// Sets fields of a state map, leaving the others as the client gave them.
-pub fn with_fields(given: &[(Value, Value)], fields: Vec<(Value, Value)>) -> Vec<(Value, Value)> {
+pub fn with_fields(given: &[(Value, Value)], mut fields: Vec<(Value, Value)>) -> Vec<(Value, Value)> {
     /// Names of functions and of what only the server needs.
     const HIDDEN: [&str; 3] = ["callback", "ruckigObj", "ik"];
     let is_set = |key: &Value| fields.iter().any(|(set, _)| set == key);
     let is_hidden = |key: &Value| HIDDEN.iter().any(|name| key.as_text() == Some(name));
-    let kept = given.iter().filter(|(key, _)| !is_set(key) && !is_hidden(key)).cloned();
-    kept.chain(fields.iter().cloned()).collect()
+    let kept: Vec<_> = given.iter().filter(|(key, _)| !is_set(key) && !is_hidden(key)).cloned().collect();
+    fields.extend(kept);
+    fields
 }

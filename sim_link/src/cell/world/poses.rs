@@ -55,7 +55,7 @@ fn reference(tree: &Tree, object: Flagged, relative_to: Handle) -> Result<Isomet
         },
         other => other,
     };
-    let is_joint = matches!(tree.get(reference).map_err(|_| WorldError::NoSuchReference)?.kind, Kind::Joint(_));
+    let is_joint = matches!(tree.get(reference).ok().ok_or(WorldError::NoSuchReference)?.kind, Kind::Joint(_));
     if is_joint && !object.joint_base {
         tree.moving_pose(reference, Chain::Reported)
     } else {

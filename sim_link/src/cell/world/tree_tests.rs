@@ -3,7 +3,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use super::*;
 
 fn joint() -> Kind {
-    Kind::Joint(Joint::new(-TAU, TAU))
+    Kind::Joint(Box::new(Joint::new(-TAU, TAU)))
 }
 
 fn dummy() -> Kind {
