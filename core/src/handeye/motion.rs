@@ -14,11 +14,11 @@ use crate::frames::{Anchor, Frame as _, Mount, Pose};
 /// Two motions about different axes are the least that determines a hand-eye transform, and they take three views.
 pub const MIN_VIEWS: usize = 3;
 
-/// A turn below this [rad] counts as none. Real pose pairs scatter by 0.04° to 0.26° per axis (robot and camera
+/// A turn below this, in radians, counts as none. Real pose pairs scatter by 0.04° to 0.26° per axis (robot and camera
 /// together), so the axis of a turn under 1° is mostly noise.
 pub const NO_ROTATION_RAD: f64 = 1f64.to_radians();
 
-/// Axes that spread by less than this [rad] count as parallel. The error along the common axis is the error of the
+/// Axes that spread by less than this, in radians, count as parallel. The error along the common axis is the error of the
 /// poses over the sine of the spread: at 1° half a millimetre becomes three centimetres.
 pub const PARALLEL_AXES_RAD: f64 = 1f64.to_radians();
 

@@ -21,8 +21,8 @@ use crate::se3::skew;
 /// Views hold `anchor_from_mount` and `camera_from_target`, metres. The result maps camera to mount coordinates.
 /// # Needs
 /// Three views, turned about two axes that are not parallel. The real parts, equal for exact motions by the theorem
-/// of screw congruence, are not used. Rotations and half metres stand in one sum of squares, so with noise the answer
-/// depends on the unit of length and on the mount's origin. Quaternion signs as for [`Horaud`](super::Horaud).
+/// of screw congruence, are not used, so that with noise the axes of the frames matter. Rotations and half metres
+/// stand in one sum of squares, so the unit of length does too. Quaternion signs as for [`Horaud`](super::Horaud).
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when half turns leave the rotation open, when more than two
 /// singular vectors are null, or when the noise leaves no real combination of the two (OpenCV returns NaN).

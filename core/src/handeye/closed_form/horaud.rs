@@ -17,8 +17,8 @@ use crate::handeye::{HandEyeError, PosePair};
 /// # Frames and units
 /// Views hold `anchor_from_mount` and `camera_from_target`, metres. The result maps camera to mount coordinates.
 /// # Needs
-/// Three views, turned about two axes that are not parallel. The answer follows every change of the anchor, mount,
-/// camera and target frames, also with noise. Wide turns count most and repeated poses count nothing.
+/// Three views, turned about two axes that are not parallel. Wide turns count most, motions between repeated poses not
+/// at all.
 /// The quaternions of `A` and `B` must have matching signs: positive real parts, as in OpenCV, and next to a half
 /// turn the sign that the other motions ask for.
 /// # Errors

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::linear::{Rows, rotation_up_to_scale};
+use super::linear::{Rows, rotation_of_size_one};
 use super::pairing::matrix;
 use super::shah::solution;
 use super::{ClosedForm, ClosedFormSolution, Method, check};
@@ -23,9 +23,11 @@ use crate::handeye::{HandEyeError, PosePair};
 /// Three views, turned about two axes that are not parallel, with the mount moved as well as turned: the size of the
 /// matrices follows from the translations alone. It need not become 1, and an error of it goes into the translations
 /// of both links: with few or noisy views they can be off by centimetres (17 cm with eight views of a real
-/// eye-to-hand session, as in OpenCV). Half turns need no care, unless there are no other turns.
+/// eye-to-hand session, as in OpenCV). Half turns need no care: no axis is taken.
 /// # Errors
-/// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when the translations do not fix the size of the matrices.
+/// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when nothing fixes the size of a matrix, or when it is not
+/// between 0.5 and 2 because the translations are too small for their noise: OpenCV then returns translations wrong by
+/// that factor.
 /// # Reference
 /// Li, Wang & Wu 2010, "Simultaneous robot-world and hand-eye calibration using dual-quaternions and Kronecker
 /// product", International Journal of the Physical Sciences 5(10), 1530-1536, eq. 19 (the journal assigned no DOI).
@@ -44,10 +46,12 @@ impl ClosedForm for Li {
         for view in pairs {
             rows.push(&equations(view));
         }
-        let x = rows.least_squares().ok_or_else(|| method.fails("the views leave a rotation or translation open"))?;
+        let x = rows.least_squares().ok_or_else(|| {
+            method.fails("the views leave a rotation, translation or scale open, move the tip further")
+        })?;
         let rotation = |at: usize| {
-            rotation_up_to_scale(&Matrix3::from_row_slice(&x.as_slice()[at..at + 9]))
-                .ok_or_else(|| method.fails("the mount's origin moved too little to fix the scale of the rotations"))
+            rotation_of_size_one(&Matrix3::from_row_slice(&x.as_slice()[at..at + 9]))
+                .ok_or_else(|| method.fails("the mount's origin moved too little to fix the scale against the noise"))
         };
         let translation = |at: usize| Vector3::new(x[at], x[at + 1], x[at + 2]);
         method.finite(solution((rotation(0)?, translation(18)), (rotation(9)?, translation(21))))

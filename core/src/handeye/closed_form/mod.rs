@@ -2,11 +2,25 @@
 //!
 //! Five solve `A X = X B` over the relative motions of all pairs of views, two solve `A X = Z B` over the views
 //! themselves; [`all`] lists them. They follow the variants that OpenCV's `calibrateHandEye` and
-//! `calibrateRobotWorldHandEye` use and agree with version 4.14 to rounding; where a file here departs from OpenCV,
-//! it is in a case that OpenCV answers wrongly or not at all, and its documentation says so.
+//! `calibrateRobotWorldHandEye` use and agree with version 4.14 to 1e-9; where a file here departs from OpenCV, it is
+//! in a case that OpenCV answers wrongly or not at all, and its documentation says so.
 //!
 //! None of them weights its data, so none is the estimate to trust: they start the joint estimation, and their
-//! disagreement tells how well the views determine the answer.
+//! disagreement tells how well the views determine the answer. With exact data all are exact. With noise, most
+//! depend on choices that should not matter: on where the origin or the axes of a frame were put, and the methods over
+//! pairs, which take each pair in one direction only, on the order of the views:
+//!
+//! | method | anchor | mount | camera | target | order of views |
+//! | --- | --- | --- | --- | --- | --- |
+//! | `tsai_lenz` | free | origin and axes matter | origin and axes matter | free | matters for the translation |
+//! | `park_martin` | free | free | origin matters | free | matters for the translation |
+//! | `horaud` | free | free | origin matters | free | matters for the translation |
+//! | `andreff` | free | free | origin matters | free | matters |
+//! | `daniilidis` | free | origin and axes matter | origin and axes matter | free | free |
+//! | `shah` | origin matters | free | free | free | free |
+//! | `li` | origin matters | origin matters | free | free | free |
+//!
+//! `andreff`, `daniilidis` and `li` also depend on the unit of length, which is the metre here.
 
 mod andreff;
 mod daniilidis;

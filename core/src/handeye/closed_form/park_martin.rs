@@ -18,16 +18,16 @@ use crate::se3;
 /// # Frames and units
 /// Views hold `anchor_from_mount` and `camera_from_target`, metres. The result maps camera to mount coordinates.
 /// # Needs
-/// Three views, turned about two axes that are not parallel. The answer follows every change of the anchor, mount,
-/// camera and target frames, also with noise. Wide turns count most and repeated poses count nothing.
+/// Three views, turned about two axes that are not parallel. Wide turns count most, motions between repeated poses not
+/// at all.
 /// Next to a half turn the sign of the axes is taken from the other motions, where OpenCV takes it from noise.
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when half turns leave the rotation open, or when the camera
 /// did not turn as the robot did.
 /// # Reference
 /// Park & Martin 1994, "Robot sensor calibration: solving AX=XB on the Euclidean group", doi:10.1109/70.326576. The
-/// paper's `(MᵀM)^(-1/2) Mᵀ` with `M = Σ b aᵀ` is taken from an SVD that keeps the determinant at +1, which also
-/// covers rotation vectors in one plane, where `MᵀM` has no inverse.
+/// paper's `(MᵀM)^(-1/2) Mᵀ` with `M = Σ b aᵀ` is taken from an SVD that keeps the determinant at +1, where
+/// noise on a weak third axis would make it a reflection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ParkMartin;
 

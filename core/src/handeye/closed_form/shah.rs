@@ -19,9 +19,8 @@ use crate::handeye::{HandEyeError, PosePair};
 /// Views hold `anchor_from_mount` and `camera_from_target`, metres. The results map camera to mount and target to
 /// anchor coordinates.
 /// # Needs
-/// Three views, turned about two axes that are not parallel. The answer follows every change of the four frames, also
-/// with noise. Every view counts alike, so a repeated pose counts double. Half turns need no care, unless there are
-/// no other turns.
+/// Three views, turned about two axes that are not parallel. Every view counts alike, so a repeated pose counts double.
+/// Half turns need no care, unless there are no other turns.
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when two pairs of singular vectors fit equally well.
 /// # Reference

@@ -27,9 +27,9 @@ const LARGEST_CHORD: f64 = 1.7;
 /// Views hold `anchor_from_mount` and `camera_from_target`, metres. The result maps camera to mount coordinates.
 /// # Needs
 /// Three views, turned about two axes that are not parallel by 17.3° to 116.4°, seen by robot and camera alike; other
-/// motions are left out. The answer does not depend on the anchor frame, but with noise it does on the mount frame.
+/// motions are left out.
 /// Near a half turn of the camera on its mount `x` grows without bound and noise pulls the angle below 180°, so
-/// another method is then the better one. When `x` does not exist within [rounding](super::linear::RANK_TOLERANCE)
+/// another method is then the better one. When `x` does not exist within rounding (condition number 1e10),
 /// the camera is turned by the half turn about x, y or z that conditions the system best, and turned back.
 /// # Errors
 /// As [`ClosedForm::solve`]; [`HandEyeError::NoSolution`] when the turns of that size do not span two axes (OpenCV
