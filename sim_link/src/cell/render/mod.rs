@@ -182,8 +182,8 @@ pub enum LightSource {
 impl Default for Light {
     /// A ceiling lamp in front of the arm, mild enough for white paper.
     fn default() -> Self {
-        let towards_lamp = Unit::new_normalize(Vector3::new(0.35, 0.75, 1.0));
-        Self { source: LightSource::Directional(towards_lamp), ambient: 0.5, diffuse: 0.45 }
+        let towards_lamp = Unit::new_normalize(Vector3::new(0.35, 0.9, 1.0));
+        Self { source: LightSource::Directional(towards_lamp), ambient: 0.52, diffuse: 0.46 }
     }
 }
 
@@ -219,3 +219,8 @@ pub struct RenderedFrame {
     /// exactly where there is nothing between near and far plane.
     pub depth_m: Vec<f32>,
 }
+
+#[cfg(test)]
+mod scene_tests;
+#[cfg(test)]
+mod truth_tests;

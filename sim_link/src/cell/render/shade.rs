@@ -1,7 +1,10 @@
 //! Colour of a surface point: lamp, finish, fading of the ground.
 
+use std::sync::LazyLock;
+
 use nalgebra::Isometry3;
 
+use super::board::floor;
 use super::shapes::{Vec3, dot, scale_add};
 use super::{Finish, Light, LightSource, Solid};
 
@@ -91,20 +94,17 @@ pub(super) struct Spot {
 }
 
 impl Spot {
-    /// How the point moves on the surface per pixel to the right and per pixel down.
-    fn across_pixel(&self) -> [Vec3; 2] {
+    /// Coordinate of the point along a direction, and half the range that it has over the pixel.
+    fn along(&self, direction: &Vec3, origin: f64) -> (f64, f64) {
         let Self { point, normal, by_pixel, .. } = self;
-        let depth = point[2];
-        let facing = 1.0 / dot(normal, point);
-        let by_ray = |axis: usize| {
-            let mut step = scale_add(-depth * normal[axis] * facing, point, &[0.0; 3]);
-            step[axis] += depth;
-            step
-        };
-        let (by_x, by_y) = (by_ray(0), by_ray(1));
+        let value = dot(direction, point);
+        let facing = value / dot(normal, point);
+        // A point on the plane n·p = const moves by depth · (e - p n_e / n·p) when the ray changes along the axis e.
+        let by_x = point[2] * (direction[0] - facing * normal[0]);
+        let by_y = point[2] * (direction[1] - facing * normal[1]);
         let [x_by_u, x_by_v, y_by_u, y_by_v] = by_pixel.map(f64::from);
-        let along = |x: f64, y: f64| scale_add(x, &by_x, &scale_add(y, &by_y, &[0.0; 3]));
-        [along(x_by_u, y_by_u), along(x_by_v, y_by_v)]
+        let range = (by_x * x_by_u + by_y * y_by_u).abs() + (by_x * x_by_v + by_y * y_by_v).abs();
+        (value + origin, 0.5 * range)
     }
 }
 
@@ -152,40 +152,44 @@ impl Coat {
 
     /// Factor on the colour.
     fn texture(&self, spot: &Spot) -> f32 {
-        let place = |axis: usize| dot(&self.shape_from_camera[axis], &spot.point) + self.origin[axis];
-        if matches!(self.finish, Finish::Matt | Finish::Satin) {
-            return 1.0;
-        }
-        let [by_u, by_v] = spot.across_pixel();
-        let half_width = |axis: usize| {
-            let row = &self.shape_from_camera[axis];
-            0.5 * (dot(row, &by_u).abs() + dot(row, &by_v).abs())
-        };
+        let along = |axis: usize| spot.along(&self.shape_from_camera[axis], self.origin[axis]);
         match self.finish {
             Finish::Matt | Finish::Satin => 1.0,
-            Finish::Brushed => 1.0 + 0.05 * grain(place(2) / 0.0011, half_width(2) / 0.0011, 7),
+            Finish::Brushed => {
+                let (z, width) = along(2);
+                1.0 + 0.06 * grain(z * 900.0, width * 900.0)
+            }
             Finish::Tiles { pitch_m, joint_m } => {
-                let (x, y) = (place(0) / pitch_m, place(1) / pitch_m);
-                let (wx, wy) = (half_width(0) / pitch_m, half_width(1) / pitch_m);
-                let joint = joint_m / pitch_m;
-                let open = (1.0 - stripes(x, wx, joint)) * (1.0 - stripes(y, wy, joint));
-                let tile = lattice(x.floor() as i64, y.floor() as i64);
-                let far = fading(wx.max(wy));
-                (1.0 - 0.30 * (1.0 - open) as f32) * (1.0 + 0.035 * far * tile)
+                let per_metre = 1.0 / pitch_m;
+                let ((x, x_width), (y, y_width)) = (along(0), along(1));
+                let (x, y) = (x * per_metre, y * per_metre);
+                let (x_width, y_width) = (x_width * per_metre, y_width * per_metre);
+                let joint = joint_m * per_metre;
+                let open = (1.0 - stripes(x, x_width, joint)) * (1.0 - stripes(y, y_width, joint));
+                let tone = fading(x_width.max(y_width)) * lattice(floor(x) as i64, floor(y) as i64);
+                (0.7 + 0.3 * open as f32) * (1.0 + 0.03 * tone)
             }
             Finish::Wood => {
-                let (x, y) = (place(0), place(1));
-                let (wx, wy) = (half_width(0), half_width(1));
-                let board = (y / 0.14).floor();
-                let bend = f64::from(cloud(x * 1.7 + board * 17.3, y * 9.0 + board * 5.1)) * 0.012;
-                let fine = 520.0;
-                let rings = cloud(x * 2.2 + board * 31.7, (y + bend) * 75.0) * fading(wy * 75.0);
-                let pores = cloud(x * 14.0, (y + bend) * fine) * fading((wy * fine).max(wx * 14.0));
-                let seam = stripes(y / 0.14, wy / 0.14, 0.006) as f32;
-                (1.0 + 0.10 * rings + 0.05 * pores + 0.05 * lattice(board as i64, 3)) * (1.0 - 0.4 * seam)
+                let rows = &self.shape_from_camera;
+                // Grain runs along x on the flat sides and around the edge between them.
+                let across_edge = scale_add(1.0, &rows[1], &rows[2]);
+                let ((x, _), (y, width)) = (along(0), spot.along(&across_edge, self.origin[1] + self.origin[2]));
+                wood(x, y, width)
             }
         }
     }
+}
+
+/// Planks along x; `width` is half of what a pixel covers across.
+fn wood(x: f64, y: f64, width: f64) -> f32 {
+    const PLANK_M: f64 = 0.14;
+    let plank = floor(y / PLANK_M);
+    let shift = 1000.0 * f64::from(lattice(plank as i64, 3));
+    let bend = 0.009 * f64::from(grain(x * 2.6 + shift, 0.0)) + 0.002 * f64::from(grain(x * 9.0 - shift, 0.0));
+    let rings = grain((y + bend) * 95.0 + shift, width * 95.0);
+    let pores = grain((y + bend) * 620.0 - shift, width * 620.0);
+    let tone = 1.0 + 0.11 * rings + 0.07 * pores + 0.05 * lattice(plank as i64, 5);
+    tone * (1.0 - 0.45 * stripes(y / PLANK_M, width / PLANK_M, 0.007) as f32)
 }
 
 fn unit(a: &Vec3) -> Vec3 {
@@ -195,9 +199,14 @@ fn unit(a: &Vec3) -> Vec3 {
 
 /// Part of the interval `x ± half` that lies in stripes of width `width` before every integer.
 fn stripes(x: f64, half: f64, width: f64) -> f64 {
-    let up_to = |x: f64| x.floor() * width + (x - x.floor() - (1.0 - width)).max(0.0);
     let half = half.max(1e-9);
-    (up_to(x + half) - up_to(x - half)) / (2.0 * half)
+    let (low, high) = (x - half, x + half);
+    let below = floor(low);
+    if high - below < 1.0 - width {
+        return 0.0;
+    }
+    let up_to = |x: f64, whole: f64| whole * width + (x - whole - (1.0 - width)).max(0.0);
+    (up_to(high, floor(high)) - up_to(low, below)) / (2.0 * half)
 }
 
 /// 1 for detail much larger than a pixel, 0 for detail that a pixel would alias; `half` is in units of the detail.
@@ -213,25 +222,35 @@ fn lattice(i: i64, j: i64) -> f32 {
     h as i32 as f32 / 2_147_483_648.0
 }
 
-/// Smooth random numbers along a line, in ±1, fading where a pixel is wider than the detail.
-fn grain(x: f64, half: f64, row: i64) -> f32 {
-    let visible = fading(half);
-    if visible == 0.0 {
-        return 0.0;
-    }
-    let i = x.floor();
-    let f = (x - i) as f32;
-    let (a, b) = (lattice(i as i64, row), lattice(i as i64 + 1, row));
-    visible * (a + (b - a) * f)
-}
+/// Samples of [`GRAIN`] at its finest level, a power of two.
+const GRAIN_SAMPLES: usize = 2048;
+const GRAIN_LEVELS: usize = 8;
 
-/// Smooth random numbers over a plane, in ±1.
-fn cloud(x: f64, y: f64) -> f32 {
-    let (i, j) = (x.floor(), y.floor());
-    let (f, g) = ((x - i) as f32, (y - j) as f32);
-    let (f, g) = (f * f * (3.0 - 2.0 * f), g * g * (3.0 - 2.0 * g));
-    let at = |di: i64, dj: i64| lattice(i as i64 + di, j as i64 + dj);
-    let low = at(0, 0) + (at(1, 0) - at(0, 0)) * f;
-    let high = at(0, 1) + (at(1, 1) - at(0, 1)) * f;
-    low + (high - low) * g
+/// Random numbers in ±1 along a line, and their means over 2, 4, 8… neighbours.
+static GRAIN: LazyLock<Vec<Vec<f32>>> = LazyLock::new(|| {
+    let mut levels = vec![(0..GRAIN_SAMPLES as i64).map(|i| lattice(i, 11)).collect::<Vec<f32>>()];
+    for level in 1..GRAIN_LEVELS {
+        let halved = levels[level - 1].chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        levels.push(halved);
+    }
+    levels
+});
+
+/// Smooth random numbers along a line, in ±1 with detail of length 1, averaged over `x ± half`.
+fn grain(x: f64, half: f64) -> f32 {
+    let scale = (2.0 * half).max(1.0);
+    // log2 by the bits of the float: exact at powers of two, linear between.
+    let level = (scale.to_bits() as f64 / (1u64 << 52) as f64 - 1023.0).min((GRAIN_LEVELS - 1) as f64 - 1e-6);
+    let fine = level as usize;
+    let sample = |level: usize| {
+        let samples = &GRAIN[level];
+        let x = x / (1u32 << level) as f64 - 0.5;
+        let whole = floor(x);
+        let f = (x - whole) as f32;
+        let i = whole as i64 as usize & (samples.len() - 1);
+        let (a, b) = (samples[i], samples[(i + 1) & (samples.len() - 1)]);
+        a + (b - a) * f * f * (3.0 - 2.0 * f)
+    };
+    let blend = (level - fine as f64) as f32;
+    if blend == 0.0 { sample(fine) } else { sample(fine) * (1.0 - blend) + sample(fine + 1) * blend }
 }
