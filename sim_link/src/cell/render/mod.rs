@@ -13,8 +13,10 @@ pub mod props;
 mod rays;
 mod renderer;
 mod shade;
+mod shadow;
 mod shapes;
 mod stage;
+mod texture;
 
 use handeye_core::image::RgbImage;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
@@ -135,7 +137,7 @@ pub enum Shape {
     Plane,
 }
 
-/// Surface of a [`Solid`].
+/// Surface of a [`Solid`]. Shadows fall on [`Self::Tiles`] and [`Self::Wood`] only.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Finish {
     /// One colour, no gloss.

@@ -1,11 +1,10 @@
 //! Colour of a surface point: lamp, finish, fading of the ground.
 
-use std::sync::LazyLock;
-
 use nalgebra::Isometry3;
 
 use super::board::floor;
 use super::shapes::{Vec3, dot, scale_add};
+use super::texture::{fading, grain, lattice, stripes, wood};
 use super::{Finish, Light, LightSource, Solid};
 
 /// Sharpness of the highlight on satin and brushed surfaces, as a power of two of the cosine.
@@ -136,6 +135,11 @@ impl Coat {
         })
     }
 
+    /// Whether shadows fall on it.
+    pub fn is_ground(&self) -> bool {
+        matches!(self.finish, Finish::Tiles { .. } | Finish::Wood)
+    }
+
     pub fn colour_at(&self, spot: &Spot, lamp: &Lamp, background: [f32; 3]) -> [f32; 3] {
         let towards = lamp.towards(&spot.point);
         let tone = lamp.brightness(&spot.normal, &towards, spot.sunlit) * self.texture(spot);
@@ -173,84 +177,15 @@ impl Coat {
                 let rows = &self.shape_from_camera;
                 // Grain runs along x on the flat sides and around the edge between them.
                 let across_edge = scale_add(1.0, &rows[1], &rows[2]);
-                let ((x, _), (y, width)) = (along(0), spot.along(&across_edge, self.origin[1] + self.origin[2]));
-                wood(x, y, width)
+                let ((x, x_width), (y, y_width)) =
+                    (along(0), spot.along(&across_edge, self.origin[1] + self.origin[2]));
+                wood(x, y, [x_width, y_width])
             }
         }
     }
 }
 
-/// Planks along x; `width` is half of what a pixel covers across.
-fn wood(x: f64, y: f64, width: f64) -> f32 {
-    const PLANK_M: f64 = 0.14;
-    let plank = floor(y / PLANK_M);
-    let shift = 1000.0 * f64::from(lattice(plank as i64, 3));
-    let bend = 0.009 * f64::from(grain(x * 2.6 + shift, 0.0)) + 0.002 * f64::from(grain(x * 9.0 - shift, 0.0));
-    let rings = grain((y + bend) * 95.0 + shift, width * 95.0);
-    let pores = grain((y + bend) * 620.0 - shift, width * 620.0);
-    let tone = 1.0 + 0.11 * rings + 0.07 * pores + 0.05 * lattice(plank as i64, 5);
-    tone * (1.0 - 0.45 * stripes(y / PLANK_M, width / PLANK_M, 0.007) as f32)
-}
-
 fn unit(a: &Vec3) -> Vec3 {
     let scale = 1.0 / dot(a, a).sqrt();
     [a[0] * scale, a[1] * scale, a[2] * scale]
-}
-
-/// Part of the interval `x ± half` that lies in stripes of width `width` before every integer.
-fn stripes(x: f64, half: f64, width: f64) -> f64 {
-    let half = half.max(1e-9);
-    let (low, high) = (x - half, x + half);
-    let below = floor(low);
-    if high - below < 1.0 - width {
-        return 0.0;
-    }
-    let up_to = |x: f64, whole: f64| whole * width + (x - whole - (1.0 - width)).max(0.0);
-    (up_to(high, floor(high)) - up_to(low, below)) / (2.0 * half)
-}
-
-/// 1 for detail much larger than a pixel, 0 for detail that a pixel would alias; `half` is in units of the detail.
-fn fading(half: f64) -> f32 {
-    (1.6 - 3.2 * half).clamp(0.0, 1.0) as f32
-}
-
-/// A fixed random number in ±1 for each point of a lattice.
-fn lattice(i: i64, j: i64) -> f32 {
-    let mut h = (i as u32).wrapping_mul(0x9E37_79B1) ^ (j as u32).wrapping_mul(0x85EB_CA77);
-    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-    h ^= h >> 13;
-    h as i32 as f32 / 2_147_483_648.0
-}
-
-/// Samples of [`GRAIN`] at its finest level, a power of two.
-const GRAIN_SAMPLES: usize = 2048;
-const GRAIN_LEVELS: usize = 8;
-
-/// Random numbers in ±1 along a line, and their means over 2, 4, 8… neighbours.
-static GRAIN: LazyLock<Vec<Vec<f32>>> = LazyLock::new(|| {
-    let mut levels = vec![(0..GRAIN_SAMPLES as i64).map(|i| lattice(i, 11)).collect::<Vec<f32>>()];
-    for level in 1..GRAIN_LEVELS {
-        let halved = levels[level - 1].chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
-        levels.push(halved);
-    }
-    levels
-});
-
-/// Smooth random numbers along a line, in ±1 with detail of length 1, averaged over `x ± half`.
-fn grain(x: f64, half: f64) -> f32 {
-    let scale = (2.0 * half).max(1.0);
-    // log2 by the bits of the float: exact at powers of two, linear between.
-    let level = (scale.to_bits() as f64 / (1u64 << 52) as f64 - 1023.0).min((GRAIN_LEVELS - 1) as f64 - 1e-6);
-    let fine = level as usize;
-    let sample = |level: usize| {
-        let samples = &GRAIN[level];
-        let x = x / (1u32 << level) as f64 - 0.5;
-        let whole = floor(x);
-        let f = (x - whole) as f32;
-        let i = whole as i64 as usize & (samples.len() - 1);
-        let (a, b) = (samples[i], samples[(i + 1) & (samples.len() - 1)]);
-        a + (b - a) * f * f * (3.0 - 2.0 * f)
-    };
-    let blend = (level - fine as f64) as f32;
-    if blend == 0.0 { sample(fine) } else { sample(fine) * (1.0 - blend) + sample(fine + 1) * blend }
 }
