@@ -14,7 +14,7 @@ use handeye_core::result::CalibrationResult;
 use handeye_core::session::{Capture, GroundTruth, Session, SessionMeta, SessionWriter};
 use handeye_core::target::{Grid, TargetSpec};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{CellClient, CellPaths, Frame, MotionTolerance};
+use handeye_sim_link::client::cell::{CellClient, CellPaths, Frame, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError, MotionLimits};
 use time::OffsetDateTime;
 use time::macros::format_description;
@@ -189,6 +189,8 @@ fn capture_all(
             }
             Err(error) => return Err(Failure::failed(error)),
         }
+        // An arm that still swings, or a picture from before it stood, would be a capture in motion.
+        cell.arm().settle(&SettleOptions::default(), cancel).map_err(Failure::failed)?;
         let frame = cell.grab().map_err(Failure::failed)?;
         store(session, &frame)?;
         tracing::info!("pose {} of {} captured ({name})", index + 1, plan.goals.len());

@@ -6,7 +6,7 @@ use handeye_core::camera::Intrinsics;
 use handeye_core::frames::{Base, Camera, Pose, Sensor, Tip};
 use handeye_core::image::RgbImage;
 
-use super::truth::{GroundTruth, PublishedTruth, TRUTH_NAME};
+use super::truth::{GroundTruth, PublishedTruth, TRUTH_FUNCTION};
 use super::{CellInfo, CellObjects, JointAngles, read_joint_angles};
 use crate::client::convert::{DepthFrame, sensor_from_camera};
 use crate::client::error::LinkError;
@@ -115,15 +115,16 @@ impl CameraFeed {
     /// that sees this is worth nothing.
     ///
     /// The pose comes from the scene: `tip_from_camera = tip_from_sensor * sensor_from_camera`. Intrinsics are those that
-    /// the cell publishes under [`TRUTH_NAME`], or else those of the sensor's settings, which are exact for
+    /// the cell publishes through [`TRUTH_FUNCTION`], or else those of the sensor's settings, which are exact for
     /// CoppeliaSim's own renderer.
     ///
     /// # Errors
     /// [`LinkError::BadTruth`] when something is published that cannot be read; otherwise as for any call.
     pub fn ground_truth(&mut self) -> Result<GroundTruth, LinkError> {
-        let published = match self.sim.get_published_string(TRUTH_NAME)? {
-            Some(text) => PublishedTruth::parse(&text)?,
-            None => PublishedTruth::default(),
+        let published = match self.sim.connection().call(TRUTH_FUNCTION, Vec::new()) {
+            Ok(reply) => PublishedTruth::parse(&reply.into_map(0)?)?,
+            Err(error) if error.is_unknown_function() => PublishedTruth::default(),
+            Err(error) => return Err(error),
         };
         let tip_from_sensor: Pose<Tip, Sensor> = self.sim.get_object_pose(self.objects.camera, self.objects.tip)?;
         let tip_from_camera: Pose<Tip, Camera> = tip_from_sensor * sensor_from_camera();

@@ -25,7 +25,7 @@ use handeye_core::frames::{Base, Pose, Tip};
 
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use camera::{CameraFeed, Frame};
-pub use truth::{GroundTruth, PublishedTruth, TRUTH_NAME};
+pub use truth::{GroundTruth, TRUTH_FUNCTION};
 
 use super::endpoint::Endpoint;
 use super::error::LinkError;

@@ -23,7 +23,7 @@ struct World {
     /// Parts of the way that a joint goes towards its target in a pass.
     follow: f64,
     missing: Vec<&'static str>,
-    truth: Option<String>,
+    truth: Option<Value>,
     passes_per_image: u32,
     cancel_at_step: Option<(u32, CancelToken)>,
     die_in: Option<&'static str>,
@@ -114,7 +114,10 @@ impl World {
             }
             "sim.getVisionSensorDepth" => ret([Value::Bytes(vec![0; 32]), wire::integers([4, 2])]),
             "sim.getNamedStringParam" => ret([Value::Null]),
-            "sim.getStringSignal" => ret([self.truth.clone().map_or(Value::Null, Value::from)]),
+            "handeye.truth" => match &self.truth {
+                Some(truth) => ret([truth.clone()]),
+                None => err("No such function: handeye.truth"),
+            },
             _ => self.motion(name, args),
         }
     }
@@ -432,24 +435,41 @@ fn the_truth_of_the_reference_scene_is_in_opencv_axes() {
 
 #[test]
 fn what_the_cell_publishes_goes_before_what_the_scene_shows() {
-    let mut intrinsics = Intrinsics::pinhole(4, 2, 3.7);
-    intrinsics.distortion = handeye_core::camera::Distortion::BrownConrady([0.1, 0.0, 0.001, 0.0, 0.0]);
-    let base_from_target = Pose::from_translation_xyzw([0.0, -0.4, 0.8], [0.0, 0.0, 1.0, 0.0]);
-    let published = PublishedTruth {
-        intrinsics: Some(intrinsics),
-        tip_from_camera: None,
-        base_from_target: Some(base_from_target),
+    let intrinsics = Intrinsics {
+        distortion: handeye_core::camera::Distortion::BrownConrady([0.1, 0.0, 0.001, 0.0, 0.0]),
+        ..Intrinsics::pinhole(4, 2, 3.7)
     };
+    let base_from_target = Pose::from_translation_xyzw([0.0, -0.4, 0.8], [0.0, 0.0, 1.0, 0.0]);
+    let published = wire::map([
+        (
+            "intrinsics",
+            wire::map([
+                ("width", Value::from(4)),
+                ("height", Value::from(2)),
+                ("fx", Value::Float(3.7)),
+                ("fy", Value::Float(3.7)),
+                ("cx", Value::Float(1.5)),
+                ("cy", Value::Float(0.5)),
+                ("model", Value::from("brown_conrady")),
+                ("distortion", wire::floats([0.1, 0.0, 0.001, 0.0, 0.0])),
+            ]),
+        ),
+        ("base_from_target", wire::floats([0.0, -0.4, 0.8, 0.0, 0.0, 1.0, 0.0])),
+    ]);
     let world = world();
-    edit(&world, |w| w.truth = Some(published.to_toml().expect("TOML")));
+    edit(&world, |w| w.truth = Some(published));
     let mut cell = cell(Arc::clone(&world));
     let truth = cell.client.ground_truth().expect("published");
     assert_eq!((truth.intrinsics, truth.intrinsics_published), (intrinsics, true));
     let (distance_m, angle_rad) = truth.base_from_target.expect("published").distance_to(&base_from_target);
     assert!(distance_m < 1e-15 && angle_rad < 1e-7);
 
-    edit(&world, |w| w.truth = Some("intrinsics = 3".to_owned()));
-    assert!(matches!(cell.client.ground_truth(), Err(LinkError::BadTruth { .. })));
-    edit(&world, |w| w.truth = Some("unknown = 3".to_owned()));
-    assert!(matches!(cell.client.ground_truth(), Err(LinkError::BadTruth { .. })));
+    for bad in [
+        wire::map([("intrinsics", Value::from(3))]),
+        wire::map([("base_from_target", wire::floats([0.0, 1.0]))]),
+        wire::map([("tip_from_camera", wire::floats([f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))]),
+    ] {
+        edit(&world, |w| w.truth = Some(bad));
+        assert!(matches!(cell.client.ground_truth(), Err(LinkError::BadTruth { .. })));
+    }
 }

@@ -1,13 +1,15 @@
 //! What a simulated cell says about itself, for comparison with what a calibration found.
 
-use handeye_core::camera::Intrinsics;
+use ciborium::Value;
+use handeye_core::camera::{Distortion, Intrinsics};
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use serde::{Deserialize, Serialize};
 
+use crate::client::convert;
 use crate::client::error::LinkError;
+use crate::wire::Reader;
 
-/// Name of the string signal under which a cell publishes a [`PublishedTruth`].
-pub const TRUTH_NAME: &str = "handeye.truth";
+/// The function through which a cell publishes its truth; CoppeliaSim has no such function.
+pub const TRUTH_FUNCTION: &str = "handeye.truth";
 
 /// The truth about a simulated cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,45 +24,59 @@ pub struct GroundTruth {
     pub intrinsics_published: bool,
 }
 
-/// The document that a cell publishes, as TOML; every part may be absent.
+/// What a cell publishes; every part may be absent.
 ///
 /// It carries what a scene of CoppeliaSim cannot express: a lens with distortion, the origin of the target, a camera
 /// that is not where its drawing is.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PublishedTruth {
-    /// The camera.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct PublishedTruth {
     pub intrinsics: Option<Intrinsics>,
-    /// The camera on the tip.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_from_camera: Option<Pose<Tip, Camera>>,
-    /// The target in the base.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_from_target: Option<Pose<Base, Target>>,
 }
 
 impl PublishedTruth {
-    /// Reads the document.
+    /// Reads the map that [`TRUTH_FUNCTION`] returns: poses `[x y z qx qy qz qw]`, intrinsics by their names.
     ///
     /// # Errors
-    /// [`LinkError::BadTruth`] when it is no such document or has numbers that cannot be computed with.
-    pub fn parse(text: &str) -> Result<Self, LinkError> {
-        let bad = |reason: String| LinkError::BadTruth { reason };
-        let truth: Self = toml::from_str(text).map_err(|error| bad(error.to_string()))?;
-        if let Some(intrinsics) = &truth.intrinsics {
-            intrinsics.validate().map_err(|error| bad(error.to_string()))?;
-        }
-        let finite = truth.tip_from_camera.is_none_or(|pose| pose.is_finite())
-            && truth.base_from_target.is_none_or(|pose| pose.is_finite());
-        if finite { Ok(truth) } else { Err(bad("a pose is not finite".to_owned())) }
+    /// [`LinkError::BadTruth`] when a part is there and cannot be computed with.
+    pub fn parse(map: &Value) -> Result<Self, LinkError> {
+        Ok(Self {
+            intrinsics: map.get("intrinsics").map(intrinsics).transpose()?,
+            tip_from_camera: map.get("tip_from_camera").map(|v| pose(v, "tip_from_camera")).transpose()?,
+            base_from_target: map.get("base_from_target").map(|v| pose(v, "base_from_target")).transpose()?,
+        })
     }
+}
 
-    /// Writes the document.
-    ///
-    /// # Errors
-    /// [`LinkError::BadTruth`] when a number has no TOML form.
-    pub fn to_toml(&self) -> Result<String, LinkError> {
-        toml::to_string(self).map_err(|error| LinkError::BadTruth { reason: error.to_string() })
+fn bad(reason: impl Into<String>) -> LinkError {
+    LinkError::BadTruth { reason: reason.into() }
+}
+
+fn pose<Dst, Src>(value: &Value, what: &str) -> Result<Pose<Dst, Src>, LinkError> {
+    let numbers = value.numbers().unwrap_or_default();
+    let seven = numbers.as_slice().try_into().map_err(|_other_length| bad(format!("{what}: not seven numbers")))?;
+    convert::pose_from_seven(seven).map_err(|error| bad(format!("{what}: {error}")))
+}
+
+fn intrinsics(map: &Value) -> Result<Intrinsics, LinkError> {
+    let number =
+        |key: &str| map.get(key).and_then(Reader::number).ok_or_else(|| bad(format!("intrinsics: no number {key}")));
+    let name = map.get("model").and_then(Reader::text).unwrap_or_default();
+    let model = Distortion::from_name(name).ok_or_else(|| bad(format!("intrinsics: no lens model {name:?}")))?;
+    let coefficients = map.get("distortion").and_then(Reader::numbers).unwrap_or_default();
+    if coefficients.len() != model.coefficients().len() {
+        return Err(bad(format!("intrinsics: {} distortion coefficients for the model {name:?}", coefficients.len())));
     }
+    let intrinsics = Intrinsics {
+        width: number("width")? as u32,
+        height: number("height")? as u32,
+        fx: number("fx")?,
+        fy: number("fy")?,
+        cx: number("cx")?,
+        cy: number("cy")?,
+        distortion: model.with_coefficients(&coefficients),
+    };
+    intrinsics.validate().map_err(|error| bad(error.to_string()))?;
+    Ok(intrinsics)
 }

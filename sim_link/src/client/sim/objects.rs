@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use super::{JointInterval, ObjectHandle, Sim};
 use crate::client::convert::{seven_from_pose, twelve_from_pose};
 use crate::client::error::LinkError;
-use crate::wire::{self, Reader as _};
+use crate::wire;
 
 impl Sim {
     /// The object at a path such as `/UR5/Tip`.
@@ -195,25 +195,5 @@ impl Sim {
         // The second number is the length of the interval, not its end.
         let [min_rad, range_rad] = reply.exactly::<2>(1)?;
         Ok(JointInterval { cyclic: reply.boolean(0)?, min_rad, max_rad: min_rad + range_rad })
-    }
-
-    /// A string that a script of the scene published under a name; `None` when there is none, or when this server has
-    /// no such strings.
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call but the function's absence.
-    pub fn get_published_string(&mut self, name: &str) -> Result<Option<String>, LinkError> {
-        for func in ["sim.getStringSignal", "sim.getNamedStringParam"] {
-            match self.call(func, vec![Value::from(name)]) {
-                Ok(reply) if reply.is_missing(0) => {}
-                Ok(reply) => match reply.values()[0].text() {
-                    Some(text) if !text.is_empty() => return Ok(Some(text.to_owned())),
-                    _ => {}
-                },
-                Err(error) if error.is_unknown_function() => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(None)
     }
 }

@@ -159,21 +159,6 @@ fn simulation_states_are_told_apart() {
     }
 }
 
-#[test]
-fn a_published_string_may_be_absent_in_every_way() {
-    for answer in [Value::Null, Value::from("")] {
-        let (mut sim, _log) = answering(vec![answer]);
-        assert_eq!(sim.get_published_string("x"), Ok(None));
-    }
-    let (mut with_nothing, _log) = answering(vec![]);
-    assert_eq!(with_nothing.get_published_string("x"), Ok(None));
-    let (mut without_signals, _log) = sim(|request| match func(request) {
-        "sim.getStringSignal" => err("No such function: sim.getStringSignal"),
-        _ => ret([Value::Bytes(b"found".to_vec())]),
-    });
-    assert_eq!(without_signals.get_published_string("x"), Ok(Some("found".to_owned())));
-}
-
 fn motion() -> JointMotion {
     JointMotion {
         joints: vec![ObjectHandle(19), ObjectHandle(22)],
