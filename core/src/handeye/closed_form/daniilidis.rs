@@ -44,12 +44,11 @@ impl ClosedForm for Daniilidis {
         for motion in pairing::aligned_motions(&method, pairs)? {
             rows.push(&equations(&motion));
         }
-        let (singular, vectors) =
-            rows.right_singular().ok_or_else(|| method.fails("the numbers overflow, check the length unit"))?;
-        if singular[5] <= RANK_TOLERANCE * singular[0] {
+        let singular = rows.singular().ok_or_else(|| method.fails("the numbers overflow, check the length unit"))?;
+        if singular.values[5] <= RANK_TOLERANCE * singular.values[0] {
             return Err(method.fails("the motions leave rotation or translation open"));
         }
-        let (q, q_dual) = unit_combination(&vectors.column(6).into_owned(), &vectors.column(7).into_owned())
+        let (q, q_dual) = unit_combination(&singular.right[6], &singular.right[7])
             .ok_or_else(|| method.fails("no rigid transform is near the null space, the poses are too noisy"))?;
         let translation = (q_dual * q.conjugate() * 2.0).imag();
         with_mean_target(&method, pairs, pairing::pose(UnitQuaternion::new_unchecked(q), translation))

@@ -1,8 +1,8 @@
 //! Shah: hand-eye and target placement together, rotations by one SVD of a Kronecker sum.
 
-use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::linear::{MAX_SVD_SWEEPS, RANK_TOLERANCE, Rows, rotation_up_to_scale};
+use super::linear::{RANK_TOLERANCE, Rows, rotation_up_to_scale, singular};
 use super::pairing::matrix;
 use super::{ClosedForm, ClosedFormSolution, Method, check};
 use crate::frames::Pose;
@@ -67,13 +67,12 @@ fn rotations(views: &[PosePair]) -> Option<(UnitQuaternion<f64>, UnitQuaternion<
             r_b.kronecker(&r_a)
         })
         .sum();
-    let svd = sum.try_svd(true, true, f64::EPSILON, MAX_SVD_SWEEPS)?;
-    let s = &svd.singular_values;
-    if s[0] - s[1] <= RANK_TOLERANCE * s[0] {
+    let singular = singular(&DMatrix::from_column_slice(9, 9, sum.as_slice()))?;
+    if singular.values[0] - singular.values[1] <= RANK_TOLERANCE * singular.values[0] {
         return None;
     }
-    let x = Matrix3::from_column_slice(svd.v_t?.row(0).transpose().as_slice());
-    let z = Matrix3::from_column_slice(svd.u?.column(0).as_slice());
+    let x = Matrix3::from_column_slice(singular.right[0].as_slice());
+    let z = Matrix3::from_column_slice(singular.scaled_left[0].as_slice());
     Some((rotation_up_to_scale(&x)?, rotation_up_to_scale(&z)?))
 }
 

@@ -146,6 +146,18 @@ fn extreme_poses() -> impl Strategy<Value = Vec<(Isometry3<f64>, Isometry3<f64>)
 }
 
 proptest! {
+    /// The half turns show their axes but not the axes' signs, so the answer could be turned by 180° about z.
+    #[test]
+    fn half_turns_and_turns_about_one_other_axis_are_refused_too(truth in any_truth(), centre in any_pose()) {
+        let turns = [([0.0; 3], [0.0; 3]), ([0.2, 0.1, 0.0], [PI, 0.0, 0.0]), ([0.0, -0.1, 0.2], [0.0, 0.0, 0.7])];
+        let views = truth.views(&turns.map(|(t, r)| Pose::from_isometry(centre * isometry(t, r))));
+        for name in ["park_martin", "horaud", "daniilidis"] {
+            prop_assert!(no_solution_of(name, &views).contains("half turns"), "{name}");
+        }
+        prop_assert!(no_solution_of("tsai_lenz", &views).contains("fewer than two axes"));
+        prop_assert!(no_solution_of("shah", &views).contains("more than one rotation"));
+    }
+
     #[test]
     fn no_finite_input_makes_a_method_panic_or_return_a_number_that_is_not_finite(poses in extreme_poses()) {
         let views: Vec<_> = poses

@@ -1,5 +1,6 @@
 mod degenerate;
 mod exact;
+mod linear;
 mod noisy;
 mod reference;
 

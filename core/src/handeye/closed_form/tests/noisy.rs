@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::handeye::HandEyeError;
-use crate::handeye::closed_form::by_name;
+use crate::handeye::closed_form::{all, by_name};
 
 /// Metres and radians: as bad as poses of real sessions get.
 const NOISE: f64 = 0.005;
@@ -16,8 +16,9 @@ const NOISE: f64 = 0.005;
 /// Rounding, 1e-16 on metres and radians, times a condition number of up to 1e5.
 const SAME: f64 = 1e-11;
 
-/// By how much a method may move when a pose changes by `NOISE`: ten times is what the weakest geometry of
-/// [`robot_poses`], two tilts by 40° and no other, asks for.
+/// How far a method may be off when poses are off by up to `NOISE`: the translation along an axis about which the two
+/// sure tilts of [`robot_poses`] do not turn is worse than the poses by one over the sine of the tilt, on arms of metres.
+/// A wrong sign at the half turn is off by a radian.
 const STABLE: f64 = 20.0 * NOISE;
 
 /// Changes of frame that a method follows, by what the documentation of the methods promises: any change of the frame,
@@ -100,6 +101,34 @@ proptest! {
             let (metres, radians) = one.mount_from_camera.distance_to(&other.mount_from_camera);
             prop_assert!(radians < SAME, "{name} turned by {radians:e}");
             prop_assert!(!translation_too || metres < SAME, "{name} moved by {metres:e}");
+        }
+    }
+
+    #[test]
+    fn the_sign_of_a_quaternion_means_nothing(
+        truth in any_truth(),
+        poses in robot_poses(),
+        seed in any::<u64>(),
+        flips in prop::collection::vec(any::<[bool; 2]>(), 9),
+    ) {
+        fn flipped(isometry: &Isometry3<f64>, flip: bool) -> Isometry3<f64> {
+            let q = isometry.rotation.into_inner();
+            Isometry3::from_parts(isometry.translation, UnitQuaternion::new_unchecked(if flip { -q } else { q }))
+        }
+        let views = with_noise(&truth.views(&poses), seed, NOISE);
+        let same: Vec<_> = views
+            .iter()
+            .zip(&flips)
+            .map(|(view, flip)| PosePair {
+                anchor_from_mount: flipped(view.anchor_from_mount.isometry(), flip[0]).into(),
+                camera_from_target: flipped(view.camera_from_target.isometry(), flip[1]).into(),
+            })
+            .collect();
+        for method in all() {
+            let (Ok(one), Ok(other)) = (method.solve(&views), method.solve(&same)) else {
+                return Err(TestCaseError::fail(format!("{} found no solution", method.name())));
+            };
+            prop_assert!(difference(&one, &other) < SAME, "{}", method.name());
         }
     }
 

@@ -10,7 +10,7 @@ use crate::frames::Pose;
 use crate::handeye::closed_form::by_name;
 use crate::handeye::{Mode, PosePair};
 
-/// Largest difference in metres and in elements of the rotation matrix. Arithmetic alone leaves 3e-14. The margin is for
+/// Largest difference in metres and in elements of the rotation matrix. Arithmetic alone leaves 3e-13. The margin is for
 /// OpenCV's `Rodrigues`, which takes turns below 1e-5 rad for none: where a robot came back to a pose within that, as
 /// in the KUKA session, its Park & Martin differs from the exact one by 4e-10.
 const REFERENCE_TOLERANCE: f64 = 1e-9;
