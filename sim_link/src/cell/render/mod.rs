@@ -8,6 +8,7 @@
 //! 0 to 1; there is no gamma. Lengths are metres.
 
 mod board;
+mod ground;
 mod imaging;
 pub mod props;
 mod rays;

@@ -1,5 +1,7 @@
 //! The ray of every pixel of one camera, and the picture cut into tiles.
 
+use std::ops::Range;
+
 use handeye_core::camera::{Distortion, Intrinsics};
 use nalgebra::{Point3, Vector2};
 
@@ -38,12 +40,15 @@ impl Ray {
     }
 }
 
-/// A block of pixels with the bounds of its rays; `None` where no pixel has one.
+/// A block of pixels.
 #[derive(Debug, Clone)]
 pub(super) struct Tile {
-    pub columns: std::ops::Range<usize>,
-    pub rows: std::ops::Range<usize>,
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+    /// Bounds of its rays; `None` where no pixel has one.
     pub rays: Option<Rays>,
+    /// Whether every pixel has one.
+    pub is_complete: bool,
 }
 
 /// All rays of a camera.
@@ -81,9 +86,14 @@ impl RayTable {
             for left in (0..width).step_by(TILE) {
                 let columns = left..(left + TILE).min(width);
                 let rows = top..(top + TILE).min(height);
-                let block = rows.clone().flat_map(|y| columns.clone().map(move |x| (x, y)));
-                let rays = bounds(block.map(|(x, y)| table.ray(x, y)));
-                table.tiles.push(Tile { columns, rows, rays });
+                let block: Vec<Ray> = rows
+                    .clone()
+                    .flat_map(|y| columns.clone().map(move |x| (x, y)))
+                    .map(|(x, y)| table.ray(x, y))
+                    .collect();
+                let rays = bounds(block.iter());
+                let is_complete = block.iter().all(Ray::exists);
+                table.tiles.push(Tile { columns, rows, rays, is_complete });
             }
         }
         table
@@ -115,10 +125,10 @@ fn ray_of(camera: &Intrinsics, px: &Vector2<f64>) -> Option<Ray> {
 }
 
 /// Bounds of the footprints of some pixels.
-fn bounds(rays: impl Iterator<Item = Ray>) -> Option<Rays> {
+fn bounds<'a>(rays: impl Iterator<Item = &'a Ray>) -> Option<Rays> {
     let mut low = [f64::INFINITY; 2];
     let mut high = [f64::NEG_INFINITY; 2];
-    for ray in rays.filter(Ray::exists) {
+    for ray in rays.filter(|ray| ray.exists()) {
         for (u, v) in [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)] {
             let corner = ray.beside(u, v);
             low = [low[0].min(corner.x), low[1].min(corner.y)];

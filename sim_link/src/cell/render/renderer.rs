@@ -1,5 +1,7 @@
 //! From a scene to pixels.
 
+use std::ops::Range;
+
 use handeye_core::camera::Intrinsics;
 use handeye_core::image::RgbImage;
 
@@ -98,6 +100,9 @@ impl Renderer {
 
     fn trace_tile(&self, stage: &Stage, tile: &Tile, sight: &Sight, with_colour: bool, traced: &mut Traced) {
         for y in tile.rows.clone() {
+            if with_colour && self.trace_run(stage, tile, y, sight, traced) {
+                continue;
+            }
             for x in tile.columns.clone() {
                 let i = y * self.table.width + x;
                 let ray = self.table.ray(x, y);
@@ -108,6 +113,30 @@ impl Renderer {
                     traced.colours[3 * i..3 * i + 3].copy_from_slice(&stage.colour(sight, &hit, &ray));
                 }
             }
+        }
+    }
+
+    /// The short way for one row of a tile; false where there is none.
+    fn trace_run(&self, stage: &Stage, tile: &Tile, y: usize, sight: &Sight, traced: &mut Traced) -> bool {
+        if !tile.is_complete {
+            return false;
+        }
+        let Range { start, end } = tile.columns;
+        let pixels = y * self.table.width + start..y * self.table.width + end;
+        let depths = traced.depths_m[pixels.clone()].iter_mut();
+        let mut out = depths.zip(traced.colours[3 * pixels.start..3 * pixels.end].chunks_exact_mut(3));
+        let put = |depth: f64, colour: [f32; 3]| {
+            if let Some((depth_out, colour_out)) = out.next() {
+                *depth_out = depth as f32;
+                colour_out.copy_from_slice(&colour);
+            }
+        };
+        match stage.paint_run(sight, end - start, |i| self.table.ray(start + i, y), put) {
+            Some(face) => {
+                traced.faces[pixels].fill(face);
+                true
+            }
+            None => false,
         }
     }
 

@@ -1,11 +1,11 @@
 //! Bodies, order of depth, clipping, edges, and pictures as values.
 
 use handeye_core::camera::{Distortion, Intrinsics};
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::{BoardSurface, Finish, Imaging, Light, RenderScene, Renderer, Shape, Solid};
+use super::{BoardSurface, Finish, Imaging, Light, LightSource, RenderScene, Renderer, Shape, Solid};
 
 const FAR_M: f64 = 3.5;
 
@@ -212,6 +212,59 @@ fn edges_of_bodies_are_smooth_and_keep_their_area() {
     assert!((covered / expected - 1.0).abs() < 2e-3, "{covered} {expected}");
     let levels: std::collections::BTreeSet<u8> = picture.pixels().map(|p| p.0[2]).collect();
     assert!(levels.len() > 10, "{levels:?}");
+}
+
+/// A floor 0.3 m under the camera, with a ball over it.
+fn floor_scene(source: LightSource, with_ball: bool) -> RenderScene {
+    let up = UnitQuaternion::rotation_between(&Vector3::z(), &-Vector3::y()).expect("not opposite");
+    let floor = Isometry3::from_parts(Translation3::new(0.0, 0.3, 0.0), up);
+    let mut solids = vec![
+        Solid::new(Shape::Plane, floor, [0.7; 3]).with_finish(Finish::Tiles { pitch_m: 0.11, joint_m: 0.004 }),
+        Solid::new(
+            Shape::Box { half_extents: Vector3::new(0.6, 0.2, 0.05) },
+            floor * Translation3::new(0.0, -1.5, 0.05),
+            [0.7; 3],
+        )
+        .with_finish(Finish::Wood),
+    ];
+    if with_ball {
+        solids.push(ball(0.1, 0.15, 1.0, 0.05));
+    }
+    RenderScene { light: Light { source, ..Light::default() }, ..scene(solids) }
+}
+
+#[test]
+fn floors_look_the_same_by_the_short_way_as_by_the_long_way() {
+    let towards = Vector3::new(0.3, -1.0, -0.2).normalize();
+    // A lamp at a place takes the long way, one in a direction the short way.
+    let far_lamp = LightSource::Point(Point3::from(towards * 1e7));
+    let renderer = Renderer::new(Intrinsics::from_view_angle(640, 480, 57f64.to_radians()), 0.01, FAR_M);
+    let render = |source| renderer.render(&floor_scene(source, true), &Imaging::default(), 0);
+    let (short, long) = (render(LightSource::Directional(Unit::new_normalize(towards))), render(far_lamp));
+    assert_eq!(short.depth_m, long.depth_m);
+    let worst = short.rgb.iter().zip(long.rgb.iter()).map(|(a, b)| a.abs_diff(*b)).max();
+    assert!(worst <= Some(8), "{worst:?}");
+    let sum: u64 = short.rgb.iter().zip(long.rgb.iter()).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    assert!(sum < short.rgb.len() as u64 / 4, "mean difference {}", sum as f64 / short.rgb.len() as f64);
+}
+
+#[test]
+fn a_body_darkens_the_floor_below_it_and_leaves_the_print_alone() {
+    let above = LightSource::Directional(Unit::new_normalize(Vector3::new(0.0, -1.0, 0.0)));
+    let render = |with_ball| renderer().render_rgb(&floor_scene(above, with_ball), &Imaging::default(), 0);
+    let (with, without) = (render(true), render(false));
+    let camera = small_camera();
+    let below = camera.project(&Point3::new(0.1, 0.3, 1.0)).expect("in front");
+    let at = |picture: &handeye_core::image::RgbImage| picture.get_pixel(below.x as u32, below.y as u32).0[0];
+    assert!(f32::from(at(&with)) < 0.75 * f32::from(at(&without)), "{} {}", at(&with), at(&without));
+
+    let facing = LightSource::Directional(Unit::new_normalize(Vector3::new(0.0, -0.2, -1.0)));
+    let board_only = |solids| {
+        let scene = RenderScene { light: Light { source: facing, ..Light::default() }, ..scene(solids) };
+        renderer().render_rgb(&scene, &Imaging::default(), 0)
+    };
+    // The ball is behind the camera, between the lamp and the board.
+    assert_eq!(board_only(Vec::new()), board_only(vec![ball(0.0, 0.0, -0.3, 0.05)]));
 }
 
 #[test]

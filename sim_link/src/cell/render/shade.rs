@@ -2,9 +2,8 @@
 
 use nalgebra::Isometry3;
 
-use super::board::floor;
 use super::shapes::{Vec3, dot, scale_add};
-use super::texture::{fading, grain, lattice, stripes, wood};
+use super::texture::{WoodAt, grain, tiles};
 use super::{Finish, Light, LightSource, Solid};
 
 /// Sharpness of the highlight on satin and brushed surfaces, as a power of two of the cosine.
@@ -148,41 +147,65 @@ impl Coat {
             Finish::Matt | Finish::Tiles { .. } | Finish::Wood => 0.0,
         };
         let lit = self.colour.map(|c| c * tone + shine);
-        let Some([start, end]) = self.fade else { return lit };
-        let x = ((spot.point[2] - start) / (end - start)).clamp(0.0, 1.0) as f32;
-        let mist = x * x * (3.0 - 2.0 * x);
-        std::array::from_fn(|i| lit[i] + mist * (background[i] - lit[i]))
+        match self.fade {
+            Some(fade) => misty(lit, background, fade, spot.point[2]),
+            None => lit,
+        }
+    }
+
+    /// The directions, and the values at the camera, of the coordinates in which the pattern of a ground is drawn.
+    pub fn pattern_axes(&self) -> ((Vec3, f64), (Vec3, f64)) {
+        let (rows, origin) = (&self.shape_from_camera, &self.origin);
+        let x = (rows[0], origin[0]);
+        match self.finish {
+            // Grain runs along x on the flat sides and around the edge between them.
+            Finish::Wood => (x, (scale_add(1.0, &rows[1], &rows[2]), origin[1] + origin[2])),
+            _ => (x, (rows[1], origin[1])),
+        }
+    }
+
+    pub fn finish(&self) -> Finish {
+        self.finish
+    }
+
+    pub fn colour(&self) -> [f32; 3] {
+        self.colour
+    }
+
+    pub fn fade(&self) -> Option<[f64; 2]> {
+        self.fade
     }
 
     /// Factor on the colour.
     fn texture(&self, spot: &Spot) -> f32 {
-        let along = |axis: usize| spot.along(&self.shape_from_camera[axis], self.origin[axis]);
+        let on_ground = || {
+            let ((x_axis, x_origin), (y_axis, y_origin)) = self.pattern_axes();
+            let ((x, x_half), (y, y_half)) = (spot.along(&x_axis, x_origin), spot.along(&y_axis, y_origin));
+            ([x, y], [x_half, y_half])
+        };
         match self.finish {
             Finish::Matt | Finish::Satin => 1.0,
             Finish::Brushed => {
-                let (z, width) = along(2);
-                1.0 + 0.06 * grain(z * 900.0, width * 900.0)
+                let (z, half) = spot.along(&self.shape_from_camera[2], self.origin[2]);
+                1.0 + 0.06 * grain(z * 900.0, half * 900.0)
             }
             Finish::Tiles { pitch_m, joint_m } => {
-                let per_metre = 1.0 / pitch_m;
-                let ((x, x_width), (y, y_width)) = (along(0), along(1));
-                let (x, y) = (x * per_metre, y * per_metre);
-                let (x_width, y_width) = (x_width * per_metre, y_width * per_metre);
-                let joint = joint_m * per_metre;
-                let open = (1.0 - stripes(x, x_width, joint)) * (1.0 - stripes(y, y_width, joint));
-                let tone = fading(x_width.max(y_width)) * lattice(floor(x) as i64, floor(y) as i64);
-                (0.7 + 0.3 * open as f32) * (1.0 + 0.03 * tone)
+                let (at, half) = on_ground();
+                tiles(at, half, pitch_m, joint_m)
             }
             Finish::Wood => {
-                let rows = &self.shape_from_camera;
-                // Grain runs along x on the flat sides and around the edge between them.
-                let across_edge = scale_add(1.0, &rows[1], &rows[2]);
-                let ((x, x_width), (y, y_width)) =
-                    (along(0), spot.along(&across_edge, self.origin[1] + self.origin[2]));
-                wood(x, y, [x_width, y_width])
+                let (at, half) = on_ground();
+                WoodAt::new(half).tone(at[0], at[1])
             }
         }
     }
+}
+
+/// Fades a colour into the background over a range of depths.
+pub(super) fn misty(colour: [f32; 3], background: [f32; 3], [start, end]: [f64; 2], depth: f64) -> [f32; 3] {
+    let x = ((depth - start) / (end - start)).clamp(0.0, 1.0) as f32;
+    let mist = x * x * (3.0 - 2.0 * x);
+    std::array::from_fn(|i| colour[i] + mist * (background[i] - colour[i]))
 }
 
 fn unit(a: &Vec3) -> Vec3 {

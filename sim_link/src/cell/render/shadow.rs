@@ -79,8 +79,8 @@ impl Caster {
             Form::Plate { middle, u, v, normal, half } => {
                 let offset = scale_add(-1.0, point, middle);
                 let way = dot(&offset, normal) / dot(towards, normal);
-                // Written so that a NaN from light along the plate lets it pass.
-                if !(way > 0.0) {
+                // Light along the plate, which gives a NaN or an infinity, passes.
+                if way.is_nan() || way <= 0.0 {
                     return 1.0;
                 }
                 let across = scale_add(-way, towards, &offset);

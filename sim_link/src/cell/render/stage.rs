@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::board::{Footprint, Pattern};
+use super::ground::Ground;
 use super::rays::Ray;
 use super::shade::{Coat, Lamp, Spot};
 use super::shadow::{self, Caster};
@@ -33,6 +34,8 @@ enum Paint {
     /// One colour, light included.
     Flat([f32; 3]),
     Coat(Coat),
+    /// A coat with its short way.
+    Ground(Coat, Ground),
     Print(Print),
 }
 
@@ -68,6 +71,8 @@ pub(super) struct Sight {
     candidates: Vec<Candidate>,
     /// What may throw a shadow there, as indices.
     casters: Vec<u16>,
+    /// The first candidate hides all else and no ray misses it.
+    is_covered: bool,
 }
 
 #[derive(Debug)]
@@ -109,12 +114,21 @@ impl Stage {
     fn add_face(&mut self, surfaces: Vec<Surface>, owner: usize, coat: &Coat) {
         let face = self.pieces.last().map_or(BACKGROUND, |piece| piece.face).saturating_add(1);
         for surface in surfaces {
-            let flat = match &surface {
-                Surface::Facet(facet) => coat.flat(&self.lamp, &facet.normal),
-                Surface::Ball(_) | Surface::Mantle(_) => None,
+            let paint = match &surface {
+                Surface::Facet(facet) => self.facet_paint(facet, coat),
+                Surface::Ball(_) | Surface::Mantle(_) => Paint::Coat(coat.clone()),
             };
-            let paint = flat.map_or_else(|| Paint::Coat(coat.clone()), Paint::Flat);
             self.pieces.push(Piece { surface, face, paint, lead: 1.0, owner: Some(owner) });
+        }
+    }
+
+    fn facet_paint(&self, facet: &Facet, coat: &Coat) -> Paint {
+        if let Some(flat) = coat.flat(&self.lamp, &facet.normal) {
+            Paint::Flat(flat)
+        } else if let Some(ground) = Ground::new(facet, coat, &self.lamp) {
+            Paint::Ground(coat.clone(), ground)
+        } else {
+            Paint::Coat(coat.clone())
         }
     }
 
@@ -122,11 +136,13 @@ impl Stage {
     pub fn survey(&self, rays: &Rays, with_shadows: bool) -> Sight {
         let mut candidates = Vec::new();
         let mut hidden_beyond = self.far_m;
+        let mut is_covered = false;
         for (index, piece) in self.pieces.iter().enumerate() {
             let Some(reach) = piece.surface.reach(rays) else { continue };
             if let Some(farthest) = reach.covers_within
                 && reach.nearest >= self.near_m
             {
+                is_covered |= farthest < self.far_m;
                 hidden_beyond = hidden_beyond.min(farthest);
             }
             candidates.push(Candidate { piece: index as u16, nearest: reach.nearest });
@@ -134,14 +150,15 @@ impl Stage {
         candidates.retain(|candidate| candidate.nearest <= hidden_beyond);
         candidates.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
         let casters = if with_shadows { self.casters_for(&candidates, rays) } else { Vec::new() };
-        Sight { candidates, casters }
+        is_covered &= candidates.len() == 1;
+        Sight { candidates, casters, is_covered }
     }
 
     fn casters_for(&self, candidates: &[Candidate], rays: &Rays) -> Vec<u16> {
         let grounds = candidates.iter().filter_map(|candidate| {
             let piece = &self.pieces[candidate.piece as usize];
             match (&piece.surface, &piece.paint) {
-                (Surface::Facet(facet), Paint::Coat(coat)) if coat.is_ground() => Some(facet),
+                (Surface::Facet(facet), Paint::Coat(coat) | Paint::Ground(coat, _)) if coat.is_ground() => Some(facet),
                 _ => None,
             }
         });
@@ -172,6 +189,35 @@ impl Stage {
         best
     }
 
+    fn sunlit(&self, sight: &Sight, receiver: &Piece, point: &Vec3, towards: &Vec3) -> f32 {
+        if sight.casters.is_empty() {
+            return 1.0;
+        }
+        let casters = sight.casters.iter().map(|&index| &self.casters[index as usize]);
+        shadow::sunlit(casters, receiver.owner, point, towards)
+    }
+
+    /// Paints a run of neighbouring pixels of a tile, all of which have rays, at once where that is possible: calls
+    /// `put` for each in turn with depth and colour and returns the face, or does nothing and returns `None`.
+    pub fn paint_run(
+        &self,
+        sight: &Sight,
+        count: usize,
+        ray_at: impl Fn(usize) -> Ray,
+        mut put: impl FnMut(f64, [f32; 3]),
+    ) -> Option<u16> {
+        let Some(first) = sight.candidates.first() else {
+            (0..count).for_each(|_| put(self.far_m, self.background));
+            return Some(BACKGROUND);
+        };
+        let piece = &self.pieces[first.piece as usize];
+        let (true, Paint::Ground(_, ground)) = (sight.is_covered, &piece.paint) else { return None };
+        let sunlit = |point: &Vec3| self.sunlit(sight, piece, point, &ground.towards);
+        let shadows: Option<&dyn Fn(&Vec3) -> f32> = if sight.casters.is_empty() { None } else { Some(&sunlit) };
+        ground.paint(count, ray_at, self.background, shadows, put);
+        Some(piece.face)
+    }
+
     /// Number of the face that was hit.
     pub fn face(&self, hit: &Hit) -> u16 {
         hit.piece.map_or(BACKGROUND, |index| self.pieces[index as usize].face)
@@ -189,17 +235,12 @@ impl Stage {
         let coat = match &piece.paint {
             Paint::Flat(colour) => return *colour,
             Paint::Print(print) => return print.colour(ray, &piece.surface, &self.lamp),
-            Paint::Coat(coat) => coat,
+            Paint::Coat(coat) | Paint::Ground(coat, _) => coat,
         };
         let direction = ray.direction();
         let point = direction.map(|c| c * hit.depth);
         let normal = piece.surface.normal(&point);
-        let sunlit = if coat.is_ground() && !sight.casters.is_empty() {
-            let casters = sight.casters.iter().map(|&index| &self.casters[index as usize]);
-            shadow::sunlit(casters, piece.owner, &point, &self.lamp.towards(&point))
-        } else {
-            1.0
-        };
+        let sunlit = if coat.is_ground() { self.sunlit(sight, piece, &point, &self.lamp.towards(&point)) } else { 1.0 };
         let spot = Spot { ray: direction, by_pixel: ray.by_pixel, point, normal, sunlit };
         coat.colour_at(&spot, &self.lamp, self.background)
     }

@@ -18,7 +18,7 @@ const GRAIN_SAMPLES: usize = 2048;
 const GRAIN_LEVELS: usize = 8;
 
 /// Part of the interval `x ± half` that lies in stripes of width `width` before every integer.
-pub(super) fn stripes(x: f64, half: f64, width: f64) -> f64 {
+fn stripes(x: f64, half: f64, width: f64) -> f64 {
     let half = half.max(1e-9);
     let (low, high) = (x - half, x + half);
     let below = floor(low);
@@ -30,12 +30,12 @@ pub(super) fn stripes(x: f64, half: f64, width: f64) -> f64 {
 }
 
 /// 1 for detail much larger than a pixel, 0 for detail that a pixel would alias; `half` is in units of the detail.
-pub(super) fn fading(half: f64) -> f32 {
+fn fading(half: f64) -> f32 {
     (1.6 - 3.2 * half).clamp(0.0, 1.0) as f32
 }
 
 /// A fixed random number in ±1 for each point of a lattice.
-pub(super) fn lattice(i: i64, j: i64) -> f32 {
+fn lattice(i: i64, j: i64) -> f32 {
     let mut h = (i as u32).wrapping_mul(0x9E37_79B1) ^ (j as u32).wrapping_mul(0x85EB_CA77);
     h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
     h ^= h >> 13;
@@ -75,18 +75,45 @@ fn detail_level(texels: f64, levels: usize) -> (usize, f32) {
     (level as usize, (level - (level as usize) as f64) as f32)
 }
 
-/// Factor on the colour of wood with planks along x; `half` is half of what a pixel covers along and across.
-pub(super) fn wood(x: f64, y: f64, half: [f64; 2]) -> f32 {
-    let texels = (2.0 * half[0] / WOOD_TEXEL_M[0]).max(2.0 * half[1] / WOOD_TEXEL_M[1]);
-    let (fine, blend) = detail_level(texels, WOOD_LEVELS);
-    let levels = &*WOOD;
-    let at = [x / WOOD_TEXEL_M[0], y / WOOD_TEXEL_M[1]];
-    let tone = levels[fine].sample(at, fine);
-    if blend == 0.0 { tone } else { tone * (1.0 - blend) + levels[fine + 1].sample(at, fine + 1) * blend }
+/// Wood at some level of detail.
+#[derive(Clone, Copy)]
+pub(super) struct WoodAt {
+    fine: &'static Map,
+    coarse: &'static Map,
+    blend: f32,
+}
+
+impl WoodAt {
+    /// `half` is half of what a pixel covers along and across the grain.
+    pub fn new(half: [f64; 2]) -> Self {
+        let texels = (2.0 * half[0] / WOOD_TEXEL_M[0]).max(2.0 * half[1] / WOOD_TEXEL_M[1]);
+        let (level, blend) = detail_level(texels, WOOD_LEVELS);
+        Self { fine: &WOOD[level], coarse: &WOOD[level + 1], blend }
+    }
+
+    /// Factor on the colour of planks along x.
+    pub fn tone(&self, x: f64, y: f64) -> f32 {
+        let at = [x * (1.0 / WOOD_TEXEL_M[0]), y * (1.0 / WOOD_TEXEL_M[1])];
+        let tone = self.fine.sample(at);
+        if self.blend == 0.0 { tone } else { tone * (1.0 - self.blend) + self.coarse.sample(at) * self.blend }
+    }
+}
+
+/// Factor on the colour of square tiles with joints; `half` is half of what a pixel covers along x and y.
+pub(super) fn tiles([x, y]: [f64; 2], half: [f64; 2], pitch_m: f64, joint_m: f64) -> f32 {
+    let per_metre = 1.0 / pitch_m;
+    let (x, y) = (x * per_metre, y * per_metre);
+    let [x_half, y_half] = half.map(|h| h * per_metre);
+    let joint = joint_m * per_metre;
+    let open = (1.0 - stripes(x, x_half, joint)) * (1.0 - stripes(y, y_half, joint));
+    let tone = fading(x_half.max(y_half)) * lattice(floor(x) as i64, floor(y) as i64);
+    (0.7 + 0.3 * open as f32) * (1.0 + 0.03 * tone)
 }
 
 /// A picture of one number per texel. It repeats mirrored, so that no seam shows.
 struct Map {
+    /// Texels of the finest level per texel, inverse.
+    scale: f64,
     /// Texels along x; both sides are powers of two.
     width: usize,
     height: usize,
@@ -95,9 +122,8 @@ struct Map {
 
 impl Map {
     /// Between texels, at a place that is given in texels of level 0.
-    fn sample(&self, at: [f64; 2], level: usize) -> f32 {
-        let scale = 1.0 / f64::from(1u32 << level);
-        let (x, y) = (at[0] * scale - 0.5, at[1] * scale - 0.5);
+    fn sample(&self, at: [f64; 2]) -> f32 {
+        let (x, y) = (at[0] * self.scale - 0.5, at[1] * self.scale - 0.5);
         let (i, j) = (floor(x), floor(y));
         let (f, g) = ((x - i) as f32, (y - j) as f32);
         let columns = [mirrored(i as i64, self.width), mirrored(i as i64 + 1, self.width)];
@@ -116,7 +142,7 @@ impl Map {
             ((sum + 2) / 4) as u8
         };
         let texels = (0..width * height).map(|i| mean(2 * (i % width), 2 * (i / width))).collect();
-        Self { width, height, texels }
+        Self { scale: 0.5 * self.scale, width, height, texels }
     }
 }
 
@@ -135,7 +161,7 @@ static WOOD: LazyLock<Vec<Map>> = LazyLock::new(|| {
             (tone * (255.0 / WOOD_RANGE)).round() as u8
         })
         .collect();
-    let mut levels = vec![Map { width, height, texels }];
+    let mut levels = vec![Map { scale: 1.0, width, height, texels }];
     for level in 1..WOOD_LEVELS {
         let halved = levels[level - 1].halved();
         levels.push(halved);
@@ -157,6 +183,10 @@ fn bake_wood(x: f64, y: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn wood(x: f64, y: f64, half: [f64; 2]) -> f32 {
+        WoodAt::new(half).tone(x, y)
+    }
 
     #[test]
     fn stripes_are_averaged_exactly() {
