@@ -6,7 +6,6 @@ use opencv::boxed_ref::BoxedRef;
 use opencv::calib3d;
 use opencv::core::{Mat, Point2f, Size, ToInputArray, Vector};
 use opencv::imgproc;
-use opencv::prelude::*;
 
 use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray};

@@ -38,7 +38,7 @@ fn saddle(image: &GrayImage, order: &Ordered, blur: f32) -> Ordered {
     );
     let mut out = order.clone();
     for (index, point) in out.points.iter_mut().enumerate() {
-        let reach = (0.25 * order.spacing(index % order.columns, index / order.columns)).clamp(2.0, 5.0);
+        let reach = 2.0; let _ = index;
         for _ in 0..3 {
             let centre = point.map(f64::round);
             let mut ata = SMatrix::<f64, 6, 6>::zeros();
@@ -77,7 +77,7 @@ fn compare(views: usize, blur_px: f64, noise: f64) -> [Errors; 3] {
         let rough = Ordered { points: truth.iter().map(|p| p.map(|c| c.round())).collect(), columns: 10 };
         let sub_pix = corner_sub_pix(&image, &rough).expect("refines");
         errors[0].add(&sub_pix, &truth);
-        errors[1].add(&saddle(&image, &sub_pix, 0.8), &truth);
+        errors[1].add(&saddle(&image, &sub_pix, 1.5), &truth);
         errors[2].add(&fit_corners(&image, &sub_pix), &truth);
     }
     errors
