@@ -7,6 +7,9 @@ use super::{VisionError, chessboard, circles};
 use crate::observation::Corner;
 use crate::target::TargetSpec;
 
+/// An image with fewer pixels than this per point cannot show the target: squares of less than 3 px are not separated.
+const MIN_SQUARE_PX: u32 = 3;
+
 /// How long a detection may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Effort {
@@ -68,14 +71,18 @@ pub fn detect_with(
     target: &TargetSpec,
     options: DetectOptions,
 ) -> Result<Option<Vec<Corner>>, VisionError> {
-    const MOST: usize = 1000;
     let grid = target.grid();
     let (columns, rows) = (grid.columns, grid.rows);
     if columns < 3 || rows < 3 {
         return Err(VisionError::TargetTooSmall { columns, rows });
     }
-    if columns > MOST || rows > MOST {
-        // More points than any image resolves.
+    let (width, height) = image.dimensions();
+    if width == 0 || height == 0 {
+        return Err(VisionError::BadImage { width, height });
+    }
+    if columns.min(rows) >= (width.min(height) / MIN_SQUARE_PX) as usize
+        || columns.max(rows) >= (width.max(height) / MIN_SQUARE_PX * 2) as usize
+    {
         return Ok(None);
     }
     let found = match target {
