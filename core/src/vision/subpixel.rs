@@ -101,12 +101,7 @@ struct Patch {
 
 impl Patch {
     /// The pixels within [`CELL_PART`] of a step along both axes; `None` when too few or cut by the image border.
-    fn around(
-        image: &GrayImage,
-        origin: Vector2<f64>,
-        along_x: &Vector2<f64>,
-        along_y: &Vector2<f64>,
-    ) -> Option<Self> {
+    fn around(image: &GrayImage, origin: Vector2<f64>, along_x: &Vector2<f64>, along_y: &Vector2<f64>) -> Option<Self> {
         let area = along_x.perp(along_y);
         let half = (along_x.abs() + along_y.abs()) * CELL_PART;
         let half = Vector2::new(half.x.min(REACH_PX), half.y.min(REACH_PX));
