@@ -95,6 +95,5 @@ fn corners_of(dataset: &Dataset, entry: &Entry, cancel: &CancelToken) -> Result<
         return Ok(None);
     }
     let image = dataset.load_gray(entry)?;
-    vision::detect(&image, &dataset.target, vision::Effort::Thorough)
-        .map_err(|source| ObserveError::Vision { name: entry.name.clone(), source })
+    vision::detect(&image, &dataset.target).map_err(|source| ObserveError::Vision { name: entry.name.clone(), source })
 }

@@ -78,7 +78,7 @@ pub fn gray_from_rgb(rgb: &RgbImage) -> GrayImage {
     let mut gray = GrayImage::new(rgb.width(), rgb.height());
     for (to, from) in gray.pixels_mut().zip(rgb.pixels()) {
         let [r, g, b] = from.0.map(u32::from);
-        to.0 = [((r * 4899 + g * 9617 + b * 1868 + (1 << 13)) >> 14) as u8];
+        to.0 = [((r * 9798 + g * 19235 + b * 3735 + (1 << 14)) >> 15) as u8];
     }
     gray
 }

@@ -8,6 +8,7 @@ pub mod atomic_file;
 pub mod calibrate;
 pub mod camera;
 pub mod dataset;
+pub mod depth;
 pub mod export;
 pub mod frames;
 pub mod handeye;
@@ -20,7 +21,6 @@ pub mod result;
 pub mod se3;
 pub mod session;
 pub mod target;
-
 #[cfg(feature = "opencv")]
 pub mod vision;
 

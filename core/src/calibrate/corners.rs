@@ -80,13 +80,14 @@ impl Lens {
                 let corners: Vec<_> = seen.iter().map(|s| s.corners).collect();
                 let found =
                     intrinsics::calibrate(&corners, &observations.target, observations.image_size, model, start)?;
-                (found.intrinsics, true, found.sigma)
+                let sigma = found.sigma;
+                (found.intrinsics, true, Some([sigma.fx, sigma.fy, sigma.cx, sigma.cy]))
             }
         };
         let mut camera_from_target = Vec::with_capacity(seen.len());
         let mut rms_px = Vec::with_capacity(seen.len());
         for s in seen {
-            let pose = pnp::camera_from_target(s.corners, &observations.target, &intrinsics)?;
+            let pose = pnp::solve(s.corners, &observations.target, &intrinsics)?.best;
             camera_from_target.push(pose.camera_from_target);
             rms_px.push(pose.rms_px);
         }

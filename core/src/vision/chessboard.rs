@@ -1,90 +1,189 @@
-//! Inner corners of a chessboard: OpenCV finds the grid, a saddle fit places the corners.
+//! Chessboards: found by OpenCV, brought into one order, refined by our own corner model.
 
 use image::GrayImage;
-use image::imageops::{self, FilterType};
 use nalgebra::Vector2;
+use opencv::boxed_ref::BoxedRef;
 use opencv::calib3d;
-use opencv::core::{Point2f, Size, TermCriteria, TermCriteria_Type, Vector};
+use opencv::core::{Mat, Point2f, Size, ToInputArray, Vector};
 use opencv::imgproc;
 
-use super::{Effort, VisionError, is_empty, mat, order, saddle};
+use super::VisionError;
+use super::bridge::{failed, from_points2f, mat_from_gray};
+use super::detect::Effort;
+use super::order::{Ordered, canonical};
+use super::subpixel;
 use crate::target::Grid;
 
-/// Images with fewer pixels than this are also tried at twice their size.
-const SMALL_IMAGE: u32 = 1_000_000;
+/// Least share of neighbouring squares that must differ in the direction the pattern asks for.
+const MIN_ALTERNATION: f64 = 0.9;
+/// Images up to this many pixels are worth enlarging in search of a small board; beyond it costs seconds.
+const MAX_PIXELS_TO_ENLARGE: u32 = 1_500_000;
+/// Images of less width than this are not made smaller: squares would vanish.
+const MIN_WIDTH_TO_REDUCE: u32 = 640;
 
-pub fn detect(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
-    if is_empty(image) {
-        return Ok(None);
-    }
-    let Some(rough) = find_grid(image, grid, effort)? else { return Ok(None) };
-    let start = sub_pixel(image, grid, rough)?;
-    let placed = saddle::refine_all(image, grid, &start);
-    Ok(Some(order::chessboard(placed, grid, image)))
+pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
+    let Some(found) = search(image, grid, effort)? else { return Ok(None) };
+    let ordered = canonical(&found, grid, |order| contrast_of_first_square(image, order) < 0.0);
+    let refined = subpixel::fit_corners(image, &subpixel::corner_sub_pix(image, &ordered)?);
+    Ok(refined.is_regular().then_some(refined))
 }
 
-fn find_grid(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
-    let base = calib3d::CALIB_CB_ADAPTIVE_THRESH | calib3d::CALIB_CB_NORMALIZE_IMAGE;
-    if effort == Effort::Live {
-        return classic(image, grid, base | calib3d::CALIB_CB_FAST_CHECK);
-    }
-    if let Some(found) = classic(image, grid, base)? {
-        return Ok(Some(found));
-    }
+/// The way to look, in the order in which they are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Strategy {
+    /// Adaptive threshold and quads, given up at once when too few quads are in sight.
+    Quick,
+    /// The same with every threshold and dilation.
+    Patient,
+    /// Every threshold on an image of half the size: for large squares, blur and noise.
+    Reduced,
+    /// Every threshold on an image of twice the size: for small squares.
+    Enlarged,
+    /// The sector-based detector (Duda & Frese 2018): slow, for the boards that thresholds cannot separate.
+    SectorBased,
+}
+
+fn strategies(image: &GrayImage, effort: Effort) -> Vec<Strategy> {
     let (width, height) = image.dimensions();
-    // Half the size joins squares that noise or print texture has torn; twice the size parts squares that touch.
-    let scale = if width * height < SMALL_IMAGE { 2.0 } else { 0.5 };
-    let resized = imageops::resize(
-        image,
-        (f64::from(width) * scale) as u32,
-        (f64::from(height) * scale) as u32,
-        FilterType::Triangle,
-    );
-    if !is_empty(&resized)
-        && let Some(found) = classic(&resized, grid, base)?
-    {
-        // Pixel centres: (u + 0.5) scales, u does not.
-        return Ok(Some(found.into_iter().map(|p| (p.add_scalar(0.5) / scale).add_scalar(-0.5)).collect()));
+    let mut all = vec![Strategy::Quick];
+    if effort == Effort::Thorough {
+        all.push(Strategy::Patient);
+        if width >= MIN_WIDTH_TO_REDUCE {
+            all.push(Strategy::Reduced);
+        }
+        if width.saturating_mul(height) <= MAX_PIXELS_TO_ENLARGE {
+            all.push(Strategy::Enlarged);
+        }
+        all.push(Strategy::SectorBased);
     }
-    sector_based(image, grid)
+    all
 }
 
-fn pattern_size(grid: &Grid) -> Size {
+fn search(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
+    let mat = mat_from_gray(image)?;
+    for strategy in strategies(image, effort) {
+        let Some(points) = attempt(&mat, grid, strategy)? else { continue };
+        let order = Ordered::new(points, grid);
+        if order.is_regular() && alternation(image, &order) >= MIN_ALTERNATION {
+            tracing::trace!(?strategy, "chessboard found");
+            return Ok(Some(order));
+        }
+    }
+    Ok(None)
+}
+
+fn attempt(mat: &BoxedRef<'_, Mat>, grid: &Grid, strategy: Strategy) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
+    const QUADS: i32 = calib3d::CALIB_CB_ADAPTIVE_THRESH + calib3d::CALIB_CB_NORMALIZE_IMAGE;
+    match strategy {
+        Strategy::Quick => find_quads(mat, grid, QUADS + calib3d::CALIB_CB_FAST_CHECK),
+        Strategy::Patient => find_quads(mat, grid, QUADS),
+        Strategy::Reduced => scaled(mat, grid, 0.5, QUADS),
+        Strategy::Enlarged => scaled(mat, grid, 2.0, QUADS),
+        Strategy::SectorBased => find_sectors(mat, grid),
+    }
+}
+
+fn pattern(grid: &Grid) -> Size {
+    // The sizes are checked before: see `detect`.
     Size::new(grid.columns as i32, grid.rows as i32)
 }
 
-fn classic(image: &GrayImage, grid: &Grid, flags: i32) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
+fn find_quads(mat: &impl ToInputArray, grid: &Grid, flags: i32) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
     let mut corners = Vector::<Point2f>::new();
-    let found = calib3d::find_chessboard_corners(&mat(image)?, pattern_size(grid), &mut corners, flags)
-        .map_err(VisionError::opencv("look for a chessboard"))?;
-    Ok((found && corners.len() == grid.len()).then(|| from_points(&corners)))
+    let found = calib3d::find_chessboard_corners(mat, pattern(grid), &mut corners, flags)
+        .map_err(failed("look for a chessboard"))?;
+    Ok(complete(found, &corners, grid))
 }
 
-fn sector_based(image: &GrayImage, grid: &Grid) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
-    let mut corners = Vector::<Point2f>::new();
-    let flags = calib3d::CALIB_CB_ACCURACY;
-    let found = calib3d::find_chessboard_corners_sb(&mat(image)?, pattern_size(grid), &mut corners, flags)
-        .map_err(VisionError::opencv("look for a chessboard"))?;
-    Ok((found && corners.len() == grid.len()).then(|| from_points(&corners)))
+fn find_sectors(mat: &impl ToInputArray, grid: &Grid) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
+    let flags = calib3d::CALIB_CB_NORMALIZE_IMAGE + calib3d::CALIB_CB_EXHAUSTIVE + calib3d::CALIB_CB_ACCURACY;
+    for flags in [calib3d::CALIB_CB_ACCURACY, flags] {
+        let mut corners = Vector::<Point2f>::new();
+        let found = calib3d::find_chessboard_corners_sb(mat, pattern(grid), &mut corners, flags)
+            .map_err(failed("look for a chessboard by sectors"))?;
+        if let Some(points) = complete(found, &corners, grid) {
+            return Ok(Some(points));
+        }
+    }
+    Ok(None)
 }
 
-fn from_points(points: &Vector<Point2f>) -> Vec<Vector2<f64>> {
-    points.iter().map(|p| Vector2::new(f64::from(p.x), f64::from(p.y))).collect()
+/// OpenCV leaves a partial list behind when it does not find all.
+fn complete(found: bool, corners: &Vector<Point2f>, grid: &Grid) -> Option<Vec<Vector2<f64>>> {
+    (found && corners.len() == grid.len()).then(|| from_points2f(corners))
 }
 
-/// OpenCV's refinement with a window that stays inside the squares next to a corner: a fixed window of eleven pixels
-/// reaches into the next corner of a small board and pulls by half a pixel.
-fn sub_pixel(image: &GrayImage, grid: &Grid, rough: Vec<Vector2<f64>>) -> Result<Vec<Vector2<f64>>, VisionError> {
-    const LARGEST_WINDOW: i32 = 11;
-    let spacing = saddle::smallest_spacing(grid, &rough);
-    let half = ((0.4 * spacing) as i32).clamp(1, LARGEST_WINDOW);
-    let mut corners: Vector<Point2f> = rough.iter().map(|p| Point2f::new(p.x as f32, p.y as f32)).collect();
-    let criteria = TermCriteria {
-        typ: TermCriteria_Type::COUNT as i32 | TermCriteria_Type::EPS as i32,
-        max_count: 100,
-        epsilon: 1e-4,
-    };
-    imgproc::corner_sub_pix(&mat(image)?, &mut corners, Size::new(half, half), Size::new(-1, -1), criteria)
-        .map_err(VisionError::opencv("refine corners"))?;
-    Ok(from_points(&corners))
+fn scaled(
+    mat: &BoxedRef<'_, Mat>,
+    grid: &Grid,
+    factor: f64,
+    flags: i32,
+) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
+    let method = if factor < 1.0 { imgproc::INTER_AREA } else { imgproc::INTER_CUBIC };
+    let mut resized = Mat::default();
+    imgproc::resize(mat, &mut resized, Size::default(), factor, factor, method)
+        .map_err(failed("change the size of the image"))?;
+    let found = find_quads(&resized, grid, flags)?;
+    // Pixel centres: a coordinate u covers u - 0.5 .. u + 0.5, so it is u + 0.5 that scales.
+    let back = |p: Vector2<f64>| p.map(|c| (c + 0.5) / factor - 0.5);
+    Ok(found.map(|points| points.into_iter().map(back).collect()))
+}
+
+/// Intensity around the centre of a cell: the mean of 3×3 pixels, or of the one pixel where squares are small.
+fn cell_intensity(image: &GrayImage, order: &Ordered, column: usize, row: usize) -> f64 {
+    let centre = order.cell_centre(column, row);
+    let [a, b, c, d] = order.cell(column, row);
+    let side =
+        [(b - a).norm(), (c - b).norm(), (d - c).norm(), (a - d).norm()].into_iter().fold(f64::INFINITY, f64::min);
+    let reach = i64::from(side > 6.0);
+    let (width, height) = (i64::from(image.width()), i64::from(image.height()));
+    let (u, v) = (centre.x.round() as i64, centre.y.round() as i64);
+    let mut sum = 0.0;
+    let mut count = 0.0;
+    for y in v - reach..=v + reach {
+        for x in u - reach..=u + reach {
+            if (0..width).contains(&x) && (0..height).contains(&y) {
+                sum += f64::from(image.get_pixel(x as u32, y as u32).0[0]);
+                count += 1.0;
+            }
+        }
+    }
+    // A cell between corners in the image always covers a pixel of it; the fallback cannot decide anything.
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// Differences between horizontally and vertically neighbouring cells: a cell of even parity less its odd neighbour.
+fn differences(image: &GrayImage, order: &Ordered) -> Vec<f64> {
+    let (columns, rows) = (order.columns - 1, order.rows() - 1);
+    let intensity: Vec<f64> =
+        (0..columns * rows).map(|i| cell_intensity(image, order, i % columns, i / columns)).collect();
+    let mut out = Vec::with_capacity(2 * columns * rows);
+    for row in 0..rows {
+        for column in 0..columns {
+            let sign = if (row + column) % 2 == 0 { 1.0 } else { -1.0 };
+            let here = intensity[row * columns + column];
+            if column + 1 < columns {
+                out.push(sign * (here - intensity[row * columns + column + 1]));
+            }
+            if row + 1 < rows {
+                out.push(sign * (here - intensity[(row + 1) * columns + column]));
+            }
+        }
+    }
+    out
+}
+
+/// Share of neighbouring cells that differ in the same direction: 1 for a chessboard, one half for anything else.
+///
+/// Neighbours are compared, not cells with a threshold, so that a gradient of the light across the board is harmless.
+fn alternation(image: &GrayImage, order: &Ordered) -> f64 {
+    let all = differences(image, order);
+    let positive = all.iter().filter(|&&d| d > 0.0).count();
+    let negative = all.iter().filter(|&&d| d < 0.0).count();
+    positive.max(negative) as f64 / all.len() as f64
+}
+
+/// How much brighter the first square and all of its colour are than their neighbours; negative when it is dark.
+fn contrast_of_first_square(image: &GrayImage, order: &Ordered) -> f64 {
+    differences(image, order).iter().sum()
 }

@@ -1,112 +1,151 @@
-//! Seeing: the target in an image, its pose, and the camera's intrinsics.
+//! From images to corners, poses and intrinsics. The only module that knows OpenCV.
 //!
-//! The only place that knows OpenCV (feature `opencv`). Pixels are OpenCV's: (0, 0) is the centre of the top-left one.
+//! Pixels are in the convention of [`crate::camera`]: (0, 0) is the centre of the top-left pixel.
+//!
+//! OpenCV's own errors never leave this module as types: [`VisionError::OpenCv`] carries the operation and the text.
 
+mod bridge;
 mod chessboard;
 mod circles;
-pub mod intrinsics;
+mod detect;
 mod order;
+mod subpixel;
+
+pub mod intrinsics;
 pub mod pnp;
-mod saddle;
 
-use image::GrayImage;
-use opencv::boxed_ref::BoxedRef;
-use opencv::core::Mat;
+pub use detect::{DetectOptions, Effort, detect, detect_with};
 
-use crate::observation::Corner;
-use crate::target::TargetSpec;
+use crate::camera::CameraError;
 
-/// Why an image or a set of corners gave no answer.
+/// Why there is no detection, pose or calibration.
+///
+/// A board that is simply not in the picture is not an error: [`detect`] returns `None`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VisionError {
-    /// OpenCV refused the input.
-    #[error("OpenCV could not {doing}: {message}")]
-    OpenCv {
-        /// What was being done.
-        doing: &'static str,
-        /// OpenCV's own words, first line.
-        message: String,
+    /// The target cannot be looked for.
+    #[error("a target of {columns}×{rows} points cannot be detected: it needs at least 3 points along either side")]
+    TargetTooSmall {
+        /// Points along x.
+        columns: usize,
+        /// Points along y.
+        rows: usize,
     },
-    /// Fewer corners than a pose needs.
-    #[error("{got} corners in a view, at least {need} are needed for the pose of the target")]
+    /// The distance between points is not a length.
+    #[error("the target's point distance of {square_m} m is not usable: it must be finite and positive")]
+    BadSquare {
+        /// Its value in metres.
+        square_m: f64,
+    },
+    /// The image has no pixels, or more than OpenCV can address.
+    #[error("an image of {width}×{height} pixels cannot be searched")]
+    BadImage {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+    /// Not enough corners for a pose or for a view.
+    #[error("view {view} has {got} corners, {need} are needed; leave it out or detect it again")]
     TooFewCorners {
+        /// Index of the view, 0 where there is only one.
+        view: usize,
         /// Corners given.
         got: usize,
         /// Corners needed.
         need: usize,
     },
-    /// Fewer views than intrinsics need.
-    #[error(
-        "{got} views of the target, at least {need} are needed for the intrinsics: capture more, tilted differently"
-    )]
+    /// A corner that is not a point of the target, is listed twice, or is not a number.
+    #[error("view {view}: corner {index} at ({u_px}, {v_px}) px {reason}")]
+    BadCorner {
+        /// Index of the view, 0 where there is only one.
+        view: usize,
+        /// The corner's index.
+        index: usize,
+        /// Its column in pixels.
+        u_px: f64,
+        /// Its row in pixels.
+        v_px: f64,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// All corners of the view lie on one line, in the image or on the target, so that they fix no pose.
+    #[error("view {view}: the corners lie on one line and fix no pose")]
+    CollinearCorners {
+        /// Index of the view, 0 where there is only one.
+        view: usize,
+    },
+    /// Neither planar solution puts the whole target in front of the camera.
+    #[error("no pose puts all {corners} corners in front of the camera; check the order of corners and the intrinsics")]
+    NoPose {
+        /// Corners given.
+        corners: usize,
+    },
+    /// The camera model cannot be used or has no ray for a corner.
+    #[error("camera model: {source}")]
+    Camera {
+        /// What the model says.
+        #[from]
+        source: CameraError,
+    },
+    /// Not enough views to estimate intrinsics.
+    #[error("intrinsics need at least {need} views of the target, there are {got}; capture more from other angles")]
     TooFewViews {
         /// Views given.
         got: usize,
         /// Views needed.
         need: usize,
     },
-    /// All views look at the target alike, so that focal length and distance cannot be told apart.
+    /// The target has the same orientation to the camera in all views, which leaves the focal length undetermined.
     #[error(
-        "the target has the same tilt in all {views} views (within {spread_deg:.2}°), so the focal length cannot be \
-         found: add views tilted by 20° or more, or give the intrinsics"
+        "the target is tilted the same way in all {views} views (within {spread_deg:.1}°), which leaves the focal length \
+         undetermined; capture views tilted by 20° or more about different axes"
     )]
-    SameTilt {
-        /// Number of views.
+    ParallelViews {
+        /// Views given.
         views: usize,
-        /// Largest angle between two normals of the target, degrees.
+        /// Largest angle between the target's normals in two views, degrees.
         spread_deg: f64,
     },
-    /// No pose puts the target before the camera so that it looks like this.
-    #[error("no pose of the target fits these corners: {reason}")]
-    NoPose {
-        /// What failed.
-        reason: &'static str,
+    /// The views determine the camera so weakly that its numbers would be noise.
+    #[error(
+        "the views leave {parameter} undetermined: 0.1 px of corner noise moves it by {sigma_px:.0} px; \
+         capture views tilted by 20° or more about different axes"
+    )]
+    Undetermined {
+        /// Which parameter.
+        parameter: &'static str,
+        /// Its standard deviation for 0.1 px of noise, in pixels.
+        sigma_px: f64,
     },
-}
-
-impl VisionError {
-    fn opencv(doing: &'static str) -> impl Fn(opencv::Error) -> Self {
-        move |error| Self::OpenCv { doing, message: error.message.lines().next().unwrap_or_default().to_owned() }
-    }
-}
-
-/// How hard to look.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Effort {
-    /// One pass that gives up early: for every frame of a live picture.
-    Live,
-    /// Everything that helps: other scales, then the slow detector.
-    #[default]
-    Thorough,
-}
-
-/// Finds all points of the target in an image.
-///
-/// Corners come in the order of [`TargetSpec::points`], the same end of the board first in every view. The printed
-/// pattern of a symmetric target ([`TargetSpec::is_symmetric`]) does not tell its ends apart; then the order whose x axis
-/// points most to the right in the image is taken. `None` when the target is not (wholly) in view.
-///
-/// # Errors
-/// [`VisionError::OpenCv`] for an image that cannot be processed.
-pub fn detect(image: &GrayImage, target: &TargetSpec, effort: Effort) -> Result<Option<Vec<Corner>>, VisionError> {
-    let points = match target {
-        TargetSpec::Chessboard(grid) => chessboard::detect(image, grid, effort)?,
-        TargetSpec::Circles(grid) => circles::detect(image, grid)?,
-    };
-    Ok(points.map(|points| points.into_iter().enumerate().map(|(index, px)| Corner { index, px }).collect()))
-}
-
-/// A view of the image as OpenCV's matrix, without a copy.
-fn mat(image: &GrayImage) -> Result<BoxedRef<'_, Mat>, VisionError> {
-    Mat::new_rows_cols_with_data(image.height() as i32, image.width() as i32, image.as_raw())
-        .map_err(VisionError::opencv("read the image"))
-}
-
-/// Whether a matrix has pixels at all.
-fn is_empty(image: &GrayImage) -> bool {
-    image.width() < 3 || image.height() < 3
+    /// The optimisation ended at numbers that are no camera.
+    #[error(
+        "the calibration did not converge to a camera ({reason}); check the order of corners and the target's size"
+    )]
+    NotACamera {
+        /// What is wrong with them.
+        reason: String,
+    },
+    /// OpenCV refused or failed.
+    #[error("OpenCV could not {operation}: {message}")]
+    OpenCv {
+        /// What it was asked to do.
+        operation: &'static str,
+        /// What it said.
+        message: String,
+    },
 }
 
 #[cfg(test)]
-mod tests;
+mod camera_tests;
+#[cfg(test)]
+mod detect_tests;
+#[cfg(test)]
+mod gray_tests;
+#[cfg(test)]
+mod intrinsics_tests;
+#[cfg(test)]
+mod pnp_tests;
+#[cfg(test)]
+mod rendered;

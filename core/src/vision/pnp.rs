@@ -1,222 +1,247 @@
-//! Pose of a flat target in the camera from its corners.
-//!
-//! A flat target seen from afar has two poses that explain it almost equally well, mirrored about the line of sight. Both
-//! are refined, and the caller is told how clear the choice is.
-//!
-//! Reference: Schweighofer & Pinz 2006, "Robust pose estimation from a planar target"; Hartley & Zisserman 2004, §4.1
-//! (homography).
+//! The pose of the target from its corners in one image.
 
-use nalgebra::{
-    Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, SymmetricEigen, Translation3, UnitQuaternion, Vector2,
-    Vector3, Vector6,
-};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SymmetricEigen, Vector2, Vector6};
+use opencv::calib3d::{SolvePnPMethod, solve_pnp_generic};
+use opencv::core::{Mat, Vector, no_array};
 
 use super::VisionError;
+use super::bridge::{failed, isometry, mat_from_matrix3, numbers, to_points2d, to_points3d};
 use crate::camera::Intrinsics;
 use crate::frames::{Camera, Pose, Target};
 use crate::observation::Corner;
-use crate::se3;
 use crate::target::TargetSpec;
 
-/// Least number of corners.
-const NEED: usize = 4;
-/// Steps of the refinement.
+/// Corners that fix a planar pose.
+const MIN_CORNERS: usize = 4;
+/// Smallest cosine to the optical axis of the rays that start a solution: the plane z = 1 has no room for more.
+const MIN_RAY_Z: f64 = 0.05;
+/// Ratio of extents below which corners are taken for collinear.
+const MIN_FLATNESS: f64 = 1e-4;
 const MAX_STEPS: usize = 50;
-/// A refinement ends when the cost falls by less than this part.
-const COST_TOLERANCE: f64 = 1e-14;
+/// A step whose rotation [rad] and translation [part of the distance] are below this ends the refinement.
+const CONVERGED: f64 = 1e-12;
+/// Two solutions closer than this angle [rad] are one: a tenth of what corner noise of 0.1 px does to a pose.
+const SAME_ROTATION: f64 = 1e-4;
 
-/// A pose and how well it fits.
+/// A pose and how well it explains the corners.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solution {
+    /// The target's pose in the camera.
+    pub camera_from_target: Pose<Camera, Target>,
+    /// Root mean square of the 2-D distances between seen and projected corners, pixels.
+    pub rms_px: f64,
+}
+
+/// The poses that a flat target may have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanarPose {
-    /// Target in the camera.
-    pub camera_from_target: Pose<Camera, Target>,
-    /// RMS of the 2-D residuals, pixels.
-    pub rms_px: f64,
-    /// The mirrored pose, where it is a second minimum in front of the camera, and its RMS in pixels.
-    pub second: Option<(Pose<Camera, Target>, f64)>,
+    /// The one with the smaller error.
+    pub best: Solution,
+    /// The other minimum of the reprojection error, roughly `best` mirrored at the line of sight; `None` where there
+    /// is only one.
+    pub alternative: Option<Solution>,
 }
 
 impl PlanarPose {
-    /// RMS of this pose over that of the mirrored one: near 0 the choice is clear, near 1 it is a guess.
-    pub fn ambiguity(&self) -> f64 {
-        self.second.map_or(0.0, |(_, second)| if second > 0.0 { self.rms_px / second } else { 1.0 })
+    /// Error of the best solution over that of the alternative: near 0 the pose is certain, near 1 it is a guess
+    /// (small or distant targets seen almost head-on). `None` without alternative.
+    pub fn ambiguity(&self) -> Option<f64> {
+        // Two perfect solutions cannot be told apart.
+        self.alternative.map(|a| if a.rms_px > 0.0 { self.best.rms_px / a.rms_px } else { 1.0 })
     }
 }
 
-/// Estimates `camera_from_target` by least squares of the reprojection error, for every lens model.
-///
-/// # Needs
-/// Four corners, not on a line, seen in front of the camera plane.
+/// The best of [`solve`], for callers to whom ambiguity does not matter.
 ///
 /// # Errors
-/// [`VisionError::TooFewCorners`], [`VisionError::NoPose`].
+/// As [`solve`].
 pub fn camera_from_target(
     corners: &[Corner],
     target: &TargetSpec,
     intrinsics: &Intrinsics,
-) -> Result<PlanarPose, VisionError> {
-    if corners.len() < NEED {
-        return Err(VisionError::TooFewCorners { got: corners.len(), need: NEED });
-    }
-    let grid = target.grid();
-    let points: Vec<Point3<f64>> = corners.iter().map(|c| grid.point(c.index)).collect();
-    let problem = Problem { points: &points, corners, intrinsics };
-    let start = from_homography(&problem)?;
-    let first = problem.refine(start);
-    let (first, first_cost) = first.ok_or(VisionError::NoPose { reason: "the fit puts it behind the camera" })?;
-    let mirrored = problem.refine(mirrored(&first, &centroid(&points)));
-    let rms = |cost: f64| (cost / corners.len() as f64).sqrt();
-    // The same minimum reached twice is no ambiguity.
-    let other = mirrored.filter(|(pose, _)| pose.rotation.angle_to(&first.rotation) > 1e-3);
-    let ((best, best_cost), second) = match other {
-        Some((pose, cost)) if cost < first_cost => ((pose, cost), Some((first, first_cost))),
-        other => ((first, first_cost), other),
-    };
-    Ok(PlanarPose {
-        camera_from_target: Pose::from_isometry(best),
-        rms_px: rms(best_cost),
-        second: second.map(|(pose, cost)| (Pose::from_isometry(pose), rms(cost))),
-    })
+) -> Result<Pose<Camera, Target>, VisionError> {
+    solve(corners, target, intrinsics).map(|pose| pose.best.camera_from_target)
 }
 
-struct Problem<'a> {
-    points: &'a [Point3<f64>],
-    corners: &'a [Corner],
-    intrinsics: &'a Intrinsics,
-}
-
-impl Problem<'_> {
-    /// Sum of squared residuals; `None` when a point is behind the camera.
-    fn cost(&self, pose: &Isometry3<f64>) -> Option<f64> {
-        self.points
-            .iter()
-            .zip(self.corners)
-            .map(|(point, corner)| Some((self.intrinsics.project(&(pose * point)).ok()? - corner.px).norm_squared()))
-            .sum()
-    }
-
-    /// Levenberg–Marquardt; the pose and its cost.
-    fn refine(&self, start: Isometry3<f64>) -> Option<(Isometry3<f64>, f64)> {
-        let mut pose = start;
-        let mut cost = self.cost(&pose)?;
-        let mut damping = 1e-3;
-        for _ in 0..MAX_STEPS {
-            let (normal, gradient) = self.normal_equations(&pose)?;
-            let before = cost;
-            while damping < 1e10 {
-                let damped = normal + Matrix6::from_diagonal(&(normal.diagonal() * damping));
-                let next = damped.cholesky().map(|c| pose * se3::exp(&-c.solve(&gradient)));
-                match next.and_then(|p| Some((p, self.cost(&p)?))) {
-                    Some((next_pose, next_cost)) if next_cost <= cost => {
-                        (pose, cost) = (next_pose, next_cost);
-                        damping = (damping * 0.1).max(1e-12);
-                        break;
-                    }
-                    _ => damping *= 10.0,
-                }
-            }
-            if before - cost <= COST_TOLERANCE * before {
-                break;
-            }
-        }
-        Some((pose, cost))
-    }
-
-    fn normal_equations(&self, pose: &Isometry3<f64>) -> Option<(Matrix6<f64>, Vector6<f64>)> {
-        let rotation = pose.rotation.to_rotation_matrix().into_inner();
-        let mut normal = Matrix6::zeros();
-        let mut gradient = Vector6::zeros();
-        for (point, corner) in self.points.iter().zip(self.corners) {
-            let projection = self.intrinsics.project_with_jacobians(&(pose * point)).ok()?;
-            let by_point = projection.px_by_point * rotation;
-            let mut jacobian = SMatrix::<f64, 2, 6>::zeros();
-            jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_point);
-            jacobian.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-by_point * se3::skew(&point.coords)));
-            normal += jacobian.transpose() * jacobian;
-            gradient += jacobian.transpose() * (projection.px - corner.px);
-        }
-        Some((normal, gradient))
-    }
-}
-
-fn centroid(points: &[Point3<f64>]) -> Point3<f64> {
-    Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64)
-}
-
-/// The pose whose plane is tilted the other way about the line of sight to the target's middle.
-fn mirrored(pose: &Isometry3<f64>, centre: &Point3<f64>) -> Isometry3<f64> {
-    let middle = pose * centre;
-    let sight = middle.coords.normalize();
-    let normal = pose.rotation * Vector3::z();
-    // Turning the normal by twice its angle to the line of sight mirrors it about that line.
-    let axis = normal.cross(&sight);
-    let angle = 2.0 * axis.norm().atan2(normal.dot(&sight));
-    let turn = axis.try_normalize(1e-12).map_or_else(UnitQuaternion::identity, |axis| {
-        UnitQuaternion::from_axis_angle(&nalgebra::Unit::new_unchecked(axis), angle)
-    });
-    let rotation = turn * pose.rotation;
-    Isometry3::from_parts(Translation3::from(middle.coords - rotation * centre.coords), rotation)
-}
-
-/// A start from the homography between the target's plane and the undistorted image plane.
-fn from_homography(problem: &Problem<'_>) -> Result<Isometry3<f64>, VisionError> {
-    let rays: Vec<Vector2<f64>> = problem
-        .corners
+/// Estimates `camera_from_target` from the corners of a flat target by least squares on the reprojection error.
+///
+/// Both solutions of IPPE on the corners' rays are refined by Levenberg–Marquardt on
+/// `Σ ‖corner_px − project(camera_from_target * corner_in_target)‖²` with the camera's own Jacobians, so every lens
+/// model is served, rays far off the axis included. A minimum with part of the target behind the camera is dropped.
+///
+/// # Needs
+/// Four corners that do not lie on one line; more than half of them may not lie beyond 87° from the optical axis.
+/// Solutions that fall together count as one.
+///
+/// # Errors
+/// [`VisionError::TooFewCorners`], [`VisionError::BadCorner`], [`VisionError::CollinearCorners`],
+/// [`VisionError::Camera`] for unusable intrinsics or a corner outside the lens model, [`VisionError::NoPose`].
+///
+/// # Reference
+/// Collins & Bartoli 2014, "Infinitesimal plane-based pose estimation", IJCV 109; OpenCV's `SOLVEPNP_IPPE`.
+pub fn solve(corners: &[Corner], target: &TargetSpec, intrinsics: &Intrinsics) -> Result<PlanarPose, VisionError> {
+    intrinsics.validate()?;
+    check_corners(corners, target, 0)?;
+    let seen: Vec<(Point3<f64>, Vector2<f64>)> =
+        corners.iter().map(|corner| (target.grid().point(corner.index), corner.px)).collect();
+    let mut solutions: Vec<Solution> = initial_poses(&seen, intrinsics)?
         .iter()
-        .map(|corner| {
-            let ray = problem.intrinsics.unproject(&corner.px).ok().filter(|ray| ray.z > 1e-3);
-            ray.map(|ray| Vector2::new(ray.x / ray.z, ray.y / ray.z))
-                .ok_or(VisionError::NoPose { reason: "a corner lies outside the range of the lens model" })
-        })
-        .collect::<Result<_, _>>()?;
-    let plane: Vec<Vector2<f64>> = problem.points.iter().map(|p| p.coords.xy()).collect();
-    let h = homography(&plane, &rays).ok_or(VisionError::NoPose { reason: "the corners lie on a line" })?;
-    let (a, b, t) = (h.column(0).into_owned(), h.column(1).into_owned(), h.column(2).into_owned());
-    let mut scale = 2.0 / (a.norm() + b.norm());
-    // In front of the camera.
-    if t.z < 0.0 {
-        scale = -scale;
-    }
-    let (a, b, t) = (a * scale, b * scale, t * scale);
-    let rotation = se3::nearest_rotation(&Matrix3::from_columns(&[a, b, a.cross(&b)]));
-    if !(scale.is_finite() && t.z > 0.0) {
-        return Err(VisionError::NoPose { reason: "the corners lie on a line" });
-    }
-    Ok(Isometry3::from_parts(Translation3::from(t), UnitQuaternion::from_rotation_matrix(&rotation)))
+        .filter_map(|start| refine(&seen, intrinsics, start))
+        .map(|(pose, rms_px)| Solution { camera_from_target: Pose::from_isometry(pose), rms_px })
+        .collect();
+    solutions.sort_by(|a, b| a.rms_px.total_cmp(&b.rms_px));
+    let mut solutions = solutions.into_iter();
+    let best = solutions.next().ok_or(VisionError::NoPose { corners: corners.len() })?;
+    let alternative = solutions.find(|other| {
+        other.camera_from_target.rotation().angle_to(&best.camera_from_target.rotation()) > SAME_ROTATION
+    });
+    Ok(PlanarPose { best, alternative })
 }
 
-/// Shift and scale that bring points to mean zero and mean distance √2.
-fn normalisation(points: &[Vector2<f64>]) -> Option<Matrix3<f64>> {
-    let n = points.len() as f64;
-    let mean = points.iter().sum::<Vector2<f64>>() / n;
-    let distance = points.iter().map(|p| (p - mean).norm()).sum::<f64>() / n;
-    (distance > 0.0).then(|| {
-        let s = std::f64::consts::SQRT_2 / distance;
-        Matrix3::new(s, 0.0, -s * mean.x, 0.0, s, -s * mean.y, 0.0, 0.0, 1.0)
-    })
-}
-
-/// Direct linear transform on normalised coordinates; `None` for points on a line.
-fn homography(from: &[Vector2<f64>], to: &[Vector2<f64>]) -> Option<Matrix3<f64>> {
-    let (normalise_from, normalise_to) = (normalisation(from)?, normalisation(to)?);
-    let mut normal = SMatrix::<f64, 9, 9>::zeros();
-    for (p, q) in from.iter().zip(to) {
-        let p = normalise_from * p.push(1.0);
-        let q = normalise_to * q.push(1.0);
-        let zero = Vector3::zeros();
-        for (first, second, third) in [(zero, -p, p * q.y), (p, zero, -p * q.x)] {
-            let row = SVector::<f64, 9>::from_iterator(first.iter().chain(second.iter()).chain(third.iter()).copied());
-            normal.ger(1.0, &row, &row, 1.0);
+/// Checks that the corners of view `view` are points of the target, are numbers and span a plane.
+pub(super) fn check_corners(corners: &[Corner], target: &TargetSpec, view: usize) -> Result<(), VisionError> {
+    let grid = target.grid();
+    if !(grid.square_m.is_finite() && grid.square_m > 0.0) {
+        return Err(VisionError::BadSquare { square_m: grid.square_m });
+    }
+    if corners.len() < MIN_CORNERS {
+        return Err(VisionError::TooFewCorners { view, got: corners.len(), need: MIN_CORNERS });
+    }
+    let mut taken = vec![false; grid.len()];
+    for corner in corners {
+        let bad = |reason| {
+            let (u_px, v_px) = (corner.px.x, corner.px.y);
+            Err(VisionError::BadCorner { view, index: corner.index, u_px, v_px, reason })
+        };
+        if !(corner.px.x.is_finite() && corner.px.y.is_finite()) {
+            return bad("is not a number");
+        }
+        match taken.get_mut(corner.index) {
+            None => return bad("is no point of the target; check its columns and rows"),
+            Some(true) => return bad("is listed twice"),
+            Some(slot) => *slot = true,
         }
     }
-    let eigen = SymmetricEigen::new(normal);
-    let mut order: Vec<usize> = (0..9).collect();
-    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    // Two vanishing eigenvalues: more than one homography fits, the points lie on a line.
-    if eigen.eigenvalues[order[1]] < 1e-9 * eigen.eigenvalues[order[8]] {
-        return None;
+    let on_target: Vec<Vector2<f64>> = corners.iter().map(|c| grid.point(c.index).coords.xy()).collect();
+    let in_image: Vec<Vector2<f64>> = corners.iter().map(|c| c.px).collect();
+    if is_collinear(&on_target) || is_collinear(&in_image) {
+        return Err(VisionError::CollinearCorners { view });
     }
-    let h = eigen.eigenvectors.column(order[0]);
-    let h = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
-    Some(normalise_to.try_inverse()? * h * normalise_from)
+    Ok(())
+}
+
+fn is_collinear(points: &[Vector2<f64>]) -> bool {
+    let mean = points.iter().sum::<Vector2<f64>>() / points.len() as f64;
+    let scatter: SMatrix<f64, 2, 2> = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum();
+    let extents = SymmetricEigen::new(scatter).eigenvalues;
+    extents.min() <= MIN_FLATNESS * MIN_FLATNESS * extents.max()
+}
+
+/// Both IPPE solutions on the plane z = 1.
+fn initial_poses(
+    seen: &[(Point3<f64>, Vector2<f64>)],
+    intrinsics: &Intrinsics,
+) -> Result<Vec<Isometry3<f64>>, VisionError> {
+    let mut points = Vec::with_capacity(seen.len());
+    let mut normalised = Vec::with_capacity(seen.len());
+    for (point, px) in seen {
+        let ray = intrinsics.unproject(px)?;
+        if ray.z > MIN_RAY_Z {
+            points.push(*point);
+            normalised.push(ray.xy() / ray.z);
+        }
+    }
+    if points.len() < MIN_CORNERS || is_collinear(&normalised) {
+        return Err(VisionError::NoPose { corners: seen.len() });
+    }
+    let (mut rotations, mut translations) = (Vector::<Mat>::new(), Vector::<Mat>::new());
+    solve_pnp_generic(
+        &to_points3d(&points),
+        &to_points2d(&normalised),
+        &mat_from_matrix3(&Matrix3::identity())?,
+        &no_array(),
+        &mut rotations,
+        &mut translations,
+        false,
+        SolvePnPMethod::SOLVEPNP_IPPE,
+        &no_array(),
+        &no_array(),
+        &mut no_array(),
+    )
+    .map_err(failed("solve for the target's pose"))?;
+    let mut poses = Vec::new();
+    for (rotation, translation) in rotations.iter().zip(translations.iter()) {
+        if let (&[rx, ry, rz], &[x, y, z]) = (&numbers(&rotation)?[..], &numbers(&translation)?[..]) {
+            poses.push(isometry(&[rx, ry, rz], &[x, y, z]));
+        }
+    }
+    Ok(poses)
+}
+
+/// Levenberg–Marquardt over `start * exp(delta)`; the pose and its RMS in pixels. `None` when the start has a corner
+/// without image, which no later step would mend.
+fn refine(
+    seen: &[(Point3<f64>, Vector2<f64>)],
+    intrinsics: &Intrinsics,
+    start: &Isometry3<f64>,
+) -> Option<(Isometry3<f64>, f64)> {
+    let mut pose = *start;
+    let (mut cost, mut hessian, mut gradient) = normal_equations(seen, intrinsics, &pose)?;
+    let mut damping = 1e-6;
+    for _ in 0..MAX_STEPS {
+        let mut damped = hessian;
+        for i in 0..6 {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        let step: Vector6<f64> = -damped.cholesky()?.solve(&gradient);
+        let candidate = pose * crate::se3::exp(&step);
+        match normal_equations(seen, intrinsics, &candidate) {
+            Some((new_cost, new_hessian, new_gradient)) if new_cost <= cost => {
+                (pose, cost, hessian, gradient) = (candidate, new_cost, new_hessian, new_gradient);
+                damping = f64::max(damping * 0.1, 1e-12);
+            }
+            _ => damping = f64::max(damping * 10.0, 1e-6),
+        }
+        let distance = pose.translation.vector.norm();
+        let small = step.fixed_rows::<3>(0).norm() < CONVERGED * distance && step.fixed_rows::<3>(3).norm() < CONVERGED;
+        if small || damping > 1e8 {
+            break;
+        }
+    }
+    Some((pose, (cost / seen.len() as f64).sqrt()))
+}
+
+/// Sum of squared errors, JᵀJ and Jᵀr by the pose's right perturbation; `None` when a corner has no image.
+fn normal_equations(
+    seen: &[(Point3<f64>, Vector2<f64>)],
+    intrinsics: &Intrinsics,
+    pose: &Isometry3<f64>,
+) -> Option<(f64, Matrix6<f64>, Vector6<f64>)> {
+    let mut cost = 0.0;
+    let mut hessian = Matrix6::zeros();
+    let mut gradient = Vector6::zeros();
+    let rotation = pose.rotation.to_rotation_matrix();
+    for (point, px) in seen {
+        let projection = intrinsics.project_with_jacobians(&(pose * point)).ok()?;
+        let residual = projection.px - px;
+        let by_pose = px_by_pose(&projection.px_by_point, rotation.matrix(), point);
+        cost += residual.norm_squared();
+        hessian += by_pose.transpose() * by_pose;
+        gradient += by_pose.transpose() * residual;
+    }
+    cost.is_finite().then_some((cost, hessian, gradient))
+}
+
+/// Derivative of a pixel by `delta` in `project(pose * exp(delta) * point)`.
+pub(super) fn px_by_pose(
+    px_by_point: &nalgebra::Matrix2x3<f64>,
+    rotation: &Matrix3<f64>,
+    point: &Point3<f64>,
+) -> SMatrix<f64, 2, 6> {
+    let by_translation = px_by_point * rotation;
+    let by_rotation = -by_translation * crate::se3::skew(&point.coords);
+    let mut out = SMatrix::<f64, 2, 6>::zeros();
+    out.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_translation);
+    out.fixed_view_mut::<2, 3>(0, 3).copy_from(&by_rotation);
+    out
 }
