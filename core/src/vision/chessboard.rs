@@ -24,7 +24,7 @@ const MIN_WIDTH_TO_REDUCE: u32 = 640;
 pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
     let Some(found) = search(image, grid, effort)? else { return Ok(None) };
     let ordered = canonical(&found, grid, |order| contrast_of_first_square(image, order) < 0.0);
-    let refined = subpixel::fit_corners(image, &subpixel::corner_sub_pix(image, &ordered)?);
+    let refined = subpixel::refine(image, &ordered)?;
     Ok(refined.is_regular().then_some(refined))
 }
 

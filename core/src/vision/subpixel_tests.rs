@@ -41,7 +41,7 @@ fn compare(views: u64, blur_px: f64, noise: f64) -> [Errors; 2] {
         let rough = Ordered { points: truth.iter().map(|p| p.map(f64::round)).collect(), columns: 10 };
         let sub_pix = corner_sub_pix(&image, &rough).expect("refines");
         errors[0].add(&sub_pix, &truth);
-        errors[1].add(&fit_corners(&image, &sub_pix), &truth);
+        errors[1].add(&refine(&image, &rough).expect("refines"), &truth);
     }
     errors
 }
@@ -88,7 +88,7 @@ fn squares_of_eight_pixels_are_enough() {
         let rough = Ordered { points: truth.iter().map(|p| p.map(f64::round)).collect(), columns: 10 };
         let sub_pix = corner_sub_pix(&image, &rough).expect("refines");
         reference.add(&sub_pix, &truth);
-        errors.add(&fit_corners(&image, &sub_pix), &truth);
+        errors.add(&refine(&image, &rough).expect("refines"), &truth);
     }
     println!("8 px squares: cornerSubPix rms {:.4}, model rms {:.4}", reference.rms(), errors.rms());
     assert!(errors.rms() < 0.02 && errors.rms() < reference.rms(), "{} {}", errors.rms(), reference.rms());
@@ -102,7 +102,8 @@ fn what_is_no_corner_keeps_the_answer_of_corner_sub_pix() {
         (0..9).map(|i| Vector2::new(30.0 + 20.0 * f64::from(i % 3), 30.0 + 20.0 * f64::from(i / 3))).collect();
     let order = Ordered { points, columns: 3 };
     for image in [flat, edge] {
-        assert_eq!(fit_corners(&image, &order).points, order.points);
+        let sub_pix = corner_sub_pix(&image, &order).expect("refines");
+        assert_eq!(refine(&image, &order).expect("refines").points, sub_pix.points);
     }
     // A corner so close to the border that its window is cut.
     let board = GrayImage::from_fn(40, 40, |u, v| image::Luma([if (u / 20 + v / 20) % 2 == 0 { 30 } else { 200 }]));
@@ -110,7 +111,8 @@ fn what_is_no_corner_keeps_the_answer_of_corner_sub_pix() {
         points: (0..9).map(|i| Vector2::new(1.0 + 18.0 * f64::from(i % 3), 1.0 + 18.0 * f64::from(i / 3))).collect(),
         columns: 3,
     };
-    assert_eq!(fit_corners(&board, &near).points[0], near.points[0]);
+    let sub_pix = corner_sub_pix(&board, &near).expect("refines");
+    assert_eq!(refine(&board, &near).expect("refines").points[0], sub_pix.points[0]);
 }
 
 #[test]
