@@ -9,6 +9,7 @@ mod chessboard;
 mod circles;
 mod detect;
 mod order;
+mod saddle;
 mod subpixel;
 
 pub mod intrinsics;

@@ -18,6 +18,7 @@ use opencv::core::{Size, TermCriteria, TermCriteria_EPS, TermCriteria_MAX_ITER};
 use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray, to_points2f};
 use super::order::Ordered;
+use super::saddle;
 
 /// Half window as a part of the distance to the nearest neighbour: pixels further out see the next corner.
 const WINDOW_PER_SPACING: f64 = 0.4;
@@ -36,6 +37,9 @@ const MAX_STEPS: usize = 12;
 const CONVERGED_PX: f64 = 5e-4;
 /// Blurs that a fit may end at; outside, it has found something else than a corner.
 const BLUR_PX: (f64, f64) = (0.1, 4.0);
+/// Below this blur an edge has the profile of a pixel's area (0.29 px of its own), not of the Gaussian in the model, and
+/// edges along the pixel grid end up off by a tenth of a pixel, all by the same.
+const SHARP_PX: f64 = 0.5;
 /// Least contrast (half the difference between dark and light) in grey levels.
 const MIN_CONTRAST: f64 = 3.0;
 /// Largest RMS misfit as a part of the contrast: noise of a grainy image has a tenth, an edge that does not belong to
@@ -77,29 +81,49 @@ pub(super) fn corner_sub_pix(image: &GrayImage, order: &Ordered) -> Result<Order
 ///
 /// Both `cornerSubPix`'s answer and, where that is elsewhere (its window held an edge that is not the corner's), the
 /// corner as found serve as start; the fit with the smaller misfit counts. Without any fit `cornerSubPix` stands.
+/// A picture sharper than [`SHARP_PX`] is finished by [`saddle::refine`], all corners alike.
 pub(super) fn refine(image: &GrayImage, found: &Ordered) -> Result<Ordered, VisionError> {
     let mut out = corner_sub_pix(image, found)?;
+    let mut blurs = Vec::with_capacity(out.points.len());
     for (index, point) in out.points.iter_mut().enumerate() {
         let starts = [*point, found.points[index]];
         let apart = (starts[0] - starts[1]).norm() > SAME_START_PX;
-        if let Some(corner) = fit_corner(image, found, index, if apart { &starts } else { &starts[..1] }) {
-            *point = corner;
+        if let Some(fit) = fit_corner(image, found, index, if apart { &starts } else { &starts[..1] }) {
+            *point = fit.corner;
+            blurs.push(fit.blur_px);
+        }
+    }
+    blurs.sort_by(f64::total_cmp);
+    if blurs.get(blurs.len() / 2).is_some_and(|blur| *blur < SHARP_PX) {
+        for index in 0..out.points.len() {
+            let spacing = found.spacing(index % found.columns, index / found.columns);
+            if let Some(corner) = saddle::refine(image, &out.points[index], spacing) {
+                out.points[index] = corner;
+            }
         }
     }
     Ok(out)
 }
 
-fn fit_corner(image: &GrayImage, found: &Ordered, index: usize, starts: &[Vector2<f64>]) -> Option<Vector2<f64>> {
+/// A fitted corner.
+struct Fit {
+    corner: Vector2<f64>,
+    blur_px: f64,
+    misfit: f64,
+}
+
+fn fit_corner(image: &GrayImage, found: &Ordered, index: usize, starts: &[Vector2<f64>]) -> Option<Fit> {
     let (column, row) = (index % found.columns, index / found.columns);
     let (along_x, along_y) = found.steps(column, row);
     let bound = (MAX_MOVE.0 * found.spacing(column, row)).max(MAX_MOVE.1);
     CELL_PARTS.into_iter().find_map(|part| {
         let fits = starts.iter().filter_map(|start| {
             let patch = Patch::around(image, *start, &along_x, &along_y, part)?;
-            let (offset, misfit) = fit(&patch, starting_point(&patch, &along_x, &along_y))?;
-            (offset.norm() <= bound).then(|| (start + offset, misfit))
+            let (model, misfit) = fit(&patch, starting_point(&patch, &along_x, &along_y))?;
+            let offset = Vector2::new(model[0], model[1]);
+            (offset.norm() <= bound).then(|| Fit { corner: start + offset, blur_px: model[4], misfit })
         });
-        fits.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(corner, _)| corner)
+        fits.min_by(|a, b| a.misfit.total_cmp(&b.misfit))
     })
 }
 
@@ -166,9 +190,9 @@ fn starting_point(patch: &Patch, along_x: &Vector2<f64>, along_y: &Vector2<f64>)
     ])
 }
 
-/// Levenberg–Marquardt; the corner and the RMS misfit as a part of the contrast. `None` when it ends at something
+/// Levenberg–Marquardt; the parameters and the RMS misfit as a part of the contrast. `None` when it ends at something
 /// that is not a corner.
-fn fit(patch: &Patch, start: Parameters) -> Option<(Vector2<f64>, f64)> {
+fn fit(patch: &Patch, start: Parameters) -> Option<(Parameters, f64)> {
     let mut x = start;
     let (mut cost, mut hessian, mut gradient) = normal_equations(patch, &x);
     let mut damping = 1e-3;
@@ -197,7 +221,7 @@ fn fit(patch: &Patch, start: Parameters) -> Option<(Vector2<f64>, f64)> {
     let misfit = (cost / patch.pixels.len() as f64).sqrt() / x[8].abs();
     let lines_apart = (x[2] - x[3]).sin().abs();
     let is_corner = x[8].abs() >= MIN_CONTRAST && misfit <= MAX_MISFIT && x[4] < BLUR_PX.1 && lines_apart > 0.1;
-    is_corner.then(|| (Vector2::new(x[0], x[1]), misfit))
+    is_corner.then_some((x, misfit))
 }
 
 /// Sum of squared misfits, JᵀJ and Jᵀr.
