@@ -17,6 +17,9 @@ import threading
 import time
 
 import numpy as np
+
+if os.environ.get('HANDEYE_CBOR') == 'cbor':
+    sys.modules['cbor2'] = None  # the client then takes the only library that it depends on
 from coppeliasim_zmqremoteapi_client import RemoteAPIClient
 from coppeliasim_zmqremoteapi_client.asyncio import RemoteAPIClient as AsyncClient
 from coppeliasim_zmqremoteapi_client import cbor

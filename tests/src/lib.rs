@@ -1,6 +1,8 @@
 //! Support for the end-to-end tests: where things are, and how to run them as a user does.
 
+use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
 
 /// Root of the workspace.
 pub fn workspace_root() -> &'static Path {
@@ -36,4 +38,60 @@ pub fn handeye_binary() -> PathBuf {
         folder.pop();
     }
     folder.join(format!("handeye{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// `handeye cell` as a process of its own, on a free port; killed when dropped.
+#[derive(Debug)]
+pub struct CellProcess {
+    child: Child,
+    port: u16,
+}
+
+impl CellProcess {
+    /// Starts it on any free port and waits for its line.
+    pub fn start(arguments: &[&str]) -> Self {
+        Self::start_on(0, arguments)
+    }
+
+    /// Starts it on a port (0 for any) and waits for its line.
+    ///
+    /// # Panics
+    /// When it does not say that it listens.
+    pub fn start_on(port: u16, arguments: &[&str]) -> Self {
+        let mut child = Command::new(handeye_binary())
+            .args(["cell", "--quiet", "--port", &port.to_string()])
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap_or_else(|error| panic!("{}: {error}; run cargo build -p handeye_app", handeye_binary().display()));
+        let mut line = String::new();
+        if let Some(stdout) = child.stdout.take() {
+            BufReader::new(stdout).read_line(&mut line).unwrap_or_default();
+        }
+        let port = line
+            .trim()
+            .strip_prefix("listening on tcp://")
+            .and_then(|address| address.rsplit(':').next())
+            .and_then(|port| port.parse().ok())
+            .unwrap_or_else(|| panic!("the cell said {line:?} instead of where it listens"));
+        Self { child, port }
+    }
+
+    /// Where it listens on 127.0.0.1.
+    pub fn port(&self) -> u16 {
+        self.port
+    }
+
+    /// Ends it at once, as a crash would.
+    pub fn kill(&mut self) {
+        if self.child.kill().and_then(|()| self.child.wait()).is_err() {
+            eprintln!("the cell was gone already");
+        }
+    }
+}
+
+impl Drop for CellProcess {
+    fn drop(&mut self) {
+        self.kill();
+    }
 }
