@@ -62,10 +62,11 @@ def main():
     board = np.zeros((COLUMNS * ROWS, 3), np.float32)
     board[:, :2] = np.mgrid[0:COLUMNS, 0:ROWS].T.reshape(-1, 2) * SQUARE_M
     image_points, tips, size = [], [], None
-    for pose in taught["poses"]:
+    for pose in taught["pose"]:
+        goal = pose["base_from_tip"]
         sim.moveToPose({
             "ik": {"tip": tip, "target": target},
-            "targetPose": pose["translation_m"] + pose["rotation_xyzw"],
+            "targetPose": goal["translation_m"] + goal["rotation_xyzw"],
             "maxVel": 4 * [30.0],
             "maxAccel": 4 * [1.0],
             "maxJerk": 4 * [1.0],
