@@ -1,1 +1,38 @@
 //! A client of the remote API: connection, calls, and the typed part of `sim.*` that the workbench uses.
+//!
+//! | layer | what it knows |
+//! | --- | --- |
+//! | [`Transport`] | one request, one reply, and when the server is gone |
+//! | [`Connection`] | calls, callbacks, both protocol versions, time limits, recovery |
+//! | [`Sim`] | functions of `sim.*` with their types; CoppeliaSim's conventions end in [`convert`] |
+//! | [`cell`] | an arm with a camera: move, stop, look, and the truth of a simulated cell |
+
+mod callback;
+mod cancel;
+pub mod cell;
+mod connection;
+pub mod constants;
+pub mod convert;
+mod endpoint;
+mod error;
+mod options;
+mod protocol;
+mod returned;
+mod sim;
+#[cfg(test)]
+mod testing;
+mod transport;
+
+pub use callback::{CallbackName, CallbackScope};
+pub use cancel::CancelToken;
+pub use connection::Connection;
+pub use endpoint::{DEFAULT_PORT, Endpoint};
+pub use error::LinkError;
+pub use options::{CallOptions, ConnectionOptions};
+pub use protocol::ProtocolVersion;
+pub use returned::Returned;
+pub use sim::{
+    JointInterval, JointMotion, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, SensorOptics, Sim,
+    SimulationState,
+};
+pub use transport::{Transport, TransportFault, ZmqTransport};

@@ -1,0 +1,300 @@
+//! The arm: where it is, how to move it, how to stop it.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use handeye_core::frames::{Base, Pose, Tip};
+
+use super::{CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles, require_running};
+use crate::client::cancel::CancelToken;
+use crate::client::error::LinkError;
+use crate::client::options::CallOptions;
+use crate::client::sim::{JointMotion, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, Sim};
+
+/// Longest motion, in real time. The slowest sensible one takes a minute; a simulation may run slower than real time.
+const LONGEST_MOTION: Duration = Duration::from_mins(10);
+
+/// Passes in a row that have to be at rest: one alone may be the turning point of an oscillation.
+const RESTING_PASSES: u32 = 3;
+
+/// How far from its goal a tip may stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionTolerance {
+    /// Distance [m].
+    pub distance_m: f64,
+    /// Angle [rad].
+    pub angle_rad: f64,
+}
+
+impl Default for MotionTolerance {
+    /// Twice the precision to which the simulator's inverse kinematics works by default (1 mm, 0.5°).
+    fn default() -> Self {
+        Self { distance_m: 0.002, angle_rad: 1.0_f64.to_radians() }
+    }
+}
+
+/// When an arm counts as standing still.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SettleOptions {
+    /// Fastest joint [rad/s] that counts as at rest.
+    pub rate_rad_s: f64,
+    /// Longest wait, in simulated time [s].
+    pub limit_s: f64,
+}
+
+impl Default for SettleOptions {
+    /// At 0.001 rad/s an arm of 1 m reach moves by 0.05 mm in a pass: less than a tenth of a pixel at working distance.
+    fn default() -> Self {
+        Self { rate_rad_s: 1e-3, limit_s: 5.0 }
+    }
+}
+
+/// The arm of a cell, over a connection of its own.
+pub struct Arm {
+    sim: Sim,
+    objects: Arc<CellObjects>,
+    info: Arc<CellInfo>,
+}
+
+/// What differs between motions of joints and of the tip.
+enum Motion {
+    Joints(JointMotion),
+    Pose(PoseMotion),
+}
+
+impl Motion {
+    fn init(&self, sim: &mut Sim) -> Result<MotionState, LinkError> {
+        match self {
+            Self::Joints(motion) => sim.move_to_config_init(motion),
+            Self::Pose(motion) => sim.move_to_pose_init(motion),
+        }
+    }
+
+    fn step(&self, sim: &mut Sim, state: &mut MotionState) -> Result<MotionStatus, LinkError> {
+        match self {
+            Self::Joints(_) => sim.move_to_config_step(state),
+            Self::Pose(_) => sim.move_to_pose_step(state),
+        }
+    }
+
+    fn cleanup(&self, sim: &mut Sim, state: MotionState) -> Result<(), LinkError> {
+        match self {
+            Self::Joints(_) => sim.move_to_config_cleanup(state),
+            Self::Pose(_) => sim.move_to_pose_cleanup(state),
+        }
+    }
+
+    fn whole(&self, sim: &mut Sim, options: &CallOptions) -> Result<(), LinkError> {
+        match self {
+            Self::Joints(motion) => sim.move_to_config(motion, options),
+            Self::Pose(motion) => sim.move_to_pose(motion, options),
+        }
+    }
+}
+
+impl Arm {
+    pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
+        Self { sim, objects, info }
+    }
+
+    /// What is known about the cell.
+    pub fn info(&self) -> &CellInfo {
+        &self.info
+    }
+
+    /// The typed calls, for what has no method here: start, stop and step the simulation, write to its log.
+    pub fn sim(&mut self) -> &mut Sim {
+        &mut self.sim
+    }
+
+    /// Positions of the joints from the base up [rad].
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn joint_angles(&mut self) -> Result<JointAngles, LinkError> {
+        read_joint_angles(&mut self.sim, &self.objects.joints)
+    }
+
+    /// The tip as the controller reports it: its pose in the world of the scene.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn base_from_tip(&mut self) -> Result<Pose<Base, Tip>, LinkError> {
+        self.sim.get_object_pose(self.objects.tip, ObjectHandle::WORLD)
+    }
+
+    /// Moves the joints to `goal` [rad] within `limits` and returns when the motion is over; an arm with dynamic joints
+    /// still follows for a moment, see [`Arm::settle`].
+    ///
+    /// # Errors
+    /// [`LinkError::JointOutOfRange`] or [`LinkError::BadMotion`] before anything moves; [`LinkError::NotRunning`];
+    /// [`LinkError::Cancelled`] with the arm stopped; [`LinkError::Unsupported`] before CoppeliaSim 4.7.
+    pub fn move_to_joints(
+        &mut self,
+        goal: &JointAngles,
+        limits: &MotionLimits,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        self.check_range(goal)?;
+        self.drive(
+            &Motion::Joints(JointMotion {
+                joints: self.objects.joints.to_vec(),
+                target_rad: goal.to_vec(),
+                limits: limits.clone(),
+            }),
+            "moving the joints",
+            cancel,
+        )
+    }
+
+    /// Moves the tip to `goal` within `limits` (x, y, z, angle), waits until the arm stands still, and compares.
+    ///
+    /// # Errors
+    /// As [`Arm::move_to_joints`]; [`LinkError::Unreached`] when the tip is elsewhere, [`LinkError::NotSettled`] when it
+    /// does not come to rest, [`LinkError::NoSuchObject`] in a scene without a target dummy.
+    pub fn move_to_pose(
+        &mut self,
+        goal: &Pose<Base, Tip>,
+        limits: &MotionLimits,
+        tolerance: &MotionTolerance,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        if !goal.is_finite() {
+            let value = f64::NAN;
+            return Err(LinkError::BadMotion { what: "the goal", expected: "a finite pose", value });
+        }
+        let Some(target) = self.objects.target else {
+            let path = self.objects.target_path.clone();
+            return Err(LinkError::NoSuchObject { path, what: "target dummy of motions" });
+        };
+        let motion = PoseMotion { tip: self.objects.tip, target, target_pose: *goal, limits: limits.clone() };
+        self.drive(&Motion::Pose(motion), "moving the tip", cancel)?;
+        self.settle(&SettleOptions::default(), cancel)?;
+        let (distance_m, angle_rad) = self.base_from_tip()?.distance_to(goal);
+        if distance_m <= tolerance.distance_m && angle_rad <= tolerance.angle_rad {
+            return Ok(());
+        }
+        Err(LinkError::Unreached { distance_mm: distance_m * 1e3, angle_deg: angle_rad.to_degrees() })
+    }
+
+    /// Has every joint stay where it is now.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call; the arm may then still move.
+    pub fn stop(&mut self) -> Result<(), LinkError> {
+        for &joint in &self.objects.joints {
+            let here_rad = self.sim.get_joint_position(joint)?;
+            self.sim.set_joint_target_position(joint, here_rad)?;
+        }
+        Ok(())
+    }
+
+    /// Waits until the arm stands still, and one complete pass longer, so that images show it so. Returns the simulated
+    /// time that it took [s].
+    ///
+    /// # Errors
+    /// [`LinkError::NotSettled`] after `options.limit_s` of simulated time; [`LinkError::NotRunning`];
+    /// [`LinkError::Cancelled`].
+    pub fn settle(&mut self, options: &SettleOptions, cancel: &CancelToken) -> Result<f64, LinkError> {
+        let task = "waiting for the arm to stand still";
+        require_running(&mut self.sim, task)?;
+        let call = CallOptions::cancelled_by(cancel);
+        let start_s = self.sim.get_simulation_time()?;
+        let (mut before_s, mut before) = (start_s, self.joint_angles()?);
+        let mut resting = 0;
+        loop {
+            self.sim.step(&call)?;
+            let (now_s, now) = (self.sim.get_simulation_time()?, self.joint_angles()?);
+            if now_s <= before_s {
+                require_running(&mut self.sim, task)?;
+                continue;
+            }
+            let travel_rad = before.iter().zip(&now).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+            let rate_rad_s = travel_rad / (now_s - before_s);
+            resting = if rate_rad_s <= options.rate_rad_s { resting + 1 } else { 0 };
+            let after_s = now_s - start_s;
+            if resting >= RESTING_PASSES {
+                return Ok(after_s);
+            }
+            if after_s > options.limit_s {
+                return Err(LinkError::NotSettled { after_s, rate_deg_s: rate_rad_s.to_degrees() });
+            }
+            (before_s, before) = (now_s, now);
+        }
+    }
+
+    fn check_range(&self, goal: &JointAngles) -> Result<(), LinkError> {
+        for (index, (&goal_rad, interval)) in goal.iter().zip(&self.info.joint_intervals).enumerate() {
+            if !goal_rad.is_finite() {
+                let expected = "finite angles";
+                return Err(LinkError::BadMotion { what: "the goal", expected, value: goal_rad });
+            }
+            // A millionth of a radian over the end is rounding, and clamping it moves nothing.
+            let inside = (interval.min_rad - 1e-6..=interval.max_rad + 1e-6).contains(&goal_rad);
+            if !interval.cyclic && !inside {
+                return Err(LinkError::JointOutOfRange {
+                    joint: index + 1,
+                    goal_deg: goal_rad.to_degrees(),
+                    min_deg: interval.min_rad.to_degrees(),
+                    max_deg: interval.max_rad.to_degrees(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn drive(&mut self, motion: &Motion, task: &'static str, cancel: &CancelToken) -> Result<(), LinkError> {
+        match motion {
+            Motion::Joints(motion) => motion.limits.validate(JOINTS)?,
+            Motion::Pose(motion) => motion.limits.validate(4)?,
+        }
+        require_running(&mut self.sim, task)?;
+        if cancel.is_cancelled() {
+            return Err(LinkError::Cancelled { call: task.to_owned() });
+        }
+        match motion.init(&mut self.sim) {
+            Ok(state) => self.drive_stepwise(motion, state, task, cancel),
+            Err(LinkError::Unsupported { .. }) => {
+                let outcome = motion.whole(&mut self.sim, &CallOptions::long(LONGEST_MOTION, cancel));
+                match outcome {
+                    Err(LinkError::Cancelled { .. } | LinkError::Timeout { .. }) => self.stop().and(outcome),
+                    outcome => outcome,
+                }
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn drive_stepwise(
+        &mut self,
+        motion: &Motion,
+        mut state: MotionState,
+        task: &'static str,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        let started = Instant::now();
+        let call = CallOptions::cancelled_by(cancel);
+        let outcome = loop {
+            if cancel.is_cancelled() {
+                break Err(LinkError::Cancelled { call: task.to_owned() });
+            }
+            if started.elapsed() > LONGEST_MOTION {
+                break Err(LinkError::Timeout { call: task.to_owned(), after: started.elapsed() });
+            }
+            let stepped = motion.step(&mut self.sim, &mut state);
+            // The commanded point takes effect in the pass that follows, also the last one.
+            match stepped.and_then(|status| self.sim.step(&call).map(|()| status)) {
+                Ok(MotionStatus::Running) => {}
+                Ok(MotionStatus::Done) => break Ok(()),
+                Err(error) => break Err(error),
+            }
+        };
+        match &outcome {
+            Ok(()) => motion.cleanup(&mut self.sim, state),
+            // A server that has gone or hangs drives nothing any more, and asking it to tidy up only takes time.
+            Err(LinkError::Disconnected { .. } | LinkError::Timeout { .. } | LinkError::Unreachable { .. }) => outcome,
+            // The arm has to stand before the caller hears of it. If it cannot be told to, that is the worse news.
+            Err(_) => self.stop().and(motion.cleanup(&mut self.sim, state)).and(outcome),
+        }
+    }
+}

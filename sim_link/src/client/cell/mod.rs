@@ -1,0 +1,307 @@
+//! An arm with an RGB-D camera behind a remote API: what the workbench drives.
+//!
+//! [`CellClient`] finds the objects of the scene and holds two connections, because a connection can do one thing at a
+//! time: [`Arm`] moves and stops, [`CameraFeed`] takes frames, and after [`CellClient::split`] each lives on a thread of
+//! its own, so that pictures keep coming while the arm moves.
+//!
+//! # How motions are driven
+//! A motion can be left to the server (`sim.moveToConfig`, one call that ends when the arm is there) or taken step by
+//! step (`_init`, then `_step` and `sim.step` for each pass, then `_cleanup`). [`Arm`] takes it step by step: between
+//! two steps the stop button is looked at, and a client that dies leaves an arm that stands still, not one that carries
+//! on. The API has no other way to end a motion of another client. The simulation is not taken into stepping mode for
+//! it: it keeps its pace, other clients keep theirs, and a crash cannot freeze it; the price is that a slow network
+//! makes the arm pause for a pass now and then on its way, which changes nothing about where it ends.
+//! A server without the step functions gets the single call. Cancelling that ends this client's record on the server
+//! and with it, on CoppeliaSim, the motion; the arm is told to stay where it is in either case.
+
+mod arm;
+mod camera;
+mod truth;
+
+use std::sync::Arc;
+
+use handeye_core::camera::Intrinsics;
+use handeye_core::frames::{Base, Pose, Tip};
+
+pub use arm::{Arm, MotionTolerance, SettleOptions};
+pub use camera::{CameraFeed, Frame};
+pub use truth::{GroundTruth, PublishedTruth, TRUTH_NAME};
+
+use super::cancel::CancelToken;
+use super::endpoint::Endpoint;
+use super::error::LinkError;
+use super::options::ConnectionOptions;
+use super::protocol::ProtocolVersion;
+use super::sim::{JointInterval, MotionLimits, ObjectHandle, SensorOptics, Sim, SimulationState};
+
+/// Number of joints of the arm.
+pub const JOINTS: usize = 6;
+
+/// Positions of the joints from the base up [rad].
+pub type JointAngles = [f64; JOINTS];
+
+/// Where the parts of the cell are in the scene.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CellPaths {
+    /// The joints: the first six matches in the order of the tree, from the base up.
+    pub joints: String,
+    /// The dummy whose pose the controller reports.
+    pub tip: String,
+    /// The dummy that inverse kinematics follows; without it there are no motions to a pose.
+    pub target: String,
+    /// The vision sensor for colour.
+    pub camera: String,
+    /// The vision sensor for depth, at the same place.
+    pub depth: String,
+}
+
+impl Default for CellPaths {
+    /// The public UR5 hand-eye scene, which the built-in cell mimics.
+    fn default() -> Self {
+        Self {
+            joints: "/UR5/joint".to_owned(),
+            tip: "/UR5/Tip".to_owned(),
+            target: "/UR5/Target".to_owned(),
+            camera: "/UR5/3D_camera".to_owned(),
+            depth: "/UR5/3D_camera/depth".to_owned(),
+        }
+    }
+}
+
+/// What is known about a cell once it has been found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellInfo {
+    /// Where the server is.
+    pub endpoint: Endpoint,
+    /// Version of the remote API.
+    pub protocol: ProtocolVersion,
+    /// Version of the simulator, 41000 is 4.10.0; 0 when it does not tell.
+    pub program_version: i64,
+    /// Ranges of the joints from the base up.
+    pub joint_intervals: [JointInterval; JOINTS],
+    /// The colour sensor.
+    pub optics: SensorOptics,
+    /// The depth sensor, whose clipping planes bound the depths.
+    pub depth_optics: SensorOptics,
+    /// Simulated time per pass [s].
+    pub time_step_s: f64,
+}
+
+/// Handles of the cell's objects.
+#[derive(Debug, Clone, PartialEq)]
+struct CellObjects {
+    joints: [ObjectHandle; JOINTS],
+    tip: ObjectHandle,
+    target: Option<ObjectHandle>,
+    target_path: String,
+    camera: ObjectHandle,
+    depth: ObjectHandle,
+}
+
+/// A cell: an arm and its camera, over two connections.
+pub struct CellClient {
+    info: Arc<CellInfo>,
+    arm: Arm,
+    camera: CameraFeed,
+}
+
+impl CellClient {
+    /// Connects twice and finds the objects of the scene.
+    ///
+    /// # Errors
+    /// [`LinkError::NoSuchObject`] names the first object that is missing; otherwise as for any call.
+    pub fn connect(endpoint: &Endpoint, options: &ConnectionOptions, paths: &CellPaths) -> Result<Self, LinkError> {
+        let control = Sim::connect(endpoint, options.clone())?;
+        // Two clients with one id would share one record on the server.
+        let camera_options =
+            ConnectionOptions { seed: options.seed.map(|seed| seed.wrapping_add(1)), ..options.clone() };
+        let camera = Sim::connect(endpoint, camera_options)?;
+        Self::over(control, camera, paths)
+    }
+
+    /// Over two connections to the same server.
+    ///
+    /// # Errors
+    /// As [`Self::connect`].
+    pub fn over(mut control: Sim, camera: Sim, paths: &CellPaths) -> Result<Self, LinkError> {
+        let objects = Arc::new(CellObjects::find(&mut control, paths)?);
+        let info = Arc::new(CellInfo::read(&mut control, &objects)?);
+        Ok(Self {
+            arm: Arm::new(control, Arc::clone(&objects), Arc::clone(&info)),
+            camera: CameraFeed::new(camera, objects, Arc::clone(&info)),
+            info,
+        })
+    }
+
+    /// What is known about the cell.
+    pub fn info(&self) -> &CellInfo {
+        &self.info
+    }
+
+    /// The arm.
+    pub fn arm(&mut self) -> &mut Arm {
+        &mut self.arm
+    }
+
+    /// The camera.
+    pub fn camera(&mut self) -> &mut CameraFeed {
+        &mut self.camera
+    }
+
+    /// The two halves, each for a thread of its own.
+    pub fn split(self) -> (Arm, CameraFeed) {
+        (self.arm, self.camera)
+    }
+
+    /// See [`Arm::joint_angles`].
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call, as for all that follow.
+    pub fn joint_angles(&mut self) -> Result<JointAngles, LinkError> {
+        self.arm.joint_angles()
+    }
+
+    /// See [`Arm::base_from_tip`].
+    ///
+    /// # Errors
+    /// As [`Arm::base_from_tip`].
+    pub fn base_from_tip(&mut self) -> Result<Pose<Base, Tip>, LinkError> {
+        self.arm.base_from_tip()
+    }
+
+    /// See [`Arm::move_to_joints`].
+    ///
+    /// # Errors
+    /// As [`Arm::move_to_joints`].
+    pub fn move_to_joints(
+        &mut self,
+        goal: &JointAngles,
+        limits: &MotionLimits,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        self.arm.move_to_joints(goal, limits, cancel)
+    }
+
+    /// See [`Arm::move_to_pose`].
+    ///
+    /// # Errors
+    /// As [`Arm::move_to_pose`].
+    pub fn move_to_pose(
+        &mut self,
+        goal: &Pose<Base, Tip>,
+        limits: &MotionLimits,
+        tolerance: &MotionTolerance,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        self.arm.move_to_pose(goal, limits, tolerance, cancel)
+    }
+
+    /// See [`Arm::stop`].
+    ///
+    /// # Errors
+    /// As [`Arm::stop`].
+    pub fn stop(&mut self) -> Result<(), LinkError> {
+        self.arm.stop()
+    }
+
+    /// See [`CameraFeed::grab`].
+    ///
+    /// # Errors
+    /// As [`CameraFeed::grab`].
+    pub fn grab(&mut self) -> Result<Frame, LinkError> {
+        self.camera.grab()
+    }
+
+    /// See [`CameraFeed::ground_truth`].
+    ///
+    /// # Errors
+    /// As [`CameraFeed::ground_truth`].
+    pub fn ground_truth(&mut self) -> Result<GroundTruth, LinkError> {
+        self.camera.ground_truth()
+    }
+
+    /// See [`CellInfo::camera_intrinsics_nominal`].
+    pub fn camera_intrinsics_nominal(&self) -> Intrinsics {
+        self.info.camera_intrinsics_nominal()
+    }
+}
+
+impl CellInfo {
+    /// The camera that the colour sensor's settings describe: a pinhole without distortion. A cell that simulates a
+    /// lens publishes the true one, see [`GroundTruth`].
+    pub fn camera_intrinsics_nominal(&self) -> Intrinsics {
+        self.optics.intrinsics()
+    }
+
+    fn read(sim: &mut Sim, objects: &CellObjects) -> Result<Self, LinkError> {
+        let mut joint_intervals = Vec::with_capacity(JOINTS);
+        for &joint in &objects.joints {
+            joint_intervals.push(sim.get_joint_interval(joint)?);
+        }
+        let program_version = match sim.program_version() {
+            Ok(version) => version,
+            // Only shown to the user; a server that answers no still serves the cell.
+            Err(LinkError::Remote { .. } | LinkError::UnexpectedReply { .. }) => 0,
+            Err(error) => return Err(error),
+        };
+        Ok(Self {
+            endpoint: sim.connection().endpoint().clone(),
+            protocol: sim.connection().version().unwrap_or(ProtocolVersion::V2),
+            program_version,
+            joint_intervals: std::array::from_fn(|i| joint_intervals[i]),
+            optics: sim.get_sensor_optics(objects.camera)?,
+            depth_optics: sim.get_sensor_optics(objects.depth)?,
+            time_step_s: sim.get_simulation_time_step()?,
+        })
+    }
+}
+
+impl CellObjects {
+    fn find(sim: &mut Sim, paths: &CellPaths) -> Result<Self, LinkError> {
+        let mut joints = [ObjectHandle::WORLD; JOINTS];
+        for (index, joint) in joints.iter_mut().enumerate() {
+            let found = sim.get_object_index(&paths.joints, index as u32);
+            *joint = named(found, &format!("{} [{index}]", paths.joints), "joint of the arm")?;
+        }
+        Ok(Self {
+            joints,
+            tip: named(sim.get_object(&paths.tip), &paths.tip, "tip")?,
+            target: sim.find_object(&paths.target)?,
+            target_path: paths.target.clone(),
+            camera: named(sim.get_object(&paths.camera), &paths.camera, "colour sensor")?,
+            depth: named(sim.get_object(&paths.depth), &paths.depth, "depth sensor")?,
+        })
+    }
+}
+
+/// The server's refusal of a path means that the object is not there.
+fn named(found: Result<ObjectHandle, LinkError>, path: &str, what: &'static str) -> Result<ObjectHandle, LinkError> {
+    match found {
+        Ok(handle) if handle.0 >= 0 => Ok(handle),
+        Ok(_) => Err(LinkError::NoSuchObject { path: path.to_owned(), what }),
+        Err(error @ LinkError::Remote { .. }) if !error.is_unknown_function() => {
+            tracing::debug!(path, %error, "an object of the cell was not found");
+            Err(LinkError::NoSuchObject { path: path.to_owned(), what })
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn require_running(sim: &mut Sim, task: &'static str) -> Result<(), LinkError> {
+    match sim.get_simulation_state()? {
+        SimulationState::Running => Ok(()),
+        SimulationState::Paused => Err(LinkError::NotRunning { task, state: "paused" }),
+        SimulationState::Stopped => Err(LinkError::NotRunning { task, state: "stopped" }),
+    }
+}
+
+fn read_joint_angles(sim: &mut Sim, joints: &[ObjectHandle; JOINTS]) -> Result<JointAngles, LinkError> {
+    let mut angles = [0.0; JOINTS];
+    for (angle, &joint) in angles.iter_mut().zip(joints) {
+        *angle = sim.get_joint_position(joint)?;
+    }
+    Ok(angles)
+}
+
+#[cfg(test)]
+mod tests;

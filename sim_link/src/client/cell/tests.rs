@@ -1,0 +1,455 @@
+//! A cell in a closure: just enough of a server to see what the client makes of it.
+
+use std::sync::{Mutex, PoisonError};
+
+use approx::assert_relative_eq;
+use ciborium::Value;
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::*;
+use crate::client::convert::seven_from_pose;
+use crate::client::testing::{Answer, Log, args, connection, err, func, ret};
+use crate::client::transport::TransportFault;
+use crate::wire::{self, Reader};
+
+/// State of the cell, and how it misbehaves.
+struct World {
+    state: i64,
+    time_s: f64,
+    joints: [f64; JOINTS],
+    targets: [f64; JOINTS],
+    goal: Option<[f64; JOINTS]>,
+    base_from_tip: Pose<Base, Tip>,
+    /// Parts of the way that a joint goes towards its target in a pass.
+    follow: f64,
+    missing: Vec<&'static str>,
+    truth: Option<String>,
+    passes_per_image: u32,
+    cancel_at_step: Option<(u32, CancelToken)>,
+    die_in: Option<&'static str>,
+    steps: u32,
+    held: i32,
+}
+
+type Shared = Arc<Mutex<World>>;
+
+const TIP: i64 = 20;
+const TARGET: i64 = 21;
+const CAMERA: i64 = 22;
+const DEPTH: i64 = 23;
+
+fn world() -> Shared {
+    Arc::new(Mutex::new(World {
+        state: 17,
+        time_s: 1.0,
+        joints: [0.0; JOINTS],
+        targets: [0.0; JOINTS],
+        goal: None,
+        base_from_tip: Pose::from_translation_xyzw([0.1, 0.2, 0.9], [0.0, 0.0, 0.0, 1.0]),
+        follow: 1.0,
+        missing: Vec::new(),
+        truth: None,
+        passes_per_image: 0,
+        cancel_at_step: None,
+        die_in: None,
+        steps: 0,
+        held: 0,
+    }))
+}
+
+impl World {
+    fn pass(&mut self) {
+        self.time_s += 0.05;
+        for (joint, target) in self.joints.iter_mut().zip(self.targets) {
+            *joint += self.follow * (target - *joint);
+        }
+    }
+
+    fn answer(&mut self, request: &Value) -> Answer {
+        let (name, args) = (func(request), args(request));
+        if self.missing.contains(&name) {
+            return err(&format!("No such function: {name}"));
+        }
+        if self.die_in == Some(name) {
+            return Answer::Fault(TransportFault::Disconnected);
+        }
+        let id = args.first().and_then(Reader::integer).unwrap_or(-1);
+        match name {
+            "sim.getObject" => self.object(args),
+            "sim.getJointInterval" => ret([Value::from(false), wire::floats([-3.0, 6.5])]),
+            "sim.getJointPosition" => ret([Value::Float(self.joints[id as usize])]),
+            "sim.setJointTargetPosition" => {
+                self.targets[id as usize] = args[1].number().expect("a number");
+                ret([Value::from(1)])
+            }
+            "sim.getInt32Param" => ret([Value::from(41000)]),
+            "sim.getVisionSensorRes" => ret([wire::integers([4, 2])]),
+            "sim.getObjectInt32Param" => ret([Value::from(1)]),
+            "sim.getObjectFloatParam" => ret([Value::Float(match args[1].integer() {
+                Some(1000) => 0.01,
+                Some(1001) => 3.5,
+                _ => 1.0,
+            })]),
+            "sim.getSimulationTimeStep" => ret([Value::Float(0.05)]),
+            "sim.getSimulationTime" => ret([Value::Float(self.time_s)]),
+            "sim.getSimulationState" => ret([Value::from(self.state)]),
+            "sim.step" => {
+                self.pass();
+                ret([])
+            }
+            "sim.acquireLock" => {
+                self.held += 1;
+                ret([])
+            }
+            "sim.releaseLock" => {
+                self.held -= 1;
+                ret([])
+            }
+            "sim.getObjectPose" => self.pose(id, args),
+            "sim.getVisionSensorImg" => {
+                if self.held == 0 {
+                    (0..self.passes_per_image).for_each(|_| self.pass());
+                }
+                ret([Value::Bytes((0..24).collect()), wire::integers([4, 2])])
+            }
+            "sim.getVisionSensorDepth" => ret([Value::Bytes(vec![0; 32]), wire::integers([4, 2])]),
+            "sim.getNamedStringParam" => ret([Value::Null]),
+            "sim.getStringSignal" => ret([self.truth.clone().map_or(Value::Null, Value::from)]),
+            _ => self.motion(name, args),
+        }
+    }
+
+    fn object(&self, args: &[Value]) -> Answer {
+        let index = args.get(1).and_then(|options| options.get("index")).and_then(Reader::integer);
+        let quiet = args.get(1).is_some_and(|options| options.get("noError").is_some());
+        let path = args[0].text().expect("a path");
+        let handle = match (path, index) {
+            ("/UR5/joint", Some(index)) => Some(index),
+            ("/UR5/Tip", None) => Some(TIP),
+            ("/UR5/Target", None) => Some(TARGET),
+            ("/UR5/3D_camera", None) => Some(CAMERA),
+            ("/UR5/3D_camera/depth", None) => Some(DEPTH),
+            _ => None,
+        };
+        match handle.filter(|_| !self.missing.contains(&path)) {
+            Some(handle) => ret([Value::from(handle)]),
+            None if quiet => ret([Value::from(-1)]),
+            None => err("354: in sim._getObject: object does not exist, or alias/path is ill formatted."),
+        }
+    }
+
+    fn pose(&self, id: i64, args: &[Value]) -> Answer {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        match (id, args[1].integer()) {
+            (TIP, Some(-1)) => ret([wire::floats(seven_from_pose(&self.base_from_tip))]),
+            // The reference scene's sensor on its tip.
+            (CAMERA, Some(TIP)) => ret([wire::floats([0.05, 0.0, 0.0, 0.0, 0.0, -half, half])]),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Motions of three steps that end at their goal.
+    fn motion(&mut self, name: &str, args: &[Value]) -> Answer {
+        let numbers = |key: &str| args[0].get(key).and_then(Reader::numbers);
+        match name {
+            "sim.moveToConfig_init" | "sim.moveToPose_init" => {
+                self.goal = numbers("targetPos").and_then(|q| q.try_into().ok());
+                self.steps = 0;
+                ret([wire::map([("ruckigObj", Value::from(1))])])
+            }
+            "sim.moveToConfig_step" | "sim.moveToPose_step" => {
+                self.steps += 1;
+                if let Some((at, cancel)) = &self.cancel_at_step
+                    && *at == self.steps
+                {
+                    cancel.cancel();
+                }
+                let done = self.steps == 3;
+                if let Some(goal) = self.goal {
+                    self.targets = std::array::from_fn(|i| goal[i] * f64::from(self.steps) / 3.0);
+                }
+                ret([Value::from(i64::from(done)), args[0].clone()])
+            }
+            "sim.moveToConfig_cleanup" | "sim.moveToPose_cleanup" => {
+                self.steps = 0;
+                ret([])
+            }
+            "sim.moveToConfig" => {
+                self.targets = numbers("targetPos").and_then(|q| q.try_into().ok()).expect("a goal");
+                self.pass();
+                ret([wire::map([("timeLeft", Value::Float(0.0))])])
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+struct Cell {
+    client: CellClient,
+    world: Shared,
+    control: Log,
+    camera: Log,
+}
+
+fn try_cell(world: &Shared) -> (Result<CellClient, LinkError>, Log, Log) {
+    let half = || {
+        let shared = Arc::clone(world);
+        let answer = move |request: &Value| shared.lock().unwrap_or_else(PoisonError::into_inner).answer(request);
+        let (connection, log) = connection(answer);
+        (Sim::new(connection), log)
+    };
+    let ((control, control_log), (camera, camera_log)) = (half(), half());
+    (CellClient::over(control, camera, &CellPaths::default()), control_log, camera_log)
+}
+
+fn cell(world: Shared) -> Cell {
+    let (client, control, camera) = try_cell(&world);
+    Cell { client: client.expect("the scene is complete"), world, control, camera }
+}
+
+impl Cell {
+    fn world(&self) -> std::sync::MutexGuard<'_, World> {
+        self.world.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn edit(world: &Shared, change: impl FnOnce(&mut World)) {
+    change(&mut world.lock().unwrap_or_else(PoisonError::into_inner));
+}
+
+const GOAL: JointAngles = [0.3, -0.6, 0.9, 0.0, 1.5, 0.0];
+
+fn limits() -> MotionLimits {
+    MotionLimits::uniform(JOINTS, 3.0, 2.0, 1.0)
+}
+
+fn pose_limits() -> MotionLimits {
+    MotionLimits::uniform(4, 3.0, 2.0, 1.0)
+}
+
+#[test]
+fn the_reference_scene_is_discovered() {
+    let cell = cell(world());
+    let info = cell.client.info();
+    assert_eq!((info.program_version, info.protocol, info.time_step_s), (41000, ProtocolVersion::V2, 0.05));
+    assert_eq!((info.optics.width, info.optics.height, info.depth_optics.far_m), (4, 2, 3.5));
+    assert_relative_eq!(info.joint_intervals[5].max_rad, 3.5, epsilon = 1e-12);
+    // f = 2 / tan(0.5)
+    assert_relative_eq!(cell.client.camera_intrinsics_nominal().fx, 3.6609754, epsilon = 1e-6);
+}
+
+#[test]
+fn a_scene_without_its_tip_is_named_with_the_path() {
+    let world = world();
+    edit(&world, |w| w.missing.push("/UR5/Tip"));
+    let error = try_cell(&world).0.err().expect("no tip");
+    assert_eq!(error, LinkError::NoSuchObject { path: "/UR5/Tip".to_owned(), what: "tip" });
+}
+
+#[test]
+fn a_scene_without_a_target_can_do_everything_but_motions_to_a_pose() {
+    let world = world();
+    edit(&world, |w| w.missing.push("/UR5/Target"));
+    let mut cell = cell(world);
+    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect("joints need no target");
+    let goal = Pose::identity();
+    let error = cell.client.move_to_pose(&goal, &pose_limits(), &MotionTolerance::default(), &CancelToken::new());
+    assert!(matches!(error, Err(LinkError::NoSuchObject { path, .. }) if path == "/UR5/Target"));
+}
+
+#[test]
+fn a_motion_is_stepped_to_its_end_and_tidied_up() {
+    let mut cell = cell(world());
+    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect("arrived");
+    assert_eq!(cell.client.joint_angles(), Ok(GOAL));
+    let functions = cell.control.functions();
+    let steps = functions.iter().filter(|f| *f == "sim.step").count();
+    assert_eq!(steps, 3, "every commanded point gets a pass, the last too");
+    assert!(functions.contains(&"sim.moveToConfig_cleanup".to_owned()));
+    assert!(!functions.contains(&"sim.setStepping".to_owned()), "other clients keep their clock");
+}
+
+#[test]
+fn cancelling_between_steps_stops_the_arm_where_it_is() {
+    let world = world();
+    let cancel = CancelToken::new();
+    edit(&world, |w| {
+        w.cancel_at_step = Some((2, cancel.clone()));
+        w.follow = 0.5;
+    });
+    let mut cell = cell(world);
+    let error = cell.client.move_to_joints(&GOAL, &limits(), &cancel).expect_err("cancelled");
+    assert!(matches!(error, LinkError::Cancelled { .. }), "{error}");
+    let world = cell.world();
+    assert_eq!(world.steps, 0, "the motion is tidied up on the server");
+    assert_eq!(world.targets, world.joints, "no joint has a way to go");
+    assert_ne!(world.joints, GOAL);
+}
+
+#[test]
+fn a_motion_that_is_cancelled_before_it_begins_does_not_begin() {
+    let mut cell = cell(world());
+    let cancel = CancelToken::new();
+    cancel.cancel();
+    assert!(matches!(cell.client.move_to_joints(&GOAL, &limits(), &cancel), Err(LinkError::Cancelled { .. })));
+    assert!(!cell.control.functions().contains(&"sim.moveToConfig_init".to_owned()));
+}
+
+#[test]
+fn a_server_without_steps_gets_the_whole_motion() {
+    let world = world();
+    edit(&world, |w| w.missing.push("sim.moveToConfig_init"));
+    let mut cell = cell(world);
+    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect("arrived");
+    assert_eq!(cell.client.joint_angles(), Ok(GOAL));
+}
+
+#[test]
+fn a_server_that_dies_in_a_motion_is_reported_without_further_calls() {
+    let world = world();
+    let mut cell = cell(Arc::clone(&world));
+    edit(&world, |w| w.die_in = Some("sim.step"));
+    let error = cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect_err("died");
+    assert_eq!(error, LinkError::Disconnected { call: "sim.step".to_owned() });
+    assert_eq!(cell.control.functions().last().map(String::as_str), Some("sim.step"));
+}
+
+#[test]
+fn nothing_moves_while_the_simulation_does_not_run() {
+    for (state, expected) in [(0, "stopped"), (8, "paused")] {
+        let world = world();
+        edit(&world, |w| w.state = state);
+        let mut cell = cell(world);
+        let error = cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::new()).expect_err("not running");
+        assert_eq!(error, LinkError::NotRunning { task: "moving the joints", state: expected });
+    }
+}
+
+#[test]
+fn a_goal_out_of_range_is_refused_with_joint_and_range() {
+    let mut cell = cell(world());
+    let mut goal = GOAL;
+    goal[3] = 7.0;
+    let error = cell.client.move_to_joints(&goal, &limits(), &CancelToken::new()).expect_err("out of range");
+    assert!(matches!(error, LinkError::JointOutOfRange { joint: 4, .. }), "{error}");
+    goal[3] = f64::NAN;
+    let error = cell.client.move_to_joints(&goal, &limits(), &CancelToken::new()).expect_err("not a number");
+    assert!(matches!(error, LinkError::BadMotion { .. }), "{error}");
+}
+
+#[test]
+fn a_tip_that_did_not_arrive_is_an_error_with_the_distance() {
+    let mut cell = cell(world());
+    let (tolerance, cancel) = (MotionTolerance::default(), CancelToken::new());
+    let here = cell.client.base_from_tip().expect("a pose");
+    cell.client.move_to_pose(&here, &pose_limits(), &tolerance, &cancel).expect("already there");
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.1);
+    let goal = Pose::from_isometry(nalgebra::Isometry3::from_parts(Vector3::new(0.1, 0.25, 0.9).into(), turn));
+    let error = cell.client.move_to_pose(&goal, &pose_limits(), &tolerance, &cancel).expect_err("inverse kinematics");
+    let LinkError::Unreached { distance_mm, angle_deg } = error else { panic!("{error}") };
+    assert_relative_eq!(distance_mm, 50.0, epsilon = 1e-9);
+    assert_relative_eq!(angle_deg, 0.1_f64.to_degrees(), epsilon = 1e-9);
+}
+
+#[test]
+fn settling_waits_for_the_joints_and_tells_how_long() {
+    let world = world();
+    edit(&world, |w| {
+        w.targets = [0.1; JOINTS];
+        w.follow = 0.5;
+    });
+    let mut cell = cell(world);
+    let options = SettleOptions { rate_rad_s: 1e-3, limit_s: 5.0 };
+    let after_s = cell.client.arm().settle(&options, &CancelToken::new()).expect("settles");
+    // The travel of pass n is 0.1 / 2ⁿ rad, which is under 5e-5 rad from pass 11 on; two more passes confirm it.
+    assert_relative_eq!(after_s, 13.0 * 0.05, epsilon = 1e-9);
+    let options = SettleOptions { limit_s: 0.2, ..options };
+    cell.world().targets = [1.0; JOINTS];
+    let error = cell.client.arm().settle(&options, &CancelToken::new()).expect_err("too short");
+    assert!(matches!(error, LinkError::NotSettled { .. }), "{error}");
+}
+
+#[test]
+fn a_frame_is_of_one_instant_because_the_simulation_is_held() {
+    let world = world();
+    edit(&world, |w| w.passes_per_image = 1);
+    let mut cell = cell(world);
+    let frame = cell.client.grab().expect("a frame");
+    assert_eq!(frame.sim_time_s, cell.world().time_s, "time stood still");
+    assert_eq!(cell.world().held, 0, "and goes on");
+    assert_eq!((frame.rgb.dimensions(), frame.depth.width, frame.depth.height), ((4, 2), 4, 2));
+    assert_eq!(frame.rgb.get_pixel(0, 0).0, [12, 13, 14], "the second row of the buffer is the upper one");
+}
+
+#[test]
+fn without_a_hold_a_frame_is_read_again_until_the_clock_stands() {
+    let world = world();
+    edit(&world, |w| w.missing.push("sim.acquireLock"));
+    let mut cell = cell(world);
+    cell.client.grab().expect("the clock stands");
+    cell.world().passes_per_image = 1;
+    let error = cell.client.grab().expect_err("the clock runs");
+    assert!(matches!(error, LinkError::MixedInstants { .. }), "{error}");
+}
+
+#[test]
+fn a_frame_that_fails_does_not_leave_the_simulation_held() {
+    let world = world();
+    let mut cell = cell(Arc::clone(&world));
+    edit(&world, |w| w.missing.push("sim.getVisionSensorDepth"));
+    assert!(cell.client.grab().is_err());
+    assert_eq!(cell.world().held, 0);
+
+    edit(&world, |w| w.die_in = Some("sim.getVisionSensorImg"));
+    let uuid = cell.client.camera().sim().connection().uuid().to_owned();
+    assert!(matches!(cell.client.grab(), Err(LinkError::Disconnected { .. })));
+    assert_ne!(cell.client.camera().sim().connection().uuid(), uuid, "the record that holds is ended");
+}
+
+#[test]
+fn frames_and_motions_go_over_two_connections() {
+    let mut cell = cell(world());
+    cell.client.grab().expect("a frame");
+    assert!(!cell.control.functions().contains(&"sim.getVisionSensorImg".to_owned()));
+    assert!(cell.camera.functions().contains(&"sim.getVisionSensorImg".to_owned()));
+    let (mut arm, mut camera) = cell.client.split();
+    let moving = std::thread::spawn(move || arm.move_to_joints(&GOAL, &limits(), &CancelToken::new()));
+    camera.grab().expect("a frame");
+    moving.join().expect("no panic").expect("arrived");
+}
+
+#[test]
+fn the_truth_of_the_reference_scene_is_in_opencv_axes() {
+    let mut cell = cell(world());
+    let truth = cell.client.ground_truth().expect("a scene");
+    // Rz(+90°) and 50 mm along x of the tip.
+    let x_in_tip = truth.tip_from_camera.rotation() * Vector3::x();
+    assert_relative_eq!(x_in_tip, Vector3::y(), epsilon = 1e-12);
+    assert_relative_eq!(truth.tip_from_camera.translation(), Vector3::new(0.05, 0.0, 0.0), epsilon = 1e-12);
+    assert_eq!((truth.base_from_target, truth.intrinsics_published), (None, false));
+    assert_eq!(truth.intrinsics, cell.client.camera_intrinsics_nominal());
+}
+
+#[test]
+fn what_the_cell_publishes_goes_before_what_the_scene_shows() {
+    let mut intrinsics = Intrinsics::pinhole(4, 2, 3.7);
+    intrinsics.distortion = handeye_core::camera::Distortion::BrownConrady([0.1, 0.0, 0.001, 0.0, 0.0]);
+    let base_from_target = Pose::from_translation_xyzw([0.0, -0.4, 0.8], [0.0, 0.0, 1.0, 0.0]);
+    let published = PublishedTruth {
+        intrinsics: Some(intrinsics),
+        tip_from_camera: None,
+        base_from_target: Some(base_from_target),
+    };
+    let world = world();
+    edit(&world, |w| w.truth = Some(published.to_toml().expect("TOML")));
+    let mut cell = cell(Arc::clone(&world));
+    let truth = cell.client.ground_truth().expect("published");
+    assert_eq!((truth.intrinsics, truth.intrinsics_published), (intrinsics, true));
+    let (distance_m, angle_rad) = truth.base_from_target.expect("published").distance_to(&base_from_target);
+    assert!(distance_m < 1e-15 && angle_rad < 1e-7);
+
+    edit(&world, |w| w.truth = Some("intrinsics = 3".to_owned()));
+    assert!(matches!(cell.client.ground_truth(), Err(LinkError::BadTruth { .. })));
+    edit(&world, |w| w.truth = Some("unknown = 3".to_owned()));
+    assert!(matches!(cell.client.ground_truth(), Err(LinkError::BadTruth { .. })));
+}

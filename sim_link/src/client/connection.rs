@@ -1,0 +1,395 @@
+//! One conversation with a remote API server: calls, callbacks, time limits, recovery.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use ciborium::Value;
+
+use super::callback::{Callback, CallbackName, CallbackScope};
+use super::cancel::CancelToken;
+use super::endpoint::Endpoint;
+use super::error::LinkError;
+use super::options::{CallOptions, ConnectionOptions};
+use super::protocol::{
+    self, CALLBACK_SUFFIX, ClientIds, END, EXECUTED, Introduction, ProtocolVersion, REPEAT, ReplyError, ServerMessage,
+    WAIT,
+};
+use super::returned::Returned;
+use super::transport::{Transport, TransportFault, ZmqTransport};
+
+/// Longest stretch of waiting without a look at the cancel token.
+const SLICE: Duration = Duration::from_millis(20);
+
+/// A client of one server. Belongs to one thread at a time: it can be sent to another, not shared.
+///
+/// A call that ends without a reply (time out, lost connection, cancelled, nonsense) closes the socket, so that the next
+/// call starts on a new one. The client id stays, and with it the server's record of this client (stepping mode,
+/// locks); unless the server was left in the middle of a conversation, waiting for this client and perhaps holding the
+/// simulation, or the call was cancelled or ran past its total time: then the record is ended and a new id taken.
+/// [`Connection::epoch`] tells when state on the server may have been lost.
+pub struct Connection {
+    transport: Box<dyn Transport>,
+    endpoint: Endpoint,
+    options: ConnectionOptions,
+    ids: ClientIds,
+    uuid: String,
+    introduced: bool,
+    version: Option<ProtocolVersion>,
+    contacted: bool,
+    epoch: u64,
+    callbacks: BTreeMap<String, Callback>,
+    registered: u64,
+    depth: u32,
+    broken: Option<LinkError>,
+}
+
+/// A call under way.
+struct Exchange<'a> {
+    func: &'a str,
+    reply_timeout: Duration,
+    total_timeout: Duration,
+    started: Instant,
+    cancel: Option<&'a CancelToken>,
+    /// The server has asked this client for something, so it waits for an answer inside the call.
+    asked: bool,
+}
+
+impl Connection {
+    /// Prepares a connection over TCP. The server may be started later; the first call finds out.
+    ///
+    /// # Errors
+    /// [`LinkError::Socket`] when no socket can be made for the address.
+    pub fn connect(endpoint: &Endpoint, options: ConnectionOptions) -> Result<Self, LinkError> {
+        let mut transport = ZmqTransport::new(endpoint, options.heartbeat);
+        transport.open()?;
+        Ok(Self::over(Box::new(transport), endpoint, options))
+    }
+
+    /// A connection over any transport; `endpoint` only appears in messages.
+    pub fn over(transport: Box<dyn Transport>, endpoint: &Endpoint, options: ConnectionOptions) -> Self {
+        let mut ids = ClientIds::new(options.seed);
+        let uuid = ids.draw();
+        Self {
+            transport,
+            endpoint: endpoint.clone(),
+            options,
+            ids,
+            uuid,
+            introduced: false,
+            version: None,
+            contacted: false,
+            epoch: 0,
+            callbacks: BTreeMap::new(),
+            registered: 0,
+            depth: 0,
+            broken: None,
+        }
+    }
+
+    /// Where the server is.
+    pub fn endpoint(&self) -> &Endpoint {
+        &self.endpoint
+    }
+
+    /// The version that the server answered in; `None` before its first answer.
+    pub fn version(&self) -> Option<ProtocolVersion> {
+        self.version
+    }
+
+    /// Longest duration of a call that has no limit of its own.
+    pub fn total_timeout(&self) -> Duration {
+        self.options.total_timeout
+    }
+
+    /// This client's id.
+    pub fn uuid(&self) -> &str {
+        &self.uuid
+    }
+
+    /// Grows whenever the server may have lost this client's state (stepping mode, locks).
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Calls a function of the server by its dotted name, with the connection's time limits.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a conversation; [`LinkError::Remote`] when the server says no.
+    pub fn call(&mut self, func: &str, args: Vec<Value>) -> Result<Returned, LinkError> {
+        self.call_with(func, args, &CallOptions::default())
+    }
+
+    /// [`Connection::call`] with limits of its own.
+    ///
+    /// # Errors
+    /// As [`Connection::call`].
+    pub fn call_with(&mut self, func: &str, args: Vec<Value>, options: &CallOptions) -> Result<Returned, LinkError> {
+        let mut exchange = Exchange {
+            func,
+            reply_timeout: options.reply_timeout.unwrap_or(self.options.reply_timeout),
+            total_timeout: options.total_timeout.unwrap_or(self.options.total_timeout),
+            started: Instant::now(),
+            cancel: options.cancel.as_ref(),
+            asked: false,
+        };
+        if self.depth == 0 {
+            self.broken = None;
+        }
+        self.converse(&mut exchange, args).map(|values| Returned::new(func, values))
+    }
+
+    /// Makes a closure callable by the server, under a name to be passed as an argument of a call.
+    ///
+    /// The closure gets the server's arguments and a scope for further calls, and returns the callback's results. Its
+    /// error does not reach the server, which gets no results and carries on; the call returns it when it ends.
+    pub fn register_callback(
+        &mut self,
+        name: &str,
+        callback: impl FnMut(&mut CallbackScope<'_>, &[Value]) -> Result<Vec<Value>, LinkError> + Send + 'static,
+    ) -> CallbackName {
+        self.registered += 1;
+        let name = format!("{name}_{:x}", self.registered);
+        self.callbacks.insert(name.clone(), Box::new(callback));
+        CallbackName(name)
+    }
+
+    /// Forgets a callback.
+    pub fn unregister_callback(&mut self, name: &CallbackName) {
+        self.callbacks.remove(&name.0);
+    }
+
+    /// Has the server forget this client, its stepping mode and its locks, and goes on as a new one.
+    pub fn renew(&mut self) {
+        self.contacted |= self.transport.connected();
+        if self.version != Some(ProtocolVersion::V1) && self.contacted {
+            let farewell = protocol::request(END, Vec::new(), &self.uuid, None);
+            self.transport.send_last(&farewell);
+        } else {
+            self.transport.reset();
+        }
+        self.uuid = self.ids.draw();
+        self.introduced = false;
+        self.epoch += 1;
+    }
+
+    fn converse(&mut self, exchange: &mut Exchange<'_>, args: Vec<Value>) -> Result<Vec<Value>, LinkError> {
+        let mut callback_error = None;
+        // Kept for a server that turns out to speak the other version by now.
+        let mut retry = (self.version == Some(ProtocolVersion::V1)).then(|| args.clone());
+        let mut message = self.request(exchange.func, args);
+        loop {
+            let reply = self.exchange(exchange, &message)?;
+            match reply {
+                ServerMessage::Returned { values, version } => {
+                    self.version = Some(version);
+                    return callback_error.map_or(Ok(values), Err);
+                }
+                ServerMessage::Failed { message, version } => {
+                    self.version = Some(version);
+                    return Err(LinkError::Remote { call: exchange.func.to_owned(), message });
+                }
+                ServerMessage::OtherVersion { message: text } => {
+                    // The call was not executed, so repeating it is safe.
+                    let Some(args) = retry.take() else {
+                        let call = exchange.func.to_owned();
+                        return Err(self.give_up(exchange, LinkError::VersionMismatch { call, reply: text }));
+                    };
+                    self.version = None;
+                    self.introduced = false;
+                    message = self.request(exchange.func, args);
+                }
+                ServerMessage::Ask { func, .. } if func == REPEAT => exchange.asked = true,
+                ServerMessage::Ask { func, .. } if func == WAIT => {
+                    exchange.asked = true;
+                    message = self.request(EXECUTED, Vec::new());
+                }
+                ServerMessage::Ask { func, args } => {
+                    exchange.asked = true;
+                    let results = self.run_callback(exchange, &func, &args, &mut callback_error)?;
+                    message = self.request(EXECUTED, results);
+                }
+                ServerMessage::Nothing => {
+                    return Err(self.unexpected(exchange, "a result", "an empty map".to_owned()));
+                }
+            }
+        }
+    }
+
+    /// Sends one message and waits for its reply.
+    fn exchange(&mut self, exchange: &Exchange<'_>, message: &[u8]) -> Result<ServerMessage, LinkError> {
+        self.check_limits(exchange, exchange.asked || self.depth > 0)?;
+        if let Err(fault) = self.transport.send(message) {
+            return Err(self.fault(exchange, fault));
+        }
+        let sent = Instant::now();
+        loop {
+            self.check_limits(exchange, true)?;
+            let waited = sent.elapsed();
+            // A call may be allowed a long silence, but that is of a server, not of nobody.
+            let connected = self.transport.connected();
+            let limit =
+                if connected { exchange.reply_timeout } else { exchange.reply_timeout.min(self.options.reply_timeout) };
+            let Some(left) = limit.checked_sub(waited).filter(|left| !left.is_zero()) else {
+                let late = self.late(exchange, waited);
+                return Err(self.give_up(exchange, late));
+            };
+            let left = left.min(exchange.total_timeout.saturating_sub(exchange.started.elapsed()));
+            let received = self.transport.receive(left.min(SLICE));
+            self.contacted |= self.transport.connected();
+            match received {
+                Ok(None) => {}
+                Ok(Some(bytes)) => return self.read(exchange, &bytes),
+                Err(fault) => return Err(self.fault(exchange, fault)),
+            }
+        }
+    }
+
+    /// Ends the call when it is cancelled or too long; `under_way` says whether the server knows of it.
+    fn check_limits(&mut self, exchange: &Exchange<'_>, under_way: bool) -> Result<(), LinkError> {
+        let cancelled = exchange.cancel.is_some_and(CancelToken::is_cancelled) || self.options.shutdown.is_cancelled();
+        let elapsed = exchange.started.elapsed();
+        if !cancelled && elapsed < exchange.total_timeout {
+            return Ok(());
+        }
+        let error = if cancelled {
+            LinkError::Cancelled { call: exchange.func.to_owned() }
+        } else {
+            self.late(exchange, elapsed)
+        };
+        if under_way {
+            // The server may still be busy with the call, a motion say: with this client's record, the call ends.
+            self.renew();
+        }
+        Err(self.note(error))
+    }
+
+    fn read(&mut self, exchange: &Exchange<'_>, bytes: &[u8]) -> Result<ServerMessage, LinkError> {
+        let call = || exchange.func.to_owned();
+        let error = match protocol::parse(bytes) {
+            Ok(message) => return Ok(message),
+            Err(ReplyError::Wire(source)) => LinkError::Malformed { call: call(), source },
+            Err(ReplyError::Shape { expected, got }) => {
+                LinkError::UnexpectedReply { call: call(), expected: expected.to_owned(), got }
+            }
+        };
+        Err(self.give_up(exchange, error))
+    }
+
+    fn run_callback(
+        &mut self,
+        exchange: &Exchange<'_>,
+        name: &str,
+        args: &[Value],
+        first_error: &mut Option<LinkError>,
+    ) -> Result<Vec<Value>, LinkError> {
+        // Out of the map while it runs, so that it can be given the connection. It cannot be entered again meanwhile,
+        // which also bounds the nesting.
+        let Some(mut callback) = self.callbacks.remove(name) else {
+            tracing::debug!(callback = name, "the server asked for a callback that is not here, or runs already");
+            return Ok(Vec::new());
+        };
+        let left = exchange.total_timeout.saturating_sub(exchange.started.elapsed());
+        let options = CallOptions {
+            reply_timeout: Some(exchange.reply_timeout),
+            total_timeout: Some(left),
+            cancel: exchange.cancel.cloned(),
+        };
+        self.depth += 1;
+        let result = callback(&mut CallbackScope::new(self, options), args);
+        self.depth -= 1;
+        self.callbacks.insert(name.to_owned(), callback);
+        if let Some(broken) = &self.broken {
+            return Err(broken.clone());
+        }
+        Ok(result.unwrap_or_else(|error| {
+            first_error.get_or_insert(error);
+            Vec::new()
+        }))
+    }
+
+    fn request(&mut self, func: &str, args: Vec<Value>) -> Vec<u8> {
+        if self.version == Some(ProtocolVersion::V1) {
+            return protocol::request_v1(func, args);
+        }
+        let introduction =
+            (!self.introduced).then_some(Introduction { lang: "rust", idle_timeout_s: self.options.idle_timeout_s });
+        self.introduced = true;
+        protocol::request(func, args, &self.uuid, introduction)
+    }
+
+    fn late(&self, exchange: &Exchange<'_>, after: Duration) -> LinkError {
+        let call = exchange.func.to_owned();
+        if self.transport.connected() {
+            LinkError::Timeout { call, after }
+        } else {
+            LinkError::Unreachable { call, endpoint: self.endpoint.clone(), after }
+        }
+    }
+
+    fn fault(&mut self, exchange: &Exchange<'_>, fault: TransportFault) -> LinkError {
+        let call = exchange.func.to_owned();
+        let error = match fault {
+            TransportFault::Disconnected => LinkError::Disconnected { call },
+            TransportFault::ManyParts(parts) => LinkError::UnexpectedReply {
+                call,
+                expected: "a message of one part".to_owned(),
+                got: format!("{parts} parts"),
+            },
+            TransportFault::Refused(reason) => LinkError::Socket { endpoint: self.endpoint.to_string(), reason },
+        };
+        if matches!(error, LinkError::Disconnected { .. }) {
+            // Whatever comes back on that address may be a new server, of another version.
+            self.version = None;
+            self.drop_exchange();
+            return self.note(error);
+        }
+        self.give_up(exchange, error)
+    }
+
+    fn unexpected(&mut self, exchange: &Exchange<'_>, expected: &str, got: String) -> LinkError {
+        let error = LinkError::UnexpectedReply { call: exchange.func.to_owned(), expected: expected.to_owned(), got };
+        self.give_up(exchange, error)
+    }
+
+    /// Leaves a call that the server may not have left.
+    fn give_up(&mut self, exchange: &Exchange<'_>, error: LinkError) -> LinkError {
+        if exchange.asked || self.depth > 0 {
+            self.renew();
+        } else {
+            self.drop_exchange();
+        }
+        self.note(error)
+    }
+
+    fn drop_exchange(&mut self) {
+        self.transport.reset();
+        self.introduced = false;
+        self.epoch += 1;
+    }
+
+    /// Remembers that the conversation broke, for the calls that this one is nested in.
+    fn note(&mut self, error: LinkError) -> LinkError {
+        self.broken.get_or_insert_with(|| error.clone());
+        error
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        if self.version != Some(ProtocolVersion::V1) && self.contacted {
+            let farewell = protocol::request(END, Vec::new(), &self.uuid, None);
+            self.transport.send_last(&farewell);
+        }
+    }
+}
+
+impl CallbackName {
+    /// The argument that stands for the callback in a call.
+    pub fn to_argument(&self) -> Value {
+        Value::from(format!("{}{CALLBACK_SUFFIX}", self.0))
+    }
+}
+
+#[cfg(test)]
+#[path = "connection_tests.rs"]
+mod tests;

@@ -1,0 +1,328 @@
+use std::sync::mpsc;
+
+use super::*;
+use crate::client::testing::{Answer, Event, Log, args, ask, connection, err, func, ret};
+use crate::wire::{self, Reader};
+
+fn v1(values: Vec<Value>) -> Answer {
+    Answer::Say(wire::map([("success", Value::from(true)), ("ret", Value::Array(values))]))
+}
+
+fn v1_error(text: &str) -> Answer {
+    Answer::Say(wire::map([("success", Value::from(false)), ("error", Value::from(text))]))
+}
+
+fn has(request: &Value, key: &str) -> bool {
+    request.get(key).is_some()
+}
+
+fn ended(log: &Log) -> usize {
+    let is_end = |event: &&Event| matches!(event, Event::SentLast(request) if func(request) == END);
+    log.events().iter().filter(is_end).count()
+}
+
+#[test]
+fn only_the_first_message_introduces_the_client() {
+    let (mut connection, log) = connection(|_| ret([Value::from(1)]));
+    connection.call("sim.a", vec![]).expect("answered");
+    connection.call("sim.b", vec![]).expect("answered");
+    let requests = log.requests();
+    assert_eq!(requests[0].get("ver").and_then(Reader::integer), Some(2));
+    assert_eq!(requests[0].get("lang").and_then(|v| v.text()), Some("rust"));
+    assert_eq!(requests[0].get("timeout").and_then(Reader::integer), Some(60));
+    assert!(!has(&requests[1], "ver"));
+    assert_eq!(requests[0].get("uuid"), requests[1].get("uuid"));
+    assert_eq!(connection.version(), Some(ProtocolVersion::V2));
+}
+
+#[test]
+fn a_refusal_keeps_the_servers_words() {
+    let (mut connection, log) = connection(|_| err("354: in sim._getObject: object does not exist"));
+    let error = connection.call("sim.getObject", vec![]).expect_err("refused");
+    let message = "354: in sim._getObject: object does not exist".to_owned();
+    assert_eq!(error, LinkError::Remote { call: "sim.getObject".to_owned(), message });
+    assert_eq!(log.events().len(), 1, "a refusal is an answer: nothing is reset");
+}
+
+#[test]
+fn waiting_and_repeating_end_in_the_result() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |_| {
+        turn += 1;
+        match turn {
+            3 => ask(REPEAT),
+            1..=4 => ask(WAIT),
+            _ => ret([Value::from(5)]),
+        }
+    });
+    assert_eq!(connection.call("sim.step", vec![]).expect("done").integer(0), Ok(5));
+    // The message that was refused is sent again, whichever it was.
+    assert_eq!(log.functions(), ["sim.step", EXECUTED, EXECUTED, EXECUTED, EXECUTED]);
+}
+
+#[test]
+fn a_repeated_first_request_is_the_same_request() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |_| {
+        turn += 1;
+        if turn == 1 { ask(REPEAT) } else { ret([]) }
+    });
+    connection.call("sim.x", vec![Value::from(3)]).expect("done");
+    let requests = log.requests();
+    assert_eq!(requests[0], requests[1]);
+}
+
+#[test]
+fn a_callback_gets_its_arguments_and_may_call_back() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |request| {
+        turn += 1;
+        match turn {
+            1 => {
+                let name =
+                    args(request)[0].text().and_then(|t| t.strip_suffix("@func")).expect("a callback").to_owned();
+                Answer::Say(wire::map([
+                    ("func", Value::from(name)),
+                    ("args", Value::Array(vec![Value::from(20), Value::from(1)])),
+                ]))
+            }
+            2 => ret([Value::from(0.5)]),
+            3 => ret([args(request)[0].clone()]),
+            _ => panic!("{request:?}"),
+        }
+    });
+    let name = connection.register_callback("moved", |scope, args| {
+        let joint = args[0].clone();
+        let position = scope.call("sim.getJointPosition", vec![joint])?.number(0)?;
+        Ok(vec![Value::Float(position * 2.0)])
+    });
+    let done = connection.call("sim.testCB", vec![name.to_argument()]).expect("done");
+    assert_eq!(done.number(0), Ok(1.0));
+    assert_eq!(log.functions(), ["sim.testCB", "sim.getJointPosition", EXECUTED]);
+}
+
+#[test]
+fn an_unknown_callback_is_answered_with_nothing() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |_| {
+        turn += 1;
+        if turn == 1 { ask("someones_button") } else { ret([]) }
+    });
+    connection.call("sim.x", vec![]).expect("done");
+    assert!(args(&log.requests()[1]).is_empty());
+}
+
+#[test]
+fn an_error_in_a_callback_does_not_strand_the_server() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |_| {
+        turn += 1;
+        if turn == 1 { ask("failing_1") } else { ret([]) }
+    });
+    connection.register_callback("failing", |_, _| Err(LinkError::MixedInstants { attempts: 3 }));
+    let error = connection.call("sim.x", vec![]).expect_err("the callback failed");
+    assert_eq!(error, LinkError::MixedInstants { attempts: 3 });
+    assert_eq!(log.functions(), ["sim.x", EXECUTED]);
+}
+
+#[test]
+fn a_callback_cannot_hide_that_the_conversation_broke() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |_| {
+        turn += 1;
+        match turn {
+            1 => ask("careless_1"),
+            2 => Answer::Silence,
+            _ => ret([]),
+        }
+    });
+    connection.register_callback("careless", |scope, _| {
+        let _ignored = scope.call("sim.y", vec![]);
+        Ok(vec![])
+    });
+    let error = connection.call("sim.x", vec![]).expect_err("broke inside");
+    assert!(matches!(&error, LinkError::Timeout { call, .. } if call == "sim.y"), "{error}");
+    assert_eq!(ended(&log), 1, "the server waits for the callback's answer: it has to be told");
+    connection.call("sim.z", vec![]).expect("the next call works");
+}
+
+#[test]
+fn a_callback_that_runs_is_not_entered_again() {
+    let (mut connection, _log) = connection(|request| match func(request) {
+        "sim.again" => ask("again_1"),
+        _ => ret([]),
+    });
+    connection.register_callback("again", |scope, _| scope.call("sim.again", vec![]).map(|_| vec![]));
+    connection.call("sim.again", vec![]).map(drop).expect("ends");
+}
+
+#[test]
+fn silence_is_a_timeout_and_keeps_the_client_id() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |_| {
+        turn += 1;
+        if turn == 1 { Answer::Silence } else { ret([]) }
+    });
+    let uuid = connection.uuid().to_owned();
+    let error = connection.call("sim.x", vec![]).expect_err("silence");
+    assert!(matches!(error, LinkError::Timeout { .. }), "{error}");
+    connection.call("sim.x", vec![]).expect("the next call works");
+    assert_eq!(connection.uuid(), uuid);
+    assert_eq!(ended(&log), 0);
+    assert!(has(&log.requests()[1], "ver"), "a server that restarted must be told again");
+    assert_eq!(connection.epoch(), 1);
+}
+
+#[test]
+fn silence_in_the_middle_of_a_conversation_ends_the_clients_record() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |_| {
+        turn += 1;
+        match turn {
+            1 => ask(WAIT),
+            2 => Answer::Silence,
+            _ => ret([]),
+        }
+    });
+    let uuid = connection.uuid().to_owned();
+    connection.call("sim.moveToConfig", vec![]).expect_err("silence");
+    assert_eq!(ended(&log), 1);
+    connection.call("sim.x", vec![]).expect("the next call works");
+    assert_ne!(connection.uuid(), uuid, "an old message to the old record must not touch the new one");
+}
+
+#[test]
+fn a_server_that_always_waits_is_stopped_by_the_total_time() {
+    let (mut connection, log) = connection(|_| ask(WAIT));
+    let error = connection.call("sim.step", vec![]).expect_err("endless");
+    assert!(matches!(error, LinkError::Timeout { after, .. } if after >= Duration::from_millis(300)), "{error}");
+    assert_eq!(ended(&log), 1);
+}
+
+#[test]
+fn cancelling_ends_a_wait_and_the_clients_record() {
+    let cancel = CancelToken::new();
+    let flag = cancel.clone();
+    let (mut connection, log) = connection(move |_| {
+        flag.cancel();
+        Answer::Silence
+    });
+    let options = CallOptions::long(Duration::from_secs(30), &cancel);
+    let error = connection.call_with("sim.moveToConfig", vec![], &options).expect_err("cancelled");
+    assert_eq!(error, LinkError::Cancelled { call: "sim.moveToConfig".to_owned() });
+    assert_eq!(ended(&log), 1);
+}
+
+#[test]
+fn a_call_that_was_cancelled_before_it_began_is_not_sent() {
+    let cancel = CancelToken::new();
+    cancel.cancel();
+    let (mut connection, log) = connection(|_| ret([]));
+    let options = CallOptions::cancelled_by(&cancel);
+    assert!(matches!(connection.call_with("sim.x", vec![], &options), Err(LinkError::Cancelled { .. })));
+    assert_eq!(log.events(), []);
+}
+
+#[test]
+fn the_end_of_the_program_ends_every_wait() {
+    let (mut connection, _log) = connection(|_| Answer::Silence);
+    connection.options.shutdown.cancel();
+    assert!(matches!(connection.call("sim.x", vec![]), Err(LinkError::Cancelled { .. })));
+}
+
+#[test]
+fn nonsense_is_named_and_the_next_call_works() {
+    let mut turn = 0;
+    let (mut connection, _log) = connection(move |_| {
+        turn += 1;
+        match turn {
+            1 => Answer::Raw(b"HTTP/1.1 400 Bad Request".to_vec()),
+            2 => Answer::Raw(Vec::new()),
+            3 => Answer::Say(Value::from(3)),
+            4 => Answer::Say(wire::map([("ret", Value::from(3))])),
+            5 => Answer::Say(Value::Map(Vec::new())),
+            6 => Answer::Fault(TransportFault::ManyParts(2)),
+            _ => ret([]),
+        }
+    });
+    for turn in 1..=2 {
+        let error = connection.call("sim.x", vec![]).expect_err("nonsense");
+        assert!(matches!(error, LinkError::Malformed { .. }), "{turn}: {error}");
+    }
+    for turn in 3..=6 {
+        let error = connection.call("sim.x", vec![]).expect_err("nonsense");
+        assert!(matches!(error, LinkError::UnexpectedReply { .. }), "{turn}: {error}");
+    }
+    connection.call("sim.x", vec![]).expect("the next call works");
+}
+
+#[test]
+fn an_old_server_is_recognised_and_spoken_to_in_its_version() {
+    let (mut connection, log) = connection(|request| match func(request) {
+        "zmqRemoteApi.require" => v1_error("No such function: zmqRemoteApi.require"),
+        _ => v1(vec![Value::from(1)]),
+    });
+    let error = connection.call("zmqRemoteApi.require", vec![Value::from("sim")]).expect_err("unknown there");
+    assert!(error.is_unknown_function(), "{error}");
+    assert_eq!(connection.version(), Some(ProtocolVersion::V1));
+    assert_eq!(connection.call("sim.setJointPosition", vec![]).expect("answered").integer(0), Ok(1));
+    let second = &log.requests()[1];
+    assert!(!has(second, "uuid") && !has(second, "argsL") && !has(second, "ver"), "{second:?}");
+    drop(connection);
+    assert_eq!(ended(&log), 0, "an old server does not know the farewell");
+}
+
+#[test]
+fn a_server_that_was_replaced_by_a_newer_one_is_spoken_to_in_the_newer_version() {
+    let mut turn = 0;
+    let (mut connection, log) = connection(move |request| {
+        turn += 1;
+        match turn {
+            1 => v1(vec![]),
+            _ if !has(request, "uuid") => {
+                v1_error("The client ZeroMQ remote API version does not match CoppeliaSim's version")
+            }
+            _ => ret([args(request)[0].clone()]),
+        }
+    });
+    connection.call("sim.x", vec![]).expect("answered by the old one");
+    let reply = connection.call("sim.y", vec![Value::from(9)]).expect("answered by the new one");
+    assert_eq!(reply.integer(0), Ok(9));
+    assert_eq!(connection.version(), Some(ProtocolVersion::V2));
+    assert_eq!(log.functions(), ["sim.x", "sim.y", "sim.y"]);
+}
+
+#[test]
+fn a_server_of_an_unknown_version_is_an_error_with_its_words() {
+    let text = "The client ZeroMQ remote API version does not match CoppeliaSim's version";
+    let (mut connection, log) = connection(move |_| v1_error(text));
+    let error = connection.call("sim.x", vec![]).expect_err("mismatch");
+    assert_eq!(error, LinkError::VersionMismatch { call: "sim.x".to_owned(), reply: text.to_owned() });
+    assert_eq!(log.requests().len(), 1, "asking again would go on for ever");
+}
+
+#[test]
+fn leaving_is_announced() {
+    let (mut connection, log) = connection(|_| ret([]));
+    connection.call("sim.x", vec![]).expect("answered");
+    let uuid = Value::from(connection.uuid());
+    drop(connection);
+    let Some(Event::SentLast(farewell)) = log.events().pop() else { panic!("{:?}", log.events()) };
+    assert_eq!(func(&farewell), END);
+    assert_eq!(farewell.get("uuid"), Some(&uuid));
+}
+
+#[test]
+fn a_client_that_never_reached_a_server_leaves_in_silence() {
+    let (connection, log) = connection(|_| ret([]));
+    drop(connection);
+    assert_eq!(log.events(), []);
+}
+
+#[test]
+fn a_connection_can_move_to_another_thread() {
+    let (mut connection, _log) = connection(|_| ret([Value::from(4)]));
+    let (send, receive) = mpsc::channel();
+    std::thread::spawn(move || send.send(connection.call("sim.x", vec![])).expect("listening"));
+    assert_eq!(receive.recv().expect("answered").expect("answered").integer(0), Ok(4));
+}

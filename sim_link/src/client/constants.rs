@@ -1,0 +1,55 @@
+//! Numbers of the `sim.*` API that the client uses, as of CoppeliaSim 4.10; all of them hold since 4.2.
+
+/// Stands for the world as a reference frame.
+pub const HANDLE_WORLD: i64 = -1;
+/// Stands for every object.
+pub const HANDLE_ALL: i64 = -2;
+/// Stands for the parent of the object as a reference frame.
+pub const HANDLE_PARENT: i64 = -11;
+
+/// Object type: shape.
+pub const OBJECT_SHAPE: i64 = 0;
+/// Object type: joint.
+pub const OBJECT_JOINT: i64 = 1;
+/// Object type: dummy.
+pub const OBJECT_DUMMY: i64 = 4;
+/// Object type: vision sensor.
+pub const OBJECT_VISION_SENSOR: i64 = 9;
+
+/// Simulation state: stopped.
+pub const SIMULATION_STOPPED: i64 = 0;
+/// Simulation state: paused.
+pub const SIMULATION_PAUSED: i64 = 8;
+/// Bit of the simulation states in which time advances.
+pub const SIMULATION_ADVANCING: i64 = 16;
+
+/// Float parameter of a vision sensor: near clipping plane [m].
+pub const VISION_NEAR_CLIPPING: i64 = 1000;
+/// Float parameter of a vision sensor: far clipping plane [m].
+pub const VISION_FAR_CLIPPING: i64 = 1001;
+/// Float parameter of a vision sensor: opening angle along the larger image side [rad].
+pub const VISION_PERSPECTIVE_ANGLE: i64 = 1004;
+/// Integer parameter of a vision sensor: 0 means orthographic.
+pub const VISION_PERSPECTIVE: i64 = 1018;
+
+/// Option of the depth call: metres rather than the fraction between the clipping planes.
+pub const DEPTH_IN_METRES: i64 = 1;
+
+/// Integer parameter: version, 41000 is 4.10.0.
+pub const INT_PROGRAM_VERSION: i64 = 1;
+/// Integer parameter: passes per second while no simulation runs; 0 is as fast as possible.
+pub const INT_IDLE_FPS: i64 = 26;
+/// String parameter: path of the scene file.
+pub const STRING_SCENE_PATH: i64 = 14;
+
+/// Log level: errors. The simulator also raises one.
+pub const LOG_ERRORS: i64 = 420;
+/// Log level: warnings.
+pub const LOG_WARNINGS: i64 = 430;
+/// Log level: information.
+pub const LOG_INFOS: i64 = 450;
+
+/// Result of a motion step: not there yet.
+pub const MOTION_RUNNING: i64 = 0;
+/// Result of a motion step: there.
+pub const MOTION_DONE: i64 = 1;

@@ -1,0 +1,188 @@
+//! CoppeliaSim's conventions to ours, in this one place.
+//!
+//! | CoppeliaSim | here |
+//! | --- | --- |
+//! | pose `[x y z qx qy qz qw]` | [`Pose`] |
+//! | matrix, 3×4, row by row: `[R | p]` | [`Pose`] |
+//! | image rows from the bottom up | row 0 on top |
+//! | depth as little-endian `f32`, metres along the optical axis, rows from the bottom up | [`DepthFrame`], row 0 on top |
+//! | vision sensor axes: x left, y up, z forward | [`Camera`]: x right, y down, z forward |
+
+use handeye_core::frames::{Camera, Pose, Sensor};
+use handeye_core::image::RgbImage;
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+/// A rotation may be off by so much (norm of a quaternion, entries of RᵀR) before it is refused. Single precision, in
+/// which CoppeliaSim computed until 4.5, is off by 1e-6; a quaternion in another order or scale by far more.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+
+/// Largest image side believed.
+const MAX_SIDE: f64 = 16384.0;
+
+/// A value of the simulator that means nothing.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConvertError {
+    /// A number is infinite or not a number.
+    #[error("the pose is not finite")]
+    NotFinite,
+    /// The rotation part is no rotation.
+    #[error("the pose has no rotation: it is off by {off_by:.1e}")]
+    NotARotation {
+        /// Largest deviation from a unit quaternion, or from an orthonormal right-handed matrix.
+        off_by: f64,
+    },
+    /// Width or height is not a size.
+    #[error("{width} × {height} is not an image size")]
+    BadResolution {
+        /// Width as given.
+        width: f64,
+        /// Height as given.
+        height: f64,
+    },
+    /// The buffer does not fit the size.
+    #[error("a buffer of {got} bytes is not an image of {width} × {height} pixels, which has {expected}")]
+    BufferSize {
+        /// Bytes in the buffer.
+        got: usize,
+        /// Bytes it should have.
+        expected: usize,
+        /// Image width in pixels.
+        width: u32,
+        /// Image height in pixels.
+        height: u32,
+    },
+}
+
+/// A depth image: distance along the optical axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthFrame {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Depths in metres, row by row, row 0 on top; the far clipping plane where nothing was hit.
+    pub metres: Vec<f32>,
+}
+
+impl DepthFrame {
+    /// Depth in metres at a column and a row from the top; `None` outside.
+    pub fn at(&self, column: u32, row: u32) -> Option<f32> {
+        if column >= self.width {
+            return None;
+        }
+        self.metres.get(row as usize * self.width as usize + column as usize).copied()
+    }
+}
+
+/// `sensor_from_camera`: half a turn about the optical axis. Both are right-handed and look along +z, but a vision
+/// sensor has y up and x to the left of its picture.
+pub fn sensor_from_camera() -> Pose<Sensor, Camera> {
+    let half_turn = Rotation3::from_matrix_unchecked(Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)));
+    Pose::from_isometry(Isometry3::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_rotation_matrix(&half_turn),
+    ))
+}
+
+/// A pose from CoppeliaSim's seven numbers.
+///
+/// # Errors
+/// [`ConvertError`] when they are not finite or the quaternion is not a unit one.
+pub fn pose_from_seven<Dst, Src>(v: &[f64; 7]) -> Result<Pose<Dst, Src>, ConvertError> {
+    if v.iter().any(|x| !x.is_finite()) {
+        return Err(ConvertError::NotFinite);
+    }
+    let [x, y, z, qx, qy, qz, qw] = *v;
+    let off_by = ((qx * qx + qy * qy + qz * qz + qw * qw).sqrt() - 1.0).abs();
+    if off_by > ROTATION_TOLERANCE {
+        return Err(ConvertError::NotARotation { off_by });
+    }
+    Ok(Pose::from_translation_xyzw([x, y, z], [qx, qy, qz, qw]))
+}
+
+/// CoppeliaSim's seven numbers for a pose.
+pub fn seven_from_pose<Dst, Src>(pose: &Pose<Dst, Src>) -> [f64; 7] {
+    let t = pose.translation();
+    let [qx, qy, qz, qw] = pose.xyzw();
+    [t.x, t.y, t.z, qx, qy, qz, qw]
+}
+
+/// A pose from the twelve numbers of a CoppeliaSim matrix.
+///
+/// # Errors
+/// [`ConvertError`] when they are not finite, or the left 3×3 block is no rotation.
+pub fn pose_from_twelve<Dst, Src>(v: &[f64; 12]) -> Result<Pose<Dst, Src>, ConvertError> {
+    if v.iter().any(|x| !x.is_finite()) {
+        return Err(ConvertError::NotFinite);
+    }
+    let [xx, yx, zx, px, xy, yy, zy, py, xz, yz, zz, pz] = *v;
+    let r = Matrix3::new(xx, yx, zx, xy, yy, zy, xz, yz, zz);
+    let off_by = (r.transpose() * r - Matrix3::identity()).amax().max((r.determinant() - 1.0).abs());
+    if off_by > ROTATION_TOLERANCE {
+        return Err(ConvertError::NotARotation { off_by });
+    }
+    let rotation = UnitQuaternion::from_rotation_matrix(&handeye_core::se3::nearest_rotation(&r));
+    Ok(Pose::from_isometry(Isometry3::from_parts(Translation3::new(px, py, pz), rotation)))
+}
+
+/// The twelve numbers of a CoppeliaSim matrix for a pose.
+pub fn twelve_from_pose<Dst, Src>(pose: &Pose<Dst, Src>) -> [f64; 12] {
+    let r = pose.rotation().to_rotation_matrix();
+    let t = pose.translation();
+    std::array::from_fn(|i| if i % 4 == 3 { t[i / 4] } else { r[(i / 4, i % 4)] })
+}
+
+/// An image size from two numbers.
+///
+/// # Errors
+/// [`ConvertError::BadResolution`] unless both are whole and from 1 to 16384.
+pub fn resolution(width: f64, height: f64) -> Result<(u32, u32), ConvertError> {
+    let good = |side: f64| side.fract() == 0.0 && (1.0..=MAX_SIDE).contains(&side);
+    if good(width) && good(height) {
+        Ok((width as u32, height as u32))
+    } else {
+        Err(ConvertError::BadResolution { width, height })
+    }
+}
+
+/// A colour image from `width * height` RGB triples with the bottom row first.
+///
+/// # Errors
+/// [`ConvertError::BufferSize`].
+pub fn rgb_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<RgbImage, ConvertError> {
+    let flipped = top_row_first(bytes, width, height, 3)?;
+    RgbImage::from_raw(width, height, flipped).ok_or(ConvertError::BufferSize {
+        got: bytes.len(),
+        expected: width as usize * height as usize * 3,
+        width,
+        height,
+    })
+}
+
+/// A depth image from little-endian `f32` with the bottom row first.
+///
+/// # Errors
+/// [`ConvertError::BufferSize`].
+pub fn depth_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<DepthFrame, ConvertError> {
+    let flipped = top_row_first(bytes, width, height, 4)?;
+    let metres = flipped.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+    Ok(DepthFrame { width, height, metres })
+}
+
+fn top_row_first(bytes: &[u8], width: u32, height: u32, bytes_per_pixel: usize) -> Result<Vec<u8>, ConvertError> {
+    let row = width as usize * bytes_per_pixel;
+    let expected = row * height as usize;
+    if bytes.len() != expected || expected == 0 {
+        return Err(ConvertError::BufferSize { got: bytes.len(), expected, width, height });
+    }
+    let mut flipped = Vec::with_capacity(expected);
+    for line in bytes.chunks_exact(row).rev() {
+        flipped.extend_from_slice(line);
+    }
+    Ok(flipped)
+}
+
+#[cfg(test)]
+#[path = "convert_tests.rs"]
+mod tests;

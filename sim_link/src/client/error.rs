@@ -1,0 +1,223 @@
+//! What can go wrong between the workbench and a cell.
+
+use std::time::Duration;
+
+use super::convert::ConvertError;
+use super::endpoint::Endpoint;
+use crate::wire::WireError;
+
+/// Why a call, or a task made of calls, has no result. Each message says what to do next.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// The address cannot be used.
+    #[error("{text:?} is not an address of a server: {reason}; write HOST:PORT, for example 127.0.0.1:23000")]
+    BadEndpoint {
+        /// What was given.
+        text: String,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// The operating system or the socket library refused.
+    #[error("no socket to {endpoint}: {reason}; check the address and the number of open files of this process")]
+    Socket {
+        /// Where to.
+        endpoint: String,
+        /// What the library said.
+        reason: String,
+    },
+    /// Nothing that speaks ZeroMQ accepted a connection.
+    #[error(
+        "{call}: nothing answers at {endpoint} (waited {after:.1?}); start CoppeliaSim or the built-in cell, check that \
+         the ZMQ remote API add-on is enabled and which port its status bar shows (usually 23000)"
+    )]
+    Unreachable {
+        /// Which call.
+        call: String,
+        /// Where to.
+        endpoint: Endpoint,
+        /// How long was waited.
+        after: Duration,
+    },
+    /// The server accepted the connection but did not answer in time.
+    #[error(
+        "{call}: no answer for {after:.1?}; the simulator may be busy, show a dialog or be held by a client in stepping \
+         mode: look at its window, then try again"
+    )]
+    Timeout {
+        /// Which call.
+        call: String,
+        /// How long was waited.
+        after: Duration,
+    },
+    /// The connection was lost while the call was under way; whether it had an effect is not known.
+    #[error("{call}: the server went away during the call; start it again if it has stopped, then connect again")]
+    Disconnected {
+        /// Which call.
+        call: String,
+    },
+    /// The caller cancelled.
+    #[error("{call}: cancelled")]
+    Cancelled {
+        /// Which call.
+        call: String,
+    },
+    /// The server answered with an error.
+    #[error("{call} failed in the simulator: {message}")]
+    Remote {
+        /// Which call.
+        call: String,
+        /// The server's text, verbatim.
+        message: String,
+    },
+    /// The server speaks another protocol.
+    #[error(
+        "{call}: the server speaks another version of the remote API ({reply:?}); CoppeliaSim 4.2 to 4.10 with its ZMQ \
+         remote API add-on is supported"
+    )]
+    VersionMismatch {
+        /// Which call.
+        call: String,
+        /// What the server said.
+        reply: String,
+    },
+    /// The reply is not a message.
+    #[error("{call}: the reply cannot be read: {source}; is this the port of the ZMQ remote API (usually 23000)?")]
+    Malformed {
+        /// Which call.
+        call: String,
+        /// What is wrong with it.
+        source: WireError,
+    },
+    /// The reply is a message, but not one that the call can have.
+    #[error("{call}: expected {expected}, got {got}; check that the simulator's version is 4.2 to 4.10")]
+    UnexpectedReply {
+        /// Which call.
+        call: String,
+        /// What was expected.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+    /// The reply has the right shape but a value that means nothing.
+    #[error("{call}: {source}; check the object in the scene")]
+    BadValue {
+        /// Which call.
+        call: String,
+        /// What is wrong with it.
+        source: ConvertError,
+    },
+    /// The server is too old for the call.
+    #[error("{call} is not available on this server: it needs {needs}")]
+    Unsupported {
+        /// Which call.
+        call: String,
+        /// From which version on.
+        needs: &'static str,
+    },
+    /// The scene lacks an object.
+    #[error("the scene has no {path} ({what}); open the cell's scene, or set the path of the {what} in the settings")]
+    NoSuchObject {
+        /// The path asked for.
+        path: String,
+        /// What it is for.
+        what: &'static str,
+    },
+    /// The simulation does not run, so nothing would move and no image would be new.
+    #[error("{task}: the simulation is {state}; start it first")]
+    NotRunning {
+        /// What was asked for.
+        task: &'static str,
+        /// `stopped` or `paused`.
+        state: &'static str,
+    },
+    /// A joint cannot go there; the simulator would clamp it without a word.
+    #[error("joint {joint} cannot go to {goal_deg:.2}°: its range is {min_deg:.1}° to {max_deg:.1}°")]
+    JointOutOfRange {
+        /// Which joint, counted from 1 at the base.
+        joint: usize,
+        /// Where it should go.
+        goal_deg: f64,
+        /// Lower end of its range.
+        min_deg: f64,
+        /// Upper end of its range.
+        max_deg: f64,
+    },
+    /// A goal or a limit of a motion is not usable.
+    #[error("{what} of a motion must be {expected}, got {value}")]
+    BadMotion {
+        /// Which quantity.
+        what: &'static str,
+        /// What it must be.
+        expected: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// The simulator gave the motion up.
+    #[error(
+        "{call}: the simulator stopped the motion with code {code}; check the limits of velocity, acceleration, jerk"
+    )]
+    MotionFailed {
+        /// Which call.
+        call: String,
+        /// Result of the motion generator.
+        code: i64,
+    },
+    /// The motion ended elsewhere; inverse kinematics failing is not an error for the simulator.
+    #[error(
+        "the tip stopped {distance_mm:.2} mm and {angle_deg:.2}° from its goal, which may be out of reach: choose \
+         another pose, or go there joint by joint"
+    )]
+    Unreached {
+        /// From the goal.
+        distance_mm: f64,
+        /// From the goal.
+        angle_deg: f64,
+    },
+    /// The arm did not come to rest.
+    #[error(
+        "the arm still moves by {rate_deg_s:.3}°/s after {after_s:.2} s of simulation; wait longer or check the scene"
+    )]
+    NotSettled {
+        /// Simulated time waited.
+        after_s: f64,
+        /// Fastest joint.
+        rate_deg_s: f64,
+    },
+    /// Image and pose could not be had for one and the same instant.
+    #[error(
+        "the simulation moved on while a frame was read, {attempts} times in a row; pause it, or use CoppeliaSim 4.6 or \
+         newer, which can be held for the moment"
+    )]
+    MixedInstants {
+        /// How often it was tried.
+        attempts: u32,
+    },
+    /// What the cell publishes about itself cannot be read.
+    #[error("the cell publishes a ground truth that cannot be read: {reason}")]
+    BadTruth {
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+impl LinkError {
+    /// Whether the conversation itself broke, so that nothing is known about the server's state: worth a new try or a
+    /// reconnection, in contrast to an answer that says no.
+    pub fn is_connection_loss(&self) -> bool {
+        matches!(
+            self,
+            Self::Unreachable { .. }
+                | Self::Timeout { .. }
+                | Self::Disconnected { .. }
+                | Self::Cancelled { .. }
+                | Self::Malformed { .. }
+                | Self::Socket { .. }
+        )
+    }
+
+    /// Whether the server said that it has no such function.
+    pub fn is_unknown_function(&self) -> bool {
+        matches!(self, Self::Remote { message, .. } if message.contains(super::protocol::UNKNOWN_FUNCTION))
+    }
+}

@@ -1,0 +1,61 @@
+//! How long to wait for what.
+
+use std::time::Duration;
+
+use super::cancel::CancelToken;
+
+/// How a connection behaves unless a call says otherwise.
+#[derive(Debug, Clone)]
+pub struct ConnectionOptions {
+    /// Longest silence of the server within a call.
+    pub reply_timeout: Duration,
+    /// Longest duration of a whole call, however lively the server is.
+    pub total_timeout: Duration,
+    /// A host that has been silent for so long counts as gone, even if its connection was never closed; `None` relies
+    /// on the connection alone.
+    pub heartbeat: Option<Duration>,
+    /// After so many seconds without a message the server may forget this client, with its stepping mode and locks: it
+    /// bounds how long a client that crashed can hold the simulation.
+    pub idle_timeout_s: u32,
+    /// Seed of the client ids; `None` draws them from the system. Two clients of one server must not share a seed.
+    pub seed: Option<u64>,
+    /// Ends every wait of this connection, for the end of the program.
+    pub shutdown: CancelToken,
+}
+
+impl Default for ConnectionOptions {
+    fn default() -> Self {
+        Self {
+            reply_timeout: Duration::from_secs(5),
+            total_timeout: Duration::from_mins(1),
+            heartbeat: Some(Duration::from_millis(1500)),
+            idle_timeout_s: 60,
+            seed: None,
+            shutdown: CancelToken::new(),
+        }
+    }
+}
+
+/// Limits of one call.
+#[derive(Debug, Clone, Default)]
+pub struct CallOptions {
+    /// Longest silence of the server; `None` takes the connection's.
+    pub reply_timeout: Option<Duration>,
+    /// Longest duration of the call; `None` takes the connection's.
+    pub total_timeout: Option<Duration>,
+    /// Ends the wait within 50 ms when raised.
+    pub cancel: Option<CancelToken>,
+}
+
+impl CallOptions {
+    /// For a call that may take `total`, in silence: a server that defers its reply says nothing until it is done.
+    /// That it is alive is watched by the connection itself.
+    pub fn long(total: Duration, cancel: &CancelToken) -> Self {
+        Self { reply_timeout: Some(total), total_timeout: Some(total), cancel: Some(cancel.clone()) }
+    }
+
+    /// The usual limits, and a cancel token.
+    pub fn cancelled_by(cancel: &CancelToken) -> Self {
+        Self { cancel: Some(cancel.clone()), ..Self::default() }
+    }
+}

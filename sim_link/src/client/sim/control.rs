@@ -1,0 +1,202 @@
+//! The simulation as a whole: run, pause, stop, step, and the simulator's settings.
+
+use ciborium::Value;
+
+use super::Sim;
+use crate::client::constants::{
+    INT_IDLE_FPS, INT_PROGRAM_VERSION, SIMULATION_ADVANCING, SIMULATION_PAUSED, SIMULATION_STOPPED,
+};
+use crate::client::error::LinkError;
+use crate::client::options::CallOptions;
+use crate::client::protocol::ProtocolVersion;
+
+/// Whether time advances.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum SimulationState {
+    /// It does not, and the scene is as it was before the start.
+    Stopped,
+    /// It does not for now.
+    Paused,
+    /// It does; also in the passes that lead in and out of a pause or a stop.
+    Running,
+}
+
+impl SimulationState {
+    fn from_code(code: i64) -> Option<Self> {
+        match code {
+            SIMULATION_STOPPED => Some(Self::Stopped),
+            SIMULATION_PAUSED => Some(Self::Paused),
+            code if code > 0 && code & SIMULATION_ADVANCING != 0 => Some(Self::Running),
+            _ => None,
+        }
+    }
+}
+
+impl Sim {
+    /// Starts the simulation, or lets a paused one go on.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call, as everywhere here.
+    pub fn start_simulation(&mut self) -> Result<(), LinkError> {
+        self.call("sim.startSimulation", Vec::new()).map(drop)
+    }
+
+    /// Pauses the simulation within two passes.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn pause_simulation(&mut self) -> Result<(), LinkError> {
+        self.call("sim.pauseSimulation", Vec::new()).map(drop)
+    }
+
+    /// Stops the simulation within a few passes; every object goes back to where it was before the start, and every
+    /// client's stepping mode ends.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn stop_simulation(&mut self) -> Result<(), LinkError> {
+        self.call("sim.stopSimulation", Vec::new()).map(drop)
+    }
+
+    /// Whether time advances.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn get_simulation_state(&mut self) -> Result<SimulationState, LinkError> {
+        let call = "sim.getSimulationState";
+        let code = self.call(call, Vec::new())?.integer(0)?;
+        SimulationState::from_code(code).ok_or_else(|| LinkError::UnexpectedReply {
+            call: call.to_owned(),
+            expected: "a simulation state".to_owned(),
+            got: code.to_string(),
+        })
+    }
+
+    /// Simulated time [s].
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn get_simulation_time(&mut self) -> Result<f64, LinkError> {
+        self.call("sim.getSimulationTime", Vec::new())?.number(0)
+    }
+
+    /// Simulated time that one pass takes [s].
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn get_simulation_time_step(&mut self) -> Result<f64, LinkError> {
+        self.call("sim.getSimulationTimeStep", Vec::new())?.number(0)
+    }
+
+    /// Takes the simulation into this client's hand: time advances only in [`Sim::step`], until it is given back by
+    /// `false` as often as it was taken.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn set_stepping(&mut self, enable: bool) -> Result<(), LinkError> {
+        if self.connection.version() == Some(ProtocolVersion::V1) {
+            let args = vec![Value::from(enable), Value::from(self.connection.uuid())];
+            return self.call("setStepping", args).map(drop);
+        }
+        self.call("sim.setStepping", vec![Value::from(enable)]).map(drop)
+    }
+
+    /// Waits until the next pass of the simulation is complete, and in stepping mode makes it happen: images and poses
+    /// read afterwards belong together. Returns at once when the simulation is stopped or paused.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn step(&mut self, options: &CallOptions) -> Result<(), LinkError> {
+        if self.connection.version() == Some(ProtocolVersion::V1) {
+            return self.step_v1(options);
+        }
+        self.call_with("sim.step", Vec::new(), options).map(drop)
+    }
+
+    /// A server of version 1 announces the end of a pass on a second socket. Its clock says the same.
+    fn step_v1(&mut self, options: &CallOptions) -> Result<(), LinkError> {
+        let started = std::time::Instant::now();
+        let before = self.get_simulation_time()?;
+        if self.get_simulation_state()? != SimulationState::Running {
+            return Ok(());
+        }
+        let uuid = Value::from(self.connection.uuid());
+        self.call_with("step", vec![uuid], options)?;
+        let limit = options.total_timeout.unwrap_or_else(|| self.connection.total_timeout());
+        while self.call_with("sim.getSimulationTime", Vec::new(), options)?.number(0)? == before
+            && self.get_simulation_state()? == SimulationState::Running
+        {
+            if started.elapsed() > limit {
+                return Err(LinkError::Timeout { call: "step".to_owned(), after: started.elapsed() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Holds the simulation where it is until [`Sim::release_lock`], so that several calls see the same instant.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn acquire_lock(&mut self) -> Result<(), LinkError> {
+        self.call("sim.acquireLock", Vec::new()).map(drop)
+    }
+
+    /// Lets the simulation go on.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn release_lock(&mut self) -> Result<(), LinkError> {
+        self.call("sim.releaseLock", Vec::new()).map(drop)
+    }
+
+    /// Writes a line to the simulator's log at a level of [`crate::client::constants`].
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn add_log(&mut self, level: i64, line: &str) -> Result<(), LinkError> {
+        self.call("sim.addLog", vec![Value::from(level), Value::from(line)]).map(drop)
+    }
+
+    /// An integer setting of the simulator.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn get_int_param(&mut self, id: i64) -> Result<i64, LinkError> {
+        self.call("sim.getInt32Param", vec![Value::from(id)])?.integer(0)
+    }
+
+    /// Changes an integer setting of the simulator.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn set_int_param(&mut self, id: i64, value: i64) -> Result<(), LinkError> {
+        self.call("sim.setInt32Param", vec![Value::from(id), Value::from(value)]).map(drop)
+    }
+
+    /// A text setting of the simulator.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn get_string_param(&mut self, id: i64) -> Result<String, LinkError> {
+        Ok(self.call("sim.getStringParam", vec![Value::from(id)])?.text(0)?.to_owned())
+    }
+
+    /// Version of the simulator: 41000 is 4.10.0.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn program_version(&mut self) -> Result<i64, LinkError> {
+        self.get_int_param(INT_PROGRAM_VERSION)
+    }
+
+    /// Has the simulator answer at full speed while no simulation runs (it looks 8 times a second otherwise); returns
+    /// the setting as it was, to be restored.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn answer_quickly_when_stopped(&mut self) -> Result<i64, LinkError> {
+        let before = self.get_int_param(INT_IDLE_FPS)?;
+        self.set_int_param(INT_IDLE_FPS, 0)?;
+        Ok(before)
+    }
+}
