@@ -2,6 +2,8 @@
 
 pub mod kinematics;
 pub mod motion;
+pub mod planning;
 pub mod render;
 pub mod scene;
 pub mod server;
+pub mod world;

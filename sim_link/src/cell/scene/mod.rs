@@ -1,1 +1,129 @@
-//! scene of the cell.
+//! The scene of the built-in cell: what a scene file says, and the truth that follows from it and a seed.
+//!
+//! A scene file is TOML. Every field has a default, and the defaults together are the public UR5 hand-eye scene:
+//! exact, without noise or distortion. Lengths are in metres and angles in degrees where the name does not say
+//! otherwise; poses are a position and a quaternion x, y, z, w.
+
+mod check;
+mod error;
+mod errors_of_robot;
+mod locate;
+mod resolved;
+mod spec;
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+pub use error::SceneError;
+pub use errors_of_robot::RobotErrors;
+pub use resolved::{ResolvedScene, ResolvedSolid, sensor_from_camera};
+pub use spec::{
+    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, RelativeTo, RobotSpec, SimulationSpec, SolidSpec,
+};
+
+const REFERENCE: &str = include_str!("../../../../assets/scenes/reference.toml");
+const REALISTIC: &str = include_str!("../../../../assets/scenes/realistic.toml");
+
+/// A scene file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Scene {
+    /// Seed of everything random in the cell, unless another is given when it starts.
+    pub seed: u64,
+    /// How simulated time runs.
+    pub simulation: SimulationSpec,
+    /// The arm.
+    pub robot: RobotSpec,
+    /// The RGB-D camera on the tip.
+    pub camera: CameraSpec,
+    /// The printed chessboard.
+    pub board: BoardSpec,
+    /// Imperfections of the colour image.
+    pub image: ImageSpec,
+    /// Imperfections of the depth image.
+    pub depth: DepthSpec,
+    /// Light and background.
+    pub light: LightSpec,
+    /// Boxes that stand around: floor, table, board stand.
+    pub solids: Vec<SolidSpec>,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            simulation: SimulationSpec::default(),
+            robot: RobotSpec::default(),
+            camera: CameraSpec::default(),
+            board: BoardSpec::default(),
+            image: ImageSpec::default(),
+            depth: DepthSpec::default(),
+            light: LightSpec::default(),
+            solids: spec::reference_solids(),
+        }
+    }
+}
+
+impl Scene {
+    /// Reads and checks a scene file.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the file, the line and the field.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let file = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&text, &file),
+            Err(source) => Err(SceneError::Read { file, source }),
+        }
+    }
+
+    /// Reads and checks a scene from the text of a scene file.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the line and the field.
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
+        Self::parse(text, "scene")
+    }
+
+    /// The public UR5 hand-eye scene: exact, without noise or distortion.
+    ///
+    /// # Errors
+    /// None as long as the file that is built in is valid, which a test asserts.
+    pub fn reference() -> Result<Self, SceneError> {
+        Self::parse(REFERENCE, "assets/scenes/reference.toml")
+    }
+
+    /// The same cell with the faults of a good real one: a lens, a little noise, a robot that repeats to 0.05 mm.
+    ///
+    /// # Errors
+    /// None as long as the file that is built in is valid, which a test asserts.
+    pub fn realistic() -> Result<Self, SceneError> {
+        Self::parse(REALISTIC, "assets/scenes/realistic.toml")
+    }
+
+    /// Checks every number, and draws what is random in the scene.
+    ///
+    /// The same scene and seed give the same truth on every machine. The draws are independent of each other: giving
+    /// the camera a random offset does not move the board.
+    ///
+    /// # Errors
+    /// [`SceneError::Field`] for a number out of its range.
+    pub fn resolve(&self, seed: u64) -> Result<ResolvedScene, SceneError> {
+        check::check(self).map_err(|found| found.at("scene", None))?;
+        Ok(resolved::resolve(self, seed))
+    }
+
+    fn parse(text: &str, file: &str) -> Result<Self, SceneError> {
+        let scene: Self = toml::from_str(text).map_err(|error| SceneError::syntax(file, text, &error))?;
+        check::check(&scene).map_err(|found| {
+            let line = locate::line_of(text, &found.field);
+            found.at(file, line)
+        })?;
+        Ok(scene)
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests;

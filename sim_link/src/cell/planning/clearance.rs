@@ -1,0 +1,210 @@
+//! Whether a configuration of the arm touches itself or something else, with the links as capsules.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::cell::kinematics::{ArmPose, JointAngles, forward};
+
+/// How far the upper arm runs beside the plane through the shoulder, along the shoulder axis.
+const UPPER_ARM_BESIDE_M: f64 = 0.136;
+/// The same for the forearm.
+const FOREARM_BESIDE_M: f64 = 0.016;
+/// Distance of two points that are checked along a capsule.
+const SAMPLE_M: f64 = 0.03;
+/// Gap that the arm keeps from itself.
+const SELF_CLEARANCE_M: f64 = 0.01;
+
+/// The arm with a camera on its tip, as far as collisions go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arm {
+    /// Pose of the arm frame in the world.
+    pub world_from_arm: Isometry3<f64>,
+    /// Pose of the tip in the connection.
+    pub connection_from_tip: Isometry3<f64>,
+    /// Pose of the camera in the tip.
+    pub tip_from_camera: Isometry3<f64>,
+}
+
+/// A box that the arm must not touch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Obstacle {
+    /// Pose of its centre in the world.
+    pub world_from_centre: Isometry3<f64>,
+    /// Lengths of its edges, metres.
+    pub size_m: [f64; 3],
+}
+
+/// All points within a radius of a line segment.
+#[derive(Debug, Clone, Copy)]
+struct Capsule {
+    from: Point3<f64>,
+    to: Point3<f64>,
+    radius_m: f64,
+}
+
+/// Capsules of the moving arm, in the arm frame, in the order from base to tool.
+struct Body {
+    column: Capsule,
+    upper_arm: Capsule,
+    forearm: Capsule,
+    wrist: [Capsule; 3],
+    tool: Capsule,
+    camera: Capsule,
+}
+
+impl Arm {
+    /// Whether the arm, its tool and its camera keep their distance from the obstacles, and from the arm itself.
+    pub fn is_free(&self, joints: &JointAngles, obstacles: &[Obstacle], clearance_m: f64) -> bool {
+        let body = self.body(&forward(joints));
+        if body.touches_itself() {
+            return false;
+        }
+        let moving = body.moving();
+        obstacles.iter().all(|obstacle| {
+            let centre_from_arm = obstacle.world_from_centre.inverse() * self.world_from_arm;
+            moving.iter().all(|capsule| capsule.distance_to_box(&centre_from_arm, &obstacle.size_m) >= clearance_m)
+        })
+    }
+
+    fn body(&self, pose: &ArmPose) -> Body {
+        let joint = &pose.arm_from_joint;
+        let on_axis = |i: usize, along_m: f64| joint[i] * Point3::new(0.0, 0.0, along_m);
+        let connection = Point3::from(pose.arm_from_connection.translation.vector);
+        let arm_from_tip = pose.arm_from_connection * self.connection_from_tip;
+        let arm_from_camera = arm_from_tip * self.tip_from_camera;
+        let wrist_1 = joint[3].inverse() * joint[4] * Point3::origin();
+        let capsule = |from, to, radius_m| Capsule { from, to, radius_m };
+        Body {
+            column: capsule(Point3::origin(), Point3::new(0.0, 0.0, 0.09), 0.075),
+            upper_arm: capsule(on_axis(1, UPPER_ARM_BESIDE_M), joint[2] * beside(UPPER_ARM_BESIDE_M), 0.06),
+            forearm: capsule(on_axis(2, FOREARM_BESIDE_M), joint[3] * beside(FOREARM_BESIDE_M), 0.05),
+            wrist: [
+                capsule(on_axis(3, FOREARM_BESIDE_M), joint[3] * wrist_1, 0.04),
+                capsule(on_axis(4, 0.0), on_axis(5, 0.0), 0.04),
+                capsule(on_axis(5, 0.0), connection, 0.04),
+            ],
+            tool: capsule(connection, Point3::from(arm_from_tip.translation.vector), 0.03),
+            // The lens is at the origin, the housing behind it.
+            camera: capsule(
+                Point3::from(arm_from_camera.translation.vector),
+                arm_from_camera * Point3::new(0.0, 0.0, -0.03),
+                0.03,
+            ),
+        }
+    }
+}
+
+fn beside(distance_m: f64) -> Point3<f64> {
+    Point3::new(0.0, 0.0, distance_m)
+}
+
+impl Body {
+    fn moving(&self) -> [Capsule; 7] {
+        let [a, b, c] = self.wrist;
+        [self.upper_arm, self.forearm, a, b, c, self.tool, self.camera]
+    }
+
+    /// Neighbours are left out: they touch by design.
+    fn touches_itself(&self) -> bool {
+        let [_, wrist_2, wrist_3] = &self.wrist;
+        let ends = [wrist_2, wrist_3, &self.tool, &self.camera];
+        let near = |a: &Capsule, b: &Capsule| a.distance_to(b) < SELF_CLEARANCE_M;
+        near(&self.forearm, &self.column)
+            || ends.iter().any(|end| near(end, &self.column) || near(end, &self.upper_arm))
+            || [wrist_3, &self.tool, &self.camera].iter().any(|end| near(end, &self.forearm))
+    }
+}
+
+impl Capsule {
+    fn distance_to(&self, other: &Self) -> f64 {
+        segment_distance([self.from, self.to], [other.from, other.to]) - self.radius_m - other.radius_m
+    }
+
+    /// At most half a sample too large.
+    fn distance_to_box(&self, centre_from_arm: &Isometry3<f64>, size_m: &[f64; 3]) -> f64 {
+        let (from, to) = (centre_from_arm * self.from, centre_from_arm * self.to);
+        let steps = ((to - from).norm() / SAMPLE_M).ceil().max(1.0);
+        let half = Vector3::from(*size_m) * 0.5;
+        let nearest = (0..=steps as usize)
+            .map(|step| {
+                let point = from + (to - from) * (step as f64 / steps);
+                (point.coords.abs() - half).map(|v| v.max(0.0)).norm()
+            })
+            .fold(f64::INFINITY, f64::min);
+        nearest - self.radius_m
+    }
+}
+
+/// Shortest distance of two line segments.
+///
+/// Reference: Ericson 2005, "Real-time collision detection", section 5.1.9.
+fn segment_distance(first: [Point3<f64>; 2], second: [Point3<f64>; 2]) -> f64 {
+    let d1 = first[1] - first[0];
+    let d2 = second[1] - second[0];
+    let r = first[0] - second[0];
+    let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
+    // A segment of no length is a point: its parameter is of no consequence.
+    let clamp = |numerator: f64, denominator: f64| {
+        if denominator > 1e-12 { (numerator / denominator).clamp(0.0, 1.0) } else { 0.0 }
+    };
+    let (b, c) = (d1.dot(&d2), d1.dot(&r));
+    let mut s = clamp(b * f - c * e, a * e - b * b);
+    let mut t = clamp(b * s + f, e);
+    s = clamp(b * t - c, a);
+    t = clamp(b * s + f, e);
+    ((first[0] + d1 * s) - (second[0] + d2 * t)).norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_of_segments_agree_with_a_dense_search() {
+        let p = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
+        let cases = [
+            [p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(0.5, 1.0, -1.0), p(0.5, 1.0, 1.0)],
+            [p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(2.0, 1.0, 0.0), p(3.0, 1.0, 0.0)],
+            [p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(0.2, 0.3, 0.0), p(0.8, 0.3, 0.0)],
+            [p(0.0, 0.0, 0.0), p(0.0, 0.0, 0.0), p(0.2, 0.3, 0.0), p(0.8, -0.3, 0.4)],
+            [p(0.1, 0.2, 0.3), p(-0.4, 0.5, 0.9), p(0.7, -0.6, 0.2), p(0.3, 0.8, -0.5)],
+        ];
+        for [a, b, c, d] in cases {
+            let mut dense = f64::INFINITY;
+            for i in 0..=400 {
+                for j in 0..=400 {
+                    let first = a + (b - a) * (f64::from(i) / 400.0);
+                    let second = c + (d - c) * (f64::from(j) / 400.0);
+                    dense = dense.min((first - second).norm());
+                }
+            }
+            let exact = segment_distance([a, b], [c, d]);
+            // The grid misses the nearest points by at most half its pitch on each segment.
+            assert!(exact <= dense + 1e-12 && exact > dense - 0.004, "{exact} is not {dense}");
+        }
+    }
+
+    #[test]
+    fn a_folded_arm_touches_itself_and_a_stretched_one_does_not() {
+        let arm = Arm {
+            world_from_arm: Isometry3::identity(),
+            connection_from_tip: Isometry3::translation(0.0, 0.0, 0.017),
+            tip_from_camera: Isometry3::translation(0.05, 0.0, 0.0),
+        };
+        assert!(arm.is_free(&[0.0; 6], &[], 0.02));
+        // Elbow bent by 170° brings the hand to the shoulder.
+        assert!(!arm.is_free(&[0.0, 0.0, 170_f64.to_radians(), 0.0, 0.0, 0.0], &[], 0.02));
+    }
+
+    #[test]
+    fn an_arm_that_lies_on_the_table_is_not_free() {
+        let arm = Arm {
+            world_from_arm: Isometry3::translation(0.0, 0.0, 0.025),
+            connection_from_tip: Isometry3::identity(),
+            tip_from_camera: Isometry3::translation(0.05, 0.0, 0.0),
+        };
+        let table = Obstacle { world_from_centre: Isometry3::translation(0.0, 0.0, -0.05), size_m: [5.0, 5.0, 0.1] };
+        let lifted = |deg: f64| [0.0, deg.to_radians(), 0.0, 0.0, 0.0, 0.0];
+        assert!(arm.is_free(&lifted(60.0), &[table], 0.02));
+        assert!(!arm.is_free(&lifted(95.0), &[table], 0.02));
+    }
+}

@@ -1,0 +1,298 @@
+//! Poses from which to look at a board: reachable, safe to drive between, and as different as possible.
+
+mod clearance;
+
+use handeye_core::camera::Intrinsics;
+use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::target::TargetSpec;
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::kinematics::{JointAngles, JointLimits, inverse_nearest};
+use super::scene::ResolvedScene;
+pub use clearance::{Arm, Obstacle};
+
+/// Largest joint step between two checks of a path: a tool 1 m away moves by 5 cm, half the size of a link.
+const PATH_STEP_RAD: f64 = 0.05;
+
+/// What the planner knows of a cell. Being a centimetre or a few degrees off costs nothing but margin, so estimates and
+/// drawings do.
+#[derive(Debug, Clone)]
+pub struct ViewSetup {
+    /// Where the target is.
+    pub base_from_target: Pose<Base, Target>,
+    /// What it is.
+    pub target: TargetSpec,
+    /// The lens.
+    pub intrinsics: Intrinsics,
+    /// Where the camera sits.
+    pub tip_from_camera: Pose<Tip, Camera>,
+    /// The arm and its tool.
+    pub arm: Arm,
+    /// Ranges of the joints.
+    pub joint_limits: JointLimits,
+    /// Configuration to start from; poses are reached without changing over to another branch where possible.
+    pub start_joints: JointAngles,
+    /// What the arm must not touch.
+    pub obstacles: Vec<Obstacle>,
+}
+
+impl ViewSetup {
+    /// A simulated cell as it truly is.
+    pub fn of(scene: &ResolvedScene) -> Self {
+        let sheet = Obstacle {
+            world_from_centre: scene.world_from_plane * Translation3::new(0.0, 0.0, -0.001),
+            size_m: [scene.paper_m[0], scene.paper_m[1], 0.002],
+        };
+        let solids = scene.solids.iter().map(|s| Obstacle { world_from_centre: s.world_from_solid, size_m: s.size_m });
+        Self {
+            base_from_target: scene.base_from_target,
+            target: scene.target,
+            intrinsics: scene.intrinsics,
+            tip_from_camera: scene.tip_from_camera,
+            arm: Arm {
+                world_from_arm: scene.world_from_arm,
+                connection_from_tip: scene.connection_from_tip,
+                tip_from_camera: *scene.tip_from_camera.isometry(),
+            },
+            joint_limits: scene.joint_limits,
+            start_joints: scene.start_joints,
+            obstacles: std::iter::once(sheet).chain(solids).collect(),
+        }
+    }
+}
+
+/// What kind of views are wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewOptions {
+    /// How many.
+    pub count: usize,
+    /// Seed of the candidates.
+    pub seed: u64,
+    /// Nearest and farthest distance between camera and board.
+    pub distance_m: [f64; 2],
+    /// Largest angle between the line of sight and the normal of the board.
+    pub cone_rad: f64,
+    /// Largest roll of the camera either way.
+    pub roll_rad: f64,
+    /// How far from the middle of the board the line of sight may meet it.
+    pub aim_m: f64,
+    /// Free pixels between the printed squares and the edge of the image.
+    pub margin_px: f64,
+    /// Free space around the arm and its tool.
+    pub clearance_m: f64,
+    /// How many random views are tried.
+    pub candidates: usize,
+}
+
+impl Default for ViewOptions {
+    fn default() -> Self {
+        Self {
+            count: 20,
+            seed: 1,
+            distance_m: [0.3, 0.5],
+            cone_rad: 45_f64.to_radians(),
+            roll_rad: std::f64::consts::PI,
+            aim_m: 0.03,
+            margin_px: 12.0,
+            clearance_m: 0.02,
+            candidates: 3000,
+        }
+    }
+}
+
+/// A pose to look at the board from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlannedView {
+    /// Joint values, radians.
+    pub joints: JointAngles,
+    /// Tip pose there.
+    pub base_from_tip: Pose<Base, Tip>,
+}
+
+/// Why there are not enough views.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// Fewer views than asked for fit the cell.
+    #[error(
+        "only {found} of {wanted} views: of {candidates} tried, {not_in_view} would not show the whole board, \
+         {unreachable} are out of the arm's reach, {in_the_way} would touch something and {no_path} cannot be driven \
+         to safely from the others: move the board towards the middle of the workspace, or allow other distances and \
+         angles"
+    )]
+    TooFewViews {
+        /// Views found.
+        found: usize,
+        /// Views wanted.
+        wanted: usize,
+        /// Random views tried.
+        candidates: usize,
+        /// Of these, how many do not show the whole board.
+        not_in_view: usize,
+        /// How many the arm cannot reach within its limits.
+        unreachable: usize,
+        /// How many would touch the arm itself or an obstacle.
+        in_the_way: usize,
+        /// How many have no free straight path in joint space to every view chosen.
+        no_path: usize,
+    },
+    /// Even the configuration to start from is not free.
+    #[error("the arm already touches something in the configuration to start from: move it into free space first")]
+    StartBlocked,
+}
+
+/// Picks views of the board that differ as much as possible in rotation.
+///
+/// Random views are drawn from a cone about the board's normal, with any roll, distance and a little aiming beside the
+/// middle. Kept are those that show the whole board, that the arm reaches within its limits and that touch nothing.
+/// From these the one nearest to the start is taken first, then always the one whose rotation is farthest from all
+/// taken so far, provided that the straight path in joint space is free between it and every other, and the start.
+/// So any order of visiting them is safe, and the first few are well spread too.
+///
+/// The same setup and options give the same views.
+///
+/// # Errors
+/// [`PlanError`] says what the candidates failed at.
+pub fn poses_looking_at(setup: &ViewSetup, options: &ViewOptions) -> Result<Vec<PlannedView>, PlanError> {
+    if !setup.arm.is_free(&setup.start_joints, &setup.obstacles, options.clearance_m) {
+        return Err(PlanError::StartBlocked);
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+    let (mut not_in_view, mut unreachable, mut in_the_way) = (0, 0, 0);
+    let mut views = Vec::new();
+    for _ in 0..options.candidates {
+        let target_from_camera = draw(setup, options, &mut rng);
+        if !shows_whole_board(setup, options, &target_from_camera) {
+            not_in_view += 1;
+            continue;
+        }
+        let base_from_tip = setup.base_from_target * target_from_camera * setup.tip_from_camera.inverse();
+        let Some(joints) = setup.reach(&base_from_tip) else {
+            unreachable += 1;
+            continue;
+        };
+        if !setup.arm.is_free(&joints, &setup.obstacles, options.clearance_m) {
+            in_the_way += 1;
+            continue;
+        }
+        views.push(PlannedView { joints, base_from_tip });
+    }
+    let (chosen, no_path) = choose(setup, options, views);
+    if chosen.len() < options.count {
+        return Err(PlanError::TooFewViews {
+            found: chosen.len(),
+            wanted: options.count,
+            candidates: options.candidates,
+            not_in_view,
+            unreachable,
+            in_the_way,
+            no_path,
+        });
+    }
+    Ok(chosen)
+}
+
+/// Orders views so that each is near the one before: less time on the way, but less spread in the first few.
+pub fn order_by_travel(start: &JointAngles, views: &mut [PlannedView]) {
+    let mut from = *start;
+    for next in 0..views.len() {
+        let nearest = (next..views.len())
+            .min_by(|&a, &b| travel(&from, &views[a].joints).total_cmp(&travel(&from, &views[b].joints)))
+            .unwrap_or(next);
+        views.swap(next, nearest);
+        from = views[next].joints;
+    }
+}
+
+impl ViewSetup {
+    fn reach(&self, base_from_tip: &Pose<Base, Tip>) -> Option<JointAngles> {
+        let arm_from_connection =
+            self.arm.world_from_arm.inverse() * base_from_tip.isometry() * self.arm.connection_from_tip.inverse();
+        inverse_nearest(&arm_from_connection, &self.start_joints, &self.joint_limits).ok()
+    }
+
+    fn path_is_free(&self, from: &JointAngles, to: &JointAngles, clearance_m: f64) -> bool {
+        let steps = (travel(from, to) / PATH_STEP_RAD).ceil().max(1.0) as usize;
+        (1..steps).all(|step| {
+            let part = step as f64 / steps as f64;
+            let joints: JointAngles = std::array::from_fn(|i| from[i] + part * (to[i] - from[i]));
+            self.arm.is_free(&joints, &self.obstacles, clearance_m)
+        })
+    }
+}
+
+/// Largest joint movement, radians.
+fn travel(from: &JointAngles, to: &JointAngles) -> f64 {
+    from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn draw(setup: &ViewSetup, options: &ViewOptions, rng: &mut ChaCha8Rng) -> Pose<Target, Camera> {
+    let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+    // Uniform on the cap of the sphere: its area is proportional to its height.
+    let tilt = uniform(options.cone_rad.cos(), 1.0).clamp(-1.0, 1.0).acos();
+    let heading = uniform(0.0, std::f64::consts::TAU);
+    let distance_m = uniform(options.distance_m[0], options.distance_m[1]);
+    let roll = uniform(-options.roll_rad, options.roll_rad);
+    let beside = Vector3::new(uniform(-options.aim_m, options.aim_m), uniform(-options.aim_m, options.aim_m), 0.0);
+    let aim = setup.target.centre() + beside;
+    // The target's z points into the board, so the viewer is on the side of -z.
+    let to_camera = Vector3::new(tilt.sin() * heading.cos(), tilt.sin() * heading.sin(), -tilt.cos());
+    let forward = -to_camera;
+    // Upright is the camera whose x is nearest to the target's; with a tilt below 90° there is one.
+    let right = (Vector3::x() - forward * forward.x).normalize();
+    let axes = Matrix3::from_columns(&[right, forward.cross(&right), forward]);
+    let upright = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    let rolled = upright * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
+    let eye = aim + to_camera * distance_m;
+    Pose::from_isometry(Isometry3::from_parts(Translation3::from(eye.coords), rolled))
+}
+
+fn shows_whole_board(setup: &ViewSetup, options: &ViewOptions, target_from_camera: &Pose<Target, Camera>) -> bool {
+    let grid = setup.target.grid();
+    let camera_from_target = target_from_camera.inverse();
+    let (width, height) = (f64::from(setup.intrinsics.width), f64::from(setup.intrinsics.height));
+    let margin = options.margin_px - 0.5;
+    // The printed pattern goes one square beyond its outermost points; its border bounds it in any lens.
+    let (last_column, last_row) = (grid.columns as i64, grid.rows as i64);
+    (-1..=last_row).all(|row| {
+        (-1..=last_column).filter(|&column| row == -1 || row == last_row || column == -1 || column == last_column).all(
+            |column| {
+                let point = Point3::new(column as f64 * grid.square_m, row as f64 * grid.square_m, 0.0);
+                setup.intrinsics.project(&(camera_from_target.isometry() * point)).is_ok_and(|px| {
+                    px.x >= margin && px.y >= margin && px.x <= width - 1.0 - margin && px.y <= height - 1.0 - margin
+                })
+            },
+        )
+    })
+}
+
+/// Greedy farthest-point selection; also counts the candidates that were given up for want of a path.
+fn choose(setup: &ViewSetup, options: &ViewOptions, mut rest: Vec<PlannedView>) -> (Vec<PlannedView>, usize) {
+    let mut chosen: Vec<PlannedView> = Vec::with_capacity(options.count);
+    let mut no_path = 0;
+    // Angle from each remaining candidate to the nearest one chosen; before the first, closeness to the start.
+    let mut scores: Vec<f64> = rest.iter().map(|view| -travel(&setup.start_joints, &view.joints)).collect();
+    while chosen.len() < options.count {
+        let Some(best) = (0..rest.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])) else { break };
+        let view = rest.swap_remove(best);
+        scores.swap_remove(best);
+        let reachable = |from: &JointAngles| setup.path_is_free(from, &view.joints, options.clearance_m);
+        if !(reachable(&setup.start_joints) && chosen.iter().all(|other| reachable(&other.joints))) {
+            no_path += 1;
+            continue;
+        }
+        let first = chosen.is_empty();
+        for (score, other) in scores.iter_mut().zip(&rest) {
+            let angle = view.base_from_tip.rotation().angle_to(&other.base_from_tip.rotation());
+            *score = if first { angle } else { score.min(angle) };
+        }
+        chosen.push(view);
+    }
+    (chosen, no_path)
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests;

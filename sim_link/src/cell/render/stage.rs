@@ -1,0 +1,220 @@
+//! A scene as one camera sees it: surfaces in camera coordinates with their looks.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::RenderScene;
+use super::board::{Footprint, Pattern};
+use super::rays::Ray;
+use super::shade::{Coat, Lamp, Spot};
+use super::shapes::{Facet, Rays, Surface, Vec3, dot, faces, scale_add};
+
+/// Face number of the background.
+pub(super) const BACKGROUND: u16 = 0;
+
+/// The sheet wins against what it lies on up to this relative difference in depth, half a micrometre at half a metre.
+const SHEET_LEAD: f64 = 1.0 - 1e-6;
+
+/// One surface with its look.
+#[derive(Debug)]
+struct Piece {
+    surface: Surface,
+    /// Number of the smooth face that it belongs to; between different faces there is a visible edge.
+    face: u16,
+    paint: Paint,
+    /// Depth counts this many times its value when surfaces compete.
+    lead: f64,
+}
+
+#[derive(Debug)]
+enum Paint {
+    /// One colour, light included.
+    Flat([f32; 3]),
+    Coat(Coat),
+    Print(Print),
+}
+
+/// The printed side of the board: the ray `d` meets it at `depth · (s·d, r·d)` in squares.
+#[derive(Debug)]
+struct Print {
+    s: Vec3,
+    r: Vec3,
+    inverse_depth: Vec3,
+    pattern: Pattern,
+    dark: f32,
+    white: f32,
+}
+
+/// Where a ray ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Hit {
+    pub depth: f64,
+    piece: Option<u16>,
+}
+
+/// A surface that a tile may see.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Candidate {
+    piece: u16,
+    nearest: f64,
+}
+
+#[derive(Debug)]
+pub(super) struct Stage {
+    pieces: Vec<Piece>,
+    lamp: Lamp,
+    background: [f32; 3],
+    near_m: f64,
+    far_m: f64,
+}
+
+impl Stage {
+    pub fn new(scene: &RenderScene, near_m: f64, far_m: f64) -> Self {
+        let camera_from_world = scene.world_from_camera.inverse();
+        let lamp = Lamp::new(&scene.light, &camera_from_world);
+        let mut stage = Self { pieces: Vec::new(), lamp, background: scene.background, near_m, far_m };
+        stage.pieces.extend(sheet(scene, &camera_from_world, &lamp));
+        for solid in &scene.solids {
+            let camera_from_shape = camera_from_world * solid.world_from_shape;
+            let coat = Coat::new(solid, &camera_from_shape, far_m);
+            for face in faces(solid, &camera_from_shape) {
+                stage.add_face(face, &coat);
+            }
+        }
+        stage
+    }
+
+    fn add_face(&mut self, surfaces: Vec<Surface>, coat: &Coat) {
+        let face = self.pieces.last().map_or(BACKGROUND, |piece| piece.face).saturating_add(1);
+        for surface in surfaces {
+            let flat = match &surface {
+                Surface::Facet(facet) => coat.flat(&self.lamp, &facet.normal),
+                Surface::Ball(_) | Surface::Mantle(_) => None,
+            };
+            let paint = flat.map_or_else(|| Paint::Coat(coat.clone()), Paint::Flat);
+            self.pieces.push(Piece { surface, face, paint, lead: 1.0 });
+        }
+    }
+
+    /// Collects what the rays of a tile may hit, from near to far, without what is hidden behind a face that covers
+    /// the whole tile.
+    pub fn survey(&self, rays: &Rays, out: &mut Vec<Candidate>) {
+        let start = out.len();
+        let mut hidden_beyond = self.far_m;
+        for (index, piece) in self.pieces.iter().enumerate() {
+            let Some(reach) = piece.surface.reach(rays) else { continue };
+            if let Some(farthest) = reach.covers_within
+                && reach.nearest >= self.near_m
+            {
+                hidden_beyond = hidden_beyond.min(farthest);
+            }
+            out.push(Candidate { piece: index as u16, nearest: reach.nearest });
+        }
+        let mut kept = start;
+        for i in start..out.len() {
+            if out[i].nearest <= hidden_beyond {
+                out.swap(kept, i);
+                kept += 1;
+            }
+        }
+        out.truncate(kept);
+        out[start..].sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
+    }
+
+    /// The first surface between the clipping planes along a ray.
+    pub fn first_hit(&self, candidates: &[Candidate], ray: &Ray) -> Hit {
+        let direction = ray.direction();
+        let mut best = Hit { depth: self.far_m, piece: None };
+        let mut bar = self.far_m;
+        for candidate in candidates {
+            if candidate.nearest > bar {
+                break;
+            }
+            let piece = &self.pieces[candidate.piece as usize];
+            let depth = piece.surface.hit(&direction);
+            if depth >= self.near_m && depth * piece.lead < bar {
+                bar = depth * piece.lead;
+                best = Hit { depth, piece: Some(candidate.piece) };
+            }
+        }
+        best
+    }
+
+    /// Number of the face that was hit.
+    pub fn face(&self, hit: &Hit) -> u16 {
+        hit.piece.map_or(BACKGROUND, |index| self.pieces[index as usize].face)
+    }
+
+    /// Whether the colour of a face depends on the whole footprint of a pixel and not on the hit alone.
+    pub fn is_print(&self, hit: &Hit) -> bool {
+        hit.piece.is_some_and(|index| matches!(self.pieces[index as usize].paint, Paint::Print(_)))
+    }
+
+    /// Colour of what was hit, for the footprint of one pixel around the ray.
+    pub fn colour(&self, hit: &Hit, ray: &Ray) -> [f32; 3] {
+        let Some(index) = hit.piece else { return self.background };
+        let piece = &self.pieces[index as usize];
+        let coat = match &piece.paint {
+            Paint::Flat(colour) => return *colour,
+            Paint::Print(print) => return print.colour(ray, &piece.surface, &self.lamp),
+            Paint::Coat(coat) => coat,
+        };
+        let direction = ray.direction();
+        let point = direction.map(|c| c * hit.depth);
+        let normal = piece.surface.normal(&point);
+        let spot = Spot { ray: direction, by_pixel: ray.by_pixel, point, normal, sunlit: 1.0 };
+        coat.colour_at(&spot, &self.lamp, self.background)
+    }
+}
+
+/// The board's sheet of paper, the side that the camera sees.
+fn sheet(scene: &RenderScene, camera_from_world: &Isometry3<f64>, lamp: &Lamp) -> Option<Piece> {
+    let board = &scene.board;
+    let camera_from_target = camera_from_world * board.world_from_target;
+    let turn = |v: Vector3<f64>| camera_from_target.rotation * v;
+    let pattern_middle =
+        Vector3::new((board.columns as f64 - 1.0) / 2.0, (board.rows as f64 - 1.0) / 2.0, 0.0) * board.square_m;
+    let middle = camera_from_target.translation.vector + turn(pattern_middle);
+    let [half_width, half_height] = board.paper_m.map(|side| 0.5 * side);
+    let facet = Facet::rectangle(&middle, &turn(Vector3::x() * half_width), &turn(Vector3::y() * half_height))?;
+    let from_front = dot(&facet.normal, &turn(-Vector3::z()).into()) > 0.0;
+    let paint = if from_front {
+        let c = *facet.inverse_depth();
+        let origin: Vec3 = camera_from_target.translation.vector.into();
+        let in_squares = |axis: Vector3<f64>| {
+            let axis: Vec3 = turn(axis / board.square_m).into();
+            scale_add(-dot(&axis, &origin), &c, &axis)
+        };
+        Paint::Print(Print {
+            s: in_squares(Vector3::x()),
+            r: in_squares(Vector3::y()),
+            inverse_depth: c,
+            pattern: Pattern::new(board.columns, board.rows),
+            dark: board.dark,
+            white: board.white,
+        })
+    } else {
+        let coat = Coat::matt(board.back);
+        coat.flat(lamp, &facet.normal).map_or_else(|| Paint::Coat(coat), Paint::Flat)
+    };
+    Some(Piece { surface: Surface::Facet(facet), face: BACKGROUND + 1, paint, lead: SHEET_LEAD })
+}
+
+impl Print {
+    fn colour(&self, ray: &Ray, surface: &Surface, lamp: &Lamp) -> [f32; 3] {
+        let direction = ray.direction();
+        let depth = 1.0 / dot(&self.inverse_depth, &direction);
+        let (s, r) = (depth * dot(&self.s, &direction), depth * dot(&self.r, &direction));
+        let [x_by_u, x_by_v, y_by_u, y_by_v] = ray.by_pixel.map(f64::from);
+        let slopes = |form: &Vec3, value: f64| {
+            let by_x = depth * (form[0] - value * self.inverse_depth[0]);
+            let by_y = depth * (form[1] - value * self.inverse_depth[1]);
+            [by_x * x_by_u + by_y * y_by_u, by_x * x_by_v + by_y * y_by_v]
+        };
+        let ([s_by_u, s_by_v], [r_by_u, r_by_v]) = (slopes(&self.s, s), slopes(&self.r, r));
+        let footprint = Footprint { centre: [s, r], by_u: [s_by_u, r_by_u], by_v: [s_by_v, r_by_v] };
+        let dark = self.pattern.dark_fraction(&footprint) as f32;
+        let point = direction.map(|c| c * depth);
+        let light = lamp.brightness(&surface.normal(&point), &lamp.towards(&point), 1.0);
+        [light * (self.white + dark * (self.dark - self.white)); 3]
+    }
+}

@@ -1,0 +1,81 @@
+//! What can be wrong with a scene file.
+
+use super::locate;
+
+/// Why a scene cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The file cannot be read.
+    #[error("the scene file cannot be read: {source}. File: {file}")]
+    Read {
+        /// Path as given.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not TOML, an unknown field, or a value of the wrong type.
+    #[error("{message}{}. {}", in_field(field), place(file, *line))]
+    Syntax {
+        /// Path as given.
+        file: String,
+        /// Line, counted from 1, where known.
+        line: Option<usize>,
+        /// Dotted name of the field, empty where the error is outside of any.
+        field: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// A number out of its range.
+    #[error("{field} is {value}, it must be {need}. {}", place(file, *line))]
+    Field {
+        /// Path as given.
+        file: String,
+        /// Line, counted from 1; absent where the value is a default.
+        line: Option<usize>,
+        /// Dotted name of the field.
+        field: String,
+        /// Its value.
+        value: String,
+        /// What it must be.
+        need: String,
+    },
+}
+
+fn in_field(field: &str) -> String {
+    if field.is_empty() { String::new() } else { format!(" in `{field}`") }
+}
+
+fn place(file: &str, line: Option<usize>) -> String {
+    match line {
+        Some(line) => format!("File: {file}, line {line}"),
+        None => format!("File: {file}"),
+    }
+}
+
+impl SceneError {
+    pub(super) fn syntax(file: &str, text: &str, error: &toml::de::Error) -> Self {
+        let start = error.span().map(|span| span.start);
+        Self::Syntax {
+            file: file.to_owned(),
+            line: start.map(|start| locate::line_at(text, start)),
+            field: start.map(|start| locate::field_at(text, start)).unwrap_or_default(),
+            message: error.message().trim_end().to_owned(),
+        }
+    }
+}
+
+/// A range that is not kept, before file and line are known.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Violation {
+    pub field: String,
+    pub value: String,
+    pub need: String,
+}
+
+impl Violation {
+    pub fn at(self, file: &str, line: Option<usize>) -> SceneError {
+        let Self { field, value, need } = self;
+        SceneError::Field { file: file.to_owned(), line, field, value, need }
+    }
+}

@@ -1,0 +1,179 @@
+//! The truth of one run of the cell.
+
+use handeye_core::camera::Intrinsics;
+use handeye_core::frames::{Base, Camera, Pose, Sensor, Target, Tip};
+use handeye_core::target::{Grid, TargetSpec};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+
+use super::Scene;
+use super::errors_of_robot::{RobotErrors, gaussian};
+use super::spec::{
+    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo, SimulationSpec,
+    SolidSpec,
+};
+use crate::cell::kinematics::{JointAngles, JointLimits, forward};
+
+const CAMERA_STREAM: u64 = 1;
+const BOARD_STREAM: u64 = 2;
+
+/// A scene with everything random drawn: what is true in one run.
+///
+/// The world is the frame [`Base`]: the one in which the controller reports tip poses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResolvedScene {
+    /// Seed that it was drawn from; noise of images is to be drawn from it too.
+    pub seed: u64,
+    /// How simulated time runs.
+    pub simulation: SimulationSpec,
+    /// The lens of colour and depth.
+    pub intrinsics: Intrinsics,
+    /// Depth of the nearest point that is seen, metres.
+    pub near_m: f64,
+    /// Depth reported where nothing is seen, metres.
+    pub far_m: f64,
+    /// Pose of the arm frame (`/UR5`) in the world.
+    pub world_from_arm: Isometry3<f64>,
+    /// Pose of the tip (`/UR5/Tip`) in the connection.
+    pub connection_from_tip: Isometry3<f64>,
+    /// The hand-eye transform.
+    pub tip_from_camera: Pose<Tip, Camera>,
+    /// Pose of the vision sensor (`/UR5/3D_camera`) in the tip: the camera in CoppeliaSim's axes.
+    pub tip_from_sensor: Pose<Tip, Sensor>,
+    /// Pose of the target.
+    pub base_from_target: Pose<Base, Target>,
+    /// Pose of the printed sheet (`/Plane`) in the world: origin in its centre, z out of the printed side.
+    pub world_from_plane: Isometry3<f64>,
+    /// What is printed on it.
+    pub target: TargetSpec,
+    /// Size of the sheet along x and y of the plane, metres.
+    pub paper_m: [f64; 2],
+    /// Joint values at the start, radians.
+    pub start_joints: JointAngles,
+    /// Ranges of the joints.
+    pub joint_limits: JointLimits,
+    /// Errors of the arm.
+    pub robot_errors: RobotErrors,
+    /// Imperfections of the colour image.
+    pub image: ImageSpec,
+    /// Imperfections of the depth image.
+    pub depth: DepthSpec,
+    /// Light and background.
+    pub light: LightSpec,
+    /// What stands around.
+    pub solids: Vec<ResolvedSolid>,
+}
+
+/// A box in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResolvedSolid {
+    /// Name, for messages.
+    pub name: String,
+    /// Pose of its centre in the world.
+    pub world_from_solid: Isometry3<f64>,
+    /// Lengths of its edges along its own axes, metres.
+    pub size_m: [f64; 3],
+    /// Colour: red, green, blue.
+    pub colour: [u8; 3],
+}
+
+impl ResolvedScene {
+    /// The tip pose that the controller reports for the joint values of its encoders.
+    pub fn reported_tip(&self, encoders: &JointAngles) -> Pose<Base, Tip> {
+        let arm_from_tip = forward(encoders).arm_from_connection * self.connection_from_tip;
+        Pose::from_isometry(self.world_from_arm * arm_from_tip)
+    }
+
+    /// Where the tip really is, see [`RobotErrors`].
+    pub fn true_tip(&self, encoders: &JointAngles, settled_index: u64) -> Pose<Base, Tip> {
+        let arm_from_tip = self.robot_errors.true_tip(encoders, &self.connection_from_tip, settled_index);
+        Pose::from_isometry(self.world_from_arm * arm_from_tip)
+    }
+
+    /// The target as the camera sees it from a true tip pose.
+    pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
+        (*base_from_tip * self.tip_from_camera).inverse() * self.base_from_target
+    }
+}
+
+/// The camera in the axes of a vision sensor: half a turn about the optical axis, its own inverse.
+pub fn sensor_from_camera() -> Pose<Sensor, Camera> {
+    let half_turn = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 0.0, 0.0, 1.0));
+    Pose::from_isometry(Isometry3::from_parts(Translation3::identity(), half_turn))
+}
+
+/// Draws the random parts of a scene that has been checked.
+pub(super) fn resolve(scene: &Scene, seed: u64) -> ResolvedScene {
+    let Scene { seed: _, simulation, robot, camera, board, image, depth, light, solids } = scene;
+    let tip_from_camera = camera_on_tip(camera, seed);
+    let world_from_plane = board.plane.isometry()
+        * handeye_core::se3::exp(&gaussian(
+            seed,
+            BOARD_STREAM,
+            board.random_offset_mm * 1e-3,
+            board.random_offset_deg.to_radians(),
+        ));
+    let target = TargetSpec::Chessboard(Grid { columns: board.columns, rows: board.rows, square_m: board.square_m });
+    ResolvedScene {
+        seed,
+        simulation: *simulation,
+        intrinsics: intrinsics(camera),
+        near_m: camera.near_m,
+        far_m: camera.far_m,
+        world_from_arm: robot.arm.isometry(),
+        connection_from_tip: robot.tip.isometry(),
+        tip_from_camera,
+        tip_from_sensor: tip_from_camera * sensor_from_camera().inverse(),
+        base_from_target: Pose::from_isometry(world_from_plane * plane_from_target(board)),
+        world_from_plane,
+        target,
+        paper_m: board.paper_m,
+        start_joints: robot.start_joints_deg.map(f64::to_radians),
+        joint_limits: JointLimits {
+            min_rad: robot.min_joints_deg.map(f64::to_radians),
+            max_rad: robot.max_joints_deg.map(f64::to_radians),
+        },
+        robot_errors: RobotErrors::new(robot, seed),
+        image: *image,
+        depth: *depth,
+        light: *light,
+        solids: solids.iter().map(|solid| place(solid, &world_from_plane)).collect(),
+    }
+}
+
+fn camera_on_tip(camera: &CameraSpec, seed: u64) -> Pose<Tip, Camera> {
+    let nominal = Pose::<Tip, Sensor>::from_isometry(camera.sensor.isometry()) * sensor_from_camera();
+    let (sigma_m, sigma_rad) = (camera.random_offset_mm * 1e-3, camera.random_offset_deg.to_radians());
+    nominal.perturbed(&gaussian(seed, CAMERA_STREAM, sigma_m, sigma_rad))
+}
+
+/// The sheet's z points at the viewer and its y up; the target's z points into the sheet and its y down the rows.
+fn plane_from_target(board: &BoardSpec) -> Isometry3<f64> {
+    let half = |corners: usize| (corners as f64 - 1.0) / 2.0 * board.square_m;
+    let half_turn_about_x = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
+    Isometry3::from_parts(Translation3::new(-half(board.columns), half(board.rows), 0.0), half_turn_about_x)
+}
+
+/// The lens of a camera whose numbers may still be out of range.
+pub(super) fn intrinsics(camera: &CameraSpec) -> Intrinsics {
+    let CameraSpec { width, height, view_angle_deg, fx, fy, cx, cy, distortion, .. } = *camera;
+    let angle_deg = view_angle_deg.unwrap_or(REFERENCE_VIEW_ANGLE_DEG);
+    let by_angle = Intrinsics::from_view_angle(width, height, angle_deg.to_radians());
+    Intrinsics {
+        fx: fx.unwrap_or(by_angle.fx),
+        fy: fy.unwrap_or(by_angle.fy),
+        cx: cx.unwrap_or(by_angle.cx),
+        cy: cy.unwrap_or(by_angle.cy),
+        distortion,
+        ..by_angle
+    }
+}
+
+fn place(solid: &SolidSpec, world_from_plane: &Isometry3<f64>) -> ResolvedSolid {
+    let SolidSpec { name, size_m, position_m, rotation_xyzw, relative_to, colour } = solid;
+    let pose = super::PoseSpec { position_m: *position_m, rotation_xyzw: *rotation_xyzw }.isometry();
+    let world_from_solid = match relative_to {
+        RelativeTo::World => pose,
+        RelativeTo::Plane => world_from_plane * pose,
+    };
+    ResolvedSolid { name: name.clone(), world_from_solid, size_m: *size_m, colour: *colour }
+}

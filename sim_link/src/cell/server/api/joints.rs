@@ -1,0 +1,72 @@
+//! `sim.*`: joints.
+
+use ciborium::Value;
+
+use super::{Call, Outcome, Table, one, several};
+use crate::cell::server::args::ApiError;
+use crate::cell::world::{DriveLimits, Joint};
+use crate::wire;
+
+pub(super) const FUNCTIONS: Table = &[
+    ("getJointPosition", get_joint_position),
+    ("setJointPosition", set_joint_position),
+    ("getJointTargetPosition", get_joint_target_position),
+    ("setJointTargetPosition", set_joint_target_position),
+    ("getJointInterval", get_joint_interval),
+    ("getJointType", get_joint_type),
+    ("getJointMode", get_joint_mode),
+    ("getJointVelocity", get_joint_velocity),
+];
+
+const JOINT_REVOLUTE: i64 = 10;
+const JOINTMODE_KINEMATIC: i64 = 0;
+
+fn joint<'a>(call: &'a Call<'_>) -> Result<&'a Joint, ApiError> {
+    Ok(call.cell.world.tree.joint(call.args.handle(0)?)?)
+}
+
+fn get_joint_position(call: &mut Call<'_>) -> Outcome {
+    one(joint(call)?.position_rad())
+}
+
+fn set_joint_position(call: &mut Call<'_>) -> Outcome {
+    let position_rad = call.args.number(1)?;
+    let done = call.cell.world.tree.joint_mut(call.args.handle(0)?)?.set_position(position_rad)?;
+    one(i64::from(done))
+}
+
+fn get_joint_target_position(call: &mut Call<'_>) -> Outcome {
+    one(joint(call)?.target_rad())
+}
+
+fn set_joint_target_position(call: &mut Call<'_>) -> Outcome {
+    let target_rad = call.args.number(1)?;
+    let limits: Option<DriveLimits> = match call.args.optional_numbers(2)? {
+        None => None,
+        Some(limits) if limits.is_empty() => None,
+        Some(limits) => Some(limits.try_into().map_err(|_: Vec<f64>| ApiError::WrongSize)?),
+    };
+    call.cell.world.tree.joint_mut(call.args.handle(0)?)?.drive_to(target_rad, limits)?;
+    one(1)
+}
+
+/// Whether it is cyclic, and the smallest position with the *range* above it.
+fn get_joint_interval(call: &mut Call<'_>) -> Outcome {
+    let joint = joint(call)?;
+    let (min_rad, max_rad) = joint.interval_rad();
+    several([Value::Bool(joint.cyclic), wire::floats([min_rad, max_rad - min_rad])])
+}
+
+fn get_joint_type(call: &mut Call<'_>) -> Outcome {
+    joint(call)?;
+    one(JOINT_REVOLUTE)
+}
+
+fn get_joint_mode(call: &mut Call<'_>) -> Outcome {
+    joint(call)?;
+    several([Value::from(JOINTMODE_KINEMATIC), Value::from(0)])
+}
+
+fn get_joint_velocity(call: &mut Call<'_>) -> Outcome {
+    one(joint(call)?.velocity_rad_s())
+}

@@ -1,0 +1,226 @@
+//! What the vision sensors deliver: drawn when somebody asks, kept until there is something else to see.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use handeye_core::camera::Intrinsics;
+use nalgebra::{Unit, Vector3};
+
+use super::message;
+use super::stage::{Stage, out_of_sight};
+use crate::cell::render::{BoardSurface, Imaging, Light, LightSource, RenderScene, Renderer, Solid};
+use crate::cell::scene::{ResolvedScene, sensor_from_camera};
+use crate::cell::world::{Handle, Moment, Shown, VisionSensor};
+
+/// Sensors with different lenses whose rays are kept; the cell has one lens.
+const MAX_RENDERERS: usize = 4;
+
+/// Buffers that are kept: colour and depth of a few sensors.
+const MAX_PICTURES: usize = 8;
+
+/// One buffer of a sensor as clients get it: row by row from the bottom.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// Its bytes: R, G, B per pixel, or one little-endian `f32` in metres.
+    pub bytes: Vec<u8>,
+    /// The whole reply to the plain request for it.
+    pub reply: Vec<u8>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Channel {
+    Colour,
+    Depth,
+}
+
+/// What a picture depends on.
+#[derive(Debug, Clone)]
+struct Source {
+    intrinsics: Intrinsics,
+    range_m: (f64, f64),
+    /// Absent for a buffer that nothing was drawn into.
+    moment: Option<Arc<Moment>>,
+    /// The pass, where pictures have noise.
+    pass: Option<u64>,
+}
+
+impl Source {
+    fn is(&self, other: &Self) -> bool {
+        let same_moment = match (&self.moment, &other.moment) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        same_moment
+            && self.pass == other.pass
+            && self.range_m == other.range_m
+            && self.intrinsics == other.intrinsics
+    }
+}
+
+/// All cameras of the cell.
+#[derive(Debug)]
+pub struct Cameras {
+    seed: u64,
+    imaging: Imaging,
+    light: Light,
+    background: [f32; 3],
+    board: BoardSurface,
+    renderers: Vec<Renderer>,
+    ranges_m: Vec<(f64, f64)>,
+    pictures: BTreeMap<(Handle, Channel), (Source, Picture)>,
+}
+
+impl Cameras {
+    /// The cameras of a scene.
+    pub fn new(scene: &ResolvedScene) -> Self {
+        let grid = scene.target.grid();
+        let direction = Unit::try_new(Vector3::from(scene.light.direction), 1e-12).unwrap_or_else(Vector3::z_axis);
+        Self {
+            seed: scene.seed,
+            imaging: Imaging {
+                blur_px: scene.image.blur_px,
+                noise_grey: scene.image.noise_grey,
+                exposure: scene.image.exposure,
+                depth_noise_m: scene.depth.noise_mm * 1e-3,
+                depth_noise_per_m2: scene.depth.noise_mm_per_m2 * 1e-3,
+            },
+            light: Light {
+                source: LightSource::Directional(direction),
+                ambient: scene.light.ambient as f32,
+                diffuse: scene.light.diffuse as f32,
+            },
+            background: scene.light.background.map(|c| f32::from(c) / 255.0),
+            board: BoardSurface::new(out_of_sight(), grid.columns, grid.rows, grid.square_m, scene.paper_m),
+            renderers: Vec::new(),
+            ranges_m: Vec::new(),
+            pictures: BTreeMap::new(),
+        }
+    }
+
+    /// The colour buffer of a sensor.
+    pub fn colour(&mut self, handle: Handle, sensor: &VisionSensor, stage: &Stage) -> &Picture {
+        let shown = sensor.shown().filter(|_| !sensor.ignore_rgb);
+        let noisy = self.imaging.noise_grey > 0.0;
+        self.picture(handle, Channel::Colour, sensor, shown, noisy, stage)
+    }
+
+    /// The depth buffer of a sensor, metres along the optical axis.
+    pub fn depth(&mut self, handle: Handle, sensor: &VisionSensor, stage: &Stage) -> &Picture {
+        let shown = sensor.shown().filter(|_| !sensor.ignore_depth);
+        let noisy = self.imaging.depth_noise_m > 0.0 || self.imaging.depth_noise_per_m2 > 0.0;
+        self.picture(handle, Channel::Depth, sensor, shown, noisy, stage)
+    }
+
+    fn picture(
+        &mut self,
+        handle: Handle,
+        channel: Channel,
+        sensor: &VisionSensor,
+        shown: Option<&Shown>,
+        noisy: bool,
+        stage: &Stage,
+    ) -> &Picture {
+        let source = Source {
+            intrinsics: sensor.intrinsics,
+            range_m: (sensor.near_m, sensor.far_m),
+            moment: shown.map(|shown| Arc::clone(&shown.moment)),
+            pass: shown.filter(|_| noisy).map(|shown| shown.pass),
+        };
+        let key = (handle, channel);
+        let is_current = self.pictures.get(&key).is_some_and(|(kept, _)| kept.is(&source));
+        if !is_current {
+            if self.pictures.len() >= MAX_PICTURES {
+                self.pictures.clear();
+            }
+            let bytes = self.draw(handle, channel, sensor, shown, stage);
+            let size = [sensor.intrinsics.width, sensor.intrinsics.height];
+            let reply = message::returned_image(&bytes, size);
+            self.pictures.insert(key, (source.clone(), Picture { bytes, reply }));
+        }
+        // Just inserted if it was not there, so the entry is never made here.
+        &self.pictures.entry(key).or_insert_with(|| (source, Picture { bytes: Vec::new(), reply: Vec::new() })).1
+    }
+
+    fn draw(
+        &mut self,
+        handle: Handle,
+        channel: Channel,
+        sensor: &VisionSensor,
+        shown: Option<&Shown>,
+        stage: &Stage,
+    ) -> Vec<u8> {
+        let (width, height) = (sensor.intrinsics.width as usize, sensor.intrinsics.height as usize);
+        let seen = shown.and_then(|shown| Some((shown, self.scene(handle, &shown.moment, stage)?)));
+        let Some((shown, scene)) = seen else {
+            return match channel {
+                Channel::Colour => self.background.map(|c| (c * 255.0).round() as u8).repeat(width * height),
+                Channel::Depth => (sensor.far_m as f32).to_le_bytes().repeat(width * height),
+            };
+        };
+        let seed = frame_seed(self.seed, handle, shown.pass);
+        let imaging = self.imaging;
+        let renderer = self.renderer(sensor);
+        match channel {
+            Channel::Colour => {
+                let picture = renderer.render_rgb(&scene, &imaging, seed);
+                bottom_up(picture.as_raw(), 3 * width)
+            }
+            Channel::Depth => {
+                let depth = renderer.render_depth(&scene, &imaging, seed);
+                let bytes: Vec<u8> = depth.iter().flat_map(|d| d.to_le_bytes()).collect();
+                bottom_up(&bytes, 4 * width)
+            }
+        }
+    }
+
+    /// What there was to see from a sensor; `None` if the sensor was not there yet.
+    fn scene(&self, handle: Handle, moment: &Moment, stage: &Stage) -> Option<RenderScene> {
+        let world_from_camera = moment.pose(handle)? * sensor_from_camera().isometry();
+        let mut board = self.board.clone();
+        if let Some(world_from_plane) = moment.pose(stage.plane) {
+            board.world_from_target = world_from_plane * stage.plane_from_target;
+        }
+        let placed = |(object, solid): &(Handle, Solid)| {
+            let world_from_shape = moment.pose(*object)? * solid.world_from_shape;
+            Some(Solid { world_from_shape, ..solid.clone() })
+        };
+        let solids = stage.solids.iter().filter_map(placed).collect();
+        Some(RenderScene { world_from_camera, board, solids, light: self.light, background: self.background })
+    }
+
+    fn renderer(&mut self, sensor: &VisionSensor) -> &Renderer {
+        let range_m = (sensor.near_m, sensor.far_m);
+        let known = self
+            .renderers
+            .iter()
+            .zip(&self.ranges_m)
+            .position(|(renderer, range)| *renderer.intrinsics() == sensor.intrinsics && *range == range_m);
+        let at = known.unwrap_or_else(|| {
+            if self.renderers.len() >= MAX_RENDERERS {
+                self.renderers.clear();
+                self.ranges_m.clear();
+            }
+            self.renderers.push(Renderer::new(sensor.intrinsics, sensor.near_m, sensor.far_m));
+            self.ranges_m.push(range_m);
+            self.renderers.len() - 1
+        });
+        &self.renderers[at]
+    }
+}
+
+/// Turns an image upside down: the renderer starts at the top, the API at the bottom.
+fn bottom_up(bytes: &[u8], row_bytes: usize) -> Vec<u8> {
+    bytes.chunks_exact(row_bytes.max(1)).rev().flatten().copied().collect()
+}
+
+/// A seed of its own for every frame of every sensor. Steele, Lea, Flood 2014, "Fast splittable pseudorandom number
+/// generators", the finaliser of SplitMix64.
+fn frame_seed(seed: u64, handle: Handle, pass: u64) -> u64 {
+    let mix = |mut z: u64| {
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    mix(mix(mix(seed).wrapping_add(handle.unsigned_abs())).wrapping_add(pass))
+}

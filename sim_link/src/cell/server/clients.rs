@@ -1,0 +1,247 @@
+//! What the server remembers of its clients: one record per id, one per connection.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::plans::Plans;
+use super::task::Task;
+
+/// Clients with different ids that are remembered at a time.
+pub const MAX_CLIENTS: usize = 64;
+
+/// Calls of one connection that may be under way: a blocking one, and those that its callbacks make.
+pub const MAX_CALLS: usize = 16;
+
+/// How long a client whose last connection is gone keeps its stepping and its locks. A client that makes a new
+/// socket after a time-out is back within milliseconds; one that was killed never is.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// Name that the socket gives a connection.
+pub type Peer = Vec<u8>;
+
+/// A client, by the id that it sends with every request.
+#[derive(Debug)]
+pub struct Client {
+    /// Above zero, passes wait until it has asked for one.
+    pub stepping_level: u32,
+    /// Number of the pass that it wants to see begin.
+    pub desired_step: u64,
+    /// Above zero, passes wait.
+    pub locks: u32,
+    /// Idle time after which it is forgotten.
+    pub idle_limit: Duration,
+    /// When it was last heard of.
+    pub last_seen: Duration,
+    /// Since when it has had no connection.
+    pub gone_since: Option<Duration>,
+    /// Motions that it steps itself.
+    pub plans: Plans,
+}
+
+impl Client {
+    fn new(idle_limit: Duration, now: Duration) -> Self {
+        Self {
+            stepping_level: 0,
+            desired_step: 0,
+            locks: 0,
+            idle_limit,
+            last_seen: now,
+            gone_since: None,
+            plans: Plans::default(),
+        }
+    }
+
+    fn holds_anything(&self) -> bool {
+        self.stepping_level > 0 || self.locks > 0
+    }
+}
+
+/// What a call under way waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waiting {
+    /// Nothing: it goes on at once.
+    Nothing,
+    /// The end of the pass with this number.
+    Pass(u64),
+    /// The return of a callback.
+    Callback,
+    /// A time.
+    Time(Duration),
+}
+
+/// A call under way.
+#[derive(Debug)]
+pub struct Running {
+    /// Who made it.
+    pub uuid: String,
+    /// Name of the function, for messages.
+    pub func: String,
+    /// What remains to be done.
+    pub task: Box<dyn Task>,
+    /// What it waits for.
+    pub waiting: Waiting,
+}
+
+/// One connection.
+#[derive(Debug, Default)]
+pub struct Connection {
+    /// Id that it last used.
+    pub uuid: String,
+    /// Its calls, innermost last.
+    pub calls: Vec<Running>,
+}
+
+impl Connection {
+    /// Whether its client is busy with a callback, during which no pass may run.
+    pub fn runs_callback(&self) -> bool {
+        self.calls.last().is_some_and(|call| call.waiting == Waiting::Callback)
+    }
+
+    /// The innermost call that waits for a callback.
+    pub fn waiting_for_callback(&self) -> Option<usize> {
+        self.calls.iter().rposition(|call| call.waiting == Waiting::Callback)
+    }
+}
+
+/// All clients and connections.
+#[derive(Debug, Default)]
+pub struct Clients {
+    records: BTreeMap<String, Client>,
+    connections: BTreeMap<Peer, Connection>,
+}
+
+impl Clients {
+    /// The record of a client, made if it is new; `None` when there are too many that must not be forgotten.
+    pub fn meet(&mut self, uuid: &str, idle_limit: Duration, now: Duration) -> Option<&mut Client> {
+        if !self.records.contains_key(uuid) {
+            if self.records.len() >= MAX_CLIENTS && !self.forget_idlest() {
+                return None;
+            }
+            self.records.insert(uuid.to_owned(), Client::new(idle_limit, now));
+        }
+        let client = self.records.get_mut(uuid)?;
+        client.last_seen = now;
+        client.gone_since = None;
+        Some(client)
+    }
+
+    /// The record of a client that has one.
+    pub fn record_mut(&mut self, uuid: &str) -> Option<&mut Client> {
+        self.records.get_mut(uuid)
+    }
+
+    /// All records.
+    pub fn records_mut(&mut self) -> impl Iterator<Item = &mut Client> {
+        self.records.values_mut()
+    }
+
+    /// Number of clients that are remembered.
+    pub fn len(&self) -> usize {
+        self.records.len()
+    }
+
+    /// The connection, made if it is new, now used by `uuid`.
+    pub fn connection(&mut self, peer: &Peer, uuid: &str) -> &mut Connection {
+        let connection = self.connections.entry(peer.clone()).or_default();
+        if connection.uuid != uuid {
+            uuid.clone_into(&mut connection.uuid);
+        }
+        connection
+    }
+
+    /// The connection, if it is known.
+    pub fn connection_mut(&mut self, peer: &Peer) -> Option<&mut Connection> {
+        self.connections.get_mut(peer)
+    }
+
+    /// All connections.
+    pub fn connections(&self) -> impl Iterator<Item = (&Peer, &Connection)> {
+        self.connections.iter()
+    }
+
+    /// All connections, to change.
+    pub fn connections_mut(&mut self) -> impl Iterator<Item = (&Peer, &mut Connection)> {
+        self.connections.iter_mut()
+    }
+
+    /// Whether a pass has to wait for somebody.
+    pub fn hold_pass(&self, step: u64) -> bool {
+        let waits_for_pass = |uuid: &str| {
+            self.connections.values().flat_map(|connection| &connection.calls).any(|call| {
+                call.uuid == uuid && matches!(call.waiting, Waiting::Pass(_))
+            })
+        };
+        self.connections.values().any(Connection::runs_callback)
+            || self.records.iter().any(|(uuid, client)| {
+                (client.stepping_level > 0 && client.desired_step <= step) || (client.locks > 0 && !waits_for_pass(uuid))
+            })
+    }
+
+    /// Forgets a connection and gives back its calls.
+    pub fn disconnect(&mut self, peer: &Peer, now: Duration) -> Vec<Running> {
+        let Some(connection) = self.connections.remove(peer) else { return Vec::new() };
+        if !self.is_connected(&connection.uuid)
+            && let Some(client) = self.records.get_mut(&connection.uuid)
+        {
+            client.gone_since = Some(now);
+        }
+        connection.calls
+    }
+
+    /// Forgets a client and gives back its calls.
+    pub fn forget(&mut self, uuid: &str) -> Vec<Running> {
+        self.records.remove(uuid);
+        let mut calls = Vec::new();
+        for connection in self.connections.values_mut() {
+            calls.extend(connection.calls.extract_if(.., |call| call.uuid == uuid));
+        }
+        calls
+    }
+
+    /// Clients that were silent for longer than they may be, or whose connections are all gone.
+    pub fn expired(&self, now: Duration) -> Vec<String> {
+        let expired = |(uuid, client): &(&String, &Client)| {
+            let silent = now.saturating_sub(client.last_seen) > client.idle_limit && !self.is_working(uuid);
+            silent || client.gone_since.is_some_and(|since| now.saturating_sub(since) > GRACE)
+        };
+        self.records.iter().filter(expired).map(|(uuid, _)| uuid.clone()).collect()
+    }
+
+    /// When [`Self::expired`] may next have something to say.
+    pub fn next_expiry(&self) -> Option<Duration> {
+        // One past the limit: at the limit itself nobody has exceeded it.
+        let past = Duration::from_millis(1);
+        let of = |(uuid, client): (&String, &Client)| {
+            let silent = (!self.is_working(uuid)).then(|| client.last_seen + client.idle_limit + past);
+            let gone = client.gone_since.map(|since| since + GRACE + past);
+            silent.into_iter().chain(gone).min()
+        };
+        self.records.iter().filter_map(of).min()
+    }
+
+    /// Whether calls of the client go on without it: its silence is then no sign of anything.
+    fn is_working(&self, uuid: &str) -> bool {
+        let mut calls = self.connections.values().flat_map(|connection| &connection.calls);
+        calls.any(|call| call.uuid == uuid && call.waiting != Waiting::Callback)
+    }
+
+    fn is_connected(&self, uuid: &str) -> bool {
+        self.connections.values().any(|connection| connection.uuid == uuid)
+    }
+
+    fn forget_idlest(&mut self) -> bool {
+        let idlest = self
+            .records
+            .iter()
+            .filter(|(uuid, client)| {
+                let has_calls = self.connections.values().any(|c| c.calls.iter().any(|call| call.uuid == **uuid));
+                !client.holds_anything() && !has_calls
+            })
+            .min_by_key(|(_, client)| client.last_seen)
+            .map(|(uuid, _)| uuid.clone());
+        match idlest {
+            Some(uuid) => self.records.remove(&uuid).is_some(),
+            None => false,
+        }
+    }
+}

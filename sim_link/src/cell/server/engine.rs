@@ -1,0 +1,323 @@
+//! The server without its socket: requests in, replies out, passes of the simulation in between.
+
+use std::time::Duration;
+
+use super::api::{Call, Effect, Registry};
+use super::args::{ApiError, Args};
+use super::cell::Cell;
+use super::clients::{Client, Clients, MAX_CALLS, MAX_CLIENTS, Peer, Running, Waiting};
+use super::message::{self, Request};
+use super::task::{Answer, Next, Task, Wake};
+
+/// Steps that calls may take in one turn before requests are looked at again. A motion in a stopped simulation has no
+/// pass to wait for and would otherwise keep everybody waiting until it is over.
+const STEPS_PER_TURN: usize = 200;
+
+/// What the simulator puts before the message of an error: the line of its own script that made the call.
+const ERROR_LINE: u32 = 354;
+
+/// A reply and the connection that it goes to.
+pub type Outgoing = (Peer, Vec<u8>);
+
+/// When there is something to do without a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Due {
+    /// At once.
+    Now,
+    /// At a time on the server's clock.
+    At(Duration),
+    /// Never.
+    Never,
+}
+
+/// World and clients.
+#[derive(Debug)]
+pub struct Engine {
+    cell: Cell,
+    clients: Clients,
+    registry: Registry,
+    /// Passes since the server was started.
+    step: u64,
+    /// When the next pass is due, where time is real.
+    next_pass: Option<Duration>,
+    /// Motions whose clients have vanished, on their way to rest.
+    orphans: Vec<Box<dyn Task>>,
+    outgoing: Vec<Outgoing>,
+}
+
+impl Engine {
+    /// Serves a cell.
+    pub fn new(cell: Cell) -> Self {
+        Self {
+            cell,
+            clients: Clients::default(),
+            registry: Registry::new(),
+            step: 0,
+            next_pass: None,
+            orphans: Vec::new(),
+            outgoing: Vec::new(),
+        }
+    }
+
+    /// The cell that is served.
+    pub fn cell(&self) -> &Cell {
+        &self.cell
+    }
+
+    /// The replies since the last time.
+    pub fn take_outgoing(&mut self) -> Vec<Outgoing> {
+        std::mem::take(&mut self.outgoing)
+    }
+
+    /// Takes in a request at a time on the server's clock.
+    pub fn receive(&mut self, peer: &Peer, bytes: &[u8], now: Duration) {
+        self.cell.now = now;
+        match message::parse(bytes) {
+            Err(error) => self.send(peer, message::failed(&error.to_string())),
+            Ok(Request::WithoutId) => self.send(peer, message::version_mismatch()),
+            Ok(Request::Nothing) => self.send(peer, message::empty()),
+            Ok(Request::Eval) => {
+                let text = "in eval: the built-in cell has no Lua interpreter: call its functions by name.";
+                self.send(peer, message::failed(text));
+            }
+            Ok(Request::End { uuid }) => {
+                self.forget(&uuid);
+                self.send(peer, message::empty());
+            }
+            Ok(Request::Executed { uuid, values }) => self.executed(peer, &uuid, values),
+            Ok(Request::Call { uuid, func, args, idle_limit }) => {
+                if self.clients.meet(&uuid, idle_limit, now).is_some() {
+                    self.call(peer, uuid, func, Args::new(args));
+                } else {
+                    let text = format!("the built-in cell serves {MAX_CLIENTS} clients at a time: close one and try again.");
+                    self.send(peer, message::failed(&text));
+                }
+            }
+        }
+    }
+
+    /// A connection is gone.
+    pub fn disconnected(&mut self, peer: &Peer, now: Duration) {
+        self.cell.now = now;
+        for call in self.clients.disconnect(peer, now) {
+            self.adopt(call);
+        }
+    }
+
+    /// When [`Self::turn`] has something to do.
+    pub fn due(&self) -> Due {
+        if self.next_call().is_some() {
+            return Due::Now;
+        }
+        let calls = self.clients.connections().flat_map(|(_, connection)| &connection.calls);
+        let times = calls.filter_map(|call| match call.waiting {
+            Waiting::Time(time) => Some(time),
+            _ => None,
+        });
+        let mut next = times.chain(self.clients.next_expiry()).min();
+        if self.cell.world.simulation().is_advancing() && !self.clients.hold_pass(self.step) {
+            match self.next_pass.filter(|_| self.cell.real_time) {
+                None => return Due::Now,
+                Some(time) => next = Some(next.map_or(time, |next| next.min(time))),
+            }
+        }
+        next.map_or(Due::Never, Due::At)
+    }
+
+    /// Does what is due at a time on the server's clock: goes on with calls, runs at most one pass.
+    pub fn turn(&mut self, now: Duration) {
+        self.cell.now = now;
+        for uuid in self.clients.expired(now) {
+            tracing::info!(uuid, "a client was silent for too long and is forgotten");
+            self.forget(&uuid);
+        }
+        self.resume_calls();
+        if self.is_pass_due(now) {
+            self.run_pass(now);
+        }
+    }
+
+    fn is_pass_due(&self, now: Duration) -> bool {
+        self.cell.world.simulation().is_advancing()
+            && !self.clients.hold_pass(self.step)
+            && !(self.cell.real_time && self.next_pass.is_some_and(|time| time > now))
+    }
+
+    fn run_pass(&mut self, now: Duration) {
+        self.cell.world.run_pass();
+        self.step += 1;
+        let seconds = self.cell.world.simulation().time_step_s() / self.cell.speed_factor;
+        let length = Duration::try_from_secs_f64(seconds).unwrap_or_default();
+        // A pass that was held for long is not made up for by a burst of others.
+        let began = self.next_pass.map_or(now, |time| time.max(now.saturating_sub(length)));
+        self.next_pass = self.cell.world.simulation().is_advancing().then(|| began + length);
+        let mut orphans = std::mem::take(&mut self.orphans);
+        orphans.retain_mut(|task| matches!(task.resume(&mut self.cell, Wake::PassOver), Ok(Next::Pass)));
+        self.orphans = orphans;
+        self.resume_calls();
+    }
+
+    /// Goes on with the calls that need not wait any longer.
+    fn resume_calls(&mut self) {
+        for _ in 0..STEPS_PER_TURN {
+            let Some((peer, index, wake)) = self.next_call() else { return };
+            let Some(connection) = self.clients.connection_mut(&peer) else { return };
+            let call = connection.calls.remove(index);
+            self.run(&peer, call, wake, index);
+        }
+    }
+
+    fn next_call(&self) -> Option<(Peer, usize, Wake)> {
+        let advancing = self.cell.world.simulation().is_advancing();
+        let wake = |waiting: Waiting| match waiting {
+            Waiting::Nothing => Some(Wake::Started),
+            Waiting::Pass(step) => (step < self.step || !advancing).then_some(Wake::PassOver),
+            Waiting::Time(time) => (time <= self.cell.now).then_some(Wake::TimeReached),
+            Waiting::Callback => None,
+        };
+        self.clients.connections().find_map(|(peer, connection)| {
+            connection
+                .calls
+                .iter()
+                .enumerate()
+                .find_map(|(index, call)| Some((peer.clone(), index, wake(call.waiting)?)))
+        })
+    }
+
+    /// Goes on with a call that was taken out of its connection, and puts it back unless it is done.
+    fn run(&mut self, peer: &Peer, mut call: Running, wake: Wake, index: usize) {
+        match call.task.resume(&mut self.cell, wake) {
+            Ok(Next::Return(values)) => return self.send(peer, message::returned(values)),
+            Err(error) => return self.fail(peer, &call.func, &error),
+            Ok(Next::Pass) => {
+                call.waiting = Waiting::Pass(self.step);
+                if let Some(client) = self.clients.record_mut(&call.uuid) {
+                    client.desired_step = self.step + 1;
+                }
+            }
+            Ok(Next::Time(time)) => call.waiting = Waiting::Time(time),
+            Ok(Next::Callback { name, args }) => {
+                call.waiting = Waiting::Callback;
+                self.send(peer, message::callback(&name, args));
+            }
+        }
+        let uuid = call.uuid.clone();
+        let calls = &mut self.clients.connection(peer, &uuid).calls;
+        calls.insert(index.min(calls.len()), call);
+    }
+
+    fn executed(&mut self, peer: &Peer, uuid: &str, values: Vec<ciborium::Value>) {
+        let now = self.cell.now;
+        if let Some(client) = self.clients.record_mut(uuid) {
+            client.last_seen = now;
+        }
+        let waiting = self.clients.connection_mut(peer).and_then(|connection| {
+            let index = connection.waiting_for_callback()?;
+            Some((connection.calls.remove(index), index))
+        });
+        match waiting {
+            Some((call, index)) => {
+                self.run(peer, call, Wake::Executed(values), index);
+                self.resume_calls();
+            }
+            None => self.send(peer, message::failed("no function of this client was being called.")),
+        }
+    }
+
+    fn call(&mut self, peer: &Peer, uuid: String, func: String, args: Args) {
+        if self.clients.connection(peer, &uuid).calls.len() >= MAX_CALLS {
+            let text = format!("a connection may have {MAX_CALLS} calls under way: wait for one to return.");
+            return self.send(peer, message::failed(&text));
+        }
+        let Some(function) = self.registry.function(&func) else {
+            let error = self.registry.not_a_function(&func);
+            return self.send(peer, message::failed(&error));
+        };
+        let Some(client) = self.clients.record_mut(&uuid) else { return };
+        let mut call = Call { cell: &mut self.cell, client, args: &args, step: self.step, effects: Vec::new() };
+        let answer = function(&mut call);
+        let effects = std::mem::take(&mut call.effects);
+        for effect in effects {
+            self.carry_out(effect);
+        }
+        match answer {
+            Ok(Answer::Values(values)) => self.send(peer, message::returned(values)),
+            Ok(Answer::Encoded(bytes)) => self.send(peer, bytes),
+            Ok(Answer::Info(name)) => match self.registry.info(&name) {
+                Some(info) => self.send(peer, message::returned(vec![info])),
+                None => self.send(peer, message::failed(&format!("module '{name}' not found"))),
+            },
+            Ok(Answer::Later(task)) => {
+                let index = self.clients.connection(peer, &uuid).calls.len();
+                let call = Running { uuid, func, task, waiting: Waiting::Nothing };
+                self.run(peer, call, Wake::Started, index);
+                self.resume_calls();
+            }
+            Err(error) => self.fail(peer, &func, &error),
+        }
+    }
+
+    fn carry_out(&mut self, effect: Effect) {
+        match effect {
+            Effect::ReleaseEverybody => {
+                for client in self.clients.records_mut() {
+                    (client.stepping_level, client.locks) = (0, 0);
+                }
+            }
+            Effect::Brake => {
+                for (_, connection) in self.clients.connections_mut() {
+                    for call in &mut connection.calls {
+                        call.task.brake(&self.cell);
+                    }
+                }
+                self.clients.records_mut().flat_map(|client| client.plans.iter_mut()).for_each(super::plans::Motion::brake);
+                self.cell.world.brake_joints();
+            }
+        }
+    }
+
+    fn forget(&mut self, uuid: &str) {
+        for call in self.clients.forget(uuid) {
+            self.adopt(call);
+        }
+    }
+
+    /// Brings what a vanished client was moving to rest.
+    fn adopt(&mut self, mut call: Running) {
+        if call.task.is_moving() && matches!(call.waiting, Waiting::Pass(_)) {
+            tracing::warn!(uuid = call.uuid, func = call.func, "a client vanished during a motion: braking");
+            call.task.brake(&self.cell);
+            self.orphans.push(call.task);
+        }
+    }
+
+    fn fail(&mut self, peer: &Peer, func: &str, error: &ApiError) {
+        // The simulator reports this one under the name of its inner function.
+        let name = if func == "sim.getObject" { "sim._getObject" } else { func };
+        self.send(peer, message::failed(&format!("{ERROR_LINE}: in {name}: {error}")));
+    }
+
+    fn send(&mut self, peer: &Peer, bytes: Vec<u8>) {
+        self.outgoing.push((peer.clone(), bytes));
+    }
+}
+
+impl Client {
+    /// Changes the stepping level as `sim.setStepping` does and gives the previous one.
+    pub fn set_stepping(&mut self, enable: bool, step: u64) -> u32 {
+        let previous = self.stepping_level;
+        if enable {
+            if previous == 0 {
+                self.desired_step = step;
+            }
+            self.stepping_level = previous.saturating_add(1);
+        } else {
+            self.stepping_level = previous.saturating_sub(1);
+        }
+        previous
+    }
+}
+
+#[cfg(test)]
+#[path = "engine_tests.rs"]
+mod tests;

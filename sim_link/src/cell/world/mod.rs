@@ -1,0 +1,158 @@
+//! The world of the cell: an object tree and a simulation that advances it in passes. No sockets, no clock.
+//!
+//! The robot exists twice. Clients see it as its controller does ([`Chain::Reported`]); cameras see it as it stands
+//! ([`Chain::Actual`]), with whatever errors the scene gives its joints.
+
+pub mod error;
+pub mod joint;
+pub mod paths;
+pub mod poses;
+pub mod sensor;
+pub mod simulation;
+pub mod tree;
+
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
+
+pub use error::WorldError;
+pub use joint::{DriveLimits, Joint};
+pub use poses::Flagged;
+pub use sensor::{Moment, Shown, VisionSensor};
+pub use simulation::{Simulation, State};
+pub use tree::{Chain, Handle, Kind, Object, Tree, turn_z};
+
+/// The faults of a robot: how it really stands, given how it believes to stand.
+pub trait Faults: std::fmt::Debug + Send {
+    /// Sets the displacements of the objects. Called once per pass, after the joints have moved.
+    fn apply(&mut self, tree: &mut Tree);
+}
+
+/// The object tree with its simulation.
+#[derive(Debug, Default)]
+pub struct World {
+    /// The objects.
+    pub tree: Tree,
+    simulation: Simulation,
+    /// Passes over the life of the world.
+    pass: u64,
+    faults: Option<Box<dyn Faults>>,
+    latest: Option<Arc<Moment>>,
+}
+
+impl World {
+    /// Gives the robot faults that only the cameras see.
+    pub fn set_faults(&mut self, faults: Box<dyn Faults>) {
+        self.faults = Some(faults);
+        self.apply_faults();
+    }
+
+    /// The simulation's state and time.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// Sets the length of a pass.
+    ///
+    /// # Errors
+    /// See [`Simulation::set_time_step`].
+    pub fn set_time_step(&mut self, time_step_s: f64) -> Result<(), WorldError> {
+        self.simulation.set_time_step(time_step_s)
+    }
+
+    /// Starts or resumes the simulation.
+    pub fn start_simulation(&mut self) {
+        self.simulation.start(&self.tree);
+    }
+
+    /// Asks for a pause; it comes within two passes.
+    pub fn pause_simulation(&mut self) {
+        self.simulation.pause();
+    }
+
+    /// Asks for the end; it comes within three passes.
+    pub fn stop_simulation(&mut self) {
+        self.simulation.stop();
+    }
+
+    /// Runs the rest of a pass: joints on their way move on, sensors take in what there is to see, time advances.
+    /// Nothing happens unless the simulation is advancing.
+    pub fn run_pass(&mut self) {
+        if !self.simulation.is_advancing() {
+            return;
+        }
+        let time_step_s = self.simulation.time_step_s();
+        for (_, object) in self.tree.iter_mut() {
+            if let Kind::Joint(joint) = &mut object.kind {
+                joint.advance(time_step_s);
+            }
+        }
+        self.pass += 1;
+        self.apply_faults();
+        let shown = self.look();
+        for (_, object) in self.tree.iter_mut() {
+            if let Kind::VisionSensor(sensor) = &mut object.kind
+                && !sensor.explicit
+            {
+                sensor.shown = Some(shown.clone());
+            }
+        }
+        if self.simulation.end_pass() {
+            self.simulation.restore(&mut self.tree);
+            self.apply_faults();
+            for (_, object) in self.tree.iter_mut() {
+                if let Kind::VisionSensor(sensor) = &mut object.kind {
+                    sensor.shown = None;
+                }
+            }
+        }
+    }
+
+    /// Refreshes a sensor that the simulation leaves alone.
+    ///
+    /// # Errors
+    /// No such sensor; [`WorldError::NotExplicitlyHandled`].
+    pub fn handle_sensor(&mut self, handle: Handle) -> Result<(), WorldError> {
+        if !self.tree.sensor(handle)?.explicit {
+            return Err(WorldError::NotExplicitlyHandled);
+        }
+        let shown = self.look();
+        self.tree.sensor_mut(handle)?.shown = Some(shown);
+        Ok(())
+    }
+
+    /// Brakes every joint that is on its way to a target position.
+    pub fn brake_joints(&mut self) {
+        for (_, object) in self.tree.iter_mut() {
+            if let Kind::Joint(joint) = &mut object.kind {
+                joint.brake();
+            }
+        }
+    }
+
+    /// Where everything that can see or be seen really is. The moment is the same one as long as nothing of that has
+    /// moved, so that what was computed from it stays valid; dummies come and go unseen.
+    fn look(&mut self) -> Shown {
+        let poses: Vec<(Handle, Isometry3<f64>)> = self
+            .tree
+            .iter()
+            .filter(|(_, object)| matches!(object.kind, Kind::Shape | Kind::VisionSensor(_)))
+            .filter_map(|(handle, _)| Some((handle, self.tree.world_pose(handle, Chain::Actual).ok()?)))
+            .collect();
+        let moment = match &self.latest {
+            Some(latest) if latest.poses == poses => Arc::clone(latest),
+            _ => Arc::new(Moment { poses }),
+        };
+        self.latest = Some(Arc::clone(&moment));
+        Shown { pass: self.pass, moment }
+    }
+
+    fn apply_faults(&mut self) {
+        if let Some(faults) = &mut self.faults {
+            faults.apply(&mut self.tree);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
