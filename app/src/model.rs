@@ -3,7 +3,6 @@
 //! Only [`crate::gui::App::apply`] and [`crate::gui::App::absorb`] change a [`Model`]; panes read it. Times are seconds
 //! on the clock that the application was started with.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_core::frames::{Base, Pose, Tip};
@@ -250,8 +249,6 @@ pub struct Message {
 pub struct Model {
     /// Which cell.
     pub source: CellSource,
-    /// Session folder that was asked for.
-    pub session: Option<PathBuf>,
     /// The present time.
     pub now_s: f64,
     /// The connection for joints, tip, simulation and stop.
@@ -280,7 +277,6 @@ impl Model {
         let first = LinkState::first(&source);
         Self {
             source,
-            session: None,
             now_s: 0.0,
             control: first.clone(),
             camera: first,

@@ -1,0 +1,27 @@
+//! A strip over the pictures that says why they are not live.
+
+use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, RichText, Stroke, Ui};
+
+use super::action_ui;
+use crate::command::Outbox;
+use crate::gui::status::Status;
+use crate::gui::theme::{CARD_RADIUS, Palette};
+
+/// The strip, as wide as there is room.
+pub fn banner_ui(ui: &mut Ui, status: &Status, outbox: &mut Outbox) {
+    let palette = Palette::of(ui);
+    Frame::new()
+        .fill(palette.tinted(status.tone))
+        .stroke(Stroke::new(1.0, palette.tone(status.tone).gamma_multiply(0.6)))
+        .corner_radius(CornerRadius::same(CARD_RADIUS))
+        .inner_margin(Margin::symmetric(14, 8))
+        .show(ui, |ui| {
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                action_ui(ui, status.action, outbox);
+                ui.with_layout(Layout::top_down(Align::Min), |ui| {
+                    ui.label(RichText::new(&status.title).strong());
+                    ui.add(Label::new(RichText::new(&status.detail).color(palette.weak)).wrap());
+                });
+            });
+        });
+}

@@ -1,0 +1,103 @@
+//! The bar at the bottom: the robot in numbers, the age of the pictures, the last message.
+
+use egui::{Button, Label, RichText, Sense, Ui, Vec2};
+
+use crate::command::{Command, Outbox};
+use crate::gui::numbers;
+use crate::gui::status::STALE_AFTER_S;
+use crate::gui::theme::{CAPTION, Palette};
+use crate::model::{Model, RobotState, RotationFormat, Severity};
+
+/// Shown where a number is not known.
+const UNKNOWN: &str = "–";
+
+/// The bar.
+pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let palette = Palette::of(ui);
+    // What is on the screen after a loss is history, and looks like it.
+    let live = model.control.is_connected();
+    let robot = model.robot.as_ref();
+    ui.spacing_mut().item_spacing.x = 20.0;
+    ui.horizontal(|ui| {
+        let colour = if live { palette.text } else { palette.weak };
+        let text = |number: fn(&RobotState) -> String| robot.map_or_else(|| UNKNOWN.to_owned(), number);
+        field_ui(ui, "Tip in base  x y z  mm", &text(|robot| numbers::translation_mm(&robot.base_from_tip)), colour);
+        rotation_ui(ui, model, colour, outbox);
+        field_ui(ui, "Joints 1 to 6  deg", &text(joints_deg), colour);
+        field_ui(ui, "Simulation  s", &text(|robot| numbers::fixed(robot.sim_time_s, 2, 7)), colour);
+        let stale = model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S);
+        let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
+        field_ui(ui, "Image age", &age, if stale { palette.warning } else { palette.text });
+        field_ui(ui, "Dropped", &model.dropped_frames.to_string(), palette.text)
+            .on_hover_text("Pictures that arrived but were replaced by newer ones before the window could show them");
+    });
+    ui.add_space(2.0);
+    message_ui(ui, model);
+}
+
+/// A caption over a value, read together by a screen reader.
+fn field_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> egui::Response {
+    let weak = Palette::of(ui).weak;
+    ui.vertical(|ui| {
+        ui.spacing_mut().item_spacing.y = 1.0;
+        ui.label(RichText::new(caption).size(CAPTION).color(weak));
+        let label = ui.add(Label::new(RichText::new(value).monospace().color(colour)).extend().sense(Sense::hover()));
+        label.widget_info(|| {
+            let spoken = value.split_whitespace().collect::<Vec<_>>().join(" ");
+            egui::WidgetInfo::labeled(egui::WidgetType::Label, true, format!("{caption}: {spoken}"))
+        });
+    })
+    .response
+}
+
+fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut Outbox) {
+    let (caption, next) = match model.view.rotation {
+        RotationFormat::RollPitchYaw => ("Tip in base  roll pitch yaw  deg", RotationFormat::Quaternion),
+        RotationFormat::Quaternion => ("Tip in base  quaternion x y z w", RotationFormat::RollPitchYaw),
+    };
+    let value = model.robot.as_ref().map_or_else(
+        || UNKNOWN.to_owned(),
+        |robot| match model.view.rotation {
+            RotationFormat::RollPitchYaw => numbers::rpy_deg(&robot.base_from_tip),
+            RotationFormat::Quaternion => numbers::quaternion(&robot.base_from_tip),
+        },
+    );
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        field_ui(ui, caption, &value, colour);
+        let button = ui
+            .add(Button::new(RichText::new("⇄").size(12.0)).min_size(Vec2::splat(22.0)).small())
+            .on_hover_text("Show the rotation in the other way");
+        button.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::WidgetType::Button, true, "Other way to write the rotation")
+        });
+        if button.clicked() {
+            outbox.send(Command::SetRotationFormat(next));
+        }
+    });
+}
+
+fn message_ui(ui: &mut Ui, model: &Model) {
+    let palette = Palette::of(ui);
+    let (text, colour) = match &model.message {
+        None => ("Ready", palette.weak),
+        Some(message) => {
+            let colour = match message.severity {
+                Severity::Info => palette.weak,
+                Severity::Warning => palette.warning,
+                Severity::Error => palette.tone(crate::gui::theme::Tone::Bad),
+            };
+            (message.text.as_str(), colour)
+        }
+    };
+    ui.add(Label::new(RichText::new(text).color(colour)).truncate());
+}
+
+fn joints_deg(robot: &RobotState) -> String {
+    numbers::row(&robot.joints_rad.map(f64::to_degrees), 1, 6)
+}
+
+/// Tenths while it is young, so that it does not flicker.
+fn age_text(age_s: f64) -> String {
+    if age_s < 60.0 { format!("{:>4} s", numbers::fixed(age_s, 1, 4)) } else { format!("{:>4.0} min", age_s / 60.0) }
+}
