@@ -19,7 +19,7 @@ pub fn row(values: &[f64], decimals: usize, width: usize) -> String {
 /// Translation in millimetres.
 pub fn translation_mm(pose: &Pose<Base, Tip>) -> String {
     let translation = pose.translation() * 1e3;
-    row(translation.as_slice(), 1, 7)
+    row(translation.as_slice(), 1, 6)
 }
 
 /// Roll, pitch and yaw in degrees: R = Rz(yaw) · Ry(pitch) · Rx(roll).
@@ -49,7 +49,7 @@ mod tests {
     fn a_tip_pose_is_written_in_millimetres_and_degrees() {
         let quarter = std::f64::consts::FRAC_PI_4;
         let pose = Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
-        assert_eq!(translation_mm(&pose), "  110.0   −16.0   847.0");
+        assert_eq!(translation_mm(&pose), " 110.0  −16.0  847.0");
         assert_eq!(rpy_deg(&pose), "   0.00    0.00   90.00");
         assert_eq!(quaternion(&pose), " 0.0000  0.0000  0.7071  0.7071");
     }

@@ -124,12 +124,14 @@ fn of_link(model: &Model, state: &LinkState, half: &str) -> Status {
     }
 }
 
-/// First letter large, full stop at the end.
+/// First letter large, unless the first word is a name in code; full stop at the end.
 fn sentence(text: &str) -> String {
+    let is_code = text.split_whitespace().next().is_some_and(|word| word.trim_end_matches(['.', ':']).contains(['.', '/']));
     let mut letters = text.chars();
     let Some(first) = letters.next() else { return String::new() };
     let end = if text.ends_with(['.', '!', '?', '…']) { "" } else { "." };
-    format!("{}{}{end}", first.to_uppercase(), letters.as_str())
+    let first = if is_code { first.to_string() } else { first.to_uppercase().to_string() };
+    format!("{first}{}{end}", letters.as_str())
 }
 
 /// `3 s`, `2 min 5 s`, `1 h 4 min`.
@@ -158,6 +160,7 @@ mod tests {
     fn a_reason_becomes_a_sentence() {
         assert_eq!(sentence("nothing answers"), "Nothing answers.");
         assert_eq!(sentence("Done."), "Done.");
+        assert_eq!(sentence("sim.getObject: no answer"), "sim.getObject: no answer.");
         assert_eq!(sentence(""), "");
     }
 }

@@ -66,6 +66,11 @@ impl FakeCell {
         self.script.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// How many clones there are.
+    pub fn owners(&self) -> usize {
+        Arc::strong_count(&self.script)
+    }
+
     /// The colour picture of a number.
     pub fn rgb(number: u64) -> RgbImage {
         RgbImage::from_fn(SIZE.0, SIZE.1, |column, row| Rgb([column as u8, row as u8, number as u8]))

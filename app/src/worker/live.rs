@@ -151,7 +151,15 @@ fn start_built_in() -> Result<CellServer, PortError> {
 }
 
 fn port_error(error: LinkError) -> PortError {
-    let text = error.to_string();
+    let text = match &error {
+        // Which call found out is of no interest when nobody is there for any call.
+        LinkError::Unreachable { endpoint, .. } => format!(
+            "nothing answers at {endpoint}; start CoppeliaSim or a cell there, check that its ZMQ remote API add-on is \
+             enabled and which port its status bar shows (usually 23000)"
+        ),
+        LinkError::Disconnected { .. } => "the server closed the connection; start it again if it has ended".to_owned(),
+        other => other.to_string(),
+    };
     match error {
         LinkError::BadEndpoint { .. } => PortError::Hopeless(text),
         error if error.is_connection_loss() => PortError::Lost(text),

@@ -1,11 +1,14 @@
 //! A strip over the pictures that says why they are not live.
 
-use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, RichText, Stroke, Ui};
+use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, RichText, Stroke, Ui, Vec2};
 
 use super::action_ui;
 use crate::command::Outbox;
 use crate::gui::status::Status;
 use crate::gui::theme::{CARD_RADIUS, Palette};
+
+/// Kept free for the button.
+const BUTTON_WIDTH: f32 = 160.0;
 
 /// The strip, as wide as there is room.
 pub fn banner_ui(ui: &mut Ui, status: &Status, outbox: &mut Outbox) {
@@ -16,12 +19,13 @@ pub fn banner_ui(ui: &mut Ui, status: &Status, outbox: &mut Outbox) {
         .corner_radius(CornerRadius::same(CARD_RADIUS))
         .inner_margin(Margin::symmetric(14, 8))
         .show(ui, |ui| {
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                action_ui(ui, status.action, outbox);
-                ui.with_layout(Layout::top_down(Align::Min), |ui| {
+            ui.horizontal(|ui| {
+                let text = Vec2::new((ui.available_width() - BUTTON_WIDTH).max(0.0), 0.0);
+                ui.allocate_ui_with_layout(text, Layout::top_down(Align::Min), |ui| {
                     ui.label(RichText::new(&status.title).strong());
                     ui.add(Label::new(RichText::new(&status.detail).color(palette.weak)).wrap());
                 });
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| action_ui(ui, status.action, outbox));
             });
         });
 }

@@ -105,7 +105,8 @@ impl Picture<'_> {
         let texture = self.texture?;
         let room = ui.max_rect();
         let [width, height] = texture.size().map(|side| side.max(1) as f32);
-        let scale = (room.width() / width).min(room.height() / height);
+        // A window can be dragged smaller than all its bars together.
+        let scale = (room.width() / width).min(room.height() / height).max(0.0);
         let rect = Rect::from_center_size(room.center(), Vec2::new(width, height) * scale);
         let mut image = Image::from_texture(texture).fit_to_exact_size(rect.size()).sense(Sense::hover());
         if self.is_stale() {

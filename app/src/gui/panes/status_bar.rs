@@ -21,25 +21,28 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.horizontal(|ui| {
         let colour = if live { palette.text } else { palette.weak };
         let text = |number: fn(&RobotState) -> String| robot.map_or_else(|| UNKNOWN.to_owned(), number);
-        field_ui(ui, "Tip in base  x y z  mm", &text(|robot| numbers::translation_mm(&robot.base_from_tip)), colour);
+        field_ui(ui, "Tip in base, x y z [mm]", &text(|robot| numbers::translation_mm(&robot.base_from_tip)), 20, colour);
         rotation_ui(ui, model, colour, outbox);
-        field_ui(ui, "Joints 1 to 6  deg", &text(joints_deg), colour);
-        field_ui(ui, "Simulation  s", &text(|robot| numbers::fixed(robot.sim_time_s, 2, 7)), colour);
+        field_ui(ui, "Joints 1 to 6 [deg]", &text(joints_deg), 41, colour);
+        field_ui(ui, "Simulation", &text(|robot| format!("{:.2} s", robot.sim_time_s)), 9, colour);
         let stale = model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S);
         let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
-        field_ui(ui, "Image age", &age, if stale { palette.warning } else { palette.text });
-        field_ui(ui, "Dropped", &model.dropped_frames.to_string(), palette.text)
+        field_ui(ui, "Image age", &age, 6, if stale { palette.warning } else { palette.text });
+        field_ui(ui, "Dropped", &model.dropped_frames.to_string(), 6, palette.text)
             .on_hover_text("Pictures that arrived but were replaced by newer ones before the window could show them");
     });
     ui.add_space(2.0);
     message_ui(ui, model);
 }
 
-/// A caption over a value, read together by a screen reader.
-fn field_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> egui::Response {
+/// A caption over a value with room for `digits`, read together by a screen reader.
+fn field_ui(ui: &mut Ui, caption: &str, value: &str, digits: usize, colour: egui::Color32) -> egui::Response {
     let weak = Palette::of(ui).weak;
+    let digit = ui.fonts_mut(|fonts| fonts.glyph_width(&egui::TextStyle::Monospace.resolve(ui.style()), '0'));
     ui.vertical(|ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
+        // Nothing moves sideways when a number grows or is not known.
+        ui.set_min_width(digits as f32 * digit);
         ui.label(RichText::new(caption).size(CAPTION).color(weak));
         let label = ui.add(Label::new(RichText::new(value).monospace().color(colour)).extend().sense(Sense::hover()));
         label.widget_info(|| {
@@ -51,9 +54,11 @@ fn field_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> e
 }
 
 fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut Outbox) {
-    let (caption, next) = match model.view.rotation {
-        RotationFormat::RollPitchYaw => ("Tip in base  roll pitch yaw  deg", RotationFormat::Quaternion),
-        RotationFormat::Quaternion => ("Tip in base  quaternion x y z w", RotationFormat::RollPitchYaw),
+    let (caption, digits, next, name) = match model.view.rotation {
+        RotationFormat::RollPitchYaw => {
+            ("Tip in base, roll pitch yaw [deg]", 23, RotationFormat::Quaternion, "quat")
+        }
+        RotationFormat::Quaternion => ("Tip in base, quaternion x y z w", 31, RotationFormat::RollPitchYaw, "rpy"),
     };
     let value = model.robot.as_ref().map_or_else(
         || UNKNOWN.to_owned(),
@@ -64,13 +69,13 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
     );
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
-        field_ui(ui, caption, &value, colour);
+        field_ui(ui, caption, &value, digits, colour);
         let button = ui
-            .add(Button::new(RichText::new("⇄").size(12.0)).min_size(Vec2::splat(22.0)).small())
-            .on_hover_text("Show the rotation in the other way");
-        button.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::WidgetType::Button, true, "Other way to write the rotation")
-        });
+            .add(Button::new(RichText::new(name).size(CAPTION)).min_size(Vec2::new(34.0, 22.0)).small())
+            .on_hover_text(match next {
+                RotationFormat::Quaternion => "Write the rotation as a quaternion",
+                RotationFormat::RollPitchYaw => "Write the rotation as roll, pitch and yaw",
+            });
         if button.clicked() {
             outbox.send(Command::SetRotationFormat(next));
         }
@@ -80,7 +85,7 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
     let (text, colour) = match &model.message {
-        None => ("Ready", palette.weak),
+        None => ("", palette.weak),
         Some(message) => {
             let colour = match message.severity {
                 Severity::Info => palette.weak,
@@ -99,5 +104,5 @@ fn joints_deg(robot: &RobotState) -> String {
 
 /// Tenths while it is young, so that it does not flicker.
 fn age_text(age_s: f64) -> String {
-    if age_s < 60.0 { format!("{:>4} s", numbers::fixed(age_s, 1, 4)) } else { format!("{:>4.0} min", age_s / 60.0) }
+    if age_s < 60.0 { format!("{age_s:.1} s") } else { format!("{:.0} min", age_s / 60.0) }
 }
