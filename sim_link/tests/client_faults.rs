@@ -291,6 +291,53 @@ fn cancelling_ends_a_long_silent_call_and_tells_the_server() {
 }
 
 #[test]
+fn a_client_that_gives_up_again_and_again_is_heard_every_time() {
+    const ROUNDS: usize = 20;
+    let (pending, is_pending) = channel::<CancelToken>();
+    let tokens: Vec<CancelToken> = (0..ROUNDS).map(|_| CancelToken::new()).collect();
+    let for_server = tokens.clone();
+    let (endpoint, server) = serve(move |peer| {
+        let uuid = |request: &Value| request.get("uuid").and_then(|id| id.text()).expect("an id").to_owned();
+        let (mut calls, mut farewells) = (Vec::new(), Vec::new());
+        // A farewell goes its own way and may come after the next call.
+        while farewells.len() < ROUNDS {
+            let (to, request) = peer.next();
+            if func(&request) == "_*end*_" {
+                farewells.push(uuid(&request));
+                continue;
+            }
+            let token = for_server[calls.len()].clone();
+            calls.push(uuid(&request));
+            if calls.len() % 2 == 0 {
+                // Give up in the middle of a conversation, while the answer is the client's to give.
+                token.cancel();
+                peer.say(&to, &ask("_*wait*_"));
+            } else {
+                pending.send(token).expect("the test listens");
+            }
+        }
+        calls.sort();
+        farewells.sort();
+        assert_eq!(calls, farewells);
+        calls.dedup();
+        assert_eq!(calls.len(), ROUNDS, "every call is on a record of its own");
+    });
+    let client = std::thread::spawn(move || {
+        let mut connection = connect(&endpoint, options());
+        for token in &tokens {
+            let limits = CallOptions::long(PATIENCE, token);
+            let error = connection.call_with("sim.moveToConfig", vec![], &limits).expect_err("cancelled");
+            assert!(matches!(error, LinkError::Cancelled { .. }), "{error}");
+        }
+    });
+    for token in is_pending {
+        token.cancel();
+    }
+    client.join().expect("no panic");
+    join(server);
+}
+
+#[test]
 fn a_thousand_requests_to_wait_are_waited_for() {
     let (endpoint, server) = serve(|peer| {
         let (mut to, request) = peer.next();

@@ -23,11 +23,11 @@ pub const SIMULATION_PAUSED: i64 = 8;
 /// Bit of the simulation states in which time advances.
 pub const SIMULATION_ADVANCING: i64 = 16;
 
-/// Float parameter of a vision sensor: near clipping plane [m].
+/// Float parameter of a vision sensor: near clipping plane (m).
 pub const VISION_NEAR_CLIPPING: i64 = 1000;
-/// Float parameter of a vision sensor: far clipping plane [m].
+/// Float parameter of a vision sensor: far clipping plane (m).
 pub const VISION_FAR_CLIPPING: i64 = 1001;
-/// Float parameter of a vision sensor: opening angle along the larger image side [rad].
+/// Float parameter of a vision sensor: opening angle along the larger image side (rad).
 pub const VISION_PERSPECTIVE_ANGLE: i64 = 1004;
 /// Integer parameter of a vision sensor: 0 means orthographic.
 pub const VISION_PERSPECTIVE: i64 = 1018;

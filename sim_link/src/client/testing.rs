@@ -107,7 +107,7 @@ impl Transport for Fake {
         self.log.push(Event::SentLast(wire::decode(message).expect("requests are valid")));
     }
 
-    fn connected(&self) -> bool {
+    fn connected(&mut self) -> bool {
         true
     }
 }

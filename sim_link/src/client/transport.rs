@@ -6,12 +6,15 @@ use super::endpoint::Endpoint;
 use super::error::LinkError;
 use crate::wire::MAX_MESSAGE_BYTES;
 
-/// How long a last message may keep a closing socket alive. A server on this machine takes it in under a millisecond;
-/// one that has gone must not hold up the end of the program.
-const FAREWELL: Duration = Duration::from_millis(100);
+/// How long a last message may keep a closing socket alive. A server on this machine takes it in under a millisecond,
+/// on a busy one in a tenth of a second; one that has gone must not hold up the end of the program.
+const FAREWELL: Duration = Duration::from_millis(500);
 
 /// Pause before a refused connection is tried again: short, because a person waits for the server to come up.
 const RECONNECT_MS: i32 = 50;
+
+/// Name of the monitors of the sockets, within a context.
+const MONITOR: &str = "inproc://monitor";
 
 /// Why a transport has no message.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,7 +48,7 @@ pub trait Transport: Send {
     fn send_last(&mut self, message: &[u8]);
 
     /// Whether a server is on the other side, as far as is known since the last reset.
-    fn connected(&self) -> bool;
+    fn connected(&mut self) -> bool;
 }
 
 /// A REQ socket over TCP that notices when its server dies.
@@ -65,6 +68,7 @@ pub struct ZmqTransport {
 struct Channel {
     request: zmq::Socket,
     monitor: zmq::Socket,
+    serial: u64,
     awaiting_reply: bool,
     shaken_hands: bool,
     lost: bool,
@@ -125,14 +129,16 @@ impl Channel {
             request.set_heartbeat_ivl(third)?;
             request.set_heartbeat_timeout(third.saturating_mul(2))?;
         }
-        let name = format!("inproc://monitor-{serial}");
+        let name = format!("{MONITOR}-{serial}");
         let events = zmq::SocketEvent::HANDSHAKE_SUCCEEDED as i32 | zmq::SocketEvent::DISCONNECTED as i32;
         request.monitor(&name, events)?;
         let monitor = context.socket(zmq::PAIR)?;
         monitor.set_linger(0)?;
+        // The library's I/O thread blocks on a monitor that is full, and with it every socket of this context.
+        monitor.set_rcvhwm(0)?;
         monitor.connect(&name)?;
         request.connect(&endpoint.to_string())?;
-        Ok(Self { request, monitor, awaiting_reply: false, shaken_hands: false, lost: false })
+        Ok(Self { request, monitor, serial, awaiting_reply: false, shaken_hands: false, lost: false })
     }
 
     /// Takes the pending events of the monitor.
@@ -160,6 +166,17 @@ impl Channel {
             }
             Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => Ok(None),
             Err(error) => Err(TransportFault::Refused(error.to_string())),
+        }
+    }
+}
+
+impl Drop for Channel {
+    /// A request socket that lingers, or is not reaped yet, still reports events, and the library's I/O thread would
+    /// wait for ever for a monitor that nobody reads any more. So the reports are switched off first: they go to a
+    /// second monitor, which is told nothing.
+    fn drop(&mut self) {
+        if let Err(error) = self.request.monitor(&format!("{MONITOR}-{}-off", self.serial), 0) {
+            tracing::debug!(%error, "the monitor of a socket could not be switched off");
         }
     }
 }
@@ -207,7 +224,10 @@ impl Transport for ZmqTransport {
         self.channel = None;
     }
 
-    fn connected(&self) -> bool {
-        self.channel.as_ref().is_some_and(|channel| channel.shaken_hands && !channel.lost)
+    fn connected(&mut self) -> bool {
+        self.channel.as_mut().is_some_and(|channel| {
+            channel.listen_to_monitor();
+            channel.shaken_hands && !channel.lost
+        })
     }
 }

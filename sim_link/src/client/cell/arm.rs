@@ -20,9 +20,9 @@ const RESTING_PASSES: u32 = 3;
 /// How far from its goal a tip may stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionTolerance {
-    /// Distance [m].
+    /// Distance (m).
     pub distance_m: f64,
-    /// Angle [rad].
+    /// Angle (rad).
     pub angle_rad: f64,
 }
 
@@ -36,9 +36,9 @@ impl Default for MotionTolerance {
 /// When an arm counts as standing still.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SettleOptions {
-    /// Fastest joint [rad/s] that counts as at rest.
+    /// Fastest joint (rad/s) that counts as at rest.
     pub rate_rad_s: f64,
-    /// Longest wait, in simulated time [s].
+    /// Longest wait, in simulated time (s).
     pub limit_s: f64,
 }
 
@@ -107,7 +107,7 @@ impl Arm {
         &mut self.sim
     }
 
-    /// Positions of the joints from the base up [rad].
+    /// Positions of the joints from the base up (rad).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -123,7 +123,7 @@ impl Arm {
         self.sim.get_object_pose(self.objects.tip, ObjectHandle::WORLD)
     }
 
-    /// Moves the joints to `goal` [rad] within `limits` and returns when the motion is over; an arm with dynamic joints
+    /// Moves the joints to `goal` (rad) within `limits` and returns when the motion is over; an arm with dynamic joints
     /// still follows for a moment, see [`Arm::settle`].
     ///
     /// # Errors
@@ -190,7 +190,7 @@ impl Arm {
     }
 
     /// Waits until the arm stands still, and one complete pass longer, so that images show it so. Returns the simulated
-    /// time that it took [s].
+    /// time that it took (s).
     ///
     /// # Errors
     /// [`LinkError::NotSettled`] after `options.limit_s` of simulated time; [`LinkError::NotRunning`];

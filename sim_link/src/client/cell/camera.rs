@@ -22,11 +22,11 @@ pub struct Frame {
     pub rgb: RgbImage,
     /// Depth image, row 0 on top.
     pub depth: DepthFrame,
-    /// Simulated time [s].
+    /// Simulated time (s).
     pub sim_time_s: f64,
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints [rad].
+    /// Positions of the joints (rad).
     pub joints: JointAngles,
 }
 

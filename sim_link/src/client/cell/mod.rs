@@ -37,7 +37,7 @@ use super::sim::{JointInterval, MotionLimits, ObjectHandle, SensorOptics, Sim, S
 /// Number of joints of the arm.
 pub const JOINTS: usize = 6;
 
-/// Positions of the joints from the base up [rad].
+/// Positions of the joints from the base up (rad).
 pub type JointAngles = [f64; JOINTS];
 
 /// Where the parts of the cell are in the scene.
@@ -83,7 +83,7 @@ pub struct CellInfo {
     pub optics: SensorOptics,
     /// The depth sensor, whose clipping planes bound the depths.
     pub depth_optics: SensorOptics,
-    /// Simulated time per pass [s].
+    /// Simulated time per pass (s).
     pub time_step_s: f64,
 }
 

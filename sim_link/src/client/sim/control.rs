@@ -72,7 +72,7 @@ impl Sim {
         })
     }
 
-    /// Simulated time [s].
+    /// Simulated time (s).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -80,7 +80,7 @@ impl Sim {
         self.call("sim.getSimulationTime", Vec::new())?.number(0)
     }
 
-    /// Simulated time that one pass takes [s].
+    /// Simulated time that one pass takes (s).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.

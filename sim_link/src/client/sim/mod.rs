@@ -42,9 +42,9 @@ impl ObjectHandle {
 pub struct JointInterval {
     /// It turns without end.
     pub cyclic: bool,
-    /// Lower end [rad].
+    /// Lower end (rad).
     pub min_rad: f64,
-    /// Upper end [rad].
+    /// Upper end (rad).
     pub max_rad: f64,
 }
 

@@ -14,7 +14,7 @@ use crate::wire;
 /// The version that has motions with a map of parameters.
 const NEEDS: &str = "CoppeliaSim 4.7 or newer";
 
-/// Limits of a motion, one number per joint [rad], or for a pose motion x, y, z [m] and angle [rad].
+/// Limits of a motion, one number per joint (rad), or for a pose motion x, y, z (m) and angle (rad).
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionLimits {
     /// Largest speed, per second.
@@ -63,7 +63,7 @@ impl MotionLimits {
 pub struct JointMotion {
     /// The joints.
     pub joints: Vec<ObjectHandle>,
-    /// Where each goes [rad].
+    /// Where each goes (rad).
     pub target_rad: Vec<f64>,
     /// Limits per joint.
     pub limits: MotionLimits,

@@ -62,7 +62,7 @@ impl Sim {
         self.call("sim.getObjectType", vec![object.to_value()])?.integer(0)
     }
 
-    /// A new dummy of a size [m] at the origin of the world.
+    /// A new dummy of a size (m) at the origin of the world.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -131,7 +131,7 @@ impl Sim {
         self.call("sim.setObjectMatrix", vec![object.to_value(), frame.to_value(), value]).map(drop)
     }
 
-    /// The origin of `object` in `frame` [m].
+    /// The origin of `object` in `frame` (m).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -140,7 +140,7 @@ impl Sim {
         Ok(Point3::from(self.call("sim.getObjectPosition", args)?.exactly::<3>(0)?))
     }
 
-    /// Moves the origin of `object` to a point of `frame` [m], without turning it.
+    /// Moves the origin of `object` to a point of `frame` (m), without turning it.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -154,7 +154,7 @@ impl Sim {
         self.call("sim.setObjectPosition", vec![object.to_value(), frame.to_value(), value]).map(drop)
     }
 
-    /// The position of a joint [rad].
+    /// The position of a joint (rad).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -162,7 +162,7 @@ impl Sim {
         self.call("sim.getJointPosition", vec![joint.to_value()])?.number(0)
     }
 
-    /// Puts a joint at a position [rad] at once. The simulator clamps to its interval.
+    /// Puts a joint at a position (rad) at once. The simulator clamps to its interval.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -170,7 +170,7 @@ impl Sim {
         self.call("sim.setJointPosition", vec![joint.to_value(), Value::Float(position_rad)]).map(drop)
     }
 
-    /// Where the controller of a joint holds it or takes it [rad].
+    /// Where the controller of a joint holds it or takes it (rad).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -178,7 +178,7 @@ impl Sim {
         self.call("sim.getJointTargetPosition", vec![joint.to_value()])?.number(0)
     }
 
-    /// Tells the controller of a joint where to take it [rad].
+    /// Tells the controller of a joint where to take it (rad).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.

@@ -18,11 +18,11 @@ pub struct SensorOptics {
     pub width: u32,
     /// Image height in pixels.
     pub height: u32,
-    /// Opening angle along the larger image side [rad].
+    /// Opening angle along the larger image side (rad).
     pub view_angle_rad: f64,
-    /// Near clipping plane [m].
+    /// Near clipping plane (m).
     pub near_m: f64,
-    /// Far clipping plane [m].
+    /// Far clipping plane (m).
     pub far_m: f64,
 }
 
