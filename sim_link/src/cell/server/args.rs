@@ -184,7 +184,7 @@ impl Args {
     /// # Errors
     /// Missing, not a list, or of another length.
     pub fn array<const N: usize>(&self, at: usize) -> Result<[f64; N], ApiError> {
-        self.numbers(at)?.try_into().map_err(|_: Vec<f64>| ApiError::WrongSize)
+        self.numbers(at)?.try_into().ok().ok_or(ApiError::WrongSize)
     }
 
     /// A list of handles.

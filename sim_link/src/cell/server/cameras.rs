@@ -51,10 +51,7 @@ impl Source {
             (None, None) => true,
             _ => false,
         };
-        same_moment
-            && self.pass == other.pass
-            && self.range_m == other.range_m
-            && self.intrinsics == other.intrinsics
+        same_moment && self.pass == other.pass && self.range_m == other.range_m && self.intrinsics == other.intrinsics
     }
 }
 

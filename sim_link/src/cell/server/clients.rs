@@ -106,7 +106,7 @@ impl Connection {
 /// All clients and connections.
 #[derive(Debug, Default)]
 pub struct Clients {
-    records: BTreeMap<String, Client>,
+    pub(super) records: BTreeMap<String, Client>,
     connections: BTreeMap<Peer, Connection>,
 }
 
@@ -133,11 +133,6 @@ impl Clients {
     /// All records.
     pub fn records_mut(&mut self) -> impl Iterator<Item = &mut Client> {
         self.records.values_mut()
-    }
-
-    /// Number of clients that are remembered.
-    pub fn len(&self) -> usize {
-        self.records.len()
     }
 
     /// The connection, made if it is new, now used by `uuid`.
@@ -167,13 +162,15 @@ impl Clients {
     /// Whether a pass has to wait for somebody.
     pub fn hold_pass(&self, step: u64) -> bool {
         let waits_for_pass = |uuid: &str| {
-            self.connections.values().flat_map(|connection| &connection.calls).any(|call| {
-                call.uuid == uuid && matches!(call.waiting, Waiting::Pass(_))
-            })
+            self.connections
+                .values()
+                .flat_map(|connection| &connection.calls)
+                .any(|call| call.uuid == uuid && matches!(call.waiting, Waiting::Pass(_)))
         };
         self.connections.values().any(Connection::runs_callback)
             || self.records.iter().any(|(uuid, client)| {
-                (client.stepping_level > 0 && client.desired_step <= step) || (client.locks > 0 && !waits_for_pass(uuid))
+                (client.stepping_level > 0 && client.desired_step <= step)
+                    || (client.locks > 0 && !waits_for_pass(uuid))
             })
     }
 

@@ -8,6 +8,7 @@ use super::cell::Cell;
 use super::clients::{Client, Clients, MAX_CALLS, MAX_CLIENTS, Peer, Running, Waiting};
 use super::message::{self, Request};
 use super::task::{Answer, Next, Task, Wake};
+use crate::cell::world::State;
 
 /// Steps that calls may take in one turn before requests are looked at again. A motion in a stopped simulation has no
 /// pass to wait for and would otherwise keep everybody waiting until it is over.
@@ -59,11 +60,6 @@ impl Engine {
         }
     }
 
-    /// The cell that is served.
-    pub fn cell(&self) -> &Cell {
-        &self.cell
-    }
-
     /// The replies since the last time.
     pub fn take_outgoing(&mut self) -> Vec<Outgoing> {
         std::mem::take(&mut self.outgoing)
@@ -87,9 +83,10 @@ impl Engine {
             Ok(Request::Executed { uuid, values }) => self.executed(peer, &uuid, values),
             Ok(Request::Call { uuid, func, args, idle_limit }) => {
                 if self.clients.meet(&uuid, idle_limit, now).is_some() {
-                    self.call(peer, uuid, func, Args::new(args));
+                    self.call(peer, uuid, func, &Args::new(args));
                 } else {
-                    let text = format!("the built-in cell serves {MAX_CLIENTS} clients at a time: close one and try again.");
+                    let text =
+                        format!("the built-in cell serves {MAX_CLIENTS} clients at a time: close one and try again.");
                     self.send(peer, message::failed(&text));
                 }
             }
@@ -224,7 +221,7 @@ impl Engine {
         }
     }
 
-    fn call(&mut self, peer: &Peer, uuid: String, func: String, args: Args) {
+    fn call(&mut self, peer: &Peer, uuid: String, func: String, args: &Args) {
         if self.clients.connection(peer, &uuid).calls.len() >= MAX_CALLS {
             let text = format!("a connection may have {MAX_CALLS} calls under way: wait for one to return.");
             return self.send(peer, message::failed(&text));
@@ -234,7 +231,7 @@ impl Engine {
             return self.send(peer, message::failed(&error));
         };
         let Some(client) = self.clients.record_mut(&uuid) else { return };
-        let mut call = Call { cell: &mut self.cell, client, args: &args, step: self.step, effects: Vec::new() };
+        let mut call = Call { cell: &mut self.cell, client, args, step: self.step, effects: Vec::new() };
         let answer = function(&mut call);
         let effects = std::mem::take(&mut call.effects);
         for effect in effects {
@@ -270,7 +267,10 @@ impl Engine {
                         call.task.brake(&self.cell);
                     }
                 }
-                self.clients.records_mut().flat_map(|client| client.plans.iter_mut()).for_each(super::plans::Motion::brake);
+                self.clients
+                    .records_mut()
+                    .flat_map(|client| client.plans.iter_mut())
+                    .for_each(super::plans::Motion::brake);
                 self.cell.world.brake_joints();
             }
         }
@@ -284,7 +284,9 @@ impl Engine {
 
     /// Brings what a vanished client was moving to rest.
     fn adopt(&mut self, mut call: Running) {
-        if call.task.is_moving() && matches!(call.waiting, Waiting::Pass(_)) {
+        let is_on_its_way =
+            matches!(call.waiting, Waiting::Pass(_)) && self.cell.world.simulation().state() != State::Stopped;
+        if call.task.is_moving() && is_on_its_way {
             tracing::warn!(uuid = call.uuid, func = call.func, "a client vanished during a motion: braking");
             call.task.brake(&self.cell);
             self.orphans.push(call.task);
@@ -319,5 +321,5 @@ impl Client {
 }
 
 #[cfg(test)]
-#[path = "engine_tests.rs"]
+#[path = "engine_tests/mod.rs"]
 mod tests;

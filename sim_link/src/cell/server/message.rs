@@ -16,8 +16,8 @@ const MAX_ARGS: usize = 64;
 const MAX_UUID_BYTES: usize = 128;
 
 /// Idle time after which a client is forgotten unless it says otherwise, and the longest that it may ask for.
-const DEFAULT_IDLE_LIMIT: Duration = Duration::from_secs(600);
-const MAX_IDLE_LIMIT: Duration = Duration::from_secs(24 * 3600);
+const DEFAULT_IDLE_LIMIT: Duration = Duration::from_mins(10);
+const MAX_IDLE_LIMIT: Duration = Duration::from_hours(24);
 
 /// What a client wants.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,7 +116,7 @@ fn arguments(message: &Value) -> Result<Vec<Value>, BadRequest> {
         Some(args) => args.list().ok_or(shape("`args` is not an array"))?.to_vec(),
     };
     if let Some(count) = message.get("argsL").and_then(Reader::integer) {
-        let count = usize::try_from(count).map_err(|_| shape("`argsL` is negative"))?;
+        let count = usize::try_from(count).ok().ok_or(shape("`argsL` is negative"))?;
         if count > MAX_ARGS {
             return Err(shape("`argsL` is over 64"));
         }
@@ -185,18 +185,18 @@ pub fn returned_image(bytes: &[u8], resolution: [u32; 2]) -> Vec<u8> {
 fn head(message: &mut Vec<u8>, major: u8, value: u64) {
     let major = major << 5;
     match value {
-        0..24 => message.push(major | value as u8),
-        24..0x100 => message.extend_from_slice(&[major | 24, value as u8]),
+        0..24 => message.push(major + value as u8),
+        24..0x100 => message.extend_from_slice(&[major + 24, value as u8]),
         0x100..0x1_0000 => {
-            message.push(major | 25);
+            message.push(major + 25);
             message.extend_from_slice(&(value as u16).to_be_bytes());
         }
         0x1_0000..0x1_0000_0000 => {
-            message.push(major | 26);
+            message.push(major + 26);
             message.extend_from_slice(&(value as u32).to_be_bytes());
         }
         _ => {
-            message.push(major | 27);
+            message.push(major + 27);
             message.extend_from_slice(&value.to_be_bytes());
         }
     }
@@ -221,11 +221,10 @@ mod tests {
     }
 
     /// The id's 43 bytes as the Python client writes them.
-    const ID: &str =
-        "6475756964 7824 63303662333833322d353030382d346362622d623337322d343666663932636163666535";
+    const ID: &str = "6475756964 7824 63303662333833322d353030382d346362622d623337322d343666663932636163666535";
 
     fn call(func: &str, args: Vec<Value>) -> Request {
-        let idle_limit = Duration::from_secs(600);
+        let idle_limit = Duration::from_mins(10);
         Request::Call { uuid: UUID.to_owned(), func: func.to_owned(), args, idle_limit }
     }
 
@@ -254,7 +253,10 @@ mod tests {
     fn replies_are_the_recorded_bytes() {
         assert_eq!(returned(vec![]), hex("a1 63726574 a0"));
         assert_eq!(returned(vec![Value::from(28)]), hex("a1 63726574 81 181c"));
-        assert_eq!(failed("No such function: sim.nope"), hex("a1 63657272 781a 4e6f20737563682066756e6374696f6e3a2073696d2e6e6f7065"));
+        assert_eq!(
+            failed("No such function: sim.nope"),
+            hex("a1 63657272 781a 4e6f20737563682066756e6374696f6e3a2073696d2e6e6f7065")
+        );
         assert_eq!(returned_image(&hex("000102fffefd"), [2, 1]), hex("a1 63726574 82 46 000102fffefd 82 02 01"));
         let image = returned_image(&vec![7; 921_600], [640, 480]);
         assert!(image.starts_with(&hex("a1 63726574 82 5a000e1000")) && image.ends_with(&hex("82 190280 1901e0")));

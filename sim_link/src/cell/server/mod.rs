@@ -26,7 +26,8 @@ mod task;
 use std::thread::JoinHandle;
 
 use crate::cell::scene::Scene;
-use cell::{BuildError, Cell};
+pub use cell::BuildError;
+use cell::Cell;
 use engine::Engine;
 use socket::{Loop, Stopper};
 
@@ -60,7 +61,9 @@ pub enum CellError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// Another program listens there, most likely CoppeliaSim or another cell.
-    #[error("port {port} on {bind} is in use: end the program that listens there, or choose another port (0 finds a free one)")]
+    #[error(
+        "port {port} on {bind} is in use: end the program that listens there, or choose another port (0 finds a free one)"
+    )]
     PortInUse {
         /// Address asked for.
         bind: String,

@@ -125,9 +125,7 @@ impl Task for MotionTask {
             Wake::Started | Wake::PassOver | Wake::TimeReached => {
                 self.motion.advance(cell)?;
                 match &self.motion.callback {
-                    Some(name) => {
-                        Ok(Next::Callback { name: name.clone(), args: self.motion.plan.callback_args() })
-                    }
+                    Some(name) => Ok(Next::Callback { name: name.clone(), args: self.motion.plan.callback_args() }),
                     None => Ok(Next::Pass),
                 }
             }
@@ -157,7 +155,8 @@ impl Plans {
     /// The client has too many.
     pub fn keep(&mut self, motion: Motion) -> Result<i64, ApiError> {
         if self.plans.len() >= MAX_PLANS {
-            let text = format!("a client may prepare {MAX_PLANS} motions: call the _cleanup function of those that are done.");
+            let text =
+                format!("a client may prepare {MAX_PLANS} motions: call the _cleanup function of those that are done.");
             return Err(ApiError::Other(text));
         }
         self.next += 1;
@@ -260,11 +259,12 @@ pub fn entry(name: &str, value: Value) -> (Value, Value) {
 }
 
 /// Sets fields of a state map, leaving the others as the client gave them.
-pub fn with_fields(given: &[(Value, Value)], fields: Vec<(Value, Value)>) -> Vec<(Value, Value)> {
+pub fn with_fields(given: &[(Value, Value)], mut fields: Vec<(Value, Value)>) -> Vec<(Value, Value)> {
     /// Names of functions and of what only the server needs.
     const HIDDEN: [&str; 3] = ["callback", "ruckigObj", "ik"];
     let is_set = |key: &Value| fields.iter().any(|(set, _)| set == key);
     let is_hidden = |key: &Value| HIDDEN.iter().any(|name| key.as_text() == Some(name));
-    let kept = given.iter().filter(|(key, _)| !is_set(key) && !is_hidden(key)).cloned();
-    kept.chain(fields.iter().cloned()).collect()
+    let kept: Vec<_> = given.iter().filter(|(key, _)| !is_set(key) && !is_hidden(key)).cloned().collect();
+    fields.extend(kept);
+    fields
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 use ciborium::Value;
 
 use super::*;
-use crate::wire::{self, Reader as _};
+use crate::wire::{self, Reader};
 
 /// How long a reply may take on a machine that is busy with other tests.
 const PATIENCE_MS: i32 = 20_000;
@@ -45,7 +45,7 @@ impl Client {
 
     fn time_s(&self) -> f64 {
         let reply = self.call("sim.getSimulationTime", vec![]);
-        reply.get("ret").and_then(|ret| ret.numbers()).expect("a time")[0]
+        reply.get("ret").and_then(Reader::numbers).expect("a time")[0]
     }
 
     /// Asks until simulated time has passed a mark.
@@ -181,4 +181,10 @@ fn dropping_the_server_closes_its_socket_at_once() {
     let before = std::time::Instant::now();
     drop(server);
     assert!(before.elapsed() < Duration::from_secs(2));
+}
+
+#[test]
+fn a_server_can_be_shared_between_threads() {
+    fn shared<T: Send + Sync>() {}
+    shared::<CellServer>();
 }

@@ -1,9 +1,11 @@
 //! The objects of the built-in cell: arm, tip, camera, board and what stands around, as a scene describes them.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use std::cell::RefCell;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::cell::kinematics::{JOINTS, JointAngles, forward};
-use crate::cell::render::{Finish, Shape, Solid};
+use crate::cell::render::{Shape, Solid, props};
 use crate::cell::scene::{RelativeTo, ResolvedScene, RobotErrors, Scene};
 use crate::cell::world::{Faults, Handle, Joint, Kind, Tree, VisionSensor, World, WorldError, turn_z};
 
@@ -28,16 +30,6 @@ pub struct Stage {
     pub solids: Vec<(Handle, Solid)>,
 }
 
-/// Silver of the tubes, blue of the caps, black of the tool.
-const TUBE: [f32; 3] = [0.72, 0.74, 0.77];
-const CAP: [f32; 3] = [0.34, 0.53, 0.70];
-const TOOL: [f32; 3] = [0.16, 0.16, 0.17];
-
-/// How far the upper arm runs beside the shoulder and the forearm beside the elbow, along the joint axes: the housings
-/// of a UR5 sit side by side.
-const UPPER_ARM_BESIDE_M: f64 = 0.1359;
-const FOREARM_BESIDE_M: f64 = 0.0165;
-
 /// Builds the world of a scene.
 ///
 /// # Errors
@@ -58,7 +50,8 @@ pub fn build(scene: &Scene, resolved: &ResolvedScene) -> Result<(World, Stage), 
     let camera = tree.add("3D_camera", sensor(colour), Some(tip), *resolved.tip_from_sensor.isometry())?;
     tree.add("depth", sensor(depth), Some(camera), Isometry3::identity())?;
     let plane = tree.add("Plane", Kind::Shape, None, resolved.world_from_plane)?;
-    builder.gripper(connection, resolved)?;
+    let gripper = builder.tree.add("Gripper", Kind::Shape, Some(tip), Isometry3::identity())?;
+    builder.solids.extend(props::gripper(&Isometry3::identity()).into_iter().map(|solid| (gripper, solid)));
     builder.surroundings(scene, resolved, plane)?;
     let mut world = World::default();
     world.tree = builder.tree;
@@ -81,60 +74,20 @@ impl Builder {
         let at_zero = forward(&[0.0; JOINTS]);
         let mut joints = [0; JOINTS];
         let (mut parent, mut arm_from_parent) = (arm, Isometry3::identity());
+        let mut frames = vec![(parent, arm_from_parent)];
         for (index, slot) in joints.iter_mut().enumerate() {
             let mut joint = Joint::new(resolved.joint_limits.min_rad[index], resolved.joint_limits.max_rad[index]);
             joint.set_position(resolved.start_joints[index])?;
             let parent_from_joint = arm_from_parent.inv_mul(&at_zero.arm_from_joint[index]);
-            *slot = self.tree.add("joint", Kind::Joint(joint), Some(parent), parent_from_joint)?;
+            *slot = self.tree.add("joint", Kind::Joint(Box::new(joint)), Some(parent), parent_from_joint)?;
             parent = self.tree.add("link", Kind::Shape, Some(*slot), Isometry3::identity())?;
             arm_from_parent = at_zero.arm_from_link[index];
-            let arm_from_next = at_zero.arm_from_joint.get(index + 1).unwrap_or(&at_zero.arm_from_connection);
-            self.link_body(index, parent, arm_from_parent.inv_mul(arm_from_next).translation.vector);
+            frames.push((parent, arm_from_parent));
         }
         let parent_from_connection = arm_from_parent.inv_mul(&at_zero.arm_from_connection);
         let connection = self.tree.add("connection", Kind::ForceSensor, Some(parent), parent_from_connection)?;
-        let base = Shape::Cylinder { radius: 0.075, half_height: 0.025 };
-        self.solids.push((arm, Solid::new(base, Isometry3::translation(0.0, 0.0, 0.01), TUBE)));
+        self.solids.extend(arm_body(&frames));
         Ok((arm, joints, connection))
-    }
-
-    /// The body of a link in its own frame: z along its joint, the next joint's origin at `next`.
-    fn link_body(&mut self, index: usize, link: Handle, next: Vector3<f64>) {
-        let up = |z: f64| Vector3::new(0.0, 0.0, z);
-        let pieces: Vec<(Vector3<f64>, Vector3<f64>, f64, [f32; 3])> = match index {
-            0 => vec![(up(0.02), next, 0.060, TUBE)],
-            1 => vec![
-                (up(0.0), up(UPPER_ARM_BESIDE_M), 0.058, CAP),
-                (up(UPPER_ARM_BESIDE_M), next + up(UPPER_ARM_BESIDE_M), 0.050, TUBE),
-            ],
-            2 => vec![
-                (up(FOREARM_BESIDE_M), up(UPPER_ARM_BESIDE_M), 0.048, CAP),
-                (up(FOREARM_BESIDE_M), next + up(FOREARM_BESIDE_M), 0.040, TUBE),
-            ],
-            3 => vec![(up(FOREARM_BESIDE_M), next, 0.040, CAP)],
-            4 => vec![(up(0.0), next, 0.039, TUBE)],
-            // The flange ends flat, so it stops short by the radius of its rounding.
-            _ => vec![(up(0.0), next - next.normalize() * 0.036, 0.036, CAP)],
-        };
-        for (from, to, radius, colour) in pieces {
-            let shape = Shape::Capsule { a: Point3::from(from), b: Point3::from(to), radius };
-            self.solids.push((link, Solid::new(shape, Isometry3::identity(), colour).with_finish(Finish::Satin)));
-        }
-    }
-
-    /// A coupling and two fingers that close around the tip.
-    fn gripper(&mut self, connection: Handle, resolved: &ResolvedScene) -> Result<(), WorldError> {
-        const COUPLING_M: f64 = 0.012;
-        let gripper = self.tree.add("Gripper", Kind::Shape, Some(connection), Isometry3::identity())?;
-        let coupling = Shape::Cylinder { radius: 0.030, half_height: COUPLING_M / 2.0 };
-        self.solids.push((gripper, Solid::new(coupling, Isometry3::translation(0.0, 0.0, COUPLING_M / 2.0), TOOL)));
-        let reach = resolved.connection_from_tip.translation.vector.z.max(COUPLING_M) + 0.02;
-        for side in [-1.0, 1.0] {
-            let half_extents = Vector3::new(0.005, 0.004, (reach - COUPLING_M) / 2.0);
-            let pose = Isometry3::translation(0.0, side * 0.018, f64::midpoint(reach, COUPLING_M));
-            self.solids.push((gripper, Solid::new(Shape::Box { half_extents }, pose, TOOL)));
-        }
-        Ok(())
     }
 
     fn surroundings(&mut self, scene: &Scene, resolved: &ResolvedScene, plane: Handle) -> Result<(), WorldError> {
@@ -151,6 +104,18 @@ impl Builder {
         }
         Ok(())
     }
+}
+
+/// The solids of the arm in the frames of base and links, which are given at all joints zero.
+fn arm_body(frames: &[(Handle, Isometry3<f64>)]) -> Vec<(Handle, Solid)> {
+    let owners = RefCell::new(Vec::new());
+    let link_from_arm = |link: usize| {
+        let (handle, arm_from_link) = frames[link];
+        owners.borrow_mut().push(handle);
+        arm_from_link.inverse()
+    };
+    let solids = props::ur5(&Isometry3::identity(), link_from_arm);
+    owners.into_inner().into_iter().zip(solids).collect()
 }
 
 /// `mounting plate` → `MountingPlate`: a name that can stand in a path.

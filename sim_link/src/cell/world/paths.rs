@@ -240,7 +240,8 @@ fn ordered(tree: &Tree, handle: Handle) -> String {
 }
 
 fn full_path(tree: &Tree, handle: Handle) -> String {
-    let mut names: Vec<String> = std::iter::once(handle).chain(tree.ancestors(handle)).map(|h| ordered(tree, h)).collect();
+    let mut names: Vec<String> =
+        std::iter::once(handle).chain(tree.ancestors(handle)).map(|h| ordered(tree, h)).collect();
     names.reverse();
     format!("/{}", names.join("/"))
 }
@@ -258,14 +259,15 @@ fn shortest_path(tree: &Tree, handle: Handle) -> String {
 }
 
 fn model_path(tree: &Tree, handle: Handle, models: usize) -> String {
-    let mut above: Vec<Handle> = tree
-        .ancestors(handle)
-        .filter(|&h| tree.get(h).is_ok_and(|object| object.model_base))
-        .take(models)
-        .collect();
+    let mut above: Vec<Handle> =
+        tree.ancestors(handle).filter(|&h| tree.get(h).is_ok_and(|object| object.model_base)).take(models).collect();
     above.reverse();
     above.push(handle);
-    let path: String = above.iter().map(|&h| format!("/{}", tree.get(h).map_or("", |object| &object.alias))).collect();
+    let mut path = String::new();
+    for object in above.iter().filter_map(|&h| tree.get(h).ok()) {
+        path.push('/');
+        path.push_str(&object.alias);
+    }
     (0..tree.iter().count())
         .find(|&n| find(tree, &path, Some(n), None) == Ok(handle))
         .map_or_else(|| full_path(tree, handle), |n| format!("{path}{{{n}}}"))

@@ -92,7 +92,9 @@ fn relative_paths_start_at_the_proxy() {
 #[test]
 fn what_is_no_path_is_an_error_and_not_a_panic() {
     let scene = scene();
-    for path in ["", "UR5", "/", "//", "/UR5//Tip", "/UR5/", "/[0]", "/box[", "/box]", "/box[x]", "/box{-1}", ".", ":", "é[0"] {
+    for path in
+        ["", "UR5", "/", "//", "/UR5//Tip", "/UR5/", "/[0]", "/box[", "/box]", "/box[x]", "/box{-1}", ".", ":", "é[0"]
+    {
         assert_eq!(at(&scene, path), Err(WorldError::NoSuchPath), "{path}");
     }
 }

@@ -55,7 +55,7 @@ fn reference(tree: &Tree, object: Flagged, relative_to: Handle) -> Result<Isomet
         },
         other => other,
     };
-    let is_joint = matches!(tree.get(reference).map_err(|_| WorldError::NoSuchReference)?.kind, Kind::Joint(_));
+    let is_joint = matches!(tree.get(reference).ok().ok_or(WorldError::NoSuchReference)?.kind, Kind::Joint(_));
     if is_joint && !object.joint_base {
         tree.moving_pose(reference, Chain::Reported)
     } else {
@@ -82,11 +82,8 @@ pub fn get(tree: &Tree, object: Flagged, relative_to: Handle) -> Result<Isometry
 pub fn set(tree: &mut Tree, object: Flagged, relative_to: Handle, pose: &Isometry3<f64>) -> Result<(), WorldError> {
     tree.get(object.handle)?;
     check(pose)?;
-    let world_from_object = if relative_to == HANDLE_INVERSE {
-        pose.inverse()
-    } else {
-        reference(tree, object, relative_to)? * pose
-    };
+    let world_from_object =
+        if relative_to == HANDLE_INVERSE { pose.inverse() } else { reference(tree, object, relative_to)? * pose };
     check(&world_from_object)?;
     tree.set_world_pose(object.handle, &world_from_object)
 }

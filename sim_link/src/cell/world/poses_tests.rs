@@ -62,7 +62,9 @@ fn quaternions_are_normalised_and_come_in_either_order() {
 #[test]
 fn poses_relative_to_a_joint_are_in_the_frame_that_moves_unless_the_flag_says_otherwise() {
     let mut tree = Tree::default();
-    let joint = tree.add("j", Kind::Joint(Joint::new(-3.0, 3.0)), None, pose(0.0, 0.0, 1.0, [0.1, 0.0, 0.0])).expect("room");
+    let joint = tree
+        .add("j", Kind::Joint(Box::new(Joint::new(-3.0, 3.0))), None, pose(0.0, 0.0, 1.0, [0.1, 0.0, 0.0]))
+        .expect("room");
     let tip = tree.add("t", Kind::Shape, Some(joint), pose(0.5, 0.0, 0.0, [0.0; 3])).expect("room");
     tree.joint_mut(joint).expect("joint").set_position(0.7).expect("finite");
     let moving = get(&tree, Flagged::parse(tip), joint).expect("both exist");
@@ -75,7 +77,9 @@ fn poses_relative_to_a_joint_are_in_the_frame_that_moves_unless_the_flag_says_ot
 #[test]
 fn what_is_set_relative_to_anything_is_read_back_from_there() {
     let mut tree = Tree::default();
-    let joint = tree.add("j", Kind::Joint(Joint::new(-3.0, 3.0)), None, pose(0.0, 0.0, 1.0, [0.1, 0.0, 0.0])).expect("room");
+    let joint = tree
+        .add("j", Kind::Joint(Box::new(Joint::new(-3.0, 3.0))), None, pose(0.0, 0.0, 1.0, [0.1, 0.0, 0.0]))
+        .expect("room");
     let object = tree.add("o", Kind::Shape, Some(joint), pose(0.5, 0.0, 0.0, [0.0; 3])).expect("room");
     let other = tree.add("p", Kind::Shape, None, pose(0.5, -2.0, 0.0, [0.0, 1.0, 0.3])).expect("room");
     tree.joint_mut(joint).expect("joint").set_position(-1.3).expect("finite");

@@ -4,7 +4,7 @@ use super::*;
 
 fn world() -> (World, Handle, Handle) {
     let mut world = World::default();
-    let joint = Kind::Joint(Joint::new(-3.0, 3.0));
+    let joint = Kind::Joint(Box::new(Joint::new(-3.0, 3.0)));
     let joint = world.tree.add("joint", joint, None, Isometry3::identity()).expect("room");
     let sensor = VisionSensor::new(Intrinsics::pinhole(4, 2, 3.0), 0.01, 3.5);
     let sensor = Kind::VisionSensor(Box::new(sensor));

@@ -35,7 +35,7 @@ pub enum Kind {
     /// A solid.
     Shape,
     /// A revolute joint.
-    Joint(Joint),
+    Joint(Box<Joint>),
     /// A frame without extent.
     Dummy {
         /// Size of its marker in metres, kept for the client that asks.

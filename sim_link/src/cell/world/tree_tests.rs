@@ -3,7 +3,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use super::*;
 
 fn joint() -> Kind {
-    Kind::Joint(Joint::new(-TAU, TAU))
+    Kind::Joint(Box::new(Joint::new(-TAU, TAU)))
 }
 
 fn dummy() -> Kind {
@@ -58,7 +58,10 @@ fn removing_an_object_leaves_its_children_in_place() {
     tree.remove(joint).expect("exists");
     assert_eq!(tree.get(joint).expect_err("removed"), WorldError::NoSuchObject);
     assert_eq!(tree.get(tip).expect("stays").parent(), None);
-    assert!((tree.world_pose(tip, Chain::Reported).expect("stays").translation.vector - before.translation.vector).norm() < 1e-12);
+    assert!(
+        (tree.world_pose(tip, Chain::Reported).expect("stays").translation.vector - before.translation.vector).norm()
+            < 1e-12
+    );
     assert_eq!(tree.roots(), [tip]);
 }
 

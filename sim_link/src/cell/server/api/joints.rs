@@ -44,7 +44,7 @@ fn set_joint_target_position(call: &mut Call<'_>) -> Outcome {
     let limits: Option<DriveLimits> = match call.args.optional_numbers(2)? {
         None => None,
         Some(limits) if limits.is_empty() => None,
-        Some(limits) => Some(limits.try_into().map_err(|_: Vec<f64>| ApiError::WrongSize)?),
+        Some(limits) => Some(limits.try_into().ok().ok_or(ApiError::WrongSize)?),
     };
     call.cell.world.tree.joint_mut(call.args.handle(0)?)?.drive_to(target_rad, limits)?;
     one(1)

@@ -126,16 +126,19 @@ impl Registry {
 }
 
 /// Nothing.
+#[expect(clippy::unnecessary_wraps, reason = "it stands at the end of functions that return an outcome")]
 fn nothing() -> Outcome {
     Ok(Answer::Values(Vec::new()))
 }
 
 /// One value.
+#[expect(clippy::unnecessary_wraps, reason = "it stands at the end of functions that return an outcome")]
 fn one(value: impl Into<Value>) -> Outcome {
     Ok(Answer::Values(vec![value.into()]))
 }
 
 /// Several values.
+#[expect(clippy::unnecessary_wraps, reason = "it stands at the end of functions that return an outcome")]
 fn several(values: impl IntoIterator<Item = Value>) -> Outcome {
     Ok(Answer::Values(values.into_iter().collect()))
 }

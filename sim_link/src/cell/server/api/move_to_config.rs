@@ -235,11 +235,8 @@ fn from_positions(call: &Call<'_>) -> Result<Motion, ApiError> {
 }
 
 fn move_to_config(call: &mut Call<'_>) -> Outcome {
-    let motion = if call.args.is_table(0) {
-        from_map(call, &call.args.map_or_empty(0)?)?
-    } else {
-        from_positions(call)?
-    };
+    let motion =
+        if call.args.is_table(0) { from_map(call, &call.args.map_or_empty(0)?)? } else { from_positions(call)? };
     Ok(Answer::Later(Box::new(MotionTask::new(motion, call.cell))))
 }
 

@@ -197,13 +197,13 @@ impl ArmIk {
 
 fn seven(fields: &Fields<'_>, name: &'static str) -> Result<Option<Isometry3<f64>>, ApiError> {
     let Some(numbers) = fields.numbers_of(name, 7)? else { return Ok(None) };
-    let numbers: [f64; 7] = numbers.try_into().map_err(|_: Vec<f64>| ApiError::Field { problem: "invalid", name })?;
+    let numbers: [f64; 7] = numbers.try_into().ok().ok_or(ApiError::Field { problem: "invalid", name })?;
     Ok(Some(poses::from_numbers(&numbers, false)?))
 }
 
 fn twelve(fields: &Fields<'_>, name: &'static str) -> Result<Option<Isometry3<f64>>, ApiError> {
     let Some(numbers) = fields.numbers_of(name, 12)? else { return Ok(None) };
-    let numbers: [f64; 12] = numbers.try_into().map_err(|_: Vec<f64>| ApiError::Field { problem: "invalid", name })?;
+    let numbers: [f64; 12] = numbers.try_into().ok().ok_or(ApiError::Field { problem: "invalid", name })?;
     Ok(Some(poses::from_matrix(&numbers)?))
 }
 
@@ -224,7 +224,8 @@ fn mover(call: &mut Call<'_>, fields: &Fields<'_>) -> Result<(Mover, Isometry3<f
         Some(pose) => Some(pose),
         None => twelve(fields, "matrix")?,
     };
-    let start = start.ok_or_else(|| ApiError::Other("missing field: 'pose', 'object' or 'ik' is required.".to_owned()))?;
+    let start =
+        start.ok_or_else(|| ApiError::Other("missing field: 'pose', 'object' or 'ik' is required.".to_owned()))?;
     Ok((Mover::Nobody, start))
 }
 
@@ -293,7 +294,7 @@ impl Wanted {
 
 fn metric_of(numbers: Option<Vec<f64>>) -> Result<Option<[f64; 4]>, ApiError> {
     numbers
-        .map(|metric| metric.try_into().map_err(|_: Vec<f64>| ApiError::Field { problem: "invalid", name: "metric" }))
+        .map(|metric| metric.try_into().ok().ok_or(ApiError::Field { problem: "invalid", name: "metric" }))
         .transpose()
 }
 

@@ -102,7 +102,7 @@ fn set_object_parent(call: &mut Call<'_>) -> Outcome {
 
 fn get_object_child(call: &mut Call<'_>) -> Outcome {
     let children = call.cell.world.tree.get(call.args.handle(0)?)?.children();
-    let index = usize::try_from(call.args.integer(1)?).map_err(|_| WorldError::InvalidArguments)?;
+    let index = usize::try_from(call.args.integer(1)?).ok().ok_or(WorldError::InvalidArguments)?;
     one(children.get(index).copied().unwrap_or(-1))
 }
 

@@ -106,7 +106,7 @@ fn set_object_matrix(call: &mut Call<'_>) -> Outcome {
         let numbers = call.args.numbers(at)?;
         // A 4×4 matrix as some scripts send it: the last row says nothing.
         let numbers = numbers.get(..12).filter(|_| matches!(numbers.len(), 12 | 16)).ok_or(ApiError::WrongSize)?;
-        let matrix: [f64; 12] = numbers.try_into().map_err(|_| ApiError::WrongSize)?;
+        let matrix: [f64; 12] = numbers.try_into().ok().ok_or(ApiError::WrongSize)?;
         Ok(poses::from_matrix(&matrix)?)
     })
 }

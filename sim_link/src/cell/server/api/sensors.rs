@@ -35,7 +35,7 @@ impl Crop {
     fn read(call: &Call<'_>, at: usize, sensor: &VisionSensor) -> Result<Self, ApiError> {
         let pair = |at| -> Result<[usize; 2], ApiError> {
             let Some(numbers) = call.args.optional_numbers(at)? else { return Ok([0, 0]) };
-            let [a, b]: [f64; 2] = numbers.try_into().map_err(|_: Vec<f64>| ApiError::WrongSize)?;
+            let [a, b]: [f64; 2] = numbers.try_into().ok().ok_or(ApiError::WrongSize)?;
             let whole = |v: f64| {
                 let is_whole = v >= 0.0 && v.fract() == 0.0 && v < 1e6;
                 if is_whole { Ok(v as usize) } else { Err(WorldError::InvalidArguments) }

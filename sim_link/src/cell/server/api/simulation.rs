@@ -75,6 +75,7 @@ fn set_stepping(call: &mut Call<'_>) -> Outcome {
     one(i64::from(call.client.set_stepping(enable, call.step)))
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "every function of the API has this type")]
 fn step(_call: &mut Call<'_>) -> Outcome {
     Ok(Answer::Later(Box::new(StepTask)))
 }
@@ -85,8 +86,7 @@ fn wait(call: &mut Call<'_>) -> Outcome {
     if !seconds.is_finite() {
         return Err(WorldError::InvalidArguments.into());
     }
-    let since_s =
-        if simulated { call.cell.world.simulation().time_s() } else { call.cell.now.as_secs_f64() };
+    let since_s = if simulated { call.cell.world.simulation().time_s() } else { call.cell.now.as_secs_f64() };
     Ok(Answer::Later(Box::new(WaitTask { seconds, simulated, since_s })))
 }
 
