@@ -4,11 +4,14 @@
 //! Everything here is deterministic: no clock, no thread, no hidden seed.
 
 pub mod camera;
+pub mod depth;
 pub mod frames;
 pub mod handeye;
 pub mod observation;
 pub mod progress;
 pub mod se3;
 pub mod target;
+#[cfg(feature = "opencv")]
+pub mod vision;
 
 pub use image;

@@ -1,0 +1,245 @@
+//! Sub-pixel position of chessboard corners by fitting what a lens makes of one.
+//!
+//! Near an inner corner the board is two straight lines (straight under any perspective) that divide dark from light
+//! crosswise. Blurred by the lens and the area of the pixels, the intensity is close to
+//!
+//! `I(p) = m + g·(p − c) + a · erf(n₁·(p − c) / √2 σ) · erf(n₂·(p − c) / √2 σ)`
+//!
+//! with the corner `c`, the unit normals `n₁`, `n₂` of the lines, the blur `σ`, the mean level `m`, a gradient `g` of
+//! the illumination and the signed contrast `a`. All nine are fitted by Levenberg–Marquardt to the pixels around each
+//! corner, starting from OpenCV's `cornerSubPix`, whose answer stays where the fit does not converge to a corner.
+//! A quadratic saddle (Placht et al. 2014, "ROCHADE") is the second-order expansion of this at `c`; the full model
+//! uses the pixels along the edges too, where most of the information is.
+
+use image::GrayImage;
+use nalgebra::{SMatrix, SVector, Vector2};
+use opencv::core::{Size, TermCriteria, TermCriteria_EPS, TermCriteria_MAX_ITER};
+
+use super::VisionError;
+use super::bridge::{failed, from_points2f, mat_from_gray, to_points2f};
+use super::order::Ordered;
+
+/// Half window as a part of the distance to the nearest neighbour: pixels further out see the next corner.
+const WINDOW_PER_SPACING: f64 = 0.4;
+/// Half windows that `cornerSubPix` is given, in pixels: less than 2 has no gradient, more gains nothing.
+const WINDOW_PX: (i32, i32) = (2, 10);
+
+/// Part of a grid step, along x and along y, up to which a pixel counts for the fit.
+const CELL_PART: f64 = 0.42;
+/// Pixels further from the corner than this do not count: there curved edges (lens) matter before noise does.
+const REACH_PX: f64 = 8.0;
+/// Pixels needed for the nine parameters.
+const MIN_PIXELS: usize = 20;
+const MAX_STEPS: usize = 12;
+/// A step of the corner below this ends the fit: a tenth of the best that noise allows.
+const CONVERGED_PX: f64 = 5e-4;
+/// Blurs that a fit may end at; outside, it has found something else than a corner.
+const BLUR_PX: (f64, f64) = (0.1, 4.0);
+/// Least contrast (half the difference between dark and light) in grey levels.
+const MIN_CONTRAST: f64 = 3.0;
+/// Largest RMS misfit as a part of the contrast.
+const MAX_MISFIT: f64 = 0.35;
+/// A move from `cornerSubPix`'s answer by more than this part of the spacing (and at least by that many pixels) is
+/// not believed.
+const MAX_MOVE: (f64, f64) = (0.12, 0.75);
+
+type Parameters = SVector<f64, 9>;
+
+/// OpenCV's gradient-orthogonality refinement, with a window matched to the squares around each corner.
+pub(super) fn corner_sub_pix(image: &GrayImage, order: &Ordered) -> Result<Ordered, VisionError> {
+    let mat = mat_from_gray(image)?;
+    let criteria = TermCriteria { typ: TermCriteria_EPS + TermCriteria_MAX_ITER, max_count: 40, epsilon: 1e-3 };
+    let mut out = order.clone();
+    let window = |index: usize| {
+        let spacing = order.spacing(index % order.columns, index / order.columns);
+        ((WINDOW_PER_SPACING * spacing) as i32).clamp(WINDOW_PX.0, WINDOW_PX.1)
+    };
+    for half in WINDOW_PX.0..=WINDOW_PX.1 {
+        let members: Vec<usize> = (0..order.points.len()).filter(|&i| window(i) == half).collect();
+        if members.is_empty() {
+            continue;
+        }
+        let points: Vec<Vector2<f64>> = members.iter().map(|&i| order.points[i]).collect();
+        let mut refined = to_points2f(&points);
+        opencv::imgproc::corner_sub_pix(&mat, &mut refined, Size::new(half, half), Size::new(-1, -1), criteria)
+            .map_err(failed("refine corners"))?;
+        for (&i, point) in members.iter().zip(from_points2f(&refined)) {
+            out.points[i] = point;
+        }
+    }
+    Ok(out)
+}
+
+/// Fits the corner model around every corner; where that fails the corner given stays.
+pub(super) fn fit_corners(image: &GrayImage, order: &Ordered) -> Ordered {
+    let mut out = order.clone();
+    for row in 0..order.rows() {
+        for column in 0..order.columns {
+            if let Some(corner) = fit_corner(image, order, column, row) {
+                out.points[row * order.columns + column] = corner;
+            }
+        }
+    }
+    out
+}
+
+fn fit_corner(image: &GrayImage, order: &Ordered, column: usize, row: usize) -> Option<Vector2<f64>> {
+    let start = order.at(column, row);
+    let (along_x, along_y) = order.steps(column, row);
+    let patch = Patch::around(image, start, &along_x, &along_y)?;
+    let model = fit(&patch, starting_point(&patch, &along_x, &along_y))?;
+    let offset = Vector2::new(model[0], model[1]);
+    let bound = (MAX_MOVE.0 * order.spacing(column, row)).max(MAX_MOVE.1);
+    (offset.norm() <= bound).then(|| patch.origin + offset)
+}
+
+/// Pixels around a corner, relative to where it is thought to be.
+struct Patch {
+    origin: Vector2<f64>,
+    pixels: Vec<(Vector2<f64>, f64)>,
+}
+
+impl Patch {
+    /// The pixels within [`CELL_PART`] of a step along both axes; `None` when too few or cut by the image border.
+    fn around(
+        image: &GrayImage,
+        origin: Vector2<f64>,
+        along_x: &Vector2<f64>,
+        along_y: &Vector2<f64>,
+    ) -> Option<Self> {
+        let area = along_x.perp(along_y);
+        let half = (along_x.abs() + along_y.abs()) * CELL_PART;
+        let half = Vector2::new(half.x.min(REACH_PX), half.y.min(REACH_PX));
+        let (width, height) = image.dimensions();
+        let low = (origin - half).map(f64::ceil);
+        let high = (origin + half).map(f64::floor);
+        if low.x < 0.0 || low.y < 0.0 || high.x > f64::from(width) - 1.0 || high.y > f64::from(height) - 1.0 {
+            return None;
+        }
+        let mut pixels = Vec::with_capacity(300);
+        for v in low.y as u32..=high.y as u32 {
+            for u in low.x as u32..=high.x as u32 {
+                let p = Vector2::new(f64::from(u), f64::from(v)) - origin;
+                let (a, b) = (p.perp(along_y) / area, along_x.perp(&p) / area);
+                if a.abs() <= CELL_PART && b.abs() <= CELL_PART && p.norm() <= REACH_PX {
+                    pixels.push((p, f64::from(image.get_pixel(u, v).0[0])));
+                }
+            }
+        }
+        (pixels.len() >= MIN_PIXELS).then_some(Self { origin, pixels })
+    }
+}
+
+/// Lines along the grid's own steps; levels from the mean intensity of the two pairs of opposite quadrants.
+fn starting_point(patch: &Patch, along_x: &Vector2<f64>, along_y: &Vector2<f64>) -> Parameters {
+    let normal_angle = |along: &Vector2<f64>| along.x.atan2(-along.y);
+    let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+    for (p, value) in &patch.pixels {
+        let same_side = usize::from(p.perp(along_x) * p.perp(along_y) > 0.0);
+        sums[same_side] += value;
+        counts[same_side] += 1.0;
+    }
+    let mean = |i: usize| sums[i] / f64::max(counts[i], 1.0);
+    // Normals are perpendicular to the steps in the same sense, so "same side" is where the product of distances is
+    // positive; blur lowers the contrast seen, hence the factor.
+    let contrast = 0.6 * (mean(1) - mean(0));
+    Parameters::from_column_slice(&[
+        0.0,
+        0.0,
+        normal_angle(along_x),
+        normal_angle(along_y),
+        0.7,
+        0.5 * (mean(0) + mean(1)),
+        0.0,
+        0.0,
+        contrast,
+    ])
+}
+
+/// Levenberg–Marquardt; `None` when it ends at something that is not a corner.
+fn fit(patch: &Patch, start: Parameters) -> Option<Parameters> {
+    let mut x = start;
+    let (mut cost, mut hessian, mut gradient) = normal_equations(patch, &x);
+    let mut damping = 1e-3;
+    for _ in 0..MAX_STEPS {
+        let mut damped = hessian;
+        for i in 0..9 {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        let step = damped.cholesky()?.solve(&gradient);
+        let mut candidate = x - step;
+        candidate[4] = candidate[4].clamp(BLUR_PX.0, BLUR_PX.1);
+        let (new_cost, new_hessian, new_gradient) = normal_equations(patch, &candidate);
+        if new_cost <= cost {
+            (x, cost, hessian, gradient) = (candidate, new_cost, new_hessian, new_gradient);
+            damping *= 0.1;
+            if step[0].hypot(step[1]) < CONVERGED_PX {
+                break;
+            }
+        } else {
+            damping = f64::max(damping * 10.0, 1e-3);
+            if damping > 1e3 {
+                break;
+            }
+        }
+    }
+    let misfit = (cost / patch.pixels.len() as f64).sqrt();
+    let lines_apart = (x[2] - x[3]).sin().abs();
+    let is_corner =
+        x[8].abs() >= MIN_CONTRAST && misfit <= MAX_MISFIT * x[8].abs() && x[4] < BLUR_PX.1 && lines_apart > 0.1;
+    is_corner.then_some(x)
+}
+
+/// Sum of squared misfits, JᵀJ and Jᵀr.
+fn normal_equations(patch: &Patch, x: &Parameters) -> (f64, SMatrix<f64, 9, 9>, Parameters) {
+    let scale = std::f64::consts::FRAC_1_SQRT_2 / x[4];
+    let (n1, n2) = (Vector2::new(x[2].cos(), x[2].sin()), Vector2::new(x[3].cos(), x[3].sin()));
+    let (t1, t2) = (Vector2::new(-n1.y, n1.x), Vector2::new(-n2.y, n2.x));
+    let centre = Vector2::new(x[0], x[1]);
+    let contrast = x[8];
+    let mut cost = 0.0;
+    let mut hessian = SMatrix::<f64, 9, 9>::zeros();
+    let mut gradient = Parameters::zeros();
+    for (p, value) in &patch.pixels {
+        let d = p - centre;
+        let (s1, s2) = (n1.dot(&d) * scale, n2.dot(&d) * scale);
+        let ((e1, g1), (e2, g2)) = (erf_and_slope(s1), erf_and_slope(s2));
+        // Derivatives of the product by the two scaled distances.
+        let (by_s1, by_s2) = (contrast * g1 * e2, contrast * e1 * g2);
+        let by_centre = -(n1 * by_s1 + n2 * by_s2) * scale - Vector2::new(x[6], x[7]);
+        let row = Parameters::from_column_slice(&[
+            by_centre.x,
+            by_centre.y,
+            by_s1 * t1.dot(&d) * scale,
+            by_s2 * t2.dot(&d) * scale,
+            -(by_s1 * s1 + by_s2 * s2) / x[4],
+            1.0,
+            d.x,
+            d.y,
+            e1 * e2,
+        ]);
+        let residual = x[5] + x[6] * d.x + x[7] * d.y + contrast * e1 * e2 - value;
+        cost += residual * residual;
+        for j in 0..9 {
+            gradient[j] += row[j] * residual;
+            for i in j..9 {
+                hessian[(i, j)] += row[i] * row[j];
+            }
+        }
+    }
+    hessian.fill_upper_triangle_with_lower_triangle();
+    (cost, hessian, gradient)
+}
+
+/// erf(x) to 1.5·10⁻⁷ and its derivative. Abramowitz & Stegun 1964, 7.1.26.
+fn erf_and_slope(x: f64) -> (f64, f64) {
+    const A: [f64; 5] = [0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429];
+    let gauss = (-x * x).exp();
+    let t = 1.0 / (1.0 + 0.3275911 * x.abs());
+    let poly = t * (A[0] + t * (A[1] + t * (A[2] + t * (A[3] + t * A[4]))));
+    ((1.0 - poly * gauss).copysign(x), gauss * std::f64::consts::FRAC_2_SQRT_PI)
+}
+
+#[cfg(test)]
+#[path = "subpixel_tests.rs"]
+mod tests;
