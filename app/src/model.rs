@@ -5,11 +5,14 @@
 
 use std::sync::Arc;
 
+use handeye_core::depth::{ColourMap, DepthImage, DepthSample};
 use handeye_core::frames::{Base, Pose, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::cell::JointAngles;
-use handeye_sim_link::client::convert::DepthFrame;
 use serde::{Deserialize, Serialize};
+
+/// How depths are coloured, in pictures and in the bar that explains them.
+pub const DEPTH_COLOURS: ColourMap = ColourMap::Turbo;
 
 /// Which cell the window works with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -119,6 +122,8 @@ pub struct FrameInfo {
     pub rate_hz: f64,
     /// Depths [m] at the two ends of the colour map.
     pub depth_range_m: [f32; 2],
+    /// The sensor's far plane [m]: depths there are no surface.
+    pub far_plane_m: f32,
 }
 
 /// The pixels of a frame.
@@ -127,7 +132,7 @@ pub struct FrameImages {
     /// Colour, row 0 on top.
     pub rgb: RgbImage,
     /// Depth in metres, row 0 on top.
-    pub depth: DepthFrame,
+    pub depth: DepthImage,
     /// Depth as the window shows it, same size as `depth`.
     pub depth_coloured: RgbImage,
 }
@@ -138,16 +143,16 @@ impl FrameImages {
         self.rgb.get_pixel_checked(point.column, point.row).map(|pixel| pixel.0)
     }
 
-    /// Depth [m] at a pixel of the colour image, where something reflects; the depth image may have another size.
-    pub fn depth_m_at(&self, point: ImagePoint) -> Option<f32> {
+    /// Depth at a pixel of the colour image; the depth image may have another size.
+    pub fn depth_at(&self, point: ImagePoint, far_plane_m: f32) -> DepthSample {
         let (width, height) = self.rgb.dimensions();
         if point.column >= width || point.row >= height {
-            return None;
+            return DepthSample::Invalid;
         }
         let scaled = |at: u32, of: u32, to: u32| (u64::from(at) * u64::from(to) / u64::from(of)) as u32;
         let column = scaled(point.column, width, self.depth.width);
         let row = scaled(point.row, height, self.depth.height);
-        self.depth.at(column, row).filter(|depth| depth.is_finite() && *depth > 0.0)
+        self.depth.sample(column, row, far_plane_m)
     }
 }
 

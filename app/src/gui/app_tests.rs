@@ -45,7 +45,10 @@ fn a_lost_connection_is_said_and_a_retry_does_not_hide_why() {
     let connected = LinkState::Connected { address: "tcp://a:1".to_owned(), server: "sim".to_owned() };
     let why = "the cable is out".to_owned();
     app.absorb(Event::Link { link: Link::Camera, state: connected });
-    app.absorb(Event::Link { link: Link::Camera, state: LinkState::Lost { since_s: 1.0, why: why.clone(), attempt: 0 } });
+    app.absorb(Event::Link {
+        link: Link::Camera,
+        state: LinkState::Lost { since_s: 1.0, why: why.clone(), attempt: 0 },
+    });
     assert_eq!(message(&app), "Camera connection lost: the cable is out");
     app.absorb(Event::Link { link: Link::Camera, state: LinkState::Retrying { since_s: 1.0, why, attempt: 1 } });
     assert_eq!(message(&app), "Camera connection lost: the cable is out");

@@ -126,7 +126,8 @@ fn of_link(model: &Model, state: &LinkState, half: &str) -> Status {
 
 /// First letter large, unless the first word is a name in code; full stop at the end.
 fn sentence(text: &str) -> String {
-    let is_code = text.split_whitespace().next().is_some_and(|word| word.trim_end_matches(['.', ':']).contains(['.', '/']));
+    let is_code =
+        text.split_whitespace().next().is_some_and(|word| word.trim_end_matches(['.', ':']).contains(['.', '/']));
     let mut letters = text.chars();
     let Some(first) = letters.next() else { return String::new() };
     let end = if text.ends_with(['.', '!', '?', '…']) { "" } else { "." };

@@ -3,15 +3,13 @@ use std::sync::Arc;
 use egui::{Vec2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
+use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
-use handeye_sim_link::client::convert::DepthFrame;
 
 use super::*;
 use crate::command::{Command, Event};
-use crate::model::{
-    CellSource, FrameImages, FrameInfo, Link, LinkState, RobotState, RotationFormat, Simulation,
-};
+use crate::model::{CellSource, FrameImages, FrameInfo, Link, LinkState, RobotState, RotationFormat, Simulation};
 use crate::worker::fake::FakeCell;
 use crate::worker::{Clock, Connector, PortError, Waker};
 
@@ -35,7 +33,7 @@ impl Silent {
         let connector: Arc<dyn Connector> = Arc::new(cell);
         let clock: Clock = Arc::new(|| 100.0);
         let (wake, woken) = crossbeam_channel::bounded(1);
-        let waker: Waker = Arc::new(move || drop(wake.try_send(())));
+        let waker: Waker = wakes(wake);
         let mut app = App::start(source, ViewSettings::default(), &connector, clock, &waker).expect("threads");
         while ![Link::Control, Link::Camera]
             .iter()
@@ -90,6 +88,13 @@ impl Silent {
     }
 }
 
+fn wakes(wake: crossbeam_channel::Sender<()>) -> Waker {
+    // A full channel wakes as well as a fuller one.
+    Arc::new(move || {
+        let _full = wake.try_send(()).is_err();
+    })
+}
+
 fn connected() -> LinkState {
     LinkState::Connected { address: "tcp://127.0.0.1:1".to_owned(), server: "built-in cell".to_owned() }
 }
@@ -107,13 +112,17 @@ fn robot(simulation: Simulation) -> RobotState {
 fn frame(number: u64) -> Event {
     let (width, height) = (64, 48);
     let rgb = RgbImage::from_fn(width, height, |column, row| Rgb([column as u8, row as u8, 200]));
-    let metres = (0..width * height).map(|i| 0.5 + 0.01 * (i % width) as f32).collect();
-    let images = FrameImages {
-        depth_coloured: rgb.clone(),
-        depth: DepthFrame { width, height, metres },
-        rgb,
+    let mut metres: Vec<f32> = (0..width * height).map(|i| 0.5 + 0.01 * (i % width) as f32).collect();
+    metres[0] = 3.5;
+    let images = FrameImages { depth_coloured: rgb.clone(), depth: DepthImage { width, height, metres }, rgb };
+    let info = FrameInfo {
+        number,
+        sim_time_s: 12.3,
+        received_s: 100.0,
+        rate_hz: 20.0,
+        depth_range_m: [0.4, 1.2],
+        far_plane_m: 3.5,
     };
-    let info = FrameInfo { number, sim_time_s: 12.3, received_s: 100.0, rate_hz: 20.0, depth_range_m: [0.4, 1.2] };
     Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) }
 }
 
@@ -168,6 +177,15 @@ fn the_pixel_under_the_pointer_is_read_from_both_pictures() {
         silent.steps();
         assert_eq!(silent.app().model().cursor, None);
     }
+}
+
+#[test]
+fn a_pixel_without_surface_has_no_made_up_depth() {
+    let mut silent = Silent::live();
+    silent.app().apply(Command::PointAt(Some(crate::model::ImagePoint { column: 0, row: 0 })));
+    // Before the next frame of the window takes the pointer away again.
+    silent.harness.step();
+    assert!(silent.sees("Depth over 3.50 m"));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use super::link::{Duty, Outlet};
 use super::port::{CameraPort, Connected, Connector, PortError, RawFrame};
 use super::slot::LatestSlot;
 use crate::depth_view;
-use crate::model::{DepthScale, FrameImages, FrameInfo, Link, LiveFrame};
+use crate::model::{DEPTH_COLOURS, DepthScale, FrameImages, FrameInfo, Link, LiveFrame};
 
 /// Rest between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
 const PERIOD: Duration = Duration::from_millis(15);
@@ -41,25 +41,22 @@ pub struct Camera {
 impl Camera {
     /// With the place that it shares with the application.
     pub fn new(scale: DepthScale, frames: Arc<LatestSlot<LiveFrame>>) -> Self {
-        Self {
-            frames,
-            scale,
-            auto_range_m: None,
-            seen_sim_time_s: None,
-            number: 0,
-            rate: RateMeter::default(),
-        }
+        Self { frames, scale, auto_range_m: None, seen_sim_time_s: None, number: 0, rate: RateMeter::default() }
     }
 
     /// Prepares the newest pictures for the window.
-    fn publish(&mut self, raw: RawFrame, limits_m: [f32; 2], received_s: f64) -> LiveFrame {
-        let [near_m, far_m] = limits_m;
-        self.auto_range_m = depth_view::range_of(&raw.depth, far_m, self.auto_range_m);
+    fn prepare(&mut self, raw: RawFrame, limits_m: [f32; 2], received_s: f64) -> Result<LiveFrame, PortError> {
+        let [_, far_plane_m] = limits_m;
+        self.auto_range_m = depth_view::range_of(&raw.depth, far_plane_m, self.auto_range_m);
         let depth_range_m = match self.scale {
             DepthScale::Full => limits_m,
-            DepthScale::Auto => self.auto_range_m.unwrap_or([near_m, far_m]),
+            DepthScale::Auto => self.auto_range_m.unwrap_or(limits_m),
         };
-        let depth_coloured = depth_view::picture(&raw.depth, depth_range_m, far_m);
+        let [near_m, far_m] = depth_range_m;
+        let depth_coloured = raw
+            .depth
+            .colours(DEPTH_COLOURS, near_m, far_m, far_plane_m)
+            .map_err(|error| PortError::Refused(format!("the depth picture cannot be shown: {error}")))?;
         self.number += 1;
         let info = FrameInfo {
             number: self.number,
@@ -67,8 +64,9 @@ impl Camera {
             received_s,
             rate_hz: self.rate.rate_hz(),
             depth_range_m,
+            far_plane_m,
         };
-        LiveFrame { info, images: Arc::new(FrameImages { rgb: raw.rgb, depth: raw.depth, depth_coloured }) }
+        Ok(LiveFrame { info, images: Arc::new(FrameImages { rgb: raw.rgb, depth: raw.depth, depth_coloured }) })
     }
 }
 
@@ -95,18 +93,13 @@ impl Duty for Camera {
         let received_s = outlet.now_s();
         self.seen_sim_time_s = Some(raw.sim_time_s);
         self.rate.arrived(received_s);
-        let frame = self.publish(raw, port.depth_limits_m(), received_s);
+        let frame = self.prepare(raw, port.depth_limits_m(), received_s)?;
         self.frames.put(frame);
         (outlet.waker)();
         Ok(PERIOD)
     }
 
-    fn perform(
-        &mut self,
-        _port: Option<&mut Self::Port>,
-        task: Self::Task,
-        _outlet: &Outlet,
-    ) -> Result<(), PortError> {
+    fn perform(&mut self, _port: Option<&mut Self::Port>, task: Self::Task, _outlet: &Outlet) -> Result<(), PortError> {
         match task {
             CameraTask::SetDepthScale(scale) => {
                 self.scale = scale;
@@ -138,7 +131,9 @@ impl RateMeter {
     /// 0 before the second frame.
     fn rate_hz(&self) -> f64 {
         match (self.arrivals_s.front(), self.arrivals_s.back()) {
-            (Some(first_s), Some(last_s)) if last_s > first_s => (self.arrivals_s.len() - 1) as f64 / (last_s - first_s),
+            (Some(first_s), Some(last_s)) if last_s > first_s => {
+                (self.arrivals_s.len() - 1) as f64 / (last_s - first_s)
+            }
             _ => 0.0,
         }
     }

@@ -102,12 +102,7 @@ impl Duty for Control {
         Ok(PERIOD)
     }
 
-    fn perform(
-        &mut self,
-        port: Option<&mut Self::Port>,
-        task: Self::Task,
-        outlet: &Outlet,
-    ) -> Result<(), PortError> {
+    fn perform(&mut self, port: Option<&mut Self::Port>, task: Self::Task, outlet: &Outlet) -> Result<(), PortError> {
         let Some(port) = port else {
             if task == ControlTask::StartSimulation {
                 let text = "The simulation cannot be started: there is no connection to the cell";

@@ -3,10 +3,10 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
+use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::convert::DepthFrame;
 
 use super::port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
 use crate::model::{RobotState, Simulation};
@@ -154,7 +154,7 @@ impl CameraPort for FakeCell {
         let metres = (0..width * height).map(|i| 0.4 + 0.4 * (i % width) as f32 / width as f32).collect();
         Ok(RawFrame {
             rgb: Self::rgb(script.frames),
-            depth: DepthFrame { width, height, metres },
+            depth: DepthImage { width, height, metres },
             sim_time_s: script.frames as f64 * 0.05,
         })
     }

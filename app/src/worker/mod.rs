@@ -93,11 +93,7 @@ impl Workers {
     ) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
         let mut workers = Self::idle(events);
-        let outlet = || Outlet {
-            events: event_sender.clone(),
-            waker: Arc::clone(waker),
-            clock: Arc::clone(clock),
-        };
+        let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
         workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
         let duty = Camera::new(scale, Arc::clone(&workers.frames));

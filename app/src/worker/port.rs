@@ -1,8 +1,8 @@
 //! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
 
+use handeye_core::depth::DepthImage;
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::convert::DepthFrame;
 
 use crate::model::RobotState;
 
@@ -73,7 +73,7 @@ pub struct RawFrame {
     /// Colour, row 0 on top.
     pub rgb: RgbImage,
     /// Depth in metres, row 0 on top.
-    pub depth: DepthFrame,
+    pub depth: DepthImage,
     /// Simulated time [s].
     pub sim_time_s: f64,
 }

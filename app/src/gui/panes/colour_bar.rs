@@ -3,8 +3,8 @@
 use egui::{Align2, Color32, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
 
 use super::pictures::small_text;
-use crate::depth_view;
 use crate::gui::theme::{self, Palette};
+use crate::model::DEPTH_COLOURS;
 
 /// Height of the colours.
 const HEIGHT: f32 = 12.0;
@@ -22,7 +22,7 @@ pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>) {
         WidgetInfo::labeled(WidgetType::Image, true, format!("Depth colours from {near_m:.2} m to {far_m:.2} m"))
     });
     let bar = Rect::from_min_size(area.min + Vec2::new(0.0, 9.0), Vec2::new(area.width(), HEIGHT));
-    ui.painter().add(gradient(bar, range_m));
+    ui.painter().add(gradient(bar));
     for tick in 0..TICKS {
         let part = tick as f32 / (TICKS - 1) as f32;
         let x = bar.left() + part * bar.width();
@@ -42,12 +42,11 @@ pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>) {
     }
 }
 
-fn gradient(bar: Rect, range_m: [f32; 2]) -> Shape {
-    let [near_m, far_m] = range_m;
+fn gradient(bar: Rect) -> Shape {
     let mut mesh = Mesh::default();
     for step in 0..=STEPS {
         let part = step as f32 / STEPS as f32;
-        let colour: Color32 = theme::pixel(depth_view::colour(near_m + part * (far_m - near_m), range_m));
+        let colour: Color32 = theme::pixel(DEPTH_COLOURS.colour(f64::from(part)));
         let x = bar.left() + part * bar.width();
         mesh.colored_vertex(Pos2::new(x, bar.top()), colour);
         mesh.colored_vertex(Pos2::new(x, bar.bottom()), colour);

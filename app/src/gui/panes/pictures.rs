@@ -1,9 +1,11 @@
 //! The live pictures: colour and depth side by side, with the same pixel marked in both.
 
 use egui::{
-    Align, Align2, CornerRadius, FontId, Image, Layout, Pos2, Rect, Response, RichText, Sense, Stroke, TextureHandle, Ui,
-    UiBuilder, Vec2,
+    Align, Align2, CornerRadius, FontId, Image, Layout, Pos2, Rect, Response, RichText, Sense, Stroke, TextureHandle,
+    Ui, UiBuilder, Vec2,
 };
+
+use handeye_core::depth::DepthSample;
 
 use super::colour_bar;
 use crate::command::{Command, Outbox};
@@ -51,8 +53,12 @@ pub fn pictures_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: 
         },
         |ui| depth.picture_ui(ui),
         |ui| {
-            let at_cursor = model.cursor.and_then(|point| frame.images.depth_m_at(point));
-            colour_bar::colour_bar_ui(ui, frame.info.depth_range_m, at_cursor);
+            let at_cursor = model.cursor.map(|point| frame.images.depth_at(point, frame.info.far_plane_m));
+            let depth_m = match at_cursor {
+                Some(DepthSample::Metres(depth_m)) => Some(depth_m),
+                _ => None,
+            };
+            colour_bar::colour_bar_ui(ui, frame.info.depth_range_m, depth_m);
         },
     );
     let pointed = over_colour.or(over_depth);
@@ -152,7 +158,7 @@ fn mark(ui: &Ui, rect: Rect, at_px: Vec2, columns: u32, rows: u32) {
 fn pixel_ui(ui: &mut Ui, model: &Model, frame: &LiveFrame) {
     let palette = Palette::of(ui);
     let found = model.cursor.and_then(|point| Some((point, frame.images.rgb_at(point)?)));
-    let Some((ImagePoint { column, row }, [red, green, blue])) = found else {
+    let Some((point, [red, green, blue])) = found else {
         ui.label(RichText::new("Point at a picture to read a pixel").color(palette.weak));
         return;
     };
@@ -160,9 +166,12 @@ fn pixel_ui(ui: &mut Ui, model: &Model, frame: &LiveFrame) {
     let edge = Stroke::new(1.0, palette.edge);
     let fill = theme::pixel([red, green, blue]);
     ui.painter().rect(swatch, CornerRadius::same(4), fill, edge, egui::StrokeKind::Inside);
-    let depth = match model.cursor.and_then(|point| frame.images.depth_m_at(point)) {
-        Some(depth_m) => format!("{depth_m:.3} m"),
-        None => "none".to_owned(),
+    let ImagePoint { column, row } = point;
+    let far_plane_m = frame.info.far_plane_m;
+    let depth = match frame.images.depth_at(point, far_plane_m) {
+        DepthSample::Metres(depth_m) => format!("{depth_m:.3} m"),
+        DepthSample::Far => format!("over {far_plane_m:.2} m"),
+        DepthSample::Invalid => "none".to_owned(),
     };
     for (caption, value) in [
         ("Pixel", format!("{column:>3}, {row:>3}")),

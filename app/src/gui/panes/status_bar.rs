@@ -21,7 +21,13 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.horizontal(|ui| {
         let colour = if live { palette.text } else { palette.weak };
         let text = |number: fn(&RobotState) -> String| robot.map_or_else(|| UNKNOWN.to_owned(), number);
-        field_ui(ui, "Tip in base, x y z [mm]", &text(|robot| numbers::translation_mm(&robot.base_from_tip)), 20, colour);
+        field_ui(
+            ui,
+            "Tip in base, x y z [mm]",
+            &text(|robot| numbers::translation_mm(&robot.base_from_tip)),
+            20,
+            colour,
+        );
         rotation_ui(ui, model, colour, outbox);
         field_ui(ui, "Joints 1 to 6 [deg]", &text(joints_deg), 41, colour);
         field_ui(ui, "Simulation", &text(|robot| format!("{:.2} s", robot.sim_time_s)), 9, colour);
@@ -55,9 +61,7 @@ fn field_ui(ui: &mut Ui, caption: &str, value: &str, digits: usize, colour: egui
 
 fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut Outbox) {
     let (caption, digits, next, name) = match model.view.rotation {
-        RotationFormat::RollPitchYaw => {
-            ("Tip in base, roll pitch yaw [deg]", 23, RotationFormat::Quaternion, "quat")
-        }
+        RotationFormat::RollPitchYaw => ("Tip in base, roll pitch yaw [deg]", 23, RotationFormat::Quaternion, "quat"),
         RotationFormat::Quaternion => ("Tip in base, quaternion x y z w", 31, RotationFormat::RollPitchYaw, "rpy"),
     };
     let value = model.robot.as_ref().map_or_else(
