@@ -11,6 +11,10 @@ const RANGE_TAIL: f64 = 0.01;
 /// The range ends at multiples of this [m], so that it does not flicker.
 const RANGE_STEP_M: f32 = 0.05;
 
+/// Share of its length by which the range is longer at each end: the ends of the colour map are dark, and what is
+/// nearest is what people look for.
+const RANGE_MARGIN: f32 = 0.08;
+
 /// The shortest range [m]: a flat wall is not stretched over the whole map.
 const SHORTEST_RANGE_M: f32 = 0.10;
 
@@ -44,8 +48,9 @@ fn samples(depth: &DepthImage, far_plane_m: f32) -> impl Iterator<Item = f32> + 
 }
 
 fn rounded(near: f32, far: f32) -> [f32; 2] {
-    let near = (near / RANGE_STEP_M).floor() * RANGE_STEP_M;
-    let far = (far / RANGE_STEP_M).ceil() * RANGE_STEP_M;
+    let margin = RANGE_MARGIN * (far - near);
+    let near = ((near - margin) / RANGE_STEP_M).floor().max(0.0) * RANGE_STEP_M;
+    let far = ((far + margin) / RANGE_STEP_M).ceil() * RANGE_STEP_M;
     [near, far.max(near + SHORTEST_RANGE_M)]
 }
 
@@ -73,7 +78,7 @@ mod tests {
             metres[index * RANGE_STRIDE] = value;
         }
         let [near, far] = range_of(&picture(metres), 3.5, None).expect("a range");
-        assert!((near - 0.40).abs() < 1e-4 && (far - 0.75).abs() < 1e-4, "{near} {far}");
+        assert!((near - 0.35).abs() < 1e-4 && (far - 0.75).abs() < 1e-4, "{near} {far}");
     }
 
     #[test]

@@ -54,6 +54,10 @@ impl App {
     }
 
     /// Does what the user wants, or has a worker do it. Never waits for a worker.
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "a command is spent when it is applied; others will carry documents"
+    )]
     pub fn apply(&mut self, command: Command) {
         match command {
             Command::Stop => self.stop(),

@@ -30,7 +30,9 @@ pub enum Action {
 
 /// The connection as a whole: that of its two halves which is worse off.
 pub fn connection(model: &Model) -> Status {
-    let worse = if rank(&model.camera) > rank(&model.control) { Link::Camera } else { Link::Control };
+    let (camera, control) = (rank(&model.camera), rank(&model.control));
+    let camera_first = lost_since_s(&model.camera) < lost_since_s(&model.control);
+    let worse = if camera > control || (camera == control && camera_first) { Link::Camera } else { Link::Control };
     let other = model.link(if worse == Link::Camera { Link::Control } else { Link::Camera });
     let half = match (worse, other.is_connected()) {
         (_, false) => "Connection",
@@ -76,6 +78,14 @@ fn rank(state: &LinkState) -> u8 {
         LinkState::StartingCell | LinkState::Searching { .. } => 1,
         LinkState::Retrying { .. } | LinkState::Lost { .. } => 2,
         LinkState::Failed { .. } => 3,
+    }
+}
+
+/// When it was lost; later than everything when it was not.
+fn lost_since_s(state: &LinkState) -> f64 {
+    match state {
+        LinkState::Lost { since_s, .. } | LinkState::Retrying { since_s, .. } => *since_s,
+        _ => f64::INFINITY,
     }
 }
 

@@ -154,9 +154,12 @@ fn a_lost_connection_says_since_when_and_why_and_keeps_the_last_picture() {
     assert!(silent.sees("Camera connection lost 12 s ago"));
     assert!(silent.sees("The cable is out."));
     assert!(silent.harness.query_by_label("Colour picture").is_some());
-    let retrying = LinkState::Retrying { since_s: 88.0, why, attempt: 2 };
+    let retrying = LinkState::Retrying { since_s: 88.0, why: why.clone(), attempt: 2 };
     silent.absorb(Event::Link { link: Link::Camera, state: retrying });
     assert!(silent.sees("retrying"));
+    let later = LinkState::Lost { since_s: 95.0, why, attempt: 0 };
+    silent.absorb(Event::Link { link: Link::Control, state: later });
+    assert!(silent.sees("Connection lost 12 s ago"), "the first loss counts");
 }
 
 #[test]

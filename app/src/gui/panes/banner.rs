@@ -1,6 +1,6 @@
 //! A strip over the pictures that says why they are not live.
 
-use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, RichText, Stroke, Ui, Vec2};
+use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, Rect, RichText, Stroke, Ui, UiBuilder};
 
 use super::action_ui;
 use crate::command::Outbox;
@@ -19,13 +19,17 @@ pub fn banner_ui(ui: &mut Ui, status: &Status, outbox: &mut Outbox) {
         .corner_radius(CornerRadius::same(CARD_RADIUS))
         .inner_margin(Margin::symmetric(14, 8))
         .show(ui, |ui| {
-            ui.horizontal(|ui| {
-                let text = Vec2::new((ui.available_width() - BUTTON_WIDTH).max(0.0), 0.0);
-                ui.allocate_ui_with_layout(text, Layout::top_down(Align::Min), |ui| {
-                    ui.label(RichText::new(&status.title).strong());
-                    ui.add(Label::new(RichText::new(&status.detail).color(palette.weak)).wrap());
-                });
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| action_ui(ui, status.action, outbox));
+            ui.set_min_width(ui.available_width());
+            let row = ui.available_rect_before_wrap();
+            let text = ui.scope(|ui| {
+                ui.set_max_width((row.width() - BUTTON_WIDTH).max(0.0));
+                ui.label(RichText::new(&status.title).strong());
+                ui.add(Label::new(RichText::new(&status.detail).color(palette.weak)).wrap());
+            });
+            let beside = Rect::from_x_y_ranges(row.x_range(), text.response.rect.y_range());
+            let layout = Layout::right_to_left(Align::Center);
+            ui.scope_builder(UiBuilder::new().max_rect(beside).layout(layout), |ui| {
+                action_ui(ui, status.action, outbox);
             });
         });
 }
