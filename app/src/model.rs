@@ -3,6 +3,7 @@
 //! Only [`crate::gui::App::apply`] and [`crate::gui::App::absorb`] change a [`Model`]; panes read it. Times are seconds
 //! on the clock that the application was started with.
 
+use std::fmt;
 use std::sync::Arc;
 
 use handeye_core::depth::{ColourMap, DepthImage, DepthSample};
@@ -36,7 +37,10 @@ pub enum Link {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum LinkState {
     /// The built-in cell is being started.
-    StartingCell,
+    StartingCell {
+        /// Why the last try failed.
+        why: Option<String>,
+    },
     /// It has never been connected yet.
     Searching {
         /// Where a server is expected.
@@ -127,7 +131,7 @@ pub struct FrameInfo {
 }
 
 /// The pixels of a frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct FrameImages {
     /// Colour, row 0 on top.
     pub rgb: RgbImage,
@@ -135,6 +139,15 @@ pub struct FrameImages {
     pub depth: DepthImage,
     /// Depth as the window shows it, same size as `depth`.
     pub depth_coloured: RgbImage,
+}
+
+/// Sizes only: a million pixels say nothing in a log.
+impl fmt::Debug for FrameImages {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { rgb, depth, depth_coloured: _ } = self;
+        let depth = (depth.width, depth.height);
+        f.debug_struct("FrameImages").field("rgb", &rgb.dimensions()).field("depth", &depth).finish()
+    }
 }
 
 impl FrameImages {
@@ -319,7 +332,7 @@ impl LinkState {
     /// The state before the first try.
     pub fn first(source: &CellSource) -> Self {
         match source {
-            CellSource::BuiltIn => Self::StartingCell,
+            CellSource::BuiltIn => Self::StartingCell { why: None },
             CellSource::Address(address) => Self::Searching { address: address.clone(), attempt: 1, why: None },
         }
     }

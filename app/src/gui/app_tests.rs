@@ -57,7 +57,7 @@ fn a_lost_connection_is_said_and_a_retry_does_not_hide_why() {
 #[test]
 fn a_stop_without_connection_points_to_the_emergency_stop() {
     let mut app = app(&FakeCell::new(0));
-    app.absorb(Event::Link { link: Link::Control, state: LinkState::StartingCell });
+    app.absorb(Event::Link { link: Link::Control, state: LinkState::StartingCell { why: None } });
     app.apply(Command::Stop);
     assert!(message(&app).contains("emergency stop"), "{}", message(&app));
     assert!(app.model().stop_pending);

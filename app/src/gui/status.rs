@@ -75,7 +75,7 @@ pub fn before_first_picture(model: &Model) -> Status {
 fn rank(state: &LinkState) -> u8 {
     match state {
         LinkState::Connected { .. } => 0,
-        LinkState::StartingCell | LinkState::Searching { .. } => 1,
+        LinkState::StartingCell { .. } | LinkState::Searching { .. } => 1,
         LinkState::Retrying { .. } | LinkState::Lost { .. } => 2,
         LinkState::Failed { .. } => 3,
     }
@@ -92,12 +92,11 @@ fn lost_since_s(state: &LinkState) -> f64 {
 fn of_link(model: &Model, state: &LinkState, half: &str) -> Status {
     let status = |tone, title: String, detail: String, action| Status { tone, title, detail, action };
     match state {
-        LinkState::StartingCell => status(
-            Tone::Busy,
-            "Starting the built-in cell…".to_owned(),
-            "A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed.".to_owned(),
-            None,
-        ),
+        LinkState::StartingCell { why } => {
+            let cell = "A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed.";
+            let detail = why.as_deref().map_or_else(|| cell.to_owned(), sentence);
+            status(Tone::Busy, "Starting the built-in cell…".to_owned(), detail, None)
+        }
         LinkState::Searching { address, attempt, why } => {
             let detail = match why {
                 None => "Asking whether a CoppeliaSim or a cell answers there.".to_owned(),

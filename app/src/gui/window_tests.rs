@@ -129,7 +129,7 @@ fn frame(number: u64) -> Event {
 #[test]
 fn every_state_of_the_connection_says_what_goes_on() {
     let mut built_in = Silent::new(CellSource::BuiltIn);
-    built_in.links(&LinkState::StartingCell);
+    built_in.links(&LinkState::StartingCell { why: None });
     assert!(built_in.sees("Starting the built-in cell…"));
     built_in.links(&LinkState::Failed { why: "no scene".to_owned() });
     assert!(built_in.sees("The built-in cell did not start"));
@@ -208,7 +208,7 @@ fn the_robot_is_shown_in_millimetres_and_degrees() {
 #[test]
 fn stop_is_one_click_away_in_every_state() {
     let mut silent = Silent::new(CellSource::BuiltIn);
-    for prepare in [LinkState::StartingCell, connected()] {
+    for prepare in [LinkState::StartingCell { why: None }, connected()] {
         silent.links(&prepare);
         silent.harness.get_by_label("STOP").click();
         silent.steps();

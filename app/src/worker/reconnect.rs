@@ -70,7 +70,7 @@ impl Reconnect {
 
     fn searching(&self) -> LinkState {
         match &self.source {
-            CellSource::BuiltIn => LinkState::StartingCell,
+            CellSource::BuiltIn => LinkState::StartingCell { why: self.why.clone() },
             CellSource::Address(address) => {
                 LinkState::Searching { address: address.clone(), attempt: self.attempt, why: self.why.clone() }
             }
@@ -134,6 +134,6 @@ mod tests {
         let state = reconnect.failed(&PortError::Hopeless("no memory".to_owned()));
         assert_eq!(state, LinkState::Failed { why: "no memory".to_owned() });
         assert_eq!(reconnect.pause(), None);
-        assert_eq!(reconnect.trying(), LinkState::StartingCell);
+        assert_eq!(reconnect.trying(), LinkState::StartingCell { why: Some("no memory".to_owned()) });
     }
 }
