@@ -22,18 +22,12 @@ pub fn sensor() -> Intrinsics {
 fn motion(joints: &[f64; 6], link: usize) -> Isometry3<f64> {
     AXES.iter().zip(joints).take(link).fold(Isometry3::identity(), |so_far, ((point, axis), angle)| {
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(*axis) * *angle);
-        so_far * Isometry3::rotation_wrt_point(rotation, Point3::from(*point))
+        so_far * rotation_about_point(rotation, Point3::from(*point))
     })
 }
 
-trait AboutPoint {
-    fn rotation_wrt_point(rotation: UnitQuaternion<f64>, point: Point3<f64>) -> Isometry3<f64>;
-}
-
-impl AboutPoint for Isometry3<f64> {
-    fn rotation_wrt_point(rotation: UnitQuaternion<f64>, point: Point3<f64>) -> Isometry3<f64> {
-        Isometry3::from_parts(Translation3::from(point.coords - rotation * point.coords), rotation)
-    }
+fn rotation_about_point(rotation: UnitQuaternion<f64>, point: Point3<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(Translation3::from(point.coords - rotation * point.coords), rotation)
 }
 
 fn world_from_base() -> Isometry3<f64> {

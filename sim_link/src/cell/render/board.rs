@@ -30,8 +30,8 @@ impl Pattern {
         let Footprint { centre: [s, r], by_u, by_v } = footprint;
         let half_s = 0.5 * (by_u[0].abs() + by_v[0].abs());
         let half_r = 0.5 * (by_u[1].abs() + by_v[1].abs());
-        let (s_low, s_high) = ((s - half_s).floor(), (s + half_s).floor());
-        let (r_low, r_high) = ((r - half_r).floor(), (r + half_r).floor());
+        let (s_low, s_high) = (floor(s - half_s), floor(s + half_s));
+        let (r_low, r_high) = (floor(r - half_r), floor(r + half_r));
         match (s_high - s_low, r_high - r_low) {
             (0.0, 0.0) => self.cell(s_low, r_low),
             (1.0, 0.0) => {
@@ -49,7 +49,7 @@ impl Pattern {
     /// 1 where the square with this lower corner is dark.
     fn cell(&self, s: f64, r: f64) -> f64 {
         let inside = s >= -1.0 && s < self.columns && r >= -1.0 && r < self.rows;
-        if inside && (s + r).rem_euclid(2.0) == 0.0 { 1.0 } else { 0.0 }
+        if inside && is_even(s + r) { 1.0 } else { 0.0 }
     }
 
     /// The general case by Green's theorem.
@@ -64,7 +64,7 @@ impl Pattern {
         let extent = (by_u[0].abs() + by_v[0].abs()) * (by_u[1].abs() + by_v[1].abs());
         let measurable = extent.is_finite() && area.abs() > FLAT * extent.max(1.0);
         if !measurable {
-            return self.cell(s.floor(), r.floor());
+            return self.cell(floor(*s), floor(*r));
         }
         let vertex = |a: f64, b: f64| [s + 0.5 * (a * by_u[0] + b * by_v[0]), r + 0.5 * (a * by_u[1] + b * by_v[1])];
         let corners = [vertex(-1.0, -1.0), vertex(1.0, -1.0), vertex(1.0, 1.0), vertex(-1.0, 1.0)];
@@ -109,7 +109,7 @@ impl Crossings {
     fn new(from: f64, to: f64, end: f64) -> Self {
         let slope = to - from;
         let (line, last) =
-            if slope > 0.0 { ((from.floor() + 1.0).max(-1.0), end) } else { ((from.ceil() - 1.0).min(end), -1.0) };
+            if slope > 0.0 { ((floor(from) + 1.0).max(-1.0), end) } else { ((from.ceil() - 1.0).min(end), -1.0) };
         let mut crossings = Self { from, slope, line, last, tau: f64::INFINITY };
         crossings.locate();
         crossings
@@ -126,6 +126,16 @@ impl Crossings {
             self.locate();
         }
     }
+}
+
+/// Rounds down; unlike the method of that name it is no library call on processors without SSE 4.1.
+pub(super) fn floor(x: f64) -> f64 {
+    let cut = x as i64 as f64;
+    if cut > x { cut - 1.0 } else { cut }
+}
+
+fn is_even(x: f64) -> bool {
+    x as i64 & 1 == 0
 }
 
 /// Part of a parallelogram on the lower side of a line at `offset` from its centre, where `a` and `b` are the
@@ -146,7 +156,7 @@ fn below_line(offset: f64, a: f64, b: f64) -> f64 {
 fn wave(x: f64, end: f64) -> (f64, f64) {
     if x < -1.0 || x >= end {
         (0.0, 0.0)
-    } else if x.floor().rem_euclid(2.0) == 0.0 {
+    } else if is_even(floor(x)) {
         (1.0, 1.0)
     } else {
         (-1.0, 1.0)
@@ -156,7 +166,8 @@ fn wave(x: f64, end: f64) -> (f64, f64) {
 /// Antiderivative of q from -1.
 fn wave_area(x: f64, end: f64) -> f64 {
     // A triangle wave: 0 at -1, -1 at 0, 0 at 1.
-    (ramp(x, end).rem_euclid(2.0) - 1.0).abs() - 1.0
+    let x = ramp(x, end);
+    (x - 2.0 * floor(0.5 * x) - 1.0).abs() - 1.0
 }
 
 /// Antiderivative of w from -1.

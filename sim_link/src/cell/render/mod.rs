@@ -8,13 +8,16 @@
 //! 0 to 1; there is no gamma. Lengths are metres.
 
 mod board;
+mod ground;
 mod imaging;
 pub mod props;
 mod rays;
 mod renderer;
 mod shade;
+mod shadow;
 mod shapes;
 mod stage;
+mod texture;
 
 use handeye_core::image::RgbImage;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
@@ -135,7 +138,7 @@ pub enum Shape {
     Plane,
 }
 
-/// Surface of a [`Solid`].
+/// Surface of a [`Solid`]. Shadows fall on [`Self::Tiles`] and [`Self::Wood`] only.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Finish {
     /// One colour, no gloss.
@@ -182,8 +185,8 @@ pub enum LightSource {
 impl Default for Light {
     /// A ceiling lamp in front of the arm, mild enough for white paper.
     fn default() -> Self {
-        let towards_lamp = Unit::new_normalize(Vector3::new(0.35, 0.75, 1.0));
-        Self { source: LightSource::Directional(towards_lamp), ambient: 0.5, diffuse: 0.45 }
+        let towards_lamp = Unit::new_normalize(Vector3::new(0.35, 0.9, 1.0));
+        Self { source: LightSource::Directional(towards_lamp), ambient: 0.52, diffuse: 0.46 }
     }
 }
 
@@ -219,3 +222,8 @@ pub struct RenderedFrame {
     /// exactly where there is nothing between near and far plane.
     pub depth_m: Vec<f32>,
 }
+
+#[cfg(test)]
+mod scene_tests;
+#[cfg(test)]
+mod truth_tests;

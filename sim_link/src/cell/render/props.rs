@@ -5,9 +5,9 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use super::{Finish, Shape, Solid};
 
 /// Turned aluminium of tubes and housings.
-pub const ALUMINIUM: [f32; 3] = [0.62, 0.64, 0.66];
+pub const ALUMINIUM: [f32; 3] = [0.76, 0.78, 0.80];
 /// The darker tone of base, wrists and gripper.
-pub const GRAPHITE: [f32; 3] = [0.20, 0.22, 0.25];
+pub const GRAPHITE: [f32; 3] = [0.25, 0.27, 0.30];
 /// Covers of the joints.
 pub const COVER_BLUE: [f32; 3] = [0.24, 0.45, 0.66];
 
@@ -107,7 +107,7 @@ pub fn gripper(world_from_tip: &Isometry3<f64>) -> Vec<Solid> {
 
 /// The floor of the hall at z = 0.
 pub fn floor() -> Solid {
-    Solid::new(Shape::Plane, Isometry3::identity(), [0.56, 0.57, 0.58])
+    Solid::new(Shape::Plane, Isometry3::identity(), [0.70, 0.71, 0.72])
         .with_finish(Finish::Tiles { pitch_m: 0.5, joint_m: 0.006 })
 }
 
@@ -118,7 +118,7 @@ pub fn table(middle_m: Point3<f64>, size_m: [f64; 2]) -> Vec<Solid> {
     let top = Solid::new(
         Shape::Box { half_extents: Vector3::new(half[0], half[1], 0.015) },
         place(0.0, 0.0, middle_m.z - 0.015),
-        [0.66, 0.50, 0.34],
+        [0.78, 0.60, 0.42],
     )
     .with_finish(Finish::Wood);
     let leg_half = 0.5 * (middle_m.z - 0.03);

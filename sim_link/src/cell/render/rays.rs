@@ -1,5 +1,7 @@
 //! The ray of every pixel of one camera, and the picture cut into tiles.
 
+use std::ops::Range;
+
 use handeye_core::camera::{Distortion, Intrinsics};
 use nalgebra::{Point3, Vector2};
 
@@ -38,51 +40,79 @@ impl Ray {
     }
 }
 
-/// A block of pixels with the bounds of its rays; `None` where no pixel has one.
+/// A block of pixels.
 #[derive(Debug, Clone)]
 pub(super) struct Tile {
-    pub columns: std::ops::Range<usize>,
-    pub rows: std::ops::Range<usize>,
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+    /// Bounds of its rays; `None` where no pixel has one.
     pub rays: Option<Rays>,
+    /// Whether every pixel has one.
+    pub is_complete: bool,
 }
 
-/// All rays of a camera, row by row from the top.
+/// All rays of a camera.
 #[derive(Debug, Clone)]
 pub(super) struct RayTable {
     pub width: usize,
     pub height: usize,
-    pub rays: Vec<Ray>,
     pub tiles: Vec<Tile>,
+    source: Source,
+}
+
+#[derive(Debug, Clone)]
+enum Source {
+    /// Without distortion it is faster to compute a ray than to fetch it.
+    Pinhole { centre: [f64; 2], per_pixel: [f64; 2] },
+    /// Row by row from the top.
+    Table(Vec<Ray>),
 }
 
 impl RayTable {
     pub fn new(camera: &Intrinsics) -> Self {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let usable = camera.validate().is_ok();
-        let rays: Vec<Ray> = (0..width * height)
-            .map(|i| {
+        let source = if usable && camera.distortion == Distortion::None {
+            Source::Pinhole { centre: [camera.cx, camera.cy], per_pixel: [1.0 / camera.fx, 1.0 / camera.fy] }
+        } else {
+            let ray = |i: usize| {
                 let px = Vector2::new((i % width) as f64, (i / width) as f64);
                 if usable { ray_of(camera, &px).unwrap_or(Ray::NONE) } else { Ray::NONE }
-            })
-            .collect();
-        let mut tiles = Vec::new();
+            };
+            Source::Table((0..width * height).map(ray).collect())
+        };
+        let mut table = Self { width, height, tiles: Vec::new(), source };
         for top in (0..height).step_by(TILE) {
             for left in (0..width).step_by(TILE) {
                 let columns = left..(left + TILE).min(width);
                 let rows = top..(top + TILE).min(height);
-                let block = rows.clone().flat_map(|y| &rays[y * width + columns.start..y * width + columns.end]);
-                tiles.push(Tile { rays: bounds(block), columns, rows });
+                let block: Vec<Ray> = rows
+                    .clone()
+                    .flat_map(|y| columns.clone().map(move |x| (x, y)))
+                    .map(|(x, y)| table.ray(x, y))
+                    .collect();
+                let rays = bounds(block.iter());
+                let is_complete = block.iter().all(Ray::exists);
+                table.tiles.push(Tile { columns, rows, rays, is_complete });
             }
         }
-        Self { width, height, rays, tiles }
+        table
+    }
+
+    /// The ray of the pixel in column `x` and row `y`.
+    pub fn ray(&self, x: usize, y: usize) -> Ray {
+        match &self.source {
+            Source::Pinhole { centre, per_pixel } => Ray {
+                x: (x as f64 - centre[0]) * per_pixel[0],
+                y: (y as f64 - centre[1]) * per_pixel[1],
+                by_pixel: [per_pixel[0] as f32, 0.0, 0.0, per_pixel[1] as f32],
+            },
+            Source::Table(rays) => rays[y * self.width + x],
+        }
     }
 }
 
 fn ray_of(camera: &Intrinsics, px: &Vector2<f64>) -> Option<Ray> {
-    if camera.distortion == Distortion::None {
-        let by_pixel = [1.0 / camera.fx, 0.0, 0.0, 1.0 / camera.fy].map(|d| d as f32);
-        return Some(Ray { x: (px.x - camera.cx) / camera.fx, y: (px.y - camera.cy) / camera.fy, by_pixel });
-    }
     let ray = camera.unproject(px).ok()?;
     let (x, y) = (ray.x / ray.z, ray.y / ray.z);
     if ray.z <= 0.0 || x.hypot(y) > MAX_SLOPE {

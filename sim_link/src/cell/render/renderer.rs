@@ -1,10 +1,12 @@
 //! From a scene to pixels.
 
+use std::ops::Range;
+
 use handeye_core::camera::Intrinsics;
 use handeye_core::image::RgbImage;
 
 use super::rays::{Ray, RayTable, Tile};
-use super::stage::{BACKGROUND, Candidate, Hit, Stage};
+use super::stage::{BACKGROUND, Hit, Sight, Stage};
 use super::{Imaging, RenderScene, RenderedFrame, imaging};
 
 /// Rays through a pixel that an edge crosses. Their offsets are distinct in both directions, so that edges along rows
@@ -71,48 +73,75 @@ impl Renderer {
 
     fn trace(&self, scene: &RenderScene, with_colour: bool) -> Traced {
         let stage = Stage::new(scene, self.near_m, self.far_m);
-        let pixels = self.table.rays.len();
+        let pixels = self.table.width * self.table.height;
         let coloured = if with_colour { pixels } else { 0 };
         let mut traced = Traced {
             depths_m: vec![self.far_m as f32; pixels],
             faces: vec![BACKGROUND; coloured],
             colours: vec![0.0; 3 * coloured],
         };
-        let mut candidates: Vec<Candidate> = Vec::new();
-        let mut sights = Vec::with_capacity(self.table.tiles.len());
-        for tile in &self.table.tiles {
-            let start = candidates.len();
-            if let Some(rays) = &tile.rays {
-                stage.survey(rays, &mut candidates);
-            }
-            sights.push(start..candidates.len());
-            self.trace_tile(&stage, tile, &candidates[start..], with_colour, &mut traced);
-        }
+        let sights: Vec<Sight> = self
+            .table
+            .tiles
+            .iter()
+            .map(|tile| {
+                let sight = tile.rays.as_ref().map(|rays| stage.survey(rays, with_colour)).unwrap_or_default();
+                self.trace_tile(&stage, tile, &sight, with_colour, &mut traced);
+                sight
+            })
+            .collect();
         if with_colour {
-            for (tile, sight) in self.table.tiles.iter().zip(sights) {
-                self.smooth_edges(&stage, tile, &candidates[sight], &mut traced);
+            for (tile, sight) in self.table.tiles.iter().zip(&sights) {
+                self.smooth_edges(&stage, tile, sight, &mut traced);
             }
         }
         traced
     }
 
-    fn trace_tile(&self, stage: &Stage, tile: &Tile, candidates: &[Candidate], with_colour: bool, traced: &mut Traced) {
+    fn trace_tile(&self, stage: &Stage, tile: &Tile, sight: &Sight, with_colour: bool, traced: &mut Traced) {
         for y in tile.rows.clone() {
+            if with_colour && self.trace_run(stage, tile, y, sight, traced) {
+                continue;
+            }
             for x in tile.columns.clone() {
                 let i = y * self.table.width + x;
-                let ray = &self.table.rays[i];
-                let hit = stage.first_hit(candidates, ray);
+                let ray = self.table.ray(x, y);
+                let hit = stage.first_hit(sight, &ray);
                 traced.depths_m[i] = hit.depth as f32;
                 if with_colour {
                     traced.faces[i] = stage.face(&hit);
-                    traced.colours[3 * i..3 * i + 3].copy_from_slice(&stage.colour(&hit, ray));
+                    traced.colours[3 * i..3 * i + 3].copy_from_slice(&stage.colour(sight, &hit, &ray));
                 }
             }
         }
     }
 
+    /// The short way for one row of a tile; false where there is none.
+    fn trace_run(&self, stage: &Stage, tile: &Tile, y: usize, sight: &Sight, traced: &mut Traced) -> bool {
+        if !tile.is_complete {
+            return false;
+        }
+        let Range { start, end } = tile.columns;
+        let pixels = y * self.table.width + start..y * self.table.width + end;
+        let depths = traced.depths_m[pixels.clone()].iter_mut();
+        let mut out = depths.zip(traced.colours[3 * pixels.start..3 * pixels.end].chunks_exact_mut(3));
+        let put = |depth: f64, colour: [f32; 3]| {
+            if let Some((depth_out, colour_out)) = out.next() {
+                *depth_out = depth as f32;
+                colour_out.copy_from_slice(&colour);
+            }
+        };
+        match stage.paint_run(sight, end - start, |i| self.table.ray(start + i, y), put) {
+            Some(face) => {
+                traced.faces[pixels].fill(face);
+                true
+            }
+            None => false,
+        }
+    }
+
     /// Gives the pixels on the border between two faces the mean colour of their area.
-    fn smooth_edges(&self, stage: &Stage, tile: &Tile, candidates: &[Candidate], traced: &mut Traced) {
+    fn smooth_edges(&self, stage: &Stage, tile: &Tile, sight: &Sight, traced: &mut Traced) {
         let (width, height) = (self.table.width, self.table.height);
         for y in tile.rows.clone() {
             for x in tile.columns.clone() {
@@ -123,9 +152,11 @@ impl Renderer {
                     || (x + 1 < width && faces[i + 1] != face)
                     || (y > 0 && faces[i - width] != face)
                     || (y + 1 < height && faces[i + width] != face);
-                let ray = &self.table.rays[i];
-                if on_edge && ray.exists() {
-                    traced.colours[3 * i..3 * i + 3].copy_from_slice(&mean_colour(stage, candidates, ray));
+                if on_edge {
+                    let ray = self.table.ray(x, y);
+                    if ray.exists() {
+                        traced.colours[3 * i..3 * i + 3].copy_from_slice(&mean_colour(stage, sight, &ray));
+                    }
                 }
             }
         }
@@ -133,18 +164,18 @@ impl Renderer {
 }
 
 /// The colour of each face that the pixel sees, by the number of rays that end on it.
-fn mean_colour(stage: &Stage, candidates: &[Candidate], ray: &Ray) -> [f32; 3] {
+fn mean_colour(stage: &Stage, sight: &Sight, ray: &Ray) -> [f32; 3] {
     let mut seen: [Option<(u16, [f32; 3])>; 4] = [None; 4];
     let mut sum = [0.0; 3];
     for i in 0..EDGE_RAYS {
         let du = (f64::from(i) + 0.5) / f64::from(EDGE_RAYS) - 0.5;
         let dv = (f64::from(i.reverse_bits() >> 28) + 0.5) / f64::from(EDGE_RAYS) - 0.5;
         let beside = ray.beside(du, dv);
-        let hit = stage.first_hit(candidates, &beside);
+        let hit = stage.first_hit(sight, &beside);
         let face = stage.face(&hit);
         let known = seen.iter().flatten().find(|(other, _)| *other == face).map(|(_, colour)| *colour);
         let colour = known.unwrap_or_else(|| {
-            let colour = face_colour(stage, &hit, ray, &beside);
+            let colour = face_colour(stage, sight, &hit, ray, &beside);
             if let Some(free) = seen.iter_mut().find(|slot| slot.is_none()) {
                 *free = Some((face, colour));
             }
@@ -159,6 +190,6 @@ fn mean_colour(stage: &Stage, candidates: &[Candidate], ray: &Ray) -> [f32; 3] {
 
 /// The print is integrated over the whole pixel, edge or no edge: its visible part then has the value that the
 /// pixel would have if nothing crossed it.
-fn face_colour(stage: &Stage, hit: &Hit, pixel: &Ray, sample: &Ray) -> [f32; 3] {
-    stage.colour(hit, if stage.is_print(hit) { pixel } else { sample })
+fn face_colour(stage: &Stage, sight: &Sight, hit: &Hit, pixel: &Ray, sample: &Ray) -> [f32; 3] {
+    stage.colour(sight, hit, if stage.is_print(hit) { pixel } else { sample })
 }

@@ -3,6 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::shapes::{Vec3, dot, scale_add};
+use super::texture::{WoodAt, grain, tiles};
 use super::{Finish, Light, LightSource, Solid};
 
 /// Sharpness of the highlight on satin and brushed surfaces, as a power of two of the cosine.
@@ -91,20 +92,17 @@ pub(super) struct Spot {
 }
 
 impl Spot {
-    /// How the point moves on the surface per pixel to the right and per pixel down.
-    fn across_pixel(&self) -> [Vec3; 2] {
+    /// Coordinate of the point along a direction, and half the range that it has over the pixel.
+    fn along(&self, direction: &Vec3, origin: f64) -> (f64, f64) {
         let Self { point, normal, by_pixel, .. } = self;
-        let depth = point[2];
-        let facing = 1.0 / dot(normal, point);
-        let by_ray = |axis: usize| {
-            let mut step = scale_add(-depth * normal[axis] * facing, point, &[0.0; 3]);
-            step[axis] += depth;
-            step
-        };
-        let (by_x, by_y) = (by_ray(0), by_ray(1));
+        let value = dot(direction, point);
+        let facing = value / dot(normal, point);
+        // A point on the plane n·p = const moves by depth · (e - p n_e / n·p) when the ray changes along the axis e.
+        let by_x = point[2] * (direction[0] - facing * normal[0]);
+        let by_y = point[2] * (direction[1] - facing * normal[1]);
         let [x_by_u, x_by_v, y_by_u, y_by_v] = by_pixel.map(f64::from);
-        let along = |x: f64, y: f64| scale_add(x, &by_x, &scale_add(y, &by_y, &[0.0; 3]));
-        [along(x_by_u, y_by_u), along(x_by_v, y_by_v)]
+        let range = (by_x * x_by_u + by_y * y_by_u).abs() + (by_x * x_by_v + by_y * y_by_v).abs();
+        (value + origin, 0.5 * range)
     }
 }
 
@@ -136,6 +134,11 @@ impl Coat {
         })
     }
 
+    /// Whether shadows fall on it.
+    pub fn is_ground(&self) -> bool {
+        matches!(self.finish, Finish::Tiles { .. } | Finish::Wood)
+    }
+
     pub fn colour_at(&self, spot: &Spot, lamp: &Lamp, background: [f32; 3]) -> [f32; 3] {
         let towards = lamp.towards(&spot.point);
         let tone = lamp.brightness(&spot.normal, &towards, spot.sunlit) * self.texture(spot);
@@ -144,94 +147,68 @@ impl Coat {
             Finish::Matt | Finish::Tiles { .. } | Finish::Wood => 0.0,
         };
         let lit = self.colour.map(|c| c * tone + shine);
-        let Some([start, end]) = self.fade else { return lit };
-        let x = ((spot.point[2] - start) / (end - start)).clamp(0.0, 1.0) as f32;
-        let mist = x * x * (3.0 - 2.0 * x);
-        std::array::from_fn(|i| lit[i] + mist * (background[i] - lit[i]))
+        match self.fade {
+            Some(fade) => misty(lit, background, fade, spot.point[2]),
+            None => lit,
+        }
+    }
+
+    /// The directions, and the values at the camera, of the coordinates in which the pattern of a ground is drawn.
+    pub fn pattern_axes(&self) -> ((Vec3, f64), (Vec3, f64)) {
+        let (rows, origin) = (&self.shape_from_camera, &self.origin);
+        let x = (rows[0], origin[0]);
+        match self.finish {
+            // Grain runs along x on the flat sides and around the edge between them.
+            Finish::Wood => (x, (scale_add(1.0, &rows[1], &rows[2]), origin[1] + origin[2])),
+            _ => (x, (rows[1], origin[1])),
+        }
+    }
+
+    pub fn finish(&self) -> Finish {
+        self.finish
+    }
+
+    pub fn colour(&self) -> [f32; 3] {
+        self.colour
+    }
+
+    pub fn fade(&self) -> Option<[f64; 2]> {
+        self.fade
     }
 
     /// Factor on the colour.
     fn texture(&self, spot: &Spot) -> f32 {
-        let place = |axis: usize| dot(&self.shape_from_camera[axis], &spot.point) + self.origin[axis];
-        if matches!(self.finish, Finish::Matt | Finish::Satin) {
-            return 1.0;
-        }
-        let [by_u, by_v] = spot.across_pixel();
-        let half_width = |axis: usize| {
-            let row = &self.shape_from_camera[axis];
-            0.5 * (dot(row, &by_u).abs() + dot(row, &by_v).abs())
+        let on_ground = || {
+            let ((x_axis, x_origin), (y_axis, y_origin)) = self.pattern_axes();
+            let ((x, x_half), (y, y_half)) = (spot.along(&x_axis, x_origin), spot.along(&y_axis, y_origin));
+            ([x, y], [x_half, y_half])
         };
         match self.finish {
             Finish::Matt | Finish::Satin => 1.0,
-            Finish::Brushed => 1.0 + 0.05 * grain(place(2) / 0.0011, half_width(2) / 0.0011, 7),
+            Finish::Brushed => {
+                let (z, half) = spot.along(&self.shape_from_camera[2], self.origin[2]);
+                1.0 + 0.06 * grain(z * 900.0, half * 900.0)
+            }
             Finish::Tiles { pitch_m, joint_m } => {
-                let (x, y) = (place(0) / pitch_m, place(1) / pitch_m);
-                let (wx, wy) = (half_width(0) / pitch_m, half_width(1) / pitch_m);
-                let joint = joint_m / pitch_m;
-                let open = (1.0 - stripes(x, wx, joint)) * (1.0 - stripes(y, wy, joint));
-                let tile = lattice(x.floor() as i64, y.floor() as i64);
-                let far = fading(wx.max(wy));
-                (1.0 - 0.30 * (1.0 - open) as f32) * (1.0 + 0.035 * far * tile)
+                let (at, half) = on_ground();
+                tiles(at, half, pitch_m, joint_m)
             }
             Finish::Wood => {
-                let (x, y) = (place(0), place(1));
-                let (wx, wy) = (half_width(0), half_width(1));
-                let board = (y / 0.14).floor();
-                let bend = f64::from(cloud(x * 1.7 + board * 17.3, y * 9.0 + board * 5.1)) * 0.012;
-                let fine = 520.0;
-                let rings = cloud(x * 2.2 + board * 31.7, (y + bend) * 75.0) * fading(wy * 75.0);
-                let pores = cloud(x * 14.0, (y + bend) * fine) * fading((wy * fine).max(wx * 14.0));
-                let seam = stripes(y / 0.14, wy / 0.14, 0.006) as f32;
-                (1.0 + 0.10 * rings + 0.05 * pores + 0.05 * lattice(board as i64, 3)) * (1.0 - 0.4 * seam)
+                let (at, half) = on_ground();
+                WoodAt::new(half).tone(at[0], at[1])
             }
         }
     }
+}
+
+/// Fades a colour into the background over a range of depths.
+pub(super) fn misty(colour: [f32; 3], background: [f32; 3], [start, end]: [f64; 2], depth: f64) -> [f32; 3] {
+    let x = ((depth - start) / (end - start)).clamp(0.0, 1.0) as f32;
+    let mist = x * x * (3.0 - 2.0 * x);
+    std::array::from_fn(|i| colour[i] + mist * (background[i] - colour[i]))
 }
 
 fn unit(a: &Vec3) -> Vec3 {
     let scale = 1.0 / dot(a, a).sqrt();
     [a[0] * scale, a[1] * scale, a[2] * scale]
-}
-
-/// Part of the interval `x ± half` that lies in stripes of width `width` before every integer.
-fn stripes(x: f64, half: f64, width: f64) -> f64 {
-    let up_to = |x: f64| x.floor() * width + (x - x.floor() - (1.0 - width)).max(0.0);
-    let half = half.max(1e-9);
-    (up_to(x + half) - up_to(x - half)) / (2.0 * half)
-}
-
-/// 1 for detail much larger than a pixel, 0 for detail that a pixel would alias; `half` is in units of the detail.
-fn fading(half: f64) -> f32 {
-    (1.6 - 3.2 * half).clamp(0.0, 1.0) as f32
-}
-
-/// A fixed random number in ±1 for each point of a lattice.
-fn lattice(i: i64, j: i64) -> f32 {
-    let mut h = (i as u32).wrapping_mul(0x9E37_79B1) ^ (j as u32).wrapping_mul(0x85EB_CA77);
-    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-    h ^= h >> 13;
-    h as i32 as f32 / 2_147_483_648.0
-}
-
-/// Smooth random numbers along a line, in ±1, fading where a pixel is wider than the detail.
-fn grain(x: f64, half: f64, row: i64) -> f32 {
-    let visible = fading(half);
-    if visible == 0.0 {
-        return 0.0;
-    }
-    let i = x.floor();
-    let f = (x - i) as f32;
-    let (a, b) = (lattice(i as i64, row), lattice(i as i64 + 1, row));
-    visible * (a + (b - a) * f)
-}
-
-/// Smooth random numbers over a plane, in ±1.
-fn cloud(x: f64, y: f64) -> f32 {
-    let (i, j) = (x.floor(), y.floor());
-    let (f, g) = ((x - i) as f32, (y - j) as f32);
-    let (f, g) = (f * f * (3.0 - 2.0 * f), g * g * (3.0 - 2.0 * g));
-    let at = |di: i64, dj: i64| lattice(i as i64 + di, j as i64 + dj);
-    let low = at(0, 0) + (at(1, 0) - at(0, 0)) * f;
-    let high = at(0, 1) + (at(1, 1) - at(0, 1)) * f;
-    low + (high - low) * g
 }

@@ -46,6 +46,23 @@ impl Rays {
         Self { middle, half, axis: axis.into(), cosine, sine: (1.0 - cosine * cosine).max(0.0).sqrt() }
     }
 
+    /// A ball around where the rays meet a plane, cut off at a depth.
+    pub fn patch(&self, inverse_depth: &Vec3, deepest: f64) -> (Vec3, f64) {
+        let corner = |i: f64, j: f64| {
+            let ray = [self.middle[0] + i * self.half[0], self.middle[1] + j * self.half[1], 1.0];
+            let inverse = dot(inverse_depth, &ray);
+            let depth = if inverse * deepest > 1.0 { 1.0 / inverse } else { deepest };
+            ray.map(|c| c * depth)
+        };
+        let corners = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, -1.0), corner(1.0, 1.0)];
+        let middle = std::array::from_fn(|k| 0.25 * corners.iter().map(|c| c[k]).sum::<f64>());
+        let distance = |c: &Vec3| {
+            let away = scale_add(-1.0, &middle, c);
+            dot(&away, &away)
+        };
+        (middle, corners.iter().map(distance).fold(0.0, f64::max).sqrt())
+    }
+
     /// Least and greatest value of a linear form over the directions.
     fn range(&self, form: &Vec3) -> (f64, f64) {
         let middle = form[0] * self.middle[0] + form[1] * self.middle[1] + form[2];

@@ -1,12 +1,14 @@
 //! A scene as one camera sees it: surfaces in camera coordinates with their looks.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::RenderScene;
 use super::board::{Footprint, Pattern};
+use super::ground::Ground;
 use super::rays::Ray;
 use super::shade::{Coat, Lamp, Spot};
+use super::shadow::{self, Caster};
 use super::shapes::{Facet, Rays, Surface, Vec3, dot, faces, scale_add};
+use super::{BoardSurface, RenderScene};
 
 /// Face number of the background.
 pub(super) const BACKGROUND: u16 = 0;
@@ -23,6 +25,8 @@ struct Piece {
     paint: Paint,
     /// Depth counts this many times its value when surfaces compete.
     lead: f64,
+    /// The solid that it belongs to; `None` for the board.
+    owner: Option<usize>,
 }
 
 #[derive(Debug)]
@@ -30,6 +34,8 @@ enum Paint {
     /// One colour, light included.
     Flat([f32; 3]),
     Coat(Coat),
+    /// A coat with its short way.
+    Ground(Coat, Ground),
     Print(Print),
 }
 
@@ -53,14 +59,26 @@ pub(super) struct Hit {
 
 /// A surface that a tile may see.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Candidate {
+struct Candidate {
     piece: u16,
     nearest: f64,
+}
+
+/// What a tile has to do with.
+#[derive(Debug, Default)]
+pub(super) struct Sight {
+    /// From near to far.
+    candidates: Vec<Candidate>,
+    /// What may throw a shadow there, as indices.
+    casters: Vec<u16>,
+    /// The first candidate hides all else and no ray misses it.
+    is_covered: bool,
 }
 
 #[derive(Debug)]
 pub(super) struct Stage {
     pieces: Vec<Piece>,
+    casters: Vec<Caster>,
     lamp: Lamp,
     background: [f32; 3],
     near_m: f64,
@@ -71,61 +89,93 @@ impl Stage {
     pub fn new(scene: &RenderScene, near_m: f64, far_m: f64) -> Self {
         let camera_from_world = scene.world_from_camera.inverse();
         let lamp = Lamp::new(&scene.light, &camera_from_world);
-        let mut stage = Self { pieces: Vec::new(), lamp, background: scene.background, near_m, far_m };
-        stage.pieces.extend(sheet(scene, &camera_from_world, &lamp));
-        for solid in &scene.solids {
+        let mut stage =
+            Self { pieces: Vec::new(), casters: Vec::new(), lamp, background: scene.background, near_m, far_m };
+        stage.add_board(&scene.board, &camera_from_world);
+        for (owner, solid) in scene.solids.iter().enumerate() {
             let camera_from_shape = camera_from_world * solid.world_from_shape;
             let coat = Coat::new(solid, &camera_from_shape, far_m);
             for face in faces(solid, &camera_from_shape) {
-                stage.add_face(face, &coat);
+                stage.add_face(face, owner, &coat);
             }
+            stage.casters.extend(Caster::of_solid(owner, solid, &camera_from_shape));
         }
         stage
     }
 
-    fn add_face(&mut self, surfaces: Vec<Surface>, coat: &Coat) {
+    fn add_board(&mut self, board: &BoardSurface, camera_from_world: &Isometry3<f64>) {
+        let camera_from_target = camera_from_world * board.world_from_target;
+        let half = |count: usize| 0.5 * (count as f64 - 1.0) * board.square_m;
+        let middle = Point3::new(half(board.columns), half(board.rows), 0.0);
+        self.casters.push(Caster::of_board(board, &middle, &camera_from_target));
+        self.pieces.extend(sheet(board, &middle, &camera_from_target, &self.lamp));
+    }
+
+    fn add_face(&mut self, surfaces: Vec<Surface>, owner: usize, coat: &Coat) {
         let face = self.pieces.last().map_or(BACKGROUND, |piece| piece.face).saturating_add(1);
         for surface in surfaces {
-            let flat = match &surface {
-                Surface::Facet(facet) => coat.flat(&self.lamp, &facet.normal),
-                Surface::Ball(_) | Surface::Mantle(_) => None,
+            let paint = match &surface {
+                Surface::Facet(facet) => self.facet_paint(facet, coat),
+                Surface::Ball(_) | Surface::Mantle(_) => Paint::Coat(coat.clone()),
             };
-            let paint = flat.map_or_else(|| Paint::Coat(coat.clone()), Paint::Flat);
-            self.pieces.push(Piece { surface, face, paint, lead: 1.0 });
+            self.pieces.push(Piece { surface, face, paint, lead: 1.0, owner: Some(owner) });
         }
     }
 
-    /// Collects what the rays of a tile may hit, from near to far, without what is hidden behind a face that covers
-    /// the whole tile.
-    pub fn survey(&self, rays: &Rays, out: &mut Vec<Candidate>) {
-        let start = out.len();
+    fn facet_paint(&self, facet: &Facet, coat: &Coat) -> Paint {
+        if let Some(flat) = coat.flat(&self.lamp, &facet.normal) {
+            Paint::Flat(flat)
+        } else if let Some(ground) = Ground::new(facet, coat, &self.lamp) {
+            Paint::Ground(coat.clone(), ground)
+        } else {
+            Paint::Coat(coat.clone())
+        }
+    }
+
+    /// What the rays of a tile may hit, without what is hidden behind a face that covers the whole tile.
+    pub fn survey(&self, rays: &Rays, with_shadows: bool) -> Sight {
+        let mut candidates = Vec::new();
         let mut hidden_beyond = self.far_m;
+        let mut is_covered = false;
         for (index, piece) in self.pieces.iter().enumerate() {
             let Some(reach) = piece.surface.reach(rays) else { continue };
             if let Some(farthest) = reach.covers_within
                 && reach.nearest >= self.near_m
             {
+                is_covered |= farthest < self.far_m;
                 hidden_beyond = hidden_beyond.min(farthest);
             }
-            out.push(Candidate { piece: index as u16, nearest: reach.nearest });
+            candidates.push(Candidate { piece: index as u16, nearest: reach.nearest });
         }
-        let mut kept = start;
-        for i in start..out.len() {
-            if out[i].nearest <= hidden_beyond {
-                out.swap(kept, i);
-                kept += 1;
+        candidates.retain(|candidate| candidate.nearest <= hidden_beyond);
+        candidates.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
+        let casters = if with_shadows { self.casters_for(&candidates, rays) } else { Vec::new() };
+        is_covered &= candidates.len() == 1;
+        Sight { candidates, casters, is_covered }
+    }
+
+    fn casters_for(&self, candidates: &[Candidate], rays: &Rays) -> Vec<u16> {
+        let grounds = candidates.iter().filter_map(|candidate| {
+            let piece = &self.pieces[candidate.piece as usize];
+            match (&piece.surface, &piece.paint) {
+                (Surface::Facet(facet), Paint::Coat(coat) | Paint::Ground(coat, _)) if coat.is_ground() => Some(facet),
+                _ => None,
             }
-        }
-        out.truncate(kept);
-        out[start..].sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
+        });
+        let patches: Vec<(Vec3, f64)> = grounds.map(|facet| rays.patch(facet.inverse_depth(), self.far_m)).collect();
+        let darkens = |caster: &Caster| {
+            patches.iter().any(|(middle, radius)| caster.may_darken(middle, *radius, &self.lamp.towards(middle)))
+        };
+        let indices = self.casters.iter().enumerate().filter(|(_, caster)| darkens(caster));
+        indices.map(|(index, _)| index as u16).collect()
     }
 
     /// The first surface between the clipping planes along a ray.
-    pub fn first_hit(&self, candidates: &[Candidate], ray: &Ray) -> Hit {
+    pub fn first_hit(&self, sight: &Sight, ray: &Ray) -> Hit {
         let direction = ray.direction();
         let mut best = Hit { depth: self.far_m, piece: None };
         let mut bar = self.far_m;
-        for candidate in candidates {
+        for candidate in &sight.candidates {
             if candidate.nearest > bar {
                 break;
             }
@@ -139,6 +189,35 @@ impl Stage {
         best
     }
 
+    fn sunlit(&self, sight: &Sight, receiver: &Piece, point: &Vec3, towards: &Vec3) -> f32 {
+        if sight.casters.is_empty() {
+            return 1.0;
+        }
+        let casters = sight.casters.iter().map(|&index| &self.casters[index as usize]);
+        shadow::sunlit(casters, receiver.owner, point, towards)
+    }
+
+    /// Paints a run of neighbouring pixels of a tile, all of which have rays, at once where that is possible: calls
+    /// `put` for each in turn with depth and colour and returns the face, or does nothing and returns `None`.
+    pub fn paint_run(
+        &self,
+        sight: &Sight,
+        count: usize,
+        ray_at: impl Fn(usize) -> Ray,
+        mut put: impl FnMut(f64, [f32; 3]),
+    ) -> Option<u16> {
+        let Some(first) = sight.candidates.first() else {
+            (0..count).for_each(|_| put(self.far_m, self.background));
+            return Some(BACKGROUND);
+        };
+        let piece = &self.pieces[first.piece as usize];
+        let (true, Paint::Ground(_, ground)) = (sight.is_covered, &piece.paint) else { return None };
+        let sunlit = |point: &Vec3| self.sunlit(sight, piece, point, &ground.towards);
+        let shadows: Option<&dyn Fn(&Vec3) -> f32> = if sight.casters.is_empty() { None } else { Some(&sunlit) };
+        ground.paint(count, ray_at, self.background, shadows, put);
+        Some(piece.face)
+    }
+
     /// Number of the face that was hit.
     pub fn face(&self, hit: &Hit) -> u16 {
         hit.piece.map_or(BACKGROUND, |index| self.pieces[index as usize].face)
@@ -150,30 +229,32 @@ impl Stage {
     }
 
     /// Colour of what was hit, for the footprint of one pixel around the ray.
-    pub fn colour(&self, hit: &Hit, ray: &Ray) -> [f32; 3] {
+    pub fn colour(&self, sight: &Sight, hit: &Hit, ray: &Ray) -> [f32; 3] {
         let Some(index) = hit.piece else { return self.background };
         let piece = &self.pieces[index as usize];
         let coat = match &piece.paint {
             Paint::Flat(colour) => return *colour,
             Paint::Print(print) => return print.colour(ray, &piece.surface, &self.lamp),
-            Paint::Coat(coat) => coat,
+            Paint::Coat(coat) | Paint::Ground(coat, _) => coat,
         };
         let direction = ray.direction();
         let point = direction.map(|c| c * hit.depth);
         let normal = piece.surface.normal(&point);
-        let spot = Spot { ray: direction, by_pixel: ray.by_pixel, point, normal, sunlit: 1.0 };
+        let sunlit = if coat.is_ground() { self.sunlit(sight, piece, &point, &self.lamp.towards(&point)) } else { 1.0 };
+        let spot = Spot { ray: direction, by_pixel: ray.by_pixel, point, normal, sunlit };
         coat.colour_at(&spot, &self.lamp, self.background)
     }
 }
 
 /// The board's sheet of paper, the side that the camera sees.
-fn sheet(scene: &RenderScene, camera_from_world: &Isometry3<f64>, lamp: &Lamp) -> Option<Piece> {
-    let board = &scene.board;
-    let camera_from_target = camera_from_world * board.world_from_target;
+fn sheet(
+    board: &BoardSurface,
+    middle: &Point3<f64>,
+    camera_from_target: &Isometry3<f64>,
+    lamp: &Lamp,
+) -> Option<Piece> {
     let turn = |v: Vector3<f64>| camera_from_target.rotation * v;
-    let pattern_middle =
-        Vector3::new((board.columns as f64 - 1.0) / 2.0, (board.rows as f64 - 1.0) / 2.0, 0.0) * board.square_m;
-    let middle = camera_from_target.translation.vector + turn(pattern_middle);
+    let middle = (camera_from_target * middle).coords;
     let [half_width, half_height] = board.paper_m.map(|side| 0.5 * side);
     let facet = Facet::rectangle(&middle, &turn(Vector3::x() * half_width), &turn(Vector3::y() * half_height))?;
     let from_front = dot(&facet.normal, &turn(-Vector3::z()).into()) > 0.0;
@@ -196,7 +277,7 @@ fn sheet(scene: &RenderScene, camera_from_world: &Isometry3<f64>, lamp: &Lamp) -
         let coat = Coat::matt(board.back);
         coat.flat(lamp, &facet.normal).map_or_else(|| Paint::Coat(coat), Paint::Flat)
     };
-    Some(Piece { surface: Surface::Facet(facet), face: BACKGROUND + 1, paint, lead: SHEET_LEAD })
+    Some(Piece { surface: Surface::Facet(facet), face: BACKGROUND + 1, paint, lead: SHEET_LEAD, owner: None })
 }
 
 impl Print {

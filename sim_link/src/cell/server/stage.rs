@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::cell::kinematics::{JOINTS, JointAngles, forward};
-use crate::cell::render::{Shape, Solid, props};
+use crate::cell::render::{Finish, Shape, Solid, props};
 use crate::cell::scene::{RelativeTo, ResolvedScene, RobotErrors, Scene};
 use crate::cell::world::{Faults, Handle, Joint, Kind, Tree, VisionSensor, World, WorldError, turn_z};
 
@@ -52,6 +52,7 @@ pub fn build(scene: &Scene, resolved: &ResolvedScene) -> Result<(World, Stage), 
     let plane = tree.add("Plane", Kind::Shape, None, resolved.world_from_plane)?;
     let gripper = builder.tree.add("Gripper", Kind::Shape, Some(tip), Isometry3::identity())?;
     builder.solids.extend(props::gripper(&Isometry3::identity()).into_iter().map(|solid| (gripper, solid)));
+    builder.stand(resolved, plane)?;
     builder.surroundings(scene, resolved, plane)?;
     let mut world = World::default();
     world.tree = builder.tree;
@@ -90,19 +91,40 @@ impl Builder {
         Ok((arm, joints, connection))
     }
 
+    /// A plate and a post that hold the sheet. They hang on it and go where it goes.
+    fn stand(&mut self, resolved: &ResolvedScene, plane: Handle) -> Result<(), WorldError> {
+        let stand = self.tree.add("Stand", Kind::Shape, Some(plane), Isometry3::identity())?;
+        let solids = props::stand(resolved.base_from_target.isometry(), resolved.target.centre(), resolved.paper_m);
+        self.solids.extend(solids.into_iter().map(|solid| {
+            let world_from_shape = resolved.world_from_plane.inv_mul(&solid.world_from_shape);
+            (stand, Solid { world_from_shape, ..solid })
+        }));
+        Ok(())
+    }
+
     fn surroundings(&mut self, scene: &Scene, resolved: &ResolvedScene, plane: Handle) -> Result<(), WorldError> {
         for (spec, solid) in scene.solids.iter().zip(&resolved.solids) {
             let (parent, pose) = match spec.relative_to {
                 RelativeTo::Plane => (Some(plane), resolved.world_from_plane.inv_mul(&solid.world_from_solid)),
                 RelativeTo::World => (None, solid.world_from_solid),
             };
-            let handle = self.tree.add(&alias(&solid.name), Kind::Shape, parent, pose)?;
+            let alias = alias(&solid.name);
+            let handle = self.tree.add(&alias, Kind::Shape, parent, pose)?;
             let half_extents = Vector3::from(solid.size_m) / 2.0;
             let colour = solid.colour.map(|c| f32::from(c) / 255.0);
             let solid = Solid::new(Shape::Box { half_extents }, Isometry3::identity(), colour);
-            self.solids.push((handle, solid));
+            self.solids.push((handle, solid.with_finish(finish(&alias))));
         }
         Ok(())
+    }
+}
+
+/// Floors have tiles and tables have grain, so that the eye finds its way in a picture.
+fn finish(alias: &str) -> Finish {
+    match alias {
+        "Floor" => Finish::Tiles { pitch_m: 0.5, joint_m: 0.006 },
+        "Table" => Finish::Wood,
+        _ => Finish::Matt,
     }
 }
 

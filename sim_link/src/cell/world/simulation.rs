@@ -42,7 +42,16 @@ pub struct Simulation {
     time_step_s: f64,
     pause_wanted: bool,
     stop_wanted: bool,
-    before_start: Vec<(Handle, Isometry3<f64>, Option<f64>)>,
+    before_start: Vec<Before>,
+}
+
+/// An object as it was before the start.
+#[derive(Debug, Clone)]
+struct Before {
+    handle: Handle,
+    parent: Option<Handle>,
+    local: Isometry3<f64>,
+    joint_rad: Option<f64>,
 }
 
 impl Default for Simulation {
@@ -110,7 +119,7 @@ impl Simulation {
                             Kind::Joint(joint) => Some(joint.position_rad()),
                             _ => None,
                         };
-                        (handle, *object.local(), joint_rad)
+                        Before { handle, parent: object.parent(), local: *object.local(), joint_rad }
                     })
                     .collect();
             }
@@ -149,16 +158,19 @@ impl Simulation {
         self.state == State::Stopped
     }
 
-    /// Puts everything back to where it was before the start.
+    /// Puts everything back to where it was before the start. What has another parent now stays, as its old pose was
+    /// one under the old parent.
     pub(super) fn restore(&mut self, tree: &mut Tree) {
         (self.pause_wanted, self.stop_wanted) = (false, false);
-        for (handle, local, joint_rad) in std::mem::take(&mut self.before_start) {
+        for Before { handle, parent, local, joint_rad } in std::mem::take(&mut self.before_start) {
             // What was removed meanwhile stays removed.
             let Ok(object) = tree.get_mut(handle) else { continue };
             if let (Kind::Joint(joint), Some(position_rad)) = (&mut object.kind, joint_rad) {
                 joint.reset(position_rad);
             }
-            object.local = local;
+            if object.parent() == parent {
+                object.local = local;
+            }
         }
     }
 }

@@ -85,6 +85,20 @@ fn poses_and_joints_are_restored_at_the_end_and_buffers_cleared() {
 }
 
 #[test]
+fn what_was_hung_elsewhere_meanwhile_stays_there() {
+    let (mut world, _, sensor) = world();
+    world.start_simulation();
+    world.tree.set_parent(sensor, None, true).expect("exists");
+    let moved = Isometry3::translation(0.0, 0.0, 2.0);
+    world.tree.set_world_pose(sensor, &moved).expect("exists");
+    world.stop_simulation();
+    while world.simulation().is_advancing() {
+        world.run_pass();
+    }
+    assert_eq!(world.tree.world_pose(sensor, Chain::Reported), Ok(moved));
+}
+
+#[test]
 fn sensors_show_what_was_there_in_the_last_pass_and_nothing_later() {
     let (mut world, joint, sensor) = world();
     world.start_simulation();
