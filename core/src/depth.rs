@@ -129,13 +129,7 @@ impl DepthImage {
     ///
     /// # Errors
     /// [`DepthError::BadRange`], [`DepthError::WrongLength`] when the fields were set to disagree.
-    pub fn colours(
-        &self,
-        map: ColourMap,
-        near_m: f32,
-        far_m: f32,
-        far_plane_m: f32,
-    ) -> Result<RgbImage, DepthError> {
+    pub fn colours(&self, map: ColourMap, near_m: f32, far_m: f32, far_plane_m: f32) -> Result<RgbImage, DepthError> {
         if !(near_m.is_finite() && far_m.is_finite() && near_m < far_m) {
             return Err(DepthError::BadRange { what: "the colour range", low: near_m.into(), high: far_m.into() });
         }

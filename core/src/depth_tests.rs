@@ -1,3 +1,4 @@
+use super::DepthSample::{Far, Invalid, Metres};
 use super::*;
 use crate::camera::Distortion;
 use proptest::prelude::*;
@@ -12,7 +13,6 @@ fn row(metres: &[f32]) -> DepthImage {
 fn pixels_without_surface_are_told_apart() {
     let image = row(&[0.5, 0.0, -1.0, f32::NAN, 3.5, 3.4998, 3.49, f32::INFINITY, f32::NEG_INFINITY]);
     let kinds: Vec<DepthSample> = (0..9).map(|column| image.sample(column, 0, FAR_M)).collect();
-    use DepthSample::{Far, Invalid, Metres};
     assert_eq!(kinds, [Metres(0.5), Invalid, Invalid, Invalid, Far, Far, Metres(3.49), Far, Invalid]);
     assert_eq!(image.sample(9, 0, FAR_M), Invalid);
     assert_eq!(image.sample(0, 1, FAR_M), Invalid);

@@ -78,11 +78,19 @@ fn derivatives_equal_those_of_opencv() {
                 let at = |column: usize| values[(2 * i + axis) * columns + column];
                 for k in 0..3 {
                     let (got, want) = (ours.px_by_point[(axis, k)], at(translation + k));
-                    assert!((got - want).abs() < 1e-8 * (1.0 + want.abs()), "{:?} point {k}: {got} {want}", camera.distortion);
+                    assert!(
+                        (got - want).abs() < 1e-8 * (1.0 + want.abs()),
+                        "{:?} point {k}: {got} {want}",
+                        camera.distortion
+                    );
                 }
                 for k in 0..camera.parameter_count() {
                     let (got, want) = (ours.px_by_parameters[(axis, k)], at(parameters + k));
-                    assert!((got - want).abs() < 1e-8 * (1.0 + want.abs()), "{:?} parameter {k}: {got} {want}", camera.distortion);
+                    assert!(
+                        (got - want).abs() < 1e-8 * (1.0 + want.abs()),
+                        "{:?} parameter {k}: {got} {want}",
+                        camera.distortion
+                    );
                 }
             }
         }
@@ -99,8 +107,16 @@ fn rays_of_pixels_equal_those_of_opencv() {
             calib3d::fisheye_undistort_points_def(&to_points2d(&pixels), &mut rays, &k, &d).expect("undistorts");
         } else {
             let criteria = opencv::core::TermCriteria { typ: 3, max_count: 200, epsilon: 1e-14 };
-            calib3d::undistort_points_iter(&to_points2d(&pixels), &mut rays, &k, &d, &no_array(), &no_array(), criteria)
-                .expect("undistorts");
+            calib3d::undistort_points_iter(
+                &to_points2d(&pixels),
+                &mut rays,
+                &k,
+                &d,
+                &no_array(),
+                &no_array(),
+                criteria,
+            )
+            .expect("undistorts");
         }
         for (px, want) in pixels.iter().zip(rays.iter()) {
             let ray = camera.unproject(px).expect("inside");

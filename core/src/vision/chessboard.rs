@@ -24,7 +24,7 @@ const MIN_WIDTH_TO_REDUCE: u32 = 640;
 pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
     let Some(found) = search(image, grid, effort)? else { return Ok(None) };
     let ordered = canonical(&found, grid, |order| contrast_of_first_square(image, order) < 0.0);
-    let refined = subpixel::fit_corners(image, &subpixel::corner_sub_pix(image, &ordered)?);
+    let refined = subpixel::refine(image, &ordered)?;
     Ok(refined.is_regular().then_some(refined))
 }
 
@@ -72,11 +72,7 @@ fn search(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Order
     Ok(None)
 }
 
-fn attempt(
-    mat: &BoxedRef<'_, Mat>,
-    grid: &Grid,
-    strategy: Strategy,
-) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
+fn attempt(mat: &BoxedRef<'_, Mat>, grid: &Grid, strategy: Strategy) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
     const QUADS: i32 = calib3d::CALIB_CB_ADAPTIVE_THRESH + calib3d::CALIB_CB_NORMALIZE_IMAGE;
     match strategy {
         Strategy::Quick => find_quads(mat, grid, QUADS + calib3d::CALIB_CB_FAST_CHECK),
@@ -92,11 +88,7 @@ fn pattern(grid: &Grid) -> Size {
     Size::new(grid.columns as i32, grid.rows as i32)
 }
 
-fn find_quads(
-    mat: &impl ToInputArray,
-    grid: &Grid,
-    flags: i32,
-) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
+fn find_quads(mat: &impl ToInputArray, grid: &Grid, flags: i32) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
     let mut corners = Vector::<Point2f>::new();
     let found = calib3d::find_chessboard_corners(mat, pattern(grid), &mut corners, flags)
         .map_err(failed("look for a chessboard"))?;
@@ -141,8 +133,9 @@ fn scaled(
 fn cell_intensity(image: &GrayImage, order: &Ordered, column: usize, row: usize) -> f64 {
     let centre = order.cell_centre(column, row);
     let [a, b, c, d] = order.cell(column, row);
-    let side = [(b - a).norm(), (c - b).norm(), (d - c).norm(), (a - d).norm()].into_iter().fold(f64::INFINITY, f64::min);
-    let reach = if side > 6.0 { 1 } else { 0 };
+    let side =
+        [(b - a).norm(), (c - b).norm(), (d - c).norm(), (a - d).norm()].into_iter().fold(f64::INFINITY, f64::min);
+    let reach = i64::from(side > 6.0);
     let (width, height) = (i64::from(image.width()), i64::from(image.height()));
     let (u, v) = (centre.x.round() as i64, centre.y.round() as i64);
     let mut sum = 0.0;

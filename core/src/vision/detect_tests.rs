@@ -122,8 +122,7 @@ fn an_image_without_the_board_is_no_error() {
     // A board with one row less, and one that leaves the image.
     assert_eq!(detect(&scene(10, 6, [0.2, 0.7, 0.3]).render(1), &target), Ok(None));
     let mut cut = scene(10, 7, [0.2, 0.7, 0.3]);
-    cut.camera_from_target =
-        looking_at(&cut.grid, &cut.camera, 0.42, [0.2, 0.7, 0.3], Vector2::new(260.0, 0.0));
+    cut.camera_from_target = looking_at(&cut.grid, &cut.camera, 0.42, [0.2, 0.7, 0.3], Vector2::new(260.0, 0.0));
     assert_eq!(detect(&cut.render(1), &target), Ok(None));
 }
 

@@ -2,14 +2,10 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3, SMatrix, SymmetricEigen, Vector2, Vector3};
 use opencv::calib3d;
-use opencv::core::{
-    Mat, Point2f, Point3f, Size, TermCriteria, TermCriteria_EPS, TermCriteria_MAX_ITER, Vec3d, Vector,
-};
+use opencv::core::{Mat, Point2f, Point3f, Size, TermCriteria, TermCriteria_EPS, TermCriteria_MAX_ITER, Vec3d, Vector};
 
 use super::VisionError;
-use super::bridge::{
-    camera_matrix, coefficients, failed, isometries, numbers, to_points2f, to_points3f,
-};
+use super::bridge::{camera_matrix, coefficients, failed, isometries, numbers, to_points2f, to_points3f};
 use super::pnp::{check_corners, px_by_pose};
 use crate::camera::{Distortion, Intrinsics, MAX_PARAMETERS};
 use crate::frames::{Camera, Pose, Target};
@@ -149,7 +145,7 @@ fn normal_spread_deg(seen: &[Seen], nominal: &Intrinsics) -> Result<f64, VisionE
         let homography = calib3d::find_homography_ext_def(&to_points2f(&flat), &to_points2f(&view.pixels))
             .map_err(failed("fit the target's plane"))?;
         let numbers = numbers(&homography)?;
-        let inverse = (numbers.len() == 9).then(|| Matrix3::from_row_slice(&numbers)).and_then(|h| h.try_inverse());
+        let inverse = (numbers.len() == 9).then(|| Matrix3::from_row_slice(&numbers)).and_then(Matrix3::try_inverse);
         if let Some(inverse) = inverse {
             let normal = nominal.matrix().transpose() * inverse.transpose() * Vector3::z();
             normals.push(if normal.z < 0.0 { -normal } else { normal });
@@ -253,8 +249,7 @@ fn from_opencv(start: &Intrinsics, matrix: &Mat, distortion: &[f64]) -> Result<I
     let (&[fx, _, cx, _, fy, cy, ..], true) = (&k[..], k.len() == 9) else {
         return Err(VisionError::NotACamera { reason: "the camera matrix is not 3×3".into() });
     };
-    let camera =
-        Intrinsics { fx, fy, cx, cy, distortion: start.distortion.with_coefficients(distortion), ..*start };
+    let camera = Intrinsics { fx, fy, cx, cy, distortion: start.distortion.with_coefficients(distortion), ..*start };
     camera.validate().map_err(|e| VisionError::NotACamera { reason: e.to_string() })?;
     Ok(camera)
 }
@@ -291,17 +286,21 @@ fn assess(
 fn gather(seen: &[Seen], intrinsics: &Intrinsics, poses: &[Isometry3<f64>]) -> Result<Evidence, VisionError> {
     let n = intrinsics.parameter_count();
     let mut full = SMatrix::<f64, MAX_PARAMETERS, MAX_PARAMETERS>::zeros();
-    let mut out =
-        Evidence { information: DMatrix::zeros(n, n), views: Vec::with_capacity(seen.len()), squared_px: 0.0, corners: 0 };
+    let mut out = Evidence {
+        information: DMatrix::zeros(n, n),
+        views: Vec::with_capacity(seen.len()),
+        squared_px: 0.0,
+        corners: 0,
+    };
     for (index, (view, pose)) in seen.iter().zip(poses).enumerate() {
         let mut pose_block = Matrix6::zeros();
         let mut cross = SMatrix::<f64, MAX_PARAMETERS, 6>::zeros();
         let mut squared_px = 0.0;
         let rotation = pose.rotation.to_rotation_matrix();
         for (point, px) in view.points.iter().zip(&view.pixels) {
-            let projection = intrinsics.project_with_jacobians(&(pose * point)).map_err(|e| {
-                VisionError::NotACamera { reason: format!("view {index} is not in front of it: {e}") }
-            })?;
+            let projection = intrinsics
+                .project_with_jacobians(&(pose * point))
+                .map_err(|e| VisionError::NotACamera { reason: format!("view {index} is not in front of it: {e}") })?;
             let by_pose = px_by_pose(&projection.px_by_point, rotation.matrix(), point);
             let by_parameters = projection.px_by_parameters;
             squared_px += (projection.px - px).norm_squared();
@@ -331,7 +330,8 @@ fn unit_covariance(information: &DMatrix<f64>, camera: &Intrinsics) -> Result<Ve
     let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] / (scale[i] * scale[j]));
     let eigen = SymmetricEigen::new(scaled);
     let variance = |i: usize| {
-        let sum: f64 = (0..n).map(|k| eigen.eigenvectors[(i, k)].powi(2) / eigen.eigenvalues[k].max(MIN_EIGENVALUE)).sum();
+        let sum: f64 =
+            (0..n).map(|k| eigen.eigenvectors[(i, k)].powi(2) / eigen.eigenvalues[k].max(MIN_EIGENVALUE)).sum();
         sum / (scale[i] * scale[i])
     };
     let variances: Vec<f64> = (0..n).map(variance).collect();
@@ -339,7 +339,7 @@ fn unit_covariance(information: &DMatrix<f64>, camera: &Intrinsics) -> Result<Ve
         PINHOLE_NAMES.into_iter().zip(&variances).zip([camera.fx, camera.fy, camera.fx, camera.fy])
     {
         let sigma_px = TYPICAL_NOISE_PX * variance.sqrt();
-        if !(sigma_px <= MAX_RELATIVE_SIGMA * focal) {
+        if sigma_px.is_nan() || sigma_px > MAX_RELATIVE_SIGMA * focal {
             return Err(VisionError::Undetermined { parameter, sigma_px });
         }
     }

@@ -13,6 +13,7 @@ use crate::target::{Grid, TargetSpec};
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
 const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);
 const SIZE: (u32, u32) = (640, 480);
+const TRIALS: u64 = 40;
 
 fn camera(distortion: Distortion) -> Intrinsics {
     Intrinsics { distortion, fy: 575.0, cx: 322.4, cy: 236.1, ..Intrinsics::pinhole(640, 480, 581.0) }
@@ -73,7 +74,6 @@ fn the_rational_model_explains_its_own_corners() {
 #[test]
 fn the_errors_of_many_calibrations_are_as_large_as_their_sigmas() {
     let truth = camera(Distortion::BrownConrady([-0.21, 0.12, 0.001, -0.002, -0.02]));
-    const TRIALS: u64 = 40;
     let mut sum = [0.0; 4];
     for seed in 0..TRIALS {
         let found = solved(&truth, 0.1, None, seed);

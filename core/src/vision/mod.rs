@@ -122,7 +122,9 @@ pub enum VisionError {
         sigma_px: f64,
     },
     /// The optimisation ended at numbers that are no camera.
-    #[error("the calibration did not converge to a camera ({reason}); check the order of corners and the target's size")]
+    #[error(
+        "the calibration did not converge to a camera ({reason}); check the order of corners and the target's size"
+    )]
     NotACamera {
         /// What is wrong with them.
         reason: String,

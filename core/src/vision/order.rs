@@ -90,16 +90,13 @@ impl Ordered {
     /// Whether every point lies near the middle of its two neighbours along either axis: at most `max_bend` of their
     /// distance away. A grid assembled from stray points does not.
     pub fn is_smooth(&self, max_bend: f64) -> bool {
-        let straight = |a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>| {
-            (b - (a + c) / 2.0).norm() <= max_bend * (c - a).norm()
-        };
+        let straight =
+            |a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>| (b - (a + c) / 2.0).norm() <= max_bend * (c - a).norm();
         let (columns, rows) = (self.columns, self.rows());
-        let along_x = (0..rows).all(|r| {
-            (1..columns - 1).all(|c| straight(self.at(c - 1, r), self.at(c, r), self.at(c + 1, r)))
-        });
-        let along_y = (0..columns).all(|c| {
-            (1..rows - 1).all(|r| straight(self.at(c, r - 1), self.at(c, r), self.at(c, r + 1)))
-        });
+        let along_x =
+            (0..rows).all(|r| (1..columns - 1).all(|c| straight(self.at(c - 1, r), self.at(c, r), self.at(c + 1, r))));
+        let along_y =
+            (0..columns).all(|c| (1..rows - 1).all(|r| straight(self.at(c, r - 1), self.at(c, r), self.at(c, r + 1))));
         along_x && along_y
     }
 

@@ -12,6 +12,8 @@ use crate::target::{Grid, TargetSpec};
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);
+const TRIALS: usize = 200;
+const NOISE_PX: f64 = 0.1;
 
 fn cameras() -> Vec<Intrinsics> {
     [
@@ -55,7 +57,10 @@ fn exact_corners_give_the_exact_pose_through_every_lens() {
 
 #[test]
 fn a_fisheye_pose_uses_corners_beside_the_camera_too() {
-    let camera = Intrinsics { distortion: Distortion::Fisheye([-0.02, 0.004, -0.003, 0.0005]), ..Intrinsics::pinhole(640, 480, 120.0) };
+    let camera = Intrinsics {
+        distortion: Distortion::Fisheye([-0.02, 0.004, -0.003, 0.0005]),
+        ..Intrinsics::pinhole(640, 480, 120.0)
+    };
     // The board's last columns lie behind the plane of the camera.
     let truth = looking_at(&GRID, &camera, 0.05, [0.9, 1.2, 0.3], Vector2::new(20.0, 0.0));
     let depths: Vec<f64> = (0..GRID.len()).map(|i| (truth * GRID.point(i)).z).collect();
@@ -73,8 +78,6 @@ fn the_pose_error_is_that_of_least_squares() {
     let camera = Intrinsics::pinhole(640, 480, 581.0);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut sum = 0.0;
-    const TRIALS: usize = 200;
-    const NOISE_PX: f64 = 0.1;
     for _ in 0..TRIALS {
         let angles = [rng.random_range(0.2..0.7), rng.random_range(0.0..6.3), rng.random_range(-3.1..3.1)];
         let truth = looking_at(&GRID, &camera, 0.5, angles, Vector2::zeros());

@@ -66,11 +66,11 @@ impl Scene {
     /// Part of the pixel's area that is dark, by cutting it along the lines between squares.
     fn dark_part(&self, h: &Matrix3<f64>, u: f64, v: f64) -> f64 {
         let corner = |du: f64, dv: f64| Vector2::new(u + du, v + dv);
-        let pixel = vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
-        self.dark_area(h, pixel)
+        let pixel = [corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
+        self.dark_area(h, &pixel)
     }
 
-    fn dark_area(&self, h: &Matrix3<f64>, polygon: Vec<Vector2<f64>>) -> f64 {
+    fn dark_area(&self, h: &Matrix3<f64>, polygon: &[Vector2<f64>]) -> f64 {
         for axis in 0..2 {
             let values: Vec<f64> = polygon.iter().map(|p| board(h, p)[axis]).collect();
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
@@ -81,10 +81,10 @@ impl Scene {
                 // On the line, h.row(axis) * p = line * h.row(2) * p.
                 let cut = h.row(axis) - h.row(2) * line;
                 let side = |p: &Vector2<f64>| cut[0] * p.x + cut[1] * p.y + cut[2];
-                return self.dark_area(h, clip(&polygon, &side)) + self.dark_area(h, clip(&polygon, &|p| -side(p)));
+                return self.dark_area(h, &clip(polygon, &side)) + self.dark_area(h, &clip(polygon, &|p| -side(p)));
             }
         }
-        let area = area(&polygon);
+        let area = area(polygon);
         let centre = polygon.iter().sum::<Vector2<f64>>() / polygon.len() as f64;
         if area > 0.0 && self.is_dark(&board(h, &centre)) { area } else { 0.0 }
     }
@@ -130,7 +130,9 @@ fn blur(levels: &mut [f64], width: usize, height: usize, sigma: f64) {
     let reach = (5.0 * sigma).ceil() as i64;
     let mut kernel: Vec<f64> = (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp()).collect();
     let sum: f64 = kernel.iter().sum();
-    kernel.iter_mut().for_each(|k| *k /= sum);
+    for k in &mut kernel {
+        *k /= sum;
+    }
     for (count, stride, lines, line_stride) in [(width, 1, height, width), (height, width, width, 1)] {
         for line in 0..lines {
             let at = |i: i64| line * line_stride + i.clamp(0, count as i64 - 1) as usize * stride;

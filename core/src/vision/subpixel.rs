@@ -24,8 +24,9 @@ const WINDOW_PER_SPACING: f64 = 0.4;
 /// Half windows that `cornerSubPix` is given, in pixels: less than 2 has no gradient, more gains nothing.
 const WINDOW_PX: (i32, i32) = (2, 10);
 
-/// Part of a grid step, along x and along y, up to which a pixel counts for the fit.
-const CELL_PART: f64 = 0.42;
+/// Part of a grid step, along x and along y, up to which a pixel counts for the fit, and the part tried when that
+/// fails: the outermost squares of some boards are cut narrow, and dirt or a shadow may lie on a square.
+const CELL_PARTS: [f64; 2] = [0.42, 0.22];
 /// Pixels further from the corner than this do not count: there curved edges (lens) matter before noise does.
 const REACH_PX: f64 = 8.0;
 /// Pixels needed for the nine parameters.
@@ -37,11 +38,13 @@ const CONVERGED_PX: f64 = 5e-4;
 const BLUR_PX: (f64, f64) = (0.1, 4.0);
 /// Least contrast (half the difference between dark and light) in grey levels.
 const MIN_CONTRAST: f64 = 3.0;
-/// Largest RMS misfit as a part of the contrast.
-const MAX_MISFIT: f64 = 0.35;
-/// A move from `cornerSubPix`'s answer by more than this part of the spacing (and at least by that many pixels) is
-/// not believed.
+/// Largest RMS misfit as a part of the contrast: noise of a grainy image has a tenth, an edge that does not belong to
+/// the corner a third.
+const MAX_MISFIT: f64 = 0.2;
+/// Largest move from the start that is believed: a part of the spacing, at least that many pixels.
 const MAX_MOVE: (f64, f64) = (0.12, 0.75);
+/// Starts closer than this are one: the fit converges from further away.
+const SAME_START_PX: f64 = 0.75;
 
 type Parameters = SVector<f64, 9>;
 
@@ -70,45 +73,52 @@ pub(super) fn corner_sub_pix(image: &GrayImage, order: &Ordered) -> Result<Order
     Ok(out)
 }
 
-/// Fits the corner model around every corner; where that fails the corner given stays.
-pub(super) fn fit_corners(image: &GrayImage, order: &Ordered) -> Ordered {
-    let mut out = order.clone();
-    for row in 0..order.rows() {
-        for column in 0..order.columns {
-            if let Some(corner) = fit_corner(image, order, column, row) {
-                out.points[row * order.columns + column] = corner;
-            }
+/// Refines corners found to a pixel or so: by [`corner_sub_pix`], then by fitting the corner model.
+///
+/// Both `cornerSubPix`'s answer and, where that is elsewhere (its window held an edge that is not the corner's), the
+/// corner as found serve as start; the fit with the smaller misfit counts. Without any fit `cornerSubPix` stands.
+pub(super) fn refine(image: &GrayImage, found: &Ordered) -> Result<Ordered, VisionError> {
+    let mut out = corner_sub_pix(image, found)?;
+    for (index, point) in out.points.iter_mut().enumerate() {
+        let starts = [*point, found.points[index]];
+        let apart = (starts[0] - starts[1]).norm() > SAME_START_PX;
+        if let Some(corner) = fit_corner(image, found, index, if apart { &starts } else { &starts[..1] }) {
+            *point = corner;
         }
     }
-    out
+    Ok(out)
 }
 
-fn fit_corner(image: &GrayImage, order: &Ordered, column: usize, row: usize) -> Option<Vector2<f64>> {
-    let start = order.at(column, row);
-    let (along_x, along_y) = order.steps(column, row);
-    let patch = Patch::around(image, start, &along_x, &along_y)?;
-    let model = fit(&patch, starting_point(&patch, &along_x, &along_y))?;
-    let offset = Vector2::new(model[0], model[1]);
-    let bound = (MAX_MOVE.0 * order.spacing(column, row)).max(MAX_MOVE.1);
-    (offset.norm() <= bound).then(|| patch.origin + offset)
+fn fit_corner(image: &GrayImage, found: &Ordered, index: usize, starts: &[Vector2<f64>]) -> Option<Vector2<f64>> {
+    let (column, row) = (index % found.columns, index / found.columns);
+    let (along_x, along_y) = found.steps(column, row);
+    let bound = (MAX_MOVE.0 * found.spacing(column, row)).max(MAX_MOVE.1);
+    CELL_PARTS.into_iter().find_map(|part| {
+        let fits = starts.iter().filter_map(|start| {
+            let patch = Patch::around(image, *start, &along_x, &along_y, part)?;
+            let (offset, misfit) = fit(&patch, starting_point(&patch, &along_x, &along_y))?;
+            (offset.norm() <= bound).then(|| (start + offset, misfit))
+        });
+        fits.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(corner, _)| corner)
+    })
 }
 
 /// Pixels around a corner, relative to where it is thought to be.
 struct Patch {
-    origin: Vector2<f64>,
     pixels: Vec<(Vector2<f64>, f64)>,
 }
 
 impl Patch {
-    /// The pixels within [`CELL_PART`] of a step along both axes; `None` when too few or cut by the image border.
+    /// The pixels within `part` of a step along both axes; `None` when too few or cut by the image border.
     fn around(
         image: &GrayImage,
         origin: Vector2<f64>,
         along_x: &Vector2<f64>,
         along_y: &Vector2<f64>,
+        part: f64,
     ) -> Option<Self> {
         let area = along_x.perp(along_y);
-        let half = (along_x.abs() + along_y.abs()) * CELL_PART;
+        let half = (along_x.abs() + along_y.abs()) * part;
         let half = Vector2::new(half.x.min(REACH_PX), half.y.min(REACH_PX));
         let (width, height) = image.dimensions();
         let low = (origin - half).map(f64::ceil);
@@ -121,12 +131,12 @@ impl Patch {
             for u in low.x as u32..=high.x as u32 {
                 let p = Vector2::new(f64::from(u), f64::from(v)) - origin;
                 let (a, b) = (p.perp(along_y) / area, along_x.perp(&p) / area);
-                if a.abs() <= CELL_PART && b.abs() <= CELL_PART && p.norm() <= REACH_PX {
+                if a.abs() <= part && b.abs() <= part && p.norm() <= REACH_PX {
                     pixels.push((p, f64::from(image.get_pixel(u, v).0[0])));
                 }
             }
         }
-        (pixels.len() >= MIN_PIXELS).then_some(Self { origin, pixels })
+        (pixels.len() >= MIN_PIXELS).then_some(Self { pixels })
     }
 }
 
@@ -156,8 +166,9 @@ fn starting_point(patch: &Patch, along_x: &Vector2<f64>, along_y: &Vector2<f64>)
     ])
 }
 
-/// Levenberg–Marquardt; `None` when it ends at something that is not a corner.
-fn fit(patch: &Patch, start: Parameters) -> Option<Parameters> {
+/// Levenberg–Marquardt; the corner and the RMS misfit as a part of the contrast. `None` when it ends at something
+/// that is not a corner.
+fn fit(patch: &Patch, start: Parameters) -> Option<(Vector2<f64>, f64)> {
     let mut x = start;
     let (mut cost, mut hessian, mut gradient) = normal_equations(patch, &x);
     let mut damping = 1e-3;
@@ -183,11 +194,10 @@ fn fit(patch: &Patch, start: Parameters) -> Option<Parameters> {
             }
         }
     }
-    let misfit = (cost / patch.pixels.len() as f64).sqrt();
+    let misfit = (cost / patch.pixels.len() as f64).sqrt() / x[8].abs();
     let lines_apart = (x[2] - x[3]).sin().abs();
-    let is_corner =
-        x[8].abs() >= MIN_CONTRAST && misfit <= MAX_MISFIT * x[8].abs() && x[4] < BLUR_PX.1 && lines_apart > 0.1;
-    is_corner.then_some(x)
+    let is_corner = x[8].abs() >= MIN_CONTRAST && misfit <= MAX_MISFIT && x[4] < BLUR_PX.1 && lines_apart > 0.1;
+    is_corner.then(|| (Vector2::new(x[0], x[1]), misfit))
 }
 
 /// Sum of squared misfits, JᵀJ and Jᵀr.
