@@ -1,6 +1,11 @@
 //! The Handeye Workbench: a window and a command line over [`handeye_core`] and [`handeye_sim_link`].
 
 pub mod cli;
+pub mod command;
+pub mod depth_view;
+pub mod gui;
+pub mod model;
 pub mod observe;
 pub mod parallel;
 pub mod truth;
+pub mod worker;

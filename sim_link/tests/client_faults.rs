@@ -294,7 +294,7 @@ fn cancelling_ends_a_long_silent_call_and_tells_the_server() {
 fn a_client_that_gives_up_again_and_again_is_heard_every_time() {
     const ROUNDS: usize = 20;
     let (pending, is_pending) = channel::<CancelToken>();
-    let tokens: Vec<CancelToken> = (0..ROUNDS).map(|_| CancelToken::new()).collect();
+    let tokens: Vec<CancelToken> = (0..ROUNDS).map(|_| CancelToken::default()).collect();
     let for_server = tokens.clone();
     let (endpoint, server) = serve(move |peer| {
         let uuid = |request: &Value| request.get("uuid").and_then(|id| id.text()).expect("an id").to_owned();

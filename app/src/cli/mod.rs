@@ -75,7 +75,7 @@ pub fn main() -> ExitCode {
     };
     start_logging(cli.quiet);
     let result = match cli.command.unwrap_or_else(|| Command::Gui(GuiArgs::default())) {
-        Command::Gui(_) => Ok(()),
+        Command::Gui(args) => crate::gui::run(args).map_err(Failure::failed),
         Command::Cell(args) => cell::run(&args),
         Command::Auto(args) => auto::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),

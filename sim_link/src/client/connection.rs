@@ -231,16 +231,18 @@ impl Connection {
             let connected = self.transport.connected();
             let limit =
                 if connected { exchange.reply_timeout } else { exchange.reply_timeout.min(self.options.reply_timeout) };
-            let Some(left) = limit.checked_sub(waited).filter(|left| !left.is_zero()) else {
-                let late = self.late(exchange, waited);
-                return Err(self.give_up(exchange, late));
-            };
-            let left = left.min(exchange.total_timeout.saturating_sub(exchange.started.elapsed()));
-            let received = self.transport.receive(left.min(SLICE));
+            let left = limit.saturating_sub(waited);
+            let left_of_all = exchange.total_timeout.saturating_sub(exchange.started.elapsed());
+            let received = self.transport.receive(left.min(left_of_all).min(SLICE));
             self.contacted |= self.transport.connected();
             match received {
-                Ok(None) => {}
                 Ok(Some(bytes)) => return self.read(exchange, &bytes),
+                // Late only after a last look: this process may have been the one that was held up.
+                Ok(None) if left.is_zero() => {
+                    let late = self.late(exchange, waited);
+                    return Err(self.give_up(exchange, late));
+                }
+                Ok(None) => {}
                 Err(fault) => return Err(self.fault(exchange, fault)),
             }
         }

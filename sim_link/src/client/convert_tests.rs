@@ -33,7 +33,9 @@ fn the_reference_scene_has_its_known_camera() {
     let tip_from_sensor: Pose<Tip, Sensor> = pose_from_seven(&[0.05, 0.0, 0.0, 0.0, 0.0, -half, half]).expect("a pose");
     let tip_from_camera: Pose<Tip, Camera> = tip_from_sensor * sensor_from_camera();
     let x_in_tip = tip_from_camera.rotation() * Vector3::x();
+    let ahead_in_tip = tip_from_camera.rotation() * Vector3::z();
     assert_relative_eq!(x_in_tip, Vector3::y(), epsilon = 1e-12);
+    assert_relative_eq!(ahead_in_tip, Vector3::z(), epsilon = 1e-12);
     assert_relative_eq!(tip_from_camera.translation(), Vector3::new(0.05, 0.0, 0.0), epsilon = 1e-12);
 }
 

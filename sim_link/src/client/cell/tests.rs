@@ -427,7 +427,9 @@ fn the_truth_of_the_reference_scene_is_in_opencv_axes() {
     let truth = cell.client.ground_truth().expect("a scene");
     // Rz(+90°) and 50 mm along x of the tip.
     let x_in_tip = truth.tip_from_camera.rotation() * Vector3::x();
+    let ahead_in_tip = truth.tip_from_camera.rotation() * Vector3::z();
     assert_relative_eq!(x_in_tip, Vector3::y(), epsilon = 1e-12);
+    assert_relative_eq!(ahead_in_tip, Vector3::z(), epsilon = 1e-12);
     assert_relative_eq!(truth.tip_from_camera.translation(), Vector3::new(0.05, 0.0, 0.0), epsilon = 1e-12);
     assert_eq!((truth.base_from_target, truth.intrinsics_published), (None, false));
     assert_eq!(truth.intrinsics, cell.client.camera_intrinsics_nominal());

@@ -1,0 +1,56 @@
+//! Numbers as text, always of the same width so that they do not dance.
+
+use handeye_core::frames::{Base, Pose, Tip};
+
+/// A number with a fixed number of decimals, padded on the left. The sign is a real minus, and −0 is 0.
+pub fn fixed(value: f64, decimals: usize, width: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    let text = if is_zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") };
+    let padding = width.saturating_sub(text.chars().count());
+    format!("{}{text}", " ".repeat(padding))
+}
+
+/// Several numbers in a row.
+pub fn row(values: &[f64], decimals: usize, width: usize) -> String {
+    values.iter().map(|&value| fixed(value, decimals, width)).collect::<Vec<_>>().join(" ")
+}
+
+/// Translation in millimetres.
+pub fn translation_mm(pose: &Pose<Base, Tip>) -> String {
+    let translation = pose.translation() * 1e3;
+    row(translation.as_slice(), 1, 6)
+}
+
+/// Roll, pitch and yaw in degrees: R = Rz(yaw) · Ry(pitch) · Rx(roll).
+pub fn rpy_deg(pose: &Pose<Base, Tip>) -> String {
+    let (roll, pitch, yaw) = pose.rotation().euler_angles();
+    row(&[roll.to_degrees(), pitch.to_degrees(), yaw.to_degrees()], 2, 7)
+}
+
+/// Quaternion x, y, z, w with w ≥ 0.
+pub fn quaternion(pose: &Pose<Base, Tip>) -> String {
+    row(&pose.xyzw(), 4, 7)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_width_and_their_sign() {
+        assert_eq!(fixed(1.25, 1, 7), "    1.2");
+        assert_eq!(fixed(-12.34, 1, 7), "  −12.3");
+        assert_eq!(fixed(-0.001, 1, 5), "  0.0", "no negative zero");
+        assert_eq!(fixed(123456.0, 1, 3), "123456.0", "never cut");
+    }
+
+    #[test]
+    fn a_tip_pose_is_written_in_millimetres_and_degrees() {
+        let quarter = std::f64::consts::FRAC_PI_4;
+        let pose = Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
+        assert_eq!(translation_mm(&pose), " 110.0  −16.0  847.0");
+        assert_eq!(rpy_deg(&pose), "   0.00    0.00   90.00");
+        assert_eq!(quaternion(&pose), " 0.0000  0.0000  0.7071  0.7071");
+    }
+}

@@ -1,0 +1,60 @@
+//! The bar that says which colour is which depth.
+
+use egui::{Align2, Color32, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
+
+use super::pictures::small_text;
+use crate::gui::theme::{self, Palette};
+use crate::model::DEPTH_COLOURS;
+
+/// Height of the colours.
+const HEIGHT: f32 = 12.0;
+/// Colours across the bar; the graphics card mixes in between.
+const STEPS: usize = 64;
+/// Marks with numbers, the two ends included.
+const TICKS: usize = 5;
+
+/// The bar with its depths in metres, and a mark at the depth under the pointer.
+pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>) {
+    let palette = Palette::of(ui);
+    let [near_m, far_m] = range_m;
+    let (area, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
+    response.widget_info(|| {
+        WidgetInfo::labeled(WidgetType::Image, true, format!("Depth colours from {near_m:.2} m to {far_m:.2} m"))
+    });
+    let bar = Rect::from_min_size(area.min + Vec2::new(0.0, 9.0), Vec2::new(area.width(), HEIGHT));
+    ui.painter().add(gradient(bar));
+    for tick in 0..TICKS {
+        let part = tick as f32 / (TICKS - 1) as f32;
+        let x = bar.left() + part * bar.width();
+        let anchor = match tick {
+            0 => Align2::LEFT_TOP,
+            tick if tick == TICKS - 1 => Align2::RIGHT_TOP,
+            _ => Align2::CENTER_TOP,
+        };
+        let depth_m = near_m + part * (far_m - near_m);
+        small_text(ui, Pos2::new(x, bar.bottom() + 3.0), anchor, &format!("{depth_m:.2} m"));
+    }
+    if let Some(depth_m) = at_cursor_m.filter(|depth_m| (near_m..=far_m).contains(depth_m)) {
+        let x = bar.left() + (depth_m - near_m) / (far_m - near_m).max(f32::EPSILON) * bar.width();
+        let (top, bottom) = (Pos2::new(x, bar.top() - 4.0), Pos2::new(x, bar.bottom() + 2.0));
+        ui.painter().line_segment([top, bottom], Stroke::new(4.0, palette.mark_outline));
+        ui.painter().line_segment([top, bottom], Stroke::new(2.0, palette.mark));
+    }
+}
+
+fn gradient(bar: Rect) -> Shape {
+    let mut mesh = Mesh::default();
+    for step in 0..=STEPS {
+        let part = step as f32 / STEPS as f32;
+        let colour: Color32 = theme::pixel(DEPTH_COLOURS.colour(f64::from(part)));
+        let x = bar.left() + part * bar.width();
+        mesh.colored_vertex(Pos2::new(x, bar.top()), colour);
+        mesh.colored_vertex(Pos2::new(x, bar.bottom()), colour);
+        if step > 0 {
+            let last = 2 * step as u32 + 1;
+            mesh.add_triangle(last - 3, last - 2, last - 1);
+            mesh.add_triangle(last - 2, last - 1, last);
+        }
+    }
+    Shape::mesh(mesh)
+}

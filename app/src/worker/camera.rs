@@ -1,0 +1,156 @@
+//! The camera worker: fetches pictures, colours the depth, and puts the newest pair where the window finds it.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use handeye_sim_link::client::CancelToken;
+
+use super::link::{Duty, Outlet};
+use super::port::{CameraPort, Connected, Connector, PortError, RawFrame};
+use super::slot::LatestSlot;
+use crate::depth_view;
+use crate::model::{DEPTH_COLOURS, DepthScale, FrameImages, FrameInfo, Link, LiveFrame};
+
+/// Rest between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
+const PERIOD: Duration = Duration::from_millis(15);
+
+/// Over so many frames the rate is measured.
+const RATE_FRAMES: usize = 20;
+
+/// A gap this long [s] ends the stream that the rate is measured of.
+const RATE_GAP_S: f64 = 2.0;
+
+/// What the camera worker can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CameraTask {
+    /// Which depths the colour map covers, from the next picture on.
+    SetDepthScale(DepthScale),
+}
+
+/// The duty of the camera worker.
+pub struct Camera {
+    frames: Arc<LatestSlot<LiveFrame>>,
+    scale: DepthScale,
+    auto_range_m: Option<[f32; 2]>,
+    seen_sim_time_s: Option<f64>,
+    number: u64,
+    rate: RateMeter,
+}
+
+impl Camera {
+    /// With the place that it shares with the application.
+    pub fn new(scale: DepthScale, frames: Arc<LatestSlot<LiveFrame>>) -> Self {
+        Self { frames, scale, auto_range_m: None, seen_sim_time_s: None, number: 0, rate: RateMeter::default() }
+    }
+
+    /// Prepares the newest pictures for the window.
+    fn prepare(&mut self, raw: RawFrame, limits_m: [f32; 2], received_s: f64) -> Result<LiveFrame, PortError> {
+        let [_, far_plane_m] = limits_m;
+        self.auto_range_m = depth_view::range_of(&raw.depth, far_plane_m, self.auto_range_m);
+        let depth_range_m = match self.scale {
+            DepthScale::Full => limits_m,
+            DepthScale::Auto => self.auto_range_m.unwrap_or(limits_m),
+        };
+        let [near_m, far_m] = depth_range_m;
+        let depth_coloured = raw
+            .depth
+            .colours(DEPTH_COLOURS, near_m, far_m, far_plane_m)
+            .map_err(|error| PortError::Refused(format!("the depth picture cannot be shown: {error}")))?;
+        self.number += 1;
+        let info = FrameInfo {
+            number: self.number,
+            sim_time_s: raw.sim_time_s,
+            received_s,
+            rate_hz: self.rate.rate_hz(),
+            depth_range_m,
+            far_plane_m,
+        };
+        Ok(LiveFrame { info, images: Arc::new(FrameImages { rgb: raw.rgb, depth: raw.depth, depth_coloured }) })
+    }
+}
+
+impl Duty for Camera {
+    type Port = Box<dyn CameraPort>;
+    type Task = CameraTask;
+    const LINK: Link = Link::Camera;
+
+    fn connect(
+        &mut self,
+        connector: &dyn Connector,
+        shutdown: &CancelToken,
+    ) -> Result<Connected<Self::Port>, PortError> {
+        self.seen_sim_time_s = None;
+        self.rate = RateMeter::default();
+        connector.connect_camera(shutdown)
+    }
+
+    fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
+        if self.seen_sim_time_s == Some(port.sim_time_s()?) {
+            return Ok(PERIOD);
+        }
+        let raw = port.grab()?;
+        let received_s = outlet.now_s();
+        self.seen_sim_time_s = Some(raw.sim_time_s);
+        self.rate.arrived(received_s);
+        let frame = self.prepare(raw, port.depth_limits_m(), received_s)?;
+        self.frames.put(frame);
+        (outlet.waker)();
+        Ok(PERIOD)
+    }
+
+    fn perform(&mut self, _port: Option<&mut Self::Port>, task: Self::Task, _outlet: &Outlet) -> Result<(), PortError> {
+        match task {
+            CameraTask::SetDepthScale(scale) => {
+                self.scale = scale;
+                // A resting simulation would otherwise show the old colours until it runs.
+                self.seen_sim_time_s = None;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Frames per second, from the times at which they arrived.
+#[derive(Debug, Default)]
+struct RateMeter {
+    arrivals_s: VecDeque<f64>,
+}
+
+impl RateMeter {
+    fn arrived(&mut self, at_s: f64) {
+        if self.arrivals_s.back().is_some_and(|last_s| at_s - last_s > RATE_GAP_S) {
+            self.arrivals_s.clear();
+        }
+        if self.arrivals_s.len() == RATE_FRAMES {
+            self.arrivals_s.pop_front();
+        }
+        self.arrivals_s.push_back(at_s);
+    }
+
+    /// 0 before the second frame.
+    fn rate_hz(&self) -> f64 {
+        match (self.arrivals_s.front(), self.arrivals_s.back()) {
+            (Some(first_s), Some(last_s)) if last_s > first_s => {
+                (self.arrivals_s.len() - 1) as f64 / (last_s - first_s)
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_is_that_of_the_present_stream() {
+        let mut rate = RateMeter::default();
+        rate.arrived(0.0);
+        assert_eq!(rate.rate_hz(), 0.0);
+        for i in 0..50 {
+            rate.arrived(100.0 + f64::from(i) * 0.04);
+        }
+        assert!((rate.rate_hz() - 25.0).abs() < 1e-9, "{}", rate.rate_hz());
+    }
+}

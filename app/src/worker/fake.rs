@@ -1,0 +1,165 @@
+//! A cell for tests: a gradient that moves, and failures on demand.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use handeye_core::depth::DepthImage;
+use handeye_core::frames::Pose;
+use handeye_core::image::{Rgb, RgbImage};
+use handeye_sim_link::client::CancelToken;
+
+use super::port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
+use crate::model::{RobotState, Simulation};
+
+/// Width and height of the fake pictures in pixels.
+pub const SIZE: (u32, u32) = (64, 48);
+
+/// What the fake cell does.
+#[derive(Debug)]
+pub struct Script {
+    /// Answers to the next connection attempts of either kind; after the last one they succeed.
+    pub refusals: Vec<PortError>,
+    /// Connections break at the next call while this is set.
+    pub broken: bool,
+    /// Number of pictures to deliver before time stands still.
+    pub frames_left: u64,
+    /// Pictures delivered.
+    pub frames: u64,
+    /// Whether time advances.
+    pub simulation: Simulation,
+    /// Stops carried out.
+    pub stops: u32,
+    /// Why stops and starts are refused.
+    pub refuse_tasks: Option<PortError>,
+}
+
+/// A cell that tests control. Clones are the same cell.
+#[derive(Clone)]
+pub struct FakeCell {
+    script: Arc<Mutex<Script>>,
+    hang: Option<Receiver<()>>,
+}
+
+impl FakeCell {
+    /// Connects at once, delivers `frames` pictures.
+    pub fn new(frames: u64) -> Self {
+        let script = Script {
+            refusals: Vec::new(),
+            broken: false,
+            frames_left: frames,
+            frames: 0,
+            simulation: Simulation::Running,
+            stops: 0,
+            refuse_tasks: None,
+        };
+        Self { script: Arc::new(Mutex::new(script)), hang: None }
+    }
+
+    /// Accepts connections and then never answers, whatever is cancelled, until the sender is dropped.
+    pub fn that_never_answers() -> (Self, Sender<()>) {
+        let (release, hang) = bounded(0);
+        (Self { hang: Some(hang), ..Self::new(u64::MAX) }, release)
+    }
+
+    /// The script, to look at and to change.
+    pub fn script(&self) -> MutexGuard<'_, Script> {
+        self.script.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How many clones there are.
+    pub fn owners(&self) -> usize {
+        Arc::strong_count(&self.script)
+    }
+
+    /// The colour picture of a number.
+    pub fn rgb(number: u64) -> RgbImage {
+        RgbImage::from_fn(SIZE.0, SIZE.1, |column, row| Rgb([column as u8, row as u8, number as u8]))
+    }
+
+    fn answer(&self) -> Result<MutexGuard<'_, Script>, PortError> {
+        if let Some(hang) = &self.hang {
+            // Returns when the test drops its end.
+            let _released = hang.recv().is_err();
+        }
+        let script = self.script();
+        if script.broken { Err(PortError::Lost("the cable is out".to_owned())) } else { Ok(script) }
+    }
+
+    fn connected<Port>(&self, port: Port) -> Result<Connected<Port>, PortError> {
+        let mut script = self.script();
+        if !script.refusals.is_empty() {
+            return Err(script.refusals.remove(0));
+        }
+        if script.broken {
+            return Err(PortError::Lost("nothing answers".to_owned()));
+        }
+        Ok(Connected { port, address: "tcp://fake:1".to_owned(), server: "fake cell 1.2".to_owned() })
+    }
+}
+
+impl Connector for FakeCell {
+    fn connect_control(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
+        self.connected(Box::new(self.clone()))
+    }
+
+    fn connect_camera(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
+        self.connected(Box::new(self.clone()))
+    }
+}
+
+impl ControlPort for FakeCell {
+    fn state(&mut self) -> Result<RobotState, PortError> {
+        let script = self.answer()?;
+        Ok(RobotState {
+            base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
+            joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0],
+            sim_time_s: script.frames as f64 * 0.05,
+            simulation: script.simulation,
+        })
+    }
+
+    fn start_simulation(&mut self) -> Result<(), PortError> {
+        let mut script = self.answer()?;
+        if let Some(error) = &script.refuse_tasks {
+            return Err(error.clone());
+        }
+        script.simulation = Simulation::Running;
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<(), PortError> {
+        let mut script = self.answer()?;
+        if let Some(error) = &script.refuse_tasks {
+            return Err(error.clone());
+        }
+        script.stops += 1;
+        Ok(())
+    }
+}
+
+impl CameraPort for FakeCell {
+    fn sim_time_s(&mut self) -> Result<f64, PortError> {
+        let script = self.answer()?;
+        let next = script.frames + u64::from(script.frames_left > 0);
+        Ok(next as f64 * 0.05)
+    }
+
+    fn grab(&mut self) -> Result<RawFrame, PortError> {
+        let mut script = self.answer()?;
+        if script.frames_left > 0 {
+            script.frames_left -= 1;
+            script.frames += 1;
+        }
+        let (width, height) = SIZE;
+        let metres = (0..width * height).map(|i| 0.4 + 0.4 * (i % width) as f32 / width as f32).collect();
+        Ok(RawFrame {
+            rgb: Self::rgb(script.frames),
+            depth: DepthImage { width, height, metres },
+            sim_time_s: script.frames as f64 * 0.05,
+        })
+    }
+
+    fn depth_limits_m(&self) -> [f32; 2] {
+        [0.01, 3.5]
+    }
+}

@@ -1,0 +1,171 @@
+//! Connections to a cell over the remote API; starts the built-in cell when it is the one to connect to.
+
+use std::fmt::Display;
+use std::sync::{Mutex, PoisonError};
+
+use handeye_core::depth::DepthImage;
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::cell::{Arm, CameraFeed, CellClient, CellInfo, CellPaths};
+use handeye_sim_link::client::convert::DepthFrame;
+use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState};
+
+use super::port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
+use crate::model::{CellSource, RobotState, Simulation};
+
+/// Connects to the cell that the window was started for.
+pub struct LiveConnector {
+    source: CellSource,
+    paths: CellPaths,
+    /// The built-in cell, once started. It ends with this connector.
+    server: Mutex<Option<CellServer>>,
+}
+
+impl LiveConnector {
+    /// Nothing is started or connected yet.
+    pub fn new(source: CellSource) -> Self {
+        Self { source, paths: CellPaths::default(), server: Mutex::new(None) }
+    }
+
+    /// Where to connect to. Starts the built-in cell when that is needed; the second worker waits for the first.
+    fn endpoint(&self) -> Result<Endpoint, PortError> {
+        let address = match &self.source {
+            CellSource::Address(address) => address.clone(),
+            CellSource::BuiltIn => {
+                let mut server = self.server.lock().unwrap_or_else(PoisonError::into_inner);
+                match server.as_ref() {
+                    Some(server) => server.endpoint(),
+                    None => server.insert(start_built_in()?).endpoint(),
+                }
+            }
+        };
+        address.parse().map_err(|error: LinkError| PortError::Hopeless(error.to_string()))
+    }
+
+    fn connect(&self, shutdown: &CancelToken) -> Result<(CellClient, CellInfo), PortError> {
+        let endpoint = self.endpoint()?;
+        let options = ConnectionOptions { shutdown: shutdown.clone(), ..ConnectionOptions::default() };
+        let connected = CellClient::connect(&endpoint, &options, &self.paths);
+        if let Err(LinkError::Unreachable { .. }) = &connected {
+            self.give_up_server(&endpoint);
+        }
+        let client = connected.map_err(port_error)?;
+        let info = client.info().clone();
+        Ok((client, info))
+    }
+
+    /// A built-in cell that cannot be reached has died: the next try starts another one.
+    fn give_up_server(&self, endpoint: &Endpoint) {
+        let mut server = self.server.lock().unwrap_or_else(PoisonError::into_inner);
+        if server.as_ref().is_some_and(|server| server.endpoint() == endpoint.to_string()) {
+            tracing::error!(%endpoint, "the built-in cell does not answer and is started again");
+            *server = None;
+        }
+    }
+
+    fn connected<Port>(&self, port: Port, info: &CellInfo) -> Connected<Port> {
+        Connected { port, address: info.endpoint.to_string(), server: self.describe(info) }
+    }
+
+    fn describe(&self, info: &CellInfo) -> String {
+        if self.source == CellSource::BuiltIn {
+            return "built-in cell".to_owned();
+        }
+        match (info.program_version, info.protocol) {
+            (1.., _) => {
+                let version = info.program_version;
+                format!("CoppeliaSim {}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
+            }
+            (_, ProtocolVersion::V1) => "CoppeliaSim up to 4.5".to_owned(),
+            _ => "remote API server".to_owned(),
+        }
+    }
+}
+
+impl Connector for LiveConnector {
+    fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
+        let (client, info) = self.connect(shutdown)?;
+        let (arm, _camera) = client.split();
+        Ok(self.connected(Box::new(LiveControl { arm }), &info))
+    }
+
+    fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
+        let (client, info) = self.connect(shutdown)?;
+        let (_arm, feed) = client.split();
+        Ok(self.connected(Box::new(LiveCamera { feed }), &info))
+    }
+}
+
+struct LiveControl {
+    arm: Arm,
+}
+
+impl ControlPort for LiveControl {
+    fn state(&mut self) -> Result<RobotState, PortError> {
+        let read = |arm: &mut Arm| {
+            Ok(RobotState {
+                base_from_tip: arm.base_from_tip()?,
+                joints_rad: arm.joint_angles()?,
+                sim_time_s: arm.sim().get_simulation_time()?,
+                simulation: match arm.sim().get_simulation_state()? {
+                    SimulationState::Stopped => Simulation::Stopped,
+                    SimulationState::Paused => Simulation::Paused,
+                    SimulationState::Running => Simulation::Running,
+                },
+            })
+        };
+        read(&mut self.arm).map_err(port_error)
+    }
+
+    fn start_simulation(&mut self) -> Result<(), PortError> {
+        self.arm.sim().start_simulation().map_err(port_error)
+    }
+
+    fn stop(&mut self) -> Result<(), PortError> {
+        self.arm.stop().map_err(port_error)
+    }
+}
+
+struct LiveCamera {
+    feed: CameraFeed,
+}
+
+impl CameraPort for LiveCamera {
+    fn sim_time_s(&mut self) -> Result<f64, PortError> {
+        self.feed.sim().get_simulation_time().map_err(port_error)
+    }
+
+    fn grab(&mut self) -> Result<RawFrame, PortError> {
+        let frame = self.feed.grab().map_err(port_error)?;
+        let DepthFrame { width, height, metres } = frame.depth;
+        Ok(RawFrame { rgb: frame.rgb, depth: DepthImage { width, height, metres }, sim_time_s: frame.sim_time_s })
+    }
+
+    fn depth_limits_m(&self) -> [f32; 2] {
+        let optics = &self.feed.info().depth_optics;
+        [optics.near_m as f32, optics.far_m as f32]
+    }
+}
+
+fn start_built_in() -> Result<CellServer, PortError> {
+    let hopeless = |error: &dyn Display| PortError::Hopeless(error.to_string());
+    let scene = Scene::reference().map_err(|error| hopeless(&error))?;
+    CellServer::start(CellConfig::new(scene)).map_err(|error| hopeless(&error))
+}
+
+fn port_error(error: LinkError) -> PortError {
+    let text = match &error {
+        // Which call found out is of no interest when nobody is there for any call.
+        LinkError::Unreachable { endpoint, .. } => format!(
+            "nothing answers at {endpoint}; start CoppeliaSim or a cell there, check that its ZMQ remote API add-on is \
+             enabled and which port its status bar shows (usually 23000)"
+        ),
+        LinkError::Disconnected { .. } => "the server closed the connection; start it again if it has ended".to_owned(),
+        other => other.to_string(),
+    };
+    match error {
+        LinkError::BadEndpoint { .. } => PortError::Hopeless(text),
+        error if error.is_connection_loss() => PortError::Lost(text),
+        _ => PortError::Refused(text),
+    }
+}

@@ -1,0 +1,214 @@
+//! The threads behind the window. Each owns one connection to the cell and makes it again when it breaks.
+//!
+//! | thread | does | reports through |
+//! | --- | --- | --- |
+//! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
+//! | `camera` | pictures, colours of the depth | events; newest [`LiveFrame`] |
+//!
+//! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
+//! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
+
+mod camera;
+mod control;
+mod link;
+mod live;
+mod port;
+mod reconnect;
+mod slot;
+
+#[cfg(test)]
+pub mod fake;
+
+use std::io;
+use std::sync::Arc;
+use std::thread::{Builder, JoinHandle};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use handeye_sim_link::client::CancelToken;
+
+pub use camera::CameraTask;
+pub use control::{ControlTask, StopLine};
+pub use link::Request;
+pub use live::LiveConnector;
+pub use port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
+pub use slot::LatestSlot;
+
+use crate::command::Event;
+use crate::model::{CellSource, DepthScale, LiveFrame, RobotState};
+use camera::Camera;
+use control::Control;
+use link::{Duty, LinkLoop, Outlet};
+use reconnect::Reconnect;
+
+/// Tells the window that there is something to look at. Called from any thread.
+pub type Waker = Arc<dyn Fn() + Send + Sync>;
+
+/// Seconds since some moment before the workers were started.
+pub type Clock = Arc<dyn Fn() -> f64 + Send + Sync>;
+
+/// Requests that may wait for a worker. A person cannot click faster than it answers, unless it hangs.
+const MAX_REQUESTS: usize = 32;
+
+/// Events that may wait for the window.
+const MAX_EVENTS: usize = 256;
+
+/// How long the end of the program waits for the workers. Calls under way return within a fraction of it.
+pub const JOIN_DEADLINE: Duration = Duration::from_secs(2);
+
+/// A worker cannot take the request now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the connection does not answer; wait until it is back")]
+pub struct Busy;
+
+/// The application's end of the workers.
+pub struct Workers {
+    control: Option<Sender<Request<ControlTask>>>,
+    camera: Option<Sender<Request<CameraTask>>>,
+    events: Option<Receiver<Event>>,
+    stop: Arc<StopLine>,
+    robot: Arc<LatestSlot<RobotState>>,
+    frames: Arc<LatestSlot<LiveFrame>>,
+    shutdown: CancelToken,
+    threads: Vec<Thread>,
+}
+
+struct Thread {
+    handle: JoinHandle<()>,
+    /// Closes when the thread is done.
+    done: Receiver<()>,
+}
+
+impl Workers {
+    /// Starts the threads.
+    ///
+    /// # Errors
+    /// When the system has no more threads.
+    pub fn start(
+        source: &CellSource,
+        scale: DepthScale,
+        connector: &Arc<dyn Connector>,
+        clock: &Clock,
+        waker: &Waker,
+    ) -> io::Result<Self> {
+        let (event_sender, events) = bounded(MAX_EVENTS);
+        let mut workers = Self::idle(events);
+        let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
+        let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
+        workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
+        let duty = Camera::new(scale, Arc::clone(&workers.frames));
+        workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
+        Ok(workers)
+    }
+
+    /// No threads yet.
+    fn idle(events: Receiver<Event>) -> Self {
+        Self {
+            control: None,
+            camera: None,
+            events: Some(events),
+            stop: Arc::default(),
+            robot: Arc::default(),
+            frames: Arc::default(),
+            shutdown: CancelToken::default(),
+            threads: Vec::new(),
+        }
+    }
+
+    fn spawn<D: Duty + 'static>(
+        &mut self,
+        name: &str,
+        duty: D,
+        source: &CellSource,
+        connector: &Arc<dyn Connector>,
+        outlet: Outlet,
+    ) -> io::Result<Sender<Request<D::Task>>> {
+        let (sender, requests) = bounded(MAX_REQUESTS);
+        let (running, done) = bounded(0);
+        let reconnect = Reconnect::new(source.clone());
+        let connector = Arc::clone(connector);
+        let shutdown = self.shutdown.clone();
+        let handle = Builder::new().name(name.to_owned()).spawn(move || {
+            // Dropped last, also when the worker panics.
+            let _running: Sender<()> = running;
+            LinkLoop { duty, connector: connector.as_ref(), requests, outlet, shutdown }.run(reconnect);
+        })?;
+        self.threads.push(Thread { handle, done });
+        Ok(sender)
+    }
+
+    /// Hands over everything that was reported since the last time. Never waits for a worker.
+    pub fn drain(&self, mut absorb: impl FnMut(Event)) {
+        for event in self.events.iter().flat_map(Receiver::try_iter).take(MAX_EVENTS) {
+            absorb(event);
+        }
+        if let Some((robot, _)) = self.robot.take() {
+            absorb(Event::Robot(robot));
+        }
+        if let Some((LiveFrame { info, images }, dropped)) = self.frames.take() {
+            absorb(Event::Frame { info, dropped, images: Some(images) });
+        }
+    }
+
+    /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached.
+    pub fn press_stop(&self) {
+        self.stop.press();
+        // Only to wake a resting worker: one that is too busy to take it looks at the stop line by itself.
+        let woken = self.ask_control(Request::Do(ControlTask::CheckStop));
+        tracing::debug!(?woken, "stop pressed");
+    }
+
+    /// Asks the control worker for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when it does not take requests.
+    pub fn ask_control(&self, request: Request<ControlTask>) -> Result<(), Busy> {
+        ask(self.control.as_ref(), request)
+    }
+
+    /// Asks the camera worker for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when it does not take requests.
+    pub fn ask_camera(&self, request: Request<CameraTask>) -> Result<(), Busy> {
+        ask(self.camera.as_ref(), request)
+    }
+
+    /// Ends the threads: calls under way are cancelled, channels closed, threads joined. A thread that does not end
+    /// within the deadline is left alone, so that the program can end; returns how many there are.
+    pub fn shut_down(&mut self, deadline: Duration) -> usize {
+        self.shutdown.cancel();
+        self.control = None;
+        self.camera = None;
+        self.events = None;
+        let end = Instant::now() + deadline;
+        let mut left_alone = 0;
+        for Thread { handle, done } in self.threads.drain(..) {
+            let name = handle.thread().name().unwrap_or_default().to_owned();
+            // Nothing is ever sent: either the worker is done and the channel closed, or time is up.
+            if matches!(done.recv_deadline(end), Err(crossbeam_channel::RecvTimeoutError::Timeout)) {
+                tracing::warn!(name, "a worker does not end and is left alone");
+                left_alone += 1;
+            } else if handle.join().is_err() {
+                tracing::error!(name, "a worker ended with a panic");
+            }
+        }
+        left_alone
+    }
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        self.shut_down(JOIN_DEADLINE);
+    }
+}
+
+fn ask<Task>(worker: Option<&Sender<Request<Task>>>, request: Request<Task>) -> Result<(), Busy> {
+    match worker.map(|worker| worker.try_send(request)) {
+        Some(Ok(())) => Ok(()),
+        Some(Err(TrySendError::Full(_) | TrySendError::Disconnected(_))) | None => Err(Busy),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,97 @@
+//! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
+
+use handeye_core::depth::DepthImage;
+use handeye_core::image::RgbImage;
+use handeye_sim_link::client::CancelToken;
+
+use crate::model::RobotState;
+
+/// Why a port has no answer.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PortError {
+    /// The connection is broken or was never made: worth another try.
+    #[error("{0}")]
+    Lost(String),
+    /// The cell answered no.
+    #[error("{0}")]
+    Refused(String),
+    /// It cannot work before the user changes something.
+    #[error("{0}")]
+    Hopeless(String),
+}
+
+/// A connection that has just been made.
+pub struct Connected<Port> {
+    /// To make calls.
+    pub port: Port,
+    /// Where the server is.
+    pub address: String,
+    /// What it is, for example `CoppeliaSim 4.10.0`.
+    pub server: String,
+}
+
+/// Makes connections to a cell. Blocks; used on the threads of the workers only.
+pub trait Connector: Send + Sync {
+    /// A connection for joints, tip, simulation and stop.
+    ///
+    /// # Errors
+    /// [`PortError`]; within a second after `shutdown` is raised.
+    fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError>;
+
+    /// A connection for pictures.
+    ///
+    /// # Errors
+    /// As [`Self::connect_control`].
+    fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError>;
+}
+
+/// The robot and the simulation.
+pub trait ControlPort: Send {
+    /// Reads the robot.
+    ///
+    /// # Errors
+    /// [`PortError`].
+    fn state(&mut self) -> Result<RobotState, PortError>;
+
+    /// Lets simulated time advance.
+    ///
+    /// # Errors
+    /// [`PortError`].
+    fn start_simulation(&mut self) -> Result<(), PortError>;
+
+    /// Has every joint stay where it is.
+    ///
+    /// # Errors
+    /// [`PortError`]; the arm may then still move.
+    fn stop(&mut self) -> Result<(), PortError>;
+}
+
+/// Pictures as they come from the cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawFrame {
+    /// Colour, row 0 on top.
+    pub rgb: RgbImage,
+    /// Depth in metres, row 0 on top.
+    pub depth: DepthImage,
+    /// Simulated time [s].
+    pub sim_time_s: f64,
+}
+
+/// The camera.
+pub trait CameraPort: Send {
+    /// Simulated time [s]: cheap to ask for, and pictures of a time that has been seen are not fetched again.
+    ///
+    /// # Errors
+    /// [`PortError`].
+    fn sim_time_s(&mut self) -> Result<f64, PortError>;
+
+    /// Fetches the pictures of the present instant.
+    ///
+    /// # Errors
+    /// [`PortError`].
+    fn grab(&mut self) -> Result<RawFrame, PortError>;
+
+    /// Depths [m] that the sensor can measure; it reports the far one where nothing reflects.
+    fn depth_limits_m(&self) -> [f32; 2];
+}

@@ -1,0 +1,139 @@
+//! From one try to the next: what a connection that comes and goes looks like.
+
+use std::time::Duration;
+
+use super::port::PortError;
+use crate::model::{CellSource, LinkState};
+
+/// Pauses between tries. A person who starts the simulator waits for the first ones; a machine that is off for the
+/// night should not be bothered more often than the last.
+const PAUSES: [Duration; 4] =
+    [Duration::from_millis(250), Duration::from_millis(500), Duration::from_secs(1), Duration::from_secs(2)];
+
+/// Follows one connection. No thread, no clock: the worker says what happened and when.
+#[derive(Debug)]
+pub struct Reconnect {
+    source: CellSource,
+    attempt: u32,
+    why: Option<String>,
+    /// Since when a connection that once worked is gone.
+    lost_since_s: Option<f64>,
+    hopeless: bool,
+}
+
+impl Reconnect {
+    /// Before the first try.
+    pub fn new(source: CellSource) -> Self {
+        Self { source, attempt: 0, why: None, lost_since_s: None, hopeless: false }
+    }
+
+    /// A try begins.
+    pub fn trying(&mut self) -> LinkState {
+        self.attempt += 1;
+        self.hopeless = false;
+        match self.lost_since_s {
+            Some(since_s) => LinkState::Retrying { since_s, why: self.reason(), attempt: self.attempt },
+            None => self.searching(),
+        }
+    }
+
+    /// The try went well.
+    pub fn connected(&mut self, address: String, server: String) -> LinkState {
+        self.attempt = 0;
+        self.why = None;
+        self.lost_since_s = None;
+        LinkState::Connected { address, server }
+    }
+
+    /// The try failed.
+    pub fn failed(&mut self, error: &PortError) -> LinkState {
+        self.why = Some(error.to_string());
+        self.hopeless = matches!(error, PortError::Hopeless(_));
+        match self.lost_since_s {
+            _ if self.hopeless => LinkState::Failed { why: self.reason() },
+            Some(since_s) => LinkState::Lost { since_s, why: self.reason(), attempt: self.attempt },
+            None => self.searching(),
+        }
+    }
+
+    /// A connection that worked broke.
+    pub fn lost(&mut self, error: &PortError, now_s: f64) -> LinkState {
+        self.lost_since_s = Some(now_s);
+        self.failed(error)
+    }
+
+    /// How long to wait before the next try; `None` until the user asks.
+    pub fn pause(&self) -> Option<Duration> {
+        let index = (self.attempt.saturating_sub(1) as usize).min(PAUSES.len() - 1);
+        (!self.hopeless).then(|| PAUSES[index])
+    }
+
+    fn searching(&self) -> LinkState {
+        match &self.source {
+            CellSource::BuiltIn => LinkState::StartingCell { why: self.why.clone() },
+            CellSource::Address(address) => {
+                LinkState::Searching { address: address.clone(), attempt: self.attempt, why: self.why.clone() }
+            }
+        }
+    }
+
+    fn reason(&self) -> String {
+        self.why.clone().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gone() -> PortError {
+        PortError::Lost("nothing answers".to_owned())
+    }
+
+    #[test]
+    fn a_server_that_is_not_there_yet_is_searched_for_and_the_reason_is_shown() {
+        let mut reconnect = Reconnect::new(CellSource::Address("tcp://cell:1".to_owned()));
+        assert!(matches!(reconnect.trying(), LinkState::Searching { attempt: 1, why: None, .. }));
+        assert!(matches!(reconnect.failed(&gone()), LinkState::Searching { attempt: 1, why: Some(_), .. }));
+        assert!(matches!(reconnect.trying(), LinkState::Searching { attempt: 2, why: Some(_), .. }));
+        assert!(reconnect.connected("tcp://cell:1".to_owned(), "sim".to_owned()).is_connected());
+    }
+
+    #[test]
+    fn a_loss_keeps_the_time_when_it_began_over_all_retries() {
+        let mut reconnect = Reconnect::new(CellSource::BuiltIn);
+        reconnect.trying();
+        reconnect.connected(String::new(), String::new());
+        assert!(matches!(reconnect.lost(&gone(), 12.5), LinkState::Lost { since_s: 12.5, .. }));
+        for expected in 1..5 {
+            let LinkState::Retrying { since_s, attempt, .. } = reconnect.trying() else { panic!("not retrying") };
+            assert_eq!((since_s, attempt), (12.5, expected));
+            assert!(matches!(reconnect.failed(&gone()), LinkState::Lost { since_s: 12.5, .. }));
+        }
+        reconnect.connected(String::new(), String::new());
+        assert!(matches!(reconnect.lost(&gone(), 99.0), LinkState::Lost { since_s: 99.0, .. }));
+    }
+
+    #[test]
+    fn pauses_grow_and_stay_bounded() {
+        let mut reconnect = Reconnect::new(CellSource::BuiltIn);
+        let mut before = Duration::ZERO;
+        for _ in 0..10 {
+            reconnect.trying();
+            reconnect.failed(&gone());
+            let pause = reconnect.pause().expect("it tries again");
+            assert!(pause >= before && pause <= PAUSES[3]);
+            before = pause;
+        }
+    }
+
+    #[test]
+    fn what_cannot_work_waits_for_the_user() {
+        let mut reconnect = Reconnect::new(CellSource::BuiltIn);
+        reconnect.trying();
+        let state = reconnect.failed(&PortError::Hopeless("no memory".to_owned()));
+        assert_eq!(state, LinkState::Failed { why: "no memory".to_owned() });
+        assert_eq!(reconnect.pause(), None);
+        assert_eq!(reconnect.trying(), LinkState::StartingCell { why: Some("no memory".to_owned()) });
+    }
+}
