@@ -29,7 +29,7 @@ proptest! {
     }
 
     #[test]
-    fn log_undoes_exp(delta in tangent(3.14)) {
+    fn log_undoes_exp(delta in tangent(3.0)) {
         prop_assert!((log(&exp(&delta)) - delta).norm() < 1e-8);
     }
 

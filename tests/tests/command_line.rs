@@ -1,5 +1,6 @@
 //! The contract of the command line: exit codes, streams, one-line errors.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -49,7 +50,8 @@ distortion = []
     for image in poses.lines().skip(1).filter_map(|l| l.split(',').next()) {
         for row in 0..3 {
             for column in 0..4 {
-                corners.push_str(&format!("{image},{column},{row},{},{}\n", 250 + 40 * column, 200 + 40 * row));
+                let (u, v) = (250 + 40 * column, 200 + 40 * row);
+                writeln!(corners, "{image},{column},{row},{u},{v}").expect("a string takes any text");
             }
         }
     }

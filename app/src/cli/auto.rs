@@ -121,7 +121,7 @@ fn keep_earlier_session(folder: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let kept = (1..)
+    let kept = (1..u32::MAX)
         .map(|n| folder.with_file_name(format!("{name}.earlier-{n}")))
         .find(|path| !path.exists())
         .unwrap_or_else(|| folder.with_file_name(format!("{name}.earlier")));

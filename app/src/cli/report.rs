@@ -53,28 +53,13 @@ fn transform(out: &mut String, t: &TransformEstimate) {
     let [x, y, z] = t.translation_m.map(|v| v * 1e3);
     let [qx, qy, qz, qw] = t.rotation_xyzw;
     line!(out, "{}_from_{}", t.parent_frame, t.child_frame);
-    match t.covariance {
-        Some(c) => {
-            let sigma: Vec<f64> = (0..6).map(|i| c[i][i].max(0.0).sqrt()).collect();
-            line!(
-                out,
-                "  t  [{x:.3} {y:.3} {z:.3}] mm, standard deviation [{:.3} {:.3} {:.3}] mm",
-                sigma[0] * 1e3,
-                sigma[1] * 1e3,
-                sigma[2] * 1e3
-            );
-            line!(
-                out,
-                "  q  [{qx:.6} {qy:.6} {qz:.6} {qw:.6}] xyzw, standard deviation [{:.4} {:.4} {:.4}]°",
-                sigma[3].to_degrees(),
-                sigma[4].to_degrees(),
-                sigma[5].to_degrees()
-            );
-        }
-        None => {
-            line!(out, "  t  [{x:.3} {y:.3} {z:.3}] mm");
-            line!(out, "  q  [{qx:.6} {qy:.6} {qz:.6} {qw:.6}] xyzw");
-        }
+    line!(out, "  t  [{x:.3} {y:.3} {z:.3}] mm");
+    line!(out, "  q  [{qx:.6} {qy:.6} {qz:.6} {qw:.6}] xyzw");
+    if let Some(c) = t.covariance {
+        let sigma: Vec<f64> = (0..6).map(|i| c[i][i].max(0.0).sqrt()).collect();
+        let [a, b, c] = [0, 1, 2].map(|i| sigma[i] * 1e3);
+        let [d, e, f] = [3, 4, 5].map(|i| sigma[i].to_degrees());
+        line!(out, "  standard deviation [{a:.3} {b:.3} {c:.3}] mm, [{d:.4} {e:.4} {f:.4}]°");
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, CalibrateError, Method, Observations};
+use handeye_core::calibrate::{self, Method, Observations};
 use handeye_core::dataset::Dataset;
 use handeye_core::export::{self, ExportNames};
 use handeye_core::progress::CancelToken;
@@ -32,17 +32,13 @@ pub fn solve(
     input_sha256: Option<String>,
     cancel: &CancelToken,
 ) -> Result<CalibrationResult, Failure> {
-    let calibration = calibrate::calibrate(observations, method, cancel).map_err(|error| failure(error))?;
+    let calibration = calibrate::calibrate(observations, method, cancel).map_err(Failure::failed)?;
     let name = match method {
         Method::Joint => "joint",
         Method::ClosedForm(name) => name,
     };
     let options = BTreeMap::from([("method".to_owned(), serde_json::Value::from(name))]);
     Ok(calibration.to_result(env!("CARGO_PKG_VERSION"), input_sha256, options))
-}
-
-fn failure(error: CalibrateError) -> Failure {
-    Failure::failed(error)
 }
 
 /// Finds the target in every image, with a line of progress.

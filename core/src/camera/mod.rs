@@ -144,7 +144,7 @@ impl Intrinsics {
         out
     }
 
-    /// The pixel of a point in camera coordinates [m].
+    /// The pixel of a point in camera coordinates, in metres.
     ///
     /// # Errors
     /// [`CameraError::BehindCamera`]; the fisheye model alone sees points beside and behind its plane.

@@ -170,8 +170,8 @@ impl System {
         let mut matrix = SharedMatrix::zeros();
         let mut gradient = SharedVector::zeros();
         for block in &self.blocks {
-            matrix += &*block.shared * weight;
-            gradient += &*block.shared_gradient * weight;
+            matrix += *block.shared * weight;
+            gradient += *block.shared_gradient * weight;
         }
         for i in 0..self.shared_count {
             matrix[(i, i)] *= 1.0 + damping;
@@ -293,8 +293,8 @@ impl Reduced {
     ) -> Option<f64> {
         let weight = noise.corner_px.powi(-2);
         let own = Own::new(block, correction, weight, &prior_weight(noise), 0.0)?;
-        let matrix = &*block.shared * weight - own.gain.transpose() * own.factor.solve(&own.gain);
-        let gradient = &*block.shared_gradient * weight - own.gain.transpose() * own.factor.solve(&own.gradient);
+        let matrix = *block.shared * weight - own.gain.transpose() * own.factor.solve(&own.gain);
+        let gradient = *block.shared_gradient * weight - own.gain.transpose() * own.factor.solve(&own.gradient);
         let n = self.gradient.len();
         let full = self.factor.l() * self.factor.l().transpose();
         let rest = DMatrix::from_fn(n, n, |i, j| full[(i, j)] - matrix[(i, j)] * self.scale[i] * self.scale[j]);
