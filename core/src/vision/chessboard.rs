@@ -6,6 +6,7 @@ use opencv::boxed_ref::BoxedRef;
 use opencv::calib3d;
 use opencv::core::{Mat, Point2f, Size, ToInputArray, Vector};
 use opencv::imgproc;
+use opencv::prelude::*;
 
 use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray};
@@ -16,10 +17,11 @@ use crate::target::Grid;
 
 /// Least share of neighbouring squares that must differ in the direction the pattern asks for.
 const MIN_ALTERNATION: f64 = 0.9;
-/// Images up to this many pixels are worth enlarging in search of a small board; beyond it costs seconds.
-const MAX_PIXELS_TO_ENLARGE: u32 = 1_500_000;
-/// Images of less width than this are not made smaller: squares would vanish.
-const MIN_WIDTH_TO_REDUCE: u32 = 640;
+/// Larger images are searched at a half, a third … of their size first: quads cost in proportion to their number, and
+/// texture has more of them the closer one looks.
+const PIXELS_TO_REDUCE: u32 = 1_000_000;
+/// Images up to this many pixels are worth enlarging in search of a small board.
+const PIXELS_TO_ENLARGE: u32 = 500_000;
 
 pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
     let Some(found) = search(image, grid, effort)? else { return Ok(None) };
@@ -28,33 +30,34 @@ pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Opt
     Ok(refined.is_regular().then_some(refined))
 }
 
-/// The way to look, in the order in which they are tried.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A way to look.
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Strategy {
-    /// Adaptive threshold and quads, given up at once when too few quads are in sight.
-    Quick,
-    /// The same with every threshold and dilation.
-    Patient,
-    /// Every threshold on an image of half the size: for large squares, blur and noise.
-    Reduced,
-    /// Every threshold on an image of twice the size: for small squares.
-    Enlarged,
-    /// The sector-based detector (Duda & Frese 2018): slow, for the boards that thresholds cannot separate.
-    SectorBased,
+    /// Quads after one threshold for the whole image, given up at once when too few dark and light blobs are in sight.
+    Plain { scale: f64 },
+    /// The same after the light is evened out: the mean around each pixel is taken off.
+    Flattened { scale: f64 },
+    /// Quads after thresholds in windows of several sizes: for uneven light, several times as slow on a miss.
+    Adaptive { scale: f64 },
+    /// The sector-based detector (Duda & Frese 2018): half a second per megapixel, for boards whose squares no
+    /// threshold separates. `robust` normalises the image and tries more.
+    SectorBased { robust: bool },
 }
 
 fn strategies(image: &GrayImage, effort: Effort) -> Vec<Strategy> {
-    let (width, height) = image.dimensions();
-    let mut all = vec![Strategy::Quick];
+    let pixels = image.width().saturating_mul(image.height());
+    let divisor = (f64::from(pixels) / f64::from(PIXELS_TO_REDUCE)).sqrt().ceil().max(1.0);
+    let scale = 1.0 / divisor;
+    let mut all = vec![Strategy::Plain { scale }, Strategy::Flattened { scale }];
     if effort == Effort::Thorough {
-        all.push(Strategy::Patient);
-        if width >= MIN_WIDTH_TO_REDUCE {
-            all.push(Strategy::Reduced);
+        if scale < 1.0 {
+            all.extend([Strategy::Plain { scale: 1.0 }, Strategy::Flattened { scale: 1.0 }]);
         }
-        if width.saturating_mul(height) <= MAX_PIXELS_TO_ENLARGE {
-            all.push(Strategy::Enlarged);
+        all.push(Strategy::Adaptive { scale });
+        if pixels <= PIXELS_TO_ENLARGE {
+            all.push(Strategy::Plain { scale: 2.0 });
         }
-        all.push(Strategy::SectorBased);
+        all.extend([Strategy::SectorBased { robust: false }, Strategy::SectorBased { robust: true }]);
     }
     all
 }
@@ -73,13 +76,15 @@ fn search(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Order
 }
 
 fn attempt(mat: &BoxedRef<'_, Mat>, grid: &Grid, strategy: Strategy) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
-    const QUADS: i32 = calib3d::CALIB_CB_ADAPTIVE_THRESH + calib3d::CALIB_CB_NORMALIZE_IMAGE;
     match strategy {
-        Strategy::Quick => find_quads(mat, grid, QUADS + calib3d::CALIB_CB_FAST_CHECK),
-        Strategy::Patient => find_quads(mat, grid, QUADS),
-        Strategy::Reduced => scaled(mat, grid, 0.5, QUADS),
-        Strategy::Enlarged => scaled(mat, grid, 2.0, QUADS),
-        Strategy::SectorBased => find_sectors(mat, grid),
+        Strategy::Plain { scale } => {
+            scaled(mat, grid, scale, calib3d::CALIB_CB_NORMALIZE_IMAGE + calib3d::CALIB_CB_FAST_CHECK)
+        }
+        Strategy::Flattened { scale } => scaled(&flattened(mat)?, grid, scale, calib3d::CALIB_CB_FAST_CHECK),
+        Strategy::Adaptive { scale } => {
+            scaled(mat, grid, scale, calib3d::CALIB_CB_NORMALIZE_IMAGE + calib3d::CALIB_CB_ADAPTIVE_THRESH)
+        }
+        Strategy::SectorBased { robust } => find_sectors(mat, grid, robust),
     }
 }
 
@@ -95,17 +100,13 @@ fn find_quads(mat: &impl ToInputArray, grid: &Grid, flags: i32) -> Result<Option
     Ok(complete(found, &corners, grid))
 }
 
-fn find_sectors(mat: &impl ToInputArray, grid: &Grid) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
-    let flags = calib3d::CALIB_CB_NORMALIZE_IMAGE + calib3d::CALIB_CB_EXHAUSTIVE + calib3d::CALIB_CB_ACCURACY;
-    for flags in [calib3d::CALIB_CB_ACCURACY, flags] {
-        let mut corners = Vector::<Point2f>::new();
-        let found = calib3d::find_chessboard_corners_sb(mat, pattern(grid), &mut corners, flags)
-            .map_err(failed("look for a chessboard by sectors"))?;
-        if let Some(points) = complete(found, &corners, grid) {
-            return Ok(Some(points));
-        }
-    }
-    Ok(None)
+fn find_sectors(mat: &impl ToInputArray, grid: &Grid, robust: bool) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
+    let more = if robust { calib3d::CALIB_CB_NORMALIZE_IMAGE + calib3d::CALIB_CB_EXHAUSTIVE } else { 0 };
+    let mut corners = Vector::<Point2f>::new();
+    let flags = calib3d::CALIB_CB_ACCURACY + more;
+    let found = calib3d::find_chessboard_corners_sb(mat, pattern(grid), &mut corners, flags)
+        .map_err(failed("look for a chessboard by sectors"))?;
+    Ok(complete(found, &corners, grid))
 }
 
 /// OpenCV leaves a partial list behind when it does not find all.
@@ -113,17 +114,31 @@ fn complete(found: bool, corners: &Vector<Point2f>, grid: &Grid) -> Option<Vec<V
     (found && corners.len() == grid.len()).then(|| from_points2f(corners))
 }
 
+/// The image less its mean over an eighth of its size, with half as much contrast again, around middle grey.
+fn flattened(mat: &(impl ToInputArray + MatTraitConst)) -> Result<Mat, VisionError> {
+    const GAIN: f64 = 1.5;
+    let side = mat.cols().min(mat.rows()) / 8 + 1;
+    let (mut mean, mut out) = (Mat::default(), Mat::default());
+    imgproc::blur_def(mat, &mut mean, Size::new(side, side)).map_err(failed("even out the light"))?;
+    opencv::core::add_weighted_def(mat, GAIN, &mean, -GAIN, 128.0, &mut out).map_err(failed("even out the light"))?;
+    Ok(out)
+}
+
 fn scaled(
-    mat: &BoxedRef<'_, Mat>,
+    mat: &impl ToInputArray,
     grid: &Grid,
     factor: f64,
     flags: i32,
 ) -> Result<Option<Vec<Vector2<f64>>>, VisionError> {
+    if factor == 1.0 {
+        return find_quads(mat, grid, flags);
+    }
     let method = if factor < 1.0 { imgproc::INTER_AREA } else { imgproc::INTER_CUBIC };
     let mut resized = Mat::default();
     imgproc::resize(mat, &mut resized, Size::default(), factor, factor, method)
         .map_err(failed("change the size of the image"))?;
     let found = find_quads(&resized, grid, flags)?;
+    // Rounding of the size moves points by less than a pixel, which the refinement takes.
     // Pixel centres: a coordinate u covers u - 0.5 .. u + 0.5, so it is u + 0.5 that scales.
     let back = |p: Vector2<f64>| p.map(|c| (c + 0.5) / factor - 0.5);
     Ok(found.map(|points| points.into_iter().map(back).collect()))

@@ -13,9 +13,9 @@ const MIN_SQUARE_PX: u32 = 3;
 /// How long a detection may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Effort {
-    /// One quick attempt, for every frame of a live stream: a miss costs no more than a hit.
+    /// The quick methods, for every frame of a live stream: a miss costs a few times what a hit does.
     Live,
-    /// Every method, for images that are kept: a miss may take a second per megapixel.
+    /// Every method, for images that are kept: a miss may take some seconds per megapixel.
     #[default]
     Thorough,
 }

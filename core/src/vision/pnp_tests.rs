@@ -7,6 +7,7 @@ use super::VisionError;
 use super::pnp::{camera_from_target, solve};
 use super::rendered::looking_at;
 use crate::camera::{Distortion, Intrinsics};
+use crate::frames::{Camera, Pose, Target};
 use crate::observation::Corner;
 use crate::target::{Grid, TargetSpec};
 
@@ -135,4 +136,31 @@ fn unusable_corners_are_named() {
     assert!(matches!(solve(&good, &TARGET, &bad_camera), Err(VisionError::Camera { .. })));
     let bad_target = TargetSpec::Chessboard(Grid { square_m: f64::NAN, ..GRID });
     assert!(matches!(solve(&good, &bad_target, &camera), Err(VisionError::BadSquare { .. })));
+}
+
+#[test]
+fn no_small_motion_of_the_pose_lowers_the_error() {
+    const STEP: f64 = 1e-5;
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    for camera in cameras() {
+        let truth = looking_at(&GRID, &camera, 0.4, [0.5, 0.4, 0.2], Vector2::new(40.0, -30.0));
+        let corners = project(&camera, &truth, 0.3, &mut rng);
+        let pose = solve(&corners, &TARGET, &camera).expect("a pose");
+        let squared = |pose: &Pose<Camera, Target>| -> f64 {
+            let at = |c: &Corner| camera.project(&(pose.isometry() * GRID.point(c.index))).expect("in front");
+            corners.iter().map(|c| (at(c) - c.px).norm_squared()).sum()
+        };
+        for solution in [Some(pose.best), pose.alternative].into_iter().flatten() {
+            let least = squared(&solution.camera_from_target);
+            assert!((least / 70.0 - solution.rms_px.powi(2)).abs() < 1e-9);
+            for axis in 0..6 {
+                for sign in [-1.0, 1.0] {
+                    let mut delta = Vector6::zeros();
+                    delta[axis] = sign * STEP;
+                    let moved = squared(&solution.camera_from_target.perturbed(&delta));
+                    assert!(moved > least, "{:?} axis {axis}: {moved} < {least}", camera.distortion);
+                }
+            }
+        }
+    }
 }

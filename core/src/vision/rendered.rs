@@ -67,6 +67,10 @@ impl Scene {
     fn dark_part(&self, h: &Matrix3<f64>, u: f64, v: f64) -> f64 {
         let corner = |du: f64, dv: f64| Vector2::new(u + du, v + dv);
         let pixel = [corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
+        let [first, rest @ ..] = pixel.map(|p| board(h, &p).map(f64::floor));
+        if rest.iter().all(|b| *b == first) {
+            return if self.is_dark(&first) { 1.0 } else { 0.0 };
+        }
         self.dark_area(h, &pixel)
     }
 

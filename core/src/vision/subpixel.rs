@@ -3,11 +3,12 @@
 //! Near an inner corner the board is two straight lines (straight under any perspective) that divide dark from light
 //! crosswise. Blurred by the lens and the area of the pixels, the intensity is close to
 //!
-//! `I(p) = m + g·(p − c) + a · erf(n₁·(p − c) / √2 σ) · erf(n₂·(p − c) / √2 σ)`
+//! `I(p) = (1 + g·(p − c)) · (m + a · erf(n₁·(p − c) / √2 σ) · erf(n₂·(p − c) / √2 σ))`
 //!
-//! with the corner `c`, the unit normals `n₁`, `n₂` of the lines, the blur `σ`, the mean level `m`, a gradient `g` of
-//! the illumination and the signed contrast `a`. All nine are fitted by Levenberg–Marquardt to the pixels around each
-//! corner, starting from OpenCV's `cornerSubPix`, whose answer stays where the fit does not converge to a corner.
+//! with the corner `c`, the unit normals `n₁`, `n₂` of the lines, the blur `σ`, the mean level `m`, a relative
+//! gradient `g` of the illumination and the signed contrast `a`. All nine are fitted by Levenberg–Marquardt to the
+//! pixels around each corner, starting from OpenCV's `cornerSubPix`, whose answer stays where the fit does not
+//! converge to a corner.
 //! A quadratic saddle (Placht et al. 2014, "ROCHADE") is the second-order expansion of this at `c`; the full model
 //! uses the pixels along the edges too, where most of the information is.
 
@@ -238,21 +239,23 @@ fn normal_equations(patch: &Patch, x: &Parameters) -> (f64, SMatrix<f64, 9, 9>, 
         let d = p - centre;
         let (s1, s2) = (n1.dot(&d) * scale, n2.dot(&d) * scale);
         let ((e1, g1), (e2, g2)) = (erf_and_slope(s1), erf_and_slope(s2));
-        // Derivatives of the product by the two scaled distances.
-        let (by_s1, by_s2) = (contrast * g1 * e2, contrast * e1 * g2);
-        let by_centre = -(n1 * by_s1 + n2 * by_s2) * scale - Vector2::new(x[6], x[7]);
+        let light = 1.0 + x[6] * d.x + x[7] * d.y;
+        let level = x[5] + contrast * e1 * e2;
+        // Derivatives of the intensity by the two scaled distances.
+        let (by_s1, by_s2) = (light * contrast * g1 * e2, light * contrast * e1 * g2);
+        let by_centre = -(n1 * by_s1 + n2 * by_s2) * scale - Vector2::new(x[6], x[7]) * level;
         let row = Parameters::from_column_slice(&[
             by_centre.x,
             by_centre.y,
             by_s1 * t1.dot(&d) * scale,
             by_s2 * t2.dot(&d) * scale,
             -(by_s1 * s1 + by_s2 * s2) / x[4],
-            1.0,
-            d.x,
-            d.y,
-            e1 * e2,
+            light,
+            level * d.x,
+            level * d.y,
+            light * e1 * e2,
         ]);
-        let residual = x[5] + x[6] * d.x + x[7] * d.y + contrast * e1 * e2 - value;
+        let residual = level * light - value;
         cost += residual * residual;
         for j in 0..9 {
             gradient[j] += row[j] * residual;
