@@ -8,9 +8,9 @@
 //! | depth as little-endian `f32`, metres along the optical axis, rows from the bottom up | [`DepthFrame`], row 0 on top |
 //! | vision sensor axes: x left, y up, z forward | [`Camera`]: x right, y down, z forward |
 
-use handeye_core::frames::{Camera, Pose, Sensor};
+use handeye_core::frames::Pose;
 use handeye_core::image::RgbImage;
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 
 /// A rotation may be off by so much (norm of a quaternion, entries of RᵀR) before it is refused. Single precision, in
 /// which CoppeliaSim computed until 4.5, is off by 1e-6; a quaternion in another order or scale by far more.
@@ -73,16 +73,6 @@ impl DepthFrame {
         }
         self.metres.get(row as usize * self.width as usize + column as usize).copied()
     }
-}
-
-/// `sensor_from_camera`: half a turn about the optical axis. Both are right-handed and look along +z, but a vision
-/// sensor has y up and x to the left of its picture.
-pub fn sensor_from_camera() -> Pose<Sensor, Camera> {
-    let half_turn = Rotation3::from_matrix_unchecked(Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)));
-    Pose::from_isometry(Isometry3::from_parts(
-        Translation3::identity(),
-        UnitQuaternion::from_rotation_matrix(&half_turn),
-    ))
 }
 
 /// A pose from CoppeliaSim's seven numbers.

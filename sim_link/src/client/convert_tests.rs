@@ -1,7 +1,10 @@
+use crate::axes::sensor_from_camera;
 use approx::assert_relative_eq;
 use handeye_core::camera::Intrinsics;
+use handeye_core::frames::Sensor;
 use handeye_core::frames::{Base, Camera, Tip};
 use nalgebra::Point3;
+use nalgebra::Vector3;
 
 use super::*;
 

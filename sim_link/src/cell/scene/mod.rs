@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::SceneError;
 pub use errors_of_robot::RobotErrors;
-pub use resolved::{ResolvedScene, ResolvedSolid, sensor_from_camera};
+pub use resolved::{ResolvedScene, ResolvedSolid};
 pub use spec::{
     BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, RelativeTo, RobotSpec, SimulationSpec, SolidSpec,
 };

@@ -1,5 +1,6 @@
 //! The truth of one run of the cell.
 
+use crate::axes::sensor_from_camera;
 use handeye_core::camera::Intrinsics;
 use handeye_core::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 use handeye_core::target::{Grid, TargetSpec};
@@ -93,12 +94,6 @@ impl ResolvedScene {
     pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
         (*base_from_tip * self.tip_from_camera).inverse() * self.base_from_target
     }
-}
-
-/// The camera in the axes of a vision sensor: half a turn about the optical axis, its own inverse.
-pub fn sensor_from_camera() -> Pose<Sensor, Camera> {
-    let half_turn = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 0.0, 0.0, 1.0));
-    Pose::from_isometry(Isometry3::from_parts(Translation3::identity(), half_turn))
 }
 
 /// Draws the random parts of a scene that has been checked.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::axes::sensor_from_camera;
 use crate::cell::kinematics::{forward, inverse_nearest};
 use crate::cell::planning::ViewSetup;
 use handeye_core::frames::{Base, PointIn, Pose, Tip};

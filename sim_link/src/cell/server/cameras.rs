@@ -8,8 +8,9 @@ use nalgebra::{Unit, Vector3};
 
 use super::message;
 use super::stage::{Stage, out_of_sight};
+use crate::axes::sensor_from_camera;
 use crate::cell::render::{BoardSurface, Imaging, Light, LightSource, RenderScene, Renderer, Solid};
-use crate::cell::scene::{ResolvedScene, sensor_from_camera};
+use crate::cell::scene::ResolvedScene;
 use crate::cell::world::{Handle, Moment, Shown, VisionSensor};
 
 /// Sensors with different lenses whose rays are kept; the cell has one lens.

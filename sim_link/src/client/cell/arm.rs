@@ -17,6 +17,9 @@ const LONGEST_MOTION: Duration = Duration::from_mins(10);
 /// Passes in a row that have to be at rest: one alone may be the turning point of an oscillation.
 const RESTING_PASSES: u32 = 3;
 
+/// The built-in cell's function that brakes every motion.
+const STOP_FUNCTION: &str = "handeye.stop";
+
 /// How far from its goal a tip may stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionTolerance {
@@ -177,11 +180,17 @@ impl Arm {
         Err(LinkError::Unreached { distance_mm: distance_m * 1e3, angle_deg: angle_rad.to_degrees() })
     }
 
-    /// Has every joint stay where it is now.
+    /// Brings the arm to rest, whoever moves it: the built-in cell brakes every motion within its limits. CoppeliaSim has
+    /// no such call; there every joint is told to stay where it is now.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call; the arm may then still move.
     pub fn stop(&mut self) -> Result<(), LinkError> {
+        match self.sim.connection().call(STOP_FUNCTION, Vec::new()) {
+            Ok(_nothing) => return Ok(()),
+            Err(error) if error.is_unknown_function() => {}
+            Err(error) => return Err(error),
+        }
         for &joint in &self.objects.joints {
             let here_rad = self.sim.get_joint_position(joint)?;
             self.sim.set_joint_target_position(joint, here_rad)?;

@@ -8,7 +8,8 @@ use handeye_core::image::RgbImage;
 
 use super::truth::{GroundTruth, PublishedTruth, TRUTH_FUNCTION};
 use super::{CellInfo, CellObjects, JointAngles, read_joint_angles};
-use crate::client::convert::{DepthFrame, sensor_from_camera};
+use crate::axes::sensor_from_camera;
+use crate::client::convert::DepthFrame;
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
 

@@ -2,13 +2,12 @@
 
 use ciborium::Value;
 use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::frames::{Base, Camera, Pose, Sensor, Target, Tip};
+use handeye_core::frames::{Camera, Pose, Sensor, Tip};
 use nalgebra::Isometry3;
 
 use super::{Call, Effect, Outcome, Table, nothing, one};
-use crate::cell::scene::{RobotErrors, sensor_from_camera};
-use crate::cell::server::args::ApiError;
-use crate::cell::server::cell::Cell;
+use crate::axes::sensor_from_camera;
+use crate::cell::scene::RobotErrors;
 use crate::cell::world::{Chain, Flagged, poses};
 use crate::wire;
 
@@ -18,43 +17,19 @@ fn pose(pose: &Isometry3<f64>) -> Value {
     wire::floats(poses::to_numbers(pose, false))
 }
 
-/// The truth as a document, which clients look for under a signal's name whatever the simulator.
-#[derive(Debug, Clone, serde::Serialize)]
-struct Published {
-    intrinsics: Intrinsics,
-    tip_from_camera: Pose<Tip, Camera>,
-    base_from_target: Pose<Base, Target>,
-}
-
-impl Published {
-    fn of(cell: &Cell) -> Result<Self, ApiError> {
-        let (tree, stage) = (&cell.world.tree, &cell.stage);
-        let tip_from_sensor = Pose::<Tip, Sensor>::from(poses::get(tree, Flagged::parse(stage.camera), stage.tip)?);
-        let base_from_target = tree.world_pose(stage.plane, Chain::Actual)? * stage.plane_from_target;
-        Ok(Self {
-            intrinsics: cell.scene.intrinsics,
-            tip_from_camera: tip_from_sensor * sensor_from_camera(),
-            base_from_target: Pose::from(base_from_target),
-        })
-    }
-}
-
-/// Intrinsics, camera pose and target pose as TOML.
-pub(super) fn published_truth(cell: &Cell) -> Result<String, ApiError> {
-    toml::to_string(&Published::of(cell)?).map_err(|error| ApiError::Other(format!("{error}.")))
-}
-
 /// What is true in this run, for tests and reports.
 ///
 /// `tip_from_camera` and `base_from_target` are poses `[x y z qx qy qz qw]` in metres, the camera in OpenCV's axes, the
 /// base being the world. They are where the objects are now, also after a client has moved them.
 fn truth(call: &mut Call<'_>) -> Outcome {
-    let scene = &call.cell.scene;
-    let published = Published::of(call.cell)?;
+    let (tree, stage, scene) = (&call.cell.world.tree, &call.cell.stage, &call.cell.scene);
+    let tip_from_sensor = Pose::<Tip, Sensor>::from(poses::get(tree, Flagged::parse(stage.camera), stage.tip)?);
+    let tip_from_camera: Pose<Tip, Camera> = tip_from_sensor * sensor_from_camera();
+    let base_from_target = tree.world_pose(stage.plane, Chain::Actual)? * stage.plane_from_target;
     let grid = scene.target.grid();
     one(wire::map([
-        ("tip_from_camera", pose(published.tip_from_camera.isometry())),
-        ("base_from_target", pose(published.base_from_target.isometry())),
+        ("tip_from_camera", pose(tip_from_camera.isometry())),
+        ("base_from_target", pose(&base_from_target)),
         ("intrinsics", intrinsics(&scene.intrinsics)),
         (
             "target",
