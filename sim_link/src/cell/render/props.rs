@@ -89,7 +89,8 @@ pub fn cylinder_between(a: &Point3<f64>, b: &Point3<f64>, radius: f64) -> (Shape
     (Shape::Cylinder { radius, half_height: 0.5 * axis.norm() }, pose)
 }
 
-/// A small two-finger gripper on a tip whose z axis points out of the flange; it ends 95 mm before the tip's origin.
+/// A small two-finger gripper on a tip whose z axis points out of the flange; its fingers open along y and reach to
+/// z = 95 mm.
 pub fn gripper(world_from_tip: &Isometry3<f64>) -> Vec<Solid> {
     let part = |x: f64, y: f64, z: f64, half: [f64; 3], colour| {
         let shape = Shape::Box { half_extents: Vector3::from(half) };
@@ -139,4 +140,31 @@ pub fn stand(world_from_target: &Isometry3<f64>, middle_in_target: Point3<f64>, 
     let top = world_from_target * Point3::new(middle_in_target.x, middle_in_target.y, 0.018);
     let (shape, pose) = cylinder_between(&Point3::new(top.x, top.y, 0.0), &top, 0.012);
     vec![plate, Solid::new(shape, pose, GRAPHITE).with_finish(Finish::Satin)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cylinder_between_two_points_ends_at_both() {
+        let a = Point3::new(0.1, -0.2, 0.3);
+        for b in [Point3::new(0.4, 0.5, -0.1), Point3::new(0.1, -0.2, 0.9), Point3::new(0.1, -0.2, -0.9)] {
+            let (shape, pose) = cylinder_between(&a, &b, 0.05);
+            let Shape::Cylinder { half_height, .. } = shape else { panic!("{shape:?}") };
+            assert!((pose * Point3::new(0.0, 0.0, -half_height) - a).norm() < 1e-12);
+            assert!((pose * Point3::new(0.0, 0.0, half_height) - b).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn parts_of_the_arm_follow_their_link() {
+        let lifted = |link: usize| Isometry3::translation(0.0, 0.0, link as f64);
+        let (still, moved) =
+            (ur5(&Isometry3::identity(), |_| Isometry3::identity()), ur5(&Isometry3::identity(), lifted));
+        for ((part, a), b) in PARTS.iter().zip(&still).zip(&moved) {
+            let rise = b.world_from_shape.translation.vector - a.world_from_shape.translation.vector;
+            assert!((rise - Vector3::z() * part.link as f64).norm() < 1e-12);
+        }
+    }
 }

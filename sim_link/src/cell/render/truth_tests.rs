@@ -107,26 +107,27 @@ fn errors(all: &[Vector2<f64>]) -> Errors {
 fn corners_measured_in_the_picture_are_where_the_lens_model_projects_them() {
     for camera in cameras() {
         let renderer = Renderer::new(camera, 0.01, 3.5);
-        for blur_px in [0.0, 0.7] {
-            let mut random = ChaCha8Rng::seed_from_u64(7);
-            let imaging = Imaging { blur_px, ..Imaging::default() };
-            let mut all = Vec::new();
-            for seed in 0..100 {
-                let pose = random_pose(&mut random, &camera, std::f64::consts::PI);
-                let picture = renderer.render_rgb(&scene(pose), &imaging, seed);
-                for i in 0..COLUMNS * ROWS {
-                    let (c, r) = ((i % COLUMNS) as f64, (i / COLUMNS) as f64);
-                    let at = |c: f64, r: f64| camera.project(&(pose * corner(c, r))).expect("in front");
-                    let truth = at(c, r);
-                    let side = (at(c + 0.5, r) - at(c - 0.5, r)).norm().min((at(c, r + 0.5) - at(c, r - 0.5)).norm());
-                    // The window stays inside the four squares, where the picture is symmetric about the corner.
-                    all.push(refine(&picture, truth, 0.2 * side) - truth);
-                }
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        // Every other picture as sharp as can be, which is the hardest to measure in, the rest as a good lens makes it.
+        let mut all = [Vec::new(), Vec::new()];
+        for seed in 0..200 {
+            let blurred = seed % 2;
+            let imaging = Imaging { blur_px: [0.0, 0.7][blurred], ..Imaging::default() };
+            let pose = random_pose(&mut random, &camera, std::f64::consts::PI);
+            let picture = renderer.render_rgb(&scene(pose), &imaging, seed as u64);
+            for i in 0..COLUMNS * ROWS {
+                let (c, r) = ((i % COLUMNS) as f64, (i / COLUMNS) as f64);
+                let at = |c: f64, r: f64| camera.project(&(pose * corner(c, r))).expect("in front");
+                let truth = at(c, r);
+                let side = (at(c + 0.5, r) - at(c - 0.5, r)).norm().min((at(c, r + 0.5) - at(c, r - 0.5)).norm());
+                // The window stays inside the four squares, where the picture is symmetric about the corner.
+                all[blurred].push(refine(&picture, truth, 0.2 * side) - truth);
             }
-            let Errors { mean, rms } = errors(&all);
-            println!("{} blur {blur_px}: mean {mean:?} rms {rms:?}", camera.distortion.name());
-            assert!(mean.amax() < 0.01, "{mean:?}");
-            assert!(rms.amax() < 0.03, "{rms:?}");
+        }
+        for Errors { mean, rms } in all.map(|all| errors(&all)) {
+            println!("{}: mean {mean:?} rms {rms:?}", camera.distortion.name());
+            assert!(mean.amax() < 0.002, "{mean:?}");
+            assert!(rms.amax() < 0.025, "{rms:?}");
         }
     }
 }

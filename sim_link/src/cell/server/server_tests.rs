@@ -188,3 +188,37 @@ fn a_server_can_be_shared_between_threads() {
     fn shared<T: Send + Sync>() {}
     shared::<CellServer>();
 }
+
+#[test]
+fn thousands_of_calls_in_a_row_are_all_answered() {
+    // The queue of a connection holds 16 replies; it must not matter how late the news comes that they were read.
+    let server = server(false);
+    let client = Client::new(&server.endpoint(), "a");
+    for _ in 0..5000 {
+        assert_eq!(client.call("sim.getSimulationState", vec![]), ret(Value::from(0)));
+    }
+}
+
+#[test]
+fn whoever_asks_for_images_and_reads_none_keeps_nobody_else_waiting() {
+    let server = server(true);
+    let client = Client::new(&server.endpoint(), "a");
+    let camera = client.call("sim.getObject", vec![Value::from("/UR5/3D_camera")]);
+    let camera = camera.get("ret").and_then(Reader::list).expect("a handle")[0].clone();
+    let context = zmq::Context::new();
+    let greedy = context.socket(zmq::DEALER).expect("socket");
+    greedy.set_linger(0).expect("option");
+    greedy.set_rcvhwm(1).expect("option");
+    greedy.connect(&server.endpoint()).expect("connects");
+    let request = wire::encode(&wire::map([
+        ("func", Value::from("sim.getVisionSensorImg")),
+        ("args", Value::Array(vec![camera])),
+        ("uuid", Value::from("greedy")),
+    ]));
+    for _ in 0..300 {
+        greedy.send_multipart([&b""[..], &request], 0).expect("sends");
+    }
+    for _ in 0..20 {
+        assert_eq!(client.call("sim.getSimulationState", vec![]), ret(Value::from(0)));
+    }
+}

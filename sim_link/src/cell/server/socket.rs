@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::CellError;
 use super::clients::Peer;
-use super::engine::{Due, Engine};
+use super::engine::{Due, Engine, Outgoing};
 
 /// Messages that are taken in before passes and replies get their turn.
 const MESSAGES_PER_TURN: usize = 64;
@@ -18,6 +18,10 @@ const MAX_FRAME_BYTES: i64 = 16 << 20;
 /// Messages that wait per connection in either direction. A client has one request under way; one that sends more
 /// without reading must not fill the memory with images.
 const QUEUE: i32 = 16;
+
+/// Replies that wait for connections that are full, and how long until they are tried again.
+const MAX_WAITING: usize = 64;
+const RETRY_MS: i64 = 1;
 
 /// A connection that does not answer a ping for so long is gone although nobody closed it: a pulled plug.
 const HEARTBEAT: Duration = Duration::from_secs(5);
@@ -55,6 +59,8 @@ pub(super) struct Loop {
     stop: zmq::Socket,
     engine: Engine,
     peers: Peers,
+    /// Replies that did not fit into their connection's queue.
+    waiting: Vec<Outgoing>,
     endpoint: String,
     started: Instant,
 }
@@ -77,7 +83,8 @@ impl Loop {
             Ok(Err(_)) | Err(_) => address,
         };
         let started = Instant::now();
-        let serving = Self { router, monitor, stop, engine, peers: Peers::default(), endpoint, started };
+        let serving =
+            Self { router, monitor, stop, engine, peers: Peers::default(), waiting: Vec::new(), endpoint, started };
         Ok((serving, Stopper(Mutex::new(stopper))))
     }
 
@@ -118,6 +125,8 @@ impl Loop {
                 i64::try_from(left.as_micros().div_ceil(1000)).unwrap_or(i64::MAX)
             }
         };
+        let retries_soon = !self.waiting.is_empty() && !(0..=RETRY_MS).contains(&timeout_ms);
+        let timeout_ms = if retries_soon { RETRY_MS } else { timeout_ms };
         let mut items = [&self.router, &self.monitor, &self.stop].map(|socket| socket.as_poll_item(zmq::POLLIN));
         zmq::poll(&mut items, timeout_ms)?;
         Ok([items[0].is_readable(), items[1].is_readable(), items[2].is_readable()])
@@ -165,13 +174,44 @@ impl Loop {
         }
     }
 
+    /// Sends what the engine has answered, in its order, and keeps what a connection does not take yet.
+    ///
+    /// A connection counts as full until its reader's news of what was read arrive here, which under load is now and
+    /// then later than the next request: refusals are normal, and the reply goes out a moment later.
     fn reply(&mut self) {
-        for (peer, bytes) in self.engine.take_outgoing() {
-            let frames = [zmq::Message::from(peer), zmq::Message::new(), zmq::Message::from(bytes)];
-            // Whoever does not read, or is gone, gets no reply; nobody else may have to wait for that.
-            if let Err(error) = self.router.send_multipart(frames, zmq::DONTWAIT) {
-                tracing::debug!(%error, "a reply was not taken");
+        self.waiting.extend(self.engine.take_outgoing());
+        let mut full: Vec<Peer> = Vec::new();
+        for (peer, bytes) in std::mem::take(&mut self.waiting) {
+            if full.contains(&peer) {
+                self.waiting.push((peer, bytes));
+                continue;
             }
+            match self.router.send(&peer[..], zmq::SNDMORE | zmq::DONTWAIT) {
+                Ok(()) => self.send_body(bytes),
+                Err(zmq::Error::EAGAIN) => {
+                    full.push(peer.clone());
+                    self.waiting.push((peer, bytes));
+                }
+                Err(error) => tracing::debug!(%error, "a reply has no one to go to"),
+            }
+        }
+        self.drop_hoards();
+    }
+
+    /// The rest of a message whose first frame was taken, which means that all of it is.
+    fn send_body(&self, bytes: Vec<u8>) {
+        let rest = self.router.send("", zmq::SNDMORE | zmq::DONTWAIT);
+        if let Err(error) = rest.and_then(|()| self.router.send(bytes, zmq::DONTWAIT)) {
+            tracing::warn!(%error, "a reply was cut short");
+        }
+    }
+
+    /// Whoever sends requests without reading the replies loses the oldest of them.
+    fn drop_hoards(&mut self) {
+        let excess = self.waiting.len().saturating_sub(MAX_WAITING);
+        if excess > 0 {
+            tracing::warn!(excess, "replies that nobody reads are dropped");
+            self.waiting.drain(..excess);
         }
     }
 }
@@ -183,6 +223,7 @@ fn configure(router: &zmq::Socket) -> zmq::Result<()> {
     router.set_sndhwm(QUEUE)?;
     router.set_heartbeat_ivl(HEARTBEAT.as_millis() as i32)?;
     router.set_heartbeat_timeout(HEARTBEAT_TIMEOUT.as_millis() as i32)?;
+    router.set_router_mandatory(true)?;
     router.set_router_handover(true)
 }
 

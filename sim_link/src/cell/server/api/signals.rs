@@ -2,6 +2,7 @@
 
 use ciborium::Value;
 
+use super::handeye::published_truth;
 use super::{Call, Outcome, Table, nothing, one};
 use crate::cell::server::args::ApiError;
 use crate::cell::server::cell::{MAX_SIGNAL_BYTES, MAX_SIGNALS};
@@ -59,8 +60,15 @@ fn set_string_signal(call: &mut Call<'_>) -> Outcome {
     store(call, key(call, "string", 0)?, value)
 }
 
+/// Signal under which the cell itself publishes its truth.
+const TRUTH: &str = "handeye.truth";
+
 fn get_string_signal(call: &mut Call<'_>) -> Outcome {
-    load(call, &key(call, "string", 0)?)
+    let key = key(call, "string", 0)?;
+    if call.args.text(0)? == TRUTH && !call.cell.signals.contains_key(&key) {
+        return one(published_truth(call.cell)?);
+    }
+    load(call, &key)
 }
 
 fn clear_string_signal(call: &mut Call<'_>) -> Outcome {

@@ -77,6 +77,18 @@ fn truth_is_what_the_objects_say_in_opencvs_axes() {
 }
 
 #[test]
+fn truth_is_published_as_a_document_too() {
+    let mut bench = Bench::new();
+    let text = bench.get("sim.getStringSignal", vec![Value::from("handeye.truth")]);
+    let document: toml::Table = toml::from_str(text.text().expect("text")).expect("TOML");
+    let shift = &document["tip_from_camera"]["translation"];
+    let along_x_m = shift.as_array().expect("three numbers")[0].as_float().expect("a number");
+    assert!((along_x_m - 0.05).abs() < 1e-12);
+    assert_eq!(document["intrinsics"]["width"].as_integer(), Some(640));
+    assert!(document.contains_key("base_from_target"));
+}
+
+#[test]
 fn buffers_are_background_before_the_first_pass_and_come_with_the_full_resolution() {
     let mut bench = Bench::new();
     let camera = Value::from(bench.engine.cell.stage.camera);
