@@ -12,8 +12,8 @@ use super::slot::LatestSlot;
 use crate::command::Event;
 use crate::model::{CellSource, Link, RobotState, Severity, Simulation};
 
-/// Rest between two readings: numbers that change faster cannot be read.
-const PERIOD: Duration = Duration::from_millis(50);
+/// Rest between two readings: numbers that change faster cannot be read, and each reading draws the window.
+const PERIOD: Duration = Duration::from_millis(100);
 
 /// The way of a stop to the arm. It is not a message in a queue that may be full, but a flag that the worker looks at
 /// before anything else, and it stays raised until the arm has been stopped.
