@@ -38,9 +38,11 @@ const MAX_STEPS: usize = 12;
 const CONVERGED_PX: f64 = 5e-4;
 /// Blurs that a fit may end at; outside, it has found something else than a corner.
 const BLUR_PX: (f64, f64) = (0.1, 4.0);
-/// Below this blur an edge has the profile of a pixel's area (0.29 px of its own), not of the Gaussian in the model, and
-/// edges along the pixel grid end up off by a tenth of a pixel, all by the same.
+/// Below this blur an edge has the profile of a pixel's area (0.29 px of its own), not of the Gaussian in the model.
 const SHARP_PX: f64 = 0.5;
+/// An edge closer than this [tangent] to a row or column of pixels crosses hardly more than one of them within the window,
+/// so that the wrong profile of a sharp edge does not average out: up to a tenth of a pixel, the same for all corners.
+const ALIGNED: f64 = 0.1;
 /// Least contrast (half the difference between dark and light) in grey levels.
 const MIN_CONTRAST: f64 = 3.0;
 /// Largest RMS misfit as a part of the contrast: noise of a grainy image has a tenth, an edge that does not belong to
@@ -82,7 +84,8 @@ pub(super) fn corner_sub_pix(image: &GrayImage, order: &Ordered) -> Result<Order
 ///
 /// Both `cornerSubPix`'s answer and, where that is elsewhere (its window held an edge that is not the corner's), the
 /// corner as found serve as start; the fit with the smaller misfit counts. Without any fit `cornerSubPix` stands.
-/// A picture sharper than [`SHARP_PX`] is finished by [`saddle::refine`], all corners alike.
+/// In a picture sharper than [`SHARP_PX`] corners with an edge along the pixels ([`ALIGNED`]) are finished by
+/// [`saddle::refine`], which assumes no profile.
 pub(super) fn refine(image: &GrayImage, found: &Ordered) -> Result<Ordered, VisionError> {
     let mut out = corner_sub_pix(image, found)?;
     let mut blurs = Vec::with_capacity(out.points.len());
@@ -97,13 +100,22 @@ pub(super) fn refine(image: &GrayImage, found: &Ordered) -> Result<Ordered, Visi
     blurs.sort_by(f64::total_cmp);
     if blurs.get(blurs.len() / 2).is_some_and(|blur| *blur < SHARP_PX) {
         for index in 0..out.points.len() {
-            let spacing = found.spacing(index % found.columns, index / found.columns);
+            let (column, row) = (index % found.columns, index / found.columns);
+            let (along_x, along_y) = found.steps(column, row);
+            if ![along_x, along_y].iter().any(is_aligned) {
+                continue;
+            }
+            let spacing = found.spacing(column, row);
             if let Some(corner) = saddle::refine(image, &out.points[index], spacing) {
                 out.points[index] = corner;
             }
         }
     }
     Ok(out)
+}
+
+fn is_aligned(edge: &Vector2<f64>) -> bool {
+    edge.abs().min() < ALIGNED * edge.abs().max()
 }
 
 /// A fitted corner.
