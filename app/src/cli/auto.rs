@@ -92,6 +92,10 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         sim.set_stepping(false)?;
         sim.stop_simulation()
     });
+    if captured.is_err() && !session.captures().is_empty() {
+        let (count, folder) = (session.captures().len(), folder.display());
+        tracing::warn!("{count} captures are kept in {folder}; `handeye calibrate {folder}` solves them");
+    }
     captured?;
     if let Err(error) = ended {
         tracing::warn!(%error, "the simulation could not be stopped");
