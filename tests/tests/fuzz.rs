@@ -1,6 +1,6 @@
 //! Random and mutated messages: the decoders do not panic, and the server still serves.
 //!
-//! `HANDEYE_FUZZ` sets the number of messages for the decoder; a tenth of them goes over the socket.
+//! `HANDEYE_FUZZ` sets the number of messages, a million if not given.
 
 use std::time::Duration;
 
@@ -81,7 +81,7 @@ fn a_million_bad_messages_do_not_panic_the_decoder() {
 }
 
 #[test]
-fn the_server_still_serves_after_a_hundred_thousand_bad_messages() {
+fn the_server_still_serves_after_a_million_bad_messages() {
     let server = CellServer::start(CellConfig {
         real_time: Some(false),
         ..CellConfig::new(Scene::reference().expect("built in"))
@@ -94,7 +94,7 @@ fn the_server_still_serves_after_a_hundred_thousand_bad_messages() {
     socket.connect(&server.endpoint()).expect("connects");
     let seeds = seeds();
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    for i in 0..count() / 10 {
+    for i in 0..count() {
         let message = mutated(&seeds, &mut rng);
         // Some without the empty frame that a REQ socket puts before its message.
         if i % 50 == 0 {

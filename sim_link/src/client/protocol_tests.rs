@@ -190,7 +190,7 @@ fn sound_replies() -> Vec<Vec<u8>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 50_000, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 500_000, ..ProptestConfig::default() })]
 
     #[test]
     fn random_bytes_never_panic(reply in prop::collection::vec(any::<u8>(), 0..200)) {
