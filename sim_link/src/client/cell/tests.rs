@@ -114,6 +114,8 @@ impl World {
             }
             "sim.getVisionSensorDepth" => ret([Value::Bytes(vec![0; 32]), wire::integers([4, 2])]),
             "sim.getNamedStringParam" => ret([Value::Null]),
+            // CoppeliaSim's answer; a real cell that brakes is met in the end-to-end tests.
+            "handeye.stop" => err("No such function: handeye.stop"),
             "handeye.truth" => match &self.truth {
                 Some(truth) => ret([truth.clone()]),
                 None => err("No such function: handeye.truth"),
