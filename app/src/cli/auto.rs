@@ -15,7 +15,7 @@ use handeye_core::session::{Capture, GroundTruth, Session, SessionMeta, SessionW
 use handeye_core::target::{Grid, TargetSpec};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths, Frame, MotionTolerance, SettleOptions};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError, MotionLimits};
+use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError};
 use time::OffsetDateTime;
 use time::macros::format_description;
 
@@ -215,9 +215,4 @@ fn store(session: &mut SessionWriter, frame: &Frame) -> Result<(), Failure> {
         })
         .map_err(Failure::failed)?;
     Ok(())
-}
-
-/// Limits of the client from those of a pose file.
-fn limits(count: usize, velocity: f64, acceleration: f64, jerk: f64) -> MotionLimits {
-    MotionLimits::uniform(count, velocity, acceleration, jerk)
 }

@@ -8,7 +8,6 @@ use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::MotionLimits;
 
 use super::super::Failure;
-use super::limits;
 
 /// The ten reference poses, so that they are there wherever the binary is.
 const SEED10: &str = include_str!("../../../../assets/poses/seed10.toml");
@@ -49,8 +48,8 @@ impl Plan {
         Ok(Self {
             start_joints,
             goals: taught.poses.iter().map(|p| (p.name.clone(), p.goal.clone())).collect(),
-            joint_limits: limits(6, l.joint_velocity, l.joint_acceleration, l.joint_jerk),
-            tip_limits: limits(4, l.tip_velocity, l.tip_acceleration, l.tip_jerk),
+            joint_limits: MotionLimits::uniform(6, l.joint_velocity, l.joint_acceleration, l.joint_jerk),
+            tip_limits: MotionLimits::uniform(4, l.tip_velocity, l.tip_acceleration, l.tip_jerk),
         })
     }
 
@@ -73,8 +72,8 @@ impl Plan {
                 .enumerate()
                 .map(|(i, view)| (format!("planned {}", i + 1), Goal::Joints(view.joints.to_vec())))
                 .collect(),
-            joint_limits: limits(6, l.joint_velocity, l.joint_acceleration, l.joint_jerk),
-            tip_limits: limits(4, l.tip_velocity, l.tip_acceleration, l.tip_jerk),
+            joint_limits: MotionLimits::uniform(6, l.joint_velocity, l.joint_acceleration, l.joint_jerk),
+            tip_limits: MotionLimits::uniform(4, l.tip_velocity, l.tip_acceleration, l.tip_jerk),
         })
     }
 }

@@ -125,7 +125,7 @@ impl JointSolution {
     }
 }
 
-/// Rounds of weights and optimum; noise levels settle in three to six.
+/// Rounds of weights and optimum at the most.
 const MAX_ROUNDS: usize = 20;
 /// Relative change of every noise level below which the rounds end: a thousandth moves the answer by far less than its
 /// uncertainty.
