@@ -6,8 +6,11 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{
-    DepthScale, FrameImages, FrameInfo, ImagePoint, Link, LinkState, RobotState, RotationFormat, Severity, ThemeChoice,
+    CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, DepthScale, FrameImages, FrameInfo,
+    ImagePoint, Jog, JogSettings, Link, LinkState, LiveDetection, MotionGoal, MotionId, MotionOutcome, RobotState,
+    RotationFormat, Severity, ThemeChoice,
 };
+use crate::text::{Language, Text};
 
 /// What the user wants.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,8 +27,31 @@ pub enum Command {
     SetRotationFormat(RotationFormat),
     /// Which depths the colour map covers.
     SetDepthScale(DepthScale),
+    /// Of all words.
+    SetLanguage(Language),
     /// The pointer is over a pixel of the pictures, or over none.
     PointAt(Option<ImagePoint>),
+    /// Move the arm to a place, which the words name.
+    Move {
+        /// Where to.
+        goal: MotionGoal,
+        /// In words.
+        what: Text,
+    },
+    /// A jog button is pressed: one step, or the beginning of holding it.
+    Jog(Jog),
+    /// It is still held. The arm stops by itself when this does not come.
+    JogHeld(Jog),
+    /// It was released.
+    JogReleased,
+    /// How the tip is jogged.
+    SetJog(JogSettings),
+    /// Take a capture as soon as robot and picture have settled.
+    Capture(CapturePurpose),
+    /// Not any more.
+    CancelCapture,
+    /// How captures are taken.
+    SetCaptureOptions(CaptureOptions),
 }
 
 /// What happened outside the thread of the window.
@@ -57,12 +83,43 @@ pub enum Event {
     },
     /// The arm was told to stay where it is.
     Stopped,
+    /// A cell was connected.
+    Cell(Box<CellFacts>),
+    /// A motion has ended.
+    Moved {
+        /// Which one.
+        id: MotionId,
+        /// How.
+        outcome: MotionOutcome,
+    },
+    /// A held jog button can do no more, or may not: the arm stands.
+    JogEnded {
+        /// Why, when it was not released.
+        why: Option<Text>,
+    },
+    /// The newest picture was searched for the board.
+    #[serde(skip)]
+    Detection(Box<LiveDetection>),
+    /// The capture that is under way waits for something else.
+    CaptureWaits {
+        /// Its number.
+        number: u64,
+        /// For what.
+        wait: CaptureWait,
+    },
+    /// There is no capture.
+    CaptureRefused {
+        /// Its number.
+        number: u64,
+        /// Why.
+        refused: CaptureRefused,
+    },
     /// Something to tell the user.
     Notice {
         /// How much it matters.
         severity: Severity,
         /// The words.
-        text: String,
+        text: Text,
     },
 }
 

@@ -7,5 +7,6 @@ pub mod gui;
 pub mod model;
 pub mod observe;
 pub mod parallel;
+pub mod text;
 pub mod truth;
 pub mod worker;

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, Link, LinkState, LiveFrame, Message, Model, Severity, ViewSettings};
+use crate::text;
+use crate::text::Text;
 use crate::worker::{Busy, CameraTask, Clock, Connector, ControlTask, Request, Waker, Workers};
 
 /// Model and workers.
@@ -63,12 +65,12 @@ impl App {
             Command::Stop => self.stop(),
             Command::StartSimulation => {
                 let asked = self.workers.ask_control(Request::Do(ControlTask::StartSimulation));
-                self.expect("The simulation was not started", asked);
+                self.expect(text!("The simulation was not started"), asked);
             }
             Command::Reconnect => {
                 let control = self.workers.ask_control(Request::Reconnect);
                 let camera = self.workers.ask_camera(Request::Reconnect);
-                self.expect("The connection was not tried again", control.and(camera));
+                self.expect(text!("The connection was not tried again"), control.and(camera));
             }
             Command::SetTheme(theme) => self.model.view.theme = theme,
             Command::SetRotationFormat(format) => self.model.view.rotation = format,
@@ -77,9 +79,11 @@ impl App {
                 if asked.is_ok() {
                     self.model.view.depth_scale = scale;
                 }
-                self.expect("The depth range was not changed", asked);
+                self.expect(text!("The depth range was not changed"), asked);
             }
             Command::PointAt(point) => self.model.cursor = point,
+            Command::SetLanguage(language) => self.model.view.language = language,
+            _ => {}
         }
     }
 
@@ -98,9 +102,10 @@ impl App {
             }
             Event::Stopped => {
                 self.model.stop_pending = false;
-                self.say(Severity::Info, "Arm stopped: every joint stays where it is");
+                self.say(Severity::Info, text!("Arm stopped: every joint stays where it is"));
             }
             Event::Notice { severity, text } => self.say(severity, text),
+            _ => {}
         }
     }
 
@@ -108,11 +113,14 @@ impl App {
         self.workers.press_stop();
         self.model.stop_pending = true;
         if self.model.control.is_connected() {
-            self.say(Severity::Warning, "Stopping the arm…");
+            self.say(Severity::Warning, text!("Stopping the arm…"));
         } else {
             self.say(
                 Severity::Error,
-                "The arm cannot be reached: use its own emergency stop. It is stopped as soon as the connection is back",
+                text!(
+                    "The arm cannot be reached: use its own emergency stop. It is stopped as soon as the connection is \
+                     back"
+                ),
             );
         }
     }
@@ -121,33 +129,41 @@ impl App {
         let before = match link {
             Link::Control => std::mem::replace(&mut self.model.control, state),
             Link::Camera => std::mem::replace(&mut self.model.camera, state),
-        };
-        let name = match link {
-            Link::Control => "Robot",
-            Link::Camera => "Camera",
+            Link::Motion => std::mem::replace(&mut self.model.mover, state),
         };
         match (self.model.link(link).clone(), before.is_connected()) {
             (LinkState::Connected { server, address }, false) => {
-                self.say(Severity::Info, format!("{name} connected to {server} at {address}"));
+                let text = match link {
+                    Link::Control => text!("Robot connected to {server} at {address}", server = server, address = address),
+                    Link::Camera => text!("Camera connected to {server} at {address}", server = server, address = address),
+                    Link::Motion => return,
+                };
+                self.say(Severity::Info, text);
             }
             (LinkState::Lost { why, .. }, true) => {
-                self.say(Severity::Warning, format!("{name} connection lost: {why}"));
+                let text = match link {
+                    Link::Control => text!("Robot connection lost: {why}", why = why),
+                    Link::Camera => text!("Camera connection lost: {why}", why = why),
+                    Link::Motion => text!("Connection for motions lost: {why}", why = why),
+                };
+                self.say(Severity::Warning, text);
             }
-            (LinkState::Failed { why }, _) => self.say(Severity::Error, why),
+            (LinkState::Failed { why }, _) => self.say(Severity::Error, Text::verbatim(why)),
             _ => {}
         }
     }
 
     /// Tells the user when a worker did not take a request.
-    fn expect(&mut self, failure: &str, asked: Result<(), Busy>) {
-        if let Err(busy) = asked {
-            self.say(Severity::Warning, format!("{failure}: {busy}"));
+    fn expect(&mut self, failure: Text, asked: Result<(), Busy>) {
+        if asked.is_err() {
+            let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);
+            self.say(Severity::Warning, text);
         }
     }
 
     /// Shows a message from the window itself.
-    fn say(&mut self, severity: Severity, text: impl Into<String>) {
-        self.model.message = Some(Message { severity, text: text.into(), at_s: self.model.now_s });
+    fn say(&mut self, severity: Severity, text: Text) {
+        self.model.message = Some(Message { severity, text, at_s: self.model.now_s });
     }
 }
 

@@ -2,6 +2,7 @@ use std::time::{Duration, Instant};
 
 use super::*;
 use crate::model::{DepthScale, Simulation, ThemeChoice};
+use crate::text::Language;
 use crate::worker::fake::FakeCell;
 
 fn app(cell: &FakeCell) -> App {
@@ -11,8 +12,8 @@ fn app(cell: &FakeCell) -> App {
     App::start(CellSource::BuiltIn, ViewSettings::default(), &connector, clock, &waker).expect("threads")
 }
 
-fn message(app: &App) -> &str {
-    app.model().message.as_ref().map_or("", |message| message.text.as_str())
+fn message(app: &App) -> String {
+    app.model().message.as_ref().map_or_else(String::new, |message| message.text.say(Language::English))
 }
 
 #[test]

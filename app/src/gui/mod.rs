@@ -23,6 +23,7 @@ pub use app::App;
 use crate::cli::GuiArgs;
 use crate::command::Event;
 use crate::model::{CellSource, Severity};
+use crate::text::Text;
 use crate::worker::{Clock, Connector, LiveConnector, Waker};
 use window::Window;
 
@@ -53,7 +54,7 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let view = window::stored_settings(creation.storage);
         let mut app = App::start(source, view, &connector, clock, &waker)?;
         if let Some(session) = session {
-            let text = format!("This window shows the live cell and does not open sessions: {}", session.display());
+            let text = Text::verbatim(format!("sessions are not opened yet: {}", session.display()));
             app.absorb(Event::Notice { severity: Severity::Warning, text });
         }
         Ok(Box::new(Window::new(app, &creation.egui_ctx)) as Box<dyn eframe::App>)

@@ -37,7 +37,7 @@ pub fn connection(model: &Model) -> Status {
     let half = match (worse, other.is_connected()) {
         (_, false) => "Connection",
         (Link::Camera, true) => "Camera connection",
-        (Link::Control, true) => "Robot connection",
+        (Link::Control | Link::Motion, true) => "Robot connection",
     };
     of_link(model, model.link(worse), half)
 }

@@ -124,6 +124,8 @@ fn frame(number: u64) -> Event {
         rate_hz: 20.0,
         depth_range_m: [0.4, 1.2],
         far_plane_m: 3.5,
+        base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
+        joints_rad: [0.0; 6],
     };
     Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) }
 }

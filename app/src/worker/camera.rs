@@ -65,6 +65,8 @@ impl Camera {
             rate_hz: self.rate.rate_hz(),
             depth_range_m,
             far_plane_m,
+            base_from_tip: raw.base_from_tip,
+            joints_rad: raw.joints_rad,
         };
         Ok(LiveFrame { info, images: Arc::new(FrameImages { rgb: raw.rgb, depth: raw.depth, depth_coloured }) })
     }

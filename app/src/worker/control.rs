@@ -10,6 +10,7 @@ use super::link::{Duty, Outlet};
 use super::port::{Connected, Connector, ControlPort, PortError};
 use super::slot::LatestSlot;
 use crate::command::Event;
+use crate::text;
 use crate::model::{CellSource, Link, RobotState, Severity, Simulation};
 
 /// Rest between two readings: numbers that change faster cannot be read, and each reading draws the window.
@@ -70,7 +71,7 @@ impl Control {
             Ok(()) => outlet.report(Event::Stopped),
             Err(error) => {
                 self.stop.press();
-                outlet.notice(Severity::Error, format!("The arm may still move, the stop failed: {error}"));
+                outlet.notice(Severity::Error, text!("The arm may still move, the stop failed: {error}", error = &error));
                 return Err(error);
             }
         }
@@ -105,8 +106,8 @@ impl Duty for Control {
     fn perform(&mut self, port: Option<&mut Self::Port>, task: Self::Task, outlet: &Outlet) -> Result<(), PortError> {
         let Some(port) = port else {
             if task == ControlTask::StartSimulation {
-                let text = "The simulation cannot be started: there is no connection to the cell";
-                outlet.notice(Severity::Warning, text.to_owned());
+                let text = text!("The simulation cannot be started: there is no connection to the cell");
+                outlet.notice(Severity::Warning, text);
             }
             return Ok(());
         };
@@ -114,11 +115,11 @@ impl Duty for Control {
             ControlTask::CheckStop => self.stop_if_pressed(port.as_mut(), outlet),
             ControlTask::StartSimulation => match port.start_simulation() {
                 Ok(()) => {
-                    outlet.notice(Severity::Info, "Simulation started".to_owned());
+                    outlet.notice(Severity::Info, text!("Simulation started"));
                     Ok(())
                 }
                 Err(PortError::Refused(why)) => {
-                    outlet.notice(Severity::Error, format!("The simulation did not start: {why}"));
+                    outlet.notice(Severity::Error, text!("The simulation did not start: {why}", why = why));
                     Ok(())
                 }
                 Err(error) => Err(error),

@@ -156,6 +156,8 @@ impl CameraPort for FakeCell {
             rgb: Self::rgb(script.frames),
             depth: DepthImage { width, height, metres },
             sim_time_s: script.frames as f64 * 0.05,
+            base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
+            joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0],
         })
     }
 

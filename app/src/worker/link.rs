@@ -10,6 +10,7 @@ use super::reconnect::Reconnect;
 use super::{Clock, Waker};
 use crate::command::Event;
 use crate::model::{Link, Severity};
+use crate::text::Text;
 
 /// What a worker is asked for.
 #[derive(Debug)]
@@ -41,7 +42,7 @@ impl Outlet {
     }
 
     /// Tells the user something.
-    pub fn notice(&self, severity: Severity, text: String) {
+    pub fn notice(&self, severity: Severity, text: Text) {
         self.report(Event::Notice { severity, text });
     }
 

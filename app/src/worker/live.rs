@@ -138,7 +138,13 @@ impl CameraPort for LiveCamera {
     fn grab(&mut self) -> Result<RawFrame, PortError> {
         let frame = self.feed.grab().map_err(port_error)?;
         let DepthFrame { width, height, metres } = frame.depth;
-        Ok(RawFrame { rgb: frame.rgb, depth: DepthImage { width, height, metres }, sim_time_s: frame.sim_time_s })
+        Ok(RawFrame {
+            rgb: frame.rgb,
+            depth: DepthImage { width, height, metres },
+            sim_time_s: frame.sim_time_s,
+            base_from_tip: frame.base_from_tip,
+            joints_rad: frame.joints,
+        })
     }
 
     fn depth_limits_m(&self) -> [f32; 2] {

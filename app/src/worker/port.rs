@@ -1,8 +1,10 @@
 //! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
 
 use handeye_core::depth::DepthImage;
+use handeye_core::frames::{Base, Pose, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;
+use handeye_sim_link::client::cell::JointAngles;
 
 use crate::model::RobotState;
 
@@ -76,6 +78,10 @@ pub struct RawFrame {
     pub depth: DepthImage,
     /// Simulated time [s].
     pub sim_time_s: f64,
+    /// The tip as the controller reports it at that instant.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// The joints at that instant [rad].
+    pub joints_rad: JointAngles,
 }
 
 /// The camera.

@@ -89,14 +89,14 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
     let (text, colour) = match &model.message {
-        None => ("", palette.weak),
+        None => (String::new(), palette.weak),
         Some(message) => {
             let colour = match message.severity {
                 Severity::Info => palette.weak,
                 Severity::Warning => palette.warning,
                 Severity::Error => palette.tone(crate::gui::theme::Tone::Bad),
             };
-            (message.text.as_str(), colour)
+            (message.text.say(model.view.language), colour)
         }
     };
     ui.add(Label::new(RichText::new(text).color(colour)).truncate());

@@ -3,6 +3,9 @@
 //! Only [`crate::gui::App::apply`] and [`crate::gui::App::absorb`] change a [`Model`]; panes read it. Times are seconds
 //! on the clock that the application was started with.
 
+mod capture;
+mod motion;
+
 use std::fmt;
 use std::sync::Arc;
 
@@ -11,6 +14,16 @@ use handeye_core::frames::{Base, Pose, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
+
+pub use capture::{
+    CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
+};
+pub use motion::{
+    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
+    Truth,
+};
+
+use crate::text::{Language, Text};
 
 /// How depths are coloured, in pictures and in the bar that explains them.
 pub const DEPTH_COLOURS: ColourMap = ColourMap::Turbo;
@@ -24,13 +37,15 @@ pub enum CellSource {
     Address(String),
 }
 
-/// The two connections to the cell.
+/// The connections to the cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Link {
     /// Joints, tip, simulation, stop.
     Control,
     /// Pictures.
     Camera,
+    /// Motions.
+    Motion,
 }
 
 /// How a connection is doing.
@@ -128,6 +143,10 @@ pub struct FrameInfo {
     pub depth_range_m: [f32; 2],
     /// The sensor's far plane [m]: depths there are no surface.
     pub far_plane_m: f32,
+    /// The tip as the controller reported it at the instant of the pictures.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// The joints at the same instant [rad].
+    pub joints_rad: JointAngles,
 }
 
 /// The pixels of a frame.
@@ -234,6 +253,8 @@ pub enum RotationFormat {
 pub struct ViewSettings {
     /// Light or dark.
     pub theme: ThemeChoice,
+    /// Of all words.
+    pub language: Language,
     /// How rotations are written.
     pub rotation: RotationFormat,
     /// Which depths the colour map covers.
@@ -257,7 +278,7 @@ pub struct Message {
     /// How much it matters.
     pub severity: Severity,
     /// The words.
-    pub text: String,
+    pub text: Text,
     /// When it happened.
     pub at_s: f64,
 }
@@ -273,6 +294,12 @@ pub struct Model {
     pub control: LinkState,
     /// The connection for pictures.
     pub camera: LinkState,
+    /// The connection for motions.
+    pub mover: LinkState,
+    /// What is known of the cell since it was connected.
+    pub cell: Option<CellFacts>,
+    /// What the arm does, as far as this program moves it.
+    pub motion: Motion,
     /// The robot, as it was when it was last heard of.
     pub robot: Option<RobotState>,
     /// The newest pictures.
@@ -297,7 +324,10 @@ impl Model {
             source,
             now_s: 0.0,
             control: first.clone(),
-            camera: first,
+            camera: first.clone(),
+            mover: first,
+            cell: None,
+            motion: Motion::Idle,
             robot: None,
             frame: None,
             dropped_frames: 0,
@@ -313,6 +343,7 @@ impl Model {
         match link {
             Link::Control => &self.control,
             Link::Camera => &self.camera,
+            Link::Motion => &self.mover,
         }
     }
 

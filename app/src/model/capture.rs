@@ -1,0 +1,117 @@
+//! The newest sight of the board, and the capture that is under way.
+
+use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::observation::Corner;
+use serde::{Deserialize, Serialize};
+
+use crate::text::Text;
+
+/// The board in the newest picture that was searched.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LiveDetection {
+    /// Which frame.
+    pub frame: u64,
+    /// The corners; `None` when the board was not found.
+    pub corners: Option<Vec<Corner>>,
+    /// The board's pose with the intrinsics at hand.
+    pub camera_from_target: Option<Pose<Camera, Target>>,
+    /// Where the tip was.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// How long the search took [s].
+    pub took_s: f64,
+}
+
+/// What a capture is for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CapturePurpose {
+    /// It enters the fit.
+    #[default]
+    Calibrate,
+    /// It never enters the fit and tells how good it is.
+    Verify,
+}
+
+/// How captures are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CaptureOptions {
+    /// Pictures that are averaged.
+    pub frames: u32,
+    /// Captures closer than this to an earlier one in both distance [m] and angle are refused.
+    pub least_distance_m: f64,
+    /// See `least_distance_m` [rad].
+    pub least_angle_rad: f64,
+    /// Longest wait [s] for robot and image to settle.
+    pub settle_limit_s: f64,
+}
+
+impl Default for CaptureOptions {
+    fn default() -> Self {
+        Self { frames: 1, least_distance_m: 0.005, least_angle_rad: 1.0_f64.to_radians(), settle_limit_s: 10.0 }
+    }
+}
+
+/// Why a capture is not there yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CaptureWait {
+    /// No picture has come since it was asked for.
+    ForPicture,
+    /// The joints move.
+    RobotMoves,
+    /// The picture still changes.
+    PictureChanges,
+    /// Pictures are being averaged.
+    Averaging {
+        /// So many are there.
+        done: u32,
+        /// Of so many.
+        of: u32,
+    },
+    /// The board is looked for and measured.
+    Measuring,
+    /// It is being written to the disk.
+    Saving,
+}
+
+/// The capture that is under way.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaptureUnderWay {
+    /// Its number, from the command.
+    pub number: u64,
+    /// What it is for.
+    pub purpose: CapturePurpose,
+    /// What it waits for.
+    pub wait: CaptureWait,
+    /// Since when.
+    pub since_s: f64,
+}
+
+/// Why there was no capture: what is wrong and what to do, in words.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaptureRefused {
+    /// Which kind of refusal, for tests and for deciding what comes next.
+    pub kind: RefusalKind,
+    /// The words.
+    pub why: Text,
+    /// When.
+    pub at_s: f64,
+}
+
+/// Kinds of refusals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RefusalKind {
+    /// The board was not found.
+    NoBoard,
+    /// Robot or picture did not come to rest.
+    NotSettled,
+    /// The picture is blurred.
+    Blurred,
+    /// There is a capture from almost the same pose.
+    TooSimilar,
+    /// No pictures come.
+    NoPictures,
+    /// It was cancelled.
+    Cancelled,
+    /// The disk did not take it.
+    NotSaved,
+}
