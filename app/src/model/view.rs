@@ -1,0 +1,121 @@
+//! How the pictures are looked at, and which part of the work is in front.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::ImagePoint;
+
+/// What is drawn over the pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Overlays {
+    /// Corners that were found, coloured by row.
+    pub corners: bool,
+    /// The axes of the board.
+    pub axes: bool,
+    /// The board where robot pose and calibration say that it is.
+    pub predicted: bool,
+    /// Outlines of the boards of past captures.
+    pub coverage: bool,
+    /// Residuals as arrows.
+    pub residuals: bool,
+    /// By so much residuals are exaggerated.
+    pub exaggeration: f64,
+}
+
+impl Default for Overlays {
+    fn default() -> Self {
+        Self { corners: true, axes: true, predicted: true, coverage: false, residuals: true, exaggeration: 50.0 }
+    }
+}
+
+/// The part of the pictures that is shown, the same in both.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Viewport {
+    /// Its middle as parts of width and height.
+    pub centre: [f32; 2],
+    /// How many times larger than to fit.
+    pub zoom: f32,
+}
+
+impl Default for Viewport {
+    fn default() -> Self {
+        Self { centre: [0.5, 0.5], zoom: 1.0 }
+    }
+}
+
+/// The steps of the work, in their order.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Step {
+    /// A cell with a camera.
+    #[default]
+    Connect,
+    /// What is looked at.
+    Target,
+    /// Views of it.
+    Capture,
+    /// The calibration.
+    Solve,
+    /// Whether it is right.
+    Verify,
+    /// Files for others.
+    Export,
+}
+
+impl Step {
+    /// All of them in their order.
+    pub const ALL: [Self; 6] =
+        [Self::Connect, Self::Target, Self::Capture, Self::Solve, Self::Verify, Self::Export];
+}
+
+/// Dialogs over the window.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Dialog {
+    /// Keys and what they do.
+    Help,
+    /// Every command by its name.
+    Palette,
+    /// Choose a session or data set to open.
+    Open,
+    /// Choose where a copy of the session goes.
+    SaveAs,
+    /// Choose where a new session goes.
+    New,
+    /// Choose a file of taught poses to read.
+    ImportPoses,
+    /// Choose where taught poses are written.
+    ExportPoses,
+    /// Choose where exports go.
+    ExportFolder,
+    /// What this program is.
+    About,
+}
+
+/// A point that was picked in the picture, in base coordinates, with what is known of its error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PickedPoint {
+    /// The pixel.
+    pub pixel: ImagePoint,
+    /// From the depth at the pixel.
+    pub from_depth: Option<MeasuredPoint>,
+    /// Where the ray through the pixel meets the board as PnP sees it.
+    pub from_board: Option<MeasuredPoint>,
+}
+
+/// A measured point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredPoint {
+    /// In camera coordinates [m].
+    pub in_camera_m: Vector3<f64>,
+    /// In base coordinates [m]; `None` without a calibration.
+    pub in_base_m: Option<Vector3<f64>>,
+    /// Standard deviations of the latter along the axes of the base [m], as far as the calibration's covariance goes.
+    pub sigma_m: Option<Vector3<f64>>,
+}
+
+/// The session's default place for exports.
+pub fn exports_of(session: &std::path::Path) -> PathBuf {
+    session.join("exports")
+}
