@@ -5,10 +5,11 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use handeye_core::dataset::Dataset;
+use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::handeye::Mode;
 use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::session::{Capture, DepthImage, Session, SessionMeta, SessionWriter};
+use handeye_core::session::{Capture, Session, SessionMeta, SessionWriter};
 use handeye_core::target::{Grid, TargetSpec};
 
 /// Tells the test below that it is the process to be killed, and where to write.
@@ -34,7 +35,7 @@ fn image(number: usize) -> RgbImage {
 fn capture_until_killed(folder: &Path) {
     let mut writer = SessionWriter::create(folder, meta()).expect("create");
     for number in 1.. {
-        let depth = DepthImage::new(64, 48);
+        let depth = DepthImage::new(64, 48, vec![0.5; 64 * 48]).expect("as many as pixels");
         let base_from_tip = Pose::from_translation_xyzw([number as f64, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
         let image = image(number);
         let capture =

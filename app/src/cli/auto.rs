@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use handeye_core::calibrate::Method;
+use handeye_core::depth::DepthImage;
 use handeye_core::handeye::{HandEye, Mode};
-use handeye_core::image::{ImageBuffer, Luma};
 use handeye_core::poses_file::Goal;
 use handeye_core::progress::CancelToken;
 use handeye_core::result::CalibrationResult;
@@ -204,11 +204,11 @@ fn capture_all(
 
 fn store(session: &mut SessionWriter, frame: &Frame) -> Result<(), Failure> {
     let depth =
-        ImageBuffer::<Luma<f32>, _>::from_raw(frame.depth.width, frame.depth.height, frame.depth.metres.clone());
+        DepthImage::new(frame.depth.width, frame.depth.height, frame.depth.metres.clone()).map_err(Failure::failed)?;
     session
         .add_capture(&Capture {
             image: &frame.rgb,
-            depth_m: depth.as_ref(),
+            depth_m: Some(&depth),
             base_from_tip: frame.base_from_tip,
             joints_rad: Some(&frame.joints),
             sim_time_s: Some(frame.sim_time_s),

@@ -5,7 +5,7 @@
 //! dataset.toml      the same folder as a dataset folder, see [`crate::dataset`]
 //! poses.csv
 //! images/0001.png   8-bit RGB
-//! depth/0001.tiff   32-bit float, metres, see [`DepthImage`]
+//! depth/0001.tiff   32-bit float, metres, see [`DepthImage`](crate::depth::DepthImage)
 //! ```
 //!
 //! A capture counts from the moment `session.json` names it. That file is replaced as a whole and last, after the
@@ -15,7 +15,11 @@
 
 mod depth;
 mod document;
+mod edit;
 mod error;
+mod history;
+pub(crate) mod pose_record;
+mod session_file;
 mod writer;
 
 use std::fs;
@@ -23,12 +27,14 @@ use std::path::{Path, PathBuf};
 
 use image::RgbImage;
 
-pub use depth::DepthImage;
-use document::Document;
-pub use document::{CaptureRecord, FORMAT, GroundTruth, MAJOR_VERSION, MINOR_VERSION, SessionMeta};
+pub use document::{CaptureId, CaptureRecord, Document, GroundTruth, Role, SessionMeta};
+pub use edit::{Edit, EditError, TaughtChange};
 pub use error::{SessionError, SessionProblem};
+pub use history::{History, UNDO_STEPS};
+pub use session_file::{FORMAT, MAJOR_VERSION, MINOR_VERSION};
 pub use writer::{Capture, SessionWriter};
 
+use crate::depth::DepthImage;
 use crate::image_file::{self, one_line};
 
 /// Name of the document in a session folder.
@@ -98,7 +104,7 @@ fn read_document(folder: &Path) -> Result<Document, SessionError> {
         }
         Err(e) => return Err(SessionError::new(&path, SessionProblem::Unreadable(one_line(&e)))),
     };
-    Document::from_json(&text).map_err(|problem| SessionError::new(&path, problem))
+    session_file::from_json(&text).map(|file| file.document).map_err(|problem| SessionError::new(&path, problem))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-use image::{Luma, Rgb};
+use image::Rgb;
 use nalgebra::Matrix3;
 
 use super::*;
@@ -25,6 +25,24 @@ pub(super) fn meta() -> SessionMeta {
         camera: Some(CameraInput { fixed: false, intrinsics: Some(intrinsics), model: intrinsics.distortion }),
         seeds: [("scene".to_owned(), u64::MAX)].into(),
         ground_truth: Some(GroundTruth::new(&links, Some(intrinsics))),
+    }
+}
+
+/// A capture as documents have it; there need not be files.
+pub(super) fn record(id: u32) -> CaptureRecord {
+    CaptureRecord {
+        id: CaptureId(id),
+        image: format!("images/{id:04}.png"),
+        depth: (id % 2 == 0).then(|| format!("depth/{id:04}.tiff")),
+        base_from_tip: pose(id as u8),
+        joints_rad: Some(vec![0.1, f64::from(id) / 3.0]),
+        sim_time_s: None,
+        role: Role::Calibration,
+        excluded: false,
+        frames: 1,
+        corner_noise_px: Some(0.05),
+        settled_s: None,
+        pose_name: Some("front".into()),
     }
 }
 
@@ -59,7 +77,8 @@ fn a_session_reads_back_bit_for_bit_and_is_a_dataset() {
     let home = folder();
     let dir = home.path().join("new/session");
     let mut writer = SessionWriter::create(&dir, meta()).expect("create");
-    let depth = DepthImage::from_fn(24, 16, |x, y| Luma([0.3 + 0.0001 * (x + y) as f32]));
+    let depth =
+        DepthImage::new(24, 16, (0..24 * 16).map(|i| 0.3 + 0.0001 * i as f32).collect()).expect("as many as pixels");
     let joints = [0.1, -0.2, 0.3, 0.4, 0.5, 1.0 / 3.0];
     for i in 0..3 {
         let image = image(i);
@@ -160,7 +179,7 @@ fn a_capture_that_would_spoil_the_session_is_refused_and_leaves_it_as_it_was() {
     writer.add_capture(&capture(&good, 0)).expect("add");
     let before = fs::read(dir.path().join("session.json")).expect("bytes");
     let nan = Pose::from_translation_xyzw([f64::NAN, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
-    let depth = DepthImage::new(3, 3);
+    let depth = DepthImage::new(3, 3, vec![0.5; 9]).expect("nine");
     let other_size = RgbImage::new(25, 16);
     let wrong = [
         Capture { base_from_tip: nan, ..capture(&good, 0) },
@@ -186,10 +205,10 @@ fn a_damaged_session_is_an_error_that_names_the_file() {
     let path = dir.path().join("session.json");
     let good = fs::read_to_string(&path).expect("text");
     let cases = [
-        ("\"1.0\"", "\"2.0\"", "version \"2.0\""),
-        ("\"1.0\"", "\"one\"", "version \"one\""),
+        ("\"1.1\"", "\"2.0\"", "version \"2.0\""),
+        ("\"1.1\"", "\"one\"", "version \"one\""),
         ("images/0001.png", "images/0009.png", "images/0009.png"),
-        ("images/0001.png", "../0001.png", "captures[0].image"),
+        ("images/0001.png", "../0001.png", "not inside of the session"),
         ("\"rotation_xyzw\": [", "\"rotation_xyzw\": [9.0, 9.0, 9.0, 9.0], \"was\": [", "not a unit quaternion"),
         ("\"square_m\": 0.015", "\"square_m\": -1", "square_m"),
         ("\"mode\": \"eye_in_hand\"", "\"mode\": \"eye\"", "eye"),
@@ -208,7 +227,7 @@ fn a_damaged_session_is_an_error_that_names_the_file() {
         assert!(Session::open(dir.path()).is_err());
         assert!(SessionWriter::create(dir.path(), meta()).is_err(), "a damaged session is not thrown away");
     }
-    fs::write(&path, good.replace("\"1.0\"", "\"1.7\"").replacen('{', "{\"later\": 1,", 1)).expect("write");
+    fs::write(&path, good.replace("\"1.1\"", "\"1.7\"").replacen('{', "{\"later\": 1,", 1)).expect("write");
     assert!(Session::open(dir.path()).is_ok(), "a newer minor version reads");
 }
 

@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 
 use image::{ImageFormat, RgbImage};
 
-use super::depth::{self, DepthImage};
-use super::document::{CaptureRecord, Document, SessionMeta, bad};
+use super::depth;
+use super::document::{CaptureId, CaptureRecord, Document, Role, SessionMeta};
+use super::edit::EditError;
 use super::error::{SessionError, SessionProblem};
-use super::{DOCUMENT, Session, read_document};
+use super::{DOCUMENT, Session, read_document, session_file};
+use crate::depth::DepthImage;
 use crate::frames::{Base, Pose, Tip};
 use crate::image_file::{self, one_line};
 use crate::{atomic_file, dataset};
@@ -50,7 +52,7 @@ impl SessionWriter {
     /// [`SessionProblem::NotEmpty`] when the folder holds something that is not a session,
     /// [`SessionProblem::Version`] for a session of another major version; nothing is touched then.
     pub fn create(folder: &Path, meta: SessionMeta) -> Result<Self, SessionError> {
-        meta.check().map_err(|problem| SessionError::new(folder, problem))?;
+        meta.check().map_err(|e| SessionError::new(folder, e.into()))?;
         let replaced = check_free(folder)?;
         fs::create_dir_all(folder).map_err(|e| unwritable(folder, &e))?;
         let writer = Self { folder: folder.to_path_buf(), document: Document::new(meta), image_size: None };
@@ -125,9 +127,10 @@ impl SessionWriter {
 
     /// A capture's entry in the document, under the next free number.
     fn record(&self, capture: &Capture<'_>) -> Result<CaptureRecord, SessionError> {
-        let number = self.document.captures.iter().filter_map(number_of).max().map_or(1, |last| last.saturating_add(1));
+        let number = self.document.captures.iter().map(|c| c.id.0).max().map_or(1, |last| last.saturating_add(1));
         let image = format!("{IMAGES}/{number:04}.png");
-        let refuse = |what: &str| Err(self.fail(&image, bad("the capture", what)));
+        let refuse =
+            |what: &str| Err(self.fail(&image, EditError::Bad { at: "the capture".into(), what: what.into() }.into()));
         let size = capture.image.dimensions();
         if size.0 == 0 || size.1 == 0 {
             return refuse("has an image without pixels");
@@ -135,17 +138,24 @@ impl SessionWriter {
         if self.image_size.is_some_and(|first| first != size) {
             return refuse("has an image of another size than the captures before: begin a new session");
         }
-        if capture.depth_m.is_some_and(|d| d.dimensions() != size) {
+        if capture.depth_m.is_some_and(|d| (d.width, d.height) != size) {
             return refuse("has a depth image of another size than its image");
         }
         let record = CaptureRecord {
+            id: CaptureId(number),
+            role: Role::Calibration,
+            excluded: false,
+            frames: 1,
+            corner_noise_px: None,
+            settled_s: None,
+            pose_name: None,
             depth: capture.depth_m.map(|_| format!("{DEPTH}/{number:04}.tiff")),
             base_from_tip: capture.base_from_tip,
             joints_rad: capture.joints_rad.map(<[f64]>::to_vec),
             sim_time_s: capture.sim_time_s,
             image,
         };
-        record.check("the capture").map_err(|problem| self.fail(&record.image, problem))?;
+        record.check().map_err(|e| self.fail(&record.image, e.into()))?;
         Ok(record)
     }
 
@@ -162,7 +172,8 @@ impl SessionWriter {
     }
 
     fn write_document(&self) -> Result<(), SessionError> {
-        let text = self.document.to_json().map_err(|problem| self.fail(DOCUMENT, problem))?;
+        let text =
+            session_file::to_json(&self.document, 0, CaptureId(0)).map_err(|problem| self.fail(DOCUMENT, problem))?;
         self.write(DOCUMENT, text.as_bytes())
     }
 
@@ -209,11 +220,6 @@ fn check_free(folder: &Path) -> Result<Option<Document>, SessionError> {
         }
     }
     Ok(None)
-}
-
-/// The number in the name of an image, `images/0012.png`.
-fn number_of(capture: &CaptureRecord) -> Option<u64> {
-    capture.image.strip_prefix(IMAGES)?.strip_prefix('/')?.strip_suffix(".png")?.parse().ok()
 }
 
 fn remove(path: &Path) -> Result<(), SessionError> {
