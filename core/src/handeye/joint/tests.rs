@@ -7,6 +7,7 @@ use super::*;
 use crate::camera::Distortion;
 use crate::frames::{Base, Target, Tip};
 use crate::observation::Corner;
+use crate::progress::CancelToken;
 use crate::se3;
 use crate::target::{Grid, TargetSpec};
 
