@@ -1,12 +1,13 @@
 //! How the pictures are looked at, and points that are measured in them.
 
 use handeye_core::depth::{ColourMap, DepthSample};
-use handeye_core::verify;
+use handeye_core::verify::VerifyError;
 use nalgebra::Vector2;
 
 use super::App;
-use crate::model::{DepthScale, Dialog, ImagePoint, MeasuredPoint, PickedPoint};
+use crate::model::{DepthScale, Dialog, ImagePoint, PickedPoint};
 use crate::text;
+use crate::text::Text;
 use crate::worker::CameraTask;
 
 impl App {
@@ -47,25 +48,26 @@ impl App {
 
     fn measure(&self, pixel: ImagePoint) -> Option<PickedPoint> {
         let frame = self.model.frame.as_ref()?;
-        let intrinsics = self.model.intrinsics()?;
         let px = Vector2::new(f64::from(pixel.column), f64::from(pixel.row));
-        let calibration = self.model.solve.solved.as_ref().map(|solved| &solved.calibration);
-        let base_from_tip = &frame.info.base_from_tip;
-        let depth_m = match frame.images.depth_at(pixel, frame.info.far_plane_m) {
-            DepthSample::Metres(depth_m) => Some(f64::from(depth_m)),
-            DepthSample::Far | DepthSample::Invalid => None,
+        let Some(calibrated) = self.model.calibrated() else {
+            let why = || Err(text!("there is no calibration yet"));
+            return Some(PickedPoint { pixel, from_depth: why(), from_board: why() });
         };
-        let measured = |point: verify::MeasuredPoint| MeasuredPoint {
-            in_camera_m: point.in_camera.coords(),
-            in_base_m: point.in_base.map(|point| point.coords()),
-            sigma_m: point.sigma_m,
+        let words = |error: VerifyError| Text::verbatim(error.to_string());
+        let from_depth = match frame.images.depth_at(pixel, frame.info.far_plane_m) {
+            DepthSample::Metres(depth_m) => {
+                calibrated.point_at_depth(&frame.info.base_from_tip, &px, f64::from(depth_m)).map_err(words)
+            }
+            DepthSample::Far | DepthSample::Invalid => Err(text!("there is no depth at this pixel")),
         };
-        let from_depth = depth_m
-            .and_then(|depth_m| verify::point_from_depth(&px, depth_m, &intrinsics, calibration, base_from_tip).ok());
-        let seen = self.model.detection.as_ref().and_then(|detection| detection.camera_from_target);
-        let from_board = seen.and_then(|camera_from_target| {
-            verify::point_on_target(&px, &camera_from_target, &intrinsics, calibration, base_from_tip).ok()
-        });
-        Some(PickedPoint { pixel, from_depth: from_depth.map(measured), from_board: from_board.map(measured) })
+        // The board and the tip of the same picture: the newest frame may be a later one.
+        let seen = self.model.detection.as_ref().and_then(|it| Some((it.camera_from_target?, it.base_from_tip)));
+        let from_board = match seen {
+            Some((camera_from_target, base_from_tip)) => {
+                calibrated.point_on_board(&base_from_tip, &px, &camera_from_target).map_err(words)
+            }
+            None => Err(text!("the board is not in the picture")),
+        };
+        Some(PickedPoint { pixel, from_depth, from_board })
     }
 }

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use handeye_core::calibrate::{CameraKnowledge, Method, Observations, ObservedView};
-use handeye_core::observation::Corner;
+use handeye_core::observation::{Corner, View};
 use handeye_core::progress::Stage;
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
-use handeye_core::verify::VerifyView;
 
 use super::App;
 use crate::command::SolveOutcome;
@@ -110,7 +109,7 @@ impl App {
             .filter(|it| it.role == Role::Verification && !it.excluded)
             .filter_map(|it| {
                 let corners = self.corners(it.id)?.clone();
-                Some((it.id, VerifyView { name: it.image.clone(), base_from_tip: it.base_from_tip, corners }))
+                Some((it.id, View { name: it.image.clone(), base_from_tip: it.base_from_tip, corners }))
             });
         SolveJob {
             id,

@@ -163,7 +163,8 @@ impl App {
 
     /// Shows a message from the window itself.
     fn say(&mut self, severity: Severity, text: Text) {
-        self.model.message = Some(Message { severity, text, at_s: self.model.now_s });
+        let id = self.model.messages.back().map_or(0, |last| last.id + 1);
+        self.model.messages.push_back(Message { id, dismissed: false, severity, text, at_s: self.model.now_s });
     }
 }
 

@@ -6,6 +6,8 @@
 mod app;
 mod numbers;
 mod panes;
+#[cfg(test)]
+mod sample;
 mod status;
 mod textures;
 mod theme;

@@ -17,9 +17,10 @@ use std::sync::Arc;
 use handeye_core::calibrate::Method;
 use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{ColourMap, DepthImage, DepthSample};
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::frames::{Base, Camera, Pose, Tip};
 use handeye_core::handeye::HandEye;
 use handeye_core::session::{CaptureId, Document};
+use handeye_core::verify::Calibrated;
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
@@ -36,7 +37,7 @@ pub use session::{
     FolderEntry, FolderKind, FolderListing, Observed, RecentSession, Review, SessionState, StopOutcome, Tour,
 };
 pub use solve::{JobId, SolveState, SolveStatus, Solved};
-pub use view::{Dialog, MeasuredPoint, Overlays, PickedPoint, Step, Viewport, exports_of};
+pub use view::{Dialog, Overlays, PickedPoint, Step, Viewport, exports_of};
 
 use crate::session_start;
 use crate::text::{Language, Text};
@@ -476,29 +477,17 @@ impl Model {
         calibrated.or_else(|| Some(self.cell.as_ref()?.nominal_intrinsics))
     }
 
-    /// Both links of the newest calibration.
-    pub fn links(&self) -> Option<HandEye> {
-        self.solve.solved.as_ref()?.calibration.hand_eye
-    }
-
     /// The camera on the tip, by the newest calibration; `None` without one, or for a camera beside the robot.
     pub fn tip_from_camera(&self) -> Option<Pose<Tip, Camera>> {
-        match self.links()? {
+        match self.calibrated()?.hand_eye {
             HandEye::EyeInHand { tip_from_camera, .. } => Some(tip_from_camera),
             HandEye::EyeToHand { .. } => None,
         }
     }
 
-    /// Where the board is in the picture of a tip pose, by the newest calibration.
-    pub fn predicted_target(&self, base_from_tip: &Pose<Base, Tip>) -> Option<Pose<Camera, Target>> {
-        Some(match self.links()? {
-            HandEye::EyeInHand { tip_from_camera, base_from_target } => {
-                (*base_from_tip * tip_from_camera).inverse() * base_from_target
-            }
-            HandEye::EyeToHand { base_from_camera, tip_from_target } => {
-                base_from_camera.inverse() * *base_from_tip * tip_from_target
-            }
-        })
+    /// The newest calibration as what predicts and measures.
+    pub fn calibrated(&self) -> Option<&Calibrated> {
+        self.solve.solved.as_ref()?.calibrated.as_ref()
     }
 
     /// Whether the simulation is known not to run, while the connection works.

@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use handeye_core::calibrate::Calibration;
 use handeye_core::findings::Finding;
-use handeye_core::handeye::prediction::Prediction;
 use handeye_core::progress::Stage;
 use handeye_core::result::CalibrationResult;
 use handeye_core::session::CaptureId;
-use handeye_core::verify::Verification;
+use handeye_core::verify::{Calibrated, Verification, VerifyError};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -30,10 +29,10 @@ pub struct Solved {
     pub result: CalibrationResult,
     /// What is weak and what to do next.
     pub findings: Vec<Finding>,
-    /// Expected error against number of views.
-    pub prediction: Prediction,
+    /// The calibration as what predicts and measures; `None` without a hand-eye.
+    pub calibrated: Option<Calibrated>,
     /// How well it does on captures that never entered the fit; `None` while there are none.
-    pub verification: Option<Verification>,
+    pub verification: Option<Result<Verification, VerifyError>>,
     /// The captures of `verification` in its order.
     pub verified_captures: Vec<CaptureId>,
     /// How long it took [s].

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use nalgebra::Vector3;
+use handeye_core::verify::MeasuredPoint;
 use serde::{Deserialize, Serialize};
 
 use super::ImagePoint;
+use crate::text::Text;
 
 /// What is drawn over the pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -93,26 +94,15 @@ pub enum Dialog {
     About,
 }
 
-/// A point that was picked in the picture, in base coordinates, with what is known of its error.
-#[derive(Debug, Clone, PartialEq)]
+/// A point that was picked in the live picture.
+#[derive(Debug, Clone)]
 pub struct PickedPoint {
     /// The pixel.
     pub pixel: ImagePoint,
-    /// From the depth at the pixel.
-    pub from_depth: Option<MeasuredPoint>,
-    /// Where the ray through the pixel meets the board as PnP sees it.
-    pub from_board: Option<MeasuredPoint>,
-}
-
-/// A measured point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MeasuredPoint {
-    /// In camera coordinates [m].
-    pub in_camera_m: Vector3<f64>,
-    /// In base coordinates [m]; `None` without a calibration.
-    pub in_base_m: Option<Vector3<f64>>,
-    /// Standard deviations of the latter along the axes of the base [m], as far as the calibration's covariance goes.
-    pub sigma_m: Option<Vector3<f64>>,
+    /// From the depth at the pixel; or why not.
+    pub from_depth: Result<MeasuredPoint, Text>,
+    /// Where the ray through the pixel meets the board as PnP sees it; or why not.
+    pub from_board: Result<MeasuredPoint, Text>,
 }
 
 /// The session's default place for exports.

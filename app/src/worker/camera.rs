@@ -10,7 +10,8 @@ use super::link::{Duty, Outlet};
 use super::port::{CameraPort, Connected, Connector, PortError, RawFrame};
 use super::slot::LatestSlot;
 use crate::depth_view;
-use crate::model::{DEPTH_COLOURS, DepthScale, FrameImages, FrameInfo, Link, LiveFrame};
+use handeye_core::depth::ColourMap;
+use crate::model::{DepthScale, FrameImages, FrameInfo, Link, LiveFrame};
 
 /// Rest between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
 const PERIOD: Duration = Duration::from_millis(15);
@@ -55,7 +56,7 @@ impl Camera {
         let [near_m, far_m] = depth_range_m;
         let depth_coloured = raw
             .depth
-            .colours(DEPTH_COLOURS, near_m, far_m, far_plane_m)
+            .colours(ColourMap::Turbo, near_m, far_m, far_plane_m)
             .map_err(|error| PortError::Refused(format!("the depth picture cannot be shown: {error}")))?;
         self.number += 1;
         let info = FrameInfo {

@@ -1,15 +1,17 @@
 //! The solver: calibrates the newest set of captures, and checks the answer on the captures that never entered it.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, CalibrateError, Calibration, Method, Observations};
-use handeye_core::findings;
+use handeye_core::calibrate::{self, CalibrateError, Method, Observations};
+use handeye_core::findings::{self, FindingOptions};
 use handeye_core::handeye::HandEyeError;
+use handeye_core::observation::View;
 use handeye_core::progress::{CancelToken, Progress, Work};
 use handeye_core::session::CaptureId;
-use handeye_core::verify::{self, VerifyView};
+use handeye_core::verify::{self, Calibrated, CheckCapture, VerifyError};
 
 use super::link::Outlet;
 use crate::command::{Event, SolveOutcome};
@@ -30,7 +32,7 @@ pub struct SolveJob {
     /// The captures of the views.
     pub captures: Vec<CaptureId>,
     /// What was observed in captures that never enter the fit.
-    pub verification: Vec<(CaptureId, VerifyView)>,
+    pub verification: Vec<(CaptureId, View)>,
     /// Which answer is asked for.
     pub method: Method,
     /// The error [m] that is good enough.
@@ -57,7 +59,7 @@ pub fn solve(job: SolveJob, cancel: &CancelToken, outlet: &Outlet) {
 }
 
 fn answer(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) -> Result<Solved, CalibrateError> {
-    let told = std::cell::Cell::new(None::<Progress>);
+    let told = Cell::new(None::<Progress>);
     let progress = |now: Progress| {
         let tell = told.get().is_none_or(|before| {
             before.stage != now.stage || (now.fraction() - before.fraction()).abs() >= PROGRESS_STEP
@@ -74,19 +76,28 @@ fn answer(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) -> Result<Solve
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
     }
-    let views: Vec<VerifyView> = job.verification.iter().map(|(_, view)| view.clone()).collect();
-    let verification = verification(&job.observations, &calibration, &views, work)?;
-    let findings = findings::findings(&job.observations, Ok(&calibration), &findings::FindingOptions {
-        goal_m: job.goal_m,
-        ..findings::FindingOptions::default()
+    let options = FindingOptions { goal_mm: Some(job.goal_m * 1e3) };
+    let findings = findings::findings(&job.observations, Some(&calibration), &options);
+    let calibrated = Calibrated::new(&calibration).ok();
+    let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
+        let captures: Vec<CheckCapture<'_>> = job
+            .verification
+            .iter()
+            .map(|(_, view)| CheckCapture { view, depth: None, far_m: f32::INFINITY })
+            .collect();
+        verify::verify(calibrated, &job.observations.target, &captures, work)
     });
+    if let Some(Err(VerifyError::Cancelled)) = verification {
+        return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
+    }
     Ok(Solved {
         job: job.id,
         captures: job.captures.clone(),
-        findings,
         result,
-        verified_captures: job.verification.iter().map(|(id, _)| *id).collect(),
+        findings,
+        calibrated,
         verification,
+        verified_captures: job.verification.iter().map(|(id, _)| *id).collect(),
         calibration,
         took_s: 0.0,
     })

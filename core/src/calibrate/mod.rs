@@ -83,6 +83,14 @@ impl Method {
         std::iter::once("joint").chain(closed_form::all().iter().map(|m| m.name())).collect()
     }
 
+    /// Its name on the command line and in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::ClosedForm(name) => name,
+        }
+    }
+
     /// The method of that name.
     pub fn by_name(name: &str) -> Option<Self> {
         if name == "joint" {

@@ -13,6 +13,8 @@ mod yaml;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
+
 use crate::atomic_file;
 use crate::camera::Intrinsics;
 use crate::handeye::Mode;
@@ -23,7 +25,8 @@ use crate::result::{CalibrationResult, ResultProblem, TransformEstimate};
 pub const TOLERANCE: f64 = 1e-9;
 
 /// Names that a result does not know and the files of other programs want.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ExportNames {
     /// Name of the calibration where a format has one; also the name of its file.
     pub calibration: String,

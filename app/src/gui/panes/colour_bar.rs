@@ -4,7 +4,7 @@ use egui::{Align2, Color32, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, Wi
 
 use super::pictures::small_text;
 use crate::gui::theme::{self, Palette};
-use crate::model::DEPTH_COLOURS;
+use handeye_core::depth::ColourMap;
 
 /// Height of the colours.
 const HEIGHT: f32 = 12.0;
@@ -46,7 +46,7 @@ fn gradient(bar: Rect) -> Shape {
     let mut mesh = Mesh::default();
     for step in 0..=STEPS {
         let part = step as f32 / STEPS as f32;
-        let colour: Color32 = theme::pixel(DEPTH_COLOURS.colour(f64::from(part)));
+        let colour: Color32 = theme::pixel(ColourMap::Turbo.colour(f64::from(part)));
         let x = bar.left() + part * bar.width();
         mesh.colored_vertex(Pos2::new(x, bar.top()), colour);
         mesh.colored_vertex(Pos2::new(x, bar.bottom()), colour);

@@ -88,7 +88,7 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
 
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
-    let (text, colour) = match &model.message {
+    let (text, colour) = match model.message() {
         None => (String::new(), palette.weak),
         Some(message) => {
             let colour = match message.severity {
