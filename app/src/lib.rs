@@ -1,5 +1,6 @@
 //! The Handeye Workbench: a window and a command line over [`handeye_core`] and [`handeye_sim_link`].
 
+pub mod app;
 pub mod cli;
 pub mod command;
 pub mod depth_view;

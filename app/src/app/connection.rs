@@ -1,9 +1,11 @@
 //! The connections to the cell.
 
+use std::thread::Builder;
+
 use super::App;
 use crate::model::{CellFacts, CellSource, Link, LinkState, Motion, Severity};
 use crate::text;
-use crate::worker::{CameraTask, ControlTask, Request};
+use crate::worker::{CameraTask, ControlTask, Request, Workers};
 
 impl App {
     pub(super) fn stop(&mut self) {
@@ -53,9 +55,20 @@ impl App {
         self.model.control = first.clone();
         self.model.camera = first.clone();
         self.model.mover = first;
-        if let Err(error) = self.workers.connect(&source, &self.model.view) {
-            self.say(Severity::Error, text!("The connection was not begun: {error}", error = error));
+        let connector = (self.connect)(&source);
+        let captures = self.desk.captures();
+        match Workers::start(&source, &self.model.view, &connector, captures, &self.clock, &self.waker) {
+            Ok(workers) => {
+                let before = std::mem::replace(&mut self.workers, workers);
+                // It waits for calls under way, which the window must not.
+                let farewell = Builder::new().name("farewell".to_owned()).spawn(move || drop(before));
+                if let Err(error) = farewell {
+                    tracing::warn!(%error, "the connection before was left alone");
+                }
+            }
+            Err(error) => self.say(Severity::Error, text!("The connection was not begun: {error}", error = error)),
         }
+        self.model.capture = None;
         self.send_target();
     }
 

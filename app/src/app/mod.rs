@@ -21,7 +21,10 @@ use std::sync::Arc;
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
 use crate::text;
-use crate::worker::{Clock, Connector, Waker, Workers};
+use crate::worker::{Clock, Connector, Desk, Waker, Workers};
+
+/// Makes what connects to a cell.
+pub type Connect = Arc<dyn Fn(&CellSource) -> Arc<dyn Connector> + Send + Sync>;
 
 /// What an application begins with.
 pub struct Start {
@@ -38,8 +41,12 @@ pub struct Start {
 /// Model and workers.
 pub struct App {
     model: Model,
+    /// The threads that talk to the cell; others take their place when another cell is chosen.
     workers: Workers,
+    desk: Desk,
+    connect: Connect,
     clock: Clock,
+    waker: Waker,
     numbers: Numbers,
     /// The question that the solver was asked last.
     asked: Option<solve::Question>,
@@ -59,12 +66,15 @@ impl App {
     ///
     /// # Errors
     /// When the system has no more threads.
-    pub fn start(start: Start, connector: &Arc<dyn Connector>, clock: Clock, waker: &Waker) -> io::Result<Self> {
+    pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
         let Start { source, view, sessions, open } = start;
-        let workers = Workers::start(&source, &view, sessions, connector, &clock, waker)?;
+        let desk = Desk::start(sessions, &clock, &waker)?;
+        let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
         let model = Model::new(source, view);
-        let mut app = Self { model, workers, clock, numbers: Numbers::default(), asked: None };
+        let numbers = Numbers::default();
+        let mut app = Self { model, workers, desk, connect, clock, waker, numbers, asked: None };
         app.prepare_session();
+        app.send_target();
         if let Some(folder) = open {
             app.open(folder);
         }
@@ -81,6 +91,7 @@ impl App {
         self.absorb(Event::Tick { now_s: (self.clock)() });
         let mut events = Vec::new();
         self.workers.drain(|event| events.push(event));
+        self.desk.drain(|event| events.push(event));
         for event in events {
             self.absorb(event);
         }
@@ -211,5 +222,3 @@ impl App {
     }
 }
 
-#[cfg(test)]
-mod tests;

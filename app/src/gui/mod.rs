@@ -3,7 +3,6 @@
 //! Data flows in one direction: workers report events, [`App`] changes the model, panes draw the model and return
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
-mod app;
 mod numbers;
 mod panes;
 #[cfg(test)]
@@ -13,6 +12,7 @@ mod textures;
 mod theme;
 mod window;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -20,13 +20,10 @@ use anyhow::anyhow;
 use eframe::NativeOptions;
 use egui::ViewportBuilder;
 
-pub use app::App;
-
 use crate::cli::GuiArgs;
-use crate::command::Event;
-use crate::model::{CellSource, Severity};
-use crate::text::Text;
-use crate::worker::{Clock, Connector, LiveConnector, Waker};
+use crate::app::{App, Connect, Start};
+use crate::model::CellSource;
+use crate::worker::{Clock, LiveConnector, Waker};
 use window::Window;
 
 /// Name under which the system keeps the window's settings.
@@ -46,19 +43,15 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
             .with_min_inner_size([1024.0, 700.0]),
         ..NativeOptions::default()
     };
-    let session = args.session;
     let open = move |creation: &eframe::CreationContext<'_>| {
         let ctx = creation.egui_ctx.clone();
         let waker: Waker = Arc::new(move || ctx.request_repaint());
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
-        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::new(source.clone()));
+        let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
         let view = window::stored_settings(creation.storage);
-        let mut app = App::start(source, view, &connector, clock, &waker)?;
-        if let Some(session) = session {
-            let text = Text::verbatim(format!("sessions are not opened yet: {}", session.display()));
-            app.absorb(Event::Notice { severity: Severity::Warning, text });
-        }
+        let start = Start { source, view, sessions: PathBuf::from("sessions"), open: args.session };
+        let app = App::start(start, connect, clock, waker)?;
         Ok(Box::new(Window::new(app, &creation.egui_ctx)) as Box<dyn eframe::App>)
     };
     eframe::run_native(APP_ID, options, Box::new(open)).map_err(|error| {

@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use egui::Ui;
 
-use super::app::App;
 use super::panes;
 use super::textures::LiveTextures;
 use super::theme;
+use crate::app::App;
 use crate::command::Outbox;
 use crate::model::{ThemeChoice, ViewSettings};
 

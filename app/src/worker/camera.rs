@@ -27,6 +27,8 @@ const RATE_GAP_S: f64 = 2.0;
 pub enum CameraTask {
     /// Which depths the colour map covers, from the next picture on.
     SetDepthScale(DepthScale),
+    /// The colours of depths, from the next picture on.
+    SetDepthColours(ColourMap),
 }
 
 /// The duty of the camera worker.
@@ -109,6 +111,7 @@ impl Duty for Camera {
                 // A resting simulation would otherwise show the old colours until it runs.
                 self.seen_sim_time_s = None;
             }
+            CameraTask::SetDepthColours(_) => {}
         }
         Ok(())
     }

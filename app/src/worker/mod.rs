@@ -8,13 +8,20 @@
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
 
+mod archive;
 mod camera;
 mod control;
+mod desk;
+mod files;
 mod link;
 mod live;
+mod newest;
+mod observer;
 mod port;
 mod reconnect;
 mod slot;
+mod solver;
+pub mod vision;
 
 #[cfg(test)]
 pub mod fake;
@@ -27,15 +34,21 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use handeye_sim_link::client::CancelToken;
 
+pub use archive::{ArchiveTask, Beginning, timestamp_rfc3339};
 pub use camera::CameraTask;
 pub use control::{ControlTask, StopLine};
+pub use desk::Desk;
+pub use files::{ExportJob, FileTask};
 pub use link::Request;
 pub use live::LiveConnector;
+pub use observer::ObserveJob;
 pub use port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
 pub use slot::LatestSlot;
+pub use solver::SolveJob;
+pub use vision::VisionTask;
 
 use crate::command::Event;
-use crate::model::{CellSource, DepthScale, LiveFrame, RobotState};
+use crate::model::{CellSource, LiveFrame, RobotState, ViewSettings};
 use camera::Camera;
 use control::Control;
 use link::{Duty, LinkLoop, Outlet};
@@ -86,8 +99,9 @@ impl Workers {
     /// When the system has no more threads.
     pub fn start(
         source: &CellSource,
-        scale: DepthScale,
+        view: &ViewSettings,
         connector: &Arc<dyn Connector>,
+        captures: Option<Sender<vision::Measured>>,
         clock: &Clock,
         waker: &Waker,
     ) -> io::Result<Self> {
@@ -96,6 +110,7 @@ impl Workers {
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
         workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
+        let _ = captures; let scale = view.depth_scale;
         let duty = Camera::new(scale, Arc::clone(&workers.frames));
         workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
         Ok(workers)
@@ -165,6 +180,19 @@ impl Workers {
     pub fn ask_control(&self, request: Request<ControlTask>) -> Result<(), Busy> {
         ask(self.control.as_ref(), request)
     }
+
+    /// stub
+    pub fn reconnect(&self) -> Result<(), Busy> { self.ask_control(Request::Reconnect).and(self.ask_camera(Request::Reconnect)) }
+    /// stub
+    pub fn ask_vision(&self, _t: VisionTask) -> Result<(), Busy> { Ok(()) }
+    /// stub
+    pub fn move_to(&self, _r: crate::model::MotionRequest) -> Result<(), Busy> { Ok(()) }
+    /// stub
+    pub fn jog_step(&self, _id: crate::model::MotionId, _j: crate::model::Jog, _s: [f64; 2], _v: f64, _c: Option<handeye_core::frames::Pose<handeye_core::frames::Tip, handeye_core::frames::Camera>>) -> Result<(), Busy> { Ok(()) }
+    /// stub
+    pub fn hold_jog(&self, _j: crate::model::Jog, _v: f64, _c: Option<handeye_core::frames::Pose<handeye_core::frames::Tip, handeye_core::frames::Camera>>) {}
+    /// stub
+    pub fn release_jog(&self) {}
 
     /// Asks the camera worker for something.
     ///

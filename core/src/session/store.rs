@@ -41,7 +41,15 @@ impl Store {
     /// [`SessionProblem::Exists`] when the folder holds a session, [`SessionProblem::NotEmpty`] when it holds
     /// something else, [`SessionProblem::Edit`] when `meta` cannot be that of a session. Nothing is touched then.
     pub fn create(folder: &Path, meta: SessionMeta) -> Result<Self, SessionError> {
-        let history = History::new(Document::new(meta));
+        Self::create_with(folder, Document::new(meta))
+    }
+
+    /// Begins a session with what a document says, for example taught poses, which are then no change to undo.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn create_with(folder: &Path, document: Document) -> Result<Self, SessionError> {
+        let history = History::new(document);
         history.document().check().map_err(|e| SessionError::new(folder, e.into()))?;
         check_free(folder)?;
         make_folder(folder)?;
