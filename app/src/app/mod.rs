@@ -34,7 +34,7 @@ pub struct Start {
     pub view: ViewSettings,
     /// Where new sessions go.
     pub sessions: PathBuf,
-    /// A session or data set to open at once.
+    /// A session or data set to open at once; where there is none, a session is begun there.
     pub open: Option<PathBuf>,
 }
 
@@ -76,7 +76,7 @@ impl App {
         app.prepare_session();
         app.send_target();
         if let Some(folder) = open {
-            app.open(folder);
+            app.open_or_begin(folder);
         }
         Ok(app)
     }

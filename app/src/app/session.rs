@@ -108,6 +108,12 @@ impl App {
         self.ask_archive(ArchiveTask::Open(folder));
     }
 
+    /// Goes on with the session in a folder, or begins one there.
+    pub(super) fn open_or_begin(&mut self, folder: PathBuf) {
+        self.model.opening = true;
+        self.ask_archive(ArchiveTask::OpenOrNew { folder, beginning: self.beginning() });
+    }
+
     pub(super) fn save_as(&mut self, folder: PathBuf) {
         self.model.opening = true;
         self.ask_archive(ArchiveTask::SaveAs(folder));

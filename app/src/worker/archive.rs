@@ -45,6 +45,13 @@ pub enum ArchiveTask {
     },
     /// Go on with a session, or begin one with the images and poses of a data set.
     Open(PathBuf),
+    /// Go on with the session in a folder, or begin one there when there is none.
+    OpenOrNew {
+        /// Where.
+        folder: PathBuf,
+        /// With what.
+        beginning: Box<Beginning>,
+    },
     /// Go on with a complete copy in another folder.
     SaveAs(PathBuf),
     /// Change the document.
@@ -104,6 +111,13 @@ impl Archive {
             }
             ArchiveTask::New { folder, beginning } => self.begin(folder, *beginning),
             ArchiveTask::Open(folder) => self.open(&folder),
+            ArchiveTask::OpenOrNew { folder, beginning } => {
+                if kind_of(&folder) == FolderKind::Plain {
+                    self.begin(Some(folder), *beginning);
+                } else {
+                    self.open(&folder);
+                }
+            }
             ArchiveTask::SaveAs(folder) => self.save_as(&folder),
             ArchiveTask::Edit(edit) => self.change(|store| store.apply(*edit)),
             ArchiveTask::Undo => self.change(Store::undo),
