@@ -3,11 +3,9 @@
 use std::fmt::Display;
 use std::sync::{Mutex, PoisonError};
 
-use handeye_core::depth::DepthImage;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CameraFeed, CellClient, CellInfo, CellPaths};
-use handeye_sim_link::client::convert::DepthFrame;
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState};
 
 use super::port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
@@ -137,10 +135,9 @@ impl CameraPort for LiveCamera {
 
     fn grab(&mut self) -> Result<RawFrame, PortError> {
         let frame = self.feed.grab().map_err(port_error)?;
-        let DepthFrame { width, height, metres } = frame.depth;
         Ok(RawFrame {
             rgb: frame.rgb,
-            depth: DepthImage { width, height, metres },
+            depth: frame.depth,
             sim_time_s: frame.sim_time_s,
             base_from_tip: frame.base_from_tip,
             joints_rad: frame.joints,
