@@ -70,7 +70,8 @@ impl App {
             Command::Reconnect => {
                 let control = self.workers.ask_control(Request::Reconnect);
                 let camera = self.workers.ask_camera(Request::Reconnect);
-                self.expect(text!("The connection was not tried again"), control.and(camera));
+                let motion = self.workers.reconnect_motion();
+                self.expect(text!("The connection was not tried again"), control.and(camera).and(motion));
             }
             Command::SetTheme(theme) => self.model.view.theme = theme,
             Command::SetRotationFormat(format) => self.model.view.rotation = format,

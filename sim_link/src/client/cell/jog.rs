@@ -221,7 +221,11 @@ enum Pass {
 }
 
 impl JogAxes {
-    fn direction_in_base(&self, base_from_tip: &Pose<Base, Tip>, along: &Vector3<f64>) -> Result<Vector3<f64>, LinkError> {
+    fn direction_in_base(
+        &self,
+        base_from_tip: &Pose<Base, Tip>,
+        along: &Vector3<f64>,
+    ) -> Result<Vector3<f64>, LinkError> {
         let in_base = match self {
             Self::Base => *along,
             Self::Tip => base_from_tip.rotation() * along,

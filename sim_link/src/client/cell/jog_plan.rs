@@ -125,8 +125,7 @@ fn nearest(
 ) -> Result<JointAngles, JogObstacle> {
     // Without the ranges first: within them the nearest may be another configuration, and a jump.
     let half_turn = std::f64::consts::PI;
-    let around =
-        JointLimits { min_rad: before.map(|q| q - half_turn), max_rad: before.map(|q| q + half_turn) };
+    let around = JointLimits { min_rad: before.map(|q| q - half_turn), max_rad: before.map(|q| q + half_turn) };
     let joints = kinematics.reach_within(goal, before, &around).map_err(JogObstacle::Reach)?;
     let (fastest, by_rad) = largest_change(before, &joints);
     if by_rad > JUMP_RAD {
@@ -144,7 +143,9 @@ fn nearest(
 }
 
 fn largest_change(from: &JointAngles, to: &JointAngles) -> (usize, f64) {
-    (0..JOINTS).map(|i| (i, (to[i] - from[i]).abs())).fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
+    (0..JOINTS)
+        .map(|i| (i, (to[i] - from[i]).abs()))
+        .fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
 }
 
 /// The fastest speed for the next `dt_s` from which the rest of a distance is enough to stop.
@@ -273,13 +274,7 @@ impl<'a> JogPlan<'a> {
     }
 
     /// The speed along the path at which the fastest joint has its rate.
-    fn rate_limit(
-        &self,
-        from: &JointAngles,
-        to: &JointAngles,
-        between: f64,
-        fastest: f64,
-    ) -> Result<f64, JogObstacle> {
+    fn rate_limit(&self, from: &JointAngles, to: &JointAngles, between: f64, fastest: f64) -> Result<f64, JogObstacle> {
         if matches!(self.path, Path::Joint { .. }) {
             return Ok(fastest);
         }

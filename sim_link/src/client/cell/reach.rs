@@ -97,8 +97,7 @@ impl ArmKinematics {
         if !goal.is_finite() {
             return Err(IkError::NotFinite);
         }
-        let arm_from_connection =
-            self.base_from_arm.inverse() * goal.isometry() * self.connection_from_tip.inverse();
+        let arm_from_connection = self.base_from_arm.inverse() * goal.isometry() * self.connection_from_tip.inverse();
         kinematics::inverse_nearest(&arm_from_connection, seed, limits)
     }
 
