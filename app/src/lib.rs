@@ -5,6 +5,7 @@ pub mod cli;
 pub mod command;
 pub mod depth_view;
 pub mod gui;
+pub mod limits;
 pub mod model;
 pub mod observe;
 pub mod parallel;

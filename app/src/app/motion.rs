@@ -3,7 +3,7 @@
 use handeye_core::session::CaptureId;
 
 use super::App;
-use crate::model::{Jog, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Severity};
+use crate::model::{Jog, JogRequest, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Severity};
 use crate::text;
 use crate::text::Text;
 
@@ -12,7 +12,7 @@ impl App {
     pub(super) fn start_motion(&mut self, goal: MotionGoal, what: Text) {
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         let id = self.numbers.motion;
-        let request = MotionRequest { id, goal, speed: self.model.view.jog.speed };
+        let request = MotionRequest { id, goal, what: what.clone(), speed: self.model.view.jog.speed };
         match self.workers.move_to(request) {
             Ok(()) => {
                 self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
@@ -64,9 +64,8 @@ impl App {
             JogStep::Step { metres, radians } => {
                 self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
                 let id = self.numbers.motion;
-                let mount = self.camera_for_jogging();
-                let speed = self.model.view.jog.speed;
-                match self.workers.jog_step(id, jog, [metres, radians], speed, mount) {
+                let request = self.jog_request(jog);
+                match self.workers.jog_step(id, request, metres, radians) {
                     Ok(()) => {
                         let (what, since_s) = (text!("the next step"), self.model.now_s);
                         self.model.motion = Motion::Moving { id, what, since_s };
@@ -81,8 +80,7 @@ impl App {
         if self.model.view.jog.step != JogStep::Hold {
             return;
         }
-        let mount = self.camera_for_jogging();
-        self.workers.hold_jog(jog, self.model.view.jog.speed, mount);
+        self.workers.hold_jog(self.jog_request(jog));
         self.model.motion = Motion::Jogging(jog);
     }
 
@@ -107,9 +105,11 @@ impl App {
         self.model.motion = Motion::Idle;
     }
 
-    /// The camera on the tip: as calibrated, or else as the scene says. Only to choose the axes that a person jogs along.
-    fn camera_for_jogging(&self) -> Option<handeye_core::frames::Pose<handeye_core::frames::Tip, handeye_core::frames::Camera>> {
+    /// The camera on the tip is as calibrated, or else as the scene says: only to choose the axes that a person jogs
+    /// along.
+    fn jog_request(&self, jog: Jog) -> JogRequest {
         let said = || Some(self.model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
-        self.model.tip_from_camera().or_else(said)
+        let tip_from_camera = self.model.tip_from_camera().or_else(said);
+        JogRequest { jog, tip_from_camera, speed: self.model.view.jog.speed }
     }
 }

@@ -30,7 +30,7 @@ pub use capture::{
 };
 pub use export::{ExportState, Preview, PreviewFile, Written};
 pub use motion::{
-    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
+    Axis, CellFacts, Jog, JogFrame, JogRequest, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
 };
 pub use session::{

@@ -4,6 +4,7 @@
 //! | --- | --- | --- |
 //! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
 //! | `camera` | pictures, colours of the depth | events; newest [`LiveFrame`] |
+//! | `motion` | motions and jogs, one at a time | events; refusals through the [`MotionDesk`] |
 //!
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
@@ -13,8 +14,12 @@ mod camera;
 mod control;
 mod desk;
 mod files;
+mod jog_line;
 mod link;
 mod live;
+mod live_motion;
+mod motion;
+mod motion_desk;
 mod newest;
 mod observer;
 mod port;
@@ -39,19 +44,23 @@ pub use camera::CameraTask;
 pub use control::{ControlTask, StopLine};
 pub use desk::Desk;
 pub use files::{ExportJob, FileTask};
+pub use jog_line::HELD_S;
 pub use link::Request;
 pub use live::LiveConnector;
+pub use motion::MotionLook;
+pub use motion_desk::{MotionDesk, MotionTask};
 pub use observer::ObserveJob;
-pub use port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
+pub use port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
 pub use slot::LatestSlot;
 pub use solver::SolveJob;
 pub use vision::VisionTask;
 
 use crate::command::Event;
-use crate::model::{CellSource, LiveFrame, RobotState, ViewSettings};
+use crate::model::{CellSource, Jog, JogRequest, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings};
 use camera::Camera;
 use control::Control;
 use link::{Duty, LinkLoop, Outlet};
+use motion::Motions;
 use reconnect::Reconnect;
 
 /// Tells the window that there is something to look at. Called from any thread.
@@ -78,8 +87,11 @@ pub struct Busy;
 pub struct Workers {
     control: Option<Sender<Request<ControlTask>>>,
     camera: Option<Sender<Request<CameraTask>>>,
+    motion: Option<Sender<Request<MotionLook>>>,
     events: Option<Receiver<Event>>,
     stop: Arc<StopLine>,
+    desk: Arc<MotionDesk>,
+    clock: Clock,
     robot: Arc<LatestSlot<RobotState>>,
     frames: Arc<LatestSlot<LiveFrame>>,
     shutdown: CancelToken,
@@ -106,23 +118,28 @@ impl Workers {
         waker: &Waker,
     ) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
-        let mut workers = Self::idle(events);
+        let mut workers = Self::idle(events, clock, waker);
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
         workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
         let _ = captures; let scale = view.depth_scale;
         let duty = Camera::new(scale, Arc::clone(&workers.frames));
         workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
+        let duty = Motions::new(Arc::clone(&workers.desk));
+        workers.motion = Some(workers.spawn("motion", duty, source, connector, outlet())?);
         Ok(workers)
     }
 
     /// No threads yet.
-    fn idle(events: Receiver<Event>) -> Self {
+    fn idle(events: Receiver<Event>, clock: &Clock, waker: &Waker) -> Self {
         Self {
             control: None,
             camera: None,
+            motion: None,
             events: Some(events),
             stop: Arc::default(),
+            desk: Arc::new(MotionDesk::new(Arc::clone(waker))),
+            clock: Arc::clone(clock),
             robot: Arc::default(),
             frames: Arc::default(),
             shutdown: CancelToken::default(),
@@ -157,6 +174,7 @@ impl Workers {
         for event in self.events.iter().flat_map(Receiver::try_iter).take(MAX_EVENTS) {
             absorb(event);
         }
+        self.desk.take_said().into_iter().for_each(&mut absorb);
         if let Some((robot, _)) = self.robot.take() {
             absorb(Event::Robot(robot));
         }
@@ -165,12 +183,80 @@ impl Workers {
         }
     }
 
-    /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached.
+    /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached, over the control
+    /// worker's connection, whoever moves the arm. A motion or a jog of this program ends as well, and nothing is left
+    /// that could begin afterwards.
     pub fn press_stop(&self) {
         self.stop.press();
+        self.desk.cancel(self.now_s());
         // Only to wake a resting worker: one that is too busy to take it looks at the stop line by itself.
         let woken = self.ask_control(Request::Do(ControlTask::CheckStop));
         tracing::debug!(?woken, "stop pressed");
+    }
+
+    /// Asks for a motion. However it ends, [`Event::Moved`] tells once, also when it is refused because something moves
+    /// already.
+    ///
+    /// # Errors
+    /// [`Busy`] when the program ends; then nothing is reported.
+    pub fn move_to(&self, request: MotionRequest) -> Result<(), Busy> {
+        self.begin(MotionTask::Move(request))
+    }
+
+    /// Asks for one step of a jog: `metres` along a line, or `radians` about an axis or of a joint. Reported as
+    /// [`Self::move_to`].
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn jog_step(&self, id: MotionId, request: JogRequest, metres: f64, radians: f64) -> Result<(), Busy> {
+        let length = if matches!(request.jog, Jog::Translate { .. }) { metres } else { radians };
+        self.begin(MotionTask::JogStep { id, request, length })
+    }
+
+    /// Ends the motion that is under way, without a stop of everything else.
+    pub fn cancel_motion(&self) {
+        self.desk.cancel(self.now_s());
+    }
+
+    /// A jog button is held now: to be called when it is pressed, and again and again while it is held, or the arm
+    /// stops by itself after [`HELD_S`]. [`Event::JogEnded`] tells once per press that the arm stands.
+    pub fn hold_jog(&self, request: JogRequest) {
+        self.desk.hold(request, self.stop.is_pressed(), self.now_s());
+        self.wake_motion();
+    }
+
+    /// No jog button is held any more.
+    pub fn release_jog(&self) {
+        self.desk.release(self.now_s());
+    }
+
+    fn begin(&self, task: MotionTask) -> Result<(), Busy> {
+        if self.motion.is_none() {
+            return Err(Busy);
+        }
+        self.desk.ask(task, self.stop.is_pressed());
+        self.wake_motion();
+        Ok(())
+    }
+
+    /// A worker that is too busy to be woken looks at the desk by itself.
+    fn wake_motion(&self) {
+        let woken = ask(self.motion.as_ref(), Request::Do(MotionLook));
+        tracing::trace!(?woken, "the motion worker was told to look");
+    }
+
+    fn now_s(&self) -> f64 {
+        (self.clock)()
+    }
+
+    /// Has every worker try to connect now.
+    ///
+    /// # Errors
+    /// [`Busy`] when one does not take requests.
+    pub fn reconnect(&self) -> Result<(), Busy> {
+        let control = self.ask_control(Request::Reconnect);
+        let camera = self.ask_camera(Request::Reconnect);
+        control.and(camera).and(ask(self.motion.as_ref(), Request::Reconnect))
     }
 
     /// Asks the control worker for something.
@@ -182,17 +268,7 @@ impl Workers {
     }
 
     /// stub
-    pub fn reconnect(&self) -> Result<(), Busy> { self.ask_control(Request::Reconnect).and(self.ask_camera(Request::Reconnect)) }
-    /// stub
     pub fn ask_vision(&self, _t: VisionTask) -> Result<(), Busy> { Ok(()) }
-    /// stub
-    pub fn move_to(&self, _r: crate::model::MotionRequest) -> Result<(), Busy> { Ok(()) }
-    /// stub
-    pub fn jog_step(&self, _id: crate::model::MotionId, _j: crate::model::Jog, _s: [f64; 2], _v: f64, _c: Option<handeye_core::frames::Pose<handeye_core::frames::Tip, handeye_core::frames::Camera>>) -> Result<(), Busy> { Ok(()) }
-    /// stub
-    pub fn hold_jog(&self, _j: crate::model::Jog, _v: f64, _c: Option<handeye_core::frames::Pose<handeye_core::frames::Tip, handeye_core::frames::Camera>>) {}
-    /// stub
-    pub fn release_jog(&self) {}
 
     /// Asks the camera worker for something.
     ///
@@ -208,6 +284,7 @@ impl Workers {
         self.shutdown.cancel();
         self.control = None;
         self.camera = None;
+        self.motion = None;
         self.events = None;
         let end = Instant::now() + deadline;
         let mut left_alone = 0;
