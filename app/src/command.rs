@@ -3,12 +3,15 @@
 use std::panic::Location;
 use std::sync::Arc;
 
+use handeye_core::dataset::CameraInput;
+use handeye_core::handeye::Mode;
+use handeye_core::target::TargetSpec;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{
-    CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, DepthScale, FrameImages, FrameInfo,
-    ImagePoint, Jog, JogSettings, Link, LinkState, LiveDetection, MotionGoal, MotionId, MotionOutcome, RobotState,
-    RotationFormat, Severity, ThemeChoice,
+    CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, DepthScale, Dialog,
+    FrameImages, FrameInfo, ImagePoint, Jog, JogSettings, Link, LinkState, LiveDetection, MotionGoal, MotionId,
+    MotionOutcome, Pane, RobotState, RotationFormat, Severity, Step, ThemeChoice,
 };
 use crate::text::{Language, Text};
 
@@ -52,6 +55,34 @@ pub enum Command {
     CancelCapture,
     /// How captures are taken.
     SetCaptureOptions(CaptureOptions),
+    /// Work with this cell, and no longer with the one before.
+    Connect(CellSource),
+    /// What is looked at.
+    SetTarget(TargetSpec),
+    /// Where the camera sits.
+    SetMode(Mode),
+    /// What is known of the camera beforehand.
+    SetCamera(Option<CameraInput>),
+    /// Take the last change of the session back.
+    Undo,
+    /// Make it again.
+    Redo,
+    /// Take the selected captures out of the session.
+    DeleteSelected,
+    /// Calibrate from the captures at hand.
+    Solve,
+    /// Put a message aside.
+    DismissMessage(u64),
+    /// Bring the panes of a step to the front.
+    GoToStep(Step),
+    /// Bring a pane to the front.
+    ShowPane(Pane),
+    /// Put every pane where it was at first.
+    ResetLayout,
+    /// Open a window over the window.
+    OpenDialog(Dialog),
+    /// Close it.
+    CloseDialog,
 }
 
 /// What happened outside the thread of the window.

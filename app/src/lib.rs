@@ -7,6 +7,7 @@ pub mod gui;
 pub mod model;
 pub mod observe;
 pub mod parallel;
+pub mod settings;
 pub mod text;
 pub mod truth;
 pub mod worker;

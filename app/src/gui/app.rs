@@ -4,7 +4,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::command::{Command, Event, Outbox};
-use crate::model::{CellSource, Link, LinkState, LiveFrame, Message, Model, Severity, ViewSettings};
+use crate::model::{CellSource, Link, LinkState, LiveFrame, Model, Severity, ViewSettings};
 use crate::text;
 use crate::text::Text;
 use crate::worker::{Busy, CameraTask, Clock, Connector, ControlTask, Request, Waker, Workers};
@@ -83,6 +83,10 @@ impl App {
             }
             Command::PointAt(point) => self.model.cursor = point,
             Command::SetLanguage(language) => self.model.view.language = language,
+            Command::SetTarget(target) => self.model.setup.target = target,
+            Command::SetMode(mode) => self.model.setup.mode = mode,
+            Command::SetCamera(camera) => self.model.setup.camera = camera,
+            Command::DismissMessage(number) => self.model.messages.dismiss(number),
             _ => {}
         }
     }
@@ -163,7 +167,7 @@ impl App {
 
     /// Shows a message from the window itself.
     fn say(&mut self, severity: Severity, text: Text) {
-        self.model.message = Some(Message { severity, text, at_s: self.model.now_s });
+        self.model.messages.say(severity, text, self.model.now_s);
     }
 }
 

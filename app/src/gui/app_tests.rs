@@ -13,7 +13,7 @@ fn app(cell: &FakeCell) -> App {
 }
 
 fn message(app: &App) -> String {
-    app.model().message.as_ref().map_or_else(String::new, |message| message.text.say(Language::English))
+    app.model().messages.newest().map_or_else(String::new, |message| message.text.say(Language::English))
 }
 
 #[test]

@@ -4,7 +4,9 @@
 //! on the clock that the application was started with.
 
 mod capture;
+mod messages;
 mod motion;
+mod workflow;
 
 use std::fmt;
 use std::sync::Arc;
@@ -18,12 +20,14 @@ use serde::{Deserialize, Serialize};
 pub use capture::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
+pub use messages::{Message, Messages};
 pub use motion::{
     Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
 };
+pub use workflow::{Dialog, Pane, Setup, Step};
 
-use crate::text::{Language, Text};
+use crate::text::Language;
 
 /// How depths are coloured, in pictures and in the bar that explains them.
 pub const DEPTH_COLOURS: ColourMap = ColourMap::Turbo;
@@ -261,8 +265,8 @@ pub struct ViewSettings {
     pub depth_scale: DepthScale,
 }
 
-/// How much a message matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// How much a message matters, least first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Severity {
     /// It went as asked.
     Info,
@@ -270,17 +274,6 @@ pub enum Severity {
     Warning,
     /// It failed.
     Error,
-}
-
-/// The last thing that happened, in words.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Message {
-    /// How much it matters.
-    pub severity: Severity,
-    /// The words.
-    pub text: Text,
-    /// When it happened.
-    pub at_s: f64,
 }
 
 /// Everything that the window shows.
@@ -312,8 +305,12 @@ pub struct Model {
     pub cursor: Option<ImagePoint>,
     /// What is remembered from one start to the next.
     pub view: ViewSettings,
-    /// The last thing that happened.
-    pub message: Option<Message>,
+    /// What happened, in words.
+    pub messages: Messages,
+    /// What is calibrated with what.
+    pub setup: Setup,
+    /// Addresses that were connected to before, newest first.
+    pub addresses: Vec<String>,
 }
 
 impl Model {
@@ -334,7 +331,9 @@ impl Model {
             stop_pending: false,
             cursor: None,
             view,
-            message: None,
+            messages: Messages::default(),
+            setup: Setup::default(),
+            addresses: Vec::new(),
         }
     }
 
