@@ -10,6 +10,7 @@ pub mod model;
 pub mod observe;
 pub mod parallel;
 pub mod session_start;
+pub mod settings;
 pub mod text;
 pub mod truth;
 pub mod worker;

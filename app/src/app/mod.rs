@@ -57,7 +57,6 @@ pub struct App {
 struct Numbers {
     capture: u64,
     job: JobId,
-    message: u64,
     motion: MotionId,
 }
 
@@ -124,7 +123,9 @@ impl App {
             Command::Pick(pixel) => self.pick(pixel),
             Command::GoToStep(step) => self.model.step = step,
             Command::SetDialog(dialog) => self.set_dialog(dialog),
-            Command::DismissMessage(id) => self.dismiss(id),
+            Command::DismissMessage(number) => self.model.messages.dismiss(number),
+            // Where panes are is the window's business.
+            Command::ShowPane(_) | Command::ResetLayout => {}
 
             Command::Move { goal, what } => self.start_motion(goal, what),
             Command::Jog(jog) => self.jog(jog),

@@ -3,16 +3,27 @@
 //! Data flows in one direction: workers report events, [`App`] changes the model, panes draw the model and return
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
+mod actions;
+mod fonts;
+mod help;
+mod icons;
+mod layout;
 mod numbers;
+mod palette;
 mod panes;
+mod rail;
 #[cfg(test)]
 mod sample;
+mod session;
 mod status;
+mod steps;
+#[cfg(test)]
+mod testing;
 mod textures;
 mod theme;
+mod toasts;
 mod window;
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,10 +34,12 @@ use egui::ViewportBuilder;
 use crate::cli::GuiArgs;
 use crate::app::{App, Connect, Start};
 use crate::model::CellSource;
+use crate::settings::{self, SettingsFile};
 use crate::worker::{Clock, LiveConnector, Waker};
-use window::Window;
+pub use layout::Layout;
+pub use window::Window;
 
-/// Name under which the system keeps the window's settings.
+/// Name under which the system keeps layout and size of the window.
 const APP_ID: &str = "handeye-workbench";
 
 /// Opens the window and returns when it is closed.
@@ -34,7 +47,9 @@ const APP_ID: &str = "handeye-workbench";
 /// # Errors
 /// When no window can be opened, most likely because there is no screen.
 pub fn run(args: GuiArgs) -> anyhow::Result<()> {
-    let source = args.connect.map_or(CellSource::BuiltIn, CellSource::Address);
+    let variable = |name: &str| std::env::var(name).ok();
+    let (file, settings, warnings) = SettingsFile::open(settings::default_path(variable), variable);
+    let source = args.connect.map_or_else(|| settings.source(), CellSource::Address);
     let options = NativeOptions {
         viewport: ViewportBuilder::default()
             .with_app_id(APP_ID)
@@ -49,12 +64,22 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
         let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
-        let view = window::stored_settings(creation.storage);
-        let start = Start { source, view, sessions: PathBuf::from("sessions"), open: args.session };
-        let app = App::start(start, connect, clock, waker)?;
-        Ok(Box::new(Window::new(app, &creation.egui_ctx)) as Box<dyn eframe::App>)
+        let start = Start { source, view: settings.view, sessions: settings.sessions_folder(variable), open: args.session };
+        let mut app = App::start(start, connect, clock, waker)?;
+        for warning in warnings {
+            app.absorb(warning.into());
+        }
+        let layout = stored_layout(creation.storage);
+        Ok(Box::new(Window::new(app, layout, file, &creation.egui_ctx)) as Box<dyn eframe::App>)
     };
     eframe::run_native(APP_ID, options, Box::new(open)).map_err(|error| {
         anyhow!("cannot open a window: {error}; without a screen use the subcommands, see `handeye --help`")
     })
+}
+
+/// The layout of the last time; the first one when there is none that can be read.
+fn stored_layout(storage: Option<&dyn eframe::Storage>) -> Layout {
+    storage
+        .and_then(|storage| eframe::get_value::<Layout>(storage, layout::STORAGE_KEY))
+        .map_or_else(Layout::default, Layout::brought_up_to_date)
 }

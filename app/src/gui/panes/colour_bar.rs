@@ -4,6 +4,8 @@ use egui::{Align2, Color32, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, Wi
 
 use super::pictures::small_text;
 use crate::gui::theme::{self, Palette};
+use crate::text;
+use crate::text::Language;
 use handeye_core::depth::ColourMap;
 
 /// Height of the colours.
@@ -14,12 +16,14 @@ const STEPS: usize = 64;
 const TICKS: usize = 5;
 
 /// The bar with its depths in metres, and a mark at the depth under the pointer.
-pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>) {
+pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>, language: Language) {
     let palette = Palette::of(ui);
     let [near_m, far_m] = range_m;
     let (area, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     response.widget_info(|| {
-        WidgetInfo::labeled(WidgetType::Image, true, format!("Depth colours from {near_m:.2} m to {far_m:.2} m"))
+        let (near, far) = (format!("{near_m:.2}"), format!("{far_m:.2}"));
+        let label = text!("Depth colours from {near} m to {far} m", near = near, far = far).say(language);
+        WidgetInfo::labeled(WidgetType::Image, true, label)
     });
     let bar = Rect::from_min_size(area.min + Vec2::new(0.0, 9.0), Vec2::new(area.width(), HEIGHT));
     ui.painter().add(gradient(bar));

@@ -1,4 +1,4 @@
-//! The live pictures: colour and depth side by side, with the same pixel marked in both.
+//! The live pictures, colour and depth, with the same pixel marked in both.
 
 use egui::{
     Align, Align2, CornerRadius, FontId, Image, Layout, Pos2, Rect, Response, RichText, Sense, Stroke, TextureHandle,
@@ -7,80 +7,91 @@ use egui::{
 
 use handeye_core::depth::DepthSample;
 
-use super::colour_bar;
+use super::{colour_bar, empty};
 use crate::command::{Command, Outbox};
-use crate::gui::status::STALE_AFTER_S;
+use crate::gui::status::{self, STALE_AFTER_S};
 use crate::gui::textures::LiveTextures;
-use crate::gui::theme::{self, CARD_RADIUS, GAP, Palette};
+use crate::gui::theme::{self, Palette};
 use crate::model::{DepthScale, ImagePoint, LiveFrame, Model};
+use crate::text::Language;
+use crate::{text, tr};
 
 /// Height of the line over a picture.
-const HEADER: f32 = 36.0;
+const HEADER: f32 = 32.0;
 /// Height of the line under a picture.
 const FOOTER: f32 = 46.0;
 /// Distance of text to the edge of a card.
 const INSET: f32 = 12.0;
 
-/// Both pictures, as large as there is room.
-pub fn pictures_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) {
-    let Some(frame) = &model.frame else { return };
-    let area = ui.available_rect_before_wrap();
-    let width = ((area.width() - GAP) / 2.0).max(1.0);
-    let left = Rect::from_min_size(area.min, Vec2::new(width, area.height()));
-    let right = left.translate(Vec2::new(width + GAP, 0.0));
-    ui.advance_cursor_after_rect(area);
-    let picture = |texture, name| Picture { texture, name, model, frame };
-
-    let colour = picture(textures.rgb.as_ref(), "Colour picture");
-    let over_colour = card_ui(
+/// The colour picture; gives the pixel under the pointer.
+pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
+    let language = model.view.language;
+    let Some(frame) = &model.frame else {
+        empty::status_ui(ui, &status::before_first_picture(model), language, outbox);
+        return None;
+    };
+    let picture = Picture {
+        texture: textures.rgb.as_ref(),
+        name: tr!(language, "Colour picture"),
+        model,
+        frame,
+    };
+    card_ui(
         ui,
-        left,
         |ui| {
             let (width, height) = frame.images.rgb.dimensions();
-            title_ui(ui, "RGB", &format!("{width} × {height}"));
+            size_ui(ui, width, height);
         },
-        |ui| colour.picture_ui(ui),
+        |ui| picture.picture_ui(ui),
         |ui| pixel_ui(ui, model, frame),
-    );
-    let depth = picture(textures.depth.as_ref(), "Depth picture");
-    let over_depth = card_ui(
+    )
+}
+
+/// The depth picture; gives the pixel of the colour picture under the pointer.
+pub fn depth_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
+    let language = model.view.language;
+    let Some(frame) = &model.frame else {
+        let detail = tr!(language, "It comes with the colour picture, if the camera measures depth.");
+        empty::empty_ui(ui, tr!(language, "No depth picture yet"), detail);
+        return None;
+    };
+    let picture = Picture {
+        texture: textures.depth.as_ref(),
+        name: tr!(language, "Depth picture"),
+        model,
+        frame,
+    };
+    card_ui(
         ui,
-        right,
         |ui| {
-            let (width, height) = (frame.images.depth.width, frame.images.depth.height);
-            title_ui(ui, "Depth", &format!("{width} × {height}"));
-            scale_ui(ui, model.view.depth_scale, outbox);
+            size_ui(ui, frame.images.depth.width, frame.images.depth.height);
+            scale_ui(ui, model.view.depth_scale, language, outbox);
         },
-        |ui| depth.picture_ui(ui),
+        |ui| picture.picture_ui(ui),
         |ui| {
             let at_cursor = model.cursor.map(|point| frame.images.depth_at(point, frame.info.far_plane_m));
             let depth_m = match at_cursor {
                 Some(DepthSample::Metres(depth_m)) => Some(depth_m),
                 _ => None,
             };
-            colour_bar::colour_bar_ui(ui, frame.info.depth_range_m, depth_m);
+            colour_bar::colour_bar_ui(ui, frame.info.depth_range_m, depth_m, language);
         },
-    );
-    let pointed = over_colour.or(over_depth);
-    if pointed != model.cursor {
-        outbox.send(Command::PointAt(pointed));
-    }
+    )
 }
 
-/// A card with a line at the top, a picture, and a line at the bottom. Gives what the picture gives.
+/// A line at the top, a picture, and a line at the bottom. Gives what the picture gives.
 fn card_ui<R>(
     ui: &mut Ui,
-    rect: Rect,
     header_ui: impl FnOnce(&mut Ui),
     picture_ui: impl FnOnce(&mut Ui) -> R,
     footer_ui: impl FnOnce(&mut Ui),
 ) -> R {
     let palette = Palette::of(ui);
-    let radius = CornerRadius::same(CARD_RADIUS);
-    ui.painter().rect(rect, radius, palette.card, Stroke::new(1.0, palette.edge), egui::StrokeKind::Inside);
+    let rect = ui.available_rect_before_wrap();
+    ui.advance_cursor_after_rect(rect);
     let header = Rect::from_min_max(rect.min, Pos2::new(rect.max.x, rect.min.y + HEADER));
     let footer = Rect::from_min_max(Pos2::new(rect.min.x, rect.max.y - FOOTER), rect.max);
-    let well = Rect::from_min_max(header.left_bottom(), footer.right_top()).shrink2(Vec2::new(1.0, 0.0));
+    let well = Rect::from_min_max(header.left_bottom(), footer.right_top());
     ui.painter().rect_filled(well, CornerRadius::ZERO, palette.well);
     let row = |rect: Rect| {
         UiBuilder::new().max_rect(rect.shrink2(Vec2::new(INSET, 0.0))).layout(Layout::left_to_right(Align::Center))
@@ -91,10 +102,9 @@ fn card_ui<R>(
     result
 }
 
-fn title_ui(ui: &mut Ui, title: &str, size: &str) {
-    let palette = Palette::of(ui);
-    ui.label(RichText::new(title).strong().size(15.0));
-    ui.label(RichText::new(size).color(palette.weak));
+fn size_ui(ui: &mut Ui, width: u32, height: u32) {
+    let weak = Palette::of(ui).weak;
+    ui.label(RichText::new(format!("{width} × {height} px")).color(weak));
 }
 
 /// One picture with the marked pixel.
@@ -157,9 +167,11 @@ fn mark(ui: &Ui, rect: Rect, at_px: Vec2, columns: u32, rows: u32) {
 /// The pixel under the pointer in numbers.
 fn pixel_ui(ui: &mut Ui, model: &Model, frame: &LiveFrame) {
     let palette = Palette::of(ui);
+    let language = model.view.language;
     let found = model.cursor.and_then(|point| Some((point, frame.images.rgb_at(point)?)));
     let Some((point, [red, green, blue])) = found else {
-        ui.label(RichText::new("Point at a picture to read a pixel").color(palette.weak));
+        let hint = tr!(model.view.language, "Point at a picture to read a pixel");
+        ui.label(RichText::new(hint).color(palette.weak));
         return;
     };
     let (swatch, _) = ui.allocate_exact_size(Vec2::splat(18.0), Sense::hover());
@@ -170,13 +182,13 @@ fn pixel_ui(ui: &mut Ui, model: &Model, frame: &LiveFrame) {
     let far_plane_m = frame.info.far_plane_m;
     let depth = match frame.images.depth_at(point, far_plane_m) {
         DepthSample::Metres(depth_m) => format!("{depth_m:.3} m"),
-        DepthSample::Far => format!("over {far_plane_m:.2} m"),
-        DepthSample::Invalid => "none".to_owned(),
+        DepthSample::Far => text!("over {depth} m", depth = format!("{far_plane_m:.2}")).say(language),
+        DepthSample::Invalid => tr!(language, "none").to_owned(),
     };
     for (caption, value) in [
-        ("Pixel", format!("{column:>3}, {row:>3}")),
+        (tr!(language, "Pixel"), format!("{column:>3}, {row:>3}")),
         ("RGB", format!("{red:>3} {green:>3} {blue:>3}")),
-        ("Depth", depth),
+        (tr!(language, "Depth"), depth),
     ] {
         ui.label(RichText::new(caption).color(palette.weak));
         let label = ui.label(RichText::new(&value).monospace());
@@ -189,12 +201,20 @@ fn pixel_ui(ui: &mut Ui, model: &Model, frame: &LiveFrame) {
 }
 
 /// Which depths the colours cover.
-fn scale_ui(ui: &mut Ui, scale: DepthScale, outbox: &mut Outbox) {
+fn scale_ui(ui: &mut Ui, scale: DepthScale, language: Language, outbox: &mut Outbox) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         for (choice, name, what) in [
-            (DepthScale::Full, "Full range", "Colours for all depths that the sensor can measure"),
-            (DepthScale::Auto, "Auto range", "Colours for the depths that are in the picture"),
+            (
+                DepthScale::Full,
+                tr!(language, "Full range"),
+                tr!(language, "Colours for all depths [m] that the sensor can measure"),
+            ),
+            (
+                DepthScale::Auto,
+                tr!(language, "Auto range"),
+                tr!(language, "Colours for the depths [m] that are in the picture"),
+            ),
         ] {
             if ui.selectable_label(scale == choice, name).on_hover_text(what).clicked() && scale != choice {
                 outbox.send(Command::SetDepthScale(choice));

@@ -1,0 +1,110 @@
+//! Dialogs that explain: the keys, and what this program is.
+
+use egui::{Context, CornerRadius, Frame, Grid, Id, Label, Margin, Modal, RichText, ScrollArea, Stroke, Ui};
+
+use super::actions::{self, Group};
+use super::theme::{self, Palette, TITLE};
+use crate::command::{Command, Outbox};
+use crate::model::{Dialog, Model};
+use crate::tr;
+
+/// The dialog that is open, unless another part of the window draws it.
+pub fn dialog_ui(ctx: &Context, dialog: Dialog, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let content_ui = |ui: &mut Ui| match dialog {
+        Dialog::Palette | Dialog::ImportPoses | Dialog::ExportPoses | Dialog::ExportFolder => {}
+        Dialog::Help => keys_ui(ui, model),
+        Dialog::About => about_ui(ui, model),
+        Dialog::New | Dialog::Open | Dialog::SaveAs => sessions_ui(ui, model),
+    };
+    let closed = Modal::new(Id::new("dialog")).show(ctx, |ui| {
+        ui.set_max_width(560.0);
+        content_ui(ui);
+        ui.add_space(14.0);
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.button(tr!(language, "Close")).clicked()
+        })
+        .inner
+    });
+    if closed.inner || closed.should_close() {
+        outbox.send(Command::SetDialog(None));
+    }
+}
+
+fn keys_ui(ui: &mut Ui, model: &Model) {
+    let language = model.view.language;
+    let palette = Palette::of(ui);
+    ui.label(theme::title(tr!(language, "Keyboard"), TITLE));
+    let note = tr!(
+        language,
+        "Esc stops the arm at any time, also while you type or a dialog is open. All other keys rest while you type."
+    );
+    ui.add(Label::new(RichText::new(note).color(palette.weak)).wrap());
+    ui.add_space(8.0);
+    let all = actions::all(model, language);
+    let height = (ui.ctx().content_rect().height() - 260.0).max(120.0);
+    ScrollArea::vertical().max_height(height).show(ui, |ui| {
+        for group in Group::ALL {
+            let rows: Vec<_> = all.iter().filter(|action| action.group == group && !action.keys.is_empty()).collect();
+            if rows.is_empty() {
+                continue;
+            }
+            ui.add_space(6.0);
+            ui.label(RichText::new(group.name(language)).color(palette.weak).small());
+            Grid::new(("keys", group.name(language))).num_columns(2).min_col_width(250.0).spacing([16.0, 4.0]).show(
+                ui,
+                |ui| {
+                    for action in rows {
+                        ui.label(action.name);
+                        ui.horizontal(|ui| {
+                            ui.spacing_mut().item_spacing.x = 4.0;
+                            for keys in actions::keys_text(ui.ctx(), action) {
+                                key_ui(ui, &keys);
+                            }
+                        });
+                        ui.end_row();
+                    }
+                },
+            );
+        }
+    });
+}
+
+/// Keys as they look.
+pub fn key_ui(ui: &mut Ui, keys: &str) {
+    let palette = Palette::of(ui);
+    Frame::new()
+        .fill(palette.raised())
+        .stroke(Stroke::new(1.0, palette.edge))
+        .corner_radius(CornerRadius::same(4))
+        .inner_margin(Margin::symmetric(6, 1))
+        .show(ui, |ui| ui.label(RichText::new(keys).small().color(palette.text)));
+}
+
+fn about_ui(ui: &mut Ui, model: &Model) {
+    let language = model.view.language;
+    let palette = Palette::of(ui);
+    ui.label(theme::title("Handeye Workbench", TITLE));
+    ui.label(RichText::new(concat!("handeye ", env!("CARGO_PKG_VERSION"))).color(palette.weak));
+    ui.add_space(10.0);
+    for paragraph in [
+        tr!(
+            language,
+            "Calibrates where a camera sits on a robot, or beside it, and says how good the answer is in millimetres."
+        ),
+        tr!(
+            language,
+            "Fonts: Inter and Noto Sans SC, under the SIL Open Font License 1.1. The program is under MIT or Apache 2.0."
+        ),
+        tr!(language, "STOP is no substitute for the emergency stop of the robot."),
+    ] {
+        ui.add(Label::new(paragraph).wrap());
+        ui.add_space(4.0);
+    }
+}
+
+fn sessions_ui(ui: &mut Ui, model: &Model) {
+    let language = model.view.language;
+    ui.label(theme::title(tr!(language, "Session"), TITLE));
+    ui.label(tr!(language, "Sessions cannot be opened from the window yet. Use the command line: handeye calibrate FOLDER"));
+}
