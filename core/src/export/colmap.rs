@@ -42,21 +42,23 @@ fn camera_poses<'a>(input: &ExportInput<'a>) -> Result<Vec<CameraPose<'a>>, Expo
 
 fn images_text(poses: &[CameraPose<'_>], input: &ExportInput<'_>) -> String {
     let names = input.names;
-    let mut text = format!(
+    let about = format!(
         "# T_{0}_{1}: a point p in {1} is T * p in {0}; the world is {1}. Metres; quaternion w x y z, no Euler angles. {2}\n\
          # IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of points that is empty\n",
         names.camera_frame,
         names.base_frame,
         made_by(input.result),
     );
-    for (index, pose) in poses.iter().enumerate() {
+    let image = |(index, pose): (usize, &CameraPose<'_>)| {
         let camera_from_base = pose.base_from_camera.inverse();
         let [x, y, z, w] = camera_from_base.xyzw();
         let [tx, ty, tz]: [f64; 3] = camera_from_base.translation().into();
+        // Adding zero turns −0 into 0.
         let numbers = [w, x, y, z, tx, ty, tz].map(|v| v + 0.0);
-        text.push_str(&format!("{} {} 1 {}\n\n", index + 1, spaced(&numbers), pose.name));
-    }
-    text
+        format!("{} {} 1 {}\n\n", index + 1, spaced(&numbers), pose.name)
+    };
+    let images: Vec<String> = poses.iter().enumerate().map(image).collect();
+    about + &images.concat()
 }
 
 /// Lines that are neither comments nor empty.

@@ -1,10 +1,8 @@
 //! One calibration in every format, against numbers of an independent program, which are given to nine digits.
 
-use super::tests::{eye_to_hand_input_names, file_of, golden_views, with_lens};
+use super::tests::{file_of, golden_views};
 use super::*;
-use crate::camera::Distortion;
-use crate::result::CalibrationResult;
-use crate::result::tests::{GOLDEN_TRANSLATION_M, GOLDEN_XYZW, eye_to_hand, golden};
+use crate::result::tests::{GOLDEN_TRANSLATION_M, GOLDEN_XYZW, golden};
 
 /// What nine digits leave, for numbers up to about 1.
 const NINE_DIGITS: f64 = 5e-9;
@@ -391,96 +389,4 @@ fn nerfstudio_has_the_camera_in_the_base_with_opengl_axes() {
 }
 "#;
     same_as_example(&text, example);
-}
-
-#[test]
-fn eye_to_hand_is_seen_from_the_base_and_the_quaternion_turns_to_positive_w() {
-    let mut result = eye_to_hand();
-    let hand_eye = result.hand_eye.as_mut().expect("a hand-eye");
-    hand_eye.rotation_xyzw = hand_eye.rotation_xyzw.map(|v| -v);
-    assert!(hand_eye.rotation_xyzw[3] < 0.0);
-    for (format, name) in eye_to_hand_input_names() {
-        let text = file_of(format, name, &result, &ExportNames::default(), &[]).text;
-        if format != "ethz" {
-            assert!(text.contains("T_base_link_camera_color_optical_frame: "), "{text}");
-            assert!(!text.contains("T_tool0_camera"), "{text}");
-        }
-    }
-    let text = |format, name| file_of(format, name, &result, &ExportNames::default(), &[]).text;
-    let easy = text("easy_handeye2", "my_cell.calib");
-    assert!(easy.contains("calibration_type: eye_on_base"));
-    assert!(easy.ends_with("    x: -0.5\n    y: 0.5\n    z: -0.5\n    w: 0.5\n"), "{easy}");
-    assert!(text("easy_handeye", "my_cell_eye_on_base.yaml").contains("eye_on_hand: false\n"));
-    assert!(text("urdf", "my_cell.urdf").contains("<parent link=\"base_link\"/>"));
-    assert!(text("industrial_calibration", "industrial_calibration.yaml").contains("# T_tool0_board likewise"));
-    assert!(text("opencv_yaml", "opencv.yaml").contains("T_base_link_camera_color_optical_frame: !!opencv-matrix"));
-}
-
-#[test]
-fn every_lens_keeps_its_coefficients_under_the_name_of_the_reader_or_is_refused() {
-    let brown = Distortion::BrownConrady([1., 2., 3., 4., 5.]);
-    let rational = Distortion::Rational([1., 2., 3., 4., 5., 6., 7., 8.]);
-    let fisheye = Distortion::Fisheye([1., 2., 3., 4.]);
-    let without_k3 = Distortion::BrownConrady([1., 2., 3., 4., 0.]);
-    let none = Distortion::None;
-    // Format, file, lens, and words of the file or `None` where the lens is refused.
-    let cases: &[(&str, &str, Distortion, Option<&str>)] = &[
-        ("ros_camera_info", "camera_info.yaml", none, Some("plumb_bob\n")),
-        ("ros_camera_info", "camera_info.yaml", brown, Some("data: [1.0, 2.0, 3.0, 4.0, 5.0]")),
-        ("ros_camera_info", "camera_info.yaml", rational, Some("distortion_model: rational_polynomial\n")),
-        ("ros_camera_info", "camera_info.yaml", fisheye, Some("distortion_model: equidistant\n")),
-        ("opencv_yaml", "opencv.yaml", rational, Some("distortion_model: rational\n")),
-        ("opencv_yaml", "opencv.yaml", fisheye, Some("data: [ 1.0, 2.0, 3.0, 4.0 ]")),
-        ("kalibr", "camchain.yaml", none, Some("distortion_coeffs: []\n  distortion_model: none\n")),
-        ("kalibr", "camchain.yaml", without_k3, Some("[1.0, 2.0, 3.0, 4.0]\n  distortion_model: radtan\n")),
-        ("kalibr", "camchain.yaml", brown, None),
-        ("kalibr", "camchain.yaml", rational, None),
-        ("kalibr", "camchain.yaml", fisheye, Some("[1.0, 2.0, 3.0, 4.0]\n  distortion_model: equidistant\n")),
-        (
-            "mrcal",
-            "camera.cameramodel",
-            none,
-            Some("'LENSMODEL_PINHOLE',\n    'intrinsics': [ 912.4, 911.8, 640.7, 361.2,],"),
-        ),
-        ("mrcal", "camera.cameramodel", brown, Some("361.2, 1.0, 2.0, 3.0, 4.0, 5.0,],")),
-        ("mrcal", "camera.cameramodel", rational, Some("'LENSMODEL_OPENCV8'")),
-        ("mrcal", "camera.cameramodel", fisheye, None),
-        ("visp", "camera.xml", none, Some("<type>perspectiveProjWithoutDistortion</type>")),
-        ("visp", "eMc.yaml", brown, Some("no camera.xml: ViSP's lens models cannot hold this distortion")),
-        ("matlab", "handeye_calibration.m", none, Some("radialDistortion = [0.0, 0.0, 0.0];")),
-        ("matlab", "handeye_calibration.m", brown, Some("[1.0, 2.0, 5.0];\ntangentialDistortion = [3.0, 4.0];")),
-        ("matlab", "handeye_calibration.m", rational, None),
-        ("matlab", "handeye_calibration.m", fisheye, None),
-        ("colmap", "cameras.txt", none, Some("1 PINHOLE 1280 720 912.4 911.8 641.2 361.7\n")),
-        ("colmap", "cameras.txt", without_k3, Some("1 OPENCV 1280 720 912.4 911.8 641.2 361.7 1.0 2.0 3.0 4.0\n")),
-        (
-            "colmap",
-            "cameras.txt",
-            brown,
-            Some("1 FULL_OPENCV 1280 720 912.4 911.8 641.2 361.7 1.0 2.0 3.0 4.0 5.0 0.0 0.0 0.0\n"),
-        ),
-        ("colmap", "cameras.txt", rational, Some(" 1.0 2.0 3.0 4.0 5.0 6.0 7.0 8.0\n")),
-        ("colmap", "cameras.txt", fisheye, Some("1 OPENCV_FISHEYE 1280 720 912.4 911.8 641.2 361.7 1.0 2.0 3.0 4.0\n")),
-        ("nerfstudio", "transforms.json", none, Some("\"camera_model\": \"PINHOLE\"")),
-        ("nerfstudio", "transforms.json", brown, Some("\"k3\": 5.0,")),
-        ("nerfstudio", "transforms.json", rational, None),
-        ("nerfstudio", "transforms.json", fisheye, Some("\"camera_model\": \"OPENCV_FISHEYE\"")),
-    ];
-    for (format, name, lens, words) in cases {
-        let result: CalibrationResult = with_lens(*lens);
-        let (names, views) = (ExportNames::default(), golden_views());
-        let input = ExportInput { views: &views, ..ExportInput::new(&result, &names) };
-        match (preview(by_name(format).expect("known"), &input), words) {
-            (Ok(files), Some(words)) => {
-                let file = files.iter().find(|file| file.name == *name).expect("a file of that name");
-                assert!(file.text.contains(words), "{format} {words:?}: {}", file.text);
-            }
-            (Err(error @ ExportError::NeedsModel { .. }), None) => {
-                let text = error.to_string();
-                assert!(text.contains(lens.name()) && text.contains("model = "), "{text}");
-                assert!(error.is_bad_input());
-            }
-            (other, _) => panic!("{format} with {}: {other:?}", lens.name()),
-        }
-    }
 }

@@ -58,7 +58,7 @@ impl Format for IndustrialCalibration {
         let [target, camera] = transforms(input)?;
         let cost = final_cost(input);
         let cost = if cost.is_nan() { ".nan".to_owned() } else { number(cost) };
-        let mut text = format!(
+        let about = format!(
             "# {}\n# T_{}_{} likewise. Costs are half the mean square residual of a pixel coordinate; \
              .nan is one that is not known.\nconverged: true\ninitial_cost_per_obs: .nan\nfinal_cost_per_obs: {cost}\n",
             about_transform(&camera.1, "Metres", Rotation::QuaternionAndRpy, input.result),
@@ -66,15 +66,10 @@ impl Format for IndustrialCalibration {
             target.1.child,
         );
         let both = [&target, &camera];
-        for (key, transform) in both {
-            text.push_str(&format!("{key}:\n{}", entries(2, &TRANSFORM, &seven(transform))));
-        }
-        for (key, transform) in both {
-            text.push_str(&format!("{key}_rpy:\n{}", entries(2, &AXES, &transform.rpy())));
-        }
-        for (key, transform) in both {
-            text.push_str(&format!("{key}_pos:\n{}", entries(2, &AXES, &transform.translation())));
-        }
+        let transforms = both.map(|(key, t)| format!("{key}:\n{}", entries(2, &TRANSFORM, &seven(t))));
+        let angles = both.map(|(key, t)| format!("{key}_rpy:\n{}", entries(2, &AXES, &t.rpy())));
+        let positions = both.map(|(key, t)| format!("{key}_pos:\n{}", entries(2, &AXES, &t.translation())));
+        let text = [about, transforms.concat(), angles.concat(), positions.concat()].concat();
         Ok(vec![ExportFile::new("industrial_calibration.yaml", text)])
     }
 

@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::{ExportError, ExportNames, rotation};
 use crate::camera::Intrinsics;
 use crate::frames::{Base, Camera, Mount, Pose, Tip};
-use crate::handeye::{HandEye, Mode};
+use crate::handeye::Mode;
 use crate::result::{CalibrationResult, IntrinsicsEstimate};
 
 /// What is exported.
@@ -64,17 +64,11 @@ impl<'a> ExportInput<'a> {
 
     /// The optical frame of every view in the base.
     pub(super) fn camera_poses(&self, format: &'static str) -> Result<Vec<CameraPose<'a>>, ExportError> {
-        let tip_from_camera = match self.result.links() {
-            Some(HandEye::EyeInHand { tip_from_camera, .. }) => tip_from_camera,
-            Some(HandEye::EyeToHand { .. }) => return Err(ExportError::NeedsMovingCamera { format }),
-            None => {
-                let transform = self.optical(format)?;
-                if transform.mode == Mode::EyeToHand {
-                    return Err(ExportError::NeedsMovingCamera { format });
-                }
-                Pose::<Tip, Camera>::from_isometry(transform.isometry)
-            }
-        };
+        let transform = self.optical(format)?;
+        if transform.mode == Mode::EyeToHand {
+            return Err(ExportError::NeedsMovingCamera { format });
+        }
+        let tip_from_camera = Pose::<Tip, Camera>::from_isometry(transform.isometry);
         if self.views.is_empty() {
             return Err(ExportError::NeedsViews { format });
         }

@@ -10,6 +10,9 @@ use crate::camera::{Distortion, Intrinsics};
 
 pub(super) struct Matlab;
 
+/// A variable with its rows of numbers.
+type Variable = (&'static str, Vec<Vec<f64>>);
+
 /// k1 k2 p1 p2 k3.
 fn coefficients(k: &Intrinsics) -> Result<[f64; 5], ExportError> {
     match k.distortion {
@@ -24,8 +27,7 @@ fn coefficients(k: &Intrinsics) -> Result<[f64; 5], ExportError> {
     }
 }
 
-/// The variables of a camera with their rows of numbers.
-fn camera_variables(k: &Intrinsics) -> Result<Vec<(&'static str, Vec<Vec<f64>>)>, ExportError> {
+fn camera_variables(k: &Intrinsics) -> Result<Vec<Variable>, ExportError> {
     let [k1, k2, p1, p2, k3] = coefficients(k)?;
     let matrix = vec![vec![k.fx, 0.0, k.cx + 1.0], vec![0.0, k.fy, k.cy + 1.0], vec![0.0, 0.0, 1.0]];
     Ok(vec![
@@ -36,13 +38,20 @@ fn camera_variables(k: &Intrinsics) -> Result<Vec<(&'static str, Vec<Vec<f64>>)>
     ])
 }
 
-fn transform_variables(transform: &NamedTransform<'_>) -> Vec<(&'static str, Vec<Vec<f64>>)> {
+fn transform_variables(transform: &NamedTransform<'_>) -> Vec<Variable> {
     let rotation = transform.rows().iter().take(3).map(|row| row[..3].to_vec()).collect();
     vec![("R", rotation), ("t", vec![transform.translation().to_vec()])]
 }
 
-fn assignments(variables: &[(&str, Vec<Vec<f64>>)]) -> String {
-    let line = |(name, rows): &(&str, Vec<Vec<f64>>)| {
+fn frames(transform: &NamedTransform<'_>) -> String {
+    format!(
+        "parentFrame = \"{}\";\nchildFrame = \"{}\";\nparentFromChild = rigidtform3d(R, t);\n",
+        transform.parent, transform.child
+    )
+}
+
+fn assignments(variables: &[Variable]) -> String {
+    let line = |(name, rows): &Variable| {
         let rows: Vec<String> = rows.iter().map(|row| numbers(row)).collect();
         format!("{name} = [{}];\n", rows.join("; "))
     };
@@ -94,10 +103,7 @@ impl Format for Matlab {
         }
         if let Ok(transform) = &transform {
             text.push_str(&assignments(&transform_variables(transform)));
-            text.push_str(&format!(
-                "parentFrame = \"{}\";\nchildFrame = \"{}\";\nparentFromChild = rigidtform3d(R, t);\n",
-                transform.parent, transform.child
-            ));
+            text.push_str(&frames(transform));
         }
         Ok(vec![ExportFile::new("handeye_calibration.m", text)])
     }

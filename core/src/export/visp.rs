@@ -32,15 +32,15 @@ fn pose_file(transform: &NamedTransform<'_>) -> &'static str {
 
 fn pose_text(transform: &NamedTransform<'_>, has_camera: bool, input: &ExportInput<'_>) -> String {
     let rotation: [f64; 3] = se3::rotation_vector(&transform.isometry.rotation).into();
-    let rows: String =
-        transform.translation().iter().chain(&rotation).map(|v| format!("  - [{}]\n", number(*v + 0.0))).collect();
+    let values = transform.translation().into_iter().chain(rotation);
+    let rows: Vec<String> = values.map(|v| format!("  - [{}]\n", number(v + 0.0))).collect();
     let about = about_transform(transform, "Metres", Rotation::Vector, input.result);
     let left_out = if has_camera || input.result.intrinsics.is_none() {
         ""
     } else {
         "# There is no camera.xml: ViSP's lens models cannot hold this distortion.\n"
     };
-    format!("# {about}\n{left_out}rows: 6\ncols: 1\ndata:\n{rows}")
+    format!("# {about}\n{left_out}rows: 6\ncols: 1\ndata:\n{}", rows.concat())
 }
 
 /// The camera, when it has no distortion.
@@ -83,22 +83,13 @@ impl Format for Visp {
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
-        let camera = without_distortion(input);
-        let mut files = Vec::new();
-        match (input.optical(self.name()), &camera) {
-            (Ok(transform), _) => {
-                files.push(ExportFile::new(pose_file(&transform), pose_text(&transform, camera.is_ok(), input)));
-            }
-            (Err(_), Ok(_)) => {}
-            (Err(error), Err(ExportError::NeedsIntrinsics { .. })) => return Err(error),
-            (Err(_), Err(_)) => {}
-        }
-        match camera {
-            Ok(k) => files.push(ExportFile::new(CAMERA, camera_text(&k, input))),
-            Err(error) if files.is_empty() => return Err(error),
-            Err(_) => {}
-        }
-        Ok(files)
+        let (transform, camera) = match (input.optical(self.name()), without_distortion(input)) {
+            (Err(error), Err(ExportError::NeedsIntrinsics { .. })) | (Err(_), Err(error)) => return Err(error),
+            (transform, camera) => (transform.ok(), camera.ok()),
+        };
+        let pose = transform.map(|t| ExportFile::new(pose_file(&t), pose_text(&t, camera.is_some(), input)));
+        let camera = camera.map(|k| ExportFile::new(CAMERA, camera_text(&k, input)));
+        Ok(pose.into_iter().chain(camera).collect())
     }
 
     fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {

@@ -26,10 +26,11 @@ impl Format for Zivid {
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
         let transform = input.optical(self.name())?;
-        let rows: String = rows_mm(&transform).iter().map(|row| format!("      [{}],\n", numbers(row))).collect();
+        let rows: Vec<String> = rows_mm(&transform).iter().map(|row| format!("      [{}],\n", numbers(row))).collect();
         let text = format!(
-            "# {}\n__version__:\n  serializer: 1\n  data: 1\nFloatMatrix:\n  Data:\n    [\n{rows}    ]\n",
+            "# {}\n__version__:\n  serializer: 1\n  data: 1\nFloatMatrix:\n  Data:\n    [\n{}    ]\n",
             about_transform(&transform, "Millimetres", Rotation::Matrix, input.result),
+            rows.concat(),
         );
         Ok(vec![ExportFile::new("hand_eye_transform.yaml", text)])
     }
