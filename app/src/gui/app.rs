@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, Link, LinkState, LiveFrame, Model, Severity, ViewSettings};
+use crate::settings::ADDRESSES;
 use crate::text;
 use crate::text::Text;
 use crate::worker::{Busy, CameraTask, Clock, Connector, ControlTask, Request, Waker, Workers};
@@ -32,6 +33,13 @@ impl App {
         Ok(Self { model: Model::new(source, view), workers, clock })
     }
 
+    /// With the addresses that were connected to before.
+    #[must_use]
+    pub fn with_addresses(mut self, addresses: Vec<String>) -> Self {
+        self.model.addresses = addresses;
+        self
+    }
+
     /// What the window shows.
     pub fn model(&self) -> &Model {
         &self.model
@@ -56,10 +64,6 @@ impl App {
     }
 
     /// Does what the user wants, or has a worker do it. Never waits for a worker.
-    #[expect(
-        clippy::needless_pass_by_value,
-        reason = "a command is spent when it is applied; others will carry documents"
-    )]
     pub fn apply(&mut self, command: Command) {
         match command {
             Command::Stop => self.stop(),
@@ -86,6 +90,12 @@ impl App {
             Command::SetTarget(target) => self.model.setup.target = target,
             Command::SetMode(mode) => self.model.setup.mode = mode,
             Command::SetCamera(camera) => self.model.setup.camera = camera,
+            Command::Connect(CellSource::Address(address)) => {
+                let addresses = &mut self.model.addresses;
+                addresses.retain(|other| *other != address);
+                addresses.insert(0, address);
+                addresses.truncate(ADDRESSES);
+            }
             Command::DismissMessage(number) => self.model.messages.dismiss(number),
             _ => {}
         }
@@ -138,8 +148,12 @@ impl App {
         match (self.model.link(link).clone(), before.is_connected()) {
             (LinkState::Connected { server, address }, false) => {
                 let text = match link {
-                    Link::Control => text!("Robot connected to {server} at {address}", server = server, address = address),
-                    Link::Camera => text!("Camera connected to {server} at {address}", server = server, address = address),
+                    Link::Control => {
+                        text!("Robot connected to {server} at {address}", server = server, address = address)
+                    }
+                    Link::Camera => {
+                        text!("Camera connected to {server} at {address}", server = server, address = address)
+                    }
                     Link::Motion => return,
                 };
                 self.say(Severity::Info, text);

@@ -67,7 +67,7 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
         let connector: Arc<dyn Connector> = Arc::new(LiveConnector::new(source.clone()));
-        let mut app = App::start(source, settings.view, &connector, clock, &waker)?;
+        let mut app = App::start(source, settings.view, &connector, clock, &waker)?.with_addresses(settings.addresses);
         for warning in warnings {
             app.absorb(warning.into());
         }

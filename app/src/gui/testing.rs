@@ -13,9 +13,7 @@ use super::app::App;
 use super::layout::Layout;
 use super::window::Window;
 use crate::command::{Command, Event};
-use crate::model::{
-    CellSource, FrameImages, FrameInfo, Link, LinkState, Pane, RobotState, Simulation, ViewSettings,
-};
+use crate::model::{CellSource, FrameImages, FrameInfo, Link, LinkState, Pane, RobotState, Simulation, ViewSettings};
 use crate::settings::SettingsFile;
 use crate::worker::fake::FakeCell;
 use crate::worker::{Clock, Connector, PortError, Waker};
@@ -168,4 +166,3 @@ pub fn frame(number: u64) -> Event {
     };
     Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) }
 }
-
