@@ -14,9 +14,10 @@ use std::time::{Duration, Instant};
 
 use handeye_app::app::{App, Connect, Start};
 use handeye_app::command::{Command, Event};
-use handeye_app::gui::Window;
+use handeye_app::gui::{Layout, Window};
 use handeye_app::model::{CellSource, MotionGoal, Observed, SessionState, ViewSettings};
 use handeye_app::session_start::{self, BOARD};
+use handeye_app::settings::SettingsFile;
 use handeye_app::text::Text;
 use handeye_app::worker::{Clock, LiveConnector, Waker};
 use handeye_core::camera::Intrinsics;
@@ -74,10 +75,16 @@ fn measure(
     let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
     let waker: Waker = Arc::new(|| {});
     let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
-    let start = Start { source, view: ViewSettings::default(), sessions: sessions.clone(), open: None };
+    let start = Start {
+        source,
+        view: ViewSettings::default(),
+        addresses: Vec::new(),
+        sessions: sessions.clone(),
+        open: None,
+    };
     let app = App::start(start, connect, clock, waker)?;
     let ctx = egui::Context::default();
-    let mut window = Window::new(app, &ctx);
+    let mut window = Window::new(app, Layout::default(), SettingsFile::default(), &ctx);
     let mut begin = Some(begin);
     let (mut on_processor, mut on_clock) = (Vec::new(), Vec::new());
     let warm_up = Duration::from_secs(3);

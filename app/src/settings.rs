@@ -16,7 +16,7 @@ use crate::text;
 use crate::text::{Language, Text};
 
 /// Earlier addresses that are kept.
-const ADDRESSES: usize = 8;
+pub const ADDRESSES: usize = 8;
 
 /// The settings.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -190,7 +190,9 @@ impl Settings {
         if !self.addresses.is_empty() {
             table.insert("addresses".to_owned(), self.addresses.clone().into());
         }
-        format!("# Settings of the Handeye Workbench, see docs/settings.md. Written when one is changed in the window.\n{table}")
+        format!(
+            "# Settings of the Handeye Workbench, see docs/settings.md. Written when one is changed in the window.\n{table}"
+        )
     }
 }
 
@@ -235,12 +237,12 @@ impl SettingsFile {
         (Self { path, in_file, last_view }, settings, warnings)
     }
 
-    /// Writes the file when the user has changed how the window looks.
+    /// Writes the file when the user has changed something since the last time.
     ///
     /// # Errors
     /// When it cannot be written; it is not tried again before the next change.
-    pub fn keep_view(&mut self, view: ViewSettings) -> Result<(), Warning> {
-        if view == self.last_view {
+    pub fn keep(&mut self, view: ViewSettings, addresses: &[String]) -> Result<(), Warning> {
+        if view == self.last_view && *addresses == self.in_file.addresses {
             return Ok(());
         }
         // What the environment says and the user did not touch stays out of the file.
@@ -252,22 +254,8 @@ impl SettingsFile {
         keep(&mut kept.depth_scale, before.depth_scale, depth_scale);
         keep(&mut kept.depth_colours, before.depth_colours, depth_colours);
         self.last_view = view;
+        self.in_file.addresses = addresses.to_vec();
         self.write()
-    }
-
-    /// Remembers an address; the file is written when it is new or was not the newest. Gives all of them.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn keep_address(&mut self, address: &str) -> Result<Vec<String>, Warning> {
-        let addresses = &mut self.in_file.addresses;
-        if addresses.first().is_none_or(|newest| newest != address) {
-            addresses.retain(|other| other != address);
-            addresses.insert(0, address.to_owned());
-            addresses.truncate(ADDRESSES);
-            self.write()?;
-        }
-        Ok(self.in_file.addresses.clone())
     }
 
     fn write(&self) -> Result<(), Warning> {
@@ -279,11 +267,7 @@ impl SettingsFile {
             handeye_core::atomic_file::write(path, self.in_file.written().as_bytes())
         };
         write().map_err(|error: io::Error| {
-            Warning(text!(
-                "The settings were not written to {file}: {error}",
-                file = path.display(),
-                error = error
-            ))
+            Warning(text!("The settings were not written to {file}: {error}", file = path.display(), error = error))
         })
     }
 }

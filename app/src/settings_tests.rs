@@ -16,6 +16,8 @@ fn what_was_written_is_read_again() {
             language: Language::Chinese,
             rotation: RotationFormat::Quaternion,
             depth_scale: DepthScale::Full,
+            depth_colours: ColourMap::Viridis,
+            ..ViewSettings::default()
         },
         connect: Some("tcp://a:1".to_owned()),
         addresses: vec!["tcp://a:1".to_owned(), "tcp://b:2".to_owned()],
@@ -57,7 +59,7 @@ fn the_environment_goes_before_the_file_and_does_not_get_into_it() {
     let (mut file, settings, warnings) = SettingsFile::open(Some(path.clone()), variable);
     assert_eq!(warnings, []);
     assert_eq!((settings.view.theme, settings.view.language), (ThemeChoice::Light, Language::Chinese));
-    file.keep_view(ViewSettings { theme: ThemeChoice::Dark, ..settings.view }).expect("it can be written");
+    file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view }, &[]).expect("it can be written");
     let (_, again, _) = SettingsFile::open(Some(path), nothing);
     assert_eq!((again.view.theme, again.view.language), (ThemeChoice::Dark, Language::English));
 }
@@ -67,17 +69,18 @@ fn nothing_is_written_before_something_is_changed() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("settings.toml");
     let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
-    file.keep_view(settings.view).expect("there is nothing to do");
+    file.keep(settings.view, &[]).expect("there is nothing to do");
     assert!(!path.exists());
 }
 
 #[test]
-fn the_newest_address_is_first_and_none_is_there_twice() {
-    let (mut file, _, _) = SettingsFile::open(None, nothing);
-    for address in ["tcp://a:1", "tcp://b:1", "tcp://a:1"] {
-        file.keep_address(address).expect("there is no file");
-    }
-    assert_eq!(file.keep_address("tcp://a:1"), Ok(vec!["tcp://a:1".to_owned(), "tcp://b:1".to_owned()]));
+fn earlier_addresses_are_in_the_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("settings.toml");
+    let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
+    let addresses = vec!["tcp://a:1".to_owned(), "tcp://b:1".to_owned()];
+    file.keep(settings.view, &addresses).expect("it can be written");
+    assert_eq!(SettingsFile::open(Some(path), nothing).1.addresses, addresses);
 }
 
 #[test]
@@ -87,7 +90,7 @@ fn a_file_that_cannot_be_written_is_told() {
     std::fs::write(&blocked, "").expect("written");
     let (mut file, settings, _) = SettingsFile::open(Some(blocked.join("settings.toml")), nothing);
     let view = ViewSettings { theme: settings.view.theme.other(), ..settings.view };
-    let Err(Warning(text)) = file.keep_view(view) else { panic!("it went well") };
+    let Err(Warning(text)) = file.keep(view, &[]) else { panic!("it went well") };
     assert!(text.say(Language::English).contains("settings.toml"));
 }
 

@@ -162,6 +162,12 @@ fn chinese() -> &'static HashMap<String, String> {
     })
 }
 
+/// Every English text with its translation.
+#[cfg(test)]
+pub fn every_translation() -> impl Iterator<Item = (&'static str, &'static str)> {
+    chinese().iter().map(|(english, chinese)| (english.as_str(), chinese.as_str()))
+}
+
 #[cfg(test)]
 #[path = "text_tests.rs"]
 mod tests;

@@ -33,7 +33,13 @@ impl Workbench {
         let began = Instant::now();
         let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
         let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
-        let start = Start { source, view: ViewSettings::default(), sessions: sessions.to_path_buf(), open };
+        let start = Start {
+            source,
+            view: ViewSettings::default(),
+            addresses: Vec::new(),
+            sessions: sessions.to_path_buf(),
+            open,
+        };
         match App::start(start, connect, clock, waker) {
             Ok(app) => Self { app, woken },
             Err(error) => panic!("no threads: {error}"),

@@ -7,6 +7,9 @@ use crate::model::{CellFacts, CellSource, Link, LinkState, Motion, Severity};
 use crate::text;
 use crate::worker::{CameraTask, ControlTask, Request, Workers};
 
+/// Earlier addresses that are offered again.
+pub const ADDRESSES: usize = 8;
+
 impl App {
     pub(super) fn stop(&mut self) {
         self.workers.press_stop();
@@ -44,6 +47,12 @@ impl App {
 
     /// Works with another cell. What is open stays open: a session belongs to its captures, not to a connection.
     pub(super) fn connect(&mut self, source: CellSource) {
+        if let CellSource::Address(address) = &source {
+            let addresses = &mut self.model.addresses;
+            addresses.retain(|other| other != address);
+            addresses.insert(0, address.clone());
+            addresses.truncate(ADDRESSES);
+        }
         self.model.source = source.clone();
         self.model.robot = None;
         self.model.frame = None;

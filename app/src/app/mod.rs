@@ -32,6 +32,8 @@ pub struct Start {
     pub source: CellSource,
     /// What is remembered from one start to the next.
     pub view: ViewSettings,
+    /// Addresses that were connected to before, newest first.
+    pub addresses: Vec<String>,
     /// Where new sessions go.
     pub sessions: PathBuf,
     /// A session or data set to open at once; where there is none, a session is begun there.
@@ -66,10 +68,10 @@ impl App {
     /// # Errors
     /// When the system has no more threads.
     pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
-        let Start { source, view, sessions, open } = start;
+        let Start { source, view, addresses, sessions, open } = start;
         let desk = Desk::start(sessions, &clock, &waker)?;
         let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
-        let model = Model::new(source, view);
+        let model = Model { addresses, ..Model::new(source, view) };
         let numbers = Numbers::default();
         let mut app = Self { model, workers, desk, connect, clock, waker, numbers, asked: None };
         app.prepare_session();

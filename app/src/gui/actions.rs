@@ -171,7 +171,8 @@ pub fn keys_text(ctx: &egui::Context, action: &Action) -> Vec<String> {
 /// What the keys that were pressed in this frame ask for, but for the stop. Nothing while text is typed; a key without
 /// Ctrl belongs to the widget that has the focus.
 pub fn pressed(ctx: &egui::Context, model: &Model) -> Vec<Command> {
-    let any = ctx.input(|input| input.events.iter().any(|event| matches!(event, egui::Event::Key { pressed: true, .. })));
+    let any =
+        ctx.input(|input| input.events.iter().any(|event| matches!(event, egui::Event::Key { pressed: true, .. })));
     if !any || ctx.text_edit_focused() {
         return Vec::new();
     }

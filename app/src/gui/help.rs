@@ -106,5 +106,8 @@ fn about_ui(ui: &mut Ui, model: &Model) {
 fn sessions_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     ui.label(theme::title(tr!(language, "Session"), TITLE));
-    ui.label(tr!(language, "Sessions cannot be opened from the window yet. Use the command line: handeye calibrate FOLDER"));
+    ui.label(tr!(
+        language,
+        "Sessions cannot be opened from the window yet. Use the command line: handeye calibrate FOLDER"
+    ));
 }

@@ -152,7 +152,10 @@ impl Layout {
 
     /// The tab containers, which are drawn as cards.
     pub fn cards(&self) -> impl Iterator<Item = TileId> + '_ {
-        self.tree.tiles.iter().filter_map(|(id, tile)| matches!(tile, Tile::Container(Container::Tabs(_))).then_some(*id))
+        self.tree
+            .tiles
+            .iter()
+            .filter_map(|(id, tile)| matches!(tile, Tile::Container(Container::Tabs(_))).then_some(*id))
     }
 
     /// Whether a pane is drawn, and not behind another tab.

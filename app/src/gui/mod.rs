@@ -64,7 +64,13 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
         let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
-        let start = Start { source, view: settings.view, sessions: settings.sessions_folder(variable), open: args.session };
+        let start = Start {
+            source,
+            view: settings.view,
+            addresses: settings.addresses.clone(),
+            sessions: settings.sessions_folder(variable),
+            open: args.session,
+        };
         let mut app = App::start(start, connect, clock, waker)?;
         for warning in warnings {
             app.absorb(warning.into());

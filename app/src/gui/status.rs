@@ -93,7 +93,9 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
     match state {
         LinkState::StartingCell { why } => {
             let detail = match why {
-                None => text!("A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed."),
+                None => {
+                    text!("A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed.")
+                }
                 Some(why) => Text::verbatim(sentence(why)),
             };
             status(Tone::Busy, text!("Starting the built-in cell…"), detail, None)

@@ -105,7 +105,8 @@ impl Window {
             tracing::trace!(?command, %place, "command");
             self.apply(command);
         }
-        if let Err(warning) = self.settings.keep_view(self.app.model().view) {
+        let model = self.app.model();
+        if let Err(warning) = self.settings.keep(model.view, &model.addresses) {
             self.app.absorb(warning.into());
         }
     }

@@ -1,5 +1,7 @@
 use egui::vec2;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use handeye_core::handeye::Mode;
+use handeye_core::target::TargetSpec;
 
 use super::*;
 use crate::command::Event;
@@ -102,14 +104,19 @@ fn stop_is_one_click_away_in_every_state() {
 }
 
 #[test]
-fn the_theme_is_switched_and_remembered() {
+fn theme_and_language_are_switched_in_the_menu_at_once() {
     let mut silent = Silent::live();
     assert!(silent.harness.ctx.global_style().visuals.dark_mode);
-    silent.harness.get_by_label("Light theme").click();
-    silent.steps();
+    for name in ["Menu", "Theme ⏵", "Light theme"] {
+        silent.click(name);
+    }
     assert!(!silent.harness.ctx.global_style().visuals.dark_mode);
     assert_eq!(silent.app().model().view.theme, ThemeChoice::Light);
-    assert!(silent.harness.query_by_label("Dark theme").is_some());
+    for name in ["Menu", "Language ⏵", "简体中文"] {
+        silent.click(name);
+    }
+    assert_eq!(silent.app().model().view.language, Language::Chinese);
+    assert!(silent.sees("标定板") && !silent.sees("Poses"));
 }
 
 #[test]
@@ -149,10 +156,204 @@ fn nothing_is_cut_off_at_the_smallest_size() {
     silent.links(&connected());
     silent.absorb(Event::Robot(robot(Simulation::Running)));
     silent.absorb(frame(1));
-    silent.app().apply(Command::SetRotationFormat(RotationFormat::Quaternion));
-    silent.steps();
-    for label in ["STOP", "Light theme", "Dropped: 7", "Full range", "Colour picture", "Depth picture"] {
-        let rect = silent.harness.get_by_label(label).rect();
-        assert!(rect.min.x >= 0.0 && rect.max.x <= size.x && rect.max.y <= size.y, "{label}: {rect:?}");
+    for language in Language::ALL {
+        silent.command(Command::SetLanguage(language));
+        silent.command(Command::SetRotationFormat(RotationFormat::Quaternion));
+        let tr = |english| crate::text::translation(language, english).unwrap_or(english).to_owned();
+        let mut labels: Vec<_> = ["STOP", "Menu", "Undo", "Redo", "Full range", "Colour picture", "Depth picture"]
+            .into_iter()
+            .map(tr)
+            .collect();
+        labels.push(format!("{}: 7", tr("Dropped")));
+        labels.extend(Pane::ALL.map(|pane| panes::title(pane, language).to_owned()));
+        for label in labels {
+            let nodes: Vec<_> = silent.harness.query_all_by_label(&label).collect();
+            assert!(!nodes.is_empty(), "{label} is not there");
+            for node in nodes {
+                let rect = node.rect();
+                assert!(rect.width() > 0.0 && rect.height() > 0.0, "{label}: {rect:?}");
+                let inside = rect.min.x >= 0.0 && rect.min.y >= 0.0 && rect.max.x <= size.x && rect.max.y <= size.y;
+                assert!(inside, "{label}: {rect:?}");
+            }
+        }
     }
+}
+
+#[test]
+fn every_tab_of_the_first_layout_is_wholly_seen_at_the_smallest_size() {
+    let mut silent = Silent::of_size(CellSource::BuiltIn, vec2(1024.0, 700.0));
+    let right = silent.harness.get_by_label("Export").rect();
+    assert!(right.max.x < 1024.0 - 8.0, "{right:?}");
+    silent.click("Export");
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Export));
+}
+
+#[test]
+fn a_step_brings_its_panes_to_the_front_by_click_and_by_key() {
+    let mut silent = Silent::live();
+    let step = silent.harness.get_by_label_contains("4 Solve: blocked");
+    step.click();
+    silent.steps();
+    for pane in [Pane::Charts, Pane::Result] {
+        assert!(silent.harness.state_mut().layout().is_in_front(pane), "{pane:?}");
+    }
+    silent.press(egui::Modifiers::NONE, egui::Key::Num2);
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Target));
+    silent.command(Command::GoToStep(Step::Capture));
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Jog));
+    silent.command(Command::ResetLayout);
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Connect));
+}
+
+#[test]
+fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
+    let mut silent = Silent::live();
+    silent.press(egui::Modifiers::NONE, egui::Key::Escape);
+    assert!(silent.app().model().stop_pending);
+
+    silent.absorb(Event::Stopped);
+    silent.click("Address");
+    silent.harness.get_by_label("Address of the cell").focus();
+    silent.steps();
+    assert!(silent.harness.ctx.text_edit_focused());
+    silent.press(egui::Modifiers::NONE, egui::Key::Escape);
+    assert!(silent.app().model().stop_pending);
+
+    silent.absorb(Event::Stopped);
+    silent.command(Command::SetDialog(Some(Dialog::Help)));
+    assert!(silent.sees("Esc stops the arm at any time"));
+    silent.press(egui::Modifiers::NONE, egui::Key::Escape);
+    assert!(silent.app().model().stop_pending);
+    assert!(!silent.sees("Esc stops the arm at any time"));
+}
+
+#[test]
+fn keys_rest_while_text_is_typed() {
+    let mut silent = Silent::live();
+    silent.click("Address");
+    silent.harness.get_by_label("Address of the cell").focus();
+    silent.steps();
+    silent.press(egui::Modifiers::NONE, egui::Key::Num2);
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Connect));
+    silent.press(egui::Modifiers::COMMAND, egui::Key::K);
+    assert!(silent.harness.query_by_label("Type a command").is_none());
+}
+
+#[test]
+fn a_command_is_found_by_typing_and_done_by_enter() {
+    let mut silent = Silent::live();
+    silent.press(egui::Modifiers::COMMAND, egui::Key::K);
+    assert!(silent.harness.query_by_label("Type a command").is_some());
+    silent.harness.event(egui::Event::Text("light".to_owned()));
+    silent.steps();
+    silent.press(egui::Modifiers::NONE, egui::Key::Enter);
+    assert_eq!(silent.app().model().view.theme, ThemeChoice::Light);
+    assert!(silent.harness.query_by_label("Type a command").is_none());
+}
+
+#[test]
+fn the_help_lists_the_keys_that_work() {
+    let mut silent = Silent::live();
+    silent.press(egui::Modifiers::NONE, egui::Key::F1);
+    for text in ["Stop the arm", "Escape", "Ctrl+Z", "Ctrl+Shift+Z", "Space", "Delete the selected captures", "F1"] {
+        assert!(silent.sees(text), "{text}");
+    }
+    silent.click("Close");
+    assert!(!silent.sees("Delete the selected captures"));
+}
+
+#[test]
+fn an_error_stays_on_the_screen_until_it_is_put_aside_and_then_in_the_log() {
+    let mut silent = Silent::live();
+    let text = crate::text::Text::verbatim("the lens cap is on");
+    silent.absorb(Event::Notice { severity: crate::model::Severity::Error, text });
+    silent.click("Dismiss");
+    assert!(silent.harness.query_by_label("Dismiss").is_none());
+    silent.show(Pane::Log);
+    silent.click("Errors");
+    assert!(silent.harness.query_all_by_label("the lens cap is on").count() >= 2, "in the log and the status bar");
+}
+
+#[test]
+fn an_address_is_checked_before_it_is_used() {
+    let mut silent = Silent::live();
+    silent.click("Address");
+    let button = |silent: &Silent| silent.harness.get_by_label("Connect").accesskit_node().is_disabled();
+    assert!(!button(&silent), "the usual port on this machine is offered");
+    silent.harness.get_by_label("Address of the cell").focus();
+    silent.steps();
+    silent.harness.event(egui::Event::Text("!".to_owned()));
+    silent.steps();
+    assert!(button(&silent));
+    silent.press(egui::Modifiers::NONE, egui::Key::Backspace);
+    silent.click("Connect");
+    assert_eq!(silent.app().model().addresses, ["tcp://127.0.0.1:23000"]);
+}
+
+#[test]
+fn the_board_and_the_mode_are_set_in_the_target_pane() {
+    let mut silent = Silent::live();
+    silent.show(Pane::Target);
+    assert!(silent.sees("10 × 7 corners are 11 × 8 squares"));
+    silent.click("Dots");
+    silent.until("dots", |model| matches!(model.document().meta.target, TargetSpec::Circles(_)));
+    assert!(silent.sees("This board looks the same after half a turn"));
+    silent.click("Eye to hand");
+    silent.until("the mode", |model| model.document().meta.mode == Mode::EyeToHand);
+    silent.click("Fixed");
+    silent.until("the camera", |model| {
+        model.document().meta.camera.is_some_and(|camera| camera.fixed && camera.intrinsics.is_some())
+    });
+}
+
+/// Every text that a shape shows.
+fn texts(shape: &egui::Shape, found: &mut Vec<String>) {
+    match shape {
+        egui::Shape::Text(text) => found.push(text.galley.text().to_owned()),
+        egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| texts(shape, found)),
+        _ => {}
+    }
+}
+
+#[test]
+fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
+    let mut silent = Silent::live();
+    let dialogs = [Dialog::Help, Dialog::About, Dialog::Palette].map(|dialog| Command::SetDialog(Some(dialog)));
+    let views: Vec<_> = Pane::ALL.map(Command::ShowPane).into_iter().chain(dialogs).collect();
+    for language in Language::ALL {
+        for theme in [ThemeChoice::Dark, ThemeChoice::Light] {
+            silent.command(Command::SetLanguage(language));
+            silent.command(Command::SetTheme(theme));
+            for view in &views {
+                silent.command(view.clone());
+                let mut found = Vec::new();
+                silent.harness.output().shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut found));
+                assert!(found.len() > 20, "{view:?} {language:?}: nothing is drawn");
+                for text in found {
+                    assert_eq!(missing(&silent, &text), "", "{view:?} {language:?}: {text}");
+                }
+                silent.command(Command::SetDialog(None));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_fonts_have_every_letter_of_every_catalogue() {
+    let silent = Silent::new(CellSource::BuiltIn);
+    for (english, chinese) in crate::text::every_translation() {
+        for text in [english, chinese] {
+            assert_eq!(missing(&silent, text), "", "{text}");
+        }
+    }
+}
+
+/// The letters of a text that a font does not have.
+fn missing(silent: &Silent, text: &str) -> String {
+    let families = [egui::FontFamily::Proportional, egui::FontFamily::Monospace, fonts::semibold()];
+    silent.harness.ctx.fonts_mut(|fonts| {
+        let mut has =
+            |letter| families.iter().all(|family| fonts.has_glyph(&egui::FontId::new(13.0, family.clone()), letter));
+        text.chars().filter(|letter| !letter.is_whitespace() && !has(*letter)).collect()
+    })
 }

@@ -1,6 +1,6 @@
 //! Which cell the window works with, and how the connection is doing.
 
-use egui::{Button, ComboBox, Id, TextEdit, Ui, WidgetInfo, WidgetType};
+use egui::{Button, ComboBox, Grid, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::Endpoint;
 
 use super::{action_ui, form};
@@ -8,7 +8,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::status;
 use crate::gui::theme::{Palette, Tone};
 use crate::model::{CellSource, Link, LinkState, Model};
-use crate::text::{Language, Text};
+use crate::text::Text;
 use crate::{text, tr};
 
 /// What the user is about to connect to; it belongs to nothing but the window.
@@ -36,12 +36,12 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if let Some(choice) = form::choice_ui(ui, remote, &choices) {
             draft.remote = Some(choice);
         }
-        let wanted = if remote { address_ui(ui, model, &mut draft) } else { built_in_ui(ui, language) };
+        let wanted = if remote { address_ui(ui, model, &mut draft) } else { Some(CellSource::BuiltIn) };
         let is_new = wanted.as_ref().is_some_and(|wanted| *wanted != model.source);
         let name = if is_new { tr!(language, "Connect") } else { tr!(language, "Connect again") };
         let palette = Palette::of(ui);
         let button = match is_new {
-            true => Button::new(egui::RichText::new(name).color(palette.on_accent)).fill(palette.accent),
+            true => Button::new(RichText::new(name).color(palette.on_accent)).fill(palette.accent),
             false => Button::new(name),
         };
         let response = ui.add_enabled(wanted.is_some(), button);
@@ -59,17 +59,19 @@ fn state_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let status = status::connection(model);
     form::note_ui(ui, status.tone, &status.title.say(language), &status.detail.say(language));
     action_ui(ui, status.action, language, outbox);
-    for (link, name) in [
-        (Link::Control, tr!(language, "Robot")),
-        (Link::Camera, tr!(language, "Camera")),
-        (Link::Motion, tr!(language, "Motions")),
-    ] {
-        let (tone, words) = words(model, model.link(link));
-        form::row_ui(ui, name, |ui| {
-            let colour = Palette::of(ui).tone(tone);
-            ui.add(egui::Label::new(egui::RichText::new(words.say(language)).color(colour)).truncate());
-        });
-    }
+    Grid::new("links").num_columns(2).spacing([24.0, 3.0]).min_row_height(18.0).show(ui, |ui| {
+        for (link, name) in [
+            (Link::Control, tr!(language, "Robot")),
+            (Link::Camera, tr!(language, "Camera")),
+            (Link::Motion, tr!(language, "Motions")),
+        ] {
+            let (tone, words) = words(model, model.link(link));
+            let palette = Palette::of(ui);
+            ui.label(RichText::new(name).color(palette.weak));
+            ui.add(Label::new(RichText::new(words.say(language)).color(palette.tone(tone))).truncate());
+            ui.end_row();
+        }
+    });
 }
 
 /// A connection in a few words.
@@ -87,14 +89,6 @@ fn words(model: &Model, state: &LinkState) -> (Tone, Text) {
         }
         LinkState::Failed { .. } => (Tone::Bad, text!("failed")),
     }
-}
-
-fn built_in_ui(ui: &mut Ui, language: Language) -> Option<CellSource> {
-    form::hint_ui(
-        ui,
-        tr!(language, "A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed."),
-    );
-    Some(CellSource::BuiltIn)
 }
 
 /// The field for the address; the cell when it is a good one.
@@ -126,7 +120,7 @@ fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Option<CellSourc
         Ok(endpoint) => Some(CellSource::Address(endpoint.to_string())),
         Err(error) => {
             let colour = Palette::of(ui).bad;
-            ui.add(egui::Label::new(egui::RichText::new(error.to_string()).color(colour)).wrap());
+            ui.add(Label::new(RichText::new(error.to_string()).color(colour)).wrap());
             None
         }
     }

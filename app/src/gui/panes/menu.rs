@@ -16,8 +16,7 @@ pub fn menu_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let button = Button::new("").min_size(Vec2::new(34.0, 30.0)).frame(false);
-    let (response, _) =
-        MenuButton::from_button(button).config(config).ui(ui, |ui| content_ui(ui, model, outbox));
+    let (response, _) = MenuButton::from_button(button).config(config).ui(ui, |ui| content_ui(ui, model, outbox));
     let palette = Palette::of(ui);
     if response.hovered() || response.has_focus() {
         ui.painter().rect_filled(response.rect, 6.0, palette.card.lerp_to_gamma(palette.text, 0.08));

@@ -6,8 +6,8 @@ mod colour_bar;
 mod connect;
 mod empty;
 mod export;
-mod jog;
 mod form;
+mod jog;
 mod log;
 mod menu;
 mod pictures;
@@ -33,13 +33,7 @@ use crate::text::Language;
 use crate::tr;
 
 /// The whole window; gives the part of it where the panes are.
-pub fn all_ui(
-    ui: &mut Ui,
-    model: &Model,
-    textures: &LiveTextures,
-    layout: &mut Layout,
-    outbox: &mut Outbox,
-) -> Rect {
+pub fn all_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, layout: &mut Layout, outbox: &mut Outbox) -> Rect {
     let palette = Palette::of(ui);
     let bar = Frame::new().fill(palette.bar).inner_margin(Margin::symmetric(14, 8));
     Panel::top("top_bar").frame(bar).resizable(false).show(ui, |ui| top_bar::top_bar_ui(ui, model, outbox));

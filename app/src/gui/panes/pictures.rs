@@ -30,12 +30,7 @@ pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &m
         empty::status_ui(ui, &status::before_first_picture(model), language, outbox);
         return None;
     };
-    let picture = Picture {
-        texture: textures.rgb.as_ref(),
-        name: tr!(language, "Colour picture"),
-        model,
-        frame,
-    };
+    let picture = Picture { texture: textures.rgb.as_ref(), name: tr!(language, "Colour picture"), model, frame };
     card_ui(
         ui,
         |ui| {
@@ -55,12 +50,7 @@ pub fn depth_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mu
         empty::empty_ui(ui, tr!(language, "No depth picture yet"), detail);
         return None;
     };
-    let picture = Picture {
-        texture: textures.depth.as_ref(),
-        name: tr!(language, "Depth picture"),
-        model,
-        frame,
-    };
+    let picture = Picture { texture: textures.depth.as_ref(), name: tr!(language, "Depth picture"), model, frame };
     card_ui(
         ui,
         |ui| {

@@ -36,11 +36,10 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let stale = model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S);
         let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
         field_ui(ui, tr!(language, "Image age"), &age, 6, if stale { palette.warning } else { palette.text });
-        field_ui(ui, tr!(language, "Dropped"), &model.dropped_frames.to_string(), 6, palette.text)
-            .on_hover_text(tr!(
-                language,
-                "Pictures that arrived but were replaced by newer ones before the window could show them"
-            ));
+        field_ui(ui, tr!(language, "Dropped"), &model.dropped_frames.to_string(), 6, palette.text).on_hover_text(tr!(
+            language,
+            "Pictures that arrived but were replaced by newer ones before the window could show them"
+        ));
     });
     ui.add_space(2.0);
     message_ui(ui, model);
@@ -81,11 +80,15 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
             RotationFormat::Quaternion => numbers::quaternion(&robot.base_from_tip),
         },
     );
-    ui.horizontal(|ui| {
+    ui.horizontal_top(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
         field_ui(ui, caption, &value, digits, colour);
         let button = ui
-            .add(Button::new(RichText::new(name).size(CAPTION)).min_size(Vec2::new(34.0, 22.0)).small())
+            .vertical(|ui| {
+                ui.add_space(6.0);
+                ui.add(Button::new(RichText::new(name).size(CAPTION)).min_size(Vec2::new(34.0, 22.0)).small())
+            })
+            .inner
             .on_hover_text(match next {
                 RotationFormat::Quaternion => tr!(language, "Write the rotation as a quaternion"),
                 RotationFormat::RollPitchYaw => tr!(language, "Write the rotation as roll, pitch and yaw"),

@@ -70,7 +70,10 @@ fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let title = tr!(language, "This board looks the same after half a turn");
         let detail = match target {
             TargetSpec::Chessboard(_) => {
-                tr!(language, "Its ends cannot be told apart. Take one with an odd number of rows plus columns, as 10 × 7.")
+                tr!(
+                    language,
+                    "Its ends cannot be told apart. Take one with an odd number of rows plus columns, as 10 × 7."
+                )
             }
             TargetSpec::Circles(_) => tr!(language, "Its ends cannot be told apart. A chessboard is safer."),
         };
@@ -85,8 +88,7 @@ fn numbers_ui(ui: &mut Ui, target: &TargetSpec, language: Language, outbox: &mut
         TargetSpec::Circles(_) => Kind::Circles,
     };
     let mut grid = *target.grid();
-    let choices =
-        [(Kind::Chessboard, tr!(language, "Chessboard"), ""), (Kind::Circles, tr!(language, "Dots"), "")];
+    let choices = [(Kind::Chessboard, tr!(language, "Chessboard"), ""), (Kind::Circles, tr!(language, "Dots"), "")];
     let chosen = form::choice_ui(ui, kind, &choices);
     let (columns, rows, size) = match kind {
         Kind::Chessboard => {
@@ -129,7 +131,11 @@ fn preview_ui(ui: &mut Ui, target: &TargetSpec, room: Vec2, language: Language) 
     let palette = Palette::of(ui);
     let (area, response) = ui.allocate_exact_size(room, Sense::hover());
     response.widget_info(|| {
-        WidgetInfo::labeled(WidgetType::Image, true, text!("Drawing of the board: {board}", board = target).say(language))
+        WidgetInfo::labeled(
+            WidgetType::Image,
+            true,
+            text!("Drawing of the board: {board}", board = target).say(language),
+        )
     });
     let Grid { columns, rows, .. } = *target.grid();
     let (across, down) = (columns as f32 + 1.0, rows as f32 + 1.0);
@@ -175,10 +181,9 @@ fn preview_ui(ui: &mut Ui, target: &TargetSpec, room: Vec2, language: Language) 
 fn axes(ui: &Ui, origin: Pos2, square: f32, end_x: Pos2, end_y: Pos2) {
     let palette = Palette::of(ui);
     let font = FontId::proportional(CAPTION);
-    for (end, colour, name, anchor) in [
-        (end_x, palette.axis_x, "x", Align2::LEFT_CENTER),
-        (end_y, palette.axis_y, "y", Align2::CENTER_TOP),
-    ] {
+    for (end, colour, name, anchor) in
+        [(end_x, palette.axis_x, "x", Align2::LEFT_CENTER), (end_y, palette.axis_y, "y", Align2::CENTER_TOP)]
+    {
         let direction = (end - origin).normalized();
         let tip = origin + direction * (2.2 * square).min((end - origin).length());
         ui.painter().line_segment([origin, tip], Stroke::new(2.0, colour));
