@@ -88,6 +88,12 @@ pub enum SessionProblem {
         /// What is not known.
         what: String,
     },
+    /// `session.json` was written by a program that knows no journal, after the journal was there.
+    #[error(
+        "was changed by an older program that keeps no journal: move this file out of the folder to go on with the \
+         journal, or move journal.jsonl out to go on with this file"
+    )]
+    OlderProgram,
     /// A change that the session cannot take, or a value that it must not have.
     #[error(transparent)]
     Edit(#[from] EditError),

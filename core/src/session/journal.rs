@@ -136,8 +136,10 @@ fn check(line: &[u8]) -> Result<(), BadLine> {
 }
 
 fn checksum(body: &[u8]) -> String {
-    let digest = Sha256::digest(body);
-    digest.iter().take(CHECKSUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
+    // Two digits for each of the first eight bytes.
+    let first =
+        Sha256::digest(body).iter().take(CHECKSUM_DIGITS / 2).fold(0, |bits, byte| bits << 8 | u64::from(*byte));
+    format!("{first:016x}")
 }
 
 /// Does again what a journal says was done.

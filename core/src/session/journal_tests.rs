@@ -158,6 +158,24 @@ fn a_document_of_something_else_is_not_replaced_by_the_journal() {
     }
 }
 
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_changes_nothing_and_a_journal_that_cannot_be_put_back_takes_no_more() {
+    let dir = folder();
+    drop(store_with(dir.path(), 1));
+    let bytes = fs::read(dir.path().join(JOURNAL)).expect("journal");
+    let mut journal = Journal::open(dir.path(), bytes.len() as u64, 2).expect("open");
+    journal.file = File::options().write(true).open("/dev/full").expect("a full disk");
+    let prepared = journal.prepare(&Entry::Undo).expect("a line");
+    let error = journal.append(&prepared).expect_err("full");
+    assert!(matches!(error.problem, SessionProblem::Unwritable(_)), "{error}");
+    assert_eq!(journal.sequence(), 2);
+    // Nothing can be cut off from that file either.
+    let error = journal.prepare(&Entry::Undo).err().expect("broken");
+    assert!(matches!(error.problem, SessionProblem::Broken), "{error}");
+    assert_eq!(fs::read(dir.path().join(JOURNAL)).expect("journal"), bytes);
+}
+
 #[derive(Debug, Clone)]
 enum Step {
     Capture,
@@ -200,8 +218,9 @@ fn entry(step: &Step, history: &History) -> Entry {
         Step::Role(which, role) => Edit::SetRole { ids: ids(which), role: *role },
         Step::Mode(mode) => Edit::SetMode(*mode),
         Step::Taught(angles) => {
-            let joints =
-                |i: usize| if i % 2 == 0 { Goal::Joints(vec![angles[i]; 6]) } else { Goal::Tip(pose(i as u8)) };
+            let joints = |i: usize| {
+                if i.is_multiple_of(2) { Goal::Joints(vec![angles[i]; 6]) } else { Goal::Tip(pose(i as u8)) }
+            };
             let poses = (0..angles.len()).map(|i| TaughtPose { name: format!("p{i}"), goal: joints(i) }).collect();
             Edit::SetTaught { change: TaughtChange::Replace, poses }
         }

@@ -9,7 +9,7 @@ use image::RgbImage;
 use super::document::{CaptureRecord, Document};
 use super::error::{SessionError, SessionProblem};
 use super::history::History;
-use super::journal::{self, JOURNAL};
+use super::journal::{self, JOURNAL, Replayed};
 use super::session_file::{self, SessionFile};
 use super::{DOCUMENT, depth};
 use crate::depth::DepthImage;
@@ -31,31 +31,43 @@ pub(super) fn load(folder: &Path) -> Result<Loaded, SessionError> {
     let path = folder.join(JOURNAL);
     let bytes = match fs::read(&path) {
         Ok(bytes) => bytes,
-        Err(e) if e.kind() == ErrorKind::NotFound => return without_journal(file?),
+        Err(e) if e.kind() == ErrorKind::NotFound => return file.map(without_journal),
         Err(e) => return Err(SessionError::unreadable(&path, &e)),
     };
     let seen = match file {
-        Ok(file) => file.sequence.unwrap_or(0),
+        Ok(file) => file.sequence,
         // A document of something else, or of a newer version, is not ours to replace.
         Err(error) if matches!(error.problem, SessionProblem::Format(_) | SessionProblem::Version { .. }) => {
             return Err(error);
         }
         // The journal has everything that a missing or damaged document had.
-        Err(_) => 0,
+        Err(_) => Some(0),
     };
     let replayed = journal::replay(&bytes).map_err(|problem| SessionError::new(&path, problem))?;
+    let Some(seen) = seen else {
+        // Without a number it is from before the journal, which then has its first entry and no more.
+        return if replayed.rows == 1 {
+            Ok(from_journal(replayed))
+        } else {
+            Err(SessionError::new(&folder.join(DOCUMENT), SessionProblem::OlderProgram))
+        };
+    };
     if seen > replayed.sequence {
         // The document follows the journal, so that entry was on the disk.
         let what = format!("entry {seen} is in {DOCUMENT} and no longer in the journal");
         return Err(SessionError::new(&path, SessionProblem::Damaged { row: replayed.rows + 1, what }));
     }
-    let journal_length = Some(replayed.length as u64);
-    Ok(Loaded { history: replayed.history, sequence: replayed.sequence, journal_length })
+    Ok(from_journal(replayed))
 }
 
-fn without_journal(file: SessionFile) -> Result<Loaded, SessionError> {
+fn from_journal(replayed: Replayed) -> Loaded {
+    let journal_length = Some(replayed.length as u64);
+    Loaded { history: replayed.history, sequence: replayed.sequence, journal_length }
+}
+
+fn without_journal(file: SessionFile) -> Loaded {
     let history = History::new(file.document).with_numbers_used(file.last_capture);
-    Ok(Loaded { history, sequence: file.sequence.unwrap_or(0), journal_length: None })
+    Loaded { history, sequence: file.sequence.unwrap_or(0), journal_length: None }
 }
 
 fn read_file(folder: &Path) -> Result<SessionFile, SessionError> {

@@ -196,6 +196,42 @@ fn files_that_lag_behind_the_journal_are_written_again() {
 }
 
 #[test]
+fn a_document_by_an_older_program_is_not_overwritten() {
+    let dir = folder();
+    old_session(dir.path(), &["images/0001.png"]);
+    let old = fs::read(dir.path().join(DOCUMENT)).expect("read");
+    let mut store = Store::open(dir.path()).expect("open");
+    let begun = fs::read(dir.path().join(JOURNAL)).expect("journal");
+    store.apply(delete(1)).expect("delete");
+    drop(store);
+    fs::write(dir.path().join(DOCUMENT), &old).expect("write");
+    let error = Store::open(dir.path()).expect_err("two truths");
+    assert!(matches!(error.problem, SessionProblem::OlderProgram), "{error}");
+    assert_eq!(fs::read(dir.path().join(DOCUMENT)).expect("read"), old);
+    // This far a program comes that is killed when it gives an old session its journal.
+    fs::write(dir.path().join(JOURNAL), begun).expect("write");
+    assert_eq!(Store::open(dir.path()).expect("open").document().captures.len(), 1);
+}
+
+#[test]
+fn a_change_counts_when_a_file_that_follows_from_it_cannot_be_written() {
+    let dir = folder();
+    let mut store = store_with(dir.path(), 2);
+    let table = dir.path().join("poses.csv");
+    fs::remove_file(&table).expect("remove");
+    fs::create_dir_all(table.join("in the way")).expect("folder");
+    let error = store.apply(delete(1)).expect_err("no table");
+    assert!(matches!(error.problem, SessionProblem::Behind(_)) && !error.is_bad_input(), "{error}");
+    assert_eq!(error.file, table);
+    assert_eq!(store.document().captures.len(), 1);
+    assert_eq!(*Session::open(dir.path()).expect("read").document, **store.document());
+    fs::remove_dir_all(&table).expect("remove");
+    store.apply(exclude(2, true)).expect("exclude");
+    store.undo().expect("undo");
+    assert_eq!(Dataset::read(dir.path()).expect("a data set").entries.len(), 1);
+}
+
+#[test]
 fn a_document_that_is_ahead_of_its_journal_says_that_entries_are_missing() {
     let dir = folder();
     let mut store = store_with(dir.path(), 2);

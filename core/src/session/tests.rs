@@ -35,7 +35,7 @@ pub(super) fn record(id: u32) -> CaptureRecord {
     CaptureRecord {
         id: CaptureId(id),
         image: format!("images/{id:04}.png"),
-        depth: (id % 2 == 0).then(|| format!("depth/{id:04}.tiff")),
+        depth: id.is_multiple_of(2).then(|| format!("depth/{id:04}.tiff")),
         base_from_tip: pose(id as u8),
         joints_rad: Some(vec![0.1, f64::from(id) / 3.0]),
         sim_time_s: None,
