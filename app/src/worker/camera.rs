@@ -1,4 +1,4 @@
-//! The camera worker: fetches pictures, colours the depth, and puts the newest pair where the window finds it.
+//! The camera worker: fetches pictures, colours the depth, and puts the newest pair where window and vision find it.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use handeye_sim_link::client::CancelToken;
 
 use super::link::{Duty, Outlet};
 use super::port::{CameraPort, Connected, Connector, PortError, RawFrame};
-use super::slot::LatestSlot;
+use super::slot::{LatestSlot, Tap};
 use crate::depth_view;
 use crate::model::{DEPTH_COLOURS, DepthScale, FrameImages, FrameInfo, Link, LiveFrame};
 
@@ -31,6 +31,7 @@ pub enum CameraTask {
 /// The duty of the camera worker.
 pub struct Camera {
     frames: Arc<LatestSlot<LiveFrame>>,
+    for_vision: Arc<Tap<LiveFrame>>,
     scale: DepthScale,
     auto_range_m: Option<[f32; 2]>,
     seen_sim_time_s: Option<f64>,
@@ -39,9 +40,17 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// With the place that it shares with the application.
-    pub fn new(scale: DepthScale, frames: Arc<LatestSlot<LiveFrame>>) -> Self {
-        Self { frames, scale, auto_range_m: None, seen_sim_time_s: None, number: 0, rate: RateMeter::default() }
+    /// With the places that it shares with the application and with the vision thread.
+    pub fn new(scale: DepthScale, frames: Arc<LatestSlot<LiveFrame>>, for_vision: Arc<Tap<LiveFrame>>) -> Self {
+        Self {
+            frames,
+            for_vision,
+            scale,
+            auto_range_m: None,
+            seen_sim_time_s: None,
+            number: 0,
+            rate: RateMeter::default(),
+        }
     }
 
     /// Prepares the newest pictures for the window.
@@ -88,7 +97,9 @@ impl Duty for Camera {
     }
 
     fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
-        if self.seen_sim_time_s == Some(port.sim_time_s()?) {
+        let sim_time_s = port.sim_time_s()?;
+        self.for_vision.heard(outlet.now_s());
+        if self.seen_sim_time_s == Some(sim_time_s) {
             return Ok(PERIOD);
         }
         let raw = port.grab()?;
@@ -96,6 +107,8 @@ impl Duty for Camera {
         self.seen_sim_time_s = Some(raw.sim_time_s);
         self.rate.arrived(received_s);
         let frame = self.prepare(raw, port.depth_limits_m(), received_s)?;
+        // The pixels are shared, not copied.
+        self.for_vision.put(frame.clone());
         self.frames.put(frame);
         (outlet.waker)();
         Ok(PERIOD)

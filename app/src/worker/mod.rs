@@ -1,9 +1,10 @@
-//! The threads behind the window. Each owns one connection to the cell and makes it again when it breaks.
+//! The threads behind the window. All but `vision` own one connection to the cell and make it again when it breaks.
 //!
 //! | thread | does | reports through |
 //! | --- | --- | --- |
 //! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
 //! | `camera` | pictures, colours of the depth | events; newest [`LiveFrame`] |
+//! | `vision` | board in the newest picture, captures | events; newest [`LiveDetection`]; [`Measured`] |
 //!
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
@@ -15,6 +16,7 @@ mod live;
 mod port;
 mod reconnect;
 mod slot;
+mod vision;
 
 #[cfg(test)]
 pub mod fake;
@@ -33,13 +35,16 @@ pub use link::Request;
 pub use live::LiveConnector;
 pub use port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
 pub use slot::LatestSlot;
+pub use vision::{CaptureRequest, Measured, VisionTask};
 
 use crate::command::Event;
-use crate::model::{CellSource, DepthScale, LiveFrame, RobotState};
+use crate::model::{CellSource, DepthScale, LiveDetection, LiveFrame, RobotState};
 use camera::Camera;
 use control::Control;
 use link::{Duty, LinkLoop, Outlet};
 use reconnect::Reconnect;
+use slot::Tap;
+use vision::Vision;
 
 /// Tells the window that there is something to look at. Called from any thread.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -53,6 +58,9 @@ const MAX_REQUESTS: usize = 32;
 /// Events that may wait for the window.
 const MAX_EVENTS: usize = 256;
 
+/// Captures that may wait to be written. They come at the pace of a robot and each is megabytes.
+const MAX_MEASURED: usize = 2;
+
 /// How long the end of the program waits for the workers. Calls under way return within a fraction of it.
 pub const JOIN_DEADLINE: Duration = Duration::from_secs(2);
 
@@ -65,10 +73,13 @@ pub struct Busy;
 pub struct Workers {
     control: Option<Sender<Request<ControlTask>>>,
     camera: Option<Sender<Request<CameraTask>>>,
+    vision: Option<Sender<VisionTask>>,
+    measured: Option<Receiver<Measured>>,
     events: Option<Receiver<Event>>,
     stop: Arc<StopLine>,
     robot: Arc<LatestSlot<RobotState>>,
     frames: Arc<LatestSlot<LiveFrame>>,
+    detections: Arc<LatestSlot<LiveDetection>>,
     shutdown: CancelToken,
     threads: Vec<Thread>,
 }
@@ -96,8 +107,17 @@ impl Workers {
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
         workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
-        let duty = Camera::new(scale, Arc::clone(&workers.frames));
+        let (tap, bell) = Tap::new();
+        let tap = Arc::new(tap);
+        let duty = Camera::new(scale, Arc::clone(&workers.frames), Arc::clone(&tap));
         workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
+        let (sender, tasks) = bounded(MAX_REQUESTS);
+        let (measured, receiver) = bounded(MAX_MEASURED);
+        let detections = Arc::clone(&workers.detections);
+        let vision = Vision::new(tap, bell, tasks, detections, measured, outlet(), workers.shutdown.clone());
+        workers.run("vision", move || vision.run())?;
+        workers.vision = Some(sender);
+        workers.measured = Some(receiver);
         Ok(workers)
     }
 
@@ -106,10 +126,13 @@ impl Workers {
         Self {
             control: None,
             camera: None,
+            vision: None,
+            measured: None,
             events: Some(events),
             stop: Arc::default(),
             robot: Arc::default(),
             frames: Arc::default(),
+            detections: Arc::default(),
             shutdown: CancelToken::default(),
             threads: Vec::new(),
         }
@@ -124,17 +147,24 @@ impl Workers {
         outlet: Outlet,
     ) -> io::Result<Sender<Request<D::Task>>> {
         let (sender, requests) = bounded(MAX_REQUESTS);
-        let (running, done) = bounded(0);
         let reconnect = Reconnect::new(source.clone());
         let connector = Arc::clone(connector);
         let shutdown = self.shutdown.clone();
+        self.run(name, move || {
+            LinkLoop { duty, connector: connector.as_ref(), requests, outlet, shutdown }.run(reconnect);
+        })?;
+        Ok(sender)
+    }
+
+    fn run(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        let (running, done) = bounded(0);
         let handle = Builder::new().name(name.to_owned()).spawn(move || {
             // Dropped last, also when the worker panics.
             let _running: Sender<()> = running;
-            LinkLoop { duty, connector: connector.as_ref(), requests, outlet, shutdown }.run(reconnect);
+            work();
         })?;
         self.threads.push(Thread { handle, done });
-        Ok(sender)
+        Ok(())
     }
 
     /// Hands over everything that was reported since the last time. Never waits for a worker.
@@ -147,6 +177,9 @@ impl Workers {
         }
         if let Some((LiveFrame { info, images }, dropped)) = self.frames.take() {
             absorb(Event::Frame { info, dropped, images: Some(images) });
+        }
+        if let Some((detection, _)) = self.detections.take() {
+            absorb(Event::Detection(Box::new(detection)));
         }
     }
 
@@ -174,12 +207,28 @@ impl Workers {
         ask(self.camera.as_ref(), request)
     }
 
+    /// Asks the vision thread for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when it does not take requests.
+    pub fn ask_vision(&self, task: VisionTask) -> Result<(), Busy> {
+        ask(self.vision.as_ref(), task)
+    }
+
+    /// The end of the channel that captures come out of, for the one who writes them to the disk; once. The vision
+    /// thread waits when two are in it.
+    pub fn take_measured(&mut self) -> Option<Receiver<Measured>> {
+        self.measured.take()
+    }
+
     /// Ends the threads: calls under way are cancelled, channels closed, threads joined. A thread that does not end
     /// within the deadline is left alone, so that the program can end; returns how many there are.
     pub fn shut_down(&mut self, deadline: Duration) -> usize {
         self.shutdown.cancel();
         self.control = None;
         self.camera = None;
+        self.vision = None;
+        self.measured = None;
         self.events = None;
         let end = Instant::now() + deadline;
         let mut left_alone = 0;
@@ -203,7 +252,7 @@ impl Drop for Workers {
     }
 }
 
-fn ask<Task>(worker: Option<&Sender<Request<Task>>>, request: Request<Task>) -> Result<(), Busy> {
+fn ask<T>(worker: Option<&Sender<T>>, request: T) -> Result<(), Busy> {
     match worker.map(|worker| worker.try_send(request)) {
         Some(Ok(())) => Ok(()),
         Some(Err(TrySendError::Full(_) | TrySendError::Disconnected(_))) | None => Err(Busy),

@@ -11,6 +11,10 @@ use crate::observation::Corner;
 /// So long [s], on the clock of whoever asks, pictures may stay away and simulated time may stand still.
 pub const NO_PICTURES_S: f64 = 2.0;
 
+/// Pictures that must have come before robot or picture are said not to come to rest: twice as many as show that they
+/// are. A simulation that runs as fast as it can may pass the limit of time between two.
+const FAIR_PICTURES: u32 = 8;
+
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
@@ -111,7 +115,7 @@ pub struct Machine {
     advanced_s: f64,
     sim_time_s: Option<f64>,
     settling_s: f64,
-    rate_rad_s: f64,
+    settling_pictures: u32,
     wait: Wait,
     watch: Watch,
     collected: Option<Collected>,
@@ -137,7 +141,7 @@ impl Machine {
             advanced_s: requested_s,
             sim_time_s: None,
             settling_s: 0.0,
-            rate_rad_s: 0.0,
+            settling_pictures: 0,
             wait: Wait::ForPicture,
             watch: Watch::default(),
             collected: None,
@@ -187,6 +191,7 @@ impl Machine {
 
     fn settle(&mut self, base_from_tip: &Pose<Base, Tip>, shot: &Shot<'_>, passed_s: f64) {
         self.settling_s += passed_s;
+        self.settling_pictures = self.settling_pictures.saturating_add(1);
         let rest = self.watch.see(shot);
         self.waits_for(rest);
         if let Rest::Still { noise } = rest {
@@ -203,19 +208,23 @@ impl Machine {
                 newest: shot.number,
             });
             self.wait = Wait::Averaging { done: 1, of: self.frames() };
-        } else if self.settling_s > self.plan.settle_limit_s {
+            return;
+        }
+        if self.settling_s > self.plan.settle_limit_s && self.settling_pictures >= FAIR_PICTURES {
             let after_s = self.settling_s;
-            self.ended = Some(match self.wait {
-                Wait::RobotMoves => Refusal::RobotMoves { after_s, rate_rad_s: self.rate_rad_s },
-                _ => Refusal::PictureChanges { after_s },
-            });
+            self.ended = match rest {
+                Rest::RobotMoves { rate_rad_s } => Some(Refusal::RobotMoves { after_s, rate_rad_s }),
+                Rest::PictureChanges => Some(Refusal::PictureChanges { after_s }),
+                // Nothing moved last; a picture or two more tell.
+                Rest::Unknown | Rest::Still { .. } => None,
+            };
         }
     }
 
     /// What moved last is waited for until everything is known to be still.
     fn waits_for(&mut self, rest: Rest) {
         match rest {
-            Rest::RobotMoves { rate_rad_s } => (self.wait, self.rate_rad_s) = (Wait::RobotMoves, rate_rad_s),
+            Rest::RobotMoves { .. } => self.wait = Wait::RobotMoves,
             Rest::PictureChanges => self.wait = Wait::PictureChanges,
             Rest::Unknown | Rest::Still { .. } => {}
         }

@@ -207,6 +207,25 @@ fn a_simulation_started_anew_in_between_is_waited_for() {
 }
 
 #[test]
+fn a_simulation_that_races_is_given_enough_pictures() {
+    // 4 s pass from picture to picture, more than the limit.
+    let racing =
+        || pictures(1.0, |_| 0.0).map(|instant| Instant { sim_time_s: 4.0 * instant.number as f64, ..instant });
+    let mut machine = Machine::new(plan(1), REQUESTED_S);
+    assert_eq!(run(&mut machine, racing()).len(), 4);
+    let mut machine = Machine::new(plan(1), REQUESTED_S);
+    let progress = run(
+        &mut machine,
+        racing().map(|mut instant| {
+            instant.joints_rad[0] += 0.1 * instant.number as f64;
+            instant
+        }),
+    );
+    assert_eq!(progress.len(), 8);
+    assert!(matches!(progress[7], Progress::Refused(Refusal::RobotMoves { .. })), "{progress:?}");
+}
+
+#[test]
 fn a_pose_that_there_is_already_is_named_with_its_distance() {
     let at = |x_m: f64, turn_deg: f64| {
         Pose::from_isometry(Isometry3::new(Vector3::new(x_m, 0.0, 0.0), Vector3::z() * turn_deg.to_radians()))

@@ -73,11 +73,14 @@ fn wave(x: f64, sigma: f64, corners: usize) -> f64 {
     if x <= -1.0 || x >= corners as f64 {
         return 0.0;
     }
-    let step = |i: i32| libm::erf((x - f64::from(i)) / (sigma * std::f64::consts::SQRT_2));
-    let last = corners as i32;
-    let sum: f64 = (-4..last + 4).map(|i| if i.rem_euclid(2) == 0 { step(i) } else { -step(i) }).sum();
-    // The steps from −4 to an odd end sum to a wave around 0, or around 1 when their number is even.
-    if (last + 8) % 2 == 0 { sum - 1.0 } else { sum }
+    let nearest = x.floor() as i32;
+    let sign = |i: i32| if i.rem_euclid(2) == 0 { 1.0 } else { -1.0 };
+    // What blurring adds to the sharp wave: only steps within a few squares do.
+    let blurred = |i: i32| {
+        let t = x - f64::from(i);
+        sign(i) * (libm::erf(t / (sigma * std::f64::consts::SQRT_2)) - if t < 0.0 { -1.0 } else { 1.0 })
+    };
+    sign(nearest) + (nearest - 2..=nearest + 3).map(blurred).sum::<f64>()
 }
 
 /// Adds noise and rounds.
