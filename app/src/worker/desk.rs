@@ -25,7 +25,7 @@ const MAX_CAPTURES: usize = 4;
 /// The application's end of these threads.
 pub struct Desk {
     archive: Option<Sender<ArchiveTask>>,
-    captures: Option<Sender<Measured>>,
+    captures: Sender<Measured>,
     files: Option<Sender<FileTask>>,
     observer: NewestWins<ObserveJob>,
     solver: NewestWins<SolveJob>,
@@ -60,7 +60,7 @@ impl Desk {
         let (solver, solving) = NewestWins::start("solver", move |job, cancel| solver::solve(&job, cancel, &out))?;
         Ok(Self {
             archive: Some(archive),
-            captures: Some(captures),
+            captures,
             files: Some(files),
             observer,
             solver,
@@ -78,7 +78,7 @@ impl Desk {
     }
 
     /// Where captures are handed in.
-    pub fn captures(&self) -> Option<Sender<Measured>> {
+    pub fn captures(&self) -> Sender<Measured> {
         self.captures.clone()
     }
 
@@ -125,7 +125,6 @@ impl Drop for Desk {
         self.observer.end();
         self.solver.end();
         self.archive = None;
-        self.captures = None;
         self.files = None;
         let end = Instant::now() + JOIN_DEADLINE;
         for Started { handle, done } in self.threads.drain(..) {

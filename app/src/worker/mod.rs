@@ -1,10 +1,11 @@
-//! The threads behind the window. Each owns one connection to the cell and makes it again when it breaks.
+//! The threads behind the window. All but `vision` own one connection to the cell and make it again when it breaks.
 //!
 //! | thread | does | reports through |
 //! | --- | --- | --- |
 //! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
 //! | `camera` | pictures, colours of the depth | events; newest [`LiveFrame`] |
 //! | `motion` | motions and jogs, one at a time | events; refusals through the [`MotionDesk`] |
+//! | `vision` | board in the newest picture, captures | events; newest [`LiveDetection`]; [`Measured`] |
 //!
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
@@ -26,7 +27,7 @@ mod port;
 mod reconnect;
 mod slot;
 mod solver;
-pub mod vision;
+mod vision;
 
 #[cfg(test)]
 pub mod fake;
@@ -53,15 +54,19 @@ pub use observer::ObserveJob;
 pub use port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
 pub use slot::LatestSlot;
 pub use solver::SolveJob;
-pub use vision::VisionTask;
+pub use vision::{CaptureRequest, Measured, VisionTask};
 
 use crate::command::Event;
-use crate::model::{CellSource, Jog, JogRequest, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings};
+use crate::model::{
+    CellSource, Jog, JogRequest, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings,
+};
 use camera::Camera;
 use control::Control;
 use link::{Duty, LinkLoop, Outlet};
 use motion::Motions;
 use reconnect::Reconnect;
+use slot::Tap;
+use vision::Vision;
 
 /// Tells the window that there is something to look at. Called from any thread.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -88,12 +93,14 @@ pub struct Workers {
     control: Option<Sender<Request<ControlTask>>>,
     camera: Option<Sender<Request<CameraTask>>>,
     motion: Option<Sender<Request<MotionLook>>>,
+    vision: Option<Sender<VisionTask>>,
     events: Option<Receiver<Event>>,
     stop: Arc<StopLine>,
     desk: Arc<MotionDesk>,
     clock: Clock,
     robot: Arc<LatestSlot<RobotState>>,
     frames: Arc<LatestSlot<LiveFrame>>,
+    detections: Arc<LatestSlot<LiveDetection>>,
     shutdown: CancelToken,
     threads: Vec<Thread>,
 }
@@ -105,7 +112,7 @@ struct Thread {
 }
 
 impl Workers {
-    /// Starts the threads.
+    /// Starts the threads. What is captured goes to `captures`.
     ///
     /// # Errors
     /// When the system has no more threads.
@@ -113,7 +120,7 @@ impl Workers {
         source: &CellSource,
         view: &ViewSettings,
         connector: &Arc<dyn Connector>,
-        captures: Option<Sender<vision::Measured>>,
+        captures: Sender<Measured>,
         clock: &Clock,
         waker: &Waker,
     ) -> io::Result<Self> {
@@ -122,11 +129,17 @@ impl Workers {
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
         workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
-        let _ = captures; let scale = view.depth_scale;
-        let duty = Camera::new(scale, Arc::clone(&workers.frames));
+        let (tap, bell) = Tap::new();
+        let tap = Arc::new(tap);
+        let duty = Camera::new(view, Arc::clone(&workers.frames), Arc::clone(&tap));
         workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
         let duty = Motions::new(Arc::clone(&workers.desk));
         workers.motion = Some(workers.spawn("motion", duty, source, connector, outlet())?);
+        let (sender, tasks) = bounded(MAX_REQUESTS);
+        let detections = Arc::clone(&workers.detections);
+        let vision = Vision::new(tap, bell, tasks, detections, captures, outlet(), workers.shutdown.clone());
+        workers.run("vision", move || vision.run())?;
+        workers.vision = Some(sender);
         Ok(workers)
     }
 
@@ -136,12 +149,14 @@ impl Workers {
             control: None,
             camera: None,
             motion: None,
+            vision: None,
             events: Some(events),
             stop: Arc::default(),
             desk: Arc::new(MotionDesk::new(Arc::clone(waker))),
             clock: Arc::clone(clock),
             robot: Arc::default(),
             frames: Arc::default(),
+            detections: Arc::default(),
             shutdown: CancelToken::default(),
             threads: Vec::new(),
         }
@@ -156,17 +171,24 @@ impl Workers {
         outlet: Outlet,
     ) -> io::Result<Sender<Request<D::Task>>> {
         let (sender, requests) = bounded(MAX_REQUESTS);
-        let (running, done) = bounded(0);
         let reconnect = Reconnect::new(source.clone());
         let connector = Arc::clone(connector);
         let shutdown = self.shutdown.clone();
+        self.run(name, move || {
+            LinkLoop { duty, connector: connector.as_ref(), requests, outlet, shutdown }.run(reconnect);
+        })?;
+        Ok(sender)
+    }
+
+    fn run(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        let (running, done) = bounded(0);
         let handle = Builder::new().name(name.to_owned()).spawn(move || {
             // Dropped last, also when the worker panics.
             let _running: Sender<()> = running;
-            LinkLoop { duty, connector: connector.as_ref(), requests, outlet, shutdown }.run(reconnect);
+            work();
         })?;
         self.threads.push(Thread { handle, done });
-        Ok(sender)
+        Ok(())
     }
 
     /// Hands over everything that was reported since the last time. Never waits for a worker.
@@ -180,6 +202,9 @@ impl Workers {
         }
         if let Some((LiveFrame { info, images }, dropped)) = self.frames.take() {
             absorb(Event::Frame { info, dropped, images: Some(images) });
+        }
+        if let Some((detection, _)) = self.detections.take() {
+            absorb(Event::Detection(Box::new(detection)));
         }
     }
 
@@ -267,15 +292,20 @@ impl Workers {
         ask(self.control.as_ref(), request)
     }
 
-    /// stub
-    pub fn ask_vision(&self, _t: VisionTask) -> Result<(), Busy> { Ok(()) }
-
     /// Asks the camera worker for something.
     ///
     /// # Errors
     /// [`Busy`] when it does not take requests.
     pub fn ask_camera(&self, request: Request<CameraTask>) -> Result<(), Busy> {
         ask(self.camera.as_ref(), request)
+    }
+
+    /// Asks the vision thread for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when it does not take requests.
+    pub fn ask_vision(&self, task: VisionTask) -> Result<(), Busy> {
+        ask(self.vision.as_ref(), task)
     }
 
     /// Ends the threads: calls under way are cancelled, channels closed, threads joined. A thread that does not end
@@ -285,6 +315,7 @@ impl Workers {
         self.control = None;
         self.camera = None;
         self.motion = None;
+        self.vision = None;
         self.events = None;
         let end = Instant::now() + deadline;
         let mut left_alone = 0;
@@ -308,7 +339,7 @@ impl Drop for Workers {
     }
 }
 
-fn ask<Task>(worker: Option<&Sender<Request<Task>>>, request: Request<Task>) -> Result<(), Busy> {
+fn ask<T>(worker: Option<&Sender<T>>, request: T) -> Result<(), Busy> {
     match worker.map(|worker| worker.try_send(request)) {
         Some(Ok(())) => Ok(()),
         Some(Err(TrySendError::Full(_) | TrySendError::Disconnected(_))) | None => Err(Busy),
