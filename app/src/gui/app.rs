@@ -68,10 +68,8 @@ impl App {
                 self.expect(text!("The simulation was not started"), asked);
             }
             Command::Reconnect => {
-                let control = self.workers.ask_control(Request::Reconnect);
-                let camera = self.workers.ask_camera(Request::Reconnect);
-                let motion = self.workers.reconnect_motion();
-                self.expect(text!("The connection was not tried again"), control.and(camera).and(motion));
+                let asked = self.workers.reconnect();
+                self.expect(text!("The connection was not tried again"), asked);
             }
             Command::SetTheme(theme) => self.model.view.theme = theme,
             Command::SetRotationFormat(format) => self.model.view.rotation = format,
@@ -135,8 +133,12 @@ impl App {
         match (self.model.link(link).clone(), before.is_connected()) {
             (LinkState::Connected { server, address }, false) => {
                 let text = match link {
-                    Link::Control => text!("Robot connected to {server} at {address}", server = server, address = address),
-                    Link::Camera => text!("Camera connected to {server} at {address}", server = server, address = address),
+                    Link::Control => {
+                        text!("Robot connected to {server} at {address}", server = server, address = address)
+                    }
+                    Link::Camera => {
+                        text!("Camera connected to {server} at {address}", server = server, address = address)
+                    }
                     Link::Motion => return,
                 };
                 self.say(Severity::Info, text);

@@ -19,7 +19,7 @@ pub use capture::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
 pub use motion::{
-    Axis, CellFacts, Jog, JogFrame, JogRequest, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
+    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
 };
 

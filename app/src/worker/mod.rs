@@ -30,6 +30,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use handeye_core::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
 pub use camera::CameraTask;
@@ -39,11 +40,11 @@ pub use link::Request;
 pub use live::LiveConnector;
 pub use motion::MotionLook;
 pub use motion_desk::{MotionDesk, MotionTask};
-pub use port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
+pub use port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
 pub use slot::LatestSlot;
 
 use crate::command::Event;
-use crate::model::{CellSource, DepthScale, Jog, JogRequest, LiveFrame, MotionId, MotionRequest, RobotState};
+use crate::model::{CellSource, DepthScale, Jog, LiveFrame, MotionId, MotionRequest, RobotState};
 use camera::Camera;
 use control::Control;
 use link::{Duty, LinkLoop, Outlet};
@@ -188,14 +189,21 @@ impl Workers {
         self.begin(MotionTask::Move(request))
     }
 
-    /// Asks for one step of a jog: `metres` along a line, or `radians` about an axis or of a joint. Reported as
-    /// [`Self::move_to`].
+    /// Asks for one step of a jog at a share of the fastest speed: metres along a line, or radians about an axis or of a
+    /// joint. Reported as [`Self::move_to`].
     ///
     /// # Errors
     /// As [`Self::move_to`].
-    pub fn jog_step(&self, id: MotionId, request: JogRequest, metres: f64, radians: f64) -> Result<(), Busy> {
-        let length = if matches!(request.jog, Jog::Translate { .. }) { metres } else { radians };
-        self.begin(MotionTask::JogStep { id, request, length })
+    pub fn jog_step(
+        &self,
+        id: MotionId,
+        jog: Jog,
+        [metres, radians]: [f64; 2],
+        speed: f64,
+        tip_from_camera: Option<Pose<Tip, CameraFrame>>,
+    ) -> Result<(), Busy> {
+        let length = if matches!(jog, Jog::Translate { .. }) { metres } else { radians };
+        self.begin(MotionTask::JogStep { id, request: JogRequest { jog, tip_from_camera, speed }, length })
     }
 
     /// Ends the motion that is under way, without a stop of everything else.
@@ -204,15 +212,17 @@ impl Workers {
     }
 
     /// A jog button is held now: to be called when it is pressed, and again and again while it is held, or the arm
-    /// stops by itself after [`HELD_S`]. [`Event::JogEnded`] tells once per press that the arm stands.
-    pub fn hold_jog(&self, request: JogRequest) {
+    /// stops by itself after [`HELD_S`]. [`Event::JogEnded`] tells that the arm stands: when the jog ends, and once more when
+    /// a button is let go that had been held for longer.
+    pub fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
+        let request = JogRequest { jog, tip_from_camera, speed };
         self.desk.hold(request, self.stop.is_pressed(), self.now_s());
         self.wake_motion();
     }
 
     /// No jog button is held any more.
     pub fn release_jog(&self) {
-        self.desk.release(self.now_s());
+        self.desk.release();
     }
 
     fn begin(&self, task: MotionTask) -> Result<(), Busy> {
@@ -234,12 +244,13 @@ impl Workers {
         (self.clock)()
     }
 
-    /// Asks the motion worker to connect now.
+    /// Has every worker without a connection try now.
     ///
     /// # Errors
-    /// [`Busy`] when it does not take requests.
-    pub fn reconnect_motion(&self) -> Result<(), Busy> {
-        ask(self.motion.as_ref(), Request::Reconnect)
+    /// [`Busy`] when one does not take requests.
+    pub fn reconnect(&self) -> Result<(), Busy> {
+        let motion = ask(self.motion.as_ref(), Request::Reconnect);
+        self.ask_control(Request::Reconnect).and(self.ask_camera(Request::Reconnect)).and(motion)
     }
 
     /// Asks the control worker for something.
@@ -295,5 +306,9 @@ fn ask<Task>(worker: Option<&Sender<Request<Task>>>, request: Request<Task>) -> 
     }
 }
 
+#[cfg(test)]
+mod live_tests;
+#[cfg(test)]
+mod motion_tests;
 #[cfg(test)]
 mod tests;
