@@ -199,7 +199,7 @@ fn a_tip_that_is_held_until_it_can_go_no_further_stops_and_says_why() {
     let jog = ArmJog::Line { kinematics: &kinematics, axes: JogAxes::Base, along: Vector3::x() };
     let end = bench.arm.jog(&jog, None, &mut held).expect("calls");
     assert!(matches!(end, JogEnd::Obstacle(JogObstacle::Reach(_) | JogObstacle::Singular { .. })), "{end:?}");
-    assert!(fastest_rad_s <= 1.25 * 90_f64.to_radians(), "{}°/s", fastest_rad_s.to_degrees());
+    assert!(fastest_rad_s <= 90.01_f64.to_radians(), "{}°/s", fastest_rad_s.to_degrees());
 }
 
 #[test]
@@ -250,7 +250,9 @@ fn a_cancelled_motion_is_braked_within_its_limits() {
     let watching = std::thread::spawn(move || {
         let mut seen: Vec<(f64, f64)> = Vec::new();
         loop {
+            watch.sim().acquire_lock().expect("a call");
             let now = (watch.sim().get_simulation_time().expect("a call"), watch.joint_angles().expect("a call")[0]);
+            watch.sim().release_lock().expect("a call");
             if seen.last().is_none_or(|last| last.0 != now.0) {
                 seen.push(now);
             }
@@ -270,8 +272,9 @@ fn a_cancelled_motion_is_braked_within_its_limits() {
     let seen = watching.join().expect("no panic");
     for triple in seen.windows(3) {
         let speed = |i: usize| (triple[i + 1].1 - triple[i].1) / (triple[i + 1].0 - triple[i].0);
-        // The second difference of samples over up to three passes; a dead stop from full speed would be 20 rad/s².
-        assert!((speed(1) - speed(0)).abs() / TIME_STEP_S <= 3.0 * 2.0, "{triple:?}");
+        // Mean speeds are those of some moment, and the middles of their times are half of all the time apart.
+        let acceleration = (speed(1) - speed(0)) / ((triple[2].0 - triple[0].0) / 2.0);
+        assert!(acceleration.abs() <= 2.0 + 1e-6, "{acceleration} rad/s² over {triple:?}");
     }
 }
 
@@ -285,16 +288,18 @@ fn a_stop_brings_the_motion_of_another_client_to_rest() {
     let other = std::thread::spawn(move || {
         let mut sim = Sim::connect(&address, ConnectionOptions::default()).expect("a socket");
         let joints = (0..6).map(|i| sim.get_object_index("/UR5/joint", i).expect("a joint")).collect();
-        let limits = MotionLimits::uniform(6, 1e-4, 1.0, 10.0);
+        let limits = MotionLimits::uniform(6, 1e-3, 1.0, 10.0);
         let motion = JointMotion { joints, target_rad: goal.to_vec(), limits };
         began.send(()).expect("the test waits");
         sim.move_to_config(&motion, &CallOptions::long(PATIENCE, &CancelToken::default()))
     });
     begun.recv_timeout(PATIENCE).expect("it begins");
     let start = bench.joints()[0];
-    while bench.joints()[0] == start {}
+    while bench.joints()[0] == start {
+        assert!(!other.is_finished(), "{:?}", other.join());
+    }
     bench.arm.stop().expect("a call");
-    // At this speed the whole way would take eight hours of simulated time.
+    // At this speed the whole way takes fifty minutes of simulated time.
     other.join().expect("no panic").expect("its call returns");
     let rest = bench.joints();
     bench.arm.sim().step(&CallOptions::default()).expect("a pass");

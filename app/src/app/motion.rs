@@ -1,9 +1,10 @@
 //! Moving and jogging the arm.
 
+use handeye_core::frames::{Camera, Pose, Tip};
 use handeye_core::session::CaptureId;
 
 use super::App;
-use crate::model::{Jog, JogRequest, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Severity};
+use crate::model::{Jog, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Severity};
 use crate::text;
 use crate::text::Text;
 
@@ -12,7 +13,7 @@ impl App {
     pub(super) fn start_motion(&mut self, goal: MotionGoal, what: Text) {
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         let id = self.numbers.motion;
-        let request = MotionRequest { id, goal, what: what.clone(), speed: self.model.view.jog.speed };
+        let request = MotionRequest { id, goal, speed: self.model.view.jog.speed };
         match self.workers.move_to(request) {
             Ok(()) => {
                 self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
@@ -64,8 +65,8 @@ impl App {
             JogStep::Step { metres, radians } => {
                 self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
                 let id = self.numbers.motion;
-                let request = self.jog_request(jog);
-                match self.workers.jog_step(id, request, metres, radians) {
+                let speed = self.model.view.jog.speed;
+                match self.workers.jog_step(id, jog, [metres, radians], speed, self.camera_on_tip()) {
                     Ok(()) => {
                         let (what, since_s) = (text!("the next step"), self.model.now_s);
                         self.model.motion = Motion::Moving { id, what, since_s };
@@ -80,7 +81,7 @@ impl App {
         if self.model.view.jog.step != JogStep::Hold {
             return;
         }
-        self.workers.hold_jog(self.jog_request(jog));
+        self.workers.hold_jog(jog, self.model.view.jog.speed, self.camera_on_tip());
         self.model.motion = Motion::Jogging(jog);
     }
 
@@ -105,11 +106,9 @@ impl App {
         self.model.motion = Motion::Idle;
     }
 
-    /// The camera on the tip is as calibrated, or else as the scene says: only to choose the axes that a person jogs
-    /// along.
-    fn jog_request(&self, jog: Jog) -> JogRequest {
+    /// The camera on the tip as calibrated, or else as the scene says: only to choose the axes that a person jogs along.
+    fn camera_on_tip(&self) -> Option<Pose<Tip, Camera>> {
         let said = || Some(self.model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
-        let tip_from_camera = self.model.tip_from_camera().or_else(said);
-        JogRequest { jog, tip_from_camera, speed: self.model.view.jog.speed }
+        self.model.tip_from_camera().or_else(said)
     }
 }

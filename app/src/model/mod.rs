@@ -33,7 +33,7 @@ pub use capture::{
 pub use export::{ExportState, Preview, PreviewFile, Written};
 pub use messages::{Message, Messages};
 pub use motion::{
-    Axis, CellFacts, Jog, JogFrame, JogRequest, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
+    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
 };
 pub use session::{

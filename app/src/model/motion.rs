@@ -53,19 +53,6 @@ pub struct MotionRequest {
     pub goal: MotionGoal,
     /// Share of the fastest speed, over 0 and up to 1.
     pub speed: f64,
-    /// Where to, in words.
-    pub what: Text,
-}
-
-/// A jog that is asked for: for as long as a button is held, or by a step.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct JogRequest {
-    /// Which way.
-    pub jog: Jog,
-    /// Where the camera is, for jogs along and about its axes.
-    pub tip_from_camera: Option<Pose<Tip, Camera>>,
-    /// Share of the fastest speed, over 0 and up to 1.
-    pub speed: f64,
 }
 
 /// How a motion ended.

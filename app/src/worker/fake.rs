@@ -9,8 +9,8 @@ use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
 
-use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
-use crate::model::{CellFacts, JogRequest, MotionGoal, MotionOutcome, RobotState, Simulation};
+use super::port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
+use crate::model::{CellFacts, MotionGoal, MotionOutcome, RobotState, Simulation};
 use crate::text::Text;
 
 /// Width and height of the fake pictures in pixels.

@@ -158,7 +158,7 @@ fn preview(job: &ExportJob) -> Vec<(String, Result<Vec<PreviewFile>, String>)> {
     export::formats()
         .iter()
         .map(|format| {
-            let files = format.render(&job.input()).map_err(|error| error.to_string()).map(|files| {
+            let files = export::preview(*format, &job.input()).map_err(|error| error.to_string()).map(|files| {
                 files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect()
             });
             (format.name().to_owned(), files)

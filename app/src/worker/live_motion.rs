@@ -7,9 +7,9 @@ use handeye_sim_link::client::{CancelToken, LinkError};
 use nalgebra::Vector3;
 
 use super::live::{check_arm, port_error};
-use super::port::{MotionPort, PortError};
+use super::port::{JogRequest, MotionPort, PortError};
 use crate::limits;
-use crate::model::{Axis, Jog, JogFrame, JogRequest, MotionGoal, MotionOutcome};
+use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
 use crate::text;
 use crate::text::Text;
 

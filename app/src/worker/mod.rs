@@ -38,6 +38,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use handeye_core::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
 pub use archive::{ArchiveTask, Beginning, timestamp_rfc3339};
@@ -51,14 +52,14 @@ pub use live::LiveConnector;
 pub use motion::MotionLook;
 pub use motion_desk::{MotionDesk, MotionTask};
 pub use observer::ObserveJob;
-pub use port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
+pub use port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
 pub use slot::LatestSlot;
 pub use solver::SolveJob;
 pub use vision::{CaptureRequest, Measured, VisionTask};
 
 use crate::command::Event;
 use crate::model::{
-    CellSource, Jog, JogRequest, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings,
+    CellSource, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings,
 };
 use camera::Camera;
 use control::Control;
@@ -228,14 +229,21 @@ impl Workers {
         self.begin(MotionTask::Move(request))
     }
 
-    /// Asks for one step of a jog: `metres` along a line, or `radians` about an axis or of a joint. Reported as
-    /// [`Self::move_to`].
+    /// Asks for one step of a jog at a share of the fastest speed: metres along a line, or radians about an axis or of a
+    /// joint. Reported as [`Self::move_to`].
     ///
     /// # Errors
     /// As [`Self::move_to`].
-    pub fn jog_step(&self, id: MotionId, request: JogRequest, metres: f64, radians: f64) -> Result<(), Busy> {
-        let length = if matches!(request.jog, Jog::Translate { .. }) { metres } else { radians };
-        self.begin(MotionTask::JogStep { id, request, length })
+    pub fn jog_step(
+        &self,
+        id: MotionId,
+        jog: Jog,
+        [metres, radians]: [f64; 2],
+        speed: f64,
+        tip_from_camera: Option<Pose<Tip, CameraFrame>>,
+    ) -> Result<(), Busy> {
+        let length = if matches!(jog, Jog::Translate { .. }) { metres } else { radians };
+        self.begin(MotionTask::JogStep { id, request: JogRequest { jog, tip_from_camera, speed }, length })
     }
 
     /// Ends the motion that is under way, without a stop of everything else.
@@ -244,15 +252,17 @@ impl Workers {
     }
 
     /// A jog button is held now: to be called when it is pressed, and again and again while it is held, or the arm
-    /// stops by itself after [`HELD_S`]. [`Event::JogEnded`] tells once per press that the arm stands.
-    pub fn hold_jog(&self, request: JogRequest) {
+    /// stops by itself after [`HELD_S`]. [`Event::JogEnded`] tells that the arm stands: when the jog ends, and once more when
+    /// a button is let go that had been held for longer.
+    pub fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
+        let request = JogRequest { jog, tip_from_camera, speed };
         self.desk.hold(request, self.stop.is_pressed(), self.now_s());
         self.wake_motion();
     }
 
     /// No jog button is held any more.
     pub fn release_jog(&self) {
-        self.desk.release(self.now_s());
+        self.desk.release();
     }
 
     fn begin(&self, task: MotionTask) -> Result<(), Busy> {
@@ -274,14 +284,13 @@ impl Workers {
         (self.clock)()
     }
 
-    /// Has every worker try to connect now.
+    /// Has every worker without a connection try now.
     ///
     /// # Errors
     /// [`Busy`] when one does not take requests.
     pub fn reconnect(&self) -> Result<(), Busy> {
-        let control = self.ask_control(Request::Reconnect);
-        let camera = self.ask_camera(Request::Reconnect);
-        control.and(camera).and(ask(self.motion.as_ref(), Request::Reconnect))
+        let motion = ask(self.motion.as_ref(), Request::Reconnect);
+        self.ask_control(Request::Reconnect).and(self.ask_camera(Request::Reconnect)).and(motion)
     }
 
     /// Asks the control worker for something.
@@ -346,5 +355,9 @@ fn ask<T>(worker: Option<&Sender<T>>, request: T) -> Result<(), Busy> {
     }
 }
 
+#[cfg(test)]
+mod live_tests;
+#[cfg(test)]
+mod motion_tests;
 #[cfg(test)]
 mod tests;

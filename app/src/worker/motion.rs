@@ -8,9 +8,9 @@ use handeye_sim_link::client::CancelToken;
 use super::jog_line::Held;
 use super::link::{Duty, Outlet};
 use super::motion_desk::{MotionDesk, MotionTask, Work};
-use super::port::{Connected, Connector, MotionPort, PortError};
+use super::port::{Connected, Connector, JogRequest, MotionPort, PortError};
 use crate::command::Event;
-use crate::model::{JogRequest, Link, MotionOutcome};
+use crate::model::{Link, MotionOutcome};
 use crate::text;
 
 /// Rest between two looks at the connection. Work does not wait for it: the worker is woken.

@@ -7,8 +7,9 @@ use handeye_sim_link::client::CancelToken;
 
 use super::Waker;
 use super::jog_line::{HELD_S, Held, JogLine};
+use super::port::JogRequest;
 use crate::command::Event;
-use crate::model::{JogRequest, MotionId, MotionOutcome, MotionRequest};
+use crate::model::{MotionGoal, MotionId, MotionOutcome, MotionRequest};
 use crate::text;
 use crate::text::Text;
 
@@ -39,7 +40,8 @@ impl MotionTask {
 
     fn what(&self) -> Text {
         match self {
-            Self::Move(request) => request.what.clone(),
+            Self::Move(MotionRequest { goal: MotionGoal::Joints(_), .. }) => text!("a motion of the joints"),
+            Self::Move(MotionRequest { goal: MotionGoal::Tip(_), .. }) => text!("a motion of the tip"),
             Self::JogStep { .. } => text!("a step"),
         }
     }
@@ -75,6 +77,8 @@ struct Inner {
     line: JogLine,
     /// A stop came while a button was held.
     jog_stopped: bool,
+    /// A button was held since the window last heard that the arm stands.
+    owes_end: bool,
     /// What the window has to hear from here.
     said: Vec<Event>,
 }
@@ -110,6 +114,7 @@ impl MotionDesk {
     /// A jog button is held now.
     pub fn hold(&self, request: JogRequest, stopping: bool, now_s: f64) {
         let mut inner = self.inner();
+        inner.owes_end = true;
         if !inner.line.hold(request, now_s) || matches!(inner.doing, Doing::Jogging) && !stopping {
             return;
         }
@@ -120,12 +125,11 @@ impl MotionDesk {
     }
 
     /// No jog button is held any more.
-    pub fn release(&self, now_s: f64) {
+    pub fn release(&self) {
         let mut inner = self.inner();
-        let unheard = inner.line.request(now_s).is_some() && !matches!(inner.doing, Doing::Jogging);
         inner.line.release();
-        if unheard {
-            // Pressed and let go before the worker looked: there will be no other word of it.
+        // Pressed and let go before the worker looked, or held for longer than it meant anything.
+        if inner.owes_end && !matches!(inner.doing, Doing::Jogging) {
             inner.say(Event::JogEnded { why: None }, &self.waker);
         }
     }
@@ -215,6 +219,7 @@ impl MotionDesk {
         };
         inner.line.bar_jog(request.jog, now_s);
         let goes_on = why.is_none() && inner.line.request(now_s).is_some();
+        inner.owes_end &= goes_on;
         (!goes_on).then_some(Event::JogEnded { why })
     }
 }
@@ -246,13 +251,14 @@ impl Inner {
     }
 
     fn say(&mut self, event: Event, waker: &Waker) {
+        self.owes_end &= !matches!(event, Event::JogEnded { .. });
         self.said.push(event);
         waker();
     }
 }
 
 fn still_moving(what: Text) -> Text {
-    text!("The arm is still on its way: {what}", what = what)
+    text!("{what} is still under way", what = what)
 }
 
 fn no_connection() -> Text {

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::model::{Jog, MotionGoal};
+use crate::model::Jog;
 use crate::text::Language;
 
 fn desk() -> MotionDesk {
@@ -11,8 +11,7 @@ fn desk() -> MotionDesk {
 }
 
 fn task(id: u64) -> MotionTask {
-    let what = Text::verbatim(format!("pose {id}"));
-    MotionTask::Move(MotionRequest { id: MotionId(id), goal: MotionGoal::Joints([0.0; 6]), speed: 1.0, what })
+    MotionTask::Move(MotionRequest { id: MotionId(id), goal: MotionGoal::Joints([0.0; 6]), speed: 1.0 })
 }
 
 fn button(index: usize) -> JogRequest {
@@ -39,12 +38,13 @@ fn what_comes_while_something_moves_is_refused_with_what_moves() {
     assert!(matches!(desk.take(0.0), Work::Motion(MotionTask::Move(request), _) if request.id == MotionId(1)));
     desk.ask(task(3), false);
     desk.hold(button(0), false, 0.0);
-    let reason = "The arm is still on its way: pose 1".to_owned();
+    let reason = "a motion of the joints is still under way".to_owned();
     assert_eq!(said(&desk), [(2, reason.clone()), (3, reason.clone()), (0, reason)]);
     desk.done();
     desk.hold(button(0), false, 0.1);
     assert!(matches!(desk.take(0.1), Work::Nothing), "the press that was refused does not begin later");
-    desk.release(0.2);
+    desk.release();
+    assert_eq!(said(&desk), [(0, "released".to_owned())], "it was held after its end was told");
     desk.hold(button(0), false, 0.3);
     assert!(matches!(desk.take(0.3), Work::Jog(_)));
     desk.ask(task(4), false);
@@ -63,7 +63,7 @@ fn a_stop_leaves_nothing_that_could_begin_later() {
     let reason = "The arm is being stopped".to_owned();
     assert_eq!(said(&desk), [(2, reason.clone()), (0, reason)]);
     assert!(matches!(desk.take(0.0), Work::Nothing));
-    desk.release(0.1);
+    desk.release();
     desk.hold(button(0), false, 0.2);
     desk.cancel(0.2);
     assert_eq!(said(&desk), [(0, "The arm was stopped".to_owned())]);
@@ -88,14 +88,17 @@ fn a_jog_is_told_to_have_ended_once_and_with_its_reason() {
     assert!(matches!(desk.take(0.0), Work::Jog(_)));
     desk.cancel(0.1);
     assert_eq!(desk.is_held(&button(0), 0.1), Held::Released);
-    let Some(Event::JogEnded { why: Some(why) }) = desk.end_jog(&button(0), None, false, 0.2) else { panic!("no word") };
+    let Some(Event::JogEnded { why: Some(why) }) = desk.end_jog(&button(0), None, false, 0.2) else {
+        panic!("no word")
+    };
     assert_eq!(why.say(Language::English), "The arm was stopped");
     desk.hold(button(0), false, 0.25);
     assert!(matches!(desk.take(0.25), Work::Nothing), "it has been held all the time");
 
-    desk.release(0.3);
+    desk.release();
+    said(&desk);
     desk.hold(button(0), false, 0.4);
-    desk.release(0.41);
+    desk.release();
     assert_eq!(said(&desk), [(0, "released".to_owned())], "also when the worker was not quick enough to see it");
     desk.hold(button(1), false, 1.0);
     assert!(matches!(desk.take(1.0), Work::Jog(_)));

@@ -1,12 +1,12 @@
 //! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
 
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::frames::{Base, Camera, Pose, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::JointAngles;
 
-use crate::model::{CellFacts, JogRequest, MotionGoal, MotionOutcome, RobotState};
+use crate::model::{CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
 use crate::text::Text;
 
 /// Why a port has no answer.
@@ -80,6 +80,17 @@ pub trait ControlPort: Send {
     /// # Errors
     /// [`PortError`]; the arm may then still move.
     fn stop(&mut self) -> Result<(), PortError>;
+}
+
+/// A jog that is asked for: for as long as a button is held, or by a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JogRequest {
+    /// Which way.
+    pub jog: Jog,
+    /// Where the camera is, for jogs along and about its axes.
+    pub tip_from_camera: Option<Pose<Tip, Camera>>,
+    /// Share of the fastest speed, over 0 and up to 1.
+    pub speed: f64,
 }
 
 /// What moves the arm.

@@ -130,7 +130,8 @@ pub fn rgb_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<RgbImage,
     })
 }
 
-/// A depth image from little-endian `f32` with the bottom row first; a surface that is nowhere is at the far plane.
+/// A depth image from little-endian `f32` with the bottom row first. Where nothing was hit, the depth is that of the
+/// far clipping plane.
 ///
 /// # Errors
 /// [`ConvertError::BufferSize`].

@@ -37,6 +37,9 @@ const STEP_SAMPLES: usize = 64;
 /// A joint that turns by more between two neighbouring points of a path has changed to another configuration [rad].
 const JUMP_RAD: f64 = 0.5;
 
+/// How often a step that is too fast is halved before it is given up: to less than the crawl.
+const SLOWER_STEPS: usize = 6;
+
 /// Closer to its end than this [m, rad] a path is at its end.
 const AT_END: f64 = 1e-9;
 
@@ -204,17 +207,33 @@ impl<'a> JogPlan<'a> {
         let change = acceleration * self.dt_s;
         let next = wanted.clamp((self.speed - change).max(0.0), self.speed + change);
         self.speed = next.min(self.free_speed(next));
-        let mut distance = self.distance + self.speed * self.dt_s;
-        if let Some(length) = self.length
-            && length - distance < AT_END
-        {
-            distance = length;
-        }
-        match self.path.joints_at(distance, &self.joints) {
-            Ok(joints) => (self.joints, self.distance) = (joints, distance),
-            Err(obstacle) => (self.speed, self.obstacle) = (0.0, Some(obstacle)),
+        if let Err(obstacle) = self.step() {
+            (self.speed, self.obstacle) = (0.0, Some(obstacle));
         }
         self.joints
+    }
+
+    /// Moves on for one pass, more slowly if a joint would be too fast: what lies between the points that were looked
+    /// at may be worse than they are.
+    fn step(&mut self) -> Result<(), JogObstacle> {
+        let mut joint = 0;
+        for _ in 0..SLOWER_STEPS {
+            let mut distance = self.distance + self.speed * self.dt_s;
+            if let Some(length) = self.length
+                && length - distance < AT_END
+            {
+                distance = length;
+            }
+            let joints = self.path.joints_at(distance, &self.joints)?;
+            let (fastest, by_rad) = largest_change(&self.joints, &joints);
+            if by_rad <= JOINT_RATE * self.dt_s {
+                (self.joints, self.distance) = (joints, distance);
+                return Ok(());
+            }
+            joint = fastest + 1;
+            self.speed /= 2.0;
+        }
+        Err(JogObstacle::Singular { joint })
     }
 
     /// Whether it stands.
