@@ -1,6 +1,6 @@
 //! Dialogs that explain: the keys, and what this program is.
 
-use egui::{Context, CornerRadius, Frame, Grid, Id, Label, Margin, Modal, RichText, ScrollArea, Stroke, Ui};
+use egui::{Align, Context, CornerRadius, Frame, Grid, Id, Label, Layout, Margin, Modal, RichText, ScrollArea, Stroke, Ui};
 
 use super::actions::{self, Group};
 use super::theme::{self, Palette, TITLE};
@@ -21,7 +21,8 @@ pub fn dialog_ui(ctx: &Context, dialog: Dialog, model: &Model, outbox: &mut Outb
         ui.set_max_width(560.0);
         content_ui(ui);
         ui.add_space(14.0);
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        let row = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(row, Layout::right_to_left(Align::Center), |ui| {
             ui.button(tr!(language, "Close")).clicked()
         })
         .inner
