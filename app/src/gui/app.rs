@@ -127,7 +127,7 @@ impl App {
         self.workers.press_stop();
         self.model.stop_pending = true;
         if self.model.control.is_connected() {
-            self.say(Severity::Warning, text!("Stopping the arm…"));
+            self.say(Severity::Info, text!("Stopping the arm…"));
         } else {
             self.say(
                 Severity::Error,

@@ -253,7 +253,7 @@ fn a_command_is_found_by_typing_and_done_by_enter() {
 fn the_help_lists_the_keys_that_work() {
     let mut silent = Silent::live();
     silent.press(egui::Modifiers::NONE, egui::Key::F1);
-    for text in ["Stop the arm", "Escape", "Ctrl+Z", "Ctrl+Shift+Z", "Space", "Delete the selected captures", "F1"] {
+    for text in ["Stop the arm", "Esc", "Ctrl+Z", "Ctrl+Shift+Z", "Space", "Delete the selected captures", "F1"] {
         assert!(silent.sees(text), "{text}");
     }
     silent.click("Close");
@@ -265,7 +265,10 @@ fn an_error_stays_on_the_screen_until_it_is_put_aside_and_then_in_the_log() {
     let mut silent = Silent::live();
     let text = crate::text::Text::verbatim("the lens cap is on");
     silent.absorb(Event::Notice { severity: crate::model::Severity::Error, text });
-    assert!(silent.harness.query_all_by_label("the lens cap is on").count() >= 2, "over the panes and in the status bar");
+    assert!(
+        silent.harness.query_all_by_label("the lens cap is on").count() >= 2,
+        "over the panes and in the status bar"
+    );
     let all = silent.app().model().messages.iter().len();
     for _ in 0..all {
         if let Some(button) = silent.harness.query_all_by_label("Dismiss").next() {

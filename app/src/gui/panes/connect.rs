@@ -95,7 +95,9 @@ fn connect_button_ui(ui: &mut Ui, model: &Model, wanted: Option<&CellSource>, ou
     let palette = Palette::of(ui);
     let other = wanted.filter(|wanted| **wanted != model.source);
     let button = match other {
-        Some(_) => Button::new(RichText::new(tr!(language, "Connect now")).color(palette.on_accent)).fill(palette.accent),
+        Some(_) => {
+            Button::new(RichText::new(tr!(language, "Connect now")).color(palette.on_accent)).fill(palette.accent)
+        }
         None => Button::new(tr!(language, "Connect again")),
     };
     let pressed = ui.add_enabled(wanted.is_some(), button).clicked();

@@ -31,15 +31,26 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             colour,
         );
         rotation_ui(ui, model, colour, outbox);
-        field_ui(ui, tr!(language, "Joints 1 to 6 [deg]"), &text(joints_deg), "−888.8 −888.8 −888.8 −888.8 −888.8 −888.8", colour);
-        field_ui(ui, tr!(language, "Simulation"), &text(|robot| format!("{:.2} s", robot.sim_time_s)), "8888.88 s", colour);
+        field_ui(
+            ui,
+            tr!(language, "Joints 1 to 6 [deg]"),
+            &text(joints_deg),
+            "−888.8 −888.8 −888.8 −888.8 −888.8 −888.8",
+            colour,
+        );
+        field_ui(
+            ui,
+            tr!(language, "Simulation"),
+            &text(|robot| format!("{:.2} s", robot.sim_time_s)),
+            "8888.88 s",
+            colour,
+        );
         let stale = model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S);
         let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
         field_ui(ui, tr!(language, "Image age"), &age, "88.8 s", if stale { palette.warning } else { palette.text });
-        field_ui(ui, tr!(language, "Dropped"), &model.dropped_frames.to_string(), "88888", palette.text).on_hover_text(tr!(
-            language,
-            "Pictures that arrived but were replaced by newer ones before the window could show them"
-        ));
+        field_ui(ui, tr!(language, "Dropped"), &model.dropped_frames.to_string(), "88888", palette.text).on_hover_text(
+            tr!(language, "Pictures that arrived but were replaced by newer ones before the window could show them"),
+        );
     });
     ui.add_space(2.0);
     message_ui(ui, model);
@@ -67,12 +78,18 @@ fn field_ui(ui: &mut Ui, caption: &str, value: &str, sample: &str, colour: egui:
 fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut Outbox) {
     let language = model.view.language;
     let (caption, sample, next, name) = match model.view.rotation {
-        RotationFormat::RollPitchYaw => {
-            (tr!(language, "Tip in base, roll pitch yaw [deg]"), "−888.88 −888.88 −888.88", RotationFormat::Quaternion, "quat")
-        }
-        RotationFormat::Quaternion => {
-            (tr!(language, "Tip in base, quaternion x y z w"), "−8.8888 −8.8888 −8.8888 −8.8888", RotationFormat::RollPitchYaw, "rpy")
-        }
+        RotationFormat::RollPitchYaw => (
+            tr!(language, "Tip in base, roll pitch yaw [deg]"),
+            "−888.88 −888.88 −888.88",
+            RotationFormat::Quaternion,
+            "quat",
+        ),
+        RotationFormat::Quaternion => (
+            tr!(language, "Tip in base, quaternion x y z w"),
+            "−8.8888 −8.8888 −8.8888 −8.8888",
+            RotationFormat::RollPitchYaw,
+            "rpy",
+        ),
     };
     let value = model.robot.as_ref().map_or_else(
         || UNKNOWN.to_owned(),
