@@ -17,7 +17,7 @@ impl App {
         self.cancel_capture();
         self.model.stop_pending = true;
         if self.model.control.is_connected() {
-            self.say(Severity::Warning, text!("Stopping the arm…"));
+            self.say(Severity::Info, text!("Stopping the arm…"));
         } else {
             self.say(
                 Severity::Error,

@@ -70,7 +70,6 @@ pub const STOP_KEY: Key = Key::Escape;
 const STOP: &[KeyboardShortcut] = &[plain(STOP_KEY)];
 const CAPTURE: &[KeyboardShortcut] = &[plain(Key::Space)];
 const DELETE: &[KeyboardShortcut] = &[plain(Key::Delete)];
-/// Before undo, whose keys are part of these.
 const REDO: &[KeyboardShortcut] = &[KeyboardShortcut::new(CTRL_SHIFT, Key::Z), ctrl(Key::Y)];
 const UNDO: &[KeyboardShortcut] = &[ctrl(Key::Z)];
 const NEW: &[KeyboardShortcut] = &[ctrl(Key::N)];
@@ -112,16 +111,16 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
         action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation),
         action(tr!(language, "Try to connect now"), Group::Work, &[], Command::Reconnect),
         Action {
-            name: tr!(language, "Redo"),
-            group: Group::Session,
-            keys: REDO,
-            command: session.redo.map(|_| Command::Redo),
-        },
-        Action {
             name: tr!(language, "Undo"),
             group: Group::Session,
             keys: UNDO,
             command: session.undo.map(|_| Command::Undo),
+        },
+        Action {
+            name: tr!(language, "Redo"),
+            group: Group::Session,
+            keys: REDO,
+            command: session.redo.map(|_| Command::Redo),
         },
         dialog(tr!(language, "New session…"), NEW, Dialog::New),
         dialog(tr!(language, "Open session…"), OPEN, Dialog::Open),
@@ -158,6 +157,7 @@ pub fn keys_text(ctx: &egui::Context, action: &Action) -> Vec<String> {
         .map(|keys| {
             let key = match keys.logical_key {
                 Key::Questionmark => "?",
+                Key::Escape => "Esc",
                 key => key.name(),
             };
             match names.format(&keys.modifiers, is_mac) {
@@ -178,7 +178,10 @@ pub fn pressed(ctx: &egui::Context, model: &Model) -> Vec<Command> {
     }
     let focused = ctx.memory(|memory| memory.focused().is_some());
     let mut commands = Vec::new();
-    for action in all(model, Language::English) {
+    let mut actions = all(model, Language::English);
+    // Ctrl+Shift+Z is also Ctrl+Z with one key more: the longer one goes first.
+    actions.sort_by_key(|action| !action.keys.iter().any(|keys| keys.modifiers.shift));
+    for action in actions {
         let keys = action.keys.iter().filter(|keys| keys.logical_key != STOP_KEY);
         let mut keys = keys.filter(|keys| !(focused && keys.modifiers.is_none() && keys.logical_key == Key::Space));
         if keys.any(|keys| ctx.input_mut(|input| input.consume_shortcut(keys)))

@@ -1,12 +1,17 @@
 //! Dialogs that explain: the keys, and what this program is.
 
-use egui::{Context, CornerRadius, Frame, Grid, Id, Label, Margin, Modal, RichText, ScrollArea, Stroke, Ui};
+use egui::{
+    Align, Context, CornerRadius, Frame, Grid, Id, Label, Layout, Margin, Modal, RichText, ScrollArea, Stroke, Ui,
+};
 
-use super::actions::{self, Group};
+use super::actions::{self, Action, Group};
 use super::theme::{self, Palette, TITLE};
 use crate::command::{Command, Outbox};
 use crate::model::{Dialog, Model};
 use crate::tr;
+
+/// Width of a dialog.
+const WIDTH: f32 = 680.0;
 
 /// The dialog that is open, unless another part of the window draws it.
 pub fn dialog_ui(ctx: &Context, dialog: Dialog, model: &Model, outbox: &mut Outbox) {
@@ -18,10 +23,11 @@ pub fn dialog_ui(ctx: &Context, dialog: Dialog, model: &Model, outbox: &mut Outb
         Dialog::New | Dialog::Open | Dialog::SaveAs => sessions_ui(ui, model),
     };
     let closed = Modal::new(Id::new("dialog")).show(ctx, |ui| {
-        ui.set_max_width(560.0);
+        ui.set_max_width(WIDTH.min(ctx.content_rect().width() - 60.0));
         content_ui(ui);
         ui.add_space(14.0);
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        let row = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(row, Layout::right_to_left(Align::Center), |ui| {
             ui.button(tr!(language, "Close")).clicked()
         })
         .inner
@@ -42,30 +48,34 @@ fn keys_ui(ui: &mut Ui, model: &Model) {
     ui.add(Label::new(RichText::new(note).color(palette.weak)).wrap());
     ui.add_space(8.0);
     let all = actions::all(model, language);
-    let height = (ui.ctx().content_rect().height() - 260.0).max(120.0);
-    ScrollArea::vertical().max_height(height).show(ui, |ui| {
-        for group in Group::ALL {
-            let rows: Vec<_> = all.iter().filter(|action| action.group == group && !action.keys.is_empty()).collect();
-            if rows.is_empty() {
-                continue;
+    let height = (ui.ctx().content_rect().height() - 240.0).max(120.0);
+    ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+        ui.columns(2, |columns| {
+            let [left, right] = columns else { return };
+            for (ui, groups) in [(left, [Group::Work, Group::Session]), (right, [Group::Steps, Group::Window])] {
+                for group in groups {
+                    let rows = all.iter().filter(|action| action.group == group && !action.keys.is_empty());
+                    group_ui(ui, group.name(language), rows);
+                }
             }
-            ui.add_space(6.0);
-            ui.label(RichText::new(group.name(language)).color(palette.weak).small());
-            Grid::new(("keys", group.name(language))).num_columns(2).min_col_width(250.0).spacing([16.0, 4.0]).show(
-                ui,
-                |ui| {
-                    for action in rows {
-                        ui.label(action.name);
-                        ui.horizontal(|ui| {
-                            ui.spacing_mut().item_spacing.x = 4.0;
-                            for keys in actions::keys_text(ui.ctx(), action) {
-                                key_ui(ui, &keys);
-                            }
-                        });
-                        ui.end_row();
-                    }
-                },
-            );
+        });
+    });
+}
+
+/// The keys of one group.
+fn group_ui<'a>(ui: &mut Ui, name: &str, actions: impl Iterator<Item = &'a Action>) {
+    ui.add_space(6.0);
+    ui.label(RichText::new(name).color(Palette::of(ui).weak).small());
+    Grid::new(("keys", name)).num_columns(2).min_col_width(150.0).spacing([12.0, 4.0]).show(ui, |ui| {
+        for action in actions {
+            ui.label(action.name);
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
+                for keys in actions::keys_text(ui.ctx(), action) {
+                    key_ui(ui, &keys);
+                }
+            });
+            ui.end_row();
         }
     });
 }

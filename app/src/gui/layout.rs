@@ -19,7 +19,7 @@ const TOOLS: [Pane; 7] =
 /// Share of the height for the pictures.
 const UPPER: f32 = 0.56;
 /// Share of the lower row's width for the records.
-const LOWER_LEFT: f32 = 0.53;
+const LOWER_LEFT: f32 = 0.5;
 
 /// A pane in the tree, by name, so that a layout of another version of the program can still be read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

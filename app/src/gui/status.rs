@@ -110,7 +110,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
         }
         LinkState::Connected { address, server } => {
             let title = match model.source {
-                CellSource::BuiltIn => text!("Connected to the {server}", server = server),
+                CellSource::BuiltIn => text!("Connected to the built-in cell"),
                 CellSource::Address(_) => text!("Connected to {server}", server = server),
             };
             status(Tone::Good, title, Text::verbatim(address.clone()), None)

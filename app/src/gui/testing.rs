@@ -137,6 +137,8 @@ impl Silent {
 
     /// Clicks what has a label.
     pub fn click(&mut self, label: &str) {
+        self.harness.get_by_label(label).scroll_to_me();
+        self.steps();
         self.harness.get_by_label(label).click();
         self.steps();
     }

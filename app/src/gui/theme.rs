@@ -33,6 +33,8 @@ pub struct Palette {
     pub weak: Color32,
     /// Selections and marks.
     pub accent: Color32,
+    /// Text that is selected, and the edge of what is being typed into.
+    pub selected: Color32,
     /// It works.
     pub good: Color32,
     /// It is being worked on.
@@ -68,6 +70,7 @@ const DARK: Palette = Palette {
     text: Color32::from_rgb(226, 229, 235),
     weak: Color32::from_rgb(142, 149, 162),
     accent: Color32::from_rgb(92, 159, 255),
+    selected: Color32::from_rgb(158, 198, 255),
     good: Color32::from_rgb(70, 193, 118),
     busy: Color32::from_rgb(92, 159, 255),
     warning: Color32::from_rgb(240, 176, 64),
@@ -91,6 +94,7 @@ const LIGHT: Palette = Palette {
     text: Color32::from_rgb(28, 32, 40),
     weak: Color32::from_rgb(96, 104, 118),
     accent: Color32::from_rgb(24, 104, 219),
+    selected: Color32::from_rgb(16, 82, 178),
     good: Color32::from_rgb(24, 138, 74),
     busy: Color32::from_rgb(24, 104, 219),
     warning: Color32::from_rgb(176, 108, 0),
@@ -214,8 +218,8 @@ fn shape(style: &mut egui::Style, visuals: Visuals, palette: &Palette) {
     visuals.hyperlink_color = palette.accent;
     visuals.warn_fg_color = palette.warning;
     visuals.error_fg_color = palette.bad;
-    visuals.selection.bg_fill = palette.card.lerp_to_gamma(palette.accent, 0.35);
-    visuals.selection.stroke = Stroke::new(1.0, palette.text);
+    visuals.selection.bg_fill = palette.card.lerp_to_gamma(palette.accent, 0.2);
+    visuals.selection.stroke = Stroke::new(1.0, palette.selected);
     visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, palette.edge);
     visuals.widgets.noninteractive.fg_stroke = Stroke::new(1.0, palette.text);
     for (widget, lift) in [

@@ -1,6 +1,6 @@
 //! Messages that come up at the lower right and go by themselves; errors stay until they are put aside.
 
-use egui::{Align2, Area, Button, CornerRadius, Frame, Id, Label, Margin, Order, Rect, Sense, Stroke, Vec2};
+use egui::{Align2, Area, CornerRadius, Frame, Id, Label, Margin, Order, Rect, Sense, Stroke, Vec2};
 use egui::{WidgetInfo, WidgetType};
 
 use super::icons::{self, Icon};
@@ -74,7 +74,7 @@ fn toast_ui(ui: &mut egui::Ui, message: &Message, language: Language, outbox: &m
                 ui.set_width(WIDTH - 34.0);
                 ui.add(Label::new(text).wrap());
             });
-            let close = ui.add(Button::new("").frame(false).min_size(Vec2::splat(20.0)).sense(Sense::click()));
+            let (_, close) = ui.allocate_exact_size(Vec2::splat(18.0), Sense::click());
             close.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tr!(language, "Dismiss")));
             let ink = if close.hovered() { palette.text } else { palette.weak };
             icons::draw(ui.painter(), Icon::Close, close.rect, 12.0, ink);

@@ -1,7 +1,7 @@
 //! Which cell the window works with, and how the connection is doing.
 
-use egui::{Button, ComboBox, Grid, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
-use handeye_sim_link::client::Endpoint;
+use egui::{Button, ComboBox, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
+use handeye_sim_link::client::{Endpoint, LinkError};
 
 use super::{action_ui, form};
 use crate::command::{Command, Outbox};
@@ -36,18 +36,16 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if let Some(choice) = form::choice_ui(ui, remote, &choices) {
             draft.remote = Some(choice);
         }
-        let wanted = if remote { address_ui(ui, model, &mut draft) } else { Some(CellSource::BuiltIn) };
-        let is_new = wanted.as_ref().is_some_and(|wanted| *wanted != model.source);
-        let name = if is_new { tr!(language, "Connect") } else { tr!(language, "Connect again") };
-        let palette = Palette::of(ui);
-        let button = match is_new {
-            true => Button::new(RichText::new(name).color(palette.on_accent)).fill(palette.accent),
-            false => Button::new(name),
-        };
-        let response = ui.add_enabled(wanted.is_some(), button);
-        if let Some(source) = wanted.filter(|_| response.clicked()) {
-            outbox.send(if is_new { Command::Connect(source) } else { Command::Reconnect });
-            draft = Draft::default();
+        let wanted = ui.horizontal(|ui| {
+            let wanted = if remote { address_ui(ui, model, &mut draft) } else { Ok(CellSource::BuiltIn) };
+            if connect_button_ui(ui, model, wanted.as_ref().ok(), outbox) {
+                draft = Draft::default();
+            }
+            wanted
+        });
+        if let Err(error) = wanted.inner {
+            let colour = Palette::of(ui).bad;
+            ui.add(Label::new(RichText::new(error.to_string()).color(colour)).wrap());
         }
     });
     ui.data_mut(|data| data.insert_temp(id, draft));
@@ -59,7 +57,7 @@ fn state_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let status = status::connection(model);
     form::note_ui(ui, status.tone, &status.title.say(language), &status.detail.say(language));
     action_ui(ui, status.action, language, outbox);
-    Grid::new("links").num_columns(2).spacing([24.0, 3.0]).min_row_height(18.0).show(ui, |ui| {
+    ui.horizontal_wrapped(|ui| {
         for (link, name) in [
             (Link::Control, tr!(language, "Robot")),
             (Link::Camera, tr!(language, "Camera")),
@@ -68,8 +66,8 @@ fn state_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             let (tone, words) = words(model, model.link(link));
             let palette = Palette::of(ui);
             ui.label(RichText::new(name).color(palette.weak));
-            ui.add(Label::new(RichText::new(words.say(language)).color(palette.tone(tone))).truncate());
-            ui.end_row();
+            ui.label(RichText::new(words.say(language)).color(palette.tone(tone)));
+            ui.add_space(10.0);
         }
     });
 }
@@ -91,8 +89,26 @@ fn words(model: &Model, state: &LinkState) -> (Tone, Text) {
     }
 }
 
+/// The button; whether it was pressed.
+fn connect_button_ui(ui: &mut Ui, model: &Model, wanted: Option<&CellSource>, outbox: &mut Outbox) -> bool {
+    let language = model.view.language;
+    let palette = Palette::of(ui);
+    let other = wanted.filter(|wanted| **wanted != model.source);
+    let button = match other {
+        Some(_) => {
+            Button::new(RichText::new(tr!(language, "Connect now")).color(palette.on_accent)).fill(palette.accent)
+        }
+        None => Button::new(tr!(language, "Connect again")),
+    };
+    let pressed = ui.add_enabled(wanted.is_some(), button).clicked();
+    if pressed {
+        outbox.send(other.map_or(Command::Reconnect, |source| Command::Connect(source.clone())));
+    }
+    pressed
+}
+
 /// The field for the address; the cell when it is a good one.
-fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Option<CellSource> {
+fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Result<CellSource, LinkError> {
     let language = model.view.language;
     let mut address = draft.address.clone().unwrap_or_else(|| match (&model.source, model.addresses.first()) {
         (CellSource::Address(address), _) | (CellSource::BuiltIn, Some(address)) => address.clone(),
@@ -100,28 +116,19 @@ fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Option<CellSourc
     });
     let before = address.clone();
     let name = tr!(language, "Address of the cell");
-    ui.horizontal(|ui| {
-        let width = (ui.available_width() - 40.0).clamp(80.0, 320.0);
-        let field = ui.add(TextEdit::singleline(&mut address).desired_width(width).hint_text("tcp://host:port"));
-        field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, name));
-        if !model.addresses.is_empty() {
-            let history = ComboBox::from_id_salt("addresses").selected_text("").width(20.0).show_ui(ui, |ui| {
-                for earlier in &model.addresses {
-                    ui.selectable_value(&mut address, earlier.clone(), earlier);
-                }
-            });
-            history.response.on_hover_text(tr!(language, "Earlier addresses"));
-        }
-    });
+    let width = (ui.available_width() - 170.0).clamp(80.0, 260.0);
+    let field = ui.add(TextEdit::singleline(&mut address).desired_width(width).hint_text("tcp://host:port"));
+    field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, name));
+    if !model.addresses.is_empty() {
+        let history = ComboBox::from_id_salt("addresses").selected_text("").width(20.0).show_ui(ui, |ui| {
+            for earlier in &model.addresses {
+                ui.selectable_value(&mut address, earlier.clone(), earlier);
+            }
+        });
+        history.response.on_hover_text(tr!(language, "Earlier addresses"));
+    }
     if address != before {
         draft.address = Some(address.clone());
     }
-    match address.parse::<Endpoint>() {
-        Ok(endpoint) => Some(CellSource::Address(endpoint.to_string())),
-        Err(error) => {
-            let colour = Palette::of(ui).bad;
-            ui.add(Label::new(RichText::new(error.to_string()).color(colour)).wrap());
-            None
-        }
-    }
+    address.parse::<Endpoint>().map(|endpoint| CellSource::Address(endpoint.to_string()))
 }

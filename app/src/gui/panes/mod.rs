@@ -73,7 +73,7 @@ pub fn title(pane: Pane, language: Language) -> &'static str {
         Pane::Poses => tr!(language, "Poses"),
         Pane::Charts => tr!(language, "Charts"),
         Pane::Log => tr!(language, "Log"),
-        Pane::Connect => tr!(language, "Connection"),
+        Pane::Connect => tr!(language, "Connect"),
         Pane::Target => tr!(language, "Target"),
         Pane::Jog => tr!(language, "Jog"),
         Pane::Taught => tr!(language, "Taught"),

@@ -15,7 +15,7 @@ use crate::model::{ImagePoint, Model, Pane};
 /// Height of a row of tabs.
 const TABS: f32 = 34.0;
 /// Room at each side of a tab's title.
-const TAB_MARGIN: f32 = 9.0;
+const TAB_MARGIN: f32 = 7.5;
 /// No tile is dragged smaller than this.
 const SMALLEST: f32 = 150.0;
 
@@ -119,7 +119,7 @@ impl Behavior<Slot> for Panes<'_> {
     }
 
     fn tab_bar_left_ui(&mut self, _tiles: &Tiles<Slot>, ui: &mut Ui, _tile: TileId, _tabs: &egui_tiles::Tabs) {
-        ui.add_space(4.0);
+        ui.add_space(5.0);
     }
 
     fn tab_bar_height(&self, _style: &Style) -> f32 {
