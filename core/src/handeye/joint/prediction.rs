@@ -42,8 +42,7 @@ impl ErrorCurve {
     /// as many as there are. `None` for a goal that is not positive, or when nothing is known yet.
     pub fn views_for(&self, goal_m: f64) -> Option<usize> {
         let (views, error_m) = self.now()?;
-        // A goal that is not a number fails the comparison too.
-        if !(goal_m > 0.0) {
+        if goal_m.is_nan() || goal_m <= 0.0 {
             return None;
         }
         let needed = views as f64 * (error_m / goal_m).powi(2).max(1.0);
