@@ -27,7 +27,7 @@ use crate::model::{
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
 /// A healthy cell answers within milliseconds; this is for a machine that does something else.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 pub fn request(number: u64, frames: u32) -> CaptureRequest {
     CaptureRequest {

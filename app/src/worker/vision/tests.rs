@@ -62,6 +62,8 @@ fn what_a_capture_waits_for_is_told_when_it_changes() {
     assert_eq!(measured.thumbnail.dimensions(), (160, 120));
     assert_eq!(*measured.rgb, board_picture(1), "nothing is drawn on it");
     assert_eq!(measured.pose_name.as_deref(), Some("view"));
+    let again = handeye_core::capture::observe_image(&measured.rgb, &BOARD).expect("searches").expect("the board");
+    assert_eq!(again.corners, measured.corners, "the kept picture gives the same corners");
     let averaging = |done| (7, CaptureWait::Averaging { done, of: 3 });
     let told = [
         (7, CaptureWait::ForPicture),
