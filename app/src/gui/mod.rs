@@ -4,7 +4,11 @@
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
 mod app;
+mod captures;
+mod marks;
 mod numbers;
+#[cfg(test)]
+mod pane_harness;
 mod panes;
 #[cfg(test)]
 mod sample;

@@ -45,7 +45,7 @@ impl Window {
     /// Draws everything and applies what the user asked for.
     pub fn window_ui(&mut self, ui: &mut Ui) {
         let Self { app, textures, outbox, .. } = self;
-        textures.update(ui.ctx(), app.model().frame.as_ref());
+        textures.update(ui.ctx(), app.model());
         panes::all_ui(ui, app.model(), textures, outbox);
         if outbox.is_empty() {
             ui.request_repaint_after(CLOCK_PERIOD);

@@ -1,9 +1,12 @@
 //! The panes. Each draws a part of the model and returns what the user wants through the outbox.
 
 mod banner;
+mod charts;
 mod colour_bar;
 mod empty;
+mod live;
 mod pictures;
+mod poses;
 mod status_bar;
 mod top_bar;
 
