@@ -4,12 +4,16 @@
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
 mod actions;
+mod captures;
 mod fonts;
 mod help;
 mod icons;
 mod layout;
+mod marks;
 mod numbers;
 mod palette;
+#[cfg(test)]
+mod pane_harness;
 mod panes;
 mod rail;
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::help;
 use super::layout::{self, Layout};
 use super::palette::CommandPalette;
 use super::panes;
-use super::textures::LiveTextures;
+use super::textures::Textures;
 use super::theme;
 use super::toasts;
 use crate::app::App;
@@ -24,7 +24,7 @@ const CLOCK_PERIOD: Duration = Duration::from_millis(250);
 /// Application, graphics, and what concerns nothing but the window: where panes are, which dialog is open.
 pub struct Window {
     app: App,
-    textures: LiveTextures,
+    textures: Textures,
     theme: Option<ThemeChoice>,
     outbox: Outbox,
     layout: Layout,
@@ -38,7 +38,7 @@ impl Window {
         theme::install(ctx);
         Self {
             app,
-            textures: LiveTextures::default(),
+            textures: Textures::default(),
             theme: None,
             outbox: Outbox::default(),
             layout,
@@ -68,7 +68,7 @@ impl Window {
         self.keyboard(ui.ctx());
         let Self { app, textures, outbox, layout, palette, .. } = self;
         let model = app.model();
-        textures.update(ui.ctx(), model.frame.as_ref());
+        textures.live.update(ui.ctx(), model);
         let centre = panes::all_ui(ui, model, textures, layout, outbox);
         toasts::toasts_ui(ui.ctx(), centre, model, outbox);
         match model.dialog {
@@ -148,7 +148,7 @@ impl Window {
     /// How many frames went to the graphics card.
     #[cfg(test)]
     pub fn uploads(&self) -> u64 {
-        self.textures.uploads()
+        self.textures.live.uploads()
     }
 }
 

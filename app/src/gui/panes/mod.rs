@@ -8,9 +8,9 @@ mod empty;
 mod export;
 mod form;
 mod jog;
+mod live;
 mod log;
 mod menu;
-mod pictures;
 mod poses;
 mod result;
 mod status_bar;
@@ -25,7 +25,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui};
 use super::layout::Layout;
 use super::rail;
 use super::status::{self, Action};
-use super::textures::LiveTextures;
+use super::textures::Textures;
 use super::theme::{GAP, Palette};
 use crate::command::{Command, Outbox};
 use crate::model::{Model, Pane, Step};
@@ -33,7 +33,7 @@ use crate::text::Language;
 use crate::tr;
 
 /// The whole window; gives the part of it where the panes are.
-pub fn all_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, layout: &mut Layout, outbox: &mut Outbox) -> Rect {
+pub fn all_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut Layout, outbox: &mut Outbox) -> Rect {
     let palette = Palette::of(ui);
     let bar = Frame::new().fill(palette.bar).inner_margin(Margin::symmetric(14, 8));
     Panel::top("top_bar").frame(bar).resizable(false).show(ui, |ui| top_bar::top_bar_ui(ui, model, outbox));
