@@ -2,8 +2,16 @@
 
 mod banner;
 mod colour_bar;
+#[cfg(test)]
+pub mod driven;
 mod empty;
+#[cfg_attr(not(test), expect(dead_code, reason = "the tiles that show it come with the frame of the window"))]
+mod jog;
+#[cfg_attr(not(test), expect(dead_code, reason = "the tiles that show it come with the frame of the window"))]
+pub mod parts;
 mod pictures;
+#[cfg_attr(not(test), expect(dead_code, reason = "the tiles that show it come with the frame of the window"))]
+mod result;
 mod status_bar;
 mod top_bar;
 
