@@ -4,6 +4,8 @@ mod banner;
 mod charts;
 mod colour_bar;
 mod connect;
+#[cfg(test)]
+pub mod driven;
 mod empty;
 mod export;
 mod form;
@@ -11,6 +13,7 @@ mod jog;
 mod live;
 mod log;
 mod menu;
+mod parts;
 mod poses;
 mod result;
 mod status_bar;
