@@ -68,8 +68,9 @@ impl App {
                 self.expect(text!("The simulation was not started"), asked);
             }
             Command::Reconnect => {
-                let asked = self.workers.reconnect();
-                self.expect(text!("The connection was not tried again"), asked);
+                let control = self.workers.ask_control(Request::Reconnect);
+                let camera = self.workers.ask_camera(Request::Reconnect);
+                self.expect(text!("The connection was not tried again"), control.and(camera));
             }
             Command::SetTheme(theme) => self.model.view.theme = theme,
             Command::SetRotationFormat(format) => self.model.view.rotation = format,
@@ -133,12 +134,8 @@ impl App {
         match (self.model.link(link).clone(), before.is_connected()) {
             (LinkState::Connected { server, address }, false) => {
                 let text = match link {
-                    Link::Control => {
-                        text!("Robot connected to {server} at {address}", server = server, address = address)
-                    }
-                    Link::Camera => {
-                        text!("Camera connected to {server} at {address}", server = server, address = address)
-                    }
+                    Link::Control => text!("Robot connected to {server} at {address}", server = server, address = address),
+                    Link::Camera => text!("Camera connected to {server} at {address}", server = server, address = address),
                     Link::Motion => return,
                 };
                 self.say(Severity::Info, text);
