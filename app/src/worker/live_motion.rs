@@ -1,7 +1,7 @@
 //! The arm of a cell over the remote API, as the motion worker drives it.
 
 use handeye_sim_link::client::cell::{
-    Arm, ArmJog, ArmKinematics, JogAxes, JogEnd, JogObstacle, MotionTolerance, UnknownKinematics,
+    Arm, ArmJog, ArmKinematics, JogAxes, JogEnd, JogObstacle, MotionTolerance, SettleOptions, UnknownKinematics,
 };
 use handeye_sim_link::client::{CancelToken, LinkError};
 use nalgebra::Vector3;
@@ -37,10 +37,8 @@ impl LiveMotion {
     }
 
     fn drive(&mut self, goal: &MotionGoal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, LinkError> {
-        if !(speed > 0.0 && speed <= 1.0) {
-            let text =
-                text!("{percent} % is not a speed: choose one over 0 % and up to 100 %", percent = speed * 100.0);
-            return Ok(MotionOutcome::Refused(text));
+        if let Some(why) = bad_speed(speed) {
+            return Ok(MotionOutcome::Refused(why));
         }
         if let Some(why) = self.obstacle(goal)? {
             return Ok(MotionOutcome::Refused(why));
@@ -48,7 +46,7 @@ impl LiveMotion {
         match goal {
             MotionGoal::Joints(joints) => {
                 self.arm.move_to_joints(joints, &limits::of_joints(&limits::TOUR, speed), cancel)?;
-                self.arm.settle(&handeye_sim_link::client::cell::SettleOptions::default(), cancel)?;
+                self.arm.settle(&SettleOptions::default(), cancel)?;
             }
             MotionGoal::Tip(pose) => {
                 let limits = limits::of_tip(&limits::TOUR, speed);
@@ -64,6 +62,9 @@ impl LiveMotion {
         length: Option<f64>,
         held: &mut dyn FnMut() -> Option<f64>,
     ) -> Result<Result<JogEnd, Text>, LinkError> {
+        if let Some(why) = bad_speed(request.speed) {
+            return Ok(Err(why));
+        }
         let jog = match arm_jog(request, self.kinematics.as_ref()) {
             Ok(jog) => jog,
             Err(why) => return Ok(Err(why)),
@@ -114,6 +115,13 @@ impl MotionPort for LiveMotion {
     }
 }
 
+/// Why a share of the fastest speed is none.
+fn bad_speed(speed: f64) -> Option<Text> {
+    let is_good = speed > 0.0 && speed <= 1.0;
+    let percent = speed * 100.0;
+    (!is_good).then(|| text!("{percent} % is not a speed: choose one over 0 % and up to 100 %", percent = percent))
+}
+
 /// What an error of the arm means for the motion; only a lost connection is an error here.
 fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
     match error {
@@ -139,7 +147,7 @@ fn arm_jog<'a>(
         Jog::Translate { frame, axis, forward } | Jog::Rotate { frame, axis, forward } => (frame, axis, forward),
     };
     let kinematics = kinematics.map_err(|why| {
-        text!("Only single joints can be jogged: this is not the arm that is known here, {why}", why = why)
+        text!("Only single joints can be jogged, because the kinematics of the arm is not known: {why}", why = why)
     })?;
     let axes = match frame {
         JogFrame::Base => JogAxes::Base,

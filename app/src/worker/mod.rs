@@ -256,8 +256,9 @@ impl Workers {
     /// a button is let go that had been held for longer.
     pub fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
         let request = JogRequest { jog, tip_from_camera, speed };
-        self.desk.hold(request, self.stop.is_pressed(), self.now_s());
-        self.wake_motion();
+        if self.desk.hold(request, self.stop.is_pressed(), self.now_s()) {
+            self.wake_motion();
+        }
     }
 
     /// No jog button is held any more.

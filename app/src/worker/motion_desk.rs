@@ -111,17 +111,20 @@ impl MotionDesk {
         }
     }
 
-    /// A jog button is held now.
-    pub fn hold(&self, request: JogRequest, stopping: bool, now_s: f64) {
+    /// A jog button is held now. `true` when the worker has something to begin.
+    pub fn hold(&self, request: JogRequest, stopping: bool, now_s: f64) -> bool {
         let mut inner = self.inner();
         inner.owes_end = true;
         if !inner.line.hold(request, now_s) || matches!(inner.doing, Doing::Jogging) && !stopping {
-            return;
+            return false;
         }
-        if let Some(why) = inner.obstacle(stopping) {
+        let obstacle = inner.obstacle(stopping);
+        let begins = obstacle.is_none();
+        if let Some(why) = obstacle {
             inner.line.bar(now_s);
             inner.say(Event::JogEnded { why: Some(why) }, &self.waker);
         }
+        begins
     }
 
     /// No jog button is held any more.

@@ -20,7 +20,7 @@ pub(super) struct Bench {
     now_s: Arc<Mutex<f64>>,
     events: Vec<Event>,
     /// Events before this one have been waited for.
-    next: usize,
+    pub next: usize,
 }
 
 impl Bench {
@@ -169,7 +169,9 @@ fn one_motion_at_a_time_and_a_stop_leaves_none() {
     assert_eq!(bench.moved(1), MotionOutcome::Stopped);
     bench.next = 0;
     bench.stopped();
-    assert_eq!((cell.script().moved.len(), cell.script().stops, bench.ends()), (1, 1, 2));
+    assert_eq!(bench.ends(), 2);
+    assert_eq!(cell.script().moved, [HOME]);
+    assert_eq!(cell.script().stops, 1);
     cell.script().motions = FakeMotions::Arrive;
     bench.move_to(3, HOME, 1.0);
     assert_eq!(bench.moved(3), MotionOutcome::Arrived, "after a stop the arm moves again");
@@ -197,7 +199,8 @@ fn nothing_begins_before_a_stop_is_done() {
     assert_eq!(bench.jog_ended().as_deref(), Some("The arm is being stopped"));
     cell.script().refuse_tasks = None;
     bench.stopped();
-    assert!(cell.script().moved.is_empty() && cell.script().jogged.is_empty());
+    assert!(cell.script().moved.is_empty());
+    assert!(cell.script().jogged.is_empty());
 }
 
 #[test]

@@ -57,7 +57,13 @@ pub enum UnknownKinematics {
     /// The tip does not move with the arm.
     #[error("the tip does not hang on the last joint of the arm")]
     LooseTip,
-    /// It could not be measured.
+    /// The server did not answer what has to be known.
+    #[error("the arm could not be measured: {reason}")]
+    Unreadable {
+        /// What it said.
+        reason: String,
+    },
+    /// It did not stand still.
     #[error("the arm moved while its axes were read; let it stand and connect again")]
     Moving,
 }
@@ -115,8 +121,17 @@ impl Arm {
     /// tip moves with the joints, so one configuration is enough.
     ///
     /// # Errors
-    /// Any [`LinkError`] of a call; that the arm is another one is no error but the inner result.
+    /// A lost connection; that the arm is another one, or cannot be measured, is no error but the inner result.
     pub fn kinematics(&mut self) -> Result<Result<ArmKinematics, UnknownKinematics>, LinkError> {
+        match self.measured_kinematics() {
+            Err(error) if !error.is_connection_loss() => {
+                Ok(Err(UnknownKinematics::Unreadable { reason: error.to_string() }))
+            }
+            outcome => outcome,
+        }
+    }
+
+    fn measured_kinematics(&mut self) -> Result<Result<ArmKinematics, UnknownKinematics>, LinkError> {
         let Some(arm) = self.objects.arm else {
             return Ok(Err(UnknownKinematics::NoArm { path: self.objects.arm_path.clone() }));
         };
