@@ -13,7 +13,6 @@ use super::palette::CommandPalette;
 use super::panes;
 use super::textures::LiveTextures;
 use super::theme;
-use super::toasts;
 use crate::command::{Command, Outbox};
 use crate::model::{Dialog, ThemeChoice};
 use crate::settings::SettingsFile;
@@ -71,8 +70,7 @@ impl Window {
         let Self { app, textures, outbox, layout, dialog, palette, .. } = self;
         let model = app.model();
         textures.update(ui.ctx(), model.frame.as_ref());
-        let centre = panes::all_ui(ui, model, textures, layout, outbox);
-        toasts::toasts_ui(ui.ctx(), centre, model, outbox);
+        panes::all_ui(ui, model, textures, layout, outbox);
         match dialog {
             None => {}
             Some(Dialog::CommandPalette) => palette.palette_ui(ui.ctx(), model, outbox),
