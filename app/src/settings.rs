@@ -272,7 +272,7 @@ impl SettingsFile {
     }
 }
 
-fn keep<T: PartialEq>(kept: &mut T, before: T, now: T) {
+fn keep<T: PartialEq + Copy>(kept: &mut T, before: T, now: T) {
     if before != now {
         *kept = now;
     }

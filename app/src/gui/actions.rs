@@ -26,9 +26,6 @@ pub enum Group {
 }
 
 impl Group {
-    /// In the order of the help.
-    pub const ALL: [Self; 5] = [Self::Work, Self::Session, Self::Steps, Self::Window, Self::Panes];
-
     /// For people.
     pub fn name(self, language: Language) -> &'static str {
         match self {

@@ -1,7 +1,9 @@
-//! Dialogs that explain: the keys, and what this program is.
+//! Dialogs that explain: the keys, and what this program is. They lie over the window and block nothing: STOP can be
+//! pressed beside them.
 
 use egui::{
-    Align, Context, CornerRadius, Frame, Grid, Id, Label, Layout, Margin, Modal, RichText, ScrollArea, Stroke, Ui,
+    Align, Align2, Area, Context, CornerRadius, Frame, Grid, Id, Label, Layout, Margin, Order, Rect, RichText,
+    ScrollArea, Stroke, Ui,
 };
 
 use super::actions::{self, Action, Group};
@@ -22,19 +24,33 @@ pub fn dialog_ui(ctx: &Context, dialog: Dialog, model: &Model, outbox: &mut Outb
         Dialog::About => about_ui(ui, model),
         Dialog::New | Dialog::Open | Dialog::SaveAs => sessions_ui(ui, model),
     };
-    let closed = Modal::new(Id::new("dialog")).show(ctx, |ui| {
-        ui.set_max_width(WIDTH.min(ctx.content_rect().width() - 60.0));
-        content_ui(ui);
-        ui.add_space(14.0);
-        let row = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
-        ui.allocate_ui_with_layout(row, Layout::right_to_left(Align::Center), |ui| {
-            ui.button(tr!(language, "Close")).clicked()
-        })
-        .inner
+    let width = WIDTH.min(ctx.content_rect().width() - 80.0);
+    let area = Area::new(Id::new("dialog")).order(Order::Foreground).anchor(Align2::CENTER_CENTER, [0.0, -20.0]);
+    let shown = area.show(ctx, |ui| {
+        Frame::popup(ui.style())
+            .inner_margin(Margin::same(22))
+            .show(ui, |ui| {
+                ui.set_width(width);
+                content_ui(ui);
+                ui.add_space(14.0);
+                let row = egui::vec2(width, ui.spacing().interact_size.y);
+                ui.allocate_ui_with_layout(row, Layout::right_to_left(Align::Center), |ui| {
+                    ui.button(tr!(language, "Close")).clicked()
+                })
+                .inner
+            })
+            .inner
     });
-    if closed.inner || closed.should_close() {
+    if shown.inner || pressed_outside(ctx, shown.response.rect) {
         outbox.send(Command::SetDialog(None));
     }
+}
+
+/// Whether the pointer was pressed outside of what is over the window. What is there does what it does: STOP stops.
+pub fn pressed_outside(ctx: &Context, rect: Rect) -> bool {
+    ctx.input(|input| {
+        input.pointer.any_pressed() && input.pointer.interact_pos().is_some_and(|position| !rect.contains(position))
+    })
 }
 
 fn keys_ui(ui: &mut Ui, model: &Model) {
@@ -66,7 +82,8 @@ fn keys_ui(ui: &mut Ui, model: &Model) {
 fn group_ui<'a>(ui: &mut Ui, name: &str, actions: impl Iterator<Item = &'a Action>) {
     ui.add_space(6.0);
     ui.label(RichText::new(name).color(Palette::of(ui).weak).small());
-    Grid::new(("keys", name)).num_columns(2).min_col_width(150.0).spacing([12.0, 4.0]).show(ui, |ui| {
+    ui.spacing_mut().interact_size.y = 22.0;
+    Grid::new(("keys", name)).num_columns(2).min_col_width(170.0).spacing([12.0, 4.0]).show(ui, |ui| {
         for action in actions {
             ui.label(action.name);
             ui.horizontal(|ui| {

@@ -6,6 +6,7 @@ use egui::{
 };
 
 use super::actions::{self, Action};
+use super::help;
 use super::theme::{CAPTION, Palette};
 use crate::command::{Command, Outbox};
 use crate::model::Model;
@@ -46,8 +47,7 @@ impl CommandPalette {
             frame.show(ui, |ui| self.content_ui(ui, &found, step != 0, language)).inner
         });
         let clicked = shown.inner;
-        let outside = ctx.input(|input| input.pointer.any_pressed())
-            && ctx.input(|input| input.pointer.interact_pos()).is_some_and(|at| !shown.response.rect.contains(at));
+        let outside = help::pressed_outside(ctx, shown.response.rect);
         let choice = if enter { Some(self.chosen) } else { clicked };
         if let Some(action) = choice.and_then(|index| found.get(index)) {
             if let Some(command) = &action.command {

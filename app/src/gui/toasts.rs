@@ -1,19 +1,29 @@
-//! Messages that come up at the lower right and go by themselves; errors stay until they are put aside.
+//! Messages below the steps, where they cover nothing. They go by themselves; errors stay until they are put aside.
 
-use egui::{Align2, Area, CornerRadius, Frame, Id, Label, Margin, Order, Rect, Sense, Stroke, Vec2};
-use egui::{WidgetInfo, WidgetType};
+use std::sync::Arc;
+
+use egui::text::LayoutJob;
+use egui::{CornerRadius, FontId, Galley, Rect, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, WidgetType};
 
 use super::icons::{self, Icon};
-use super::theme::{CARD_RADIUS, GAP, Palette};
+use super::theme::{CARD_RADIUS, Palette};
 use crate::command::{Command, Outbox};
 use crate::model::{Message, Model, Severity};
 use crate::text::Language;
 use crate::tr;
 
-/// More would cover the work; the log has all of them.
+/// More would be a second log.
 const MOST: usize = 4;
-/// Width of a message.
-const WIDTH: f32 = 340.0;
+/// Lines of a message; the rest of it is in the log, and under the pointer.
+const MOST_LINES: usize = 7;
+/// Size of the letters.
+const LETTERS: f32 = 12.0;
+/// Room around the text: left of it the bar of colour, right of it the cross.
+const LEFT: f32 = 14.0;
+const RIGHT: f32 = 24.0;
+const ABOVE: f32 = 8.0;
+/// Distance between messages.
+const BETWEEN: f32 = 6.0;
 
 /// How long [s] a message stays; `None` until it is put aside.
 fn lifetime_s(severity: Severity) -> Option<f64> {
@@ -33,59 +43,62 @@ fn up(model: &Model) -> Vec<&Message> {
     model.messages.iter().rev().filter(is_up).take(MOST).collect()
 }
 
-/// Draws them into the lower right corner of `within`.
-pub fn toasts_ui(ctx: &egui::Context, within: Rect, model: &Model, outbox: &mut Outbox) {
-    let messages = up(model);
-    if messages.is_empty() {
-        return;
+/// Draws them into the room that is left, newest at the bottom. What has no room is in the log.
+pub fn toasts_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let room = ui.available_rect_before_wrap();
+    let mut bottom = room.bottom();
+    for message in up(model) {
+        let said = said(message, language);
+        let galley = galley(ui, &said, room.width() - LEFT - RIGHT);
+        let height = galley.size().y + 2.0 * ABOVE;
+        if bottom - height < room.top() {
+            return;
+        }
+        let rect = Rect::from_min_max(egui::pos2(room.left(), bottom - height), egui::pos2(room.right(), bottom));
+        bottom -= height + BETWEEN;
+        if toast_ui(ui, rect, message, &said, galley, language) {
+            outbox.send(Command::DismissMessage(message.number));
+        }
     }
-    let corner = within.right_bottom() - Vec2::splat(GAP + 6.0);
-    Area::new(Id::new("toasts")).order(Order::Foreground).pivot(Align2::RIGHT_BOTTOM).fixed_pos(corner).show(
-        ctx,
-        |ui| {
-            ui.spacing_mut().item_spacing.y = 6.0;
-            for message in messages.into_iter().rev() {
-                toast_ui(ui, message, model.view.language, outbox);
-            }
-        },
-    );
 }
 
-fn toast_ui(ui: &mut egui::Ui, message: &Message, language: Language, outbox: &mut Outbox) {
+fn said(message: &Message, language: Language) -> String {
+    match message.times {
+        1 => message.text.say(language),
+        times => format!("{} ({times}×)", message.text.say(language)),
+    }
+}
+
+fn galley(ui: &Ui, text: &str, width: f32) -> Arc<Galley> {
+    let ink = Palette::of(ui).text;
+    let mut job = LayoutJob::simple(text.to_owned(), FontId::proportional(LETTERS), ink, width);
+    job.wrap.max_rows = MOST_LINES;
+    ui.painter().layout_job(job)
+}
+
+/// One message; whether it is put aside.
+fn toast_ui(ui: &mut Ui, rect: Rect, message: &Message, said: &str, galley: Arc<Galley>, language: Language) -> bool {
     let palette = Palette::of(ui);
     let colour = match message.severity {
         Severity::Info => palette.accent,
         severity => palette.severity(severity),
     };
-    let frame = Frame::new()
-        .fill(palette.card)
-        .stroke(Stroke::new(1.0, palette.edge))
-        .shadow(ui.visuals().popup_shadow)
-        .corner_radius(CornerRadius::same(CARD_RADIUS))
-        .inner_margin(Margin { left: 16, right: 8, top: 9, bottom: 9 });
-    let shown = frame.show(ui, |ui| {
-        ui.set_width(WIDTH);
-        ui.horizontal_top(|ui| {
-            let text = match message.times {
-                1 => message.text.say(language),
-                times => format!("{} ({times}×)", message.text.say(language)),
-            };
-            ui.scope(|ui| {
-                ui.set_width(WIDTH - 34.0);
-                ui.add(Label::new(text).wrap());
-            });
-            let (_, close) = ui.allocate_exact_size(Vec2::splat(18.0), Sense::click());
-            close.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tr!(language, "Dismiss")));
-            let ink = if close.hovered() { palette.text } else { palette.weak };
-            icons::draw(ui.painter(), Icon::Close, close.rect, 12.0, ink);
-            if close.clicked() {
-                outbox.send(Command::DismissMessage(message.number));
-            }
-        });
-    });
-    let rect = shown.response.rect;
-    let bar = Rect::from_min_size(rect.min + Vec2::new(5.0, 8.0), Vec2::new(3.0, rect.height() - 16.0));
+    let id = ui.id().with(("toast", message.number));
+    let card = ui.interact(rect, id, Sense::hover());
+    card.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, said));
+    let (radius, edge) = (CornerRadius::same(CARD_RADIUS), Stroke::new(1.0, palette.edge));
+    ui.painter().rect(rect, radius, palette.raised(), edge, StrokeKind::Inside);
+    let bar = Rect::from_min_size(rect.min + Vec2::new(5.0, ABOVE), Vec2::new(3.0, rect.height() - 2.0 * ABOVE));
     ui.painter().rect_filled(bar, CornerRadius::same(2), colour);
+    ui.painter().galley(rect.min + Vec2::new(LEFT, ABOVE), galley, palette.text);
+    let corner = Rect::from_min_size(rect.right_top() + Vec2::new(-RIGHT, 3.0), Vec2::splat(RIGHT - 3.0));
+    let cross = ui.interact(corner, id.with("cross"), Sense::click());
+    cross.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tr!(language, "Dismiss")));
+    let ink = if cross.hovered() || cross.has_focus() { palette.text } else { palette.weak };
+    icons::draw(ui.painter(), Icon::Close, corner, 10.0, ink);
+    card.on_hover_text(said);
+    cross.clicked()
 }
 
 #[cfg(test)]

@@ -12,7 +12,6 @@ use super::palette::CommandPalette;
 use super::panes;
 use super::textures::Textures;
 use super::theme;
-use super::toasts;
 use crate::app::App;
 use crate::command::{Command, Outbox};
 use crate::model::{Dialog, ThemeChoice};
@@ -69,8 +68,7 @@ impl Window {
         let Self { app, textures, outbox, layout, palette, .. } = self;
         let model = app.model();
         textures.live.update(ui.ctx(), model);
-        let centre = panes::all_ui(ui, model, textures, layout, outbox);
-        toasts::toasts_ui(ui.ctx(), centre, model, outbox);
+        panes::all_ui(ui, model, textures, layout, outbox);
         match model.dialog {
             None => {}
             Some(Dialog::Palette) => palette.palette_ui(ui.ctx(), model, outbox),

@@ -93,16 +93,15 @@ fn words(model: &Model, state: &LinkState) -> (Tone, Text) {
 fn connect_button_ui(ui: &mut Ui, model: &Model, wanted: Option<&CellSource>, outbox: &mut Outbox) -> bool {
     let language = model.view.language;
     let palette = Palette::of(ui);
-    let other = wanted.filter(|wanted| **wanted != model.source);
-    let button = match other {
-        Some(_) => {
-            Button::new(RichText::new(tr!(language, "Connect now")).color(palette.on_accent)).fill(palette.accent)
-        }
-        None => Button::new(tr!(language, "Connect again")),
+    let same = wanted.is_some_and(|wanted| *wanted == model.source);
+    let button = if same {
+        Button::new(tr!(language, "Connect again"))
+    } else {
+        Button::new(RichText::new(tr!(language, "Connect now")).color(palette.on_accent)).fill(palette.accent)
     };
     let pressed = ui.add_enabled(wanted.is_some(), button).clicked();
-    if pressed {
-        outbox.send(other.map_or(Command::Reconnect, |source| Command::Connect(source.clone())));
+    if let Some(source) = wanted.filter(|_| pressed) {
+        outbox.send(if same { Command::Reconnect } else { Command::Connect(source.clone()) });
     }
     pressed
 }

@@ -23,20 +23,21 @@ mod tiles;
 mod top_bar;
 mod verify;
 
-use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui};
+use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 
 use super::layout::Layout;
 use super::rail;
 use super::status::{self, Action};
 use super::textures::Textures;
 use super::theme::{GAP, Palette};
+use super::toasts;
 use crate::command::{Command, Outbox};
 use crate::model::{Model, Pane, Step};
 use crate::text::Language;
 use crate::tr;
 
-/// The whole window; gives the part of it where the panes are.
-pub fn all_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut Layout, outbox: &mut Outbox) -> Rect {
+/// The whole window.
+pub fn all_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut Layout, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     let bar = Frame::new().fill(palette.bar).inner_margin(Margin::symmetric(14, 8));
     Panel::top("top_bar").frame(bar).resizable(false).show(ui, |ui| top_bar::top_bar_ui(ui, model, outbox));
@@ -44,16 +45,17 @@ pub fn all_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut 
     let side = Frame::new().fill(palette.bar).inner_margin(Margin { left: 8, right: 8, top: 10, bottom: 8 });
     Panel::left("rail").frame(side).resizable(false).exact_size(rail::WIDTH).show(ui, |ui| {
         rail::rail_ui(ui, model, outbox);
+        ui.add_space(GAP);
+        toasts::toasts_ui(ui, model, outbox);
     });
     let centre = Frame::new().fill(palette.backdrop).inner_margin(Margin::same(GAP as i8));
-    let shown = CentralPanel::default().frame(centre).show(ui, |ui| {
+    CentralPanel::default().frame(centre).show(ui, |ui| {
         if let Some(hindrance) = status::hindrance(model).filter(|_| model.frame.is_some()) {
             banner::banner_ui(ui, &hindrance, model.view.language, outbox);
             ui.add_space(GAP);
         }
         tiles::tiles_ui(ui, model, textures, layout, outbox);
     });
-    shown.response.rect
 }
 
 /// The button for an action.

@@ -39,7 +39,7 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 
 fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let refusal = model.message().filter(|message| message.severity != Severity::Info && !message.dismissed);
+    let refusal = model.messages.newest().filter(|message| message.severity != Severity::Info && !message.dismissed);
     let Some(message) = refusal else { return };
     let tone = if message.severity == Severity::Error { Tone::Bad } else { Tone::Warning };
     let said = message.text.say(language);
@@ -48,7 +48,7 @@ fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let width = ui.available_width() - 32.0;
         ui.allocate_ui(egui::vec2(width, 0.0), |ui| parts::notice_ui(ui, tone, &said, |_| ()));
         if parts::sign_ui(ui, Sign::Cross, close, true).clicked() {
-            outbox.send(Command::DismissMessage(message.id));
+            outbox.send(Command::DismissMessage(message.number));
         }
     });
 }

@@ -7,7 +7,7 @@ use crate::command::Command;
 use crate::gui::panes::driven::Driven;
 use crate::gui::sample;
 use crate::model::{
-    Axis, Jog, JogFrame, JogStep, LinkState, Message, Motion, MotionGoal, MotionId, Severity, Simulation,
+    Axis, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Severity, Simulation,
 };
 use crate::text::Text;
 
@@ -221,18 +221,12 @@ fn an_arm_of_unknown_kinematics_has_its_joints_jogged_only() {
 fn what_the_arm_does_can_be_stopped_and_a_refusal_is_read() {
     let mut model = sample::connected();
     model.motion = Motion::Moving { id: MotionId(1), what: Text::verbatim("pose 3"), since_s: 96.0 };
-    model.messages.push_back(Message {
-        id: 7,
-        dismissed: false,
-        severity: Severity::Warning,
-        text: Text::verbatim("Joint 2 would leave its range"),
-        at_s: 99.0,
-    });
+    model.messages.say(Severity::Warning, Text::verbatim("Joint 2 would leave its range"), 99.0);
     let mut pane = driven(model);
     assert!(pane.sees("Moving: pose 3 (4 s)"));
     assert_eq!(pane.click("Stop"), [Command::Stop]);
     assert!(pane.sees("Joint 2 would leave its range"));
-    assert_eq!(pane.click("Dismiss the message"), [Command::DismissMessage(7)]);
+    assert_eq!(pane.click("Dismiss the message"), [Command::DismissMessage(0)]);
 }
 
 #[test]
