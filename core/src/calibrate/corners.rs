@@ -225,8 +225,12 @@ fn residuals(
 /// Residual [px] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.
 const CAP_PX: f64 = 50.0;
 
+/// Over the views that the closed forms saw.
 fn capped_misfit(problem: &JointProblem<'_>, lens: &Lens, solution: &ClosedFormSolution) -> f64 {
-    problem.views.iter().map(|view| squared_residuals(problem, &lens.intrinsics, solution, view, CAP_PX)).sum()
+    subset::spread(problem.views.len(), subset::MOST_VIEWS)
+        .into_iter()
+        .map(|i| squared_residuals(problem, &lens.intrinsics, solution, &problem.views[i], CAP_PX))
+        .sum()
 }
 
 /// Sum of squared residuals of one view by the bare chain; a point without an image counts as the cap.
