@@ -191,7 +191,7 @@ fn a_robot_worse_than_the_corners_is_said_to_limit_the_answer_and_an_exact_one_i
 }
 
 #[test]
-fn a_wrong_square_makes_predictions_worse_than_the_noise_explains_or_the_robot_noisy() {
+fn a_prediction_within_the_noise_is_no_finding_and_one_twice_as_bad_is() {
     // With views of the same kind a held-out error within the noise is the rule.
     for seed in 93..98 {
         let found = of_trial(&set(20, seed), false, &FindingOptions::default());
