@@ -54,7 +54,7 @@ fn a_good_session_has_no_warning_and_says_when_the_goal_is_reached() {
 
 #[test]
 fn the_views_that_a_goal_takes_are_those_that_reach_it() {
-    // Ten sets of ten views, each with the goal of half its error: four times the views, so thirty more.
+    // Half the error takes four times the ten views, so thirty more.
     let t = set(10, 82);
     let observations = t.observations(false);
     let calibration = solve(&observations);
