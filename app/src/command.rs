@@ -1,17 +1,25 @@
 //! What the user wants and what the workers report, as plain data that can be logged and replayed.
 
+use std::collections::BTreeSet;
 use std::panic::Location;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_core::dataset::CameraInput;
+use handeye_core::depth::ColourMap;
+use handeye_core::export::ExportNames;
 use handeye_core::handeye::Mode;
+use handeye_core::poses_file::TaughtPose;
+use handeye_core::progress::Stage;
+use handeye_core::session::CaptureId;
 use handeye_core::target::TargetSpec;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, DepthScale, Dialog,
-    FrameImages, FrameInfo, ImagePoint, Jog, JogSettings, Link, LinkState, LiveDetection, MotionGoal, MotionId,
-    MotionOutcome, Pane, RobotState, RotationFormat, Severity, Step, ThemeChoice,
+    FolderListing, FrameImages, FrameInfo, ImagePoint, JobId, Jog, JogSettings, Link, LinkState, LiveDetection,
+    MotionGoal, MotionId, MotionOutcome, Observed, Overlays, Pane, Preview, RecentSession, RobotState, RotationFormat,
+    SessionState, Severity, Solved, Step, ThemeChoice, Viewport, Written,
 };
 use crate::text::{Language, Text};
 
@@ -55,34 +63,122 @@ pub enum Command {
     CancelCapture,
     /// How captures are taken.
     SetCaptureOptions(CaptureOptions),
-    /// Work with this cell, and no longer with the one before.
+    /// Work with another cell.
     Connect(CellSource),
-    /// What is looked at.
-    SetTarget(TargetSpec),
-    /// Where the camera sits.
-    SetMode(Mode),
-    /// What is known of the camera beforehand.
-    SetCamera(Option<CameraInput>),
+    /// Which step of the work is in front.
+    GoToStep(Step),
+    /// Which dialog is open.
+    SetDialog(Option<Dialog>),
+    /// A message needs no more attention.
+    DismissMessage(u64),
+    /// What is drawn over the pictures.
+    SetOverlays(Overlays),
+    /// Which part of the pictures is shown, and how large.
+    SetViewport(Viewport),
+    /// The colours of depths.
+    SetDepthColours(ColourMap),
+    /// Remember the place of the arm as a taught pose.
+    Teach {
+        /// Its name; one is found when there is none.
+        name: Option<String>,
+    },
+    /// Forget a taught pose.
+    RemoveTaught(String),
+    /// Call a taught pose something else.
+    RenameTaught {
+        /// Its name now.
+        from: String,
+        /// Its name afterwards.
+        to: String,
+    },
+    /// Visit a taught pose earlier or later.
+    ReorderTaught {
+        /// Which.
+        name: String,
+        /// Its place afterwards, counted from 0.
+        to: usize,
+    },
+    /// The ten reference poses instead of those that are taught.
+    TeachReference,
+    /// Taught poses from a file, after those that are there.
+    ImportTaught(PathBuf),
+    /// Taught poses into a file.
+    ExportTaught(PathBuf),
+    /// Move to a taught pose.
+    GoToTaught(String),
+    /// Move to where a capture was taken.
+    GoToCapture(CaptureId),
+    /// Visit all taught poses.
+    RunTour {
+        /// What is captured at each; `None` only moves.
+        purpose: Option<CapturePurpose>,
+    },
+    /// No more poses.
+    StopTour,
+    /// Which captures are selected; the last one's picture is shown.
+    Select(Vec<CaptureId>),
+    /// Show the live picture again.
+    BackToLive,
+    /// Take captures out of the fit, or back in.
+    SetExcluded {
+        /// Which.
+        ids: Vec<CaptureId>,
+        /// Out.
+        excluded: bool,
+    },
+    /// Captures enter the fit or verify it.
+    SetPurpose {
+        /// Which.
+        ids: Vec<CaptureId>,
+        /// What they are for.
+        purpose: CapturePurpose,
+    },
+    /// Delete captures; undo brings them back.
+    Delete(Vec<CaptureId>),
     /// Take the last change of the session back.
     Undo,
-    /// Make it again.
+    /// Make the change again that was taken back.
     Redo,
-    /// Take the selected captures out of the session.
-    DeleteSelected,
-    /// Calibrate from the captures at hand.
+    /// Another target.
+    SetTarget(TargetSpec),
+    /// The camera sits elsewhere.
+    SetMode(Mode),
+    /// What is known of the camera.
+    SetCamera(Option<CameraInput>),
+    /// Solve again.
     Solve,
-    /// Put a message aside.
-    DismissMessage(u64),
-    /// Bring the panes of a step to the front.
-    GoToStep(Step),
+    /// Stop solving.
+    CancelSolve,
+    /// Which answer is asked for, by its name.
+    SetMethod(String),
+    /// The error that is good enough [m].
+    SetGoal(f64),
+    /// Where the line between good and bad residuals is [px]; `None` takes it away.
+    SetOutlierLine(Option<f64>),
+    /// Measure the point at a pixel of the picture in base coordinates.
+    Pick(Option<ImagePoint>),
+    /// Which formats are exported.
+    ChooseFormats(BTreeSet<String>),
+    /// The format whose text is shown.
+    ShowFormat(String),
+    /// Names of frames and files.
+    SetExportNames(ExportNames),
+    /// Where exports go; `None` is `exports` in the session.
+    SetExportFolder(Option<PathBuf>),
+    /// Write the chosen formats.
+    Export,
+    /// Begin a session, in a folder or under the folder of sessions.
+    NewSession(Option<PathBuf>),
+    /// Go on with a session, or copy a data set into one.
+    Open(PathBuf),
+    /// Go on with a complete copy in another folder.
+    SaveAs(PathBuf),
+    /// Read the folders in a folder.
+    ListFolder(PathBuf),
     /// Bring a pane to the front.
     ShowPane(Pane),
     /// Put every pane where it was at first.
     ResetLayout,
-    /// Open a window over the window.
-    OpenDialog(Dialog),
-    /// Close it.
-    CloseDialog,
 }
 
 /// What happened outside the thread of the window.
@@ -145,6 +241,70 @@ pub enum Event {
         /// Why.
         refused: CaptureRefused,
     },
+    /// The session is now like this, on the disk.
+    Document(Box<SessionState>),
+    /// Another session is open.
+    SessionOpened,
+    /// A session could not be begun, opened or copied.
+    SessionFailed {
+        /// Why.
+        why: Text,
+    },
+    /// A capture is on the disk.
+    Captured {
+        /// The number of the request.
+        number: u64,
+        /// Its number in the session.
+        id: CaptureId,
+    },
+    /// A capture was looked at.
+    Observed {
+        /// Which.
+        id: CaptureId,
+        /// What was looked for.
+        target: TargetSpec,
+        /// What was seen; `None` when the picture cannot be read.
+        #[serde(skip)]
+        observed: Option<Arc<Observed>>,
+    },
+    /// The pictures of a capture were read.
+    Review {
+        /// Which capture.
+        id: CaptureId,
+        /// The pixels, which a log does not keep.
+        #[serde(skip)]
+        images: Option<Arc<FrameImages>>,
+    },
+    /// A solve goes on.
+    SolveProgress {
+        /// Which.
+        job: JobId,
+        /// What it does.
+        stage: Stage,
+        /// How much of that is done, 0 to 1.
+        part: f64,
+    },
+    /// A solve has ended.
+    #[serde(skip)]
+    SolveEnded {
+        /// Which.
+        job: JobId,
+        /// How.
+        outcome: SolveOutcome,
+    },
+    /// Folders were read.
+    Folder(FolderListing),
+    /// The text of every format.
+    Previews(Vec<(String, Preview)>),
+    /// Exports were written, or not.
+    Exported(Written),
+    /// Taught poses were read from a file.
+    PosesRead {
+        /// Them.
+        poses: Vec<TaughtPose>,
+    },
+    /// Sessions that were open before.
+    Recent(Vec<RecentSession>),
     /// Something to tell the user.
     Notice {
         /// How much it matters.
@@ -152,6 +312,17 @@ pub enum Event {
         /// The words.
         text: Text,
     },
+}
+
+/// How a solve ended.
+#[derive(Debug, Clone)]
+pub enum SolveOutcome {
+    /// With an answer.
+    Solved(Arc<Solved>),
+    /// Without one, and this is why.
+    Failed(Text),
+    /// It was cancelled.
+    Cancelled,
 }
 
 /// Collects the commands of one frame of the window. They are applied after it is drawn.

@@ -61,6 +61,7 @@ pub fn observe(
                 base_from_tip: entry.base_from_tip,
                 corners: corners.unwrap_or(Err(ObserveError::Cancelled))?,
                 camera_from_target: entry.camera_from_target,
+                in_fit: true,
             })
         })
         .collect::<Result<Vec<_>, ObserveError>>()?;

@@ -7,6 +7,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use handeye_core::depth::ColourMap;
 use toml::de::{DeTable, DeValue};
 
 use crate::command::Event;
@@ -18,7 +19,7 @@ use crate::text::{Language, Text};
 pub const ADDRESSES: usize = 8;
 
 /// The settings.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
     /// How the window looks.
     pub view: ViewSettings,
@@ -73,8 +74,14 @@ impl Word for DepthScale {
     const WORDS: &'static [(&'static str, Self)] = &[("auto", Self::Auto), ("full", Self::Full)];
 }
 
+impl Word for ColourMap {
+    const WORDS: &'static [(&'static str, Self)] =
+        &[("turbo", Self::Turbo), ("viridis", Self::Viridis), ("grey", Self::Grey)];
+}
+
 /// The keys, as the file and (in capitals, after `HANDEYE_`) the environment have them.
-const KEYS: [&str; 7] = ["theme", "language", "rotation", "depth_scale", "connect", "sessions", "addresses"];
+const KEYS: [&str; 8] =
+    ["theme", "language", "rotation", "depth_scale", "depth_colours", "connect", "sessions", "addresses"];
 
 impl Settings {
     /// Sets one value from text.
@@ -87,6 +94,7 @@ impl Settings {
             "language" => self.view.language = Word::from_word(value)?,
             "rotation" => self.view.rotation = Word::from_word(value)?,
             "depth_scale" => self.view.depth_scale = Word::from_word(value)?,
+            "depth_colours" => self.view.depth_colours = Word::from_word(value)?,
             "connect" => self.connect = Some(value.to_owned()).filter(|value| !value.is_empty()),
             "sessions" => self.sessions = Some(PathBuf::from(value)).filter(|_| !value.is_empty()),
             _ => return Err(KEYS.map(|key| format!("{key:?}")).join(", ")),
@@ -154,15 +162,22 @@ impl Settings {
         self.connect.clone().map_or(CellSource::BuiltIn, CellSource::Address)
     }
 
+    /// Where new sessions go.
+    pub fn sessions_folder(&self, variable: impl Fn(&str) -> Option<String>) -> PathBuf {
+        let home = || variable("HOME").filter(|home| !home.is_empty()).map(PathBuf::from).unwrap_or_default();
+        self.sessions.clone().unwrap_or_else(|| home().join("handeye-sessions"))
+    }
+
     /// The file that says this.
     fn written(&self) -> String {
         let mut table = toml::Table::new();
-        let ViewSettings { theme, language, rotation, depth_scale } = self.view;
+        let ViewSettings { theme, language, rotation, depth_scale, depth_colours, .. } = self.view;
         for (key, word) in [
             ("theme", theme.word()),
             ("language", language.word()),
             ("rotation", rotation.word()),
             ("depth_scale", depth_scale.word()),
+            ("depth_colours", depth_colours.word()),
         ] {
             table.insert(key.to_owned(), word.into());
         }
@@ -231,12 +246,13 @@ impl SettingsFile {
             return Ok(());
         }
         // What the environment says and the user did not touch stays out of the file.
-        let ViewSettings { theme, language, rotation, depth_scale } = view;
+        let ViewSettings { theme, language, rotation, depth_scale, depth_colours, .. } = view;
         let (before, kept) = (self.last_view, &mut self.in_file.view);
         keep(&mut kept.theme, before.theme, theme);
         keep(&mut kept.language, before.language, language);
         keep(&mut kept.rotation, before.rotation, rotation);
         keep(&mut kept.depth_scale, before.depth_scale, depth_scale);
+        keep(&mut kept.depth_colours, before.depth_colours, depth_colours);
         self.last_view = view;
         self.in_file.addresses = addresses.to_vec();
         self.write()

@@ -16,6 +16,8 @@ fn what_was_written_is_read_again() {
             language: Language::Chinese,
             rotation: RotationFormat::Quaternion,
             depth_scale: DepthScale::Full,
+            depth_colours: ColourMap::Viridis,
+            ..ViewSettings::default()
         },
         connect: Some("tcp://a:1".to_owned()),
         addresses: vec!["tcp://a:1".to_owned(), "tcp://b:2".to_owned()],

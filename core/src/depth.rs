@@ -1,6 +1,7 @@
 //! Depth images: samples, deprojection, colours, and the encoding in the three channels of a colour image.
 
 use image::{Rgb, RgbImage};
+use serde::{Deserialize, Serialize};
 
 use crate::camera::{CameraError, Intrinsics};
 use crate::frames::{Camera, PointIn};
@@ -196,7 +197,8 @@ pub const FAR_COLOUR: [u8; 3] = [24, 28, 40];
 ///
 /// The rainbows are linear between 17 anchors of their published tables of 256 colours and stay within 7 of 255 grey
 /// levels of them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ColourMap {
     /// Rainbow of even steps: dark blue, green, dark red. Mikhailov 2019, "Turbo, an improved rainbow colormap".
     #[default]

@@ -7,9 +7,13 @@ pub mod atomic_file;
 #[cfg(feature = "opencv")]
 pub mod calibrate;
 pub mod camera;
+pub mod capture;
+pub mod coverage;
 pub mod dataset;
 pub mod depth;
 pub mod export;
+#[cfg(feature = "opencv")]
+pub mod findings;
 pub mod frames;
 pub mod handeye;
 pub mod image_file;
@@ -21,6 +25,8 @@ pub mod result;
 pub mod se3;
 pub mod session;
 pub mod target;
+#[cfg(feature = "opencv")]
+pub mod verify;
 #[cfg(feature = "opencv")]
 pub mod vision;
 

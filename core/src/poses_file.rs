@@ -29,7 +29,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use crate::atomic_file;
@@ -57,8 +57,8 @@ pub struct TaughtPoses {
     pub poses: Vec<TaughtPose>,
 }
 
-/// One taught pose.
-#[derive(Debug, Clone, PartialEq)]
+/// One taught pose, as sessions record it; the file has names and degrees of its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TaughtPose {
     /// Its name; no two poses have the same.
     pub name: String,
@@ -67,11 +67,13 @@ pub struct TaughtPose {
 }
 
 /// Where a taught pose is.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Goal {
     /// A pose of the tip.
+    #[serde(rename = "base_from_tip", with = "crate::session::pose_record")]
     Tip(Pose<Base, Tip>),
     /// Joint angles in radians.
+    #[serde(rename = "joints_rad")]
     Joints(Vec<f64>),
 }
 

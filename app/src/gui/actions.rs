@@ -86,7 +86,7 @@ const STEPS: [&[KeyboardShortcut]; 6] = [
 /// All of it, in the order of the help.
 pub fn all(model: &Model, language: Language) -> Vec<Action> {
     let action = |name, group, keys, command| Action { name, group, keys, command: Some(command) };
-    let dialog = |name, keys, dialog| action(name, Group::Session, keys, Command::OpenDialog(dialog));
+    let dialog = |name, keys, dialog| action(name, Group::Session, keys, Command::SetDialog(Some(dialog)));
     let session = super::session::of(model);
     let connected = model.control.is_connected() && model.camera.is_connected();
     let mut all = vec![
@@ -103,7 +103,7 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
             keys: &[],
             command: connected.then_some(Command::Capture(CapturePurpose::Verify)),
         },
-        action(tr!(language, "Delete the selected captures"), Group::Work, DELETE, Command::DeleteSelected),
+        action(tr!(language, "Delete the selected captures"), Group::Work, DELETE, Command::Delete(model.selection.clone())),
         action(tr!(language, "Solve"), Group::Work, &[], Command::Solve),
         action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation),
         action(tr!(language, "Try to connect now"), Group::Work, &[], Command::Reconnect),
@@ -119,17 +119,17 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
             keys: REDO,
             command: session.redo.map(|_| Command::Redo),
         },
-        dialog(tr!(language, "New session…"), NEW, Dialog::NewSession),
-        dialog(tr!(language, "Open session…"), OPEN, Dialog::OpenSession),
-        dialog(tr!(language, "Save session…"), SAVE, Dialog::SaveSession),
+        dialog(tr!(language, "New session…"), NEW, Dialog::New),
+        dialog(tr!(language, "Open session…"), OPEN, Dialog::Open),
+        dialog(tr!(language, "Save session…"), SAVE, Dialog::SaveAs),
     ];
     for (step, keys) in Step::ALL.into_iter().zip(STEPS) {
         all.push(action(panes::step_name(step, language), Group::Steps, keys, Command::GoToStep(step)));
     }
-    let open = Command::OpenDialog;
+    let open = |dialog| Command::SetDialog(Some(dialog));
     all.extend([
-        action(tr!(language, "All commands"), Group::Window, PALETTE, open(Dialog::CommandPalette)),
-        action(tr!(language, "Keyboard"), Group::Window, KEYS, open(Dialog::Keys)),
+        action(tr!(language, "All commands"), Group::Window, PALETTE, open(Dialog::Palette)),
+        action(tr!(language, "Keyboard"), Group::Window, KEYS, open(Dialog::Help)),
         action(tr!(language, "Light theme"), Group::Window, &[], Command::SetTheme(ThemeChoice::Light)),
         action(tr!(language, "Dark theme"), Group::Window, &[], Command::SetTheme(ThemeChoice::Dark)),
         action(tr!(language, "Reset layout"), Group::Window, &[], Command::ResetLayout),

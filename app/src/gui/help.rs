@@ -19,10 +19,10 @@ const WIDTH: f32 = 680.0;
 pub fn dialog_ui(ctx: &Context, dialog: Dialog, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let content_ui = |ui: &mut Ui| match dialog {
-        Dialog::CommandPalette => {}
-        Dialog::Keys => keys_ui(ui, model),
+        Dialog::Palette | Dialog::ImportPoses | Dialog::ExportPoses | Dialog::ExportFolder => {}
+        Dialog::Help => keys_ui(ui, model),
         Dialog::About => about_ui(ui, model),
-        Dialog::NewSession | Dialog::OpenSession | Dialog::SaveSession => sessions_ui(ui, model),
+        Dialog::New | Dialog::Open | Dialog::SaveAs => sessions_ui(ui, model),
     };
     let width = WIDTH.min(ctx.content_rect().width() - 80.0);
     let area = Area::new(Id::new("dialog")).order(Order::Foreground).anchor(Align2::CENTER_CENTER, [0.0, -20.0]);
@@ -42,7 +42,7 @@ pub fn dialog_ui(ctx: &Context, dialog: Dialog, model: &Model, outbox: &mut Outb
             .inner
     });
     if shown.inner || pressed_outside(ctx, shown.response.rect) {
-        outbox.send(Command::CloseDialog);
+        outbox.send(Command::SetDialog(None));
     }
 }
 

@@ -4,15 +4,20 @@
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
 mod actions;
-mod app;
+mod captures;
 mod fonts;
 mod help;
 mod icons;
 mod layout;
+mod marks;
 mod numbers;
 mod palette;
+#[cfg(test)]
+mod pane_harness;
 mod panes;
 mod rail;
+#[cfg(test)]
+mod sample;
 mod session;
 mod status;
 mod steps;
@@ -30,16 +35,13 @@ use anyhow::anyhow;
 use eframe::NativeOptions;
 use egui::ViewportBuilder;
 
-pub use app::App;
-
 use crate::cli::GuiArgs;
-use crate::command::Event;
-use crate::model::{CellSource, Severity};
+use crate::app::{App, Connect, Start};
+use crate::model::CellSource;
 use crate::settings::{self, SettingsFile};
-use crate::text;
-use crate::worker::{Clock, Connector, LiveConnector, Waker};
-use layout::Layout;
-use window::Window;
+use crate::worker::{Clock, LiveConnector, Waker};
+pub use layout::Layout;
+pub use window::Window;
 
 /// Name under which the system keeps layout and size of the window.
 const APP_ID: &str = "handeye-workbench";
@@ -60,20 +62,22 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
             .with_min_inner_size([1024.0, 700.0]),
         ..NativeOptions::default()
     };
-    let session = args.session;
     let open = move |creation: &eframe::CreationContext<'_>| {
         let ctx = creation.egui_ctx.clone();
         let waker: Waker = Arc::new(move || ctx.request_repaint());
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
-        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::new(source.clone()));
-        let mut app = App::start(source, settings.view, &connector, clock, &waker)?.with_addresses(settings.addresses);
+        let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
+        let start = Start {
+            source,
+            view: settings.view,
+            addresses: settings.addresses.clone(),
+            sessions: settings.sessions_folder(variable),
+            open: args.session,
+        };
+        let mut app = App::start(start, connect, clock, waker)?;
         for warning in warnings {
             app.absorb(warning.into());
-        }
-        if let Some(session) = session {
-            let text = text!("The window does not open sessions yet: {folder}", folder = session.display());
-            app.absorb(Event::Notice { severity: Severity::Warning, text });
         }
         let layout = stored_layout(creation.storage);
         Ok(Box::new(Window::new(app, layout, file, &creation.egui_ctx)) as Box<dyn eframe::App>)

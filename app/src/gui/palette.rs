@@ -51,11 +51,11 @@ impl CommandPalette {
         let choice = if enter { Some(self.chosen) } else { clicked };
         if let Some(action) = choice.and_then(|index| found.get(index)) {
             if let Some(command) = &action.command {
-                outbox.send(Command::CloseDialog);
+                outbox.send(Command::SetDialog(None));
                 outbox.send(command.clone());
             }
         } else if outside {
-            outbox.send(Command::CloseDialog);
+            outbox.send(Command::SetDialog(None));
         }
     }
 
@@ -119,7 +119,7 @@ fn found(model: &Model, language: Language, typed: &str) -> Vec<Action> {
     let mut found: Vec<_> = actions::all(model, language)
         .into_iter()
         .zip(english)
-        .filter(|(action, _)| action.command != Some(Command::OpenDialog(crate::model::Dialog::CommandPalette)))
+        .filter(|(action, _)| action.command != Some(Command::SetDialog(Some(crate::model::Dialog::Palette))))
         .filter_map(|(action, english)| {
             let score = fit(action.name, typed).into_iter().chain(fit(english.name, typed)).max()?;
             Some((score, action))

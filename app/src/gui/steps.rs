@@ -1,5 +1,7 @@
 //! How far the calibration has come: what is done, what can be done now, and what stands in the way.
 
+use handeye_core::session::Role;
+
 use crate::model::{Model, Step};
 use crate::text;
 use crate::text::Text;
@@ -64,11 +66,23 @@ impl Facts {
     /// What the model says. The only place where the steps look at it.
     pub fn of(model: &Model) -> Self {
         let connected = model.control.is_connected() && model.camera.is_connected();
+        let document = model.document();
+        let seen_now = model.detection.as_ref().is_some_and(|detection| detection.corners.is_some());
+        let seen_before = model.observed.values().flatten().any(|observed| observed.corners.is_some());
+        let current = model.solve.current();
+        let written = model.export.written.as_ref().is_some_and(|written| written.files.is_ok());
         Self {
             connected,
             lost: !connected && model.frame.is_some(),
             frame_seen: model.frame.is_some(),
-            ..Self::default()
+            board_seen: seen_now || seen_before,
+            captures_in_use: document.in_use().count(),
+            solving: model.solve.is_running(),
+            solved: current.is_some(),
+            expected_error_m: current.and_then(|solved| solved.calibration.tip_error_95_m),
+            check_captures: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
+            verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
+            exported: written && current.is_some(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The window for tests, driven by the labels of its controls.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use egui::{Vec2, vec2};
 use egui_kittest::Harness;
@@ -9,11 +10,11 @@ use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 
-use super::app::App;
 use super::layout::Layout;
 use super::window::Window;
+use crate::app::{App, Connect, Start};
 use crate::command::{Command, Event};
-use crate::model::{CellSource, FrameImages, FrameInfo, Link, LinkState, Pane, RobotState, Simulation, ViewSettings};
+use crate::model::{CellSource, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation, ViewSettings};
 use crate::settings::SettingsFile;
 use crate::worker::fake::FakeCell;
 use crate::worker::{Clock, Connector, PortError, Waker};
@@ -22,7 +23,9 @@ use crate::worker::{Clock, Connector, PortError, Waker};
 pub struct Silent {
     /// The window, driven by labels.
     pub harness: Harness<'static, Window>,
+    woken: crossbeam_channel::Receiver<()>,
     _release: crossbeam_channel::Sender<()>,
+    _sessions: tempfile::TempDir,
 }
 
 /// Size of the window [points].
@@ -38,13 +41,21 @@ impl Silent {
     pub fn of_size(source: CellSource, size: Vec2) -> Self {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
-        cell.script().refusals = vec![PortError::Hopeless("not in this test".to_owned()); 2];
-        let connector: Arc<dyn Connector> = Arc::new(cell);
+        cell.script().refusals = vec![PortError::Hopeless("not in this test".to_owned()); 3];
+        let connect: Connect = Arc::new(move |_source| Arc::new(cell.clone()) as Arc<dyn Connector>);
         let clock: Clock = Arc::new(|| 100.0);
         let (wake, woken) = crossbeam_channel::bounded(1);
         let waker: Waker = wakes(wake);
-        let mut app = App::start(source, ViewSettings::default(), &connector, clock, &waker).expect("threads");
-        while ![Link::Control, Link::Camera]
+        let folder = tempfile::tempdir().expect("a folder");
+        let start = Start {
+            source,
+            view: ViewSettings::default(),
+            addresses: Vec::new(),
+            sessions: folder.path().to_path_buf(),
+            open: None,
+        };
+        let mut app = App::start(start, connect, clock, waker).expect("threads");
+        while ![Link::Control, Link::Camera, Link::Motion]
             .iter()
             .all(|&link| matches!(app.model().link(link), LinkState::Failed { .. }))
         {
@@ -59,7 +70,7 @@ impl Silent {
             },
             Window::new(app, Layout::default(), SettingsFile::default(), &egui::Context::default()),
         );
-        let mut silent = Self { harness, _release: release };
+        let mut silent = Self { harness, woken, _release: release, _sessions: folder };
         silent.steps();
         silent
     }
@@ -67,6 +78,21 @@ impl Silent {
     /// Draws until what was done shows.
     pub fn steps(&mut self) {
         self.harness.run_steps(3);
+    }
+
+    /// Waits until what the archive and the other threads do shows in the model.
+    pub fn until(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) {
+        let deadline = Instant::now() + Duration::from_secs(30);
+        loop {
+            self.steps();
+            if is_so(self.app().model()) {
+                return;
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            assert!(!left.is_zero(), "waiting for {what}");
+            // A report may have come between the look and the wait: the next look is soon in any case.
+            let _woken = self.woken.recv_timeout(left.min(Duration::from_millis(50))).is_ok();
+        }
     }
 
     /// The application.

@@ -1,35 +1,77 @@
 //! The pictures on the graphics card.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use egui::{ColorImage, Context, TextureHandle, TextureOptions};
+use egui::{ColorImage, Context, TextureFilter, TextureHandle, TextureOptions};
 use handeye_core::image::RgbImage;
+use handeye_core::session::CaptureId;
 
-use crate::model::LiveFrame;
+use crate::depth_view;
+use crate::model::{FrameImages, Model, Observed};
 
-/// Textures of the newest frame.
+/// From this zoom on, pixels are shown as the squares that they are.
+pub const CRISP_FROM: f32 = 4.0;
+
+/// Thumbnails that are kept; those that were not seen for longest go first.
+const MOST_THUMBNAILS: usize = 256;
+
+/// Which pictures are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Source {
+    /// The live frame of this number.
+    Live(u64),
+    /// The recorded pictures of a capture.
+    Review(CaptureId),
+}
+
+/// Textures of the pictures that are shown, live or recorded, and of the thumbnails.
 #[derive(Default)]
 pub struct LiveTextures {
     /// Colour.
     pub rgb: Option<TextureHandle>,
     /// Depth in colours.
     pub depth: Option<TextureHandle>,
-    number: Option<u64>,
+    /// Small pictures of captures.
+    pub thumbnails: Thumbnails,
+    review_range_m: Option<[f32; 2]>,
+    shown: Option<(Source, bool)>,
     #[cfg(test)]
     uploads: u64,
 }
 
 impl LiveTextures {
-    /// Uploads a frame, unless it is there already.
-    pub fn update(&mut self, ctx: &Context, frame: Option<&LiveFrame>) {
-        let Some(frame) = frame.filter(|frame| self.number != Some(frame.info.number)) else { return };
-        upload(ctx, &mut self.rgb, "rgb", &frame.images.rgb);
-        upload(ctx, &mut self.depth, "depth", &frame.images.depth_coloured);
-        self.number = Some(frame.info.number);
+    /// Uploads the pictures that are to be shown, unless they are there already.
+    pub fn update(&mut self, ctx: &Context, model: &Model) {
+        self.thumbnails.pass += 1;
+        let wanted: Option<(Source, &Arc<FrameImages>)> = match &model.review {
+            Some(review) => review.images.as_ref().map(|images| (Source::Review(review.id), images)),
+            None => model.frame.as_ref().map(|frame| (Source::Live(frame.info.number), &frame.images)),
+        };
+        let Some((source, images)) = wanted else { return };
+        let crisp = model.viewport.zoom >= CRISP_FROM;
+        if self.shown == Some((source, crisp)) {
+            return;
+        }
+        upload(ctx, &mut self.rgb, "rgb", &images.rgb, crisp);
+        upload(ctx, &mut self.depth, "depth", &images.depth_coloured, crisp);
+        self.review_range_m = match source {
+            Source::Live(_) => None,
+            Source::Review(_) => {
+                let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
+                depth_view::range_of(&images.depth, far_plane_m, None)
+            }
+        };
+        self.shown = Some((source, crisp));
         #[cfg(test)]
         {
             self.uploads += 1;
         }
+    }
+
+    /// Depths [m] at the ends of the colours of a recorded picture; `None` without any depth in it.
+    pub fn review_range_m(&self) -> Option<[f32; 2]> {
+        self.review_range_m
     }
 
     /// How many frames were uploaded.
@@ -39,11 +81,84 @@ impl LiveTextures {
     }
 }
 
-fn upload(ctx: &Context, texture: &mut Option<TextureHandle>, name: &str, picture: &RgbImage) {
-    let size = [picture.width() as usize, picture.height() as usize];
-    let image = Arc::new(ColorImage::from_rgb(size, picture.as_raw()));
+fn upload(ctx: &Context, texture: &mut Option<TextureHandle>, name: &str, picture: &RgbImage, crisp: bool) {
     match texture {
-        Some(texture) if texture.size() == size => texture.set(image, TextureOptions::LINEAR),
-        slot => *slot = Some(ctx.load_texture(name, image, TextureOptions::LINEAR)),
+        Some(texture) if texture.size() == [picture.width() as usize, picture.height() as usize] => {
+            texture.set(pixels(picture), options(crisp));
+        }
+        slot => *slot = Some(load(ctx, name, picture, crisp)),
+    }
+}
+
+fn load(ctx: &Context, name: &str, picture: &RgbImage, crisp: bool) -> TextureHandle {
+    ctx.load_texture(name, pixels(picture), options(crisp))
+}
+
+fn pixels(picture: &RgbImage) -> Arc<ColorImage> {
+    Arc::new(ColorImage::from_rgb([picture.width() as usize, picture.height() as usize], picture.as_raw()))
+}
+
+fn options(crisp: bool) -> TextureOptions {
+    let magnification = if crisp { TextureFilter::Nearest } else { TextureFilter::Linear };
+    TextureOptions { magnification, ..TextureOptions::LINEAR }
+}
+
+/// Everything that the window keeps on the graphics card.
+#[derive(Default)]
+pub struct Textures {
+    /// The large pictures.
+    pub live: LiveTextures,
+    /// The small ones.
+    pub thumbnails: Thumbnails,
+}
+
+/// Small pictures of captures; each is uploaded when it is first seen on the screen.
+#[derive(Default)]
+pub struct Thumbnails {
+    textures: HashMap<CaptureId, Thumbnail>,
+    /// Counts the frames of the window.
+    pass: u64,
+    #[cfg(test)]
+    uploads: u64,
+}
+
+struct Thumbnail {
+    texture: TextureHandle,
+    /// What it shows: kept, so that another picture of the same capture can be told from it.
+    picture: Arc<RgbImage>,
+    last_seen: u64,
+}
+
+impl Thumbnails {
+    /// The thumbnail of a capture.
+    pub fn of(&mut self, ctx: &Context, id: CaptureId, observed: &Observed) -> &TextureHandle {
+        let is_new = self.textures.get(&id).is_none_or(|kept| !Arc::ptr_eq(&kept.picture, &observed.thumbnail));
+        if is_new && self.textures.len() >= MOST_THUMBNAILS {
+            self.forget_oldest();
+        }
+        let (pass, picture) = (self.pass, &observed.thumbnail);
+        #[cfg(test)]
+        {
+            self.uploads += u64::from(is_new);
+        }
+        let new =
+            || Thumbnail { texture: load(ctx, "thumbnail", picture, false), picture: picture.clone(), last_seen: pass };
+        let kept = self.textures.entry(id).or_insert_with(new);
+        if !Arc::ptr_eq(&kept.picture, picture) {
+            *kept = new();
+        }
+        kept.last_seen = pass;
+        &kept.texture
+    }
+
+    fn forget_oldest(&mut self) {
+        let Some(oldest) = self.textures.iter().map(|(id, kept)| (kept.last_seen, *id)).min() else { return };
+        self.textures.remove(&oldest.1);
+    }
+
+    /// How many thumbnails were uploaded.
+    #[cfg(test)]
+    pub fn uploads(&self) -> u64 {
+        self.uploads
     }
 }

@@ -5,14 +5,14 @@ use std::time::Duration;
 use egui::Ui;
 
 use super::actions;
-use super::app::App;
 use super::fonts;
 use super::help;
 use super::layout::{self, Layout};
 use super::palette::CommandPalette;
 use super::panes;
-use super::textures::LiveTextures;
+use super::textures::Textures;
 use super::theme;
+use crate::app::App;
 use crate::command::{Command, Outbox};
 use crate::model::{Dialog, ThemeChoice};
 use crate::settings::SettingsFile;
@@ -23,11 +23,10 @@ const CLOCK_PERIOD: Duration = Duration::from_millis(250);
 /// Application, graphics, and what concerns nothing but the window: where panes are, which dialog is open.
 pub struct Window {
     app: App,
-    textures: LiveTextures,
+    textures: Textures,
     theme: Option<ThemeChoice>,
     outbox: Outbox,
     layout: Layout,
-    dialog: Option<Dialog>,
     palette: CommandPalette,
     settings: SettingsFile,
 }
@@ -38,11 +37,10 @@ impl Window {
         theme::install(ctx);
         Self {
             app,
-            textures: LiveTextures::default(),
+            textures: Textures::default(),
             theme: None,
             outbox: Outbox::default(),
             layout,
-            dialog: None,
             palette: CommandPalette::default(),
             settings,
         }
@@ -67,14 +65,14 @@ impl Window {
             return;
         }
         self.keyboard(ui.ctx());
-        let Self { app, textures, outbox, layout, dialog, palette, .. } = self;
+        let Self { app, textures, outbox, layout, palette, .. } = self;
         let model = app.model();
-        textures.update(ui.ctx(), model.frame.as_ref());
+        textures.live.update(ui.ctx(), model);
         panes::all_ui(ui, model, textures, layout, outbox);
-        match dialog {
+        match model.dialog {
             None => {}
-            Some(Dialog::CommandPalette) => palette.palette_ui(ui.ctx(), model, outbox),
-            Some(dialog) => help::dialog_ui(ui.ctx(), *dialog, model, outbox),
+            Some(Dialog::Palette) => palette.palette_ui(ui.ctx(), model, outbox),
+            Some(dialog) => help::dialog_ui(ui.ctx(), dialog, model, outbox),
         }
         if outbox.is_empty() {
             ui.request_repaint_after(CLOCK_PERIOD);
@@ -88,11 +86,11 @@ impl Window {
     fn keyboard(&mut self, ctx: &egui::Context) {
         if ctx.input(|input| input.key_pressed(actions::STOP_KEY)) {
             self.outbox.send(Command::Stop);
-            if self.dialog.is_some() {
-                self.outbox.send(Command::CloseDialog);
+            if self.app.model().dialog.is_some() {
+                self.outbox.send(Command::SetDialog(None));
             }
         }
-        if self.dialog.is_none() {
+        if self.app.model().dialog.is_none() {
             for command in actions::pressed(ctx, self.app.model()) {
                 self.outbox.send(command);
             }
@@ -114,16 +112,23 @@ impl Window {
     /// Does what concerns the window; the rest is for the application.
     pub(super) fn apply(&mut self, command: Command) {
         match command {
-            Command::GoToStep(step) => self.layout.go_to(step),
+            Command::GoToStep(step) => {
+                self.layout.go_to(step);
+                self.app.apply(command);
+            }
             Command::ShowPane(pane) => self.layout.show(pane),
             Command::ResetLayout => self.layout = Layout::default(),
-            Command::OpenDialog(dialog) => {
+            Command::SetDialog(_) => {
                 self.palette = CommandPalette::default();
-                self.dialog = Some(dialog);
+                self.app.apply(command);
             }
-            Command::CloseDialog => self.dialog = None,
             command => self.app.apply(command),
         }
+    }
+
+    /// The application.
+    pub fn app_mut(&mut self) -> &mut App {
+        &mut self.app
     }
 
     /// The application.
@@ -141,7 +146,7 @@ impl Window {
     /// How many frames went to the graphics card.
     #[cfg(test)]
     pub fn uploads(&self) -> u64 {
-        self.textures.uploads()
+        self.textures.live.uploads()
     }
 }
 

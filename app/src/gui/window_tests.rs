@@ -1,5 +1,7 @@
 use egui::vec2;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use handeye_core::handeye::Mode;
+use handeye_core::target::TargetSpec;
 
 use super::*;
 use crate::command::Event;
@@ -218,7 +220,7 @@ fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
     assert!(silent.app().model().stop_pending);
 
     silent.absorb(Event::Stopped);
-    silent.command(Command::OpenDialog(Dialog::Keys));
+    silent.command(Command::SetDialog(Some(Dialog::Help)));
     assert!(silent.sees("Esc stops the arm at any time"));
     silent.press(egui::Modifiers::NONE, egui::Key::Escape);
     assert!(silent.app().model().stop_pending);
@@ -304,13 +306,14 @@ fn the_board_and_the_mode_are_set_in_the_target_pane() {
     silent.show(Pane::Target);
     assert!(silent.sees("10 × 7 corners are 11 × 8 squares"));
     silent.click("Dots");
-    assert!(matches!(silent.app().model().setup.target, handeye_core::target::TargetSpec::Circles(_)));
+    silent.until("dots", |model| matches!(model.document().meta.target, TargetSpec::Circles(_)));
     assert!(silent.sees("This board looks the same after half a turn"));
     silent.click("Eye to hand");
-    assert_eq!(silent.app().model().setup.mode, handeye_core::handeye::Mode::EyeToHand);
+    silent.until("the mode", |model| model.document().meta.mode == Mode::EyeToHand);
     silent.click("Fixed");
-    let camera = silent.app().model().setup.camera.expect("what is known");
-    assert!(camera.fixed && camera.intrinsics.is_some());
+    silent.until("the camera", |model| {
+        model.document().meta.camera.is_some_and(|camera| camera.fixed && camera.intrinsics.is_some())
+    });
 }
 
 /// Every text that a shape shows.
@@ -325,7 +328,7 @@ fn texts(shape: &egui::Shape, found: &mut Vec<String>) {
 #[test]
 fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
     let mut silent = Silent::live();
-    let dialogs = [Dialog::Keys, Dialog::About, Dialog::CommandPalette].map(Command::OpenDialog);
+    let dialogs = [Dialog::Help, Dialog::About, Dialog::Palette].map(|dialog| Command::SetDialog(Some(dialog)));
     let views: Vec<_> = Pane::ALL.map(Command::ShowPane).into_iter().chain(dialogs).collect();
     for language in Language::ALL {
         for theme in [ThemeChoice::Dark, ThemeChoice::Light] {
@@ -339,7 +342,7 @@ fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
                 for text in found {
                     assert_eq!(missing(&silent, &text), "", "{view:?} {language:?}: {text}");
                 }
-                silent.command(Command::CloseDialog);
+                silent.command(Command::SetDialog(None));
             }
         }
     }

@@ -4,15 +4,25 @@
 //! on the clock that the application was started with.
 
 mod capture;
+mod export;
 mod messages;
 mod motion;
+mod session;
+mod solve;
+mod view;
 mod workflow;
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
+use handeye_core::calibrate::Method;
+use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{ColourMap, DepthImage, DepthSample};
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::frames::{Base, Camera, Pose, Tip};
+use handeye_core::handeye::HandEye;
+use handeye_core::session::{CaptureId, Document};
+use handeye_core::verify::Calibrated;
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
@@ -20,17 +30,21 @@ use serde::{Deserialize, Serialize};
 pub use capture::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
+pub use export::{ExportState, Preview, PreviewFile, Written};
 pub use messages::{Message, Messages};
 pub use motion::{
     Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
 };
-pub use workflow::{Dialog, Pane, Setup, Step};
+pub use session::{
+    FolderEntry, FolderKind, FolderListing, Observed, RecentSession, Review, SessionState, StopOutcome, Tour,
+};
+pub use solve::{JobId, SolveState, SolveStatus, Solved};
+pub use view::{Overlays, PickedPoint, Viewport, exports_of};
+pub use workflow::{Dialog, Pane, Step};
 
+use crate::session_start;
 use crate::text::Language;
-
-/// How depths are coloured, in pictures and in the bar that explains them.
-pub const DEPTH_COLOURS: ColourMap = ColourMap::Turbo;
 
 /// Which cell the window works with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -252,9 +266,19 @@ pub enum RotationFormat {
 }
 
 /// What the window remembers from one start to the next.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ViewSettings {
+    /// The colours of depths.
+    pub depth_colours: ColourMap,
+    /// What is drawn over the pictures.
+    pub overlays: Overlays,
+    /// How the tip is jogged.
+    pub jog: JogSettings,
+    /// How captures are taken.
+    pub capture: CaptureOptions,
+    /// The error that is good enough.
+    pub goal: Goal,
     /// Light or dark.
     pub theme: ThemeChoice,
     /// Of all words.
@@ -263,6 +287,17 @@ pub struct ViewSettings {
     pub rotation: RotationFormat,
     /// Which depths the colour map covers.
     pub depth_scale: DepthScale,
+}
+
+/// An error [m] that is good enough, 95 %.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Goal(pub f64);
+
+impl Default for Goal {
+    /// What most picking needs.
+    fn default() -> Self {
+        Self(0.5e-3)
+    }
 }
 
 /// How much a message matters, least first.
@@ -307,10 +342,48 @@ pub struct Model {
     pub view: ViewSettings,
     /// What happened, in words.
     pub messages: Messages,
-    /// What is calibrated with what.
-    pub setup: Setup,
     /// Addresses that were connected to before, newest first.
     pub addresses: Vec<String>,
+    /// The board in the newest picture that was searched.
+    pub detection: Option<LiveDetection>,
+    /// The capture that is under way.
+    pub capture: Option<CaptureUnderWay>,
+    /// Why there was no capture the last time.
+    pub refused: Option<CaptureRefused>,
+    /// The tour that is under way, or the last one.
+    pub tour: Option<Tour>,
+    /// Whether that tour is still under way.
+    pub touring: bool,
+    /// The session.
+    pub session: SessionState,
+    /// Whether a session is being opened.
+    pub opening: bool,
+    /// What was seen in its captures; `None` for a picture that cannot be read. One that is not here is being looked at.
+    pub observed: BTreeMap<CaptureId, Option<Arc<Observed>>>,
+    /// Captures that are selected, the last one last.
+    pub selection: Vec<CaptureId>,
+    /// The capture whose picture is shown instead of the live one.
+    pub review: Option<Review>,
+    /// The solver and its newest answer.
+    pub solve: SolveState,
+    /// Which answer is asked for.
+    pub method: String,
+    /// The line between good and bad residuals [px].
+    pub outlier_line_px: Option<f64>,
+    /// The point that was picked.
+    pub picked: Option<PickedPoint>,
+    /// The export dialog.
+    pub export: ExportState,
+    /// The step in front.
+    pub step: Step,
+    /// The dialog that is open.
+    pub dialog: Option<Dialog>,
+    /// What the dialogs that open and save show.
+    pub folder: Option<FolderListing>,
+    /// Sessions that were open before.
+    pub recent: Vec<RecentSession>,
+    /// The part of the pictures that is shown.
+    pub viewport: Viewport,
 }
 
 impl Model {
@@ -332,8 +405,32 @@ impl Model {
             cursor: None,
             view,
             messages: Messages::default(),
-            setup: Setup::default(),
             addresses: Vec::new(),
+            detection: None,
+            capture: None,
+            refused: None,
+            tour: None,
+            touring: false,
+            session: SessionState {
+                folder: None,
+                document: Arc::new(Document::new(session_start::meta(None, String::new()))),
+                undo: None,
+                redo: None,
+            },
+            opening: false,
+            observed: BTreeMap::new(),
+            selection: Vec::new(),
+            review: None,
+            solve: SolveState::default(),
+            method: Method::default().name().to_owned(),
+            outlier_line_px: None,
+            picked: None,
+            export: ExportState::default(),
+            step: Step::default(),
+            dialog: None,
+            folder: None,
+            recent: Vec::new(),
+            viewport: Viewport::default(),
         }
     }
 
@@ -349,6 +446,35 @@ impl Model {
     /// Age of the newest pictures [s].
     pub fn frame_age_s(&self) -> Option<f64> {
         self.frame.as_ref().map(|frame| (self.now_s - frame.info.received_s).max(0.0))
+    }
+
+    /// The captures and what they are for.
+    pub fn document(&self) -> &Document {
+        &self.session.document
+    }
+
+    /// What was seen in a capture; `None` while it is not known, or when the picture cannot be read.
+    pub fn observed(&self, id: CaptureId) -> Option<&Observed> {
+        self.observed.get(&id)?.as_deref()
+    }
+
+    /// The camera: as calibrated, or else as its settings say.
+    pub fn intrinsics(&self) -> Option<Intrinsics> {
+        let calibrated = self.solve.solved.as_ref().and_then(|solved| solved.calibration.intrinsics);
+        calibrated.or_else(|| Some(self.cell.as_ref()?.nominal_intrinsics))
+    }
+
+    /// The camera on the tip, by the newest calibration; `None` without one, or for a camera beside the robot.
+    pub fn tip_from_camera(&self) -> Option<Pose<Tip, Camera>> {
+        match self.calibrated()?.hand_eye {
+            HandEye::EyeInHand { tip_from_camera, .. } => Some(tip_from_camera),
+            HandEye::EyeToHand { .. } => None,
+        }
+    }
+
+    /// The newest calibration as what predicts and measures.
+    pub fn calibrated(&self) -> Option<&Calibrated> {
+        self.solve.solved.as_ref()?.calibrated.as_ref()
     }
 
     /// Whether the simulation is known not to run, while the connection works.

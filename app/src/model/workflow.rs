@@ -1,14 +1,12 @@
 //! The way from a connection to exported files, and the parts of the window.
 
-use handeye_core::dataset::CameraInput;
-use handeye_core::handeye::Mode;
-use handeye_core::target::{Grid, TargetSpec};
 use serde::{Deserialize, Serialize};
 
 /// Steps of a calibration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Step {
     /// Reach robot and camera.
+    #[default]
     Connect,
     /// Say what is looked at.
     Target,
@@ -78,34 +76,21 @@ impl Pane {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Dialog {
     /// All commands, to type for.
-    CommandPalette,
+    Palette,
     /// All keys.
-    Keys,
+    Help,
     /// What this is.
     About,
     /// Where a new session goes.
-    NewSession,
-    /// Which session to open.
-    OpenSession,
-    /// Where the session is kept.
-    SaveSession,
-}
-
-/// What is calibrated with what.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Setup {
-    /// Where the camera sits.
-    pub mode: Mode,
-    /// What is looked at.
-    pub target: TargetSpec,
-    /// What is known of the camera beforehand; `None` when nothing is.
-    pub camera: Option<CameraInput>,
-}
-
-/// The board of the built-in cell.
-impl Default for Setup {
-    fn default() -> Self {
-        let board = Grid { columns: 10, rows: 7, square_m: 0.015 };
-        Self { mode: Mode::EyeInHand, target: TargetSpec::Chessboard(board), camera: None }
-    }
+    New,
+    /// Which session or data set to open.
+    Open,
+    /// Where a copy of the session goes.
+    SaveAs,
+    /// Which file of taught poses to read.
+    ImportPoses,
+    /// Where taught poses are written.
+    ExportPoses,
+    /// Where exports go.
+    ExportFolder,
 }

@@ -1,42 +1,36 @@
 //! Calibration from corners.
 
+use nalgebra::Point3;
+
+use super::lens::Lens;
 use super::{
-    CalibrateError, Calibration, CameraKnowledge, Method, Observations, ViewResult, ViewStatus, best_start,
+    CalibrateError, Calibration, CornerResidual, Method, Observations, ViewResult, ViewStatus, best_start,
     check_motion, chosen, closed_forms,
 };
 use crate::camera::Intrinsics;
 use crate::frames::{Camera, Pose, Target};
 use crate::handeye::closed_form::ClosedFormSolution;
-use crate::handeye::joint::{self, JointProblem, JointStart, camera_from_target};
-use crate::handeye::{HandEye, Mode, PosePair, quality};
-use crate::observation::View;
-use crate::progress::CancelToken;
-use crate::vision::{intrinsics, pnp};
+use crate::handeye::joint::{self, JointProblem, JointStart, camera_from_target, prediction};
+use crate::handeye::{HandEye, Mode, PosePair, quality, subset};
+use crate::observation::{Corner, View};
+use crate::progress::Work;
 
 /// Least number of views with the target in sight.
-const NEED: usize = 3;
+pub(crate) const NEED: usize = 3;
 
-pub fn calibrate(
-    observations: &Observations,
-    method: Method,
-    cancel: &CancelToken,
-) -> Result<Calibration, CalibrateError> {
+pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -> Result<Calibration, CalibrateError> {
     let seen: Vec<Seen<'_>> = observations.views.iter().enumerate().filter_map(Seen::new).collect();
     if seen.len() < NEED {
-        return Err(CalibrateError::TargetNotFound {
-            found: seen.len(),
-            images: observations.views.len(),
-            need: NEED,
-            target: observations.target.to_string(),
-        });
+        return Err(too_few(observations, seen.len()));
     }
-    let lens = Lens::find(observations, &seen)?;
+    let refined = observations.mode.is_some() && method == Method::Joint;
+    let lens = Lens::find(observations, &seen, refined, work)?;
     let mut calibration = without_hand_eye(observations, &seen, &lens);
     let Some(mode) = observations.mode else { return Ok(calibration) };
 
     let (views, pairs) = with_robot(mode, &seen, &lens)?;
     check_motion(&pairs)?;
-    calibration.methods = closed_forms(&pairs);
+    calibration.methods = closed_forms(&pairs, work)?;
     let points = observations.target.points();
     let problem = JointProblem { mode, points: &points, views: &views, free_intrinsics: lens.free, noise: None };
     match method {
@@ -44,54 +38,37 @@ pub fn calibrate(
             let solution = chosen(&calibration.methods, name)?;
             take_closed_form(&mut calibration, &solution, &problem, &seen, &lens);
         }
-        Method::Joint => take_joint(&mut calibration, &problem, &seen, &lens, cancel)?,
+        Method::Joint => take_joint(&mut calibration, &problem, &seen, &lens, work)?,
     }
     Ok(calibration)
 }
 
-/// A view in which the target was found.
-struct Seen<'a> {
+/// Whether it is the target that is missing, or views that were left out.
+fn too_few(observations: &Observations, found: usize) -> CalibrateError {
+    let excluded = observations.views.iter().filter(|v| !v.in_fit).count();
+    let with_excluded = observations.views.iter().filter(|v| v.corners.is_some()).count();
+    if with_excluded >= NEED {
+        return CalibrateError::TooFewLeft { left: found, excluded, need: NEED };
+    }
+    CalibrateError::TargetNotFound {
+        found,
+        images: observations.views.len() - excluded,
+        need: NEED,
+        target: observations.target.to_string(),
+    }
+}
+
+/// A view in the fit in which the target was found.
+pub(super) struct Seen<'a> {
     /// Its index among all views.
     index: usize,
     view: &'a super::ObservedView,
-    corners: &'a [crate::observation::Corner],
+    pub(super) corners: &'a [Corner],
 }
 
 impl<'a> Seen<'a> {
     fn new((index, view): (usize, &'a super::ObservedView)) -> Option<Self> {
-        Some(Self { index, view, corners: view.corners.as_deref()? })
-    }
-}
-
-/// The camera and the target pose in every view that goes with it.
-struct Lens {
-    intrinsics: Intrinsics,
-    free: bool,
-    sigma: Option<[f64; 4]>,
-    camera_from_target: Vec<Pose<Camera, Target>>,
-    rms_px: Vec<f64>,
-}
-
-impl Lens {
-    fn find(observations: &Observations, seen: &[Seen<'_>]) -> Result<Self, CalibrateError> {
-        let (intrinsics, free, sigma) = match observations.camera {
-            CameraKnowledge::Fixed(intrinsics) => (intrinsics, false, None),
-            CameraKnowledge::Estimate { model, start } => {
-                let corners: Vec<_> = seen.iter().map(|s| s.corners).collect();
-                let found =
-                    intrinsics::calibrate(&corners, &observations.target, observations.image_size, model, start)?;
-                let sigma = found.sigma;
-                (found.intrinsics, true, Some([sigma.fx, sigma.fy, sigma.cx, sigma.cy]))
-            }
-        };
-        let mut camera_from_target = Vec::with_capacity(seen.len());
-        let mut rms_px = Vec::with_capacity(seen.len());
-        for s in seen {
-            let pose = pnp::solve(s.corners, &observations.target, &intrinsics)?.best;
-            camera_from_target.push(pose.camera_from_target);
-            rms_px.push(pose.rms_px);
-        }
-        Ok(Self { intrinsics, free, sigma, camera_from_target, rms_px })
+        Some(Self { index, view, corners: view.corners.as_deref().filter(|_| view.in_fit)? })
     }
 }
 
@@ -102,27 +79,32 @@ fn total_rms(per_view: impl Iterator<Item = (f64, usize)>) -> f64 {
 }
 
 fn without_hand_eye(observations: &Observations, seen: &[Seen<'_>], lens: &Lens) -> Calibration {
-    let mut views: Vec<ViewResult> = observations
-        .views
-        .iter()
-        .map(|v| ViewResult { name: v.name.clone(), status: ViewStatus::NoTarget, rms_px: None, influence_m: None })
-        .collect();
-    for (s, rms) in seen.iter().zip(&lens.rms_px) {
-        views[s.index].status = ViewStatus::Used;
-        views[s.index].rms_px = Some(*rms);
+    let mut views: Vec<ViewResult> =
+        observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::NoTarget)).collect();
+    let points = observations.target.points();
+    for ((s, rms), pose) in seen.iter().zip(&lens.rms_px).zip(&lens.camera_from_target) {
+        let view = &mut views[s.index];
+        view.status = ViewStatus::Used;
+        view.rms_px = Some(*rms);
+        view.residuals = residuals(&lens.intrinsics, pose, &points, s.corners);
+        view.camera_from_target = Some(*pose);
     }
     Calibration {
         hand_eye: None,
         hand_eye_covariance: None,
         target_covariance: None,
+        shared_covariance: None,
         intrinsics: Some(lens.intrinsics),
         intrinsics_fixed: !lens.free,
         intrinsics_sigma: lens.sigma,
         noise: None,
         rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(seen.iter().map(|s| s.corners.len())))),
         heldout_rms_px: None,
+        expected_heldout_rms_px: None,
+        robot_effect_px: None,
         tip_error_95_m: None,
         reference_point: None,
+        error_curve: None,
         methods: Vec::new(),
         views,
     }
@@ -150,7 +132,7 @@ fn take_joint(
     problem: &JointProblem<'_>,
     seen: &[Seen<'_>],
     lens: &Lens,
-    cancel: &CancelToken,
+    work: &Work<'_>,
 ) -> Result<(), CalibrateError> {
     let start = best_start(&calibration.methods, |s| capped_misfit(problem, lens, s))?;
     let start = JointStart {
@@ -158,13 +140,22 @@ fn take_joint(
         anchor_from_target: start.anchor_from_target,
         intrinsics: lens.intrinsics,
     };
-    let solution = joint::estimate(problem, &start, cancel)?;
+    let solution = joint::estimate(problem, &start, *work)?;
     let from_solution = JointStart {
         mount_from_camera: solution.hand_eye.mount_from_camera(),
         anchor_from_target: solution.hand_eye.anchor_from_target(),
         intrinsics: solution.intrinsics,
     };
-    calibration.heldout_rms_px = quality::held_out_rms_px(problem, &from_solution, cancel)?;
+    // Leaving out a fifth of so many views changes their noise levels by a few percent, and finding them again would
+    // take longer than everything else.
+    let known = (problem.views.len() > subset::MOST_VIEWS).then_some(solution.noise);
+    let folds = JointProblem { noise: known, ..*problem };
+    calibration.heldout_rms_px = quality::held_out_rms_px(&folds, &from_solution, *work)?;
+    let expected = prediction::expected_residuals(problem, &solution, *work)?;
+    calibration.expected_heldout_rms_px = Some(expected.prediction_px);
+    calibration.robot_effect_px = Some(expected.robot_px);
+    calibration.error_curve = Some(prediction::error_by_views(problem, &solution, *work)?);
+    calibration.shared_covariance = Some(solution.covariance.clone());
     calibration.hand_eye_covariance = Some(solution.hand_eye_covariance());
     calibration.target_covariance = Some(solution.target_covariance());
     if let Some(sigma) = solution.intrinsics_sigma().first_chunk::<4>() {
@@ -177,8 +168,13 @@ fn take_joint(
     calibration.intrinsics = Some(solution.intrinsics);
     calibration.hand_eye = Some(solution.hand_eye);
     for (s, fit) in seen.iter().zip(&solution.views) {
-        calibration.views[s.index].rms_px = Some(fit.rms_px);
-        calibration.views[s.index].influence_m = fit.influence_m;
+        let view = &mut calibration.views[s.index];
+        view.rms_px = Some(fit.rms_px);
+        view.influence_m = fit.influence_m;
+        view.correction_m = Some(fit.correction.fixed_rows::<3>(0).norm());
+        view.correction_rad = Some(fit.correction.fixed_rows::<3>(3).norm());
+        view.residuals = residuals(&solution.intrinsics, &fit.camera_from_target, problem.points, s.corners);
+        view.camera_from_target = Some(fit.camera_from_target);
     }
     Ok(())
 }
@@ -195,7 +191,16 @@ fn take_closed_form(
     for (s, view) in seen.iter().zip(problem.views) {
         let squared = squared_residuals(problem, &lens.intrinsics, solution, view, f64::INFINITY);
         let view_rms = (squared / view.corners.len() as f64).sqrt();
-        calibration.views[s.index].rms_px = view_rms.is_finite().then_some(view_rms);
+        let result = &mut calibration.views[s.index];
+        let pose = camera_from_target(
+            problem.mode,
+            &view.base_from_tip,
+            &solution.mount_from_camera,
+            &solution.anchor_from_target,
+        );
+        result.rms_px = view_rms.is_finite().then_some(view_rms);
+        result.residuals = residuals(&lens.intrinsics, &pose, problem.points, s.corners);
+        result.camera_from_target = Some(pose);
         rms.push((view_rms, view.corners.len()));
     }
     let all = total_rms(rms.into_iter());
@@ -203,11 +208,29 @@ fn take_closed_form(
     calibration.hand_eye = Some(HandEye::new(problem.mode, solution.mount_from_camera, solution.anchor_from_target));
 }
 
+/// Residuals of a view at a pose of the target; none at all when a corner has no image there.
+fn residuals(
+    intrinsics: &Intrinsics,
+    camera_from_target: &Pose<Camera, Target>,
+    points: &[Point3<f64>],
+    corners: &[Corner],
+) -> Vec<CornerResidual> {
+    let residual = |corner: &Corner| {
+        let predicted = intrinsics.project(&(camera_from_target.isometry() * points[corner.index])).ok()?;
+        Some(CornerResidual { index: corner.index, px: corner.px, residual_px: corner.px - predicted })
+    };
+    corners.iter().map(residual).collect::<Option<_>>().unwrap_or_default()
+}
+
 /// Residual [px] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.
 const CAP_PX: f64 = 50.0;
 
+/// Over the views that the closed forms saw.
 fn capped_misfit(problem: &JointProblem<'_>, lens: &Lens, solution: &ClosedFormSolution) -> f64 {
-    problem.views.iter().map(|view| squared_residuals(problem, &lens.intrinsics, solution, view, CAP_PX)).sum()
+    subset::spread(problem.views.len(), subset::MOST_VIEWS)
+        .into_iter()
+        .map(|i| squared_residuals(problem, &lens.intrinsics, solution, &problem.views[i], CAP_PX))
+        .sum()
 }
 
 /// Sum of squared residuals of one view by the bare chain; a point without an image counts as the cap.

@@ -4,20 +4,24 @@
 //! `opencv`.
 
 mod corners;
+mod lens;
 mod pairs;
 mod to_result;
 
-use nalgebra::{Matrix6, Point3};
+use nalgebra::{DMatrix, Matrix6, Point3, Vector2};
 
 use crate::camera::{Distortion, Intrinsics};
 use crate::frames::{Base, Camera, Pose, Target, Tip};
 use crate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::handeye::joint::Noise;
-use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion};
+use crate::handeye::joint::prediction::ErrorCurve;
+use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, subset};
 use crate::observation::Corner;
-use crate::progress::CancelToken;
+use crate::progress::{Stage, Work};
 use crate::target::TargetSpec;
 use crate::vision::VisionError;
+
+pub use lens::{LENS_START_VIEWS, MOST_LENS_VIEWS};
 
 /// What was observed, from a dataset folder, a session or a live capture.
 #[derive(Debug, Clone)]
@@ -45,6 +49,8 @@ pub struct ObservedView {
     pub corners: Option<Vec<Corner>>,
     /// A target pose measured elsewhere, used when there are no corners.
     pub camera_from_target: Option<Pose<Camera, Target>>,
+    /// Whether the view takes part; one that does not is listed as [`ViewStatus::Excluded`] and touches no number.
+    pub in_fit: bool,
 }
 
 /// What is known about the camera.
@@ -77,6 +83,14 @@ impl Method {
         std::iter::once("joint").chain(closed_form::all().iter().map(|m| m.name())).collect()
     }
 
+    /// Its name on the command line and in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::ClosedForm(name) => name,
+        }
+    }
+
     /// The method of that name.
     pub fn by_name(name: &str) -> Option<Self> {
         if name == "joint" {
@@ -104,6 +118,19 @@ pub enum CalibrateError {
         need: usize,
         /// What was looked for.
         target: String,
+    },
+    /// Views were left out of the fit by the caller, and the rest is too few.
+    #[error(
+        "{left} views with the target in sight are left in the fit and {excluded} are excluded, at least {need} are \
+         needed: take views back in or capture more"
+    )]
+    TooFewLeft {
+        /// Views with the target that take part.
+        left: usize,
+        /// Views that were left out.
+        excluded: usize,
+        /// Least number.
+        need: usize,
     },
     /// Intrinsics or PnP failed.
     #[error(transparent)]
@@ -134,6 +161,9 @@ pub struct Calibration {
     pub hand_eye_covariance: Option<Matrix6<f64>>,
     /// Covariance of the target's place.
     pub target_covariance: Option<Matrix6<f64>>,
+    /// Covariance of everything that predicts a view, `[mount_from_camera (6), anchor_from_target (6), free
+    /// intrinsics…]`, as in [`crate::handeye::joint::JointSolution::covariance`]; of the joint estimate only.
+    pub shared_covariance: Option<DMatrix<f64>>,
     /// Intrinsics; `None` when only pose pairs were given.
     pub intrinsics: Option<Intrinsics>,
     /// Whether they were given and kept.
@@ -144,12 +174,19 @@ pub struct Calibration {
     pub noise: Option<Noise>,
     /// RMS of 2-D corner residuals, pixels.
     pub rms_px: Option<f64>,
-    /// The same on views held out of the fit.
+    /// The same on views held out of the fit, each predicted from its reported robot pose.
     pub heldout_rms_px: Option<f64>,
+    /// What [`heldout_rms_px`](Self::heldout_rms_px) should be if the model and its noise levels are true, pixels.
+    pub expected_heldout_rms_px: Option<f64>,
+    /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow
+    /// stays in the answer.
+    pub robot_effect_px: Option<f64>,
     /// Expected error of a measured point where the camera saw the target, 95 %, metres.
     pub tip_error_95_m: Option<f64>,
     /// Where that error is stated: camera coordinates, metres.
     pub reference_point: Option<Point3<f64>>,
+    /// That error by number of views; of the joint estimate only.
+    pub error_curve: Option<ErrorCurve>,
     /// Every closed form and what it said.
     pub methods: Vec<MethodResult>,
     /// One entry per view, in the order of the observations.
@@ -176,6 +213,43 @@ pub struct ViewResult {
     pub rms_px: Option<f64>,
     /// How far the answer moves without it, metres at the reference point.
     pub influence_m: Option<f64>,
+    /// Length of the correction that the joint estimate gave its reported tip position, metres.
+    pub correction_m: Option<f64>,
+    /// Angle of the correction of its reported tip orientation, radians.
+    pub correction_rad: Option<f64>,
+    /// Residuals of its corners, in the order observed. Those of the joint estimate are with the robot pose corrected,
+    /// those of a closed form of the bare chain, those without a robot of the target's own pose. Empty where no
+    /// residual is known: no target, excluded, poses alone, or a chain that puts a corner behind the camera.
+    pub residuals: Vec<CornerResidual>,
+    /// The target's pose as fitted, by the same chain as the residuals.
+    pub camera_from_target: Option<Pose<Camera, Target>>,
+}
+
+impl ViewResult {
+    /// A view of which nothing is known yet.
+    fn new(view: &ObservedView, status: ViewStatus) -> Self {
+        Self {
+            name: view.name.clone(),
+            status: if view.in_fit { status } else { ViewStatus::Excluded },
+            rms_px: None,
+            influence_m: None,
+            correction_m: None,
+            correction_rad: None,
+            residuals: Vec::new(),
+            camera_from_target: None,
+        }
+    }
+}
+
+/// One corner and how well the model explains it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CornerResidual {
+    /// Which point of the target.
+    pub index: usize,
+    /// Where it was measured, pixels.
+    pub px: Vector2<f64>,
+    /// Measured minus predicted, pixels.
+    pub residual_px: Vector2<f64>,
 }
 
 /// How a view was used.
@@ -183,36 +257,63 @@ pub struct ViewResult {
 pub enum ViewStatus {
     /// It took part.
     Used,
+    /// The caller left it out.
+    Excluded,
     /// The target was not found in it.
     NoTarget,
 }
 
 /// Calibrates from observations.
 ///
+/// `work` is a `&CancelToken`, or a [`Work`] to follow the progress too.
+///
 /// # Needs
 /// Three views with the target in sight; for a hand-eye, robot rotations about two axes.
 ///
+/// # Many views
+/// Work that grows faster than the number of views is done on a choice of them, the same every time. Of more than
+/// [`subset::MOST_VIEWS`] views so many go into the closed forms, and the fits that leave views out keep the noise levels
+/// of the whole. Of more than [`MOST_LENS_VIEWS`] views [`LENS_START_VIEWS`] start the intrinsics, which the joint estimate
+/// refines with all of them; without a robot, or with a closed form, the intrinsics and their standard deviations stay
+/// those of [`MOST_LENS_VIEWS`] views.
+///
 /// # Errors
-/// [`CalibrateError`] says what is missing and what to do.
-pub fn calibrate(
+/// [`CalibrateError`] says what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
+pub fn calibrate<'a>(
     observations: &Observations,
     method: Method,
-    cancel: &CancelToken,
+    work: impl Into<Work<'a>>,
 ) -> Result<Calibration, CalibrateError> {
-    let only_poses = observations.views.iter().all(|v| v.corners.is_none())
-        && observations.views.iter().any(|v| v.camera_from_target.is_some());
-    if only_poses { pairs::calibrate(observations, method) } else { corners::calibrate(observations, method, cancel) }
+    let work = work.into();
+    let used = || observations.views.iter().filter(|v| v.in_fit);
+    let only_poses = used().all(|v| v.corners.is_none()) && used().any(|v| v.camera_from_target.is_some());
+    if only_poses {
+        pairs::calibrate(observations, method, &work)
+    } else {
+        corners::calibrate(observations, method, &work)
+    }
 }
 
-/// A robot that never turned is better named than a singular matrix.
+/// A robot that never turned is better named than a singular matrix. Works on the same choice of views as
+/// [`closed_forms`].
 fn check_motion(pairs: &[PosePair]) -> Result<(), HandEyeError> {
     let poses: Vec<_> = pairs.iter().map(|pair| pair.anchor_from_mount).collect();
     motion::analyse(&poses).map(drop)
 }
 
-/// Runs every closed form.
-fn closed_forms(pairs: &[PosePair]) -> Vec<MethodResult> {
-    closed_form::all().iter().map(|m| MethodResult { name: m.name(), outcome: m.solve(pairs) }).collect()
+/// Runs every closed form, on [`subset::MOST_VIEWS`] views at most.
+fn closed_forms(pairs: &[PosePair], work: &Work<'_>) -> Result<Vec<MethodResult>, HandEyeError> {
+    let chosen: Vec<PosePair> = subset::spread(pairs.len(), subset::MOST_VIEWS).into_iter().map(|i| pairs[i]).collect();
+    let methods = closed_form::all();
+    let mut results = Vec::with_capacity(methods.len());
+    for (done, method) in methods.iter().enumerate() {
+        if work.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        work.report(Stage::ClosedForms, done, methods.len());
+        results.push(MethodResult { name: method.name(), outcome: method.solve(&chosen) });
+    }
+    Ok(results)
 }
 
 /// The answer of one closed form, or its error.
@@ -243,3 +344,8 @@ fn best_start(
         })),
     }
 }
+
+#[cfg(test)]
+pub(crate) mod simulated;
+#[cfg(test)]
+mod tests;

@@ -6,13 +6,15 @@ use super::{
 };
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, pose_graph};
+use crate::progress::Work;
 use crate::se3;
 
-pub fn calibrate(observations: &Observations, method: Method) -> Result<Calibration, CalibrateError> {
+pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -> Result<Calibration, CalibrateError> {
     let mode = observations.mode.unwrap_or(Mode::EyeInHand);
     let pairs: Vec<PosePair> = observations
         .views
         .iter()
+        .filter(|view| view.in_fit)
         .map(|view| match (view.base_from_tip, view.camera_from_target) {
             (Some(base_from_tip), Some(camera_from_target)) => {
                 Ok(PosePair { anchor_from_mount: mode.anchor_from_mount(&base_from_tip), camera_from_target })
@@ -21,11 +23,12 @@ pub fn calibrate(observations: &Observations, method: Method) -> Result<Calibrat
         })
         .collect::<Result<_, _>>()?;
     check_motion(&pairs)?;
-    let methods = closed_forms(&pairs);
+    let methods = closed_forms(&pairs, work)?;
     let mut calibration = Calibration {
         hand_eye: None,
         hand_eye_covariance: None,
         target_covariance: None,
+        shared_covariance: None,
         intrinsics: match observations.camera {
             CameraKnowledge::Fixed(intrinsics) => Some(intrinsics),
             CameraKnowledge::Estimate { .. } => None,
@@ -35,14 +38,13 @@ pub fn calibrate(observations: &Observations, method: Method) -> Result<Calibrat
         noise: None,
         rms_px: None,
         heldout_rms_px: None,
+        expected_heldout_rms_px: None,
+        robot_effect_px: None,
         tip_error_95_m: None,
         reference_point: None,
+        error_curve: None,
         methods,
-        views: observations
-            .views
-            .iter()
-            .map(|v| ViewResult { name: v.name.clone(), status: ViewStatus::Used, rms_px: None, influence_m: None })
-            .collect(),
+        views: observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::Used)).collect(),
     };
     let (x, y) = match method {
         Method::ClosedForm(name) => {
@@ -63,6 +65,10 @@ pub fn calibrate(observations: &Observations, method: Method) -> Result<Calibrat
             views: pairs.len(),
             reason: "it diverged",
         }));
+    }
+    let used = calibration.views.iter_mut().filter(|v| v.status == ViewStatus::Used);
+    for (view, pair) in used.zip(&pairs) {
+        view.camera_from_target = Some(x.inverse() * pair.anchor_from_mount.inverse() * y);
     }
     calibration.hand_eye = Some(HandEye::new(mode, x, y));
     Ok(calibration)

@@ -54,6 +54,7 @@ fn view(view: &super::ViewResult) -> result::ViewResult {
         name: view.name.clone(),
         status: match view.status {
             ViewStatus::Used => result::ViewStatus::Used,
+            ViewStatus::Excluded => result::ViewStatus::Excluded,
             ViewStatus::NoTarget => result::ViewStatus::NoTarget,
         },
         rms_px: view.rms_px,

@@ -16,6 +16,7 @@ pub mod joint;
 pub mod motion;
 pub mod pose_graph;
 pub mod quality;
+pub mod subset;
 
 use serde::{Deserialize, Serialize};
 

@@ -8,7 +8,7 @@
 
 use nalgebra::{Matrix3, SymmetricEigen, UnitQuaternion, Vector3};
 
-use super::HandEyeError;
+use super::{HandEyeError, subset};
 use crate::frames::{Anchor, Frame as _, Mount, Pose};
 
 /// Two motions about different axes are the least that determines a hand-eye transform, and they take three views.
@@ -48,7 +48,8 @@ pub struct MotionSummary {
 ///
 /// # Frames and units
 /// Robot poses as in the table of [the parent module](super); axes in the mount frame; metres and radians.
-/// Neither a change of the anchor frame nor a repeated pose changes the verdict.
+/// Neither a change of the anchor frame nor a repeated pose changes the verdict. Of more than
+/// [`subset::MOST_VIEWS`] views that many are looked at, because the pairs grow with the square.
 /// # Errors
 /// In this order: [`HandEyeError::TooFewViews`] below [`MIN_VIEWS`], [`HandEyeError::NotFinite`] with the first such
 /// view, [`HandEyeError::NoRotation`] when no two views differ by [`NO_ROTATION_RAD`],
@@ -65,10 +66,11 @@ pub fn analyse(anchor_from_mount: &[Pose<Anchor, Mount>]) -> Result<MotionSummar
         return Err(HandEyeError::NotFinite { index });
     }
 
+    let chosen = subset::spread(views, subset::MOST_VIEWS);
     let mut axes = AxisScatter::default();
-    let mut angles = Vec::with_capacity(views * (views - 1) / 2);
+    let mut angles = Vec::with_capacity(chosen.len() * (chosen.len() - 1) / 2);
     let mut largest_translation_m = 0f64;
-    for (i, j) in pairs_of(views) {
+    for (i, j) in pairs_of(chosen.len()).map(|(i, j)| (chosen[i], chosen[j])) {
         let motion = relative(&anchor_from_mount[i], &anchor_from_mount[j]).rotation();
         axes.add(&motion);
         angles.push(rotation_angle(&motion));

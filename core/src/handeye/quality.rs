@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Matrix6, Point3, SMatrix};
 use super::HandEyeError;
 use super::joint::{JointProblem, JointSolution, JointStart, camera_from_target, estimate};
 use crate::observation::View;
-use crate::progress::CancelToken;
+use crate::progress::{Stage, Work};
 use crate::se3::skew;
 
 /// Covariance in the camera frame of where `point` (camera coordinates, metres) is said to be, given the covariance
@@ -80,24 +80,26 @@ const FOLDS: usize = 5;
 /// RMS of 2-D corner residuals [px] on views that the fit did not use, each predicted from its reported robot pose
 /// alone, over five folds (or one view at a time when there are fewer than ten). View `i` is in fold `i mod folds`.
 ///
-/// `None` when a fold leaves too few views for a fit.
+/// `None` when a fold leaves too few views for a fit. `work` is a `&CancelToken`, or a [`Work`] to follow the progress.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].
-pub fn held_out_rms_px(
+pub fn held_out_rms_px<'a>(
     problem: &JointProblem<'_>,
     start: &JointStart,
-    cancel: &CancelToken,
+    work: impl Into<Work<'a>>,
 ) -> Result<Option<f64>, HandEyeError> {
+    let work = work.into();
     let count = problem.views.len();
     let folds = if count < 2 * FOLDS { count } else { FOLDS };
     let mut squared = 0.0;
     let mut corners = 0usize;
     for fold in 0..folds {
+        work.report(Stage::HeldOut, fold, folds);
         let (held, used): (Vec<_>, Vec<_>) =
             problem.views.iter().cloned().enumerate().partition(|(i, _)| i % folds == fold);
         let used: Vec<View> = used.into_iter().map(|(_, view)| view).collect();
-        let fit = match estimate(&JointProblem { views: &used, ..*problem }, start, cancel) {
+        let fit = match estimate(&JointProblem { views: &used, ..*problem }, start, work.cancel) {
             Ok(fit) => fit,
             Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
             Err(_) => return Ok(None),

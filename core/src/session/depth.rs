@@ -6,14 +6,11 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use image::{ImageBuffer, Luma};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, colortype};
 
+use crate::depth::DepthImage;
 use crate::image_file::{MAX_PIXELS, one_line};
-
-/// Distance along the optical axis in metres, per pixel.
-pub type DepthImage = ImageBuffer<Luma<f32>, Vec<f32>>;
 
 pub(super) fn encode(depth_m: &DepthImage) -> Result<Vec<u8>, String> {
     let mut bytes = Cursor::new(Vec::new());
@@ -21,7 +18,7 @@ pub(super) fn encode(depth_m: &DepthImage) -> Result<Vec<u8>, String> {
         .and_then(|encoder| {
             // Speed: a capture waits for this.
             let mut encoder = encoder.with_compression(Compression::Deflate(DeflateLevel::Fast));
-            encoder.write_image::<colortype::Gray32Float>(depth_m.width(), depth_m.height(), depth_m.as_raw())
+            encoder.write_image::<colortype::Gray32Float>(depth_m.width, depth_m.height, &depth_m.metres)
         })
         .map_err(|e| one_line(&e))?;
     Ok(bytes.into_inner())
@@ -41,7 +38,7 @@ fn decode(bytes: &[u8]) -> Result<DepthImage, String> {
     let DecodingResult::F32(metres) = decoder.read_image().map_err(|e| one_line(&e))? else {
         return Err("it does not hold 32-bit floats".into());
     };
-    DepthImage::from_raw(width, height, metres).ok_or_else(|| "it does not hold one float per pixel".into())
+    DepthImage::new(width, height, metres).map_err(|e| one_line(&e))
 }
 
 #[cfg(test)]
@@ -50,14 +47,13 @@ mod tests {
 
     #[test]
     fn depth_survives_to_the_last_bit_with_holes_and_far_planes() {
-        let mut depth = DepthImage::from_fn(17, 9, |x, y| Luma([0.2 + 0.0001 * (x * y) as f32]));
-        depth.put_pixel(0, 0, Luma([f32::NAN]));
-        depth.put_pixel(1, 0, Luma([f32::INFINITY]));
-        depth.put_pixel(2, 0, Luma([1234.567]));
+        let mut metres: Vec<f32> = (0..17 * 9).map(|i| 0.2 + 0.0001 * i as f32).collect();
+        metres[..3].copy_from_slice(&[f32::NAN, f32::INFINITY, 1234.567]);
+        let depth = DepthImage::new(17, 9, metres).expect("as many as pixels");
         let bytes = encode(&depth).expect("encode");
         let read = decode(&bytes).expect("decode");
-        let bits = |d: &DepthImage| d.pixels().map(|p| p.0[0].to_bits()).collect::<Vec<_>>();
-        assert_eq!(read.dimensions(), (17, 9));
+        let bits = |d: &DepthImage| d.metres.iter().map(|m| m.to_bits()).collect::<Vec<_>>();
+        assert_eq!((read.width, read.height), (17, 9));
         assert_eq!(bits(&read), bits(&depth));
         for kept in 0..bytes.len() {
             // A TIFF may end with tables that are not needed; what is decoded is all there or an error.

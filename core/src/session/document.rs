@@ -1,29 +1,37 @@
-//! `session.json`: everything about a session that is not an image.
+//! What a session says: plain data, without files and without history.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Component, Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::error::SessionProblem;
+use super::edit::EditError;
+use super::pose_record;
 use crate::camera::Intrinsics;
 use crate::dataset::CameraInput;
 use crate::frames::{Base, Pose, Tip};
 use crate::handeye::{HandEye, Mode};
 use crate::image_file::one_line;
-use crate::json_text;
+use crate::poses_file::{Goal, TaughtPose};
 use crate::result::{CalibrationResult, TransformEstimate};
 use crate::target::TargetSpec;
 
-/// What `format` says.
-pub const FORMAT: &str = "handeye-session";
-/// The layout: a reader refuses another one.
-pub const MAJOR_VERSION: u32 = 1;
-/// Additions that an older reader may ignore.
-pub const MINOR_VERSION: u32 = 0;
-
-/// How far from 1 the length of a quaternion may be.
-const UNIT_TOLERANCE: f64 = 1e-6;
+/// The state of a session. It changes by [`super::Edit`] alone, see [`Document::apply`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Document {
+    /// What was known when it began, and what was changed since.
+    #[serde(flatten)]
+    pub meta: SessionMeta,
+    /// The captures in the order in which they were taken; a deleted one is not among them.
+    pub captures: Vec<CaptureRecord>,
+    /// The taught poses in the order in which they are visited. No two have the same name.
+    #[serde(default)]
+    pub taught: Vec<TaughtPose>,
+    /// The names that exports use for frames and cameras, as the exporter understands them.
+    #[serde(default)]
+    pub export_names: Option<serde_json::Value>,
+}
 
 /// What is known when a session begins.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -71,9 +79,36 @@ impl GroundTruth {
     }
 }
 
+/// Names a capture for as long as the session lives: the number in its file name, from 1. It is never used again in
+/// the same session, also not after the capture was deleted or its making undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct CaptureId(pub u32);
+
+impl fmt::Display for CaptureId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// What a capture is for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// It is part of the fit.
+    #[default]
+    Calibration,
+    /// It is kept out of the fit, to check the result.
+    Verification,
+}
+
 /// One capture as it is recorded.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CaptureRecord {
+    /// Which one.
+    // Sessions of version 1.0 have none; their reader fills it in, see `session_file`.
+    #[serde(default = "CaptureId::none")]
+    pub id: CaptureId,
     /// The image, relative to the session: also the name of the view.
     pub image: String,
     /// The depth image, relative to the session.
@@ -85,100 +120,75 @@ pub struct CaptureRecord {
     pub joints_rad: Option<Vec<f64>>,
     /// Simulation time of the image, seconds.
     pub sim_time_s: Option<f64>,
+    /// What it is for.
+    #[serde(default)]
+    pub role: Role,
+    /// Whether a person took it out.
+    #[serde(default)]
+    pub excluded: bool,
+    /// How many frames the image is the mean of.
+    #[serde(default = "one")]
+    pub frames: u32,
+    /// Noise of a corner of this image along one axis, pixels (one sigma), where it was measured.
+    #[serde(default)]
+    pub corner_noise_px: Option<f64>,
+    /// How long the arm had stood when the image was taken, seconds.
+    #[serde(default)]
+    pub settled_s: Option<f64>,
+    /// The taught pose at which it was taken.
+    #[serde(default)]
+    pub pose_name: Option<String>,
 }
 
-/// The document. Its head is written for people and other programs; the reader checks format and version and leaves
-/// the conventions, which are fixed.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Document {
-    format: String,
-    version: String,
-    #[serde(skip_deserializing)]
-    conventions: Conventions,
-    #[serde(flatten)]
-    pub meta: SessionMeta,
-    pub captures: Vec<CaptureRecord>,
+fn one() -> u32 {
+    1
 }
 
-#[derive(Debug, Clone, Serialize)]
-struct Conventions {
-    transforms: &'static str,
-    units: &'static str,
-    rotations: &'static str,
-    covariances: &'static str,
-    camera_axes: &'static str,
-    pixels: &'static str,
-    depth: &'static str,
-}
-
-impl Default for Conventions {
-    fn default() -> Self {
-        Self {
-            transforms: "dst_from_src maps coordinates in src to coordinates in dst: p_dst = T * p_src",
-            units: "metres, radians, seconds, pixels",
-            rotations: "unit quaternions x y z w",
-            covariances: "of [tx ty tz rx ry rz] in T * exp(delta)",
-            camera_axes: "x right, y down, z forward",
-            pixels: "(0, 0) is the centre of the top-left pixel",
-            depth: "32-bit float TIFF, metres along the optical axis",
-        }
+impl CaptureId {
+    /// Stands for a capture without a number while an old session is read.
+    pub(super) fn none() -> Self {
+        Self(0)
     }
-}
-
-#[derive(Deserialize)]
-struct Header {
-    #[serde(default)]
-    format: String,
-    #[serde(default)]
-    version: String,
 }
 
 impl Document {
+    /// A session without captures.
     pub fn new(meta: SessionMeta) -> Self {
-        Self {
-            format: FORMAT.to_owned(),
-            version: format!("{MAJOR_VERSION}.{MINOR_VERSION}"),
-            conventions: Conventions::default(),
-            meta,
-            captures: Vec::new(),
-        }
+        Self { meta, captures: Vec::new(), taught: Vec::new(), export_names: None }
     }
 
-    pub fn to_json(&self) -> Result<String, SessionProblem> {
-        json_text::pretty(self).map_err(|e| SessionProblem::Json(one_line(&e)))
+    /// A capture by its number.
+    pub fn capture(&self, id: CaptureId) -> Option<&CaptureRecord> {
+        self.captures.iter().find(|capture| capture.id == id)
     }
 
-    /// Checks format and version alone.
-    pub fn check_header(text: &str) -> Result<(), SessionProblem> {
-        let header: Header = serde_json::from_str(text).map_err(|e| SessionProblem::Json(one_line(&e)))?;
-        if header.format != FORMAT {
-            return Err(SessionProblem::Format(header.format.chars().take(40).collect()));
-        }
-        let major = header.version.split('.').next().and_then(|major| major.parse::<u32>().ok());
-        if major != Some(MAJOR_VERSION) {
-            let found = header.version.chars().take(40).collect();
-            return Err(SessionProblem::Version { found, known: MAJOR_VERSION });
-        }
-        Ok(())
+    /// The captures that a calibration is fitted to: neither excluded nor kept for verification.
+    pub fn in_use(&self) -> impl Iterator<Item = &CaptureRecord> {
+        self.captures.iter().filter(|capture| capture.is_in_use())
     }
 
-    pub fn from_json(text: &str) -> Result<Self, SessionProblem> {
-        Self::check_header(text)?;
-        let document: Self = serde_json::from_str(text).map_err(|e| SessionProblem::Json(one_line(&e)))?;
-        document.meta.check()?;
-        for (i, capture) in document.captures.iter().enumerate() {
-            capture.check(&format!("captures[{i}]"))?;
-            if document.captures[..i].iter().any(|other| other.image == capture.image) {
-                return Err(bad(format!("captures[{i}].image"), "is there twice"));
+    /// Checks everything that the types do not say.
+    ///
+    /// # Errors
+    /// [`EditError`] names the first value that a session must not have.
+    pub(super) fn check(&self) -> Result<(), EditError> {
+        self.meta.check()?;
+        for (i, capture) in self.captures.iter().enumerate() {
+            capture.check()?;
+            if self.captures[..i].iter().any(|other| other.id == capture.id) {
+                return Err(EditError::UsedNumber(capture.id));
+            }
+            if self.captures[..i].iter().any(|other| other.image == capture.image) {
+                return Err(bad(format!("the image {:?}", capture.image), "is there twice"));
             }
         }
-        Ok(document)
+        check_taught(&self.taught)
     }
 }
 
 impl SessionMeta {
     /// Checks what the types do not say.
-    pub(super) fn check(&self) -> Result<(), SessionProblem> {
+    pub(super) fn check(&self) -> Result<(), EditError> {
         let grid = self.target.grid();
         if grid.columns < 3 || grid.rows < 3 || !(grid.square_m.is_finite() && grid.square_m > 0.0) {
             return Err(bad("target", "needs at least 3 columns and rows and a positive square_m"));
@@ -195,59 +205,69 @@ impl SessionMeta {
 }
 
 impl CaptureRecord {
-    pub(super) fn check(&self, at: &str) -> Result<(), SessionProblem> {
-        for (key, name) in [("image", Some(&self.image)), ("depth", self.depth.as_ref())] {
-            if name.is_some_and(|name| !stays_inside(name)) {
-                return Err(bad(format!("{at}.{key}"), "is not a path inside of the session"));
-            }
+    /// Whether a calibration is fitted to it.
+    pub fn is_in_use(&self) -> bool {
+        !self.excluded && self.role == Role::Calibration
+    }
+
+    /// Its files, relative to the session.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.image.as_str()).chain(self.depth.as_deref())
+    }
+
+    pub(super) fn check(&self) -> Result<(), EditError> {
+        let refuse = |what: &str| Err(bad(format!("capture {} ({})", self.id, self.image), what));
+        if self.id == CaptureId::none() {
+            return refuse("has no number: numbers begin at 1");
+        }
+        if !self.files().all(stays_inside) {
+            return refuse("names a file that is not inside of the session");
         }
         if !self.base_from_tip.is_finite() {
-            return Err(bad(format!("{at}.base_from_tip"), "is not finite"));
+            return refuse("has a tip pose that is not finite");
         }
-        let joints = self.joints_rad.iter().flatten();
-        if !joints.chain(self.sim_time_s.as_ref()).all(|v| v.is_finite()) {
-            return Err(bad(format!("{at}.joints_rad or sim_time_s"), "is not finite"));
+        let measured = [self.corner_noise_px, self.settled_s];
+        if !measured.iter().flatten().all(|v| v.is_finite() && *v >= 0.0) {
+            return refuse("has a corner_noise_px or settled_s that is negative or not finite");
+        }
+        if !self.joints_rad.iter().flatten().chain(&self.sim_time_s).all(|v| v.is_finite()) {
+            return refuse("has a joint angle or a time that is not finite");
+        }
+        if self.frames == 0 {
+            return refuse("is the mean of no frames");
         }
         Ok(())
     }
 }
 
-/// Files of a session are removed and replaced by the names in its document, which others may have written.
+/// What a file of taught poses asks for as well, so that the poses of every session can be written to one.
+pub(super) fn check_taught(poses: &[TaughtPose]) -> Result<(), EditError> {
+    let mut joint_count = None;
+    for (i, pose) in poses.iter().enumerate() {
+        let refuse = |what: &str| Err(bad(format!("taught pose {:?}", pose.name), what));
+        if pose.name.trim().is_empty() {
+            return refuse("has an empty name");
+        }
+        if poses[..i].iter().any(|other| other.name == pose.name) {
+            return Err(EditError::SamePoseName(pose.name.clone()));
+        }
+        match &pose.goal {
+            Goal::Tip(base_from_tip) if !base_from_tip.is_finite() => return refuse("is not finite"),
+            Goal::Joints(joints) if !joints.iter().all(|v| v.is_finite()) => return refuse("is not finite"),
+            Goal::Joints(joints) if joints.is_empty() || *joint_count.get_or_insert(joints.len()) != joints.len() => {
+                return refuse("has another number of joint angles than the poses before, or none");
+            }
+            Goal::Tip(_) | Goal::Joints(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// Files of a session are written and copied by the names in its document, which others may have written.
 fn stays_inside(name: &str) -> bool {
     !name.is_empty() && Path::new(name).components().all(|c| matches!(c, Component::Normal(_)))
 }
 
-pub(super) fn bad(at: impl Into<String>, what: &str) -> SessionProblem {
-    SessionProblem::Bad { at: at.into(), what: what.to_owned() }
-}
-
-/// A pose with named keys; the quaternion is kept bit for bit when it has unit length.
-mod pose_record {
-    use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-    use serde::de::Error as _;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    use super::UNIT_TOLERANCE;
-    use crate::frames::Pose;
-
-    #[derive(Serialize, Deserialize)]
-    struct Record {
-        translation_m: [f64; 3],
-        rotation_xyzw: [f64; 4],
-    }
-
-    pub fn serialize<Dst, Src, S: Serializer>(pose: &Pose<Dst, Src>, serializer: S) -> Result<S::Ok, S::Error> {
-        Record { translation_m: pose.translation().into(), rotation_xyzw: pose.xyzw() }.serialize(serializer)
-    }
-
-    pub fn deserialize<'de, Dst, Src, D: Deserializer<'de>>(deserializer: D) -> Result<Pose<Dst, Src>, D::Error> {
-        let Record { translation_m, rotation_xyzw: [x, y, z, w] } = Record::deserialize(deserializer)?;
-        let q = Quaternion::new(w, x, y, z);
-        // Written so that NaN is refused as well.
-        if (q.norm() - 1.0).abs() <= UNIT_TOLERANCE {
-            let rotation = UnitQuaternion::new_unchecked(q);
-            return Ok(Pose::from_isometry(Isometry3::from_parts(Translation3::from(translation_m), rotation)));
-        }
-        Err(D::Error::custom(format!("rotation_xyzw has length {} and is not a unit quaternion", q.norm())))
-    }
+fn bad(at: impl Into<String>, what: &str) -> EditError {
+    EditError::Bad { at: at.into(), what: what.to_owned() }
 }

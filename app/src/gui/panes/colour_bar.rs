@@ -1,10 +1,9 @@
 //! The bar that says which colour is which depth.
 
-use egui::{Align2, Color32, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
+use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
+use handeye_core::depth::ColourMap;
 
-use super::pictures::small_text;
 use crate::gui::theme::{self, Palette};
-use crate::model::DEPTH_COLOURS;
 use crate::text;
 use crate::text::Language;
 
@@ -16,7 +15,7 @@ const STEPS: usize = 64;
 const TICKS: usize = 5;
 
 /// The bar with its depths in metres, and a mark at the depth under the pointer.
-pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>, language: Language) {
+pub fn colour_bar_ui(ui: &mut Ui, map: ColourMap, range_m: [f32; 2], at_cursor_m: Option<f32>, language: Language) {
     let palette = Palette::of(ui);
     let [near_m, far_m] = range_m;
     let (area, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
@@ -26,7 +25,7 @@ pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>, l
         WidgetInfo::labeled(WidgetType::Image, true, label)
     });
     let bar = Rect::from_min_size(area.min + Vec2::new(0.0, 9.0), Vec2::new(area.width(), HEIGHT));
-    ui.painter().add(gradient(bar));
+    ui.painter().add(gradient(bar, map));
     for tick in 0..TICKS {
         let part = tick as f32 / (TICKS - 1) as f32;
         let x = bar.left() + part * bar.width();
@@ -36,7 +35,8 @@ pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>, l
             _ => Align2::CENTER_TOP,
         };
         let depth_m = near_m + part * (far_m - near_m);
-        small_text(ui, Pos2::new(x, bar.bottom() + 3.0), anchor, &format!("{depth_m:.2} m"));
+        let at = Pos2::new(x, bar.bottom() + 3.0);
+        ui.painter().text(at, anchor, format!("{depth_m:.2} m"), FontId::proportional(theme::CAPTION), palette.weak);
     }
     if let Some(depth_m) = at_cursor_m.filter(|depth_m| (near_m..=far_m).contains(depth_m)) {
         let x = bar.left() + (depth_m - near_m) / (far_m - near_m).max(f32::EPSILON) * bar.width();
@@ -46,11 +46,11 @@ pub fn colour_bar_ui(ui: &mut Ui, range_m: [f32; 2], at_cursor_m: Option<f32>, l
     }
 }
 
-fn gradient(bar: Rect) -> Shape {
+fn gradient(bar: Rect, map: ColourMap) -> Shape {
     let mut mesh = Mesh::default();
     for step in 0..=STEPS {
         let part = step as f32 / STEPS as f32;
-        let colour: Color32 = theme::pixel(DEPTH_COLOURS.colour(f64::from(part)));
+        let colour: Color32 = theme::pixel(map.colour(f64::from(part)));
         let x = bar.left() + part * bar.width();
         mesh.colored_vertex(Pos2::new(x, bar.top()), colour);
         mesh.colored_vertex(Pos2::new(x, bar.bottom()), colour);

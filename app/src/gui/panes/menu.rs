@@ -37,9 +37,9 @@ fn item_ui(ui: &mut Ui, outbox: &mut Outbox, name: &str, keys: &str, command: Co
 fn content_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     ui.set_min_width(220.0);
-    item_ui(ui, outbox, tr!(language, "New session…"), "Ctrl+N", Command::OpenDialog(Dialog::NewSession));
-    item_ui(ui, outbox, tr!(language, "Open session…"), "Ctrl+O", Command::OpenDialog(Dialog::OpenSession));
-    item_ui(ui, outbox, tr!(language, "Save session…"), "Ctrl+S", Command::OpenDialog(Dialog::SaveSession));
+    item_ui(ui, outbox, tr!(language, "New session…"), "Ctrl+N", Command::SetDialog(Some(Dialog::New)));
+    item_ui(ui, outbox, tr!(language, "Open session…"), "Ctrl+O", Command::SetDialog(Some(Dialog::Open)));
+    item_ui(ui, outbox, tr!(language, "Save session…"), "Ctrl+S", Command::SetDialog(Some(Dialog::SaveAs)));
     ui.separator();
     ui.menu_button(tr!(language, "Theme"), |ui| {
         for (theme, name) in
@@ -73,7 +73,7 @@ fn content_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
     });
     ui.separator();
-    item_ui(ui, outbox, tr!(language, "All commands"), "Ctrl+K", Command::OpenDialog(Dialog::CommandPalette));
-    item_ui(ui, outbox, tr!(language, "Keyboard"), "F1", Command::OpenDialog(Dialog::Keys));
-    item_ui(ui, outbox, tr!(language, "About"), "", Command::OpenDialog(Dialog::About));
+    item_ui(ui, outbox, tr!(language, "All commands"), "Ctrl+K", Command::SetDialog(Some(Dialog::Palette)));
+    item_ui(ui, outbox, tr!(language, "Keyboard"), "F1", Command::SetDialog(Some(Dialog::Help)));
+    item_ui(ui, outbox, tr!(language, "About"), "", Command::SetDialog(Some(Dialog::About)));
 }

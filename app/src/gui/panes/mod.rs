@@ -4,13 +4,16 @@ mod banner;
 mod charts;
 mod colour_bar;
 mod connect;
+#[cfg(test)]
+pub mod driven;
 mod empty;
 mod export;
 mod form;
 mod jog;
+mod live;
 mod log;
 mod menu;
-mod pictures;
+mod parts;
 mod poses;
 mod result;
 mod status_bar;
@@ -25,7 +28,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use super::layout::Layout;
 use super::rail;
 use super::status::{self, Action};
-use super::textures::LiveTextures;
+use super::textures::Textures;
 use super::theme::{GAP, Palette};
 use super::toasts;
 use crate::command::{Command, Outbox};
@@ -34,7 +37,7 @@ use crate::text::Language;
 use crate::tr;
 
 /// The whole window.
-pub fn all_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, layout: &mut Layout, outbox: &mut Outbox) {
+pub fn all_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut Layout, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     let bar = Frame::new().fill(palette.bar).inner_margin(Margin::symmetric(14, 8));
     Panel::top("top_bar").frame(bar).resizable(false).show(ui, |ui| top_bar::top_bar_ui(ui, model, outbox));

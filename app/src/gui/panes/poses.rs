@@ -1,15 +1,182 @@
-//! The captures of this session.
+//! The captures of the session: take, judge, leave out.
 
-use egui::Ui;
+mod columns;
+mod flags;
+mod row;
+mod selecting;
+mod table;
 
-use super::empty;
-use crate::command::Outbox;
-use crate::model::Model;
-use crate::tr;
+use egui::{Align, Button, DragValue, Frame, Layout, Margin, RichText, Spinner, Ui, Vec2, WidgetInfo, WidgetType};
+use handeye_core::session::CaptureId;
+
+use super::live;
+use crate::command::{Command, Outbox};
+use crate::gui::captures::{self, CaptureTable};
+use crate::gui::marks::{self, Marks};
+use crate::gui::textures::Thumbnails;
+use crate::gui::theme::{Palette, Tone};
+use crate::model::{CaptureOptions, CapturePurpose, Model};
+use crate::{text, tr};
+
+/// Most pictures that are averaged: more take longer than they help.
+const MOST_FRAMES: u32 = 64;
+/// Height of the line at the bottom that says how captures go.
+const STATUS: f32 = 36.0;
 
 /// The pane.
-pub fn poses_ui(ui: &mut Ui, model: &Model, _outbox: &mut Outbox) {
+pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox: &mut Outbox) {
     let language = model.view.language;
-    let detail = tr!(language, "Move the arm to a pose from which the camera sees the board, and press Space.");
-    empty::empty_ui(ui, tr!(language, "No captures yet"), detail);
+    let table = captures::table(ui.ctx(), model);
+    Frame::new().inner_margin(Margin { left: 10, right: 10, top: 8, bottom: 4 }).show(ui, |ui| {
+        actions_ui(ui, model, &table, outbox);
+    });
+    let room = ui.available_rect_before_wrap();
+    let has_status = model.capture.is_some() || model.refused.is_some();
+    let (mut above, mut below) = (room, room);
+    if has_status {
+        above.max.y -= STATUS;
+        below.min.y = above.max.y;
+    }
+    ui.advance_cursor_after_rect(room);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(above), |ui| {
+        if table.rows.is_empty() {
+            let detail = tr!(
+                language,
+                "Move the arm to where the camera sees the whole board, then press Space. Ten poses with the board \
+                 tilted and turned to all sides make a good calibration."
+            );
+            marks::nothing_yet_ui(ui, tr!(language, "No captures yet"), detail);
+        } else {
+            table::table_ui(ui, model, &table, thumbnails, outbox);
+        }
+    });
+    if has_status {
+        ui.scope_builder(egui::UiBuilder::new().max_rect(below).id_salt("status"), |ui| status_ui(ui, model, outbox));
+    }
 }
+
+/// Buttons that take captures, and those for the selected ones.
+fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let hindrance = hindrance(model);
+    ui.horizontal_wrapped(|ui| {
+        let mut capture_ui = |ui: &mut Ui, button: Button<'_>, name: &str, what: &str, purpose| {
+            let response = ui.add_enabled(hindrance.is_none(), button).on_hover_text(what);
+            let response = match hindrance {
+                Some(why) => response.on_disabled_hover_text(why),
+                None => response,
+            };
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, hindrance.is_none(), name));
+            if response.clicked() {
+                outbox.send(Command::Capture(purpose));
+            }
+        };
+        let name = tr!(language, "Capture");
+        let words = RichText::new(name).strong().size(15.0).color(Marks::of(ui).on_accent);
+        let key = RichText::new(tr!(language, "Space")).size(11.0).color(Marks::of(ui).on_accent.gamma_multiply(0.75));
+        let big = Button::new(words).fill(Palette::of(ui).accent).min_size(Vec2::new(130.0, 32.0)).shortcut_text(key);
+        let what = tr!(language, "Waits until robot and picture stand still, then keeps picture, depth and robot pose");
+        capture_ui(ui, big, name, what, CapturePurpose::Calibrate);
+        let name = tr!(language, "Capture for verification");
+        let what = tr!(language, "This capture never enters the fit and tells how good the calibration is");
+        capture_ui(ui, Button::new(name).min_size(Vec2::new(0.0, 32.0)), name, what, CapturePurpose::Verify);
+        frames_ui(ui, model.view.capture, language, outbox);
+        selected_ui(ui, model, table, outbox);
+    });
+}
+
+/// Why no capture can be taken now.
+fn hindrance(model: &Model) -> Option<&'static str> {
+    let language = model.view.language;
+    if model.capture.is_some() {
+        Some(tr!(language, "A capture is under way"))
+    } else if model.touring {
+        Some(tr!(language, "The tour takes the captures now"))
+    } else if !model.camera.is_connected() || model.frame.is_none() {
+        Some(tr!(language, "There are no pictures: connect a cell first"))
+    } else if !model.control.is_connected() {
+        Some(tr!(language, "The robot is not connected"))
+    } else {
+        None
+    }
+}
+
+fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: crate::text::Language, outbox: &mut Outbox) {
+    let name = tr!(language, "Pictures to average");
+    let mut frames = options.frames;
+    let suffix = if frames == 1 { tr!(language, " picture") } else { tr!(language, " pictures") };
+    let drag = DragValue::new(&mut frames).range(1..=MOST_FRAMES).speed(0.1).suffix(suffix);
+    let what = tr!(language, "The mean of several pictures has less noise: four pictures halve it");
+    let response = ui.add(drag).on_hover_text(what);
+    response.widget_info(|| WidgetInfo {
+        value: Some(f64::from(frames)),
+        ..WidgetInfo::labeled(WidgetType::DragValue, true, name)
+    });
+    if frames != options.frames {
+        outbox.send(Command::SetCaptureOptions(CaptureOptions { frames, ..options }));
+    }
+}
+
+/// What can be done with the selected captures.
+fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let ids: Vec<CaptureId> = model.selection.iter().copied().filter(|&id| table.row(id).is_some()).collect();
+    if ids.is_empty() {
+        let (fit, verify) = table
+            .rows
+            .iter()
+            .filter(|row| !row.excluded)
+            .fold((0, 0), |(fit, verify), row| if row.verifies() { (fit, verify + 1) } else { (fit + 1, verify) });
+        let out = table.rows.len() - fit - verify;
+        let words = text!("{fit} in the fit · {verify} verify · {out} excluded", fit = fit, verify = verify, out = out);
+        if !table.rows.is_empty() {
+            ui.label(RichText::new(words.say(language)).color(Palette::of(ui).weak));
+        }
+        return;
+    }
+    let count = ids.len();
+    ui.label(RichText::new(text!("{count} selected", count = count).say(language)).color(Palette::of(ui).weak));
+    let all_out = ids.iter().all(|&id| table.row(id).is_some_and(|row| row.excluded));
+    let name = if all_out { tr!(language, "Include selected") } else { tr!(language, "Exclude selected") };
+    let what = if all_out {
+        tr!(language, "Puts the selected captures back to what they were for")
+    } else {
+        tr!(language, "Takes the selected captures out of fit and verification; they stay in the session")
+    };
+    if ui.button(name).on_hover_text(what).clicked() {
+        outbox.send(Command::SetExcluded { ids: ids.clone(), excluded: !all_out });
+    }
+    let what = tr!(language, "Deletes the selected captures; undo brings them back");
+    if ui.button(tr!(language, "Delete selected")).on_hover_text(what).clicked() {
+        outbox.send(Command::Delete(ids));
+    }
+}
+
+/// How the capture goes, or why the last one was refused.
+fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let palette = Palette::of(ui);
+    let language = model.view.language;
+    let rect = ui.max_rect();
+    let (tone, words) = match (&model.capture, &model.refused) {
+        (Some(capture), _) => (Tone::Busy, live::waiting(capture).say(language)),
+        (None, Some(refused)) => (Tone::Warning, text!("No capture: {why}", why = refused.why.clone()).say(language)),
+        (None, None) => return,
+    };
+    ui.painter().rect_filled(rect, 0.0, palette.tinted(tone));
+    let inner = rect.shrink2(Vec2::new(10.0, 0.0));
+    let layout = Layout::right_to_left(Align::Center);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(inner).layout(layout), |ui| {
+        if model.capture.is_some() && ui.button(tr!(language, "Cancel capture")).clicked() {
+            outbox.send(Command::CancelCapture);
+        }
+        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+            if tone == Tone::Busy {
+                ui.add(Spinner::new().size(15.0).color(palette.busy));
+            }
+            ui.add(egui::Label::new(&words).truncate()).on_hover_text(&words);
+        });
+    });
+}
+
+#[cfg(test)]
+mod tests;

@@ -40,7 +40,7 @@ pub fn target_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 
 fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let target = &model.setup.target;
+    let target = &model.document().meta.target;
     form::heading_ui(ui, tr!(language, "Board"));
     let beside = ui.available_width() >= BESIDE;
     ui.horizontal_top(|ui| {
@@ -195,7 +195,7 @@ fn axes(ui: &Ui, origin: Pos2, square: f32, end_x: Pos2, end_y: Pos2) {
 
 fn mode_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let mode = model.setup.mode;
+    let mode = model.document().meta.mode;
     form::heading_ui(ui, tr!(language, "Where the camera sits"));
     let choices =
         [(Mode::EyeInHand, tr!(language, "Eye in hand"), ""), (Mode::EyeToHand, tr!(language, "Eye to hand"), "")];
@@ -219,7 +219,7 @@ fn mode_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 
 fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let camera = model.setup.camera;
+    let camera = model.document().meta.camera;
     let fixed = camera.is_some_and(|camera| camera.fixed);
     form::heading_ui(ui, tr!(language, "Camera intrinsics"));
     let choices = [

@@ -4,11 +4,11 @@ use egui::{Color32, CornerRadius, FontId, Id, Response, Sense, Shape, Stroke, St
 use egui::{WidgetInfo, WidgetText, WidgetType};
 use egui_tiles::{Behavior, ResizeState, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 
-use super::{charts, connect, export, jog, log, pictures, poses, result, target, taught, verify};
+use super::{charts, connect, export, jog, live, log, poses, result, target, taught, verify};
 use crate::command::{Command, Outbox};
 use crate::gui::fonts;
 use crate::gui::layout::{Layout, Slot};
-use crate::gui::textures::LiveTextures;
+use crate::gui::textures::Textures;
 use crate::gui::theme::{CARD_RADIUS, GAP, Palette};
 use crate::model::{ImagePoint, Model, Pane};
 
@@ -20,7 +20,7 @@ const TAB_MARGIN: f32 = 7.5;
 const SMALLEST: f32 = 150.0;
 
 /// All tiles.
-pub fn tiles_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, layout: &mut Layout, outbox: &mut Outbox) {
+pub fn tiles_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut Layout, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     // Behind the tiles, whose places are known only after they were drawn.
     let behind = ui.painter().add(Shape::Noop);
@@ -42,7 +42,7 @@ pub fn tiles_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, layout: &mu
 /// What the tiles are drawn from.
 struct Panes<'a> {
     model: &'a Model,
-    textures: &'a LiveTextures,
+    textures: &'a mut Textures,
     outbox: &'a mut Outbox,
     /// The pixel under the pointer, from whichever picture it is over.
     pointed: Option<ImagePoint>,
@@ -52,9 +52,9 @@ impl Panes<'_> {
     fn content_ui(&mut self, ui: &mut Ui, pane: Pane) {
         let Self { model, textures, outbox, pointed } = self;
         match pane {
-            Pane::Colour => *pointed = pointed.or(pictures::colour_ui(ui, model, textures, outbox)),
-            Pane::Depth => *pointed = pointed.or(pictures::depth_ui(ui, model, textures, outbox)),
-            Pane::Poses => poses::poses_ui(ui, model, outbox),
+            Pane::Colour => *pointed = pointed.or(live::colour_ui(ui, model, &textures.live, outbox)),
+            Pane::Depth => *pointed = pointed.or(live::depth_ui(ui, model, &textures.live, outbox)),
+            Pane::Poses => poses::poses_ui(ui, model, &mut textures.thumbnails, outbox),
             Pane::Charts => charts::charts_ui(ui, model, outbox),
             Pane::Log => log::log_ui(ui, model, outbox),
             Pane::Connect => connect::connect_ui(ui, model, outbox),

@@ -21,9 +21,11 @@
 //! inter-block information when block sizes are unequal" (REML); Ulrich & Hillemann 2024, "Uncertainty-aware hand-eye
 //! calibration" (robot poses as observations).
 
-mod chain;
+pub(crate) mod chain;
+pub(crate) mod equations;
 mod normal;
 mod optimise;
+pub mod prediction;
 mod variance;
 
 use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
@@ -32,7 +34,7 @@ use super::{HandEye, HandEyeError, Mode};
 use crate::camera::Intrinsics;
 use crate::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::observation::View;
-use crate::progress::CancelToken;
+use crate::progress::{Stage, Work};
 
 pub use chain::camera_from_target;
 
@@ -80,6 +82,8 @@ pub struct ViewFit {
     pub rms_px: f64,
     /// Correction of the reported tip pose: translation [m] and rotation vector [rad] in the tip frame.
     pub correction: Vector6<f64>,
+    /// The target's pose by the chain with the robot pose corrected.
+    pub camera_from_target: Pose<Camera, Target>,
     /// How far the camera point [`JointSolution::reference_point`] moves when this view is left out, metres, to first
     /// order; `None` when the rest does not determine an answer.
     pub influence_m: Option<f64>,
@@ -125,13 +129,16 @@ impl JointSolution {
     }
 }
 
+/// Views below which nothing is determined.
+pub(crate) const NEED: usize = 3;
 /// Rounds of weights and optimum at the most.
 const MAX_ROUNDS: usize = 20;
 /// Relative change of every noise level below which the rounds end: a thousandth moves the answer by far less than its
 /// uncertainty.
 const ROUND_TOLERANCE: f64 = 1e-3;
 
-/// Estimates the calibration from corners and reported robot poses.
+/// Estimates the calibration from corners and reported robot poses. `work` is a `&CancelToken`, or a [`Work`] to follow
+/// the progress too.
 ///
 /// # Needs
 /// Three views with robot rotations about two axes (check with [`super::motion`] before), every view with at least
@@ -140,24 +147,25 @@ const ROUND_TOLERANCE: f64 = 1e-3;
 /// # Errors
 /// [`HandEyeError::TooFewViews`], [`HandEyeError::NoSolution`] when the normal equations are singular or the start puts
 /// the target behind the camera, [`HandEyeError::Cancelled`].
-pub fn estimate(
+pub fn estimate<'a>(
     problem: &JointProblem<'_>,
     start: &JointStart,
-    cancel: &CancelToken,
+    work: impl Into<Work<'a>>,
 ) -> Result<JointSolution, HandEyeError> {
-    const NEED: usize = 3;
+    let work = work.into();
     if problem.views.len() < NEED {
         return Err(HandEyeError::TooFewViews { got: problem.views.len(), need: NEED });
     }
     let mut state = optimise::State::new(problem, start);
     let mut noise = problem.noise.unwrap_or_else(|| variance::starting_noise(problem, &state));
     let mut iterations = 0;
-    for _ in 0..MAX_ROUNDS {
-        iterations += optimise::minimise(problem, &mut state, &noise, cancel)?;
+    for round in 0..MAX_ROUNDS {
+        work.report(Stage::Joint, round, MAX_ROUNDS);
+        iterations += optimise::minimise(problem, &mut state, &noise, work.cancel)?;
         if problem.noise.is_some() {
             break;
         }
-        let system = normal::System::new(problem, &state)?;
+        let system = normal::System::new(problem, &state, work.cancel)?;
         let next = variance::restricted_likelihood(&system, &noise)?;
         let settled = variance::change(&noise, &next) < ROUND_TOLERANCE;
         noise = next;
@@ -165,8 +173,8 @@ pub fn estimate(
             break;
         }
     }
-    iterations += optimise::minimise(problem, &mut state, &noise, cancel)?;
-    finish(problem, &state, noise, iterations)
+    iterations += optimise::minimise(problem, &mut state, &noise, work.cancel)?;
+    finish(problem, &state, noise, iterations, &work)
 }
 
 fn finish(
@@ -174,21 +182,24 @@ fn finish(
     state: &optimise::State,
     noise: Noise,
     iterations: usize,
+    work: &Work<'_>,
 ) -> Result<JointSolution, HandEyeError> {
-    let system = normal::System::new(problem, state)?;
+    let system = normal::System::new(problem, state, work.cancel)?;
     let reduced = system.reduce(&noise)?;
     let covariance = reduced.inverse();
     let reference_point = state.mean_target_centre(problem);
-    let views = system
-        .blocks
-        .iter()
-        .zip(&state.corrections)
-        .map(|(block, correction)| ViewFit {
+    let mut views = Vec::with_capacity(problem.views.len());
+    for ((block, correction), view) in system.blocks.iter().zip(&state.corrections).zip(problem.views) {
+        if work.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        views.push(ViewFit {
             rms_px: (block.squared_px / block.corner_count() as f64).sqrt(),
             correction: *correction,
+            camera_from_target: Pose::from_isometry(state.chain(problem, view, correction).camera_from_target),
             influence_m: reduced.influence_of(block, &noise, correction, &reference_point),
-        })
-        .collect();
+        });
+    }
     let corners: usize = system.blocks.iter().map(normal::ViewBlock::corner_count).sum();
     Ok(JointSolution {
         hand_eye: HandEye::new(problem.mode, state.mount_from_camera, state.anchor_from_target),
@@ -202,5 +213,7 @@ fn finish(
     })
 }
 
+#[cfg(test)]
+pub(crate) mod simulated;
 #[cfg(test)]
 mod tests;

@@ -3,13 +3,15 @@
 //! Shared unknowns are `[mount_from_camera (6), anchor_from_target (6), free intrinsics (≤ 12)]`; each view adds the
 //! six of its pose correction. Blocks are kept without weights, so that the noise levels can be varied cheaply.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Point3, SMatrix, SVector, Vector6};
 
 use super::chain::Chain;
+use super::equations::PoseEquations;
 use super::optimise::State;
 use super::{JointProblem, Noise};
 use crate::camera::MAX_PARAMETERS;
 use crate::handeye::HandEyeError;
+use crate::progress::CancelToken;
 use crate::se3::skew;
 
 /// Most shared unknowns.
@@ -48,44 +50,25 @@ impl ViewBlock {
 
     fn new(problem: &JointProblem<'_>, state: &State, view: usize) -> Result<Self, HandEyeError> {
         let data = &problem.views[view];
-        let chain = Chain::new(
-            problem.mode,
-            &data.base_from_tip,
-            &state.corrections[view],
-            &state.mount_from_camera,
-            &state.anchor_from_target,
-        );
-        let rotation: Matrix3<f64> = chain.camera_from_target.rotation.to_rotation_matrix().into_inner();
-        let mut pose = Matrix6::zeros();
-        let mut pose_by_lens = SMatrix::<f64, 6, MAX_PARAMETERS>::zeros();
-        let mut lens = SMatrix::<f64, MAX_PARAMETERS, MAX_PARAMETERS>::zeros();
-        let mut pose_gradient = Vector6::zeros();
-        let mut lens_gradient = SVector::<f64, MAX_PARAMETERS>::zeros();
-        let mut squared_px = 0.0;
-        for corner in &data.corners {
-            let point = &problem.points[corner.index];
-            let in_camera = chain.camera_from_target * point;
-            let projection =
-                state.intrinsics.project_with_jacobians(&in_camera).map_err(|_behind| HandEyeError::NoSolution {
-                    method: METHOD,
-                    views: problem.views.len(),
-                    reason: "the estimate puts the target behind the camera",
-                })?;
-            let residual = projection.px - corner.px;
-            let mut by_pose = SMatrix::<f64, 2, 6>::zeros();
-            let by_target_point = projection.px_by_point * rotation;
-            by_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_target_point);
-            by_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-by_target_point * skew(&point.coords)));
-            pose += by_pose.transpose() * by_pose;
-            pose_gradient += by_pose.transpose() * residual;
-            squared_px += residual.norm_squared();
-            if problem.free_intrinsics {
-                let by_lens = &projection.px_by_parameters;
-                pose_by_lens += by_pose.transpose() * by_lens;
-                lens += by_lens.transpose() * by_lens;
-                lens_gradient += by_lens.transpose() * residual;
-            }
-        }
+        let chain = state.chain(problem, data, &state.corrections[view]);
+        let equations = PoseEquations::new(
+            &state.intrinsics,
+            &chain.camera_from_target,
+            problem.points,
+            &data.corners,
+            problem.free_intrinsics,
+        )
+        .map_err(|_behind| HandEyeError::NoSolution {
+            method: METHOD,
+            views: problem.views.len(),
+            reason: "the estimate puts the target behind the camera",
+        })?;
+        Ok(Self::from_parts(&chain, &equations))
+    }
+
+    /// Turns equations in the view's own pose into those of the unknowns.
+    pub fn from_parts(chain: &Chain, equations: &PoseEquations) -> Self {
+        let PoseEquations { pose, pose_by_lens, lens, pose_gradient, lens_gradient, squared_px, corners } = equations;
         // xi = by_hand_eye x + y + by_correction d turns the six pose columns into those of the unknowns.
         let a = &chain.by_hand_eye;
         let d = &chain.by_correction;
@@ -94,30 +77,38 @@ impl ViewBlock {
         shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&(a.transpose() * pose * a));
         shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&(a.transpose() * pose));
         shared.fixed_view_mut::<6, 6>(6, 0).copy_from(&(pose * a));
-        shared.fixed_view_mut::<6, 6>(6, 6).copy_from(&pose);
+        shared.fixed_view_mut::<6, 6>(6, 6).copy_from(pose);
         let hand_eye_lens = a.transpose() * pose_by_lens;
         shared.fixed_view_mut::<6, MAX_PARAMETERS>(0, 12).copy_from(&hand_eye_lens);
-        shared.fixed_view_mut::<6, MAX_PARAMETERS>(6, 12).copy_from(&pose_by_lens);
+        shared.fixed_view_mut::<6, MAX_PARAMETERS>(6, 12).copy_from(pose_by_lens);
         shared.fixed_view_mut::<MAX_PARAMETERS, 6>(12, 0).copy_from(&hand_eye_lens.transpose());
         shared.fixed_view_mut::<MAX_PARAMETERS, 6>(12, 6).copy_from(&pose_by_lens.transpose());
-        shared.fixed_view_mut::<MAX_PARAMETERS, MAX_PARAMETERS>(12, 12).copy_from(&lens);
+        shared.fixed_view_mut::<MAX_PARAMETERS, MAX_PARAMETERS>(12, 12).copy_from(lens);
         let mut cross = Box::new(SharedBySix::zeros());
         cross.fixed_view_mut::<6, 6>(0, 0).copy_from(&(a.transpose() * pose_d));
         cross.fixed_view_mut::<6, 6>(6, 0).copy_from(&pose_d);
         cross.fixed_view_mut::<MAX_PARAMETERS, 6>(12, 0).copy_from(&(pose_by_lens.transpose() * d));
         let mut shared_gradient = Box::new(SharedVector::zeros());
         shared_gradient.fixed_rows_mut::<6>(0).copy_from(&(a.transpose() * pose_gradient));
-        shared_gradient.fixed_rows_mut::<6>(6).copy_from(&pose_gradient);
-        shared_gradient.fixed_rows_mut::<MAX_PARAMETERS>(12).copy_from(&lens_gradient);
-        Ok(Self {
+        shared_gradient.fixed_rows_mut::<6>(6).copy_from(pose_gradient);
+        shared_gradient.fixed_rows_mut::<MAX_PARAMETERS>(12).copy_from(lens_gradient);
+        Self {
             shared,
             cross,
             own: d.transpose() * pose_d,
             shared_gradient,
             own_gradient: d.transpose() * pose_gradient,
-            squared_px,
-            residuals: 2 * data.corners.len(),
-        })
+            squared_px: *squared_px,
+            residuals: 2 * corners,
+        }
+    }
+
+    /// What the view says about the shared unknowns once its correction is eliminated; `None` when the correction is
+    /// undetermined.
+    pub fn information(&self, noise: &Noise) -> Option<SharedMatrix> {
+        let weight = noise.corner_px.powi(-2);
+        let own = Own::new(self, &Vector6::zeros(), weight, &prior_weight(noise), 0.0)?;
+        Some(*self.shared * weight - own.gain.transpose() * own.factor.solve(&own.gain))
     }
 }
 
@@ -133,14 +124,20 @@ pub struct System {
     pub corrections: Vec<Vector6<f64>>,
     /// How many of [`MAX_SHARED`] unknowns are in use.
     pub shared_count: usize,
+    /// Polled at every view by whatever loops over them.
+    pub cancel: CancelToken,
 }
 
 impl System {
-    pub fn new(problem: &JointProblem<'_>, state: &State) -> Result<Self, HandEyeError> {
+    pub fn new(problem: &JointProblem<'_>, state: &State, cancel: &CancelToken) -> Result<Self, HandEyeError> {
         let blocks =
-            (0..problem.views.len()).map(|i| ViewBlock::new(problem, state, i)).collect::<Result<Vec<_>, _>>()?;
+            (0..problem.views.len())
+                .map(|i| {
+                    if cancel.is_cancelled() { Err(HandEyeError::Cancelled) } else { ViewBlock::new(problem, state, i) }
+                })
+                .collect::<Result<Vec<_>, _>>()?;
         let lens = if problem.free_intrinsics { state.intrinsics.parameter_count() } else { 0 };
-        Ok(Self { blocks, corrections: state.corrections.clone(), shared_count: 12 + lens })
+        Ok(Self { blocks, corrections: state.corrections.clone(), shared_count: 12 + lens, cancel: cancel.clone() })
     }
 
     pub fn squared_px(&self) -> f64 {
@@ -178,6 +175,9 @@ impl System {
         }
         let mut eliminated = Vec::with_capacity(self.blocks.len());
         for (block, correction) in self.blocks.iter().zip(&self.corrections) {
+            if self.cancel.is_cancelled() {
+                return Err(HandEyeError::Cancelled);
+            }
             let own = Own::new(block, correction, weight, &prior, damping)
                 .ok_or_else(|| self.singular("the pose correction of a view is undetermined"))?;
             matrix -= own.gain.transpose() * own.factor.solve(&own.gain);
@@ -185,16 +185,11 @@ impl System {
             eliminated.push(own);
         }
         let n = self.shared_count;
-        let active = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]);
-        let scale = DVector::from_fn(n, |i, _| active[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
-        // Columns differ by many orders (metres, radians, lens coefficients); scaled, the pivots say what is singular.
-        let scaled = DMatrix::from_fn(n, n, |i, j| active[(i, j)] * scale[i] * scale[j]);
-        let factor = Cholesky::new(scaled).filter(|f| f.l_dirty().diagonal().iter().all(|p| *p > SINGULAR_PIVOT));
-        let factor = factor.ok_or_else(|| {
-            self.singular(
+        let Some((factor, scale)) = scaled_cholesky(&matrix, n) else {
+            return Err(self.singular(
                 "some direction of the answer leaves every residual unchanged: add views turned about other axes",
-            )
-        })?;
+            ));
+        };
         Ok(Reduced { factor, scale, gradient: DVector::from_fn(n, |i, _| gradient[i]), own: eliminated })
     }
 
@@ -206,6 +201,26 @@ impl System {
 /// Smallest pivot of the scaled Cholesky factor taken as non-zero: `sqrt(f64::EPSILON)` is where the squared factor
 /// has lost all digits.
 const SINGULAR_PIVOT: f64 = 1.5e-8;
+
+/// Cholesky factor of the first `n` rows and columns, scaled to unit diagonal, and the scale; `None` when singular.
+fn scaled_cholesky(matrix: &SharedMatrix, n: usize) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+    let active = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]);
+    let scale = DVector::from_fn(n, |i, _| active[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
+    // Columns differ by many orders (metres, radians, lens coefficients); scaled, the pivots say what is singular.
+    let scaled = DMatrix::from_fn(n, n, |i, j| active[(i, j)] * scale[i] * scale[j]);
+    let factor = Cholesky::new(scaled).filter(|f| f.l_dirty().diagonal().iter().all(|p| *p > SINGULAR_PIVOT))?;
+    Some((factor, scale))
+}
+
+fn scaled_inverse(factor: &Cholesky<f64, Dyn>, scale: &DVector<f64>) -> DMatrix<f64> {
+    let inverse = factor.inverse();
+    DMatrix::from_fn(inverse.nrows(), inverse.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j])
+}
+
+/// Inverse of the first `n` rows and columns of an information matrix; `None` when it leaves a direction free.
+pub fn covariance_of(information: &SharedMatrix, n: usize) -> Option<DMatrix<f64>> {
+    scaled_cholesky(information, n).map(|(factor, scale)| scaled_inverse(&factor, &scale))
+}
 
 /// One view's correction, ready to be eliminated.
 pub struct Own {
@@ -262,8 +277,7 @@ impl Reduced {
 
     /// Inverse of the reduced matrix: the covariance of the shared unknowns when the system is undamped.
     pub fn inverse(&self) -> DMatrix<f64> {
-        let inverse = self.factor.inverse();
-        DMatrix::from_fn(inverse.nrows(), inverse.ncols(), |i, j| inverse[(i, j)] * self.scale[i] * self.scale[j])
+        scaled_inverse(&self.factor, &self.scale)
     }
 
     /// Log-determinant of the whole normal matrix, shared unknowns and corrections.

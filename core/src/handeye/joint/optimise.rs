@@ -4,10 +4,11 @@ use nalgebra::{DVector, Point3, Vector6};
 
 use super::chain::Chain;
 use super::normal::System;
-use super::{JointProblem, JointStart, Noise};
+use super::{JointProblem, JointSolution, JointStart, Noise};
 use crate::camera::Intrinsics;
 use crate::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::handeye::HandEyeError;
+use crate::observation::View;
 use crate::progress::CancelToken;
 
 /// Steps of one minimisation; a handful is usual.
@@ -38,6 +39,21 @@ impl State {
         }
     }
 
+    /// The state that a solution was found in.
+    pub fn of(solution: &JointSolution) -> Self {
+        Self {
+            mount_from_camera: solution.hand_eye.mount_from_camera(),
+            anchor_from_target: solution.hand_eye.anchor_from_target(),
+            intrinsics: solution.intrinsics,
+            corrections: solution.views.iter().map(|view| view.correction).collect(),
+        }
+    }
+
+    /// The chain of one view.
+    pub fn chain(&self, problem: &JointProblem<'_>, view: &View, correction: &Vector6<f64>) -> Chain {
+        Chain::new(problem.mode, &view.base_from_tip, correction, &self.mount_from_camera, &self.anchor_from_target)
+    }
+
     fn stepped(&self, problem: &JointProblem<'_>, shared: &DVector<f64>, own: &[Vector6<f64>]) -> Self {
         let mut next = self.clone();
         next.mount_from_camera = self.mount_from_camera.perturbed(&shared.fixed_rows::<6>(0).into_owned());
@@ -62,13 +78,7 @@ impl State {
             .iter()
             .zip(&self.corrections)
             .map(|(view, correction)| {
-                let chain = Chain::new(
-                    problem.mode,
-                    &view.base_from_tip,
-                    correction,
-                    &self.mount_from_camera,
-                    &self.anchor_from_target,
-                );
+                let chain = self.chain(problem, view, correction);
                 (chain.camera_from_target * centre).coords
             })
             .sum();
@@ -83,13 +93,10 @@ pub fn minimise(
     noise: &Noise,
     cancel: &CancelToken,
 ) -> Result<usize, HandEyeError> {
-    let mut system = System::new(problem, state)?;
+    let mut system = System::new(problem, state, cancel)?;
     let mut cost = system.cost(noise);
     let mut damping = FIRST_DAMPING;
     for step in 0..MAX_STEPS {
-        if cancel.is_cancelled() {
-            return Err(HandEyeError::Cancelled);
-        }
         loop {
             let trial = system.reduce_damped(noise, damping).map(|reduced| {
                 let shared = reduced.shared_step();
@@ -98,6 +105,7 @@ pub fn minimise(
             });
             let (next, promised) = match trial {
                 Ok(trial) => trial,
+                Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
                 Err(error) if damping >= LARGEST_DAMPING => return Err(error),
                 Err(_) => {
                     damping = (damping * 10.0).max(1e-9);
@@ -108,7 +116,10 @@ pub fn minimise(
                 return Ok(step);
             }
             // A step that puts the target behind the camera is as bad as one that raises the cost.
-            let next_system = System::new(problem, &next).ok();
+            let next_system = match System::new(problem, &next, cancel) {
+                Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
+                other => other.ok(),
+            };
             let next_cost = next_system.as_ref().map_or(f64::INFINITY, |s| s.cost(noise));
             if let (Some(next_system), true) = (next_system, next_cost < cost) {
                 (*state, system, cost) = (next, next_system, next_cost);

@@ -91,6 +91,9 @@ fn evaluate(system: &System, logs: &Vector3<f64>) -> Result<Likelihood, HandEyeE
     let mut squares = Vector6::zeros();
     let mut variances = Vector6::zeros();
     for ((own, step), correction) in reduced.own.iter().zip(&steps).zip(&system.corrections) {
+        if system.cancel.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
         let estimate = correction + step;
         squares += estimate.component_mul(&estimate);
         let solved = own.factor.solve(&own.gain);

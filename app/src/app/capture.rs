@@ -1,0 +1,73 @@
+//! Captures.
+
+use handeye_core::session::CaptureId;
+
+use super::App;
+use crate::model::{CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, Severity};
+use crate::text;
+use crate::worker::{CaptureRequest, VisionTask};
+
+impl App {
+    /// Takes a capture as soon as robot and picture have settled.
+    pub(super) fn capture(&mut self, purpose: CapturePurpose, pose_name: Option<String>) {
+        if self.model.capture.is_some() {
+            // Pressing twice must not take two.
+            return;
+        }
+        self.numbers.capture += 1;
+        let number = self.numbers.capture;
+        let others = self.model.document().captures.iter().map(|it| (it.id.0, it.base_from_tip)).collect();
+        let request = CaptureRequest { number, purpose, options: self.model.view.capture, pose_name, others };
+        let asked = self.workers.ask_vision(VisionTask::Capture(request));
+        if asked.is_ok() {
+            let since_s = self.model.now_s;
+            self.model.capture = Some(CaptureUnderWay { number, purpose, wait: CaptureWait::ForPicture, since_s });
+            self.model.refused = None;
+        }
+        self.expect(text!("There is no capture"), asked);
+    }
+
+    pub(super) fn cancel_capture(&mut self) {
+        if self.model.capture.is_some() {
+            let asked = self.workers.ask_vision(VisionTask::CancelCapture);
+            self.expect(text!("The capture was not cancelled"), asked);
+        }
+    }
+
+    pub(super) fn capture_waits(&mut self, number: u64, wait: CaptureWait) {
+        if let Some(capture) = self.model.capture.as_mut().filter(|capture| capture.number == number) {
+            capture.wait = wait;
+        }
+    }
+
+    pub(super) fn capture_refused(&mut self, number: u64, refused: CaptureRefused) {
+        if self.model.capture.as_ref().is_none_or(|capture| capture.number != number) {
+            return;
+        }
+        self.model.capture = None;
+        self.say(Severity::Warning, text!("No capture: {why}", why = refused.why.clone()));
+        self.tour_refused(&refused);
+        self.model.refused = Some(refused);
+    }
+
+    pub(super) fn captured(&mut self, number: u64, id: CaptureId) {
+        if self.model.capture.as_ref().is_some_and(|capture| capture.number == number) {
+            self.model.capture = None;
+        }
+        let capture = self.model.document().capture(id);
+        let settled = capture.and_then(|it| it.settled_s).map(|settled_s| format!("{settled_s:.2}"));
+        let noise = capture.and_then(|it| it.corner_noise_px).map(|noise_px| format!("{noise_px:.3}"));
+        let text = match (settled, noise) {
+            (Some(settled), Some(noise)) => text!(
+                "Capture {id} is kept (corner noise {noise} px, settled in {settled} s)",
+                id = id,
+                noise = noise,
+                settled = settled
+            ),
+            (Some(settled), None) => text!("Capture {id} is kept (settled in {settled} s)", id = id, settled = settled),
+            (None, _) => text!("Capture {id} is kept", id = id),
+        };
+        self.say(Severity::Info, text);
+        self.tour_captured();
+    }
+}

@@ -1,0 +1,227 @@
+//! The application without its window: the model, the workers, and the only two ways to change the model.
+//!
+//! [`App::apply`] does what the user wants, [`App::absorb`] takes in what happened. Each part of the work has a file of
+//! its own here; all of them change the model of the one [`App`] and hand work to threads, and none waits.
+
+mod capture;
+mod connection;
+mod export;
+mod looking;
+mod messages;
+mod motion;
+mod session;
+mod solve;
+mod taught;
+mod tour;
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::command::{Command, Event, Outbox};
+use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
+use crate::text;
+use crate::worker::{Clock, Connector, Desk, Waker, Workers};
+
+/// Makes what connects to a cell.
+pub type Connect = Arc<dyn Fn(&CellSource) -> Arc<dyn Connector> + Send + Sync>;
+
+/// What an application begins with.
+pub struct Start {
+    /// Which cell.
+    pub source: CellSource,
+    /// What is remembered from one start to the next.
+    pub view: ViewSettings,
+    /// Addresses that were connected to before, newest first.
+    pub addresses: Vec<String>,
+    /// Where new sessions go.
+    pub sessions: PathBuf,
+    /// A session or data set to open at once; where there is none, a session is begun there.
+    pub open: Option<PathBuf>,
+}
+
+/// Model and workers.
+pub struct App {
+    model: Model,
+    /// The threads that talk to the cell; others take their place when another cell is chosen.
+    workers: Workers,
+    desk: Desk,
+    connect: Connect,
+    clock: Clock,
+    waker: Waker,
+    numbers: Numbers,
+    /// The question that the solver was asked last.
+    asked: Option<solve::Question>,
+}
+
+/// The last numbers that were given to requests.
+#[derive(Debug, Default)]
+struct Numbers {
+    capture: u64,
+    job: JobId,
+    motion: MotionId,
+}
+
+impl App {
+    /// Starts the workers; they connect by themselves.
+    ///
+    /// # Errors
+    /// When the system has no more threads.
+    pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
+        let Start { source, view, addresses, sessions, open } = start;
+        let desk = Desk::start(sessions, &clock, &waker)?;
+        let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
+        let model = Model { addresses, ..Model::new(source, view) };
+        let numbers = Numbers::default();
+        let mut app = Self { model, workers, desk, connect, clock, waker, numbers, asked: None };
+        app.prepare_session();
+        app.send_target();
+        if let Some(folder) = open {
+            app.open_or_begin(folder);
+        }
+        Ok(app)
+    }
+
+    /// What the window shows.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Takes in what the workers have reported. Never waits for them.
+    pub fn collect(&mut self) {
+        self.absorb(Event::Tick { now_s: (self.clock)() });
+        let mut events = Vec::new();
+        self.workers.drain(|event| events.push(event));
+        self.desk.drain(|event| events.push(event));
+        for event in events {
+            self.absorb(event);
+        }
+    }
+
+    /// Applies the commands of a frame of the window.
+    pub fn apply_all(&mut self, outbox: &mut Outbox) {
+        for (command, place) in outbox.drain() {
+            tracing::trace!(?command, %place, "command");
+            self.apply(command);
+        }
+    }
+
+    /// Does what the user wants, or has a worker do it. Never waits for a worker.
+    pub fn apply(&mut self, command: Command) {
+        match command {
+            Command::Stop => self.stop(),
+            Command::StartSimulation => self.start_simulation(),
+            Command::Reconnect => self.reconnect(),
+            Command::Connect(source) => self.connect(source),
+
+            Command::SetTheme(theme) => self.model.view.theme = theme,
+            Command::SetLanguage(language) => self.model.view.language = language,
+            Command::SetRotationFormat(format) => self.model.view.rotation = format,
+            Command::SetDepthScale(scale) => self.set_depth_scale(scale),
+            Command::SetDepthColours(colours) => self.set_depth_colours(colours),
+            Command::SetOverlays(overlays) => self.model.view.overlays = overlays,
+            Command::SetViewport(viewport) => self.model.viewport = viewport,
+            Command::PointAt(point) => self.model.cursor = point,
+            Command::Pick(pixel) => self.pick(pixel),
+            Command::GoToStep(step) => self.model.step = step,
+            Command::SetDialog(dialog) => self.set_dialog(dialog),
+            Command::DismissMessage(number) => self.model.messages.dismiss(number),
+            // Where panes are is the window's business.
+            Command::ShowPane(_) | Command::ResetLayout => {}
+
+            Command::Move { goal, what } => self.start_motion(goal, what),
+            Command::Jog(jog) => self.jog(jog),
+            Command::JogHeld(jog) => self.hold_jog(jog),
+            Command::JogReleased => self.release_jog(),
+            Command::SetJog(settings) => self.model.view.jog = settings,
+            Command::Teach { name } => self.teach(name),
+            Command::RemoveTaught(name) => self.remove_taught(&name),
+            Command::RenameTaught { from, to } => self.rename_taught(&from, &to),
+            Command::ReorderTaught { name, to } => self.reorder_taught(&name, to),
+            Command::TeachReference => self.teach_reference(),
+            Command::ImportTaught(file) => self.import_taught(file),
+            Command::ExportTaught(file) => self.export_taught(file),
+            Command::GoToTaught(name) => self.go_to_taught(&name),
+            Command::GoToCapture(id) => self.go_to_capture(id),
+            Command::RunTour { purpose } => self.run_tour(purpose),
+            Command::StopTour => self.stop_tour(),
+
+            Command::Capture(purpose) => self.capture(purpose, None),
+            Command::CancelCapture => self.cancel_capture(),
+            Command::SetCaptureOptions(options) => self.model.view.capture = options,
+            Command::Select(ids) => self.select(ids),
+            Command::BackToLive => self.back_to_live(),
+
+            Command::SetExcluded { ids, excluded } => self.set_excluded(ids, excluded),
+            Command::SetPurpose { ids, purpose } => self.set_purpose(ids, purpose),
+            Command::Delete(ids) => self.delete(ids),
+            Command::Undo => self.undo(),
+            Command::Redo => self.redo(),
+            Command::SetTarget(target) => self.set_target(target),
+            Command::SetMode(mode) => self.set_mode(mode),
+            Command::SetCamera(camera) => self.set_camera(camera),
+            Command::NewSession(folder) => self.new_session(folder),
+            Command::Open(folder) => self.open(folder),
+            Command::SaveAs(folder) => self.save_as(folder),
+            Command::ListFolder(folder) => self.list_folder(folder),
+
+            Command::Solve => self.solve_again(),
+            Command::CancelSolve => self.cancel_solve(),
+            Command::SetMethod(name) => self.set_method(&name),
+            Command::SetGoal(goal) => self.set_goal(goal),
+            Command::SetOutlierLine(line_px) => self.model.outlier_line_px = line_px,
+
+            Command::ChooseFormats(formats) => self.model.export.chosen = formats,
+            Command::ShowFormat(format) => self.model.export.shown = format,
+            Command::SetExportNames(names) => self.set_export_names(names),
+            Command::SetExportFolder(folder) => self.model.export.folder = folder,
+            Command::Export => self.export(),
+        }
+    }
+
+    /// Takes in what happened.
+    pub fn absorb(&mut self, event: Event) {
+        match event {
+            Event::Tick { now_s } => self.model.now_s = now_s,
+            Event::Link { link, state } => self.link_changed(link, state),
+            Event::Robot(robot) => self.model.robot = Some(robot),
+            Event::Cell(facts) => self.cell_found(*facts),
+            Event::Stopped => self.stopped(),
+            Event::Frame { info, dropped, images } => {
+                self.model.dropped_frames = dropped;
+                // A frame out of a log has no pixels, and nothing to show.
+                if let Some(images) = images {
+                    self.model.frame = Some(LiveFrame { info, images });
+                }
+            }
+            Event::Detection(detection) => self.model.detection = Some(*detection),
+            Event::Moved { id, outcome } => self.moved(id, outcome),
+            Event::JogEnded { why } => self.jog_ended(why),
+            Event::CaptureWaits { number, wait } => self.capture_waits(number, wait),
+            Event::CaptureRefused { number, refused } => self.capture_refused(number, refused),
+            Event::Captured { number, id } => self.captured(number, id),
+            Event::Document(state) => self.document_changed(*state),
+            Event::SessionOpened => self.session_opened(),
+            Event::SessionFailed { why } => self.session_failed(why),
+            Event::Observed { id, target, observed } => self.observed(id, target, observed),
+            Event::Review { id, images } => self.reviewed(id, images),
+            Event::Folder(listing) => self.model.folder = Some(listing),
+            Event::Recent(recent) => self.model.recent = recent,
+            Event::PosesRead { poses } => self.poses_read(poses),
+            Event::SolveProgress { job, stage, part } => self.solve_progress(job, stage, part),
+            Event::SolveEnded { job, outcome } => self.solve_ended(job, outcome),
+            Event::Previews(previews) => self.model.export.previews = previews.into_iter().collect(),
+            Event::Exported(written) => self.written(written),
+            Event::Notice { severity, text } => self.say(severity, text),
+        }
+    }
+
+    /// Tells the user when a worker did not take a request.
+    fn expect<Refused>(&mut self, failure: text::Text, asked: Result<(), Refused>) {
+        if asked.is_err() {
+            let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);
+            self.say(Severity::Warning, text);
+        }
+    }
+}
+

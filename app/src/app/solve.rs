@@ -1,0 +1,197 @@
+//! Solving by itself whenever the set of captures is another.
+
+use std::sync::Arc;
+
+use handeye_core::calibrate::{CameraKnowledge, Method, Observations, ObservedView};
+use handeye_core::observation::{Corner, View};
+use handeye_core::progress::Stage;
+use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
+
+use super::App;
+use crate::command::SolveOutcome;
+use crate::model::{Goal, JobId, Severity, SolveStatus};
+use crate::observe::DEFAULT_MODEL;
+use crate::text;
+use crate::text::Text;
+use crate::worker::{ArchiveTask, SolveJob};
+
+/// Fewer views than this have no answer.
+const LEAST_VIEWS: usize = 3;
+
+/// What a calibration depends on. When it is another, there is something to solve.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Question {
+    meta: (handeye_core::handeye::Mode, handeye_core::target::TargetSpec, Option<handeye_core::dataset::CameraInput>),
+    captures: Vec<(CaptureId, Role, bool, bool)>,
+    folder: Option<std::path::PathBuf>,
+    method: String,
+    goal: Goal,
+}
+
+impl App {
+    fn question(&self) -> Question {
+        let document = self.model.document();
+        Question {
+            meta: (document.meta.mode, document.meta.target, document.meta.camera),
+            captures: document
+                .captures
+                .iter()
+                .map(|it| (it.id, it.role, it.excluded, self.model.observed(it.id).is_some()))
+                .collect(),
+            folder: self.model.session.folder.clone(),
+            method: self.model.method.clone(),
+            goal: self.model.view.goal,
+        }
+    }
+
+    /// Solves unless the answer to the present question is there or on its way.
+    pub(super) fn solve_if_changed(&mut self) {
+        // Half of a session that was just opened would give half an answer.
+        let document = self.model.document();
+        if !document.captures.iter().all(|it| self.model.observed.contains_key(&it.id)) {
+            return;
+        }
+        let question = self.question();
+        if self.asked.as_ref() != Some(&question) {
+            self.asked = Some(question);
+            self.solve();
+        }
+    }
+
+    pub(super) fn solve_again(&mut self) {
+        self.asked = Some(self.question());
+        self.solve();
+    }
+
+    fn solve(&mut self) {
+        self.model.solve.fresh = false;
+        let document = Arc::clone(&self.model.session.document);
+        let seen = document.in_use().filter(|it| self.corners(it.id).is_some()).count();
+        if seen < LEAST_VIEWS {
+            self.desk.cancel_solve();
+            self.model.solve.status = if document.captures.is_empty() {
+                SolveStatus::Idle
+            } else {
+                SolveStatus::Failed {
+                    why: text!(
+                        "{seen} captures with the board are in use, at least {need} are needed: capture more poses",
+                        seen = seen,
+                        need = LEAST_VIEWS
+                    ),
+                }
+            };
+            return;
+        }
+        self.numbers.job = JobId(self.numbers.job.0 + 1);
+        let id = self.numbers.job;
+        let since_s = self.model.now_s;
+        self.model.solve.status = SolveStatus::Running { job: id, stage: Stage::Intrinsics, part: 0.0, since_s };
+        let job = self.job(id, &document);
+        self.desk.solve(job);
+    }
+
+    fn corners(&self, id: CaptureId) -> Option<&Vec<Corner>> {
+        self.model.observed(id)?.corners.as_ref()
+    }
+
+    fn job(&self, id: JobId, document: &Document) -> SolveJob {
+        let fitted: Vec<&CaptureRecord> = document.captures.iter().filter(|it| it.role == Role::Calibration).collect();
+        let views = fitted.iter().map(|it| ObservedView {
+            name: it.image.clone(),
+            base_from_tip: Some(it.base_from_tip),
+            corners: self.corners(it.id).cloned(),
+            camera_from_target: None,
+            in_fit: it.is_in_use(),
+        });
+        let verification = document
+            .captures
+            .iter()
+            .filter(|it| it.role == Role::Verification && !it.excluded)
+            .filter_map(|it| {
+                let corners = self.corners(it.id)?.clone();
+                Some((it.id, View { name: it.image.clone(), base_from_tip: it.base_from_tip, corners }))
+            });
+        SolveJob {
+            id,
+            observations: Observations {
+                mode: Some(document.meta.mode),
+                target: document.meta.target,
+                image_size: self.image_size(),
+                camera: camera_knowledge(document),
+                views: views.collect(),
+            },
+            captures: fitted.iter().map(|it| it.id).collect(),
+            verification: verification.collect(),
+            method: Method::by_name(&self.model.method).unwrap_or_default(),
+            goal_m: self.model.view.goal.0,
+            truth: self.model.cell.as_ref().and_then(|cell| cell.truth.clone()),
+        }
+    }
+
+    /// Width and height of the pictures in pixels: all captures of a session have the same.
+    fn image_size(&self) -> (u32, u32) {
+        self.model.observed.values().flatten().map(|observed| observed.image_size).next().unwrap_or_default()
+    }
+
+    pub(super) fn cancel_solve(&mut self) {
+        self.desk.cancel_solve();
+    }
+
+    pub(super) fn set_method(&mut self, name: &str) {
+        if Method::by_name(name).is_some() {
+            name.clone_into(&mut self.model.method);
+            self.solve_if_changed();
+        }
+    }
+
+    pub(super) fn set_goal(&mut self, goal_m: f64) {
+        if goal_m.is_finite() && goal_m > 0.0 {
+            self.model.view.goal = Goal(goal_m);
+            self.solve_if_changed();
+        }
+    }
+
+    pub(super) fn solve_progress(&mut self, job: JobId, now: Stage, now_part: f64) {
+        if let SolveStatus::Running { job: running, stage, part, .. } = &mut self.model.solve.status
+            && *running == job
+        {
+            (*stage, *part) = (now, now_part);
+        }
+    }
+
+    pub(super) fn solve_ended(&mut self, job: JobId, outcome: SolveOutcome) {
+        // An answer to an earlier question is of no interest any more.
+        if job != self.numbers.job {
+            return;
+        }
+        match outcome {
+            SolveOutcome::Solved(solved) => {
+                self.model.solve.status = SolveStatus::Idle;
+                self.model.solve.fresh = true;
+                let result = Box::new(solved.result.clone());
+                self.model.solve.solved = Some(solved);
+                self.send_intrinsics();
+                self.preview_exports();
+                if self.desk.archive(ArchiveTask::Result(result)).is_err() {
+                    self.say(Severity::Warning, text!("The result was not kept beside the session; solve again to keep it"));
+                }
+            }
+            SolveOutcome::Failed(why) => self.no_answer(why),
+            SolveOutcome::Cancelled => self.model.solve.status = SolveStatus::Cancelled,
+        }
+    }
+
+    fn no_answer(&mut self, why: Text) {
+        self.model.solve.status = SolveStatus::Failed { why };
+    }
+}
+
+fn camera_knowledge(document: &Document) -> CameraKnowledge {
+    match &document.meta.camera {
+        None => CameraKnowledge::Estimate { model: DEFAULT_MODEL, start: None },
+        Some(input) => match input.intrinsics {
+            Some(intrinsics) if input.fixed => CameraKnowledge::Fixed(intrinsics),
+            start => CameraKnowledge::Estimate { model: input.model, start },
+        },
+    }
+}

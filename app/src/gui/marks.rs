@@ -1,0 +1,141 @@
+//! Colours of what is drawn over pictures and in charts: the same thing has the same colour in both.
+
+use egui::{Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2};
+
+use super::theme::Palette;
+use handeye_core::depth::ColourMap;
+
+/// Colours with a meaning of their own, besides the [`Palette`].
+#[derive(Debug, Clone, Copy)]
+pub struct Marks {
+    /// Captures that enter the fit.
+    pub fit: Color32,
+    /// Captures that verify it.
+    pub verify: Color32,
+    /// Captures that were taken out.
+    pub excluded: Color32,
+    /// The board where the calibration says that it is.
+    pub predicted: Color32,
+    /// Residuals.
+    pub residual: Color32,
+    /// What is drawn of a recorded picture, so that nobody takes it for the live one.
+    pub review: Color32,
+    /// Text on `review`.
+    pub on_review: Color32,
+    /// Text on the accent of the palette.
+    pub on_accent: Color32,
+    /// The axes x, y and z.
+    pub axes: [Color32; 3],
+    /// A point that was picked.
+    pub picked: Color32,
+}
+
+const DARK: Marks = Marks {
+    fit: Color32::from_rgb(92, 159, 255),
+    verify: Color32::from_rgb(190, 140, 255),
+    excluded: Color32::from_rgb(120, 126, 138),
+    review: Color32::from_rgb(240, 176, 64),
+    on_review: Color32::from_rgb(30, 22, 6),
+    on_accent: Color32::from_rgb(10, 22, 40),
+    ..OVER_PICTURES
+};
+
+const LIGHT: Marks = Marks {
+    fit: Color32::from_rgb(38, 116, 224),
+    verify: Color32::from_rgb(132, 72, 208),
+    excluded: Color32::from_rgb(150, 156, 168),
+    review: Color32::from_rgb(214, 138, 16),
+    on_review: Color32::from_rgb(255, 255, 255),
+    on_accent: Color32::from_rgb(255, 255, 255),
+    ..OVER_PICTURES
+};
+
+/// Pictures look the same in both themes.
+const OVER_PICTURES: Marks = Marks {
+    fit: Color32::from_rgb(92, 159, 255),
+    verify: Color32::from_rgb(190, 140, 255),
+    excluded: Color32::from_rgb(160, 166, 178),
+    predicted: Color32::from_rgb(64, 224, 255),
+    residual: Color32::from_rgb(255, 214, 64),
+    review: Color32::from_rgb(240, 176, 64),
+    on_review: Color32::from_rgb(30, 22, 6),
+    on_accent: Color32::from_rgb(10, 22, 40),
+    axes: [Color32::from_rgb(255, 82, 82), Color32::from_rgb(82, 214, 112), Color32::from_rgb(88, 148, 255)],
+    picked: Color32::from_rgb(255, 92, 200),
+};
+
+impl Marks {
+    /// Those on the surfaces of the theme that `ui` is drawn in.
+    pub fn of(ui: &Ui) -> &'static Self {
+        if ui.visuals().dark_mode { &DARK } else { &LIGHT }
+    }
+
+    /// Those over pictures.
+    pub fn over_pictures() -> &'static Self {
+        &OVER_PICTURES
+    }
+}
+
+/// Draws over a picture what can be seen on any ground: a dark line under the coloured one.
+pub fn outlined_line(painter: &Painter, points: &[Pos2], width: f32, colour: Color32) {
+    if points.len() < 2 {
+        return;
+    }
+    let under = Color32::from_black_alpha((f32::from(colour.a()) * 0.55) as u8);
+    painter.line(points.to_vec(), Stroke::new(width + 1.6, under));
+    painter.line(points.to_vec(), Stroke::new(width, colour));
+}
+
+/// The colour of a row of a board: a rainbow from the first to the last, as OpenCV draws boards.
+pub fn of_board_row(row: usize, rows: usize) -> Color32 {
+    // The dark ends of the map cannot be seen on a picture.
+    let part = 0.12 + 0.76 * row as f64 / rows.saturating_sub(1).max(1) as f64;
+    super::theme::pixel(ColourMap::Turbo.colour(part))
+}
+
+/// A few words on a dark plate, readable over any picture; gives where it is.
+pub fn plate(painter: &Painter, at: Pos2, words: &str, colour: Color32) -> Rect {
+    const INSET: Vec2 = Vec2::new(6.0, 3.0);
+    let galley = painter.layout_no_wrap(words.to_owned(), FontId::proportional(super::theme::CAPTION), colour);
+    let rect = Rect::from_min_size(at, galley.size() + 2.0 * INSET);
+    painter.rect_filled(rect, 4.0, Color32::from_black_alpha(150));
+    painter.galley(at + INSET, galley, colour);
+    rect
+}
+
+/// The colour of a capture by what it is for.
+pub fn of_capture(marks: &Marks, excluded: bool, verifies: bool) -> Color32 {
+    match (excluded, verifies) {
+        (true, _) => marks.excluded,
+        (false, true) => marks.verify,
+        (false, false) => marks.fit,
+    }
+}
+
+/// Where there is nothing: oblique lines in a rectangle.
+pub fn hatch(painter: &Painter, rect: Rect, colour: Color32) {
+    const STEP: f32 = 7.0;
+    let painter = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
+    let mut x = rect.left() - rect.height();
+    while x < rect.right() {
+        let line = [Pos2::new(x, rect.bottom()), Pos2::new(x + rect.height(), rect.top())];
+        painter.line_segment(line, Stroke::new(1.0, colour));
+        x += STEP;
+    }
+}
+
+/// A title and what to do, in the middle of a pane that has nothing to show.
+pub fn nothing_yet_ui(ui: &mut Ui, title: &str, detail: &str) {
+    const TEXT_WIDTH: f32 = 440.0;
+    let palette = Palette::of(ui);
+    let size = ui.available_size();
+    ui.allocate_ui_with_layout(size, egui::Layout::top_down(egui::Align::Center), |ui| {
+        ui.set_min_size(size);
+        ui.add_space(((size.y - 60.0) * 0.42).max(0.0));
+        ui.set_max_width(TEXT_WIDTH.min(size.x - 24.0).max(0.0));
+        ui.label(egui::RichText::new(title).size(15.0).color(palette.text));
+        ui.add_space(4.0);
+        let detail = egui::RichText::new(detail).color(palette.weak);
+        ui.add(egui::Label::new(detail).wrap().halign(egui::Align::Center));
+    });
+}

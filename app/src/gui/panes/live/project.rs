@@ -1,0 +1,65 @@
+//! Lines in space as lines in the picture, curved where the lens bends them.
+
+use egui::{Pos2, Vec2};
+use handeye_core::camera::Intrinsics;
+use handeye_core::frames::{Camera, Pose, Target};
+use handeye_core::target::TargetSpec;
+use nalgebra::Point3;
+
+use super::picture::Place;
+
+/// Pieces of a line of the length of a board.
+const PIECES: usize = 12;
+/// A point that is so many pictures away from the middle is not on the screen, and its place means little.
+const FARTHEST: f64 = 3.0;
+
+/// What is needed to draw things of the board.
+pub struct Projector<'a> {
+    /// The camera.
+    pub intrinsics: &'a Intrinsics,
+    /// The board.
+    pub camera_from_target: Pose<Camera, Target>,
+    /// The picture on the screen.
+    pub place: &'a Place,
+}
+
+impl Projector<'_> {
+    /// A point of the board on the screen; `None` behind the camera and far outside of the picture.
+    pub fn point(&self, in_target: &Point3<f64>) -> Option<Pos2> {
+        let px = self.intrinsics.project(&(self.camera_from_target.isometry() * in_target)).ok()?;
+        let (width, height) = (f64::from(self.intrinsics.width), f64::from(self.intrinsics.height));
+        let is_near = |at: f64, size: f64| at.is_finite() && (at - size / 2.0).abs() < FARTHEST * size;
+        if !(is_near(px.x, width) && is_near(px.y, height)) {
+            return None;
+        }
+        Some(self.place.screen(Vec2::new(px.x as f32, px.y as f32)))
+    }
+
+    /// A straight line of the board: the pieces of it that can be seen.
+    pub fn line(&self, from: &Point3<f64>, to: &Point3<f64>) -> Vec<Vec<Pos2>> {
+        let mut pieces = vec![Vec::new()];
+        for step in 0..=PIECES {
+            let part = step as f64 / PIECES as f64;
+            match self.point(&(from + (to - from) * part)) {
+                Some(at) => pieces.last_mut().into_iter().for_each(|piece| piece.push(at)),
+                None => pieces.push(Vec::new()),
+            }
+        }
+        pieces.retain(|piece| piece.len() > 1);
+        pieces
+    }
+}
+
+/// The lines of a board: those around it first, then those through its points.
+pub fn board_lines(target: &TargetSpec) -> (Vec<[Point3<f64>; 2]>, Vec<[Point3<f64>; 2]>) {
+    let grid = target.grid();
+    let side = grid.square_m;
+    let point = |column: f64, row: f64| Point3::new(column * side, row * side, 0.0);
+    let (right, bottom) = (grid.columns as f64 - 1.0, grid.rows as f64 - 1.0);
+    // A chessboard has one more row of squares around its inner corners.
+    let corners = [point(-1.0, -1.0), point(right + 1.0, -1.0), point(right + 1.0, bottom + 1.0), point(-1.0, bottom + 1.0)];
+    let around = (0..4).map(|i| [corners[i], corners[(i + 1) % 4]]).collect();
+    let rows = (0..grid.rows).map(|row| [point(0.0, row as f64), point(right, row as f64)]);
+    let columns = (0..grid.columns).map(|column| [point(column as f64, 0.0), point(column as f64, bottom)]);
+    (around, rows.chain(columns).collect())
+}

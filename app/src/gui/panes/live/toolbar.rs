@@ -1,0 +1,110 @@
+//! The lines over the pictures: what is drawn over the colours, and which colours depths have.
+
+use egui::{DragValue, RichText, Ui, WidgetInfo, WidgetType};
+use handeye_core::depth::ColourMap;
+
+use crate::command::{Command, Outbox};
+use crate::model::{DepthScale, Model, Overlays};
+use crate::tr;
+
+/// Residuals are shown at least as they are, and never so large that a good one leaves the picture.
+const EXAGGERATIONS: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
+
+/// A switch per overlay.
+pub fn overlays_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let before = model.view.overlays;
+    let mut now = before;
+    egui::ScrollArea::horizontal().id_salt("overlays").show(ui, |ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 7.0;
+        switch_ui(
+            ui,
+            &mut now.corners,
+            tr!(language, "Corners"),
+            tr!(language, "Corners that were found, coloured by row; the first one has a ring. Faint ones are of an earlier picture"),
+        );
+        switch_ui(
+            ui,
+            &mut now.axes,
+            tr!(language, "Axes"),
+            tr!(language, "The axes of the board: x red, y green, z blue, into the board"),
+        );
+        switch_ui(
+            ui,
+            &mut now.predicted,
+            tr!(language, "Predicted board"),
+            tr!(language, "The board where the robot's pose and the calibration say that it is"),
+        );
+        switch_ui(
+            ui,
+            &mut now.coverage,
+            tr!(language, "Coverage"),
+            tr!(language, "Where the board was in past captures; dark where it never was"),
+        );
+        switch_ui(
+            ui,
+            &mut now.residuals,
+            tr!(language, "Residuals"),
+            tr!(language, "From predicted to measured corners, exaggerated: of a capture after the fit, of the live picture by robot and calibration alone"),
+        );
+        exaggeration_ui(ui, &mut now, tr!(language, "Exaggeration of residuals"));
+    });
+    if now != before {
+        outbox.send(Command::SetOverlays(now));
+    }
+}
+
+fn switch_ui(ui: &mut Ui, on: &mut bool, name: &str, what: &str) {
+    let response = ui.selectable_label(*on, name).on_hover_text(what);
+    if response.clicked() {
+        *on = !*on;
+    }
+}
+
+fn exaggeration_ui(ui: &mut Ui, overlays: &mut Overlays, name: &str) {
+    if !overlays.residuals {
+        return;
+    }
+    let drag = DragValue::new(&mut overlays.exaggeration).range(EXAGGERATIONS).speed(1.0).max_decimals(0).prefix("× ");
+    let response = ui.add(drag).on_hover_text(name);
+    let value = overlays.exaggeration;
+    response.widget_info(|| WidgetInfo { value: Some(value), ..WidgetInfo::labeled(WidgetType::DragValue, true, name) });
+}
+
+/// Colour map and range of the depth picture.
+pub fn depth_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    egui::ScrollArea::horizontal().id_salt("depth colours").show(ui, |ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 7.0;
+        for (map, name, what) in [
+            (ColourMap::Turbo, tr!(language, "Turbo"), tr!(language, "A rainbow of even steps: shows the most detail")),
+            (ColourMap::Viridis, tr!(language, "Viridis"), tr!(language, "Even in brightness, and for every kind of eye")),
+            (ColourMap::Grey, tr!(language, "Grey"), tr!(language, "Near is dark, far is light")),
+        ] {
+            let chosen = model.view.depth_colours == map;
+            if ui.selectable_label(chosen, name).on_hover_text(what).clicked() && !chosen {
+                outbox.send(Command::SetDepthColours(map));
+            }
+        }
+        ui.separator();
+        for (scale, name, what) in [
+            (
+                DepthScale::Auto,
+                tr!(language, "Auto range"),
+                tr!(language, "Colours for the depths that are in the picture"),
+            ),
+            (
+                DepthScale::Full,
+                tr!(language, "Full range"),
+                tr!(language, "Colours for all depths that the sensor can measure"),
+            ),
+        ] {
+            let chosen = model.view.depth_scale == scale;
+            if ui.selectable_label(chosen, RichText::new(name)).on_hover_text(what).clicked() && !chosen {
+                outbox.send(Command::SetDepthScale(scale));
+            }
+        }
+    });
+}

@@ -1,0 +1,216 @@
+//! Models for tests of panes: a window at work, from a made-up chain whose truth is known.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use handeye_core::calibrate::{self, CameraKnowledge, Method, Observations, ObservedView};
+use handeye_core::camera::Intrinsics;
+use handeye_core::depth::{ColourMap, DepthImage};
+use handeye_core::findings::{self, FindingOptions};
+use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::handeye::{HandEye, Mode};
+use handeye_core::image::{Rgb, RgbImage};
+use handeye_core::observation::{Corner, View};
+use handeye_core::progress::CancelToken;
+use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
+use handeye_core::verify::{self, Calibrated, CheckCapture};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
+
+use crate::model::{
+    CellFacts, CellSource, FrameImages, FrameInfo, JobId, LinkState, LiveDetection, LiveFrame, Model, Observed,
+    RobotState, SessionState, Simulation, Solved, Truth, ViewSettings,
+};
+use crate::session_start::{self, BOARD};
+use crate::{observe, truth};
+
+/// Captures of the fit.
+pub const FITTED: u32 = 10;
+/// Captures that verify it.
+pub const VERIFYING: u32 = 2;
+
+/// Where the camera of the sample really is.
+pub fn tip_from_camera() -> Pose<Tip, Camera> {
+    let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
+    Pose::from_isometry(Isometry3::from_parts(Translation3::new(0.05, 0.0, 0.0), turn))
+}
+
+fn base_from_target() -> Pose<Base, Target> {
+    let turn = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.0);
+    Pose::from_isometry(Isometry3::from_parts(Translation3::new(0.4, 0.1, 0.02), turn))
+}
+
+/// The camera of the sample.
+pub fn intrinsics() -> Intrinsics {
+    Intrinsics::pinhole(640, 480, 589.37)
+}
+
+/// View number `n`: the board tilted and turned in another way each time.
+fn camera_from_target(n: u32) -> Pose<Camera, Target> {
+    let n = f64::from(n);
+    let turn = UnitQuaternion::from_euler_angles(0.45 * (1.7 * n).sin(), 0.45 * (2.3 * n).cos(), 0.5 * (0.9 * n).sin());
+    let centre = Translation3::new(0.02 * (1.1 * n).sin(), 0.02 * (0.7 * n).cos(), 0.32 + 0.04 * (1.9 * n).sin());
+    let half = BOARD.centre();
+    Pose::from_isometry(centre * Isometry3::from_parts(Translation3::identity(), turn) * Translation3::new(-half.x, -half.y, 0.0))
+}
+
+fn base_from_tip(n: u32) -> Pose<Base, Tip> {
+    base_from_target() * camera_from_target(n).inverse() * tip_from_camera().inverse()
+}
+
+/// Corners with a noise of about 0.05 px that is the same in every run.
+fn corners(n: u32) -> Vec<Corner> {
+    let chain = camera_from_target(n);
+    let wiggle = |i: usize, phase: f64| 0.07 * (f64::from(n) * 12.9 + i as f64 * 78.2 + phase).sin();
+    BOARD
+        .points()
+        .iter()
+        .enumerate()
+        .map(|(index, point)| {
+            let px = intrinsics().project(&(chain.isometry() * point)).expect("the board is in front of the camera");
+            Corner { index, px: px + Vector2::new(wiggle(index, 0.0), wiggle(index, 1.0)) }
+        })
+        .collect()
+}
+
+fn record(n: u32) -> CaptureRecord {
+    CaptureRecord {
+        id: CaptureId(n),
+        image: format!("images/{n:04}.png"),
+        depth: Some(format!("depth/{n:04}.tiff")),
+        base_from_tip: base_from_tip(n),
+        joints_rad: Some(vec![0.1 * f64::from(n), 0.5, -1.0, 0.0, 1.5, 0.0]),
+        sim_time_s: Some(f64::from(n)),
+        role: if n <= FITTED { Role::Calibration } else { Role::Verification },
+        excluded: false,
+        frames: 1,
+        corner_noise_px: None,
+        settled_s: Some(0.3),
+        pose_name: Some(format!("pose {n}")),
+    }
+}
+
+/// Pictures with the column in the red and the row in the green.
+pub fn pictures() -> FrameImages {
+    let (width, height) = (640, 480);
+    let rgb = RgbImage::from_fn(width, height, |column, row| Rgb([(column / 4) as u8, (row / 4) as u8, 120]));
+    let metres = (0..width * height).map(|i| 0.3 + 0.2 * (i % width) as f32 / width as f32).collect();
+    let depth = DepthImage { width, height, metres };
+    let depth_coloured = depth.colours(ColourMap::Turbo, 0.3, 0.5, 3.5).expect("a picture");
+    FrameImages { rgb, depth, depth_coloured }
+}
+
+/// Connected, with a live picture in which the board is seen, and nothing captured.
+pub fn connected() -> Model {
+    let mut model = Model::new(CellSource::BuiltIn, ViewSettings::default());
+    model.now_s = 100.0;
+    let connected = LinkState::Connected { address: "tcp://127.0.0.1:1".to_owned(), server: "built-in cell".to_owned() };
+    model.control = connected.clone();
+    model.camera = connected.clone();
+    model.mover = connected;
+    model.robot = Some(RobotState {
+        base_from_tip: base_from_tip(1),
+        joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0],
+        sim_time_s: 12.35,
+        simulation: Simulation::Running,
+    });
+    model.cell = Some(CellFacts {
+        joint_ranges_rad: [Some([-6.28, 6.28]); 6],
+        nominal_intrinsics: intrinsics(),
+        kinematics_known: true,
+        truth: Some(Truth {
+            tip_from_camera: tip_from_camera(),
+            base_from_target: Some(base_from_target()),
+            intrinsics: intrinsics(),
+        }),
+    });
+    let info = FrameInfo {
+        number: 1,
+        sim_time_s: 12.3,
+        received_s: 99.98,
+        rate_hz: 20.0,
+        depth_range_m: [0.3, 0.5],
+        far_plane_m: 3.5,
+        base_from_tip: base_from_tip(1),
+        joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0],
+    };
+    model.frame = Some(LiveFrame { info, images: Arc::new(pictures()) });
+    model.detection = Some(LiveDetection {
+        frame: 1,
+        corners: Some(corners(1)),
+        camera_from_target: Some(camera_from_target(1)),
+        base_from_tip: base_from_tip(1),
+        took_s: 0.006,
+        problem: None,
+        dropped: 0,
+    });
+    model
+}
+
+/// Ten captures of the fit and two that verify it, on the disk and looked at, not solved.
+pub fn captured() -> Model {
+    let mut model = connected();
+    let mut document = Document::new(session_start::meta(None, String::new()));
+    document.captures = (1..=FITTED + VERIFYING).map(record).collect();
+    for n in 1..=FITTED + VERIFYING {
+        let thumbnail = RgbImage::from_fn(160, 120, |column, row| Rgb([column as u8, row as u8, (20 * n) as u8]));
+        let observed =
+            Observed { corners: Some(corners(n)), image_size: (640, 480), thumbnail: Arc::new(thumbnail) };
+        model.observed.insert(CaptureId(n), Some(Arc::new(observed)));
+    }
+    let folder = Some(PathBuf::from("sessions/sample"));
+    model.session = SessionState { folder, document: Arc::new(document), undo: None, redo: None };
+    model
+}
+
+/// The same, solved and verified.
+pub fn solved() -> Model {
+    let mut model = captured();
+    let views = (1..=FITTED).map(|n| ObservedView {
+        name: record(n).image,
+        base_from_tip: Some(base_from_tip(n)),
+        corners: Some(corners(n)),
+        camera_from_target: None,
+        in_fit: true,
+    });
+    let observations = Observations {
+        mode: Some(Mode::EyeInHand),
+        target: BOARD,
+        image_size: (640, 480),
+        camera: CameraKnowledge::Estimate { model: observe::DEFAULT_MODEL, start: None },
+        views: views.collect(),
+    };
+    let cancel = CancelToken::default();
+    let calibration = calibrate::calibrate(&observations, Method::Joint, &cancel).expect("a calibration");
+    assert!(matches!(calibration.hand_eye, Some(HandEye::EyeInHand { .. })));
+    let mut result = calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
+    result.truth = truth::comparison(&result, &tip_from_camera(), &intrinsics());
+    let calibrated = Calibrated::new(&calibration).expect("a hand-eye");
+    let checks: Vec<View> = (FITTED + 1..=FITTED + VERIFYING)
+        .map(|n| View { name: record(n).image, base_from_tip: base_from_tip(n), corners: corners(n) })
+        .collect();
+    let captures: Vec<CheckCapture<'_>> =
+        checks.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
+    let verification = verify::verify(&calibrated, &BOARD, &captures, &cancel);
+    model.solve.solved = Some(Arc::new(Solved {
+        job: JobId(1),
+        captures: (1..=FITTED).map(CaptureId).collect(),
+        findings: findings::findings(&observations, Some(&calibration), &FindingOptions { goal_mm: Some(0.5) }),
+        result,
+        calibrated: Some(calibrated),
+        verification: Some(verification),
+        verified_captures: (FITTED + 1..=FITTED + VERIFYING).map(CaptureId).collect(),
+        calibration,
+        took_s: 0.2,
+    }));
+    model.solve.fresh = true;
+    model
+}
+
+#[test]
+fn the_sample_is_a_good_calibration() {
+    let model = solved();
+    let solved = model.solve.current().expect("solved");
+    let truth = solved.result.truth.as_ref().expect("compared");
+    assert!(truth.translation_error_mm.is_some_and(|mm| mm < 0.5), "{truth:?}");
+    assert!(matches!(solved.verification, Some(Ok(_))));
+}

@@ -1,0 +1,61 @@
+//! The export dialog.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use handeye_core::export::ExportNames;
+use serde::{Deserialize, Serialize};
+
+/// What is exported, and how that went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExportState {
+    /// Names of the chosen formats.
+    pub chosen: BTreeSet<String>,
+    /// Names of frames and files.
+    pub names: ExportNames,
+    /// Where to; `None` is `exports` in the session.
+    pub folder: Option<PathBuf>,
+    /// The format whose text is shown.
+    pub shown: String,
+    /// The text of every format for the present result and names.
+    pub previews: BTreeMap<String, Preview>,
+    /// How the last writing went.
+    pub written: Option<Written>,
+    /// Whether files are being written.
+    pub writing: bool,
+}
+
+impl Default for ExportState {
+    fn default() -> Self {
+        Self {
+            chosen: ["json", "ros_camera_info", "opencv_yaml", "easy_handeye2"].map(str::to_owned).into(),
+            names: ExportNames::default(),
+            folder: None,
+            shown: "json".to_owned(),
+            previews: BTreeMap::new(),
+            written: None,
+            writing: false,
+        }
+    }
+}
+
+/// The files of a format, or why it cannot hold this result.
+pub type Preview = Result<Vec<PreviewFile>, String>;
+
+/// A file as it would be written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PreviewFile {
+    /// Its name.
+    pub name: String,
+    /// Its text.
+    pub text: String,
+}
+
+/// What was written, each file read back and compared; or what went wrong.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Written {
+    /// Where.
+    pub folder: PathBuf,
+    /// The files, or why there are none.
+    pub files: Result<Vec<PathBuf>, String>,
+}

@@ -1,0 +1,89 @@
+//! The calibration of the present set of captures.
+
+use std::sync::Arc;
+
+use handeye_core::calibrate::Calibration;
+use handeye_core::findings::Finding;
+use handeye_core::progress::Stage;
+use handeye_core::result::CalibrationResult;
+use handeye_core::session::CaptureId;
+use handeye_core::verify::{Calibrated, Verification, VerifyError};
+use serde::{Deserialize, Serialize};
+
+use crate::text::Text;
+
+/// Counts solves, so that what is reported can be told from what came before.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct JobId(pub u64);
+
+/// A finished solve.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// Which job.
+    pub job: JobId,
+    /// The captures, in the order of the views of `calibration` and of `result`.
+    pub captures: Vec<CaptureId>,
+    /// The calibration.
+    pub calibration: Calibration,
+    /// The document that is exported and compared.
+    pub result: CalibrationResult,
+    /// What is weak and what to do next.
+    pub findings: Vec<Finding>,
+    /// The calibration as what predicts and measures; `None` without a hand-eye.
+    pub calibrated: Option<Calibrated>,
+    /// How well it does on captures that never entered the fit; `None` while there are none.
+    pub verification: Option<Result<Verification, VerifyError>>,
+    /// The captures of `verification` in its order.
+    pub verified_captures: Vec<CaptureId>,
+    /// How long it took [s].
+    pub took_s: f64,
+}
+
+/// What the solver does.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub enum SolveStatus {
+    /// Nothing to do.
+    #[default]
+    Idle,
+    /// It is at work.
+    Running {
+        /// On which job.
+        job: JobId,
+        /// What it does.
+        stage: Stage,
+        /// How much of that is done, 0 to 1.
+        part: f64,
+        /// Since when.
+        since_s: f64,
+    },
+    /// There is no answer for the present set, and this is why.
+    Failed {
+        /// What is missing and what to do.
+        why: Text,
+    },
+    /// The user stopped it.
+    Cancelled,
+}
+
+/// The solver and its newest answer.
+#[derive(Debug, Clone, Default)]
+pub struct SolveState {
+    /// What it does.
+    pub status: SolveStatus,
+    /// The newest answer.
+    pub solved: Option<Arc<Solved>>,
+    /// Whether that answer is that of the present set of captures.
+    pub fresh: bool,
+}
+
+impl SolveState {
+    /// The answer of the present set.
+    pub fn current(&self) -> Option<&Arc<Solved>> {
+        self.solved.as_ref().filter(|_| self.fresh)
+    }
+
+    /// Whether it is at work.
+    pub fn is_running(&self) -> bool {
+        matches!(self.status, SolveStatus::Running { .. })
+    }
+}

@@ -1,0 +1,30 @@
+//! What a new session begins with.
+
+use handeye_core::handeye::{HandEye, Mode};
+use handeye_core::session::{GroundTruth, SessionMeta};
+use handeye_core::target::{Grid, TargetSpec};
+
+use crate::model::Truth;
+
+/// The board of the reference scene.
+pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
+
+/// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.
+pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
+    let ground_truth = truth.and_then(|truth| {
+        let links = HandEye::EyeInHand {
+            tip_from_camera: truth.tip_from_camera,
+            base_from_target: truth.base_from_target?,
+        };
+        Some(GroundTruth::new(&links, Some(truth.intrinsics)))
+    });
+    SessionMeta {
+        created,
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        mode: Mode::EyeInHand,
+        target: BOARD,
+        camera: None,
+        seeds: std::collections::BTreeMap::new(),
+        ground_truth,
+    }
+}

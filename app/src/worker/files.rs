@@ -1,0 +1,176 @@
+//! Reading and writing that has to do with one click: pictures of a capture, folders, exports, pose files.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use handeye_core::dataset;
+use handeye_core::depth::{ColourMap, DepthImage};
+use handeye_core::export::{self, ExportInput, ExportNames, ExportView, Format};
+use handeye_core::poses_file::{TaughtPose, TaughtPoses};
+use handeye_core::result::CalibrationResult;
+use handeye_core::session::{CaptureRecord, Session};
+
+use super::link::Outlet;
+use crate::command::Event;
+use crate::depth_view;
+use crate::model::{
+    FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written,
+};
+use crate::text;
+
+/// What can be asked for.
+pub enum FileTask {
+    /// The pictures of a capture.
+    Review {
+        /// The session.
+        folder: PathBuf,
+        /// The capture.
+        capture: Box<CaptureRecord>,
+        /// The colours of its depths.
+        colours: ColourMap,
+    },
+    /// The folders in a folder.
+    List(PathBuf),
+    /// The text of every format.
+    Preview(Box<ExportJob>),
+    /// Write the chosen formats.
+    Export {
+        /// What.
+        job: Box<ExportJob>,
+        /// Names of formats.
+        formats: Vec<String>,
+        /// Where.
+        folder: PathBuf,
+    },
+    /// Read taught poses.
+    ReadPoses(PathBuf),
+    /// Write taught poses.
+    WritePoses {
+        /// Where.
+        file: PathBuf,
+        /// What.
+        poses: Vec<TaughtPose>,
+    },
+}
+
+/// What exports are made of.
+#[derive(Debug, Clone)]
+pub struct ExportJob {
+    /// The result.
+    pub result: CalibrationResult,
+    /// Names of frames and files.
+    pub names: ExportNames,
+    /// Views with their robot poses.
+    pub views: Vec<ExportView>,
+}
+
+impl ExportJob {
+    fn input(&self) -> ExportInput<'_> {
+        ExportInput { result: &self.result, names: &self.names, views: &self.views }
+    }
+}
+
+/// Does one task after the other and reports each.
+pub fn perform(task: FileTask, outlet: &Outlet) {
+    match task {
+        FileTask::Review { folder, capture, colours } => review(&folder, &capture, colours, outlet),
+        FileTask::List(folder) => outlet.report(Event::Folder(list(folder))),
+        FileTask::Preview(job) => outlet.report(Event::Previews(preview(&job))),
+        FileTask::Export { job, formats, folder } => {
+            let files = write(&job, &formats, &folder);
+            outlet.report(Event::Exported(Written { folder, files }));
+        }
+        FileTask::ReadPoses(file) => match TaughtPoses::read(&file) {
+            Ok(taught) => outlet.report(Event::PosesRead { poses: taught.poses }),
+            Err(error) => outlet.notice(Severity::Error, text!("The poses were not read: {error}", error = error)),
+        },
+        FileTask::WritePoses { file, poses } => {
+            let taught = TaughtPoses { start_joints_rad: None, limits: None, poses };
+            match taught.write(&file) {
+                Ok(()) => outlet.notice(Severity::Info, text!("Poses written to {file}", file = file.display())),
+                Err(error) => {
+                    outlet.notice(Severity::Error, text!("The poses were not written: {error}", error = error));
+                }
+            }
+        }
+    }
+}
+
+fn review(folder: &Path, capture: &CaptureRecord, colours: ColourMap, outlet: &Outlet) {
+    match pictures(folder, capture, colours) {
+        Ok(images) => outlet.report(Event::Review { id: capture.id, images: Some(Arc::new(images)) }),
+        Err(why) => {
+            let text = text!("Capture {id} cannot be read: {why}", id = capture.id, why = why);
+            outlet.notice(Severity::Error, text);
+        }
+    }
+}
+
+fn pictures(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<FrameImages, String> {
+    let session = Session::open(folder).map_err(|error| error.to_string())?;
+    let rgb = session.load_rgb(capture).map_err(|error| error.to_string())?;
+    let depth = session.load_depth_m(capture).map_err(|error| error.to_string())?;
+    let (width, height) = rgb.dimensions();
+    let depth = depth.unwrap_or_else(|| DepthImage {
+        width,
+        height,
+        metres: vec![f32::NAN; width as usize * height as usize],
+    });
+    // A recorded depth has its far plane in it: nothing lies behind.
+    let far_plane_m = depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
+    let [near_m, far_m] = depth_view::range_of(&depth, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
+    let depth_coloured =
+        depth.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
+    Ok(FrameImages { rgb, depth, depth_coloured })
+}
+
+/// Folders with what they are, sessions first.
+fn list(folder: PathBuf) -> FolderListing {
+    let read = || -> std::io::Result<Vec<FolderEntry>> {
+        let mut entries = Vec::new();
+        for entry in std::fs::read_dir(&folder)? {
+            let path = entry?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            if !path.is_dir() || name.starts_with('.') {
+                continue;
+            }
+            entries.push(FolderEntry { name, kind: kind_of(&path) });
+        }
+        entries.sort_by(|a, b| (a.kind, &a.name).cmp(&(b.kind, &b.name)));
+        Ok(entries)
+    };
+    let entries = read().map_err(|error| error.to_string());
+    FolderListing { folder, entries }
+}
+
+/// What a folder is to this program.
+pub fn kind_of(folder: &Path) -> FolderKind {
+    if Session::is_session(folder) {
+        FolderKind::Session
+    } else if folder.join(dataset::DESCRIPTION).is_file() {
+        FolderKind::Dataset
+    } else {
+        FolderKind::Plain
+    }
+}
+
+fn preview(job: &ExportJob) -> Vec<(String, Result<Vec<PreviewFile>, String>)> {
+    export::formats()
+        .iter()
+        .map(|format| {
+            let files = export::preview(*format, &job.input()).map_err(|error| error.to_string()).map(|files| {
+                files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect()
+            });
+            (format.name().to_owned(), files)
+        })
+        .collect()
+}
+
+fn write(job: &ExportJob, formats: &[String], folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let formats: Vec<&dyn Format> = formats
+        .iter()
+        .map(|name| export::by_name(name))
+        .collect::<Result<_, _>>()
+        .map_err(|error| error.to_string())?;
+    export::write_all(folder, &formats, &job.input()).map_err(|error| error.to_string())
+}

@@ -1,0 +1,107 @@
+//! A thread for long computations of which only the newest is of interest.
+
+use std::io;
+use std::sync::Arc;
+use std::thread::{Builder, JoinHandle};
+
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use handeye_sim_link::client::CancelToken;
+
+use super::slot::LatestSlot;
+
+/// Runs one job at a time. A job that is handed in takes the place of the one that waits and cancels the one that
+/// runs, so that the answer to the newest question comes as soon as it can.
+pub struct NewestWins<Job> {
+    jobs: Arc<LatestSlot<(Job, CancelToken)>>,
+    wake: Option<Sender<()>>,
+    running: CancelToken,
+}
+
+/// A thread that was started, and a channel that closes when it ends.
+pub struct Started {
+    /// To join it.
+    pub handle: JoinHandle<()>,
+    /// Closes when it is done.
+    pub done: Receiver<()>,
+}
+
+impl<Job: Send + 'static> NewestWins<Job> {
+    /// Starts the thread; `work` is called for one job after the other.
+    ///
+    /// # Errors
+    /// When the system has no more threads.
+    pub fn start(
+        name: &str,
+        mut work: impl FnMut(Job, &CancelToken) + Send + 'static,
+    ) -> io::Result<(Self, Started)> {
+        let jobs: Arc<LatestSlot<(Job, CancelToken)>> = Arc::default();
+        let (wake, woken) = bounded::<()>(1);
+        let (running, done) = bounded(0);
+        let waiting = Arc::clone(&jobs);
+        let handle = Builder::new().name(name.to_owned()).spawn(move || {
+            let _running: Sender<()> = running;
+            while woken.recv().is_ok() {
+                if let Some(((job, cancel), _replaced)) = waiting.take()
+                    && !cancel.is_cancelled()
+                {
+                    work(job, &cancel);
+                }
+            }
+        })?;
+        Ok((Self { jobs, wake: Some(wake), running: CancelToken::default() }, Started { handle, done }))
+    }
+
+    /// Hands in a job.
+    pub fn submit(&mut self, job: Job) {
+        self.cancel();
+        self.running = CancelToken::default();
+        self.jobs.put((job, self.running.clone()));
+        if let Some(Err(TrySendError::Disconnected(()))) = self.wake.as_ref().map(|wake| wake.try_send(())) {
+            tracing::error!("a worker has ended before the application");
+        }
+    }
+
+    /// Cancels what runs and what waits.
+    pub fn cancel(&self) {
+        self.running.cancel();
+    }
+
+    /// Cancels, and has the thread end.
+    pub fn end(&mut self) {
+        self.cancel();
+        self.wake = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    const SOON: Duration = Duration::from_secs(20);
+
+    #[test]
+    fn the_newest_job_cancels_the_running_one_and_replaces_the_waiting_ones() {
+        let (began, beginnings) = bounded(16);
+        let (ended, endings) = bounded(16);
+        let (mut worker, started) = NewestWins::start("test", move |job: u32, cancel: &CancelToken| {
+            began.send(job).expect("the test listens");
+            while job == 0 && !cancel.is_cancelled() {
+                std::thread::yield_now();
+            }
+            ended.send((job, cancel.is_cancelled())).expect("the test listens");
+        })
+        .expect("a thread");
+        worker.submit(0);
+        assert_eq!(beginnings.recv_timeout(SOON), Ok(0));
+        for job in 1..=3 {
+            worker.submit(job);
+        }
+        assert_eq!(endings.recv_timeout(SOON), Ok((0, true)), "the first job was cancelled");
+        assert_eq!(endings.recv_timeout(SOON).map(|(job, _)| job), Ok(3), "jobs 1 and 2 were never begun");
+        worker.end();
+        assert!(started.done.recv_timeout(SOON).is_err(), "the channel closes when the thread ends");
+        started.handle.join().expect("no panic");
+    }
+}

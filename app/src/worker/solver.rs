@@ -1,0 +1,104 @@
+//! The solver: calibrates the newest set of captures, and checks the answer on the captures that never entered it.
+
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use handeye_core::calibrate::{self, CalibrateError, Method, Observations};
+use handeye_core::findings::{self, FindingOptions};
+use handeye_core::handeye::HandEyeError;
+use handeye_core::observation::View;
+use handeye_core::progress::{CancelToken, Progress, Work};
+use handeye_core::session::CaptureId;
+use handeye_core::verify::{self, Calibrated, CheckCapture, VerifyError};
+
+use super::link::Outlet;
+use crate::command::{Event, SolveOutcome};
+use crate::model::{JobId, Solved, Truth};
+use crate::text;
+use crate::text::Text;
+use crate::truth;
+
+/// Progress is told when it has come so much further: a window that is drawn for every step would slow the solve down.
+const PROGRESS_STEP: f64 = 0.05;
+
+/// A set of captures to calibrate.
+pub struct SolveJob {
+    /// Its number.
+    pub id: JobId,
+    /// What was observed; captures that are left out are among the views.
+    pub observations: Observations,
+    /// The captures of the views.
+    pub captures: Vec<CaptureId>,
+    /// What was observed in captures that never enter the fit.
+    pub verification: Vec<(CaptureId, View)>,
+    /// Which answer is asked for.
+    pub method: Method,
+    /// The error [m] that is good enough.
+    pub goal_m: f64,
+    /// For comparison with the answer, when that is there.
+    pub truth: Option<Truth>,
+}
+
+/// Solves a job and reports how that went.
+pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
+    let id = job.id;
+    let began_s = outlet.now_s();
+    // A defect in a solver must not take the captures with it.
+    let solved = catch_unwind(AssertUnwindSafe(|| answer(job, cancel, outlet)));
+    let outcome = match solved {
+        Ok(Ok(solved)) => SolveOutcome::Solved(Arc::new(Solved { took_s: outlet.now_s() - began_s, ..solved })),
+        Ok(Err(CalibrateError::HandEye(HandEyeError::Cancelled))) => SolveOutcome::Cancelled,
+        Ok(Err(error)) => SolveOutcome::Failed(Text::verbatim(error.to_string())),
+        Err(_panic) => SolveOutcome::Failed(text!(
+            "The solver broke down on this set. The captures are safe. Please report it with the session folder"
+        )),
+    };
+    outlet.report(Event::SolveEnded { job: id, outcome });
+}
+
+fn answer(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) -> Result<Solved, CalibrateError> {
+    let told = Cell::new(None::<Progress>);
+    let progress = |now: Progress| {
+        let tell = told.get().is_none_or(|before| {
+            before.stage != now.stage || (now.fraction() - before.fraction()).abs() >= PROGRESS_STEP
+        });
+        if tell {
+            told.set(Some(now));
+            outlet.report(Event::SolveProgress { job: job.id, stage: now.stage, part: now.fraction() });
+        }
+    };
+    let work = Work { cancel, progress: &progress };
+    let calibration = calibrate::calibrate(&job.observations, job.method, work)?;
+    let options = BTreeMap::from([("method".to_owned(), serde_json::Value::from(job.method.name()))]);
+    let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
+    if let Some(truth) = &job.truth {
+        result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
+    }
+    let options = FindingOptions { goal_mm: Some(job.goal_m * 1e3) };
+    let findings = findings::findings(&job.observations, Some(&calibration), &options);
+    let calibrated = Calibrated::new(&calibration).ok();
+    let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
+        let captures: Vec<CheckCapture<'_>> = job
+            .verification
+            .iter()
+            .map(|(_, view)| CheckCapture { view, depth: None, far_m: f32::INFINITY })
+            .collect();
+        verify::verify(calibrated, &job.observations.target, &captures, work)
+    });
+    if let Some(Err(VerifyError::Cancelled)) = verification {
+        return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
+    }
+    Ok(Solved {
+        job: job.id,
+        captures: job.captures.clone(),
+        result,
+        findings,
+        calibrated,
+        verification,
+        verified_captures: job.verification.iter().map(|(id, _)| *id).collect(),
+        calibration,
+        took_s: 0.0,
+    })
+}

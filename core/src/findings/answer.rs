@@ -1,0 +1,208 @@
+//! Findings on a calibration: single views that stand out, the noise, the other methods, the goal.
+
+use nalgebra::{Point3, Vector3};
+
+use super::{Finding, FindingCode, FindingOptions, Severity};
+use crate::calibrate::{Calibration, ViewResult, ViewStatus};
+
+/// Views below which none can stand out from the others.
+const MIN_FOR_OUTLIERS: usize = 5;
+/// How many robust standard deviations (1.4826 times the median absolute deviation) a view may lie above the median. Five
+/// are reached by chance in one of 3 million views of Gaussian noise; real noise has longer tails.
+const ROBUST_SIGMAS: f64 = 5.0;
+/// And at least so many times the median, because the deviation of a handful of views is itself uncertain.
+const TIMES_MEDIAN: f64 = 3.0;
+/// An influence above this part of the expected error counts: leaving the view out would change what is stated.
+const INFLUENCE: f64 = 0.5;
+/// Prediction error over what the noise levels explain; they are themselves known to a fifth or so.
+const PREDICTION: f64 = 1.5;
+/// Robot noise over corner noise, both in pixels, from which better pictures hardly help: a tenth part in the square.
+const ROBOT_OVER_CORNERS: f64 = 3.0;
+/// Distance from the middle of the closed forms, metres, from which one of them is worth a word.
+const DISAGREE_M: f64 = 5e-3;
+/// More of the same views than this many times those gathered are no advice.
+const MOST_TIMES: usize = 4;
+
+pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Finding> {
+    let used: Vec<&ViewResult> = calibration.views.iter().filter(|v| v.status == ViewStatus::Used).collect();
+    let mut found = Vec::new();
+    found.extend(influence(calibration, &used));
+    found.extend(residuals(&used));
+    found.extend(corrections(&used));
+    found.extend(prediction(calibration));
+    found.extend(robot_noise(calibration));
+    found.extend(closed_forms(calibration));
+    found.extend(options.goal_mm.and_then(|goal_mm| goal(calibration, goal_mm)));
+    found
+}
+
+/// Median of values that are not all the same length as the views; `None` when there are none.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.retain(|v| v.is_finite());
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    (n > 0).then(|| 0.5 * (values[n / 2] + values[(n - 1) / 2]))
+}
+
+/// The view that stands out most by a value, the value and the median of all; `None` when none does.
+fn stands_out<'a>(
+    views: &[&'a ViewResult],
+    value: impl Fn(&ViewResult) -> Option<f64>,
+) -> Option<(&'a ViewResult, f64, f64)> {
+    let valued: Vec<(&ViewResult, f64)> = views.iter().filter_map(|v| Some((*v, value(v)?))).collect();
+    if valued.len() < MIN_FOR_OUTLIERS {
+        return None;
+    }
+    let middle = median(valued.iter().map(|(_, x)| *x).collect())?;
+    let deviation = 1.4826 * median(valued.iter().map(|(_, x)| (x - middle).abs()).collect())?;
+    let (view, largest) = valued.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let limit = (middle + ROBUST_SIGMAS * deviation).max(TIMES_MEDIAN * middle);
+    (largest > limit).then_some((view, largest, middle))
+}
+
+fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding> {
+    let error_m = calibration.tip_error_95_m?;
+    let (view, largest_m, median_m) = stands_out(used, |v| v.influence_m)?;
+    if largest_m < INFLUENCE * error_m {
+        return None;
+    }
+    let text = format!(
+        "View {} alone moves the answer by {:.2} mm; the median view moves it by {:.2} mm. Check its picture and its robot \
+         pose, or add views like it so that it does not stand alone.",
+        view.name,
+        largest_m * 1e3,
+        median_m * 1e3
+    );
+    let finding = Finding::new(FindingCode::InfluentialView, Severity::Warning, text).of_view(&view.name);
+    let finding = finding.with("influence", largest_m * 1e3, "mm").with("median_influence", median_m * 1e3, "mm");
+    Some(finding.with("expected_error_95", error_m * 1e3, "mm"))
+}
+
+fn residuals(used: &[&ViewResult]) -> Option<Finding> {
+    let (view, largest, middle) = stands_out(used, |v| v.rms_px)?;
+    let text = format!(
+        "The corners of view {} fit with {largest:.2} px, those of the median view with {middle:.2} px. Look at its picture \
+         for blur, reflections and wrong corners; leave it out if there are any.",
+        view.name
+    );
+    let finding = Finding::new(FindingCode::LargeResidual, Severity::Warning, text).of_view(&view.name);
+    Some(finding.with("rms", largest, "px").with("median_rms", middle, "px"))
+}
+
+fn corrections(used: &[&ViewResult]) -> Option<Finding> {
+    let by_distance = stands_out(used, |v| v.correction_m);
+    let by_angle = stands_out(used, |v| v.correction_rad);
+    // One view is named: that which is out by more of its median.
+    let (view, ..) =
+        [by_distance, by_angle].into_iter().flatten().max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
+    let middle = |value: fn(&ViewResult) -> Option<f64>| median(used.iter().filter_map(|v| value(v)).collect());
+    let (mm, deg) = (view.correction_m? * 1e3, view.correction_rad?.to_degrees());
+    let (median_mm, median_deg) = (middle(|v| v.correction_m)? * 1e3, middle(|v| v.correction_rad)?.to_degrees());
+    let text = format!(
+        "The robot pose of view {} had to be corrected by {mm:.2} mm and {deg:.3}°, the median by {median_mm:.2} mm and \
+         {median_deg:.3}°. The arm may have moved when the picture was taken, or the board has; leave the view out or \
+         capture it again.",
+        view.name
+    );
+    let finding = Finding::new(FindingCode::LargeCorrection, Severity::Warning, text).of_view(&view.name);
+    let finding = finding.with("correction", mm, "mm").with("correction_angle", deg, "°");
+    Some(finding.with("median_correction", median_mm, "mm").with("median_correction_angle", median_deg, "°"))
+}
+
+fn prediction(calibration: &Calibration) -> Option<Finding> {
+    let (heldout, expected) = (calibration.heldout_rms_px?, calibration.expected_heldout_rms_px?);
+    if heldout <= PREDICTION * expected {
+        return None;
+    }
+    let text = format!(
+        "Views left out of the fit are predicted to {heldout:.2} px, where robot and corner noise explain {expected:.2} px. \
+         The model misses something: a wrong view, a board that is bent or not of the stated size, too few views for so \
+         many unknowns, or robot errors that depend on the pose. Capture more views and check those that stand out."
+    );
+    let finding = Finding::new(FindingCode::PoorPrediction, Severity::Warning, text);
+    Some(finding.with("heldout_rms", heldout, "px").with("explained_rms", expected, "px"))
+}
+
+fn robot_noise(calibration: &Calibration) -> Option<Finding> {
+    let (noise, robot_px) = (calibration.noise?, calibration.robot_effect_px?);
+    // Both as 2-D distances.
+    let corner_px = noise.corner_px * std::f64::consts::SQRT_2;
+    if robot_px < ROBOT_OVER_CORNERS * corner_px {
+        return None;
+    }
+    let (mm, deg) = (noise.robot_m * 1e3, noise.robot_rad.to_degrees());
+    let text = format!(
+        "The robot limits the answer: its noise of {mm:.3} mm and {deg:.3}° per axis moves corners by {robot_px:.2} px, \
+         their own noise is {corner_px:.2} px. Better pictures will not help much; more views, and settling longer before \
+         each, will."
+    );
+    let finding = Finding::new(FindingCode::RobotNoise, Severity::Info, text);
+    let finding = finding.with("robot_effect", robot_px, "px").with("corner_noise", corner_px, "px");
+    Some(finding.with("robot_sigma", mm, "mm").with("robot_sigma_angle", deg, "°"))
+}
+
+/// Compared where the board was seen; without a joint estimate at the camera itself.
+fn closed_forms(calibration: &Calibration) -> Option<Finding> {
+    let point = calibration.reference_point.unwrap_or_else(Point3::origin);
+    let places: Vec<(&'static str, Vector3<f64>)> = calibration
+        .methods
+        .iter()
+        .filter_map(|m| Some((m.name, (m.outcome.as_ref().ok()?.mount_from_camera.isometry() * point).coords)))
+        .collect();
+    if places.len() < 3 {
+        return None;
+    }
+    let component = |i: usize| median(places.iter().map(|(_, p)| p[i]).collect());
+    let middle = Vector3::new(component(0)?, component(1)?, component(2)?);
+    let distances: Vec<(&'static str, f64)> = places.iter().map(|(name, p)| (*name, (p - middle).norm())).collect();
+    let typical_m = median(distances.iter().map(|(_, d)| *d).collect())?;
+    let mut off: Vec<(&'static str, f64)> = distances.into_iter().filter(|(_, d)| *d > DISAGREE_M).collect();
+    if off.is_empty() {
+        return None;
+    }
+    off.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let list: Vec<String> = off.iter().map(|(name, d)| format!("{name} by {:.1} mm", d * 1e3)).collect();
+    let list = list.join(", ");
+    let (severity, what_to_do) = if typical_m > DISAGREE_M {
+        (
+            Severity::Warning,
+            "Most of them do, so the views determine the answer weakly: add views with more tilt and turn.",
+        )
+    } else {
+        (Severity::Info, "The others agree; these weigh noise badly and are for comparison only.")
+    };
+    let text = format!("Closed forms differ from the middle of all: {list}. {what_to_do}");
+    let finding = Finding::new(FindingCode::ClosedFormsDisagree, severity, text);
+    let finding = finding.with("median_distance", typical_m * 1e3, "mm");
+    Some(off.iter().fold(finding, |f, (name, d)| f.with(name, d * 1e3, "mm")))
+}
+
+fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
+    let error_mm = calibration.tip_error_95_m? * 1e3;
+    let finding = |code, severity, text: String| {
+        Finding::new(code, severity, text).with("expected_error_95", error_mm, "mm").with("goal", goal_mm, "mm")
+    };
+    if error_mm <= goal_mm {
+        let text = format!(
+            "Good enough: the expected error of {error_mm:.3} mm (95 %) is below the goal of {goal_mm:.3} mm. Verify with \
+             captures that were not in the fit."
+        );
+        return Some(finding(FindingCode::GoalReached, Severity::Info, text));
+    }
+    let curve = calibration.error_curve.as_ref()?;
+    let (views, _) = curve.now()?;
+    let needed = curve.views_for(goal_mm * 1e-3);
+    let start = format!("The expected error of {error_mm:.3} mm (95 %) is above the goal of {goal_mm:.3} mm.");
+    let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {
+        let text = format!(
+            "{start} More views like these would take too many: tilt and turn the camera more, come closer, or reduce the \
+             noise."
+        );
+        return Some(finding(FindingCode::GoalNotReached, Severity::Advice, text));
+    };
+    // The curve's error equals the stated one but for rounding, so one more is the least that can help.
+    let more = needed.saturating_sub(views).max(1);
+    let s = super::plural(more);
+    let text = format!("{start} About {more} more view{s} like those gathered will reach it.");
+    Some(finding(FindingCode::GoalNotReached, Severity::Advice, text).with("more_views", more as f64, ""))
+}

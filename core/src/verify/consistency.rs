@@ -1,0 +1,145 @@
+//! Whether errors of prediction are of the size that a calibration states.
+//!
+//! The pose error of a capture, `e_i = log(predicted⁻¹ * seen)`, is to first order
+//! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and the free
+//! intrinsics, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP. With
+//! `B_i = D_i Σ_robot D_iᵀ + corner_px² (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
+//! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
+//! `√(12 n)`. The inverse is by the matrix inversion lemma, so the cost is linear in the number of captures.
+//!
+//! The noise levels are taken as known. From a dozen views they are known to a fifth, and the ratio as badly.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Point3, SMatrix, Vector6};
+
+use super::{Calibrated, CaptureCheck, Uncertainty};
+use crate::camera::MAX_PARAMETERS;
+use crate::handeye::joint::chain::Chain;
+use crate::handeye::joint::equations::PoseEquations;
+use crate::observation::View;
+use crate::se3;
+
+/// Quantile of the normal distribution at 99 %.
+const Z_99: f64 = 2.326;
+
+/// Errors of prediction against the stated uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Consistency {
+    /// χ² per degree of freedom; its expectation is 1.
+    pub ratio: f64,
+    /// Six for every capture.
+    pub degrees_of_freedom: usize,
+    /// What the ratio stays under in 99 of 100 cases when the stated uncertainty is true.
+    pub limit: f64,
+}
+
+impl Consistency {
+    /// Whether the errors are no larger than stated. Errors that are smaller count as consistent.
+    pub fn is_consistent(&self) -> bool {
+        self.ratio <= self.limit
+    }
+}
+
+/// 99 % quantile of chi-square over its degrees of freedom (Wilson & Hilferty 1931; within 1 % from six on).
+fn limit(degrees_of_freedom: usize) -> f64 {
+    let spread = 2.0 / (9.0 * degrees_of_freedom as f64);
+    (1.0 - spread + Z_99 * spread.sqrt()).powi(3)
+}
+
+/// The sums over captures.
+pub struct Sums {
+    /// `L` with `C = L Lᵀ`: in `s = L u` the prior of `u` is the identity, whatever the units.
+    root: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    robot_variance: Vector6<f64>,
+    corner_variance: f64,
+    captures: usize,
+    plain: f64,
+    gradient: DVector<f64>,
+    information: DMatrix<f64>,
+}
+
+impl Sums {
+    /// `None` when the covariance is not one.
+    pub fn new(uncertainty: &Uncertainty) -> Option<Self> {
+        let n = uncertainty.covariance.nrows();
+        if !(12..=12 + MAX_PARAMETERS).contains(&n) || uncertainty.covariance.ncols() != n {
+            return None;
+        }
+        let (m, rad) = (uncertainty.noise.robot_m.powi(2), uncertainty.noise.robot_rad.powi(2));
+        Some(Self {
+            root: Cholesky::new(uncertainty.covariance.clone())?.l(),
+            covariance: uncertainty.covariance.clone(),
+            robot_variance: Vector6::new(m, m, m, rad, rad, rad),
+            corner_variance: uncertainty.noise.corner_px.powi(2),
+            captures: 0,
+            plain: 0.0,
+            gradient: DVector::zeros(n),
+            information: DMatrix::identity(n, n),
+        })
+    }
+
+    /// Adds a capture and returns its own ratio; `None`, and nothing added, when its corners determine no pose.
+    pub fn add(
+        &mut self,
+        calibrated: &Calibrated,
+        points: &[Point3<f64>],
+        view: &View,
+        check: &CaptureCheck,
+    ) -> Option<f64> {
+        let chain = Chain::new(
+            calibrated.hand_eye.mode(),
+            &view.base_from_tip,
+            &Vector6::zeros(),
+            &calibrated.hand_eye.mount_from_camera(),
+            &calibrated.hand_eye.anchor_from_target(),
+        );
+        let n = self.covariance.nrows();
+        let seen = check.seen_camera_from_target.isometry();
+        let equations = PoseEquations::new(&calibrated.intrinsics, seen, points, &view.corners, n > 12).ok()?;
+        let pose_covariance = Cholesky::new(equations.pose)?.inverse();
+        let lens = pose_covariance * equations.pose_by_lens;
+        let mut by_shared = SMatrix::<f64, 6, { 12 + MAX_PARAMETERS }>::zeros();
+        by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
+        by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
+        by_shared.fixed_view_mut::<6, MAX_PARAMETERS>(0, 12).copy_from(&lens);
+        let by_shared = by_shared.columns(0, n).into_owned();
+        let own = chain.by_correction * Matrix6::from_diagonal(&self.robot_variance) * chain.by_correction.transpose()
+            + pose_covariance * self.corner_variance;
+        let error = se3::log((check.predicted_camera_from_target.inverse() * check.seen_camera_from_target).isometry());
+
+        let both = own + &by_shared * &self.covariance * by_shared.transpose();
+        let ratio = error.dot(&Cholesky::new(both)?.solve(&error)) / 6.0;
+        let own = Cholesky::new(own)?;
+        let by_root = by_shared * &self.root;
+        let weighted_error = own.solve(&error);
+        self.plain += error.dot(&weighted_error);
+        self.gradient += by_root.transpose() * weighted_error;
+        self.information += by_root.transpose() * own.solve(&by_root);
+        self.captures += 1;
+        ratio.is_finite().then_some(ratio)
+    }
+
+    /// The verdict; `None` without captures.
+    pub fn finish(self) -> Option<Consistency> {
+        let degrees_of_freedom = 6 * self.captures;
+        let shared = Cholesky::new(self.information)?.solve(&self.gradient).dot(&self.gradient);
+        let ratio = (self.plain - shared) / degrees_of_freedom as f64;
+        (self.captures > 0 && ratio.is_finite()).then(|| Consistency {
+            ratio,
+            degrees_of_freedom,
+            limit: limit(degrees_of_freedom),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::limit;
+
+    #[test]
+    fn the_limit_is_the_published_quantile() {
+        // 99 % quantiles of chi-square: 16.812 at 6, 88.379 at 60 degrees of freedom.
+        assert!((limit(6) * 6.0 - 16.812).abs() < 0.1, "{}", limit(6) * 6.0);
+        assert!((limit(60) * 60.0 - 88.379).abs() < 0.1, "{}", limit(60) * 60.0);
+    }
+}

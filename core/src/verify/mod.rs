@@ -1,0 +1,335 @@
+//! A calibration against captures that were never in its fit.
+//!
+//! The bare chain — reported robot pose and calibration, nothing fitted — predicts where the board is; the corners say
+//! where it was seen. What lies between is the error that a user of the calibration gets: of the calibration, of the
+//! robot and of the picture together. It is an error of prediction, measured on the board; it is not the residual of any
+//! fit.
+
+mod consistency;
+mod points;
+
+use nalgebra::{DMatrix, Isometry3, Matrix6, Point3, Vector3};
+
+use crate::calibrate::{Calibration, CornerResidual};
+use crate::camera::{CameraError, Intrinsics};
+use crate::depth::{DepthImage, DepthSample};
+use crate::frames::{Anchor, Base, Camera, Pose, Target, Tip};
+use crate::handeye::HandEye;
+use crate::handeye::joint::{Noise, camera_from_target};
+use crate::observation::View;
+use crate::progress::{Stage, Work};
+use crate::se3;
+use crate::target::TargetSpec;
+use crate::vision::{VisionError, pnp};
+
+pub use consistency::Consistency;
+pub use points::MeasuredPoint;
+
+/// What of a calibration is needed to predict.
+#[derive(Debug, Clone)]
+pub struct Calibrated {
+    /// Both rigid links.
+    pub hand_eye: HandEye,
+    /// The camera.
+    pub intrinsics: Intrinsics,
+    /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
+    pub hand_eye_covariance: Option<Matrix6<f64>>,
+    /// What says how large errors may be; of a joint estimate.
+    pub uncertainty: Option<Uncertainty>,
+}
+
+/// How uncertain a prediction is.
+#[derive(Debug, Clone)]
+pub struct Uncertainty {
+    /// Noise levels of robot and corners.
+    pub noise: Noise,
+    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…]`.
+    pub covariance: DMatrix<f64>,
+}
+
+/// Why there is nothing to verify with.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum VerifyError {
+    /// The calibration is of a camera alone.
+    #[error("the calibration has no hand-eye transform: calibrate with robot poses first")]
+    NoHandEye,
+    /// The calibration is from pose pairs.
+    #[error("the calibration has no intrinsics: verification compares pixels, so the camera must be known")]
+    NoIntrinsics,
+    /// No capture was given.
+    #[error("there is no capture to verify with: capture the board at poses that were not in the fit")]
+    NoCaptures,
+    /// The target's pose could not be found in a capture.
+    #[error("capture {name:?}: {source}")]
+    Vision {
+        /// Which capture.
+        name: String,
+        /// What failed.
+        source: VisionError,
+    },
+    /// A capture whose robot pose is not finite.
+    #[error("the robot pose of capture {name:?} is not finite: capture it again")]
+    NotFinite {
+        /// Which capture.
+        name: String,
+    },
+    /// The chain predicts the board where the camera cannot see it, although it did.
+    #[error(
+        "the calibration predicts the board of capture {name:?} behind the camera: the calibration is of another set-up, \
+         or the board was moved"
+    )]
+    PredictedBehind {
+        /// Which capture.
+        name: String,
+    },
+    /// A pixel without ray.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// A depth that is none.
+    #[error("{depth_m} m is no depth: choose a pixel with a measurement")]
+    BadDepth {
+        /// The depth given, metres.
+        depth_m: f64,
+    },
+    /// The ray of a pixel does not meet the plane of the board in front of the camera.
+    #[error(
+        "the ray of pixel ({u_px:.1}, {v_px:.1}) does not meet the plane of the board: choose a pixel on the board"
+    )]
+    MissesBoard {
+        /// Column in pixels.
+        u_px: f64,
+        /// Row in pixels.
+        v_px: f64,
+    },
+    /// The caller asked the work to end.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// A capture to verify with.
+#[derive(Debug, Clone, Copy)]
+pub struct CheckCapture<'a> {
+    /// Reported robot pose and corners; it must not have been in the fit.
+    pub view: &'a View,
+    /// The depth image taken with it, of the same camera.
+    pub depth: Option<&'a DepthImage>,
+    /// Far plane of the depth sensor in metres, infinity when it has none.
+    pub far_m: f32,
+}
+
+/// What one capture says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CaptureCheck {
+    /// Its name.
+    pub name: String,
+    /// RMS of the 2-D distances between measured corners and those that the bare chain predicts, pixels.
+    pub rms_px: f64,
+    /// The same with the board's pose fitted to this one picture: what of it is corners and lens, pixels.
+    pub pnp_rms_px: f64,
+    /// Every corner against its prediction.
+    pub residuals: Vec<CornerResidual>,
+    /// The board as predicted.
+    pub predicted_camera_from_target: Pose<Camera, Target>,
+    /// The board as seen, by PnP.
+    pub seen_camera_from_target: Pose<Camera, Target>,
+    /// Middle of the board as seen minus as predicted, in camera axes, metres.
+    pub centre_error_m: Vector3<f64>,
+    /// Angle between the board as seen and as predicted, radians.
+    pub orientation_error_rad: f64,
+    /// Origin of the board as seen minus as predicted, in base axes, metres.
+    pub origin_error_in_base_m: Vector3<f64>,
+    /// Median over the corners of measured depth minus the depth at which the predicted board is, metres; `None` without
+    /// depth image or without a measurement at any corner.
+    pub depth_error_m: Option<f64>,
+    /// Squared error of the board's pose over what the stated uncertainty expects, per degree of freedom: 1 on average,
+    /// above 2.8 in one of a hundred captures. `None` when no uncertainty is stated.
+    pub ratio: Option<f64>,
+}
+
+/// What all captures say together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verification {
+    /// One entry per capture, in the order given.
+    pub captures: Vec<CaptureCheck>,
+    /// RMS over all corners of all captures, pixels.
+    pub rms_px: f64,
+    /// RMS of the distance between the board's middle as seen and as predicted, metres.
+    pub centre_rms_m: f64,
+    /// RMS of the angle between the board as seen and as predicted, radians.
+    pub orientation_rms_rad: f64,
+    /// Scatter of the board's origin over the captures, each located by robot, calibration and its own picture: RMS
+    /// distance from the mean, metres. In the frame in which the board stands still: the base, or the tip when the
+    /// camera does. A board that was moved after the calibration leaves it small while every prediction is wrong by the
+    /// same amount. `None` for one capture.
+    pub origin_scatter_m: Option<f64>,
+    /// Whether the errors are of the size that the calibration states.
+    pub consistency: Option<Consistency>,
+}
+
+impl Calibrated {
+    /// Takes what it needs from a calibration.
+    ///
+    /// # Errors
+    /// [`VerifyError::NoHandEye`], [`VerifyError::NoIntrinsics`].
+    pub fn new(calibration: &Calibration) -> Result<Self, VerifyError> {
+        let hand_eye = calibration.hand_eye.ok_or(VerifyError::NoHandEye)?;
+        let intrinsics = calibration.intrinsics.ok_or(VerifyError::NoIntrinsics)?;
+        let uncertainty = calibration
+            .noise
+            .zip(calibration.shared_covariance.clone())
+            .map(|(noise, covariance)| Uncertainty { noise, covariance });
+        Ok(Self { hand_eye, intrinsics, hand_eye_covariance: calibration.hand_eye_covariance, uncertainty })
+    }
+
+    /// Where the camera is when the robot reports this pose.
+    pub fn base_from_camera(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Base, Camera> {
+        match self.hand_eye {
+            HandEye::EyeInHand { tip_from_camera, .. } => *base_from_tip * tip_from_camera,
+            HandEye::EyeToHand { base_from_camera, .. } => base_from_camera,
+        }
+    }
+
+    /// Where the camera sees the board when the robot reports this pose: the bare chain.
+    pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
+        camera_from_target(
+            self.hand_eye.mode(),
+            base_from_tip,
+            &self.hand_eye.mount_from_camera(),
+            &self.hand_eye.anchor_from_target(),
+        )
+    }
+}
+
+/// Checks a calibration with captures that were never in its fit. `work` is a `&CancelToken`, or a [`Work`] to follow the
+/// progress.
+///
+/// # Needs
+/// One capture with the board; ten say something about the average. The board stands where it stood for the calibration.
+///
+/// # Errors
+/// [`VerifyError`]; the first in the order of the captures.
+pub fn verify<'a>(
+    calibrated: &Calibrated,
+    target: &TargetSpec,
+    captures: &[CheckCapture<'_>],
+    work: impl Into<Work<'a>>,
+) -> Result<Verification, VerifyError> {
+    let work = work.into();
+    if captures.is_empty() {
+        return Err(VerifyError::NoCaptures);
+    }
+    let points = target.points();
+    let mut consistency = calibrated.uncertainty.as_ref().and_then(consistency::Sums::new);
+    let mut checks = Vec::with_capacity(captures.len());
+    for (done, capture) in captures.iter().enumerate() {
+        if work.is_cancelled() {
+            return Err(VerifyError::Cancelled);
+        }
+        work.report(Stage::Verification, done, captures.len());
+        let mut check = check(calibrated, target, &points, capture)?;
+        check.ratio = consistency.as_mut().and_then(|sums| sums.add(calibrated, &points, capture.view, &check));
+        checks.push(check);
+    }
+    Ok(summary(calibrated, captures, checks, consistency.and_then(consistency::Sums::finish)))
+}
+
+fn check(
+    calibrated: &Calibrated,
+    target: &TargetSpec,
+    points: &[Point3<f64>],
+    capture: &CheckCapture<'_>,
+) -> Result<CaptureCheck, VerifyError> {
+    let view = capture.view;
+    let name = || view.name.clone();
+    if !view.base_from_tip.is_finite() {
+        return Err(VerifyError::NotFinite { name: name() });
+    }
+    // PnP checks the corners, so every index below is a point of the target.
+    let seen = pnp::solve(&view.corners, target, &calibrated.intrinsics)
+        .map_err(|source| VerifyError::Vision { name: name(), source })?
+        .best;
+    let predicted = calibrated.camera_from_target(&view.base_from_tip);
+    let mut residuals = Vec::with_capacity(view.corners.len());
+    for corner in &view.corners {
+        let px = calibrated
+            .intrinsics
+            .project(&(predicted.isometry() * points[corner.index]))
+            .map_err(|_behind| VerifyError::PredictedBehind { name: name() })?;
+        residuals.push(CornerResidual { index: corner.index, px: corner.px, residual_px: corner.px - px });
+    }
+    let centre = target.centre();
+    let seen_pose = seen.camera_from_target;
+    let origin_error = seen_pose.translation() - predicted.translation();
+    Ok(CaptureCheck {
+        name: name(),
+        rms_px: rms(residuals.iter().map(|r| r.residual_px.norm_squared())),
+        pnp_rms_px: seen.rms_px,
+        centre_error_m: seen_pose.isometry() * centre - predicted.isometry() * centre,
+        orientation_error_rad: se3::rotation_vector(&(predicted.inverse() * seen_pose).rotation()).norm(),
+        origin_error_in_base_m: calibrated.base_from_camera(&view.base_from_tip).rotation() * origin_error,
+        depth_error_m: depth_error_m(calibrated, capture, predicted.isometry()),
+        residuals,
+        predicted_camera_from_target: predicted,
+        seen_camera_from_target: seen_pose,
+        ratio: None,
+    })
+}
+
+/// Median over the corners, so that a corner at an edge of the surface does not decide.
+fn depth_error_m(calibrated: &Calibrated, capture: &CheckCapture<'_>, board: &Isometry3<f64>) -> Option<f64> {
+    let image = capture.depth?;
+    let mut errors: Vec<f64> = Vec::new();
+    for corner in &capture.view.corners {
+        let (column, row) = (corner.px.x.round(), corner.px.y.round());
+        if column < 0.0 || row < 0.0 {
+            continue;
+        }
+        let DepthSample::Metres(depth) = image.sample(column as u32, row as u32, capture.far_m) else { continue };
+        // The depth is that of the pixel's middle, not of the corner.
+        let pixel = nalgebra::Vector2::new(column, row);
+        if let Ok(on_board) = points::on_plane(&calibrated.intrinsics, &pixel, board) {
+            errors.push(f64::from(depth) - on_board.z);
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    errors.get(errors.len() / 2).copied()
+}
+
+fn rms(squares: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = squares.len().max(1) as f64;
+    (squares.sum::<f64>() / count).sqrt()
+}
+
+fn summary(
+    calibrated: &Calibrated,
+    captures: &[CheckCapture<'_>],
+    checks: Vec<CaptureCheck>,
+    consistency: Option<Consistency>,
+) -> Verification {
+    let mode = calibrated.hand_eye.mode();
+    let mount_from_camera = calibrated.hand_eye.mount_from_camera();
+    let origins: Vec<Vector3<f64>> = captures
+        .iter()
+        .zip(&checks)
+        .map(|(capture, check)| {
+            let anchor_from_target: Pose<Anchor, Target> =
+                mode.anchor_from_mount(&capture.view.base_from_tip) * mount_from_camera * check.seen_camera_from_target;
+            anchor_from_target.translation()
+        })
+        .collect();
+    let mean = origins.iter().sum::<Vector3<f64>>() / origins.len() as f64;
+    let corners: Vec<f64> =
+        checks.iter().flat_map(|c| c.residuals.iter().map(|r| r.residual_px.norm_squared())).collect();
+    Verification {
+        rms_px: rms(corners.into_iter()),
+        centre_rms_m: rms(checks.iter().map(|c| c.centre_error_m.norm_squared())),
+        orientation_rms_rad: rms(checks.iter().map(|c| c.orientation_error_rad.powi(2))),
+        origin_scatter_m: (origins.len() > 1).then(|| rms(origins.iter().map(|o| (o - mean).norm_squared()))),
+        consistency,
+        captures: checks,
+    }
+}
+
+#[cfg(test)]
+mod tests;
