@@ -3,7 +3,7 @@
 use egui::{Button, ComboBox, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::{Endpoint, LinkError};
 
-use super::{action_ui, form};
+use super::form;
 use crate::command::{Command, Outbox};
 use crate::gui::status;
 use crate::gui::theme::{Palette, Tone};
@@ -26,7 +26,6 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let id = Id::new("connect draft");
     let mut draft: Draft = ui.data(|data| data.get_temp(id)).unwrap_or_default();
     form::body_ui(ui, |ui| {
-        state_ui(ui, model, outbox);
         form::heading_ui(ui, tr!(language, "Cell"));
         let remote = draft.remote.unwrap_or(matches!(model.source, CellSource::Address(_)));
         let choices = [
@@ -47,16 +46,17 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             let colour = Palette::of(ui).bad;
             ui.add(Label::new(RichText::new(error.to_string()).color(colour)).wrap());
         }
+        ui.add_space(4.0);
+        state_ui(ui, model);
     });
     ui.data_mut(|data| data.insert_temp(id, draft));
 }
 
 /// How each connection is doing.
-fn state_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+fn state_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let status = status::connection(model);
     form::note_ui(ui, status.tone, &status.title.say(language), &status.detail.say(language));
-    action_ui(ui, status.action, language, outbox);
     ui.horizontal_wrapped(|ui| {
         for (link, name) in [
             (Link::Control, tr!(language, "Robot")),
