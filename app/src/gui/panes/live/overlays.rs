@@ -94,7 +94,7 @@ fn corners(painter: &Painter, corners: &[Corner], target: &TargetSpec, place: &P
     let radius = (place.points_per_px() * 1.6).clamp(2.5, 9.0);
     let under = Color32::from_black_alpha((130.0 * strength) as u8);
     let mut shapes = Vec::with_capacity(3 * corners.len());
-    for pair in corners.windows(2) {
+    for pair in corners.windows(2).filter(|pair| pair[0].index / columns == pair[1].index / columns) {
         let colour = marks::of_board_row(pair[0].index / columns, grid.rows).gamma_multiply(0.8 * strength);
         let line = [screen(place, &pair[0].px), screen(place, &pair[1].px)];
         shapes.push(Shape::line_segment(line, Stroke::new(1.2, colour)));

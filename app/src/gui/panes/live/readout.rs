@@ -21,6 +21,8 @@ pub fn readout_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>) {
         return;
     };
     ui.spacing_mut().item_spacing.y = 2.0;
+    // Lines of text, lower than a row of buttons.
+    ui.spacing_mut().interact_size.y = 17.0;
     ui.vertical(|ui| {
         ui.add_space(4.0);
         ui.horizontal(|ui| pixel_ui(ui, model, shown, point, rgb));

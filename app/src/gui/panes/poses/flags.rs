@@ -76,6 +76,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
     if let (Some(rms_px), Some(line_px)) = (row.rms_px, circumstances.outlier_line_px)
         && rms_px > line_px
         && !row.verifies()
+        && !row.excluded
     {
         let (rms, line) = (format!("{rms_px:.3}"), format!("{line_px:.3}"));
         let why = text!(
