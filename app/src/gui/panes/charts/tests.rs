@@ -70,7 +70,8 @@ fn a_click_on_a_bar_selects_its_capture() {
     let pitch = (plot.width() / 12.0).min(46.0);
     let at = plot.left_bottom() + vec2(pitch * 4.5, -4.0);
     pane.harness.hover_at(at);
-    pane.steps();
+    // Words at the pointer take half a second.
+    pane.harness.run_steps(60);
     assert!(pane.sees("Capture 5 · pose 5"));
     pane.harness.drag_at(at);
     pane.harness.drop_at(at);

@@ -11,7 +11,7 @@ use super::*;
 use crate::command::Command;
 use crate::gui::pane_harness::{PaneHarness, PaneState};
 use crate::gui::sample;
-use crate::model::{CaptureRefused, CaptureUnderWay, CaptureWait, CapturePurpose, RefusalKind, Review, Step, Viewport};
+use crate::model::{CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, RefusalKind, Review, Step, Viewport};
 use crate::text::Text;
 
 fn colour(model: Model) -> PaneHarness {
@@ -149,14 +149,13 @@ fn the_readout_names_the_point_in_camera_and_in_base() {
     let px = intrinsics.project(&in_camera).expect("in front");
     assert!((px - Vector2::new(200.0, 300.0)).norm() < 1e-6);
     let frame = model.frame.as_ref().expect("live");
-    let in_base = model.calibrated().expect("calibrated").base_from_camera(&frame.info.base_from_tip).isometry() * in_camera;
-    let words = |at: &Point3<f64>| {
-        crate::gui::numbers::row((at.coords * 1e3).as_slice(), 1, 0)
-    };
+    let in_base =
+        model.calibrated().expect("calibrated").base_from_camera(&frame.info.base_from_tip).isometry() * in_camera;
+    let words = |at: &Point3<f64>| crate::gui::numbers::row((at.coords * 1e3).as_slice(), 1, 0);
     let pane = colour(model);
     assert!(pane.sees(&format!("Camera [mm] {}", words(&in_camera))));
     assert!(pane.sees(&format!("Base [mm] {}", words(&in_base))));
-    assert!(pane.sees("Depth 0.3625 m") && pane.sees("Pixel 200, 300"));
+    assert!(pane.sees(&format!("Depth {depth_m:.3} m")) && pane.sees("Pixel 200, 300"));
 }
 
 #[test]
@@ -254,7 +253,10 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
         let seen = place.screen(vec2(corner.px.x as f32, corner.px.y as f32));
         assert!(at.distance(seen) < 1.0, "{at:?} {seen:?}");
     }
-    let behind = project::Projector { camera_from_target: Pose::from_translation_xyzw([0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]), ..projector };
+    let behind = project::Projector {
+        camera_from_target: Pose::from_translation_xyzw([0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]),
+        ..projector
+    };
     assert_eq!(behind.point(&Point3::origin()), None);
     assert!(behind.line(&Point3::origin(), &Point3::new(0.1, 0.0, 0.0)).is_empty());
 }

@@ -2,7 +2,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use egui::{Key, Modifiers, vec2};
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use handeye_core::session::{CaptureId, CaptureRecord};
 
 use super::columns::{Column, Sort, sorted};
@@ -126,7 +126,8 @@ fn remarks_say_what_is_wrong_with_a_capture() {
     model.observed.remove(&CaptureId(4));
     model.outlier_line_px = Some(0.0);
     let mut pane = pane(model);
-    for words in ["1: Excluded", "2: Not readable, Above the line", "3: No board", "4: Looking…", "5: Above the line"] {
+    for words in ["1: Excluded", "2: Not readable, Above the line", "3: No board", "4: Looking…", "5: Above the line"]
+    {
         assert!(pane.sees(words), "{words}");
     }
     // The robot of the sample is where the first capture was taken.
