@@ -143,13 +143,13 @@ fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &Targe
     };
     // An answer of another set of captures is drawn, but does not shine.
     let colour = Marks::over_pictures().predicted.gamma_multiply(if model.solve.fresh { 1.0 } else { 0.5 });
-    let (around, inside) = board_lines(target);
-    for [from, to] in &inside {
+    let lines = board_lines(target);
+    for [from, to] in &lines.inside {
         for piece in projector.line(from, to) {
             painter.line(piece, Stroke::new(1.0, colour.gamma_multiply(0.45)));
         }
     }
-    for [from, to] in &around {
+    for [from, to] in &lines.around {
         for piece in projector.line(from, to) {
             marks::outlined_line(painter, &piece, 1.8, colour);
         }
