@@ -2,7 +2,7 @@
 
 use egui::{Ui, vec2};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use crate::command::{Command, Outbox};
 use crate::gui::theme;

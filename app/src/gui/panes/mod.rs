@@ -6,14 +6,19 @@ mod colour_bar;
 pub mod driven;
 mod empty;
 #[cfg_attr(not(test), expect(dead_code, reason = "the tiles that show it come with the frame of the window"))]
-mod jog;
+mod export;
 #[cfg_attr(not(test), expect(dead_code, reason = "the tiles that show it come with the frame of the window"))]
+mod jog;
 pub mod parts;
 mod pictures;
 #[cfg_attr(not(test), expect(dead_code, reason = "the tiles that show it come with the frame of the window"))]
 mod result;
 mod status_bar;
+#[cfg_attr(not(test), expect(dead_code, reason = "the tiles that show it come with the frame of the window"))]
+mod taught;
 mod top_bar;
+#[cfg_attr(not(test), expect(dead_code, reason = "the tiles that show it come with the frame of the window"))]
+mod verify;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Stroke, Ui};
 
