@@ -17,7 +17,12 @@ impl App {
         self.numbers.capture += 1;
         let number = self.numbers.capture;
         let others = self.model.document().captures.iter().map(|it| (it.id.0, it.base_from_tip)).collect();
-        let request = CaptureRequest { number, purpose, options: self.model.view.capture, pose_name, others };
+        let mut options = self.model.view.capture;
+        if pose_name.is_some() {
+            // Whoever taught two poses close to each other wants both; the reference poses have one twice.
+            (options.least_distance_m, options.least_angle_rad) = (0.0, 0.0);
+        }
+        let request = CaptureRequest { number, purpose, options, pose_name, others };
         let asked = self.workers.ask_vision(VisionTask::Capture(request));
         if asked.is_ok() {
             let since_s = self.model.now_s;
