@@ -31,3 +31,27 @@ pub fn of_tip(limits: &poses_file::MotionLimits, share: f64) -> MotionLimits {
 fn slower([velocity, acceleration, jerk]: [f64; 3], share: f64) -> [f64; 3] {
     [velocity * share, acceleration * share.powi(2), jerk * share.powi(3)]
 }
+
+#[cfg(test)]
+mod tests {
+    use handeye_sim_link::cell::motion::{self, JointMotion, MotionState, Sync};
+
+    use super::*;
+
+    /// How long the cell's generator of motions takes for joint 1 to turn by an angle.
+    fn duration_s(share: f64, angle_rad: f64) -> f64 {
+        let MotionLimits { velocity, acceleration, jerk } = of_joints(&TOUR, share);
+        let limits = motion::MotionLimits::uniform(1, velocity[0], acceleration[0], jerk[0]);
+        let start = MotionState::at_rest(vec![0.0]);
+        let motion = JointMotion::new(start, &[angle_rad], &[0.0], Some(&limits), Sync::Phase).expect("a motion");
+        motion.duration_s()
+    }
+
+    #[test]
+    fn a_quarter_of_the_speed_takes_four_times_as_long_however_short_the_way() {
+        for angle_rad in [0.01, 0.4, 5.0] {
+            let ratio = duration_s(0.25, angle_rad) / duration_s(1.0, angle_rad);
+            assert!((ratio - 4.0).abs() < 1e-6, "{ratio} over {angle_rad} rad");
+        }
+    }
+}

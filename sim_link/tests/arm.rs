@@ -221,6 +221,31 @@ fn a_jog_gives_way_when_somebody_else_moves_the_joint() {
 }
 
 #[test]
+fn a_stop_of_another_client_brings_a_jog_to_rest_within_its_limits() {
+    let mut bench = Bench::stepped();
+    let mut other = connect(&bench.server);
+    let mut seen = vec![bench.joints()[0]];
+    let mut passes = 0;
+    let mut held = || {
+        passes += 1;
+        seen.push(other.joint_angles().expect("a call")[0]);
+        if passes == 15 {
+            other.stop().expect("a call");
+        }
+        Some(0.5)
+    };
+    let end = bench.arm.jog(&ArmJog::Joint { index: 0, forward: true }, None, &mut held);
+    assert_eq!(end, Ok(JogEnd::Stopped));
+    assert!(passes < 30, "it took {passes} passes");
+    let speeds: Vec<f64> = seen.windows(2).map(|pair| (pair[1] - pair[0]) / TIME_STEP_S).collect();
+    for pair in speeds.windows(2) {
+        assert!((pair[1] - pair[0]).abs() <= 180_f64.to_radians() * TIME_STEP_S + 1e-9, "{speeds:?}");
+    }
+    let end = bench.arm.jog(&ArmJog::Joint { index: 0, forward: true }, None, &mut held_for(3, 0.5));
+    assert_eq!(end, Ok(JogEnd::Released), "and the next jog is a new one");
+}
+
+#[test]
 fn a_jog_ends_when_the_simulation_does() {
     let mut bench = Bench::running();
     let mut other = connect(&bench.server);

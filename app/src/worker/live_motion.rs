@@ -93,7 +93,7 @@ impl MotionPort for LiveMotion {
         let mut held = || (!cancel.is_cancelled()).then_some(speed);
         match self.jog_by(request, Some(length), &mut held) {
             Ok(Ok(JogEnd::Arrived)) => Ok(MotionOutcome::Arrived),
-            Ok(Ok(JogEnd::Released)) => Ok(MotionOutcome::Stopped),
+            Ok(Ok(JogEnd::Released | JogEnd::Stopped)) => Ok(MotionOutcome::Stopped),
             Ok(Ok(JogEnd::NotFollowing { joint })) => Ok(MotionOutcome::Failed(not_following(joint))),
             Ok(Ok(JogEnd::Obstacle(obstacle))) => Ok(MotionOutcome::Refused(obstacle_text(&obstacle))),
             Ok(Ok(JogEnd::OtherTip)) => Ok(MotionOutcome::Refused(other_tip())),
@@ -105,6 +105,7 @@ impl MotionPort for LiveMotion {
     fn jog(&mut self, request: &JogRequest, held: &mut dyn FnMut() -> Option<f64>) -> Result<Option<Text>, PortError> {
         match self.jog_by(request, None, held) {
             Ok(Ok(JogEnd::Arrived | JogEnd::Released)) => Ok(None),
+            Ok(Ok(JogEnd::Stopped)) => Ok(Some(text!("The arm was stopped"))),
             Ok(Ok(JogEnd::NotFollowing { joint })) => Ok(Some(not_following(joint))),
             Ok(Ok(JogEnd::Obstacle(obstacle))) => Ok(Some(obstacle_text(&obstacle))),
             Ok(Ok(JogEnd::OtherTip)) => Ok(Some(other_tip())),

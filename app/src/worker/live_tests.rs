@@ -131,22 +131,6 @@ fn every_pose_of_the_reference_tour_is_reached_at_full_and_at_a_quarter_of_the_s
 }
 
 #[test]
-fn a_quarter_of_the_speed_takes_four_times_as_long() {
-    let mut live = Live::new(false);
-    let mut goal = live.joints();
-    let mut took_s = [0.0; 2];
-    for (id, (speed, took_s)) in [1.0, 0.25].into_iter().zip(&mut took_s).enumerate() {
-        goal[0] += 0.4;
-        let before_s = live.watch.sim().get_simulation_time().expect("a call");
-        live.bench.move_to(id as u64, MotionGoal::Joints(goal), speed);
-        assert_eq!(live.bench.moved(id as u64), MotionOutcome::Arrived);
-        *took_s = live.watch.sim().get_simulation_time().expect("a call") - before_s;
-    }
-    // Settling and passes lost between two calls add to both.
-    assert!(took_s[1] > 2.0 * took_s[0], "{took_s:?}");
-}
-
-#[test]
 fn what_is_out_of_reach_is_refused_with_the_reason_and_nothing_moves() {
     let mut live = Live::new(false);
     let before = live.joints();

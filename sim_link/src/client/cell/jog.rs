@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 
 use super::jog_plan::{JogObstacle, JogPlan, Path};
 use super::reach::ArmKinematics;
+use super::sentinel::Sentinel;
 use super::{Arm, JOINTS, JointAngles, read_joint_angles, require_running};
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
@@ -70,6 +71,8 @@ pub enum JogAxes {
 pub enum JogEnd {
     /// It was let go.
     Released,
+    /// A client had the cell stop everything.
+    Stopped,
     /// It has its length.
     Arrived,
     /// Something is in its way. A jog of a given length was not begun.
@@ -110,7 +113,13 @@ impl Arm {
         }
         let path = self.path(jog, &start)?;
         match JogPlan::new(path, start, self.info.time_step_s, length) {
-            Ok(plan) => self.follow(plan, start, dynamic, held),
+            Ok(plan) => {
+                let mut sentinel = Sentinel::begin(&mut self.sim, &self.info)?;
+                match self.follow(plan, start, dynamic, &mut sentinel, held) {
+                    Err(error) if error.is_connection_loss() => Err(error),
+                    outcome => sentinel.end(&mut self.sim).and(outcome),
+                }
+            }
             Err(obstacle) => Ok(JogEnd::Obstacle(obstacle)),
         }
     }
@@ -120,15 +129,21 @@ impl Arm {
         mut plan: JogPlan<'_>,
         start: JointAngles,
         dynamic: [bool; JOINTS],
+        sentinel: &mut Sentinel,
         held: &mut dyn FnMut() -> Option<f64>,
     ) -> Result<JogEnd, LinkError> {
         let mut sent = start;
         let mut seen_s = f64::NEG_INFINITY;
+        let mut is_stopped = false;
         loop {
-            let share = held();
+            let mut share = held();
             // All joints go to a point in the same pass, however slow the network.
             let lock = self.hold.acquire(&mut self.sim)?;
-            let pass = self.send_next(&mut plan, share, &mut sent, &mut seen_s, dynamic);
+            let pass = sentinel.is_stopped(&mut self.sim).and_then(|now| {
+                is_stopped |= now;
+                share = share.filter(|_| !is_stopped);
+                self.send_next(&mut plan, share, &mut sent, &mut seen_s, dynamic)
+            });
             let pass = match lock {
                 Some(lock) => lock.release(&mut self.sim, pass)?,
                 None => pass?,
@@ -140,6 +155,7 @@ impl Arm {
                 Pass::None => require_running(&mut self.sim, TASK)?,
                 Pass::Sent if plan.is_at_end() => return Ok(JogEnd::Arrived),
                 Pass::Sent if plan.is_at_rest() => match plan.obstacle() {
+                    _ if is_stopped => return Ok(JogEnd::Stopped),
                     _ if share.is_none() => return Ok(JogEnd::Released),
                     Some(obstacle) => return Ok(JogEnd::Obstacle(obstacle)),
                     // Held at a speed of nothing.

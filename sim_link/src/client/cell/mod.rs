@@ -20,6 +20,7 @@ mod hold;
 mod jog;
 mod jog_plan;
 mod reach;
+mod sentinel;
 mod truth;
 
 use std::sync::Arc;
