@@ -57,13 +57,7 @@ fn the_pixel_under_the_pointer_is_that_of_the_picture_also_when_it_is_zoomed() {
         let wanted = ImagePoint { column: 200, row: 300 };
         pane.harness.hover_at(place.screen(vec2(200.0, 300.0)));
         pane.steps();
-        let pointed = pane.harness.state().pointed.expect("over the picture");
-        if viewport.zoom == 1.0 {
-            assert_eq!(pointed, wanted);
-        } else {
-            let off = pointed.column.abs_diff(wanted.column).max(pointed.row.abs_diff(wanted.row));
-            assert!(off <= 1, "{pointed:?}");
-        }
+        assert_eq!(pane.harness.state().pointed, Some(wanted), "{viewport:?}");
     }
 }
 
