@@ -117,6 +117,64 @@ fn pane_room(pane: &PaneHarness) -> Rect {
 }
 
 #[test]
+fn a_drag_moves_a_zoomed_picture_with_the_pointer() {
+    let mut model = sample::connected();
+    model.viewport = Viewport { centre: [0.5, 0.5], zoom: 4.0 };
+    let mut pane = colour(model);
+    let room = pane.rect("Colour picture");
+    let drag = |pane: &mut PaneHarness, button| {
+        let event = |pos, pressed| egui::Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE };
+        pane.harness.hover_at(room.center());
+        pane.steps();
+        pane.commands();
+        pane.harness.event(event(room.center(), true));
+        pane.harness.step();
+        pane.harness.hover_at(room.center() + vec2(30.0, -20.0));
+        pane.harness.step();
+        let sent = viewport(&pane.commands());
+        pane.harness.event(event(room.center(), false));
+        pane.steps();
+        pane.commands();
+        sent
+    };
+    for button in [PointerButton::Middle, PointerButton::Secondary, PointerButton::Primary] {
+        let now = pane.model().viewport;
+        let next = drag(&mut pane, button).expect("it moves");
+        let before = Place::new(room, vec2(640.0, 480.0), now);
+        let after = Place::new(room, vec2(640.0, 480.0), next);
+        let moved = after.picture.min - before.picture.min;
+        assert!((moved - vec2(30.0, -20.0)).length() < 0.1, "{button:?}: {moved:?}");
+    }
+    pane.model().viewport = Viewport::default();
+    pane.steps();
+    assert_eq!(drag(&mut pane, PointerButton::Primary), None, "all of the picture is there already");
+}
+
+#[test]
+fn recorded_pictures_of_another_session_are_not_taken_for_those_of_the_same_number() {
+    let mut pane = colour(reviewed(3));
+    let uploads = pane.harness.state().textures.uploads();
+    pane.steps();
+    assert_eq!(pane.harness.state().textures.uploads(), uploads);
+    pane.model().review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::pictures())) });
+    pane.steps();
+    assert_eq!(pane.harness.state().textures.uploads(), uploads + 1);
+}
+
+#[test]
+fn a_board_that_is_not_found_is_said_so_on_the_live_picture() {
+    let mut model = sample::connected();
+    if let Some(seen) = &mut model.detection {
+        seen.corners = None;
+    }
+    let mut pane = colour(model);
+    assert!(pane.sees("Board not found"));
+    pane.model().review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::pictures())) });
+    pane.steps();
+    assert!(!pane.sees("Board not found"));
+}
+
+#[test]
 fn overlays_and_depth_colours_are_switched_by_their_names() {
     let mut pane = colour(sample::solved());
     let overlays = pane.model().view.overlays;
