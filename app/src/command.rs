@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, DepthScale, Dialog,
     FolderListing, FrameImages, FrameInfo, ImagePoint, JobId, Jog, JogSettings, Link, LinkState, LiveDetection,
-    MotionGoal, MotionId, MotionOutcome, Observed, Overlays, Preview, RecentSession, RobotState, RotationFormat,
+    MotionGoal, MotionId, MotionOutcome, Observed, Overlays, Pane, Preview, RecentSession, RobotState, RotationFormat,
     SessionState, Severity, Solved, Step, ThemeChoice, Viewport, Written,
 };
 use crate::text::{Language, Text};
@@ -175,6 +175,10 @@ pub enum Command {
     SaveAs(PathBuf),
     /// Read the folders in a folder.
     ListFolder(PathBuf),
+    /// Bring a pane to the front.
+    ShowPane(Pane),
+    /// Put every pane where it was at first.
+    ResetLayout,
 }
 
 /// What happened outside the thread of the window.

@@ -1,13 +1,16 @@
 //! The Handeye Workbench: a window and a command line over [`handeye_core`] and [`handeye_sim_link`].
 
+pub mod app;
 pub mod cli;
 pub mod command;
 pub mod depth_view;
 pub mod gui;
+pub mod limits;
 pub mod model;
 pub mod observe;
 pub mod parallel;
 pub mod session_start;
+pub mod settings;
 pub mod text;
 pub mod truth;
 pub mod worker;

@@ -6,7 +6,7 @@
 //! fails for a text that has none. What a library or the cell says in its own words stays as it is.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::sync::OnceLock;
 
@@ -147,12 +147,12 @@ const CHINESE: &[(&str, &str)] = &[
     ("session", include_str!("../../assets/text/zh-CN/session.toml")),
 ];
 
-fn chinese() -> &'static HashMap<String, String> {
-    static CATALOGUE: OnceLock<HashMap<String, String>> = OnceLock::new();
+fn chinese() -> &'static BTreeMap<String, String> {
+    static CATALOGUE: OnceLock<BTreeMap<String, String>> = OnceLock::new();
     CATALOGUE.get_or_init(|| {
-        let mut all = HashMap::new();
+        let mut all = BTreeMap::new();
         for (file, content) in CHINESE {
-            match toml::from_str::<HashMap<String, String>>(content) {
+            match toml::from_str::<BTreeMap<String, String>>(content) {
                 Ok(part) => all.extend(part),
                 // The files are part of the program and a test reads them; English is shown if one is broken.
                 Err(error) => tracing::error!(file, %error, "a catalogue of translations cannot be read"),
@@ -160,6 +160,12 @@ fn chinese() -> &'static HashMap<String, String> {
         }
         all
     })
+}
+
+/// Every English text with its translation.
+#[cfg(test)]
+pub fn every_translation() -> impl Iterator<Item = (&'static str, &'static str)> {
+    chinese().iter().map(|(english, chinese)| (english.as_str(), chinese.as_str()))
 }
 
 #[cfg(test)]

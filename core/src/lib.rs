@@ -7,6 +7,7 @@ pub mod atomic_file;
 #[cfg(feature = "opencv")]
 pub mod calibrate;
 pub mod camera;
+pub mod capture;
 pub mod coverage;
 pub mod dataset;
 pub mod depth;

@@ -5,7 +5,7 @@ use handeye_core::session::CaptureId;
 use super::App;
 use crate::model::{CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, Severity};
 use crate::text;
-use crate::worker::vision::{CaptureRequest, VisionTask};
+use crate::worker::{CaptureRequest, VisionTask};
 
 impl App {
     /// Takes a capture as soon as robot and picture have settled.

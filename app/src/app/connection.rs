@@ -1,9 +1,14 @@
 //! The connections to the cell.
 
+use std::thread::Builder;
+
 use super::App;
 use crate::model::{CellFacts, CellSource, Link, LinkState, Motion, Severity};
 use crate::text;
-use crate::worker::{CameraTask, ControlTask, Request};
+use crate::worker::{CameraTask, ControlTask, Request, Workers};
+
+/// Earlier addresses that are offered again.
+pub const ADDRESSES: usize = 8;
 
 impl App {
     pub(super) fn stop(&mut self) {
@@ -12,7 +17,7 @@ impl App {
         self.cancel_capture();
         self.model.stop_pending = true;
         if self.model.control.is_connected() {
-            self.say(Severity::Warning, text!("Stopping the arm…"));
+            self.say(Severity::Info, text!("Stopping the arm…"));
         } else {
             self.say(
                 Severity::Error,
@@ -42,6 +47,12 @@ impl App {
 
     /// Works with another cell. What is open stays open: a session belongs to its captures, not to a connection.
     pub(super) fn connect(&mut self, source: CellSource) {
+        if let CellSource::Address(address) = &source {
+            let addresses = &mut self.model.addresses;
+            addresses.retain(|other| other != address);
+            addresses.insert(0, address.clone());
+            addresses.truncate(ADDRESSES);
+        }
         self.model.source = source.clone();
         self.model.robot = None;
         self.model.frame = None;
@@ -53,9 +64,20 @@ impl App {
         self.model.control = first.clone();
         self.model.camera = first.clone();
         self.model.mover = first;
-        if let Err(error) = self.workers.connect(&source, &self.model.view) {
-            self.say(Severity::Error, text!("The connection was not begun: {error}", error = error));
+        let connector = (self.connect)(&source);
+        let captures = self.desk.captures();
+        match Workers::start(&source, &self.model.view, &connector, captures, &self.clock, &self.waker) {
+            Ok(workers) => {
+                let before = std::mem::replace(&mut self.workers, workers);
+                // It waits for calls under way, which the window must not.
+                let farewell = Builder::new().name("farewell".to_owned()).spawn(move || drop(before));
+                if let Err(error) = farewell {
+                    tracing::warn!(%error, "the connection before was left alone");
+                }
+            }
+            Err(error) => self.say(Severity::Error, text!("The connection was not begun: {error}", error = error)),
         }
+        self.model.capture = None;
         self.send_target();
     }
 

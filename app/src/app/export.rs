@@ -25,7 +25,7 @@ impl App {
     pub(super) fn preview_exports(&mut self) {
         self.model.export.previews.clear();
         if let Some(job) = self.export_job() {
-            let asked = self.workers.ask_files(FileTask::Preview(job));
+            let asked = self.desk.files(FileTask::Preview(job));
             self.expect(text!("The exports are not shown"), asked);
         }
     }
@@ -42,7 +42,7 @@ impl App {
             self.say(Severity::Warning, text!("Choose at least one format, and a folder"));
             return;
         };
-        let asked = self.workers.ask_files(FileTask::Export { job, formats, folder });
+        let asked = self.desk.files(FileTask::Export { job, formats, folder });
         self.model.export.writing = asked.is_ok();
         self.expect(text!("Nothing was exported"), asked);
     }

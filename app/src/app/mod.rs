@@ -21,7 +21,10 @@ use std::sync::Arc;
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
 use crate::text;
-use crate::worker::{Clock, Connector, Waker, Workers};
+use crate::worker::{Clock, Connector, Desk, Waker, Workers};
+
+/// Makes what connects to a cell.
+pub type Connect = Arc<dyn Fn(&CellSource) -> Arc<dyn Connector> + Send + Sync>;
 
 /// What an application begins with.
 pub struct Start {
@@ -29,17 +32,23 @@ pub struct Start {
     pub source: CellSource,
     /// What is remembered from one start to the next.
     pub view: ViewSettings,
+    /// Addresses that were connected to before, newest first.
+    pub addresses: Vec<String>,
     /// Where new sessions go.
     pub sessions: PathBuf,
-    /// A session or data set to open at once.
+    /// A session or data set to open at once; where there is none, a session is begun there.
     pub open: Option<PathBuf>,
 }
 
 /// Model and workers.
 pub struct App {
     model: Model,
+    /// The threads that talk to the cell; others take their place when another cell is chosen.
     workers: Workers,
+    desk: Desk,
+    connect: Connect,
     clock: Clock,
+    waker: Waker,
     numbers: Numbers,
     /// The question that the solver was asked last.
     asked: Option<solve::Question>,
@@ -50,7 +59,6 @@ pub struct App {
 struct Numbers {
     capture: u64,
     job: JobId,
-    message: u64,
     motion: MotionId,
 }
 
@@ -59,14 +67,17 @@ impl App {
     ///
     /// # Errors
     /// When the system has no more threads.
-    pub fn start(start: Start, connector: &Arc<dyn Connector>, clock: Clock, waker: &Waker) -> io::Result<Self> {
-        let Start { source, view, sessions, open } = start;
-        let workers = Workers::start(&source, &view, sessions, connector, &clock, waker)?;
-        let model = Model::new(source, view);
-        let mut app = Self { model, workers, clock, numbers: Numbers::default(), asked: None };
+    pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
+        let Start { source, view, addresses, sessions, open } = start;
+        let desk = Desk::start(sessions, &clock, &waker)?;
+        let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
+        let model = Model { addresses, ..Model::new(source, view) };
+        let numbers = Numbers::default();
+        let mut app = Self { model, workers, desk, connect, clock, waker, numbers, asked: None };
         app.prepare_session();
+        app.send_target();
         if let Some(folder) = open {
-            app.open(folder);
+            app.open_or_begin(folder);
         }
         Ok(app)
     }
@@ -81,6 +92,7 @@ impl App {
         self.absorb(Event::Tick { now_s: (self.clock)() });
         let mut events = Vec::new();
         self.workers.drain(|event| events.push(event));
+        self.desk.drain(|event| events.push(event));
         for event in events {
             self.absorb(event);
         }
@@ -113,7 +125,9 @@ impl App {
             Command::Pick(pixel) => self.pick(pixel),
             Command::GoToStep(step) => self.model.step = step,
             Command::SetDialog(dialog) => self.set_dialog(dialog),
-            Command::DismissMessage(id) => self.dismiss(id),
+            Command::DismissMessage(number) => self.model.messages.dismiss(number),
+            // Where panes are is the window's business.
+            Command::ShowPane(_) | Command::ResetLayout => {}
 
             Command::Move { goal, what } => self.start_motion(goal, what),
             Command::Jog(jog) => self.jog(jog),
@@ -211,5 +225,3 @@ impl App {
     }
 }
 
-#[cfg(test)]
-mod tests;

@@ -1,5 +1,6 @@
 //! Moving and jogging the arm.
 
+use handeye_core::frames::{Camera, Pose, Tip};
 use handeye_core::session::CaptureId;
 
 use super::App;
@@ -64,9 +65,8 @@ impl App {
             JogStep::Step { metres, radians } => {
                 self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
                 let id = self.numbers.motion;
-                let mount = self.camera_for_jogging();
                 let speed = self.model.view.jog.speed;
-                match self.workers.jog_step(id, jog, [metres, radians], speed, mount) {
+                match self.workers.jog_step(id, jog, [metres, radians], speed, self.camera_on_tip()) {
                     Ok(()) => {
                         let (what, since_s) = (text!("the next step"), self.model.now_s);
                         self.model.motion = Motion::Moving { id, what, since_s };
@@ -81,8 +81,7 @@ impl App {
         if self.model.view.jog.step != JogStep::Hold {
             return;
         }
-        let mount = self.camera_for_jogging();
-        self.workers.hold_jog(jog, self.model.view.jog.speed, mount);
+        self.workers.hold_jog(jog, self.model.view.jog.speed, self.camera_on_tip());
         self.model.motion = Motion::Jogging(jog);
     }
 
@@ -107,8 +106,8 @@ impl App {
         self.model.motion = Motion::Idle;
     }
 
-    /// The camera on the tip: as calibrated, or else as the scene says. Only to choose the axes that a person jogs along.
-    fn camera_for_jogging(&self) -> Option<handeye_core::frames::Pose<handeye_core::frames::Tip, handeye_core::frames::Camera>> {
+    /// The camera on the tip as calibrated, or else as the scene says: only to choose the axes that a person jogs along.
+    fn camera_on_tip(&self) -> Option<Pose<Tip, Camera>> {
         let said = || Some(self.model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
         self.model.tip_from_camera().or_else(said)
     }

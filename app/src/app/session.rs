@@ -35,7 +35,7 @@ impl App {
     }
 
     fn ask_archive(&mut self, task: ArchiveTask) {
-        let asked = self.workers.ask_archive(task);
+        let asked = self.desk.archive(task);
         if asked.is_err() {
             self.say(Severity::Error, text!("The disk does not keep up: nothing was changed. Try again in a moment"));
         }
@@ -108,13 +108,19 @@ impl App {
         self.ask_archive(ArchiveTask::Open(folder));
     }
 
+    /// Goes on with the session in a folder, or begins one there.
+    pub(super) fn open_or_begin(&mut self, folder: PathBuf) {
+        self.model.opening = true;
+        self.ask_archive(ArchiveTask::OpenOrNew { folder, beginning: self.beginning() });
+    }
+
     pub(super) fn save_as(&mut self, folder: PathBuf) {
         self.model.opening = true;
         self.ask_archive(ArchiveTask::SaveAs(folder));
     }
 
     pub(super) fn list_folder(&mut self, folder: PathBuf) {
-        let asked = self.workers.ask_files(FileTask::List(folder));
+        let asked = self.desk.files(FileTask::List(folder));
         self.expect(text!("The folder was not read"), asked);
     }
 
@@ -175,7 +181,7 @@ impl App {
         let captures: Vec<_> =
             document.captures.iter().filter(|it| !self.model.observed.contains_key(&it.id)).cloned().collect();
         if !captures.is_empty() {
-            self.workers.observe(ObserveJob { folder, target: document.meta.target, captures });
+            self.desk.observe(ObserveJob { folder, target: document.meta.target, captures });
         }
     }
 
@@ -199,7 +205,7 @@ impl App {
         self.model.review = Some(Review { id, images: None });
         let capture = self.model.document().capture(id).cloned();
         let (Some(folder), Some(capture)) = (self.model.session.folder.clone(), capture) else { return };
-        let asked = self.workers.ask_files(FileTask::Review { folder, capture: Box::new(capture) });
+        let asked = self.desk.files(FileTask::Review { folder, capture: Box::new(capture), colours: self.model.view.depth_colours });
         self.expect(text!("The capture is not shown"), asked);
     }
 

@@ -68,7 +68,7 @@ impl App {
         let document = Arc::clone(&self.model.session.document);
         let seen = document.in_use().filter(|it| self.corners(it.id).is_some()).count();
         if seen < LEAST_VIEWS {
-            self.workers.cancel_solve();
+            self.desk.cancel_solve();
             self.model.solve.status = if document.captures.is_empty() {
                 SolveStatus::Idle
             } else {
@@ -87,7 +87,7 @@ impl App {
         let since_s = self.model.now_s;
         self.model.solve.status = SolveStatus::Running { job: id, stage: Stage::Intrinsics, part: 0.0, since_s };
         let job = self.job(id, &document);
-        self.workers.solve(job);
+        self.desk.solve(job);
     }
 
     fn corners(&self, id: CaptureId) -> Option<&Vec<Corner>> {
@@ -134,7 +134,7 @@ impl App {
     }
 
     pub(super) fn cancel_solve(&mut self) {
-        self.workers.cancel_solve();
+        self.desk.cancel_solve();
     }
 
     pub(super) fn set_method(&mut self, name: &str) {
@@ -172,7 +172,7 @@ impl App {
                 self.model.solve.solved = Some(solved);
                 self.send_intrinsics();
                 self.preview_exports();
-                if self.workers.ask_archive(ArchiveTask::Result(result)).is_err() {
+                if self.desk.archive(ArchiveTask::Result(result)).is_err() {
                     self.say(Severity::Warning, text!("The result was not kept beside the session; solve again to keep it"));
                 }
             }

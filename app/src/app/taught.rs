@@ -79,7 +79,7 @@ impl App {
     }
 
     pub(super) fn import_taught(&mut self, file: PathBuf) {
-        let asked = self.workers.ask_files(FileTask::ReadPoses(file));
+        let asked = self.desk.files(FileTask::ReadPoses(file));
         self.expect(text!("The poses were not read"), asked);
     }
 
@@ -99,7 +99,7 @@ impl App {
     }
 
     pub(super) fn export_taught(&mut self, file: PathBuf) {
-        let asked = self.workers.ask_files(FileTask::WritePoses { file, poses: self.taught() });
+        let asked = self.desk.files(FileTask::WritePoses { file, poses: self.taught() });
         self.expect(text!("The poses were not written"), asked);
     }
 

@@ -11,7 +11,7 @@ use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::poses_file::Goal;
 use handeye_core::progress::CancelToken;
 use handeye_core::result::CalibrationResult;
-use handeye_core::session::{Capture, GroundTruth, Session, SessionMeta, SessionWriter};
+use handeye_core::session::{Capture, FolderLock, GroundTruth, Session, SessionMeta, Store};
 use handeye_core::target::{Grid, TargetSpec};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths, Frame, MotionTolerance, SettleOptions};
@@ -84,7 +84,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let truth = cell.ground_truth().map_err(Failure::failed)?;
 
     keep_earlier_session(&folder)?;
-    let mut session = SessionWriter::create(&folder, meta(&truth, args.seed)?).map_err(Failure::failed)?;
+    let mut session = Store::create(&folder, meta(&truth, args.seed)?).map_err(Failure::failed)?;
     let captured = capture_all(&mut cell, &plan, args.real_time, &mut session, &cancel);
     // Whatever happened on the way, the arm is not left moving and the simulation not running or waiting for steps.
     let ended = cell.stop().and_then(|()| {
@@ -92,8 +92,8 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         sim.set_stepping(false)?;
         sim.stop_simulation()
     });
-    if captured.is_err() && !session.captures().is_empty() {
-        let (count, folder) = (session.captures().len(), folder.display());
+    if captured.is_err() && !session.document().captures.is_empty() {
+        let (count, folder) = (session.document().captures.len(), folder.display());
         tracing::warn!("{count} captures are kept in {folder}; `handeye calibrate {folder}` solves them");
     }
     captured?;
@@ -105,11 +105,12 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
 
     let mut result = solve::folder(&folder, Method::Joint)?;
     result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
-    finish(&folder, args.json.as_deref(), &result)
+    finish(&session, args.json.as_deref(), &result)
 }
 
-fn finish(folder: &Path, json: Option<&Path>, result: &CalibrationResult) -> Result<(), Failure> {
-    result.write(&folder.join(solve::RESULT_FILE)).map_err(Failure::failed)?;
+fn finish(session: &Store, json: Option<&Path>, result: &CalibrationResult) -> Result<(), Failure> {
+    let folder = session.folder();
+    session.write_result(result).map_err(Failure::failed)?;
     solve::write_exports(&folder.join("exports"), result)?;
     if let Some(file) = json {
         result.write(file).map_err(Failure::failed)?;
@@ -119,11 +120,13 @@ fn finish(folder: &Path, json: Option<&Path>, result: &CalibrationResult) -> Res
     Ok(())
 }
 
-/// Moves a session that is already there out of the way: nothing captured is ever overwritten.
+/// Moves a session that is already there out of the way: nothing captured is ever overwritten. A session that another
+/// program has open stays where it is, or that program would go on writing into the new one.
 fn keep_earlier_session(folder: &Path) -> Result<(), Failure> {
     if !Session::is_session(folder) {
         return Ok(());
     }
+    let _not_open_elsewhere = FolderLock::take(folder).map_err(Failure::unusable)?;
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let kept = (1..u32::MAX)
         .map(|n| folder.with_file_name(format!("{name}.earlier-{n}")))
@@ -166,7 +169,7 @@ fn capture_all(
     cell: &mut CellClient,
     plan: &Plan,
     real_time: bool,
-    session: &mut SessionWriter,
+    session: &mut Store,
     cancel: &CancelToken,
 ) -> Result<(), Failure> {
     // Stepped, a pass takes as long as it takes, and the same command gives the same pictures on every machine.
@@ -196,22 +199,22 @@ fn capture_all(
         // An arm that still swings, or a picture from before it stood, would be a capture in motion.
         cell.arm().settle(&SettleOptions::default(), cancel).map_err(Failure::failed)?;
         let frame = cell.grab().map_err(Failure::failed)?;
-        store(session, &frame)?;
+        store(session, &frame, name)?;
         tracing::info!("pose {} of {} captured ({name})", index + 1, plan.goals.len());
     }
     Ok(())
 }
 
-fn store(session: &mut SessionWriter, frame: &Frame) -> Result<(), Failure> {
+fn store(session: &mut Store, frame: &Frame, pose_name: &str) -> Result<(), Failure> {
     let depth =
         DepthImage::new(frame.depth.width, frame.depth.height, frame.depth.metres.clone()).map_err(Failure::failed)?;
     session
         .add_capture(&Capture {
-            image: &frame.rgb,
             depth_m: Some(&depth),
-            base_from_tip: frame.base_from_tip,
             joints_rad: Some(&frame.joints),
             sim_time_s: Some(frame.sim_time_s),
+            pose_name: Some(pose_name),
+            ..Capture::new(&frame.rgb, frame.base_from_tip)
         })
         .map_err(Failure::failed)?;
     Ok(())

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use handeye_core::calibrate::{self, Method, Observations};
 use handeye_core::dataset::Dataset;
-use handeye_core::export::{self, ExportNames};
+use handeye_core::export::{self, ExportInput, ExportNames};
 use handeye_core::progress::CancelToken;
 use handeye_core::result::CalibrationResult;
 
@@ -53,12 +53,14 @@ pub fn observations(dataset: &Dataset, cancel: &CancelToken) -> Result<Observati
     Ok(observations)
 }
 
-/// Every format that the result has the data for, into a folder.
+/// Every format that the result has the data for, into a folder. Poses of images are left to `export`: their files have
+/// to lie beside the images.
 pub fn write_exports(folder: &Path, result: &CalibrationResult) -> Result<Vec<PathBuf>, Failure> {
     let names = ExportNames::default();
+    let input = ExportInput::new(result, &names);
     let formats: Vec<_> =
-        export::formats().iter().copied().filter(|format| format.render(result, &names).is_ok()).collect();
-    let written = export::write_all(folder, &formats, result, &names).map_err(Failure::failed)?;
+        export::formats().iter().copied().filter(|format| export::preview(*format, &input).is_ok()).collect();
+    let written = export::write_all(folder, &formats, &input).map_err(Failure::failed)?;
     tracing::info!("wrote {} files to {}", written.len(), folder.display());
     Ok(written)
 }

@@ -3,18 +3,30 @@
 //! Data flows in one direction: workers report events, [`App`] changes the model, panes draw the model and return
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
-mod app;
+mod actions;
 mod captures;
+mod fonts;
+mod help;
+mod icons;
+mod layout;
 mod marks;
 mod numbers;
+mod palette;
 #[cfg(test)]
 mod pane_harness;
 mod panes;
+mod rail;
 #[cfg(test)]
 mod sample;
+mod session;
 mod status;
+mod steps;
+#[cfg(test)]
+mod testing;
 mod textures;
 mod theme;
+mod toasts;
+mod widget_list;
 mod window;
 
 use std::sync::Arc;
@@ -24,16 +36,15 @@ use anyhow::anyhow;
 use eframe::NativeOptions;
 use egui::ViewportBuilder;
 
-pub use app::App;
-
 use crate::cli::GuiArgs;
-use crate::command::Event;
-use crate::model::{CellSource, Severity};
-use crate::text::Text;
-use crate::worker::{Clock, Connector, LiveConnector, Waker};
-use window::Window;
+use crate::app::{App, Connect, Start};
+use crate::model::CellSource;
+use crate::settings::{self, SettingsFile};
+use crate::worker::{Clock, LiveConnector, Waker};
+pub use layout::Layout;
+pub use window::Window;
 
-/// Name under which the system keeps the window's settings.
+/// Name under which the system keeps layout and size of the window.
 const APP_ID: &str = "handeye-workbench";
 
 /// Opens the window and returns when it is closed.
@@ -41,7 +52,9 @@ const APP_ID: &str = "handeye-workbench";
 /// # Errors
 /// When no window can be opened, most likely because there is no screen.
 pub fn run(args: GuiArgs) -> anyhow::Result<()> {
-    let source = args.connect.map_or(CellSource::BuiltIn, CellSource::Address);
+    let variable = |name: &str| std::env::var(name).ok();
+    let (file, settings, warnings) = SettingsFile::open(settings::default_path(variable), variable);
+    let source = args.connect.map_or_else(|| settings.source(), CellSource::Address);
     let options = NativeOptions {
         viewport: ViewportBuilder::default()
             .with_app_id(APP_ID)
@@ -50,22 +63,37 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
             .with_min_inner_size([1024.0, 700.0]),
         ..NativeOptions::default()
     };
-    let session = args.session;
     let open = move |creation: &eframe::CreationContext<'_>| {
         let ctx = creation.egui_ctx.clone();
         let waker: Waker = Arc::new(move || ctx.request_repaint());
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
-        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::new(source.clone()));
-        let view = window::stored_settings(creation.storage);
-        let mut app = App::start(source, view, &connector, clock, &waker)?;
-        if let Some(session) = session {
-            let text = Text::verbatim(format!("sessions are not opened yet: {}", session.display()));
-            app.absorb(Event::Notice { severity: Severity::Warning, text });
+        let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
+        let start = Start {
+            source,
+            view: settings.view,
+            addresses: settings.addresses.clone(),
+            sessions: settings.sessions_folder(variable),
+            open: args.session,
+        };
+        let mut app = App::start(start, connect, clock, waker)?;
+        for warning in warnings {
+            app.absorb(warning.into());
         }
-        Ok(Box::new(Window::new(app, &creation.egui_ctx)) as Box<dyn eframe::App>)
+        if let Some(file) = variable(widget_list::VARIABLE) {
+            creation.egui_ctx.add_plugin(widget_list::WidgetList::new(file.into()));
+        }
+        let layout = stored_layout(creation.storage);
+        Ok(Box::new(Window::new(app, layout, file, &creation.egui_ctx)) as Box<dyn eframe::App>)
     };
     eframe::run_native(APP_ID, options, Box::new(open)).map_err(|error| {
         anyhow!("cannot open a window: {error}; without a screen use the subcommands, see `handeye --help`")
     })
+}
+
+/// The layout of the last time; the first one when there is none that can be read.
+fn stored_layout(storage: Option<&dyn eframe::Storage>) -> Layout {
+    storage
+        .and_then(|storage| eframe::get_value::<Layout>(storage, layout::STORAGE_KEY))
+        .map_or_else(Layout::default, Layout::brought_up_to_date)
 }

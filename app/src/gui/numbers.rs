@@ -1,6 +1,10 @@
-//! Numbers as text, always of the same width so that they do not dance.
+//! Numbers as text, always of the same width so that they do not dance: the fonts have digits of equal width, and what
+//! pads them is as wide as a digit.
 
 use handeye_core::frames::{Base, Pose, Tip};
+
+/// A space as wide as a digit.
+const FIGURE_SPACE: &str = "\u{2007}";
 
 /// A number with a fixed number of decimals, padded on the left. The sign is a real minus, and −0 is 0.
 pub fn fixed(value: f64, decimals: usize, width: usize) -> String {
@@ -8,7 +12,7 @@ pub fn fixed(value: f64, decimals: usize, width: usize) -> String {
     let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
     let text = if is_zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") };
     let padding = width.saturating_sub(text.chars().count());
-    format!("{}{text}", " ".repeat(padding))
+    format!("{}{text}", FIGURE_SPACE.repeat(padding))
 }
 
 /// Several numbers in a row.
@@ -37,11 +41,15 @@ pub fn quaternion(pose: &Pose<Base, Tip>) -> String {
 mod tests {
     use super::*;
 
+    fn plain(text: &str) -> String {
+        text.replace(FIGURE_SPACE, " ")
+    }
+
     #[test]
     fn numbers_keep_their_width_and_their_sign() {
-        assert_eq!(fixed(1.25, 1, 7), "    1.2");
-        assert_eq!(fixed(-12.34, 1, 7), "  −12.3");
-        assert_eq!(fixed(-0.001, 1, 5), "  0.0", "no negative zero");
+        assert_eq!(plain(&fixed(1.25, 1, 7)), "    1.2");
+        assert_eq!(plain(&fixed(-12.34, 1, 7)), "  −12.3");
+        assert_eq!(plain(&fixed(-0.001, 1, 5)), "  0.0", "no negative zero");
         assert_eq!(fixed(123456.0, 1, 3), "123456.0", "never cut");
     }
 
@@ -49,8 +57,8 @@ mod tests {
     fn a_tip_pose_is_written_in_millimetres_and_degrees() {
         let quarter = std::f64::consts::FRAC_PI_4;
         let pose = Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
-        assert_eq!(translation_mm(&pose), " 110.0  −16.0  847.0");
-        assert_eq!(rpy_deg(&pose), "   0.00    0.00   90.00");
-        assert_eq!(quaternion(&pose), " 0.0000  0.0000  0.7071  0.7071");
+        assert_eq!(plain(&translation_mm(&pose)), " 110.0  −16.0  847.0");
+        assert_eq!(plain(&rpy_deg(&pose)), "   0.00    0.00   90.00");
+        assert_eq!(plain(&quaternion(&pose)), " 0.0000  0.0000  0.7071  0.7071");
     }
 }

@@ -140,6 +140,8 @@ pub fn connected() -> Model {
         camera_from_target: Some(camera_from_target(1)),
         base_from_tip: base_from_tip(1),
         took_s: 0.006,
+        problem: None,
+        dropped: 0,
     });
     model
 }

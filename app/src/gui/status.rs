@@ -2,6 +2,8 @@
 
 use super::theme::Tone;
 use crate::model::{CellSource, Link, LinkState, Model, Simulation};
+use crate::text;
+use crate::text::Text;
 
 /// Old enough [s] to say so: a picture that should come many times a second.
 pub const STALE_AFTER_S: f64 = 1.0;
@@ -12,9 +14,9 @@ pub struct Status {
     /// How good it is.
     pub tone: Tone,
     /// What it is, in a few words.
-    pub title: String,
+    pub title: Text,
     /// Why, and what to do; empty when there is nothing to say.
-    pub detail: String,
+    pub detail: Text,
     /// What the user can press.
     pub action: Option<Action>,
 }
@@ -35,9 +37,9 @@ pub fn connection(model: &Model) -> Status {
     let worse = if camera > control || (camera == control && camera_first) { Link::Camera } else { Link::Control };
     let other = model.link(if worse == Link::Camera { Link::Control } else { Link::Camera });
     let half = match (worse, other.is_connected()) {
-        (_, false) => "Connection",
-        (Link::Camera, true) => "Camera connection",
-        (Link::Control | Link::Motion, true) => "Robot connection",
+        (_, false) => text!("Connection"),
+        (Link::Camera, true) => text!("Camera connection"),
+        (Link::Control | Link::Motion, true) => text!("Robot connection"),
     };
     of_link(model, model.link(worse), half)
 }
@@ -49,25 +51,22 @@ pub fn hindrance(model: &Model) -> Option<Status> {
         return Some(connection);
     }
     let (title, detail) = match model.resting_simulation()? {
-        Simulation::Paused => ("The simulation is paused", "Pictures and joints stand still until it goes on."),
+        Simulation::Paused => {
+            (text!("The simulation is paused"), text!("Pictures and joints stand still until it goes on."))
+        }
         Simulation::Stopped | Simulation::Running => {
-            ("The simulation is stopped", "Pictures are renewed only while it runs.")
+            (text!("The simulation is stopped"), text!("Pictures are renewed only while it runs."))
         }
     };
-    Some(Status {
-        tone: Tone::Warning,
-        title: title.to_owned(),
-        detail: detail.to_owned(),
-        action: Some(Action::StartSimulation),
-    })
+    Some(Status { tone: Tone::Warning, title, detail, action: Some(Action::StartSimulation) })
 }
 
 /// What is between the start and the first picture.
 pub fn before_first_picture(model: &Model) -> Status {
     hindrance(model).unwrap_or_else(|| Status {
         tone: Tone::Busy,
-        title: "Waiting for the first picture…".to_owned(),
-        detail: "The cell is connected; its camera delivers within a moment.".to_owned(),
+        title: text!("Waiting for the first picture…"),
+        detail: text!("The cell is connected; its camera delivers within a moment."),
         action: None,
     })
 }
@@ -89,46 +88,51 @@ fn lost_since_s(state: &LinkState) -> f64 {
     }
 }
 
-fn of_link(model: &Model, state: &LinkState, half: &str) -> Status {
-    let status = |tone, title: String, detail: String, action| Status { tone, title, detail, action };
+fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
+    let status = |tone, title, detail, action| Status { tone, title, detail, action };
     match state {
         LinkState::StartingCell { why } => {
-            let cell = "A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed.";
-            let detail = why.as_deref().map_or_else(|| cell.to_owned(), sentence);
-            status(Tone::Busy, "Starting the built-in cell…".to_owned(), detail, None)
+            let detail = match why {
+                None => {
+                    text!("A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed.")
+                }
+                Some(why) => Text::verbatim(sentence(why)),
+            };
+            status(Tone::Busy, text!("Starting the built-in cell…"), detail, None)
         }
         LinkState::Searching { address, attempt, why } => {
             let detail = match why {
-                None => "Asking whether a CoppeliaSim or a cell answers there.".to_owned(),
-                Some(why) => format!("Try {attempt}. {}", sentence(why)),
+                None => text!("Asking whether a CoppeliaSim or a cell answers there."),
+                Some(why) => text!("Try {attempt}. {why}", attempt = attempt, why = sentence(why)),
             };
-            status(Tone::Busy, format!("Searching for {address}…"), detail, Some(Action::Reconnect))
+            let title = text!("Searching for {address}…", address = address);
+            status(Tone::Busy, title, detail, Some(Action::Reconnect))
         }
         LinkState::Connected { address, server } => {
             let title = match model.source {
-                CellSource::BuiltIn => format!("Connected to the {server}"),
-                CellSource::Address(_) => format!("Connected to {server}"),
+                CellSource::BuiltIn => text!("Connected to the built-in cell"),
+                CellSource::Address(_) => text!("Connected to {server}", server = server),
             };
-            status(Tone::Good, title, address.clone(), None)
+            status(Tone::Good, title, Text::verbatim(address.clone()), None)
         }
         LinkState::Lost { since_s, why, .. } => status(
             Tone::Warning,
-            format!("{half} lost {} ago", duration(model.now_s - since_s)),
-            format!("{} It is tried again in a moment.", sentence(why)),
+            text!("{half} lost {ago} ago", half = half, ago = duration(model.now_s - since_s)),
+            text!("{why} It is tried again in a moment.", why = sentence(why)),
             Some(Action::Reconnect),
         ),
         LinkState::Retrying { since_s, why, attempt } => status(
             Tone::Warning,
-            format!("{half} lost {} ago, retrying", duration(model.now_s - since_s)),
-            format!("{} Try {attempt} is under way.", sentence(why)),
+            text!("{half} lost {ago} ago, retrying", half = half, ago = duration(model.now_s - since_s)),
+            text!("{why} Try {attempt} is under way.", why = sentence(why), attempt = attempt),
             None,
         ),
         LinkState::Failed { why } => {
             let title = match &model.source {
-                CellSource::BuiltIn => "The built-in cell did not start".to_owned(),
-                CellSource::Address(address) => format!("Cannot connect to {address}"),
+                CellSource::BuiltIn => text!("The built-in cell did not start"),
+                CellSource::Address(address) => text!("Cannot connect to {address}", address = address),
             };
-            status(Tone::Bad, title, sentence(why), Some(Action::Reconnect))
+            status(Tone::Bad, title, Text::verbatim(sentence(why)), Some(Action::Reconnect))
         }
     }
 }
@@ -145,7 +149,7 @@ fn sentence(text: &str) -> String {
 }
 
 /// `3 s`, `2 min 5 s`, `1 h 4 min`.
-fn duration(seconds: f64) -> String {
+pub fn duration(seconds: f64) -> String {
     let seconds = seconds.max(0.0) as u64;
     match seconds {
         0..60 => format!("{seconds} s"),

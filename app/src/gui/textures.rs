@@ -92,6 +92,15 @@ fn options(crisp: bool) -> TextureOptions {
     TextureOptions { magnification, ..TextureOptions::LINEAR }
 }
 
+/// Everything that the window keeps on the graphics card.
+#[derive(Default)]
+pub struct Textures {
+    /// The large pictures.
+    pub live: LiveTextures,
+    /// The small ones.
+    pub thumbnails: Thumbnails,
+}
+
 /// Small pictures of captures; each is uploaded when it is first seen on the screen.
 #[derive(Default)]
 pub struct Thumbnails {

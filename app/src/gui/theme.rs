@@ -1,17 +1,18 @@
 //! Every colour and text size of the window, in both themes.
 
-use egui::{Color32, CornerRadius, FontFamily, FontId, Margin, Stroke, TextStyle, Vec2, Visuals};
+use egui::{Color32, CornerRadius, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Vec2, Visuals};
 
-use crate::model::ThemeChoice;
+use super::fonts;
+use crate::model::{Severity, ThemeChoice};
 
 /// Text of captions above numbers.
 pub const CAPTION: f32 = 11.0;
 /// Titles of empty states.
-pub const TITLE: f32 = 21.0;
+pub const TITLE: f32 = 19.0;
 /// Rounding of cards and banners.
 pub const CARD_RADIUS: u8 = 8;
 /// Distance between cards, and from cards to the edge.
-pub const GAP: f32 = 12.0;
+pub const GAP: f32 = 8.0;
 
 /// Colours with a meaning.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +33,8 @@ pub struct Palette {
     pub weak: Color32,
     /// Selections and marks.
     pub accent: Color32,
+    /// Text that is selected, and the edge of what is being typed into.
+    pub selected: Color32,
     /// It works.
     pub good: Color32,
     /// It is being worked on.
@@ -42,6 +45,16 @@ pub struct Palette {
     pub bad: Color32,
     /// Text on `bad`.
     pub on_bad: Color32,
+    /// Text on `accent`.
+    pub on_accent: Color32,
+    /// A printed board.
+    pub paper: Color32,
+    /// What is printed on it.
+    pub ink: Color32,
+    /// The x axis of a frame.
+    pub axis_x: Color32,
+    /// The y axis of a frame.
+    pub axis_y: Color32,
     /// Marks over pictures, and their outline.
     pub mark: Color32,
     /// Outline of marks, which makes them visible on anything.
@@ -57,11 +70,17 @@ const DARK: Palette = Palette {
     text: Color32::from_rgb(226, 229, 235),
     weak: Color32::from_rgb(142, 149, 162),
     accent: Color32::from_rgb(92, 159, 255),
+    selected: Color32::from_rgb(158, 198, 255),
     good: Color32::from_rgb(70, 193, 118),
     busy: Color32::from_rgb(92, 159, 255),
     warning: Color32::from_rgb(240, 176, 64),
     bad: Color32::from_rgb(214, 60, 60),
     on_bad: Color32::from_rgb(255, 255, 255),
+    on_accent: Color32::from_rgb(10, 22, 40),
+    paper: Color32::from_rgb(206, 210, 218),
+    ink: Color32::from_rgb(30, 33, 40),
+    axis_x: Color32::from_rgb(236, 84, 84),
+    axis_y: Color32::from_rgb(70, 193, 118),
     mark: Color32::from_rgb(255, 255, 255),
     mark_outline: Color32::from_rgb(0, 0, 0),
 };
@@ -75,11 +94,17 @@ const LIGHT: Palette = Palette {
     text: Color32::from_rgb(28, 32, 40),
     weak: Color32::from_rgb(96, 104, 118),
     accent: Color32::from_rgb(24, 104, 219),
+    selected: Color32::from_rgb(16, 82, 178),
     good: Color32::from_rgb(24, 138, 74),
     busy: Color32::from_rgb(24, 104, 219),
     warning: Color32::from_rgb(176, 108, 0),
     bad: Color32::from_rgb(200, 36, 36),
     on_bad: Color32::from_rgb(255, 255, 255),
+    on_accent: Color32::from_rgb(255, 255, 255),
+    paper: Color32::from_rgb(255, 255, 255),
+    ink: Color32::from_rgb(44, 48, 58),
+    axis_x: Color32::from_rgb(208, 44, 44),
+    axis_y: Color32::from_rgb(24, 138, 74),
     mark: Color32::from_rgb(255, 255, 255),
     mark_outline: Color32::from_rgb(0, 0, 0),
 };
@@ -113,6 +138,20 @@ impl Palette {
         }
     }
 
+    /// The colour of a message.
+    pub fn severity(&self, severity: Severity) -> Color32 {
+        match severity {
+            Severity::Info => self.weak,
+            Severity::Warning => self.warning,
+            Severity::Error => self.bad,
+        }
+    }
+
+    /// A surface that is one step above the cards: fields, hovered rows.
+    pub fn raised(&self) -> Color32 {
+        self.card.lerp_to_gamma(self.text, 0.05)
+    }
+
     /// A surface that hints at a tone.
     pub fn tinted(&self, tone: Tone) -> Color32 {
         self.card.lerp_to_gamma(self.tone(tone), 0.16)
@@ -129,8 +168,14 @@ pub fn pixel([red, green, blue]: [u8; 3]) -> Color32 {
     Color32::from_rgb(red, green, blue)
 }
 
-/// Sets up both themes; once.
+/// A title: semibold where the language has it.
+pub fn title(text: impl Into<String>, size: f32) -> RichText {
+    RichText::new(text).font(FontId::new(size, fonts::semibold()))
+}
+
+/// Sets up fonts and both themes; once. The fonts are there from the next frame on.
 pub fn install(ctx: &egui::Context) {
+    ctx.set_fonts(fonts::definitions());
     ctx.style_mut_of(egui::Theme::Dark, |style| shape(style, Visuals::dark(), &DARK));
     ctx.style_mut_of(egui::Theme::Light, |style| shape(style, Visuals::light(), &LIGHT));
 }
@@ -145,30 +190,36 @@ pub fn choose(ctx: &egui::Context, theme: ThemeChoice) {
 
 fn shape(style: &mut egui::Style, visuals: Visuals, palette: &Palette) {
     style.text_styles = [
-        (TextStyle::Heading, FontId::new(18.0, FontFamily::Proportional)),
-        (TextStyle::Body, FontId::new(14.0, FontFamily::Proportional)),
-        (TextStyle::Button, FontId::new(14.0, FontFamily::Proportional)),
+        (TextStyle::Heading, FontId::new(16.0, fonts::semibold())),
+        (TextStyle::Body, FontId::new(13.0, FontFamily::Proportional)),
+        (TextStyle::Button, FontId::new(13.0, FontFamily::Proportional)),
         (TextStyle::Small, FontId::new(CAPTION, FontFamily::Proportional)),
-        (TextStyle::Monospace, FontId::new(13.0, FontFamily::Monospace)),
+        (TextStyle::Monospace, FontId::new(12.5, FontFamily::Monospace)),
     ]
     .into();
     style.spacing.item_spacing = Vec2::new(8.0, 4.0);
     style.spacing.button_padding = Vec2::new(10.0, 4.0);
     style.spacing.interact_size.y = 26.0;
-    style.spacing.window_margin = Margin::same(12);
+    style.spacing.window_margin = Margin::same(16);
+    style.spacing.menu_margin = Margin::same(6);
+    style.spacing.combo_width = 140.0;
+    style.spacing.scroll = egui::style::ScrollStyle::thin();
     style.interaction.selectable_labels = false;
     style.visuals = visuals;
     let visuals = &mut style.visuals;
     visuals.panel_fill = palette.backdrop;
     visuals.window_fill = palette.card;
     visuals.window_stroke = Stroke::new(1.0, palette.edge);
+    visuals.window_corner_radius = CornerRadius::same(10);
+    visuals.menu_corner_radius = CornerRadius::same(8);
+    visuals.text_edit_bg_color = Some(palette.well);
     visuals.extreme_bg_color = palette.well;
     visuals.weak_text_color = Some(palette.weak);
     visuals.hyperlink_color = palette.accent;
     visuals.warn_fg_color = palette.warning;
     visuals.error_fg_color = palette.bad;
-    visuals.selection.bg_fill = palette.card.lerp_to_gamma(palette.accent, 0.35);
-    visuals.selection.stroke = Stroke::new(1.0, palette.text);
+    visuals.selection.bg_fill = palette.card.lerp_to_gamma(palette.accent, 0.2);
+    visuals.selection.stroke = Stroke::new(1.0, palette.selected);
     visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, palette.edge);
     visuals.widgets.noninteractive.fg_stroke = Stroke::new(1.0, palette.text);
     for (widget, lift) in [

@@ -4,32 +4,46 @@ use std::time::Duration;
 
 use egui::Ui;
 
-use super::app::App;
+use super::actions;
+use super::fonts;
+use super::help;
+use super::layout::{self, Layout};
+use super::palette::CommandPalette;
 use super::panes;
-use super::textures::LiveTextures;
+use super::textures::Textures;
 use super::theme;
-use crate::command::Outbox;
-use crate::model::{ThemeChoice, ViewSettings};
+use crate::app::App;
+use crate::command::{Command, Outbox};
+use crate::model::{Dialog, ThemeChoice};
+use crate::settings::SettingsFile;
 
 /// Redraws at least this often, because ages and durations are shown.
 const CLOCK_PERIOD: Duration = Duration::from_millis(250);
 
-/// Key of the settings in eframe's storage.
-const SETTINGS_KEY: &str = "view";
-
-/// Application and graphics.
+/// Application, graphics, and what concerns nothing but the window: where panes are, which dialog is open.
 pub struct Window {
     app: App,
-    textures: LiveTextures,
+    textures: Textures,
     theme: Option<ThemeChoice>,
     outbox: Outbox,
+    layout: Layout,
+    palette: CommandPalette,
+    settings: SettingsFile,
 }
 
 impl Window {
-    /// For an application.
-    pub fn new(app: App, ctx: &egui::Context) -> Self {
+    /// For an application, with a remembered layout, and with the place where changed settings are written.
+    pub fn new(app: App, layout: Layout, settings: SettingsFile, ctx: &egui::Context) -> Self {
         theme::install(ctx);
-        Self { app, textures: LiveTextures::default(), theme: None, outbox: Outbox::default() }
+        Self {
+            app,
+            textures: Textures::default(),
+            theme: None,
+            outbox: Outbox::default(),
+            layout,
+            palette: CommandPalette::default(),
+            settings,
+        }
     }
 
     /// Takes in what happened, while the window may be hidden.
@@ -44,15 +58,77 @@ impl Window {
 
     /// Draws everything and applies what the user asked for.
     pub fn window_ui(&mut self, ui: &mut Ui) {
-        let Self { app, textures, outbox, .. } = self;
-        textures.update(ui.ctx(), app.model());
-        panes::all_ui(ui, app.model(), textures, outbox);
+        if !fonts::are_there(ui.ctx()) {
+            // The very first frame of a test; eframe draws its first frame with the fonts.
+            theme::install(ui.ctx());
+            ui.request_repaint();
+            return;
+        }
+        self.keyboard(ui.ctx());
+        let Self { app, textures, outbox, layout, palette, .. } = self;
+        let model = app.model();
+        textures.live.update(ui.ctx(), model);
+        panes::all_ui(ui, model, textures, layout, outbox);
+        match model.dialog {
+            None => {}
+            Some(Dialog::Palette) => palette.palette_ui(ui.ctx(), model, outbox),
+            Some(dialog) => help::dialog_ui(ui.ctx(), dialog, model, outbox),
+        }
         if outbox.is_empty() {
             ui.request_repaint_after(CLOCK_PERIOD);
         } else {
-            app.apply_all(outbox);
+            self.apply_all();
             ui.request_repaint();
         }
+    }
+
+    /// Esc stops the arm whatever else is going on, and closes what is open.
+    fn keyboard(&mut self, ctx: &egui::Context) {
+        if ctx.input(|input| input.key_pressed(actions::STOP_KEY)) {
+            self.outbox.send(Command::Stop);
+            if self.app.model().dialog.is_some() {
+                self.outbox.send(Command::SetDialog(None));
+            }
+        }
+        if self.app.model().dialog.is_none() {
+            for command in actions::pressed(ctx, self.app.model()) {
+                self.outbox.send(command);
+            }
+        }
+    }
+
+    fn apply_all(&mut self) {
+        let commands: Vec<_> = self.outbox.drain().collect();
+        for (command, place) in commands {
+            tracing::trace!(?command, %place, "command");
+            self.apply(command);
+        }
+        let model = self.app.model();
+        if let Err(warning) = self.settings.keep(model.view, &model.addresses) {
+            self.app.absorb(warning.into());
+        }
+    }
+
+    /// Does what concerns the window; the rest is for the application.
+    pub(super) fn apply(&mut self, command: Command) {
+        match command {
+            Command::GoToStep(step) => {
+                self.layout.go_to(step);
+                self.app.apply(command);
+            }
+            Command::ShowPane(pane) => self.layout.show(pane),
+            Command::ResetLayout => self.layout = Layout::default(),
+            Command::SetDialog(_) => {
+                self.palette = CommandPalette::default();
+                self.app.apply(command);
+            }
+            command => self.app.apply(command),
+        }
+    }
+
+    /// The application.
+    pub fn app_mut(&mut self) -> &mut App {
+        &mut self.app
     }
 
     /// The application.
@@ -61,10 +137,16 @@ impl Window {
         &mut self.app
     }
 
+    /// Where the panes are.
+    #[cfg(test)]
+    pub fn layout(&mut self) -> &mut Layout {
+        &mut self.layout
+    }
+
     /// How many frames went to the graphics card.
     #[cfg(test)]
     pub fn uploads(&self) -> u64 {
-        self.textures.uploads()
+        self.textures.live.uploads()
     }
 }
 
@@ -78,13 +160,8 @@ impl eframe::App for Window {
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
-        eframe::set_value(storage, SETTINGS_KEY, &self.app.model().view);
+        eframe::set_value(storage, layout::STORAGE_KEY, &self.layout);
     }
-}
-
-/// The settings of the last time; defaults when there are none that can be read.
-pub fn stored_settings(storage: Option<&dyn eframe::Storage>) -> ViewSettings {
-    storage.and_then(|storage| eframe::get_value(storage, SETTINGS_KEY)).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -1,134 +1,13 @@
-use std::sync::Arc;
-
-use egui::{Vec2, vec2};
-use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
-use handeye_core::depth::DepthImage;
-use handeye_core::frames::Pose;
-use handeye_core::image::{Rgb, RgbImage};
+use egui::vec2;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use handeye_core::handeye::Mode;
+use handeye_core::target::TargetSpec;
 
 use super::*;
-use crate::command::{Command, Event};
-use crate::model::{
-    CellSource, FrameImages, FrameInfo, ImagePoint, Link, LinkState, RobotState, RotationFormat, Simulation,
-};
-use crate::worker::fake::FakeCell;
-use crate::worker::{Clock, Connector, PortError, Waker};
-
-/// The window over workers that have nothing to say: the tests are the only ones that report.
-struct Silent {
-    harness: Harness<'static, Window>,
-    _release: crossbeam_channel::Sender<()>,
-}
-
-const SIZE: Vec2 = vec2(1440.0, 900.0);
-
-impl Silent {
-    fn new(source: CellSource) -> Self {
-        Self::of_size(source, SIZE)
-    }
-
-    fn of_size(source: CellSource, size: Vec2) -> Self {
-        let (cell, release) = FakeCell::that_never_answers();
-        // The workers fail once and then wait for the user, so that nothing comes from them.
-        cell.script().refusals = vec![PortError::Hopeless("not in this test".to_owned()); 2];
-        let connector: Arc<dyn Connector> = Arc::new(cell);
-        let clock: Clock = Arc::new(|| 100.0);
-        let (wake, woken) = crossbeam_channel::bounded(1);
-        let waker: Waker = wakes(wake);
-        let mut app = App::start(source, ViewSettings::default(), &connector, clock, &waker).expect("threads");
-        while ![Link::Control, Link::Camera]
-            .iter()
-            .all(|&link| matches!(app.model().link(link), LinkState::Failed { .. }))
-        {
-            woken.recv_timeout(std::time::Duration::from_secs(20)).expect("the workers report");
-            app.collect();
-        }
-        let harness = Harness::builder().with_size(size).build_ui_state(
-            |ui, window: &mut Window| {
-                let ctx = ui.ctx().clone();
-                window.collect(&ctx);
-                window.window_ui(ui);
-            },
-            Window::new(app, &egui::Context::default()),
-        );
-        let mut silent = Self { harness, _release: release };
-        theme::install(&silent.harness.ctx);
-        silent.steps();
-        silent
-    }
-
-    fn steps(&mut self) {
-        self.harness.run_steps(3);
-    }
-
-    fn app(&mut self) -> &mut App {
-        self.harness.state_mut().app()
-    }
-
-    fn absorb(&mut self, event: Event) {
-        self.app().absorb(event);
-        self.steps();
-    }
-
-    fn links(&mut self, state: &LinkState) {
-        for link in [Link::Control, Link::Camera] {
-            self.absorb(Event::Link { link, state: state.clone() });
-        }
-    }
-
-    fn sees(&self, part: &str) -> bool {
-        self.harness.query_all_by_label_contains(part).count() > 0
-    }
-
-    fn live() -> Self {
-        let mut silent = Self::new(CellSource::BuiltIn);
-        silent.links(&connected());
-        silent.absorb(Event::Robot(robot(Simulation::Running)));
-        silent.absorb(frame(1));
-        silent
-    }
-}
-
-fn wakes(wake: crossbeam_channel::Sender<()>) -> Waker {
-    // A full channel wakes as well as a fuller one.
-    Arc::new(move || {
-        let _full = wake.try_send(()).is_err();
-    })
-}
-
-fn connected() -> LinkState {
-    LinkState::Connected { address: "tcp://127.0.0.1:1".to_owned(), server: "built-in cell".to_owned() }
-}
-
-fn robot(simulation: Simulation) -> RobotState {
-    RobotState {
-        base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
-        joints_rad: [0.0, std::f64::consts::FRAC_PI_4, -1.0, 0.0, 0.0, 0.0],
-        sim_time_s: 12.35,
-        simulation,
-    }
-}
-
-/// Column and row are in the colours, and the column is in the depth.
-fn frame(number: u64) -> Event {
-    let (width, height) = (64, 48);
-    let rgb = RgbImage::from_fn(width, height, |column, row| Rgb([column as u8, row as u8, 200]));
-    let mut metres: Vec<f32> = (0..width * height).map(|i| 0.5 + 0.01 * (i % width) as f32).collect();
-    metres[0] = 3.5;
-    let images = FrameImages { depth_coloured: rgb.clone(), depth: DepthImage { width, height, metres }, rgb };
-    let info = FrameInfo {
-        number,
-        sim_time_s: 12.3,
-        received_s: 100.0,
-        rate_hz: 20.0,
-        depth_range_m: [0.4, 1.2],
-        far_plane_m: 3.5,
-        base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
-        joints_rad: [0.0; 6],
-    };
-    Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) }
-}
+use crate::command::Event;
+use crate::gui::testing::{Silent, connected, frame, robot};
+use crate::model::{CellSource, ImagePoint, Link, LinkState, Pane, RotationFormat, Simulation, Step};
+use crate::text::Language;
 
 #[test]
 fn every_state_of_the_connection_says_what_goes_on() {
@@ -225,14 +104,19 @@ fn stop_is_one_click_away_in_every_state() {
 }
 
 #[test]
-fn the_theme_is_switched_and_remembered() {
+fn theme_and_language_are_switched_in_the_menu_at_once() {
     let mut silent = Silent::live();
     assert!(silent.harness.ctx.global_style().visuals.dark_mode);
-    silent.harness.get_by_label("Light theme").click();
-    silent.steps();
+    for name in ["Menu", "Theme ⏵", "Light theme"] {
+        silent.click(name);
+    }
     assert!(!silent.harness.ctx.global_style().visuals.dark_mode);
     assert_eq!(silent.app().model().view.theme, ThemeChoice::Light);
-    assert!(silent.harness.query_by_label("Dark theme").is_some());
+    for name in ["Menu", "Language ⏵", "简体中文"] {
+        silent.click(name);
+    }
+    assert_eq!(silent.app().model().view.language, Language::Chinese);
+    assert!(silent.sees("标定板") && !silent.sees("Poses"));
 }
 
 #[test]
@@ -272,10 +156,223 @@ fn nothing_is_cut_off_at_the_smallest_size() {
     silent.links(&connected());
     silent.absorb(Event::Robot(robot(Simulation::Running)));
     silent.absorb(frame(1));
-    silent.app().apply(Command::SetRotationFormat(RotationFormat::Quaternion));
-    silent.steps();
-    for label in ["STOP", "Light theme", "Dropped: 7", "Full range", "Colour picture", "Depth picture"] {
-        let rect = silent.harness.get_by_label(label).rect();
-        assert!(rect.min.x >= 0.0 && rect.max.x <= size.x && rect.max.y <= size.y, "{label}: {rect:?}");
+    for language in Language::ALL {
+        silent.command(Command::SetLanguage(language));
+        silent.command(Command::SetRotationFormat(RotationFormat::Quaternion));
+        let tr = |english| crate::text::translation(language, english).unwrap_or(english).to_owned();
+        let mut labels: Vec<_> = ["STOP", "Menu", "Undo", "Redo", "Full range", "Colour picture", "Depth picture"]
+            .into_iter()
+            .map(tr)
+            .collect();
+        labels.push(format!("{}: 7", tr("Dropped")));
+        labels.extend(Pane::ALL.map(|pane| panes::title(pane, language).to_owned()));
+        for label in labels {
+            let nodes: Vec<_> = silent.harness.query_all_by_label(&label).collect();
+            assert!(!nodes.is_empty(), "{label} is not there");
+            for node in nodes {
+                let rect = node.rect();
+                assert!(rect.width() > 0.0 && rect.height() > 0.0, "{label}: {rect:?}");
+                let inside = rect.min.x >= 0.0 && rect.min.y >= 0.0 && rect.max.x <= size.x && rect.max.y <= size.y;
+                assert!(inside, "{label}: {rect:?}");
+            }
+        }
     }
+}
+
+#[test]
+fn every_tab_of_the_first_layout_is_wholly_seen_at_the_smallest_size() {
+    let mut silent = Silent::of_size(CellSource::BuiltIn, vec2(1024.0, 700.0));
+    let right = silent.harness.get_by_label("Export").rect();
+    assert!(right.max.x < 1024.0 - 8.0, "{right:?}");
+    silent.click("Export");
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Export));
+}
+
+#[test]
+fn a_step_brings_its_panes_to_the_front_by_click_and_by_key() {
+    let mut silent = Silent::live();
+    let step = silent.harness.get_by_label_contains("4 Solve: blocked");
+    step.click();
+    silent.steps();
+    for pane in [Pane::Charts, Pane::Result] {
+        assert!(silent.harness.state_mut().layout().is_in_front(pane), "{pane:?}");
+    }
+    silent.press(egui::Modifiers::NONE, egui::Key::Num2);
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Target));
+    silent.command(Command::GoToStep(Step::Capture));
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Jog));
+    silent.command(Command::ResetLayout);
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Connect));
+}
+
+#[test]
+fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
+    let mut silent = Silent::live();
+    silent.press(egui::Modifiers::NONE, egui::Key::Escape);
+    assert!(silent.app().model().stop_pending);
+
+    silent.absorb(Event::Stopped);
+    silent.click("Address");
+    silent.harness.get_by_label("Address of the cell").focus();
+    silent.steps();
+    assert!(silent.harness.ctx.text_edit_focused());
+    silent.press(egui::Modifiers::NONE, egui::Key::Escape);
+    assert!(silent.app().model().stop_pending);
+
+    silent.absorb(Event::Stopped);
+    silent.command(Command::SetDialog(Some(Dialog::Help)));
+    assert!(silent.sees("Esc stops the arm at any time"));
+    silent.press(egui::Modifiers::NONE, egui::Key::Escape);
+    assert!(silent.app().model().stop_pending);
+    assert!(!silent.sees("Esc stops the arm at any time"));
+}
+
+#[test]
+fn keys_rest_while_text_is_typed() {
+    let mut silent = Silent::live();
+    silent.click("Address");
+    silent.harness.get_by_label("Address of the cell").focus();
+    silent.steps();
+    silent.press(egui::Modifiers::NONE, egui::Key::Num2);
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Connect));
+    silent.press(egui::Modifiers::COMMAND, egui::Key::K);
+    assert!(silent.harness.query_by_label("Type a command").is_none());
+}
+
+#[test]
+fn a_command_is_found_by_typing_and_done_by_enter() {
+    let mut silent = Silent::live();
+    silent.press(egui::Modifiers::COMMAND, egui::Key::K);
+    assert!(silent.harness.query_by_label("Type a command").is_some());
+    silent.harness.event(egui::Event::Text("light".to_owned()));
+    silent.steps();
+    silent.press(egui::Modifiers::NONE, egui::Key::Enter);
+    assert_eq!(silent.app().model().view.theme, ThemeChoice::Light);
+    assert!(silent.harness.query_by_label("Type a command").is_none());
+}
+
+#[test]
+fn the_help_lists_the_keys_that_work() {
+    let mut silent = Silent::live();
+    silent.press(egui::Modifiers::NONE, egui::Key::F1);
+    for text in ["Stop the arm", "Esc", "Ctrl+Z", "Ctrl+Shift+Z", "Space", "Delete the selected captures", "F1"] {
+        assert!(silent.sees(text), "{text}");
+    }
+    silent.click("Close");
+    assert!(!silent.sees("Delete the selected captures"));
+}
+
+#[test]
+fn an_error_stays_on_the_screen_until_it_is_put_aside_and_then_in_the_log() {
+    let mut silent = Silent::live();
+    let text = crate::text::Text::verbatim("the lens cap is on");
+    silent.absorb(Event::Notice { severity: crate::model::Severity::Error, text });
+    assert!(
+        silent.harness.query_all_by_label("the lens cap is on").count() >= 2,
+        "over the panes and in the status bar"
+    );
+    let all = silent.app().model().messages.iter().len();
+    for _ in 0..all {
+        if let Some(button) = silent.harness.query_all_by_label("Dismiss").next() {
+            button.click();
+        }
+        silent.steps();
+    }
+    assert!(silent.harness.query_all_by_label("Dismiss").next().is_none());
+    silent.show(Pane::Log);
+    silent.click("Errors");
+    assert!(silent.harness.query_all_by_label("the lens cap is on").count() >= 2, "in the log and the status bar");
+}
+
+#[test]
+fn an_address_is_checked_before_it_is_used() {
+    let mut silent = Silent::live();
+    silent.click("Address");
+    let button = |silent: &Silent| silent.harness.get_by_label("Connect now").accesskit_node().is_disabled();
+    assert!(!button(&silent), "the usual port on this machine is offered");
+    silent.harness.get_by_label("Address of the cell").focus();
+    silent.steps();
+    silent.harness.event(egui::Event::Text("!".to_owned()));
+    silent.steps();
+    assert!(button(&silent));
+    silent.press(egui::Modifiers::NONE, egui::Key::Backspace);
+    silent.click("Connect now");
+    assert_eq!(silent.app().model().addresses, ["tcp://127.0.0.1:23000"]);
+}
+
+#[test]
+fn the_board_and_the_mode_are_set_in_the_target_pane() {
+    let mut silent = Silent::live();
+    silent.show(Pane::Target);
+    assert!(silent.sees("10 × 7 corners are 11 × 8 squares"));
+    silent.click("Dots");
+    silent.until("dots", |model| matches!(model.document().meta.target, TargetSpec::Circles(_)));
+    assert!(silent.sees("This board looks the same after half a turn"));
+    silent.click("Eye to hand");
+    silent.until("the mode", |model| model.document().meta.mode == Mode::EyeToHand);
+    silent.click("Fixed");
+    silent.until("the camera", |model| {
+        model.document().meta.camera.is_some_and(|camera| camera.fixed && camera.intrinsics.is_some())
+    });
+}
+
+/// Every text that a shape shows.
+fn texts(shape: &egui::Shape, found: &mut Vec<String>) {
+    match shape {
+        egui::Shape::Text(text) => found.push(text.galley.text().to_owned()),
+        egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| texts(shape, found)),
+        _ => {}
+    }
+}
+
+#[test]
+fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
+    let mut silent = Silent::live();
+    let dialogs = [Dialog::Help, Dialog::About, Dialog::Palette].map(|dialog| Command::SetDialog(Some(dialog)));
+    let views: Vec<_> = Pane::ALL.map(Command::ShowPane).into_iter().chain(dialogs).collect();
+    for language in Language::ALL {
+        for theme in [ThemeChoice::Dark, ThemeChoice::Light] {
+            silent.command(Command::SetLanguage(language));
+            silent.command(Command::SetTheme(theme));
+            for view in &views {
+                silent.command(view.clone());
+                let mut found = Vec::new();
+                silent.harness.output().shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut found));
+                assert!(found.len() > 20, "{view:?} {language:?}: nothing is drawn");
+                for text in found {
+                    assert_eq!(missing(&silent, &text), "", "{view:?} {language:?}: {text}");
+                }
+                silent.command(Command::SetDialog(None));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_fonts_have_every_letter_of_every_catalogue() {
+    let silent = Silent::new(CellSource::BuiltIn);
+    for (english, chinese) in crate::text::every_translation() {
+        for text in [english, chinese] {
+            assert_eq!(missing(&silent, text), "", "{text}");
+        }
+    }
+}
+
+/// The letters of a text that a font does not have.
+fn missing(silent: &Silent, text: &str) -> String {
+    let families = [egui::FontFamily::Proportional, egui::FontFamily::Monospace, fonts::semibold()];
+    silent.harness.ctx.fonts_mut(|fonts| {
+        let mut letters: std::collections::BTreeSet<char> =
+            text.chars().filter(|letter| !letter.is_whitespace()).collect();
+        let mut missing = String::new();
+        for family in &families {
+            let known = fonts.fonts.font(family).characters().clone();
+            let unknown: Vec<char> = letters.iter().copied().filter(|letter| !known.contains_key(letter)).collect();
+            for letter in unknown {
+                letters.remove(&letter);
+                missing.push(letter);
+            }
+        }
+        missing
+    })
 }

@@ -2,6 +2,7 @@
 
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::observation::Corner;
+use handeye_core::vision::VisionError;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -19,6 +20,10 @@ pub struct LiveDetection {
     pub base_from_tip: Pose<Base, Tip>,
     /// How long the search took [s].
     pub took_s: f64,
+    /// Why the picture could not be searched at all, which is another thing than a board that is not in it.
+    pub problem: Option<VisionError>,
+    /// Frames so far that were never searched, because newer ones came first.
+    pub dropped: u64,
 }
 
 /// What a capture is for.

@@ -5,12 +5,14 @@
 
 mod capture;
 mod export;
+mod messages;
 mod motion;
 mod session;
 mod solve;
 mod view;
+mod workflow;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -29,6 +31,7 @@ pub use capture::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
 pub use export::{ExportState, Preview, PreviewFile, Written};
+pub use messages::{Message, Messages};
 pub use motion::{
     Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
@@ -37,10 +40,11 @@ pub use session::{
     FolderEntry, FolderKind, FolderListing, Observed, RecentSession, Review, SessionState, StopOutcome, Tour,
 };
 pub use solve::{JobId, SolveState, SolveStatus, Solved};
-pub use view::{Dialog, Overlays, PickedPoint, Step, Viewport, exports_of};
+pub use view::{Overlays, PickedPoint, Viewport, exports_of};
+pub use workflow::{Dialog, Pane, Step};
 
 use crate::session_start;
-use crate::text::{Language, Text};
+use crate::text::Language;
 
 /// Which cell the window works with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -296,8 +300,8 @@ impl Default for Goal {
     }
 }
 
-/// How much a message matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// How much a message matters, least first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Severity {
     /// It went as asked.
     Info,
@@ -305,21 +309,6 @@ pub enum Severity {
     Warning,
     /// It failed.
     Error,
-}
-
-/// Something that happened, in words.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Message {
-    /// Its number; later messages have larger ones.
-    pub id: u64,
-    /// Whether the user has seen it and wants it off the screen; the log keeps it.
-    pub dismissed: bool,
-    /// How much it matters.
-    pub severity: Severity,
-    /// The words.
-    pub text: Text,
-    /// When it happened.
-    pub at_s: f64,
 }
 
 /// Everything that the window shows.
@@ -351,8 +340,10 @@ pub struct Model {
     pub cursor: Option<ImagePoint>,
     /// What is remembered from one start to the next.
     pub view: ViewSettings,
-    /// What happened, oldest first; the last ones of many.
-    pub messages: VecDeque<Message>,
+    /// What happened, in words.
+    pub messages: Messages,
+    /// Addresses that were connected to before, newest first.
+    pub addresses: Vec<String>,
     /// The board in the newest picture that was searched.
     pub detection: Option<LiveDetection>,
     /// The capture that is under way.
@@ -413,7 +404,8 @@ impl Model {
             stop_pending: false,
             cursor: None,
             view,
-            messages: VecDeque::new(),
+            messages: Messages::default(),
+            addresses: Vec::new(),
             detection: None,
             capture: None,
             refused: None,
@@ -454,11 +446,6 @@ impl Model {
     /// Age of the newest pictures [s].
     pub fn frame_age_s(&self) -> Option<f64> {
         self.frame.as_ref().map(|frame| (self.now_s - frame.info.received_s).max(0.0))
-    }
-
-    /// The newest message.
-    pub fn message(&self) -> Option<&Message> {
-        self.messages.back()
     }
 
     /// The captures and what they are for.

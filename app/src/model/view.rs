@@ -1,4 +1,4 @@
-//! How the pictures are looked at, and which part of the work is in front.
+//! How the pictures are looked at.
 
 use std::path::PathBuf;
 
@@ -45,53 +45,6 @@ impl Default for Viewport {
     fn default() -> Self {
         Self { centre: [0.5, 0.5], zoom: 1.0 }
     }
-}
-
-/// The steps of the work, in their order.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Step {
-    /// A cell with a camera.
-    #[default]
-    Connect,
-    /// What is looked at.
-    Target,
-    /// Views of it.
-    Capture,
-    /// The calibration.
-    Solve,
-    /// Whether it is right.
-    Verify,
-    /// Files for others.
-    Export,
-}
-
-impl Step {
-    /// All of them in their order.
-    pub const ALL: [Self; 6] =
-        [Self::Connect, Self::Target, Self::Capture, Self::Solve, Self::Verify, Self::Export];
-}
-
-/// Dialogs over the window.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Dialog {
-    /// Keys and what they do.
-    Help,
-    /// Every command by its name.
-    Palette,
-    /// Choose a session or data set to open.
-    Open,
-    /// Choose where a copy of the session goes.
-    SaveAs,
-    /// Choose where a new session goes.
-    New,
-    /// Choose a file of taught poses to read.
-    ImportPoses,
-    /// Choose where taught poses are written.
-    ExportPoses,
-    /// Choose where exports go.
-    ExportFolder,
-    /// What this program is.
-    About,
 }
 
 /// A point that was picked in the live picture.

@@ -10,16 +10,17 @@ use crossbeam_channel::{Receiver, select};
 use handeye_core::dataset::Dataset;
 use handeye_core::poses_file::TaughtPose;
 use handeye_core::result::CalibrationResult;
-use handeye_core::session::{Capture, CaptureId, Document, Edit, EditError, Role, SessionError, SessionMeta, Store};
+use handeye_core::session::{Capture, Document, Edit, Role, SessionError, SessionMeta, Store};
 
+use super::files::kind_of;
 use super::link::Outlet;
 use super::vision::Measured;
 use crate::command::Event;
-use crate::model::{CapturePurpose, CaptureRefused, CaptureWait, Observed, RefusalKind, SessionState, Severity};
+use crate::model::{CapturePurpose, CaptureRefused, CaptureWait, FolderKind, Observed, RefusalKind, SessionState, Severity};
 use crate::text;
 use crate::text::Text;
 
-pub use folders::{free_folder, timestamp};
+pub use folders::{free_folder, timestamp, timestamp_rfc3339};
 
 /// What a session begins with.
 #[derive(Debug, Clone)]
@@ -42,10 +43,15 @@ pub enum ArchiveTask {
         /// With what.
         beginning: Box<Beginning>,
     },
-    /// Go on with a session.
+    /// Go on with a session, or begin one with the images and poses of a data set.
     Open(PathBuf),
-    /// Begin a session with the images and poses of a data set.
-    Import(PathBuf),
+    /// Go on with the session in a folder, or begin one there when there is none.
+    OpenOrNew {
+        /// Where.
+        folder: PathBuf,
+        /// With what.
+        beginning: Box<Beginning>,
+    },
     /// Go on with a complete copy in another folder.
     SaveAs(PathBuf),
     /// Change the document.
@@ -104,17 +110,33 @@ impl Archive {
                 }
             }
             ArchiveTask::New { folder, beginning } => self.begin(folder, *beginning),
-            ArchiveTask::Open(folder) => {
-                let opened = Store::open(&folder);
-                self.take(opened, |error| text!("The session was not opened: {error}", error = error));
+            ArchiveTask::Open(folder) => self.open(&folder),
+            ArchiveTask::OpenOrNew { folder, beginning } => {
+                if kind_of(&folder) == FolderKind::Plain {
+                    self.begin(Some(folder), *beginning);
+                } else {
+                    self.open(&folder);
+                }
             }
-            ArchiveTask::Import(folder) => self.import(&folder),
             ArchiveTask::SaveAs(folder) => self.save_as(&folder),
             ArchiveTask::Edit(edit) => self.change(|store| store.apply(*edit)),
             ArchiveTask::Undo => self.change(Store::undo),
             ArchiveTask::Redo => self.change(Store::redo),
             ArchiveTask::Result(result) => self.keep_result(*result),
         }
+    }
+
+    fn open(&mut self, folder: &Path) {
+        if kind_of(folder) == FolderKind::Dataset {
+            self.import(folder);
+            return;
+        }
+        if self.store.as_ref().is_some_and(|store| store.folder() == folder) {
+            self.outlet.report(Event::SessionOpened);
+            return;
+        }
+        let opened = Store::open(folder);
+        self.take(opened, |error| text!("The session was not opened: {error}", error = error));
     }
 
     fn begin(&mut self, folder: Option<PathBuf>, beginning: Beginning) {
@@ -135,14 +157,17 @@ impl Archive {
         Store::create_with(&folder, document)
     }
 
+    /// The session that is open; one is begun when there is something to keep and none is.
     fn store(&mut self) -> Result<&mut Store, SessionError> {
-        if self.store.is_none() {
-            let store = self.create(None)?;
-            self.outlet.notice(Severity::Info, text!("New session in {folder}", folder = store.folder().display()));
-            self.store = Some(store);
-        }
-        // It has just been put there.
-        self.store.as_mut().ok_or_else(|| unreachable_store(&self.sessions))
+        let store = match self.store.take() {
+            Some(store) => store,
+            None => {
+                let store = self.create(None)?;
+                self.outlet.notice(Severity::Info, text!("New session in {folder}", folder = store.folder().display()));
+                store
+            }
+        };
+        Ok(self.store.insert(store))
     }
 
     /// Goes on with another session, or tells why not and stays with the present one.

@@ -1,17 +1,17 @@
-//! The camera worker: fetches pictures, colours the depth, and puts the newest pair where the window finds it.
+//! The camera worker: fetches pictures, colours the depth, and puts the newest pair where window and vision find it.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
+use handeye_core::depth::ColourMap;
 use handeye_sim_link::client::CancelToken;
 
 use super::link::{Duty, Outlet};
 use super::port::{CameraPort, Connected, Connector, PortError, RawFrame};
-use super::slot::LatestSlot;
+use super::slot::{LatestSlot, Tap};
 use crate::depth_view;
-use handeye_core::depth::ColourMap;
-use crate::model::{DepthScale, FrameImages, FrameInfo, Link, LiveFrame};
+use crate::model::{DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};
 
 /// Rest between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
 const PERIOD: Duration = Duration::from_millis(15);
@@ -27,12 +27,16 @@ const RATE_GAP_S: f64 = 2.0;
 pub enum CameraTask {
     /// Which depths the colour map covers, from the next picture on.
     SetDepthScale(DepthScale),
+    /// The colours of depths, from the next picture on.
+    SetDepthColours(ColourMap),
 }
 
 /// The duty of the camera worker.
 pub struct Camera {
     frames: Arc<LatestSlot<LiveFrame>>,
+    for_vision: Arc<Tap<LiveFrame>>,
     scale: DepthScale,
+    colours: ColourMap,
     auto_range_m: Option<[f32; 2]>,
     seen_sim_time_s: Option<f64>,
     number: u64,
@@ -40,9 +44,18 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// With the place that it shares with the application.
-    pub fn new(scale: DepthScale, frames: Arc<LatestSlot<LiveFrame>>) -> Self {
-        Self { frames, scale, auto_range_m: None, seen_sim_time_s: None, number: 0, rate: RateMeter::default() }
+    /// With the places that it shares with the application and with the vision thread.
+    pub fn new(view: &ViewSettings, frames: Arc<LatestSlot<LiveFrame>>, for_vision: Arc<Tap<LiveFrame>>) -> Self {
+        Self {
+            frames,
+            for_vision,
+            scale: view.depth_scale,
+            colours: view.depth_colours,
+            auto_range_m: None,
+            seen_sim_time_s: None,
+            number: 0,
+            rate: RateMeter::default(),
+        }
     }
 
     /// Prepares the newest pictures for the window.
@@ -56,7 +69,7 @@ impl Camera {
         let [near_m, far_m] = depth_range_m;
         let depth_coloured = raw
             .depth
-            .colours(ColourMap::Turbo, near_m, far_m, far_plane_m)
+            .colours(self.colours, near_m, far_m, far_plane_m)
             .map_err(|error| PortError::Refused(format!("the depth picture cannot be shown: {error}")))?;
         self.number += 1;
         let info = FrameInfo {
@@ -89,7 +102,9 @@ impl Duty for Camera {
     }
 
     fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
-        if self.seen_sim_time_s == Some(port.sim_time_s()?) {
+        let sim_time_s = port.sim_time_s()?;
+        self.for_vision.heard(outlet.now_s());
+        if self.seen_sim_time_s == Some(sim_time_s) {
             return Ok(PERIOD);
         }
         let raw = port.grab()?;
@@ -97,6 +112,8 @@ impl Duty for Camera {
         self.seen_sim_time_s = Some(raw.sim_time_s);
         self.rate.arrived(received_s);
         let frame = self.prepare(raw, port.depth_limits_m(), received_s)?;
+        // The pixels are shared, not copied.
+        self.for_vision.put(frame.clone());
         self.frames.put(frame);
         (outlet.waker)();
         Ok(PERIOD)
@@ -104,12 +121,11 @@ impl Duty for Camera {
 
     fn perform(&mut self, _port: Option<&mut Self::Port>, task: Self::Task, _outlet: &Outlet) -> Result<(), PortError> {
         match task {
-            CameraTask::SetDepthScale(scale) => {
-                self.scale = scale;
-                // A resting simulation would otherwise show the old colours until it runs.
-                self.seen_sim_time_s = None;
-            }
+            CameraTask::SetDepthScale(scale) => self.scale = scale,
+            CameraTask::SetDepthColours(colours) => self.colours = colours,
         }
+        // A resting simulation would otherwise show the old colours until it runs.
+        self.seen_sim_time_s = None;
         Ok(())
     }
 }

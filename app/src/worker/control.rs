@@ -1,7 +1,7 @@
 //! The control worker: reads the robot, starts the simulation, stops the arm.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use handeye_sim_link::client::CancelToken;
@@ -10,30 +10,40 @@ use super::link::{Duty, Outlet};
 use super::port::{Connected, Connector, ControlPort, PortError};
 use super::slot::LatestSlot;
 use crate::command::Event;
-use crate::text;
 use crate::model::{CellSource, Link, RobotState, Severity, Simulation};
+use crate::text;
 
 /// Rest between two readings: numbers that change faster cannot be read, and each reading draws the window.
 const PERIOD: Duration = Duration::from_millis(100);
 
-/// The way of a stop to the arm. It is not a message in a queue that may be full, but a flag that the worker looks at
-/// before anything else, and it stays raised until the arm has been stopped.
+/// The way of a stop to the arm. It is not a message in a queue that may be full, but a count that the worker looks at
+/// before anything else, and it stays ahead until the arm has been stopped.
 #[derive(Debug, Default)]
-pub struct StopLine(AtomicBool);
+pub struct StopLine {
+    pressed: AtomicU64,
+    done: AtomicU64,
+}
 
 impl StopLine {
     /// Asks for a stop.
     pub fn press(&self) {
-        self.0.store(true, Ordering::Release);
+        self.pressed.fetch_add(1, Ordering::AcqRel);
     }
 
     /// Whether a stop is asked for and not done.
     pub fn is_pressed(&self) -> bool {
-        self.0.load(Ordering::Acquire)
+        self.wanted().is_some()
     }
 
-    fn release(&self) {
-        self.0.store(false, Ordering::Release);
+    /// The number of the newest stop that is not done.
+    fn wanted(&self) -> Option<u64> {
+        let pressed = self.pressed.load(Ordering::Acquire);
+        (pressed > self.done.load(Ordering::Acquire)).then_some(pressed)
+    }
+
+    /// Stops up to this one are done. One that was pressed meanwhile is not.
+    fn finish(&self, number: u64) {
+        self.done.fetch_max(number, Ordering::AcqRel);
     }
 }
 
@@ -53,29 +63,30 @@ pub struct Control {
     /// The built-in cell belongs to this program, which starts its simulation; on somebody's CoppeliaSim that is for
     /// the user to decide.
     start_by_itself: bool,
+    /// The connection is new.
+    owes_facts: bool,
 }
 
 impl Control {
     /// For a cell, with the places that it shares with the application.
     pub fn new(source: &CellSource, stop: Arc<StopLine>, robot: Arc<LatestSlot<RobotState>>) -> Self {
-        Self { stop, robot, start_by_itself: *source == CellSource::BuiltIn }
+        Self { stop, robot, start_by_itself: *source == CellSource::BuiltIn, owes_facts: true }
     }
 
     fn stop_if_pressed(&self, port: &mut dyn ControlPort, outlet: &Outlet) -> Result<(), PortError> {
-        if !self.stop.is_pressed() {
-            return Ok(());
-        }
-        // Released first: pressing again while the arm is being stopped is a new stop, not a lost one.
-        self.stop.release();
+        let Some(number) = self.stop.wanted() else { return Ok(()) };
         match port.stop() {
-            Ok(()) => outlet.report(Event::Stopped),
+            Ok(()) => {
+                self.stop.finish(number);
+                outlet.report(Event::Stopped);
+                Ok(())
+            }
             Err(error) => {
-                self.stop.press();
-                outlet.notice(Severity::Error, text!("The arm may still move, the stop failed: {error}", error = &error));
-                return Err(error);
+                let text = text!("The arm may still move, the stop failed: {error}", error = &error);
+                outlet.notice(Severity::Error, text);
+                Err(error)
             }
         }
-        Ok(())
     }
 }
 
@@ -90,6 +101,7 @@ impl Duty for Control {
         shutdown: &CancelToken,
     ) -> Result<Connected<Self::Port>, PortError> {
         let mut connected = connector.connect_control(shutdown)?;
+        self.owes_facts = true;
         if self.start_by_itself && connected.port.state()?.simulation == Simulation::Stopped {
             connected.port.start_simulation()?;
         }
@@ -98,6 +110,9 @@ impl Duty for Control {
 
     fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
         self.stop_if_pressed(port.as_mut(), outlet)?;
+        if std::mem::take(&mut self.owes_facts) {
+            outlet.report(Event::Cell(Box::new(port.facts()?)));
+        }
         self.robot.put(port.state()?);
         (outlet.waker)();
         Ok(PERIOD)

@@ -3,21 +3,34 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
+use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
 
-use super::port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
-use crate::model::{RobotState, Simulation};
+use super::port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
+use crate::model::{CellFacts, MotionGoal, MotionOutcome, RobotState, Simulation};
+use crate::text::Text;
 
 /// Width and height of the fake pictures in pixels.
 pub const SIZE: (u32, u32) = (64, 48);
 
+/// What becomes of the motions of the fake cell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FakeMotions {
+    /// They are over at once.
+    Arrive,
+    /// They are not begun, for this reason; nor are jogs. Otherwise a jog goes on for as long as it is held.
+    Refuse(Text),
+    /// They go on until they are cancelled.
+    Hang,
+}
+
 /// What the fake cell does.
 #[derive(Debug)]
 pub struct Script {
-    /// Answers to the next connection attempts of either kind; after the last one they succeed.
+    /// Answers to the next attempts to connect for control or pictures; after the last one they succeed.
     pub refusals: Vec<PortError>,
     /// Connections break at the next call while this is set.
     pub broken: bool,
@@ -31,6 +44,12 @@ pub struct Script {
     pub stops: u32,
     /// Why stops and starts are refused.
     pub refuse_tasks: Option<PortError>,
+    /// What becomes of motions.
+    pub motions: FakeMotions,
+    /// Motions that were begun.
+    pub moved: Vec<MotionGoal>,
+    /// Jogs and steps that were begun.
+    pub jogged: Vec<JogRequest>,
 }
 
 /// A cell that tests control. Clones are the same cell.
@@ -51,6 +70,9 @@ impl FakeCell {
             simulation: Simulation::Running,
             stops: 0,
             refuse_tasks: None,
+            motions: FakeMotions::Arrive,
+            moved: Vec::new(),
+            jogged: Vec::new(),
         };
         Self { script: Arc::new(Mutex::new(script)), hang: None }
     }
@@ -105,9 +127,28 @@ impl Connector for FakeCell {
     fn connect_camera(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
         self.connected(Box::new(self.clone()))
     }
+
+    fn connect_motion(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
+        if self.script().broken {
+            return Err(PortError::Lost("nothing answers".to_owned()));
+        }
+        let server = "fake cell 1.2".to_owned();
+        Ok(Connected { port: Box::new(self.clone()), address: "tcp://fake:1".to_owned(), server })
+    }
 }
 
 impl ControlPort for FakeCell {
+    fn facts(&mut self) -> Result<CellFacts, PortError> {
+        drop(self.answer()?);
+        let (width, height) = SIZE;
+        Ok(CellFacts {
+            joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
+            nominal_intrinsics: Intrinsics::pinhole(width, height, 60.0),
+            kinematics_known: true,
+            truth: None,
+        })
+    }
+
     fn state(&mut self) -> Result<RobotState, PortError> {
         let script = self.answer()?;
         Ok(RobotState {
@@ -134,6 +175,63 @@ impl ControlPort for FakeCell {
         }
         script.stops += 1;
         Ok(())
+    }
+}
+
+impl FakeCell {
+    /// Ends as the script says; `goes_on` tells whether a motion that hangs is still wanted.
+    fn end_of_motion(
+        &self,
+        begun: impl FnOnce(&mut Script),
+        mut goes_on: impl FnMut() -> bool,
+    ) -> Result<MotionOutcome, PortError> {
+        let mut script = self.answer()?;
+        let motions = script.motions.clone();
+        if let FakeMotions::Refuse(why) = motions {
+            return Ok(MotionOutcome::Refused(why));
+        }
+        begun(&mut script);
+        drop(script);
+        if motions == FakeMotions::Arrive {
+            return Ok(MotionOutcome::Arrived);
+        }
+        while goes_on() {
+            drop(self.answer()?);
+            std::thread::yield_now();
+        }
+        Ok(MotionOutcome::Stopped)
+    }
+}
+
+impl MotionPort for FakeCell {
+    fn check(&mut self) -> Result<(), PortError> {
+        let script = self.script();
+        if script.broken { Err(PortError::Lost("the cable is out".to_owned())) } else { Ok(()) }
+    }
+
+    fn move_to(&mut self, goal: &MotionGoal, _speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
+        self.end_of_motion(|script| script.moved.push(*goal), || !cancel.is_cancelled())
+    }
+
+    fn jog_step(
+        &mut self,
+        request: &JogRequest,
+        _length: f64,
+        cancel: &CancelToken,
+    ) -> Result<MotionOutcome, PortError> {
+        self.end_of_motion(|script| script.jogged.push(*request), || !cancel.is_cancelled())
+    }
+
+    fn jog(&mut self, request: &JogRequest, held: &mut dyn FnMut() -> Option<f64>) -> Result<Option<Text>, PortError> {
+        if let FakeMotions::Refuse(why) = &self.answer()?.motions {
+            return Ok(Some(why.clone()));
+        }
+        self.script().jogged.push(*request);
+        while held().is_some() {
+            drop(self.answer()?);
+            std::thread::yield_now();
+        }
+        Ok(None)
     }
 }
 

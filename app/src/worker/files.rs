@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use handeye_core::dataset;
-use handeye_core::depth::DepthImage;
+use handeye_core::depth::{ColourMap, DepthImage};
 use handeye_core::export::{self, ExportInput, ExportNames, ExportView, Format};
 use handeye_core::poses_file::{TaughtPose, TaughtPoses};
 use handeye_core::result::CalibrationResult;
@@ -14,7 +14,7 @@ use super::link::Outlet;
 use crate::command::Event;
 use crate::depth_view;
 use crate::model::{
-    DEPTH_COLOURS, FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written,
+    FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written,
 };
 use crate::text;
 
@@ -26,6 +26,8 @@ pub enum FileTask {
         folder: PathBuf,
         /// The capture.
         capture: Box<CaptureRecord>,
+        /// The colours of its depths.
+        colours: ColourMap,
     },
     /// The folders in a folder.
     List(PathBuf),
@@ -71,7 +73,7 @@ impl ExportJob {
 /// Does one task after the other and reports each.
 pub fn perform(task: FileTask, outlet: &Outlet) {
     match task {
-        FileTask::Review { folder, capture } => review(&folder, &capture, outlet),
+        FileTask::Review { folder, capture, colours } => review(&folder, &capture, colours, outlet),
         FileTask::List(folder) => outlet.report(Event::Folder(list(folder))),
         FileTask::Preview(job) => outlet.report(Event::Previews(preview(&job))),
         FileTask::Export { job, formats, folder } => {
@@ -94,8 +96,8 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
     }
 }
 
-fn review(folder: &Path, capture: &CaptureRecord, outlet: &Outlet) {
-    match pictures(folder, capture) {
+fn review(folder: &Path, capture: &CaptureRecord, colours: ColourMap, outlet: &Outlet) {
+    match pictures(folder, capture, colours) {
         Ok(images) => outlet.report(Event::Review { id: capture.id, images: Some(Arc::new(images)) }),
         Err(why) => {
             let text = text!("Capture {id} cannot be read: {why}", id = capture.id, why = why);
@@ -104,7 +106,7 @@ fn review(folder: &Path, capture: &CaptureRecord, outlet: &Outlet) {
     }
 }
 
-fn pictures(folder: &Path, capture: &CaptureRecord) -> Result<FrameImages, String> {
+fn pictures(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<FrameImages, String> {
     let session = Session::open(folder).map_err(|error| error.to_string())?;
     let rgb = session.load_rgb(capture).map_err(|error| error.to_string())?;
     let depth = session.load_depth_m(capture).map_err(|error| error.to_string())?;
@@ -118,7 +120,7 @@ fn pictures(folder: &Path, capture: &CaptureRecord) -> Result<FrameImages, Strin
     let far_plane_m = depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
     let [near_m, far_m] = depth_view::range_of(&depth, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
     let depth_coloured =
-        depth.colours(DEPTH_COLOURS, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
+        depth.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
     Ok(FrameImages { rgb, depth, depth_coloured })
 }
 
@@ -156,7 +158,7 @@ fn preview(job: &ExportJob) -> Vec<(String, Result<Vec<PreviewFile>, String>)> {
     export::formats()
         .iter()
         .map(|format| {
-            let files = format.render(&job.input()).map_err(|error| error.to_string()).map(|files| {
+            let files = export::preview(*format, &job.input()).map_err(|error| error.to_string()).map(|files| {
                 files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect()
             });
             (format.name().to_owned(), files)

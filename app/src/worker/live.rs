@@ -3,15 +3,17 @@
 use std::fmt::Display;
 use std::sync::{Mutex, PoisonError};
 
-use handeye_core::depth::DepthImage;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{Arm, CameraFeed, CellClient, CellInfo, CellPaths};
-use handeye_sim_link::client::convert::DepthFrame;
+use handeye_sim_link::client::cell::{Arm, CameraFeed, CellInfo, CellPaths};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState};
 
-use super::port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
-use crate::model::{CellSource, RobotState, Simulation};
+use super::live_motion::LiveMotion;
+use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
+use crate::model::{CellFacts, CellSource, RobotState, Simulation, Truth};
+
+/// Why nothing answers any more.
+const CLOSED: &str = "the server closed the connection; start it again if it has ended";
 
 /// Connects to the cell that the window was started for.
 pub struct LiveConnector {
@@ -27,7 +29,7 @@ impl LiveConnector {
         Self { source, paths: CellPaths::default(), server: Mutex::new(None) }
     }
 
-    /// Where to connect to. Starts the built-in cell when that is needed; the second worker waits for the first.
+    /// Where to connect to. Starts the built-in cell when that is needed; the other workers wait for the first.
     fn endpoint(&self) -> Result<Endpoint, PortError> {
         let address = match &self.source {
             CellSource::Address(address) => address.clone(),
@@ -42,16 +44,19 @@ impl LiveConnector {
         address.parse().map_err(|error: LinkError| PortError::Hopeless(error.to_string()))
     }
 
-    fn connect(&self, shutdown: &CancelToken) -> Result<(CellClient, CellInfo), PortError> {
+    /// Makes one connection.
+    fn connect<Half>(
+        &self,
+        shutdown: &CancelToken,
+        half: impl FnOnce(&Endpoint, &ConnectionOptions, &CellPaths) -> Result<Half, LinkError>,
+    ) -> Result<Half, PortError> {
         let endpoint = self.endpoint()?;
         let options = ConnectionOptions { shutdown: shutdown.clone(), ..ConnectionOptions::default() };
-        let connected = CellClient::connect(&endpoint, &options, &self.paths);
+        let connected = half(&endpoint, &options, &self.paths);
         if let Err(LinkError::Unreachable { .. }) = &connected {
             self.give_up_server(&endpoint);
         }
-        let client = connected.map_err(port_error)?;
-        let info = client.info().clone();
-        Ok((client, info))
+        connected.map_err(port_error)
     }
 
     /// A built-in cell that cannot be reached has died: the next try starts another one.
@@ -71,6 +76,9 @@ impl LiveConnector {
         if self.source == CellSource::BuiltIn {
             return "built-in cell".to_owned();
         }
+        if info.is_handeye_cell {
+            return "Handeye cell".to_owned();
+        }
         match (info.program_version, info.protocol) {
             (1.., _) => {
                 let version = info.program_version;
@@ -84,15 +92,21 @@ impl LiveConnector {
 
 impl Connector for LiveConnector {
     fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
-        let (client, info) = self.connect(shutdown)?;
-        let (arm, _camera) = client.split();
+        let arm = self.connect(shutdown, Arm::connect)?;
+        let info = arm.info().clone();
         Ok(self.connected(Box::new(LiveControl { arm }), &info))
     }
 
     fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
-        let (client, info) = self.connect(shutdown)?;
-        let (_arm, feed) = client.split();
+        let feed = self.connect(shutdown, CameraFeed::connect)?;
+        let info = feed.info().clone();
         Ok(self.connected(Box::new(LiveCamera { feed }), &info))
+    }
+
+    fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
+        let arm = self.connect(shutdown, Arm::connect)?;
+        let info = arm.info().clone();
+        Ok(self.connected(Box::new(LiveMotion::new(arm).map_err(port_error)?), &info))
     }
 }
 
@@ -100,8 +114,43 @@ struct LiveControl {
     arm: Arm,
 }
 
+/// Whether the cell is there, as far as is known without asking: a call to a server that has gone would wait for one to
+/// come back.
+pub(super) fn check_arm(arm: &mut Arm) -> Result<(), PortError> {
+    check(arm.sim().connection().is_connected())
+}
+
+fn check(is_connected: bool) -> Result<(), PortError> {
+    if is_connected { Ok(()) } else { Err(PortError::Lost(CLOSED.to_owned())) }
+}
+
 impl ControlPort for LiveControl {
+    fn facts(&mut self) -> Result<CellFacts, PortError> {
+        let kinematics = self.arm.kinematics().map_err(port_error)?;
+        let truth = match self.arm.ground_truth() {
+            Ok(truth) => Some(Truth {
+                tip_from_camera: truth.tip_from_camera,
+                base_from_target: truth.base_from_target,
+                intrinsics: truth.intrinsics,
+            }),
+            Err(error) if error.is_connection_loss() => return Err(port_error(error)),
+            // Only compared with; a cell without it is a cell all the same.
+            Err(error) => {
+                tracing::warn!(%error, "what the cell says of itself cannot be used");
+                None
+            }
+        };
+        let info = self.arm.info();
+        Ok(CellFacts {
+            joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
+            nominal_intrinsics: info.camera_intrinsics_nominal(),
+            kinematics_known: kinematics.is_ok(),
+            truth,
+        })
+    }
+
     fn state(&mut self) -> Result<RobotState, PortError> {
+        check_arm(&mut self.arm)?;
         let read = |arm: &mut Arm| {
             Ok(RobotState {
                 base_from_tip: arm.base_from_tip()?,
@@ -132,15 +181,15 @@ struct LiveCamera {
 
 impl CameraPort for LiveCamera {
     fn sim_time_s(&mut self) -> Result<f64, PortError> {
+        check(self.feed.sim().connection().is_connected())?;
         self.feed.sim().get_simulation_time().map_err(port_error)
     }
 
     fn grab(&mut self) -> Result<RawFrame, PortError> {
         let frame = self.feed.grab().map_err(port_error)?;
-        let DepthFrame { width, height, metres } = frame.depth;
         Ok(RawFrame {
             rgb: frame.rgb,
-            depth: DepthImage { width, height, metres },
+            depth: frame.depth,
             sim_time_s: frame.sim_time_s,
             base_from_tip: frame.base_from_tip,
             joints_rad: frame.joints,
@@ -159,14 +208,14 @@ fn start_built_in() -> Result<CellServer, PortError> {
     CellServer::start(CellConfig::new(scene)).map_err(|error| hopeless(&error))
 }
 
-fn port_error(error: LinkError) -> PortError {
+pub(super) fn port_error(error: LinkError) -> PortError {
     let text = match &error {
         // Which call found out is of no interest when nobody is there for any call.
         LinkError::Unreachable { endpoint, .. } => format!(
             "nothing answers at {endpoint}; start CoppeliaSim or a cell there, check that its ZMQ remote API add-on is \
              enabled and which port its status bar shows (usually 23000)"
         ),
-        LinkError::Disconnected { .. } => "the server closed the connection; start it again if it has ended".to_owned(),
+        LinkError::Disconnected { .. } => CLOSED.to_owned(),
         other => other.to_string(),
     };
     match error {

@@ -1,20 +1,33 @@
-//! The threads behind the window. Each owns one connection to the cell and makes it again when it breaks.
+//! The threads behind the window. All but `vision` own one connection to the cell and make it again when it breaks.
 //!
 //! | thread | does | reports through |
 //! | --- | --- | --- |
 //! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
 //! | `camera` | pictures, colours of the depth | events; newest [`LiveFrame`] |
+//! | `motion` | motions and jogs, one at a time | events; refusals through the [`MotionDesk`] |
+//! | `vision` | board in the newest picture, captures | events; newest [`LiveDetection`]; [`Measured`] |
 //!
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
 
+mod archive;
 mod camera;
 mod control;
+mod desk;
+mod files;
+mod jog_line;
 mod link;
 mod live;
+mod live_motion;
+mod motion;
+mod motion_desk;
+mod newest;
+mod observer;
 mod port;
 mod reconnect;
 mod slot;
+mod solver;
+mod vision;
 
 #[cfg(test)]
 pub mod fake;
@@ -25,21 +38,36 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use handeye_core::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
+pub use archive::{ArchiveTask, Beginning, timestamp_rfc3339};
 pub use camera::CameraTask;
 pub use control::{ControlTask, StopLine};
+pub use desk::Desk;
+pub use files::{ExportJob, FileTask};
+pub use jog_line::HELD_S;
 pub use link::Request;
 pub use live::LiveConnector;
-pub use port::{CameraPort, Connected, Connector, ControlPort, PortError, RawFrame};
+pub use motion::MotionLook;
+pub use motion_desk::{MotionDesk, MotionTask};
+pub use observer::ObserveJob;
+pub use port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
 pub use slot::LatestSlot;
+pub use solver::SolveJob;
+pub use vision::{CaptureRequest, Measured, VisionTask};
 
 use crate::command::Event;
-use crate::model::{CellSource, DepthScale, LiveFrame, RobotState};
+use crate::model::{
+    CellSource, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings,
+};
 use camera::Camera;
 use control::Control;
 use link::{Duty, LinkLoop, Outlet};
+use motion::Motions;
 use reconnect::Reconnect;
+use slot::Tap;
+use vision::Vision;
 
 /// Tells the window that there is something to look at. Called from any thread.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -65,10 +93,15 @@ pub struct Busy;
 pub struct Workers {
     control: Option<Sender<Request<ControlTask>>>,
     camera: Option<Sender<Request<CameraTask>>>,
+    motion: Option<Sender<Request<MotionLook>>>,
+    vision: Option<Sender<VisionTask>>,
     events: Option<Receiver<Event>>,
     stop: Arc<StopLine>,
+    desk: Arc<MotionDesk>,
+    clock: Clock,
     robot: Arc<LatestSlot<RobotState>>,
     frames: Arc<LatestSlot<LiveFrame>>,
+    detections: Arc<LatestSlot<LiveDetection>>,
     shutdown: CancelToken,
     threads: Vec<Thread>,
 }
@@ -80,36 +113,51 @@ struct Thread {
 }
 
 impl Workers {
-    /// Starts the threads.
+    /// Starts the threads. What is captured goes to `captures`.
     ///
     /// # Errors
     /// When the system has no more threads.
     pub fn start(
         source: &CellSource,
-        scale: DepthScale,
+        view: &ViewSettings,
         connector: &Arc<dyn Connector>,
+        captures: Sender<Measured>,
         clock: &Clock,
         waker: &Waker,
     ) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
-        let mut workers = Self::idle(events);
+        let mut workers = Self::idle(events, clock, waker);
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
         workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
-        let duty = Camera::new(scale, Arc::clone(&workers.frames));
+        let (tap, bell) = Tap::new();
+        let tap = Arc::new(tap);
+        let duty = Camera::new(view, Arc::clone(&workers.frames), Arc::clone(&tap));
         workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
+        let duty = Motions::new(Arc::clone(&workers.desk));
+        workers.motion = Some(workers.spawn("motion", duty, source, connector, outlet())?);
+        let (sender, tasks) = bounded(MAX_REQUESTS);
+        let detections = Arc::clone(&workers.detections);
+        let vision = Vision::new(tap, bell, tasks, detections, captures, outlet(), workers.shutdown.clone());
+        workers.run("vision", move || vision.run())?;
+        workers.vision = Some(sender);
         Ok(workers)
     }
 
     /// No threads yet.
-    fn idle(events: Receiver<Event>) -> Self {
+    fn idle(events: Receiver<Event>, clock: &Clock, waker: &Waker) -> Self {
         Self {
             control: None,
             camera: None,
+            motion: None,
+            vision: None,
             events: Some(events),
             stop: Arc::default(),
+            desk: Arc::new(MotionDesk::new(Arc::clone(waker))),
+            clock: Arc::clone(clock),
             robot: Arc::default(),
             frames: Arc::default(),
+            detections: Arc::default(),
             shutdown: CancelToken::default(),
             threads: Vec::new(),
         }
@@ -124,17 +172,24 @@ impl Workers {
         outlet: Outlet,
     ) -> io::Result<Sender<Request<D::Task>>> {
         let (sender, requests) = bounded(MAX_REQUESTS);
-        let (running, done) = bounded(0);
         let reconnect = Reconnect::new(source.clone());
         let connector = Arc::clone(connector);
         let shutdown = self.shutdown.clone();
+        self.run(name, move || {
+            LinkLoop { duty, connector: connector.as_ref(), requests, outlet, shutdown }.run(reconnect);
+        })?;
+        Ok(sender)
+    }
+
+    fn run(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        let (running, done) = bounded(0);
         let handle = Builder::new().name(name.to_owned()).spawn(move || {
             // Dropped last, also when the worker panics.
             let _running: Sender<()> = running;
-            LinkLoop { duty, connector: connector.as_ref(), requests, outlet, shutdown }.run(reconnect);
+            work();
         })?;
         self.threads.push(Thread { handle, done });
-        Ok(sender)
+        Ok(())
     }
 
     /// Hands over everything that was reported since the last time. Never waits for a worker.
@@ -142,20 +197,101 @@ impl Workers {
         for event in self.events.iter().flat_map(Receiver::try_iter).take(MAX_EVENTS) {
             absorb(event);
         }
+        self.desk.take_said().into_iter().for_each(&mut absorb);
         if let Some((robot, _)) = self.robot.take() {
             absorb(Event::Robot(robot));
         }
         if let Some((LiveFrame { info, images }, dropped)) = self.frames.take() {
             absorb(Event::Frame { info, dropped, images: Some(images) });
         }
+        if let Some((detection, _)) = self.detections.take() {
+            absorb(Event::Detection(Box::new(detection)));
+        }
     }
 
-    /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached.
+    /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached, over the control
+    /// worker's connection, whoever moves the arm. A motion or a jog of this program ends as well, and nothing is left
+    /// that could begin afterwards.
     pub fn press_stop(&self) {
         self.stop.press();
+        self.desk.cancel(self.now_s());
         // Only to wake a resting worker: one that is too busy to take it looks at the stop line by itself.
         let woken = self.ask_control(Request::Do(ControlTask::CheckStop));
         tracing::debug!(?woken, "stop pressed");
+    }
+
+    /// Asks for a motion. However it ends, [`Event::Moved`] tells once, also when it is refused because something moves
+    /// already.
+    ///
+    /// # Errors
+    /// [`Busy`] when the program ends; then nothing is reported.
+    pub fn move_to(&self, request: MotionRequest) -> Result<(), Busy> {
+        self.begin(MotionTask::Move(request))
+    }
+
+    /// Asks for one step of a jog at a share of the fastest speed: metres along a line, or radians about an axis or of a
+    /// joint. Reported as [`Self::move_to`].
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn jog_step(
+        &self,
+        id: MotionId,
+        jog: Jog,
+        [metres, radians]: [f64; 2],
+        speed: f64,
+        tip_from_camera: Option<Pose<Tip, CameraFrame>>,
+    ) -> Result<(), Busy> {
+        let length = if matches!(jog, Jog::Translate { .. }) { metres } else { radians };
+        self.begin(MotionTask::JogStep { id, request: JogRequest { jog, tip_from_camera, speed }, length })
+    }
+
+    /// Ends the motion that is under way, without a stop of everything else.
+    pub fn cancel_motion(&self) {
+        self.desk.cancel(self.now_s());
+    }
+
+    /// A jog button is held now: to be called when it is pressed, and again and again while it is held, or the arm
+    /// stops by itself after [`HELD_S`]. [`Event::JogEnded`] tells that the arm stands: when the jog ends, and once more when
+    /// a button is let go that had been held for longer.
+    pub fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
+        let request = JogRequest { jog, tip_from_camera, speed };
+        if self.desk.hold(request, self.stop.is_pressed(), self.now_s()) {
+            self.wake_motion();
+        }
+    }
+
+    /// No jog button is held any more.
+    pub fn release_jog(&self) {
+        self.desk.release();
+    }
+
+    fn begin(&self, task: MotionTask) -> Result<(), Busy> {
+        if self.motion.is_none() {
+            return Err(Busy);
+        }
+        self.desk.ask(task, self.stop.is_pressed());
+        self.wake_motion();
+        Ok(())
+    }
+
+    /// A worker that is too busy to be woken looks at the desk by itself.
+    fn wake_motion(&self) {
+        let woken = ask(self.motion.as_ref(), Request::Do(MotionLook));
+        tracing::trace!(?woken, "the motion worker was told to look");
+    }
+
+    fn now_s(&self) -> f64 {
+        (self.clock)()
+    }
+
+    /// Has every worker without a connection try now.
+    ///
+    /// # Errors
+    /// [`Busy`] when one does not take requests.
+    pub fn reconnect(&self) -> Result<(), Busy> {
+        let motion = ask(self.motion.as_ref(), Request::Reconnect);
+        self.ask_control(Request::Reconnect).and(self.ask_camera(Request::Reconnect)).and(motion)
     }
 
     /// Asks the control worker for something.
@@ -174,12 +310,22 @@ impl Workers {
         ask(self.camera.as_ref(), request)
     }
 
+    /// Asks the vision thread for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when it does not take requests.
+    pub fn ask_vision(&self, task: VisionTask) -> Result<(), Busy> {
+        ask(self.vision.as_ref(), task)
+    }
+
     /// Ends the threads: calls under way are cancelled, channels closed, threads joined. A thread that does not end
     /// within the deadline is left alone, so that the program can end; returns how many there are.
     pub fn shut_down(&mut self, deadline: Duration) -> usize {
         self.shutdown.cancel();
         self.control = None;
         self.camera = None;
+        self.motion = None;
+        self.vision = None;
         self.events = None;
         let end = Instant::now() + deadline;
         let mut left_alone = 0;
@@ -203,12 +349,16 @@ impl Drop for Workers {
     }
 }
 
-fn ask<Task>(worker: Option<&Sender<Request<Task>>>, request: Request<Task>) -> Result<(), Busy> {
+fn ask<T>(worker: Option<&Sender<T>>, request: T) -> Result<(), Busy> {
     match worker.map(|worker| worker.try_send(request)) {
         Some(Ok(())) => Ok(()),
         Some(Err(TrySendError::Full(_) | TrySendError::Disconnected(_))) | None => Err(Busy),
     }
 }
 
+#[cfg(test)]
+mod live_tests;
+#[cfg(test)]
+mod motion_tests;
 #[cfg(test)]
 mod tests;

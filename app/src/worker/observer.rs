@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use handeye_core::capture::observe_image;
 use handeye_core::progress::CancelToken;
 use handeye_core::session::{CaptureId, CaptureRecord};
 use handeye_core::target::TargetSpec;
@@ -45,6 +46,6 @@ fn report(id: CaptureId, target: TargetSpec, observed: Option<Observed>, outlet:
 fn look(job: &ObserveJob, capture: &CaptureRecord) -> Result<Observed, String> {
     let path = job.folder.join(&capture.image);
     let rgb = handeye_core::image_file::load_rgb(&path).map_err(|error| error.to_string())?;
-    let seen = vision::observe_image(&rgb, &job.target).map_err(|error| error.to_string())?;
-    Ok(Observed { corners: seen.corners, image_size: rgb.dimensions(), thumbnail: Arc::new(vision::thumbnail(&rgb)) })
+    let seen = observe_image(&rgb, &job.target).map_err(|error| error.to_string())?;
+    Ok(Observed { corners: seen.map(|seen| seen.corners), image_size: rgb.dimensions(), thumbnail: Arc::new(vision::thumbnail(&rgb)) })
 }

@@ -1,12 +1,13 @@
 //! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
 
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::frames::{Base, Camera, Pose, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::JointAngles;
 
-use crate::model::RobotState;
+use crate::model::{CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
+use crate::text::Text;
 
 /// Why a port has no answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -46,10 +47,22 @@ pub trait Connector: Send + Sync {
     /// # Errors
     /// As [`Self::connect_control`].
     fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError>;
+
+    /// A connection for motions.
+    ///
+    /// # Errors
+    /// As [`Self::connect_control`].
+    fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError>;
 }
 
 /// The robot and the simulation.
 pub trait ControlPort: Send {
+    /// What does not change while the connection lasts.
+    ///
+    /// # Errors
+    /// [`PortError`].
+    fn facts(&mut self) -> Result<CellFacts, PortError>;
+
     /// Reads the robot.
     ///
     /// # Errors
@@ -67,6 +80,47 @@ pub trait ControlPort: Send {
     /// # Errors
     /// [`PortError`]; the arm may then still move.
     fn stop(&mut self) -> Result<(), PortError>;
+}
+
+/// A jog that is asked for: for as long as a button is held, or by a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JogRequest {
+    /// Which way.
+    pub jog: Jog,
+    /// Where the camera is, for jogs along and about its axes.
+    pub tip_from_camera: Option<Pose<Tip, Camera>>,
+    /// Share of the fastest speed, over 0 and up to 1.
+    pub speed: f64,
+}
+
+/// What moves the arm.
+pub trait MotionPort: Send {
+    /// Looks whether the cell is there, without asking it for anything.
+    ///
+    /// # Errors
+    /// [`PortError::Lost`] when it has gone.
+    fn check(&mut self) -> Result<(), PortError>;
+
+    /// Moves to a goal, at a share of the fastest speed, and returns when the arm stands: there, or where `cancel`
+    /// brought it to rest.
+    ///
+    /// # Errors
+    /// [`PortError::Lost`]; everything else is an outcome.
+    fn move_to(&mut self, goal: &MotionGoal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, PortError>;
+
+    /// Jogs by a length (metres or radians).
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    fn jog_step(&mut self, request: &JogRequest, length: f64, cancel: &CancelToken)
+    -> Result<MotionOutcome, PortError>;
+
+    /// Jogs for as long as `held` gives a share of the fastest speed, and returns when the arm stands; with the reason
+    /// when it ended by itself, or did not begin.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    fn jog(&mut self, request: &JogRequest, held: &mut dyn FnMut() -> Option<f64>) -> Result<Option<Text>, PortError>;
 }
 
 /// Pictures as they come from the cell.

@@ -42,11 +42,11 @@ pub struct SolveJob {
 }
 
 /// Solves a job and reports how that went.
-pub fn solve(job: SolveJob, cancel: &CancelToken, outlet: &Outlet) {
+pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
     let id = job.id;
     let began_s = outlet.now_s();
     // A defect in a solver must not take the captures with it.
-    let solved = catch_unwind(AssertUnwindSafe(|| answer(&job, cancel, outlet)));
+    let solved = catch_unwind(AssertUnwindSafe(|| answer(job, cancel, outlet)));
     let outcome = match solved {
         Ok(Ok(solved)) => SolveOutcome::Solved(Arc::new(Solved { took_s: outlet.now_s() - began_s, ..solved })),
         Ok(Err(CalibrateError::HandEye(HandEyeError::Cancelled))) => SolveOutcome::Cancelled,

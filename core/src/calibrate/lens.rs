@@ -12,10 +12,12 @@ use crate::progress::{Stage, Work};
 use crate::target::TargetSpec;
 use crate::vision::{intrinsics, pnp};
 
-/// Most views that go into OpenCV's calibration of the camera, which cannot be interrupted. Of more, those that differ
-/// most from each other are taken: they hold what there is to know of the lens but for the averaging of noise, and the
-/// joint estimate then uses every view.
+/// Most views that go into OpenCV's calibration of the camera, which cannot be interrupted and takes a time that grows
+/// with the cube of the views: sixty take seconds.
 pub const MOST_LENS_VIEWS: usize = 60;
+/// How many of more views are taken where the joint estimate refines the camera with all views anyway. A start needs to
+/// be near, not precise, and thirty take less than a second.
+pub const LENS_START_VIEWS: usize = 30;
 
 /// Camera and target poses.
 pub struct Lens {
@@ -27,12 +29,23 @@ pub struct Lens {
 }
 
 impl Lens {
-    pub fn find(observations: &Observations, seen: &[Seen<'_>], work: &Work<'_>) -> Result<Self, CalibrateError> {
+    /// `refined` says that the joint estimate will refine the camera with all views.
+    pub fn find(
+        observations: &Observations,
+        seen: &[Seen<'_>],
+        refined: bool,
+        work: &Work<'_>,
+    ) -> Result<Self, CalibrateError> {
         let (intrinsics, free, sigma) = match observations.camera {
             CameraKnowledge::Fixed(intrinsics) => (intrinsics, false, None),
             CameraKnowledge::Estimate { model, start } => {
                 work.report(Stage::Intrinsics, 0, 1);
-                let chosen = most_different(observations, seen, work)?;
+                let most = if refined { LENS_START_VIEWS } else { MOST_LENS_VIEWS };
+                let chosen = if seen.len() <= MOST_LENS_VIEWS {
+                    seen.iter().map(|s| s.corners).collect()
+                } else {
+                    most_different(observations, seen, most, work)?
+                };
                 let found =
                     intrinsics::calibrate(&chosen, &observations.target, observations.image_size, model, start)?;
                 let sigma = found.sigma;
@@ -57,25 +70,24 @@ impl Lens {
 /// Where and how the target lies in the image: see [`appearance`].
 type Appearance = SVector<f64, 6>;
 
-/// The corners of [`MOST_LENS_VIEWS`] views, in the order of the views; of all when there are no more.
+/// The corners of `most` views of a larger number, in the order of the views: those that differ most from each other
+/// hold what there is to know of the lens, but for the averaging of noise.
 ///
 /// Each next view is the one farthest from those taken (Gonzalez 1985, "Clustering to minimize the maximum intercluster
 /// distance"), measured by [`appearance`].
 fn most_different<'a>(
     observations: &Observations,
     seen: &[Seen<'a>],
+    most: usize,
     work: &Work<'_>,
 ) -> Result<Vec<&'a [Corner]>, CalibrateError> {
-    if seen.len() <= MOST_LENS_VIEWS {
-        return Ok(seen.iter().map(|s| s.corners).collect());
-    }
     let (width, height) = observations.image_size;
     let side = f64::from(width.max(height)).max(1.0);
     let appearances: Vec<Appearance> = seen.iter().map(|s| appearance(s.corners, &observations.target, side)).collect();
     let mut distance = vec![f64::INFINITY; seen.len()];
-    let mut chosen = Vec::with_capacity(MOST_LENS_VIEWS);
+    let mut chosen = Vec::with_capacity(most);
     let mut next = 0;
-    while chosen.len() < MOST_LENS_VIEWS {
+    while chosen.len() < most.min(seen.len()) {
         if work.is_cancelled() {
             return Err(HandEyeError::Cancelled.into());
         }

@@ -21,7 +21,7 @@ use crate::progress::{Stage, Work};
 use crate::target::TargetSpec;
 use crate::vision::VisionError;
 
-pub use lens::MOST_LENS_VIEWS;
+pub use lens::{LENS_START_VIEWS, MOST_LENS_VIEWS};
 
 /// What was observed, from a dataset folder, a session or a live capture.
 #[derive(Debug, Clone)]
@@ -271,9 +271,11 @@ pub enum ViewStatus {
 /// Three views with the target in sight; for a hand-eye, robot rotations about two axes.
 ///
 /// # Many views
-/// Closed forms use at most [`subset::MOST_VIEWS`] views and the start of the intrinsics
-/// [`MOST_LENS_VIEWS`], chosen alike every time; the joint estimate then uses them all. Without a robot, or
-/// with a closed form, the intrinsics stay those of that choice of views.
+/// Work that grows faster than the number of views is done on a choice of them, the same every time. Of more than
+/// [`subset::MOST_VIEWS`] views so many go into the closed forms, and the fits that leave views out keep the noise levels
+/// of the whole. Of more than [`MOST_LENS_VIEWS`] views [`LENS_START_VIEWS`] start the intrinsics, which the joint estimate
+/// refines with all of them; without a robot, or with a closed form, the intrinsics and their standard deviations stay
+/// those of [`MOST_LENS_VIEWS`] views.
 ///
 /// # Errors
 /// [`CalibrateError`] says what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
@@ -342,3 +344,8 @@ fn best_start(
         })),
     }
 }
+
+#[cfg(test)]
+pub(crate) mod simulated;
+#[cfg(test)]
+mod tests;

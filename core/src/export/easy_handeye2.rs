@@ -3,13 +3,10 @@
 //! Its publisher reads `~/.ros2/easy_handeye2/calibrations/<name>.calib` and broadcasts the transform from
 //! `robot_effector_frame` (eye in hand) or `robot_base_frame` (eye on base) to `tracking_base_frame`.
 
-use super::yaml::Yaml;
-use super::{
-    ExportError, ExportFile, ExportNames, Format, NamedTransform, compare_numbers, compare_text, entry, quoted,
-    transform_comment,
-};
+use super::text::{Rotation, about_transform, entries, quoted};
+use super::yaml::{Leaf, Yaml};
+use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::handeye::Mode;
-use crate::result::CalibrationResult;
 
 pub(super) struct EasyHandeye2;
 
@@ -29,50 +26,49 @@ impl Format for EasyHandeye2 {
         ".calib file for the publisher of easy_handeye2 (ROS 2)"
     }
 
-    fn render(&self, result: &CalibrationResult, names: &ExportNames) -> Result<Vec<ExportFile>, ExportError> {
-        let transform = NamedTransform::of(result, names)
-            .ok_or(ExportError::NeedsHandEye { format: self.name(), alternative: "json or ros_camera_info" })?;
-        let mut text = format!(
-            "{}\nparameters:\n  name: {}\n  calibration_type: {}\n  robot_base_frame: {}\n  \
+    fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
+        let transform = input.published(self.name())?;
+        let names = input.names;
+        let text = format!(
+            "# {}\nparameters:\n  name: {}\n  calibration_type: {}\n  robot_base_frame: {}\n  \
              robot_effector_frame: {}\n  tracking_base_frame: {}\n  tracking_marker_frame: {}\n  \
              freehand_robot_movement: true\n  move_group_namespace: /\n  move_group: manipulator\n\
-             transform:\n  translation:\n",
-            transform_comment(&transform, result),
+             transform:\n  translation:\n{}  rotation:\n{}",
+            about_transform(&transform, "Metres", Rotation::Quaternion, input.result),
             quoted(&names.calibration),
             calibration_type(transform.mode),
             quoted(&names.base_frame),
             quoted(&names.effector_frame),
-            quoted(&names.camera_frame),
+            quoted(transform.child),
             quoted(&names.target_frame),
+            entries(4, &["x", "y", "z"], &transform.translation()),
+            entries(4, &["x", "y", "z", "w"], &transform.xyzw()),
         );
-        for (key, value) in ["x", "y", "z"].into_iter().zip(transform.estimate.translation_m) {
-            text.push_str(&entry(4, key, value));
-        }
-        text.push_str("  rotation:\n");
-        for (key, value) in ["x", "y", "z", "w"].into_iter().zip(transform.xyzw()) {
-            text.push_str(&entry(4, key, value));
-        }
-        Ok(vec![ExportFile { name: format!("{}.calib", names.calibration), text }])
+        Ok(vec![ExportFile::new(format!("{}.calib", names.calibration), text)])
     }
 
-    fn compare(&self, text: &str, result: &CalibrationResult, names: &ExportNames) -> Result<(), String> {
-        let yaml = Yaml::parse(text)?;
-        let transform = NamedTransform::of(result, names).ok_or("no hand-eye")?;
-        let read = |group: &str, keys: &[&str]| {
-            keys.iter().map(|key| yaml.number(&format!("transform.{group}.{key}"))).collect::<Result<Vec<_>, _>>()
-        };
-        compare_numbers("the translation", &read("translation", &["x", "y", "z"])?, &transform.estimate.translation_m)?;
-        compare_numbers("the rotation", &read("rotation", &["x", "y", "z", "w"])?, &transform.xyzw())?;
-        let texts = [
-            ("name", names.calibration.as_str()),
-            ("calibration_type", calibration_type(transform.mode)),
-            ("robot_base_frame", &names.base_frame),
-            ("robot_effector_frame", &names.effector_frame),
-            ("tracking_base_frame", &names.camera_frame),
-            ("tracking_marker_frame", &names.target_frame),
-        ];
-        texts
-            .into_iter()
-            .try_for_each(|(key, expected)| compare_text(key, yaml.text(&format!("parameters.{key}"))?, expected))
+    fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {
+        let transform = input.published(self.name()).map_err(|e| e.to_string())?;
+        let names = input.names;
+        let [x, y, z] = transform.translation().map(Leaf::Number);
+        let [qx, qy, qz, qw] = transform.xyzw().map(Leaf::Number);
+        Yaml::parse(&file.text)?.compare(&[
+            ("parameters.name", Leaf::text(&names.calibration)),
+            ("parameters.calibration_type", Leaf::text(calibration_type(transform.mode))),
+            ("parameters.robot_base_frame", Leaf::text(&names.base_frame)),
+            ("parameters.robot_effector_frame", Leaf::text(&names.effector_frame)),
+            ("parameters.tracking_base_frame", Leaf::text(transform.child)),
+            ("parameters.tracking_marker_frame", Leaf::text(&names.target_frame)),
+            ("parameters.freehand_robot_movement", Leaf::text("true")),
+            ("parameters.move_group_namespace", Leaf::text("/")),
+            ("parameters.move_group", Leaf::text("manipulator")),
+            ("transform.translation.x", x),
+            ("transform.translation.y", y),
+            ("transform.translation.z", z),
+            ("transform.rotation.x", qx),
+            ("transform.rotation.y", qy),
+            ("transform.rotation.z", qz),
+            ("transform.rotation.w", qw),
+        ])
     }
 }

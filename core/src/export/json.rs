@@ -1,6 +1,6 @@
 //! The result JSON itself: the only format with covariances and quality.
 
-use super::{ExportError, ExportFile, ExportNames, Format};
+use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::result::CalibrationResult;
 
 pub(super) struct Json;
@@ -14,13 +14,13 @@ impl Format for Json {
         "handeye's own result with covariances, quality and provenance"
     }
 
-    fn render(&self, result: &CalibrationResult, _names: &ExportNames) -> Result<Vec<ExportFile>, ExportError> {
-        let text = result.to_json().map_err(ExportError::BadResult)?;
-        Ok(vec![ExportFile { name: "calibration.json".into(), text }])
+    fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
+        let text = input.result.to_json().map_err(ExportError::BadResult)?;
+        Ok(vec![ExportFile::new("calibration.json", text)])
     }
 
-    fn compare(&self, text: &str, result: &CalibrationResult, _names: &ExportNames) -> Result<(), String> {
-        let read = CalibrationResult::from_json(text).map_err(|e| e.to_string())?;
-        if read == *result { Ok(()) } else { Err("not the same result".into()) }
+    fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {
+        let read = CalibrationResult::from_json(&file.text).map_err(|e| e.to_string())?;
+        if read == *input.result { Ok(()) } else { Err("not the same result".into()) }
     }
 }

@@ -4,14 +4,11 @@
 //! written `_`. `distortion_model` is for people and programs that ask: `brown_conrady` and `rational` go with
 //! `cv::projectPoints`, `fisheye` goes with `cv::fisheye::projectPoints`.
 
-use super::yaml::Yaml;
-use super::{
-    ExportError, ExportFile, ExportNames, Format, NamedTransform, compare_numbers, compare_text, entry, intrinsics_of,
-    made_by, numbers, transform_comment,
-};
+use super::input::NamedTransform;
+use super::text::{Rotation, about_intrinsics, about_transform, entry, numbers};
+use super::yaml::{Leaf, Yaml};
+use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::camera::{Distortion, Intrinsics};
-use crate::frames::{Camera, Mount, Pose};
-use crate::result::CalibrationResult;
 
 pub(super) struct OpencvYaml;
 
@@ -39,15 +36,6 @@ fn transform_key(transform: &NamedTransform<'_>) -> String {
     format!("T_{}_{}", plain(transform.parent), plain(transform.child))
 }
 
-fn transform_values(transform: &NamedTransform<'_>) -> Vec<f64> {
-    let pose = Pose::<Mount, Camera>::from_translation_xyzw(
-        transform.estimate.translation_m,
-        transform.estimate.rotation_xyzw,
-    );
-    // nalgebra stores columns.
-    pose.matrix().transpose().iter().copied().collect()
-}
-
 impl Format for OpencvYaml {
     fn name(&self) -> &'static str {
         "opencv_yaml"
@@ -58,47 +46,52 @@ impl Format for OpencvYaml {
     }
 
     /// Writes what the result has, intrinsics, hand-eye or both; a result without either is refused.
-    fn render(&self, result: &CalibrationResult, names: &ExportNames) -> Result<Vec<ExportFile>, ExportError> {
-        let transform = NamedTransform::of(result, names);
-        let intrinsics = intrinsics_of(result);
-        if transform.is_none() && intrinsics.is_none() {
-            return Err(ExportError::NeedsIntrinsics { format: self.name(), alternative: "json" });
-        }
-        let comment = transform.as_ref().map_or_else(
-            || format!("# Intrinsics in pixels; no transform and no Euler angles. {}", made_by(result)),
-            |transform| transform_comment(transform, result),
-        );
+    fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
+        let transform = input.optical(self.name()).ok();
+        let intrinsics = input.intrinsics(self.name());
+        let about = match &transform {
+            Some(transform) => about_transform(transform, "Metres", Rotation::Matrix, input.result),
+            None => about_intrinsics(input.result),
+        };
         // OpenCV wants its directive first; the comment goes behind the start of the document.
-        let mut text = format!("%YAML:1.0\n---\n{comment}\n");
-        if let Some(k) = &intrinsics {
-            text.push_str(&format_intrinsics(k));
+        let mut text = format!("%YAML:1.0\n---\n# {about}\n");
+        match (intrinsics, &transform) {
+            (Ok(k), _) => text.push_str(&format_intrinsics(&k)),
+            (Err(_), Some(_)) => {}
+            (Err(error), None) => return Err(error),
         }
-        if let Some(rms_px) = result.quality.rms_px {
+        if let Some(rms_px) = input.result.quality.rms_px {
             text.push_str(&entry(0, "avg_reprojection_error", rms_px));
         }
         if let Some(transform) = &transform {
-            text.push_str(&matrix(&transform_key(transform), 4, &transform_values(transform)));
+            text.push_str(&matrix(&transform_key(transform), 4, transform.rows().as_flattened()));
         }
-        Ok(vec![ExportFile { name: "opencv.yaml".into(), text }])
+        Ok(vec![ExportFile::new("opencv.yaml", text)])
     }
 
-    fn compare(&self, text: &str, result: &CalibrationResult, names: &ExportNames) -> Result<(), String> {
-        let yaml = Yaml::parse(text)?;
-        if let Some(k) = intrinsics_of(result) {
-            let size = [yaml.number("image_width")?, yaml.number("image_height")?];
-            compare_numbers("the image size", &size, &[f64::from(k.width), f64::from(k.height)])?;
-            compare_numbers("camera_matrix", &yaml.numbers("camera_matrix.data")?, &camera_matrix(&k))?;
-            compare_text("distortion_model", yaml.text("distortion_model")?, k.distortion.name())?;
-            let distortion = yaml.numbers("distortion_coefficients.data")?;
-            compare_numbers("distortion", &distortion, &coefficients(&k.distortion))?;
-        } else if yaml.has("camera_matrix.data") {
-            return Err("a camera that the result does not have".into());
+    fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {
+        let mut expected: Vec<(String, Leaf)> = Vec::new();
+        let mut matrix = |key: &str, rows: usize, values: Vec<f64>| {
+            let columns = values.len() / rows;
+            expected.push((format!("{key}.rows"), Leaf::Number(rows as f64)));
+            expected.push((format!("{key}.cols"), Leaf::Number(columns as f64)));
+            expected.push((format!("{key}.dt"), Leaf::text("d")));
+            expected.push((format!("{key}.data"), Leaf::Numbers(values)));
+        };
+        if let Ok(transform) = input.optical(self.name()) {
+            matrix(&transform_key(&transform), 4, transform.rows().as_flattened().to_vec());
         }
-        if let Some(transform) = NamedTransform::of(result, names) {
-            let path = format!("{}.data", transform_key(&transform));
-            compare_numbers(&path, &yaml.numbers(&path)?, &transform_values(&transform))?;
+        if let Ok(k) = input.intrinsics(self.name()) {
+            matrix("camera_matrix", 3, camera_matrix(&k).to_vec());
+            matrix("distortion_coefficients", 1, coefficients(&k.distortion));
+            expected.push(("image_width".into(), Leaf::Number(k.width.into())));
+            expected.push(("image_height".into(), Leaf::Number(k.height.into())));
+            expected.push(("distortion_model".into(), Leaf::text(k.distortion.name())));
         }
-        Ok(())
+        if let Some(rms_px) = input.result.quality.rms_px {
+            expected.push(("avg_reprojection_error".into(), Leaf::Number(rms_px)));
+        }
+        Yaml::parse(&file.text)?.compare(&expected)
     }
 }
 

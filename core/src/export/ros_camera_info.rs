@@ -4,15 +4,14 @@
 //! `projection_matrix` is the camera matrix as it is, which is valid for a single camera; ROS's own calibrator writes
 //! the optimal new camera matrix there. Every camera driver with `camera_info_manager` reads the file.
 
-use super::yaml::Yaml;
-use super::{
-    ExportError, ExportFile, ExportNames, Format, compare_numbers, compare_text, intrinsics_of, made_by, numbers,
-    quoted,
-};
+use super::text::{about_intrinsics, numbers, quoted};
+use super::yaml::{Leaf, Yaml};
+use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::camera::{Distortion, Intrinsics};
-use crate::result::CalibrationResult;
 
 pub(super) struct RosCameraInfo;
+
+const RECTIFICATION: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 /// ROS's name of the model and its coefficients; a camera without distortion has `plumb_bob` with zeros.
 fn model(distortion: &Distortion) -> (&'static str, Vec<f64>) {
@@ -44,48 +43,56 @@ impl Format for RosCameraInfo {
     }
 
     fn description(&self) -> &'static str {
-        "camera_info YAML for ROS 1 and ROS 2 camera drivers"
+        "camera_info YAML that ROS camera drivers load (intrinsics)"
     }
 
-    fn render(&self, result: &CalibrationResult, names: &ExportNames) -> Result<Vec<ExportFile>, ExportError> {
-        let k = intrinsics_of(result)
-            .ok_or(ExportError::NeedsIntrinsics { format: self.name(), alternative: "json or easy_handeye2" })?;
+    fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
+        let k = input.intrinsics(self.name())?;
         let (model, coefficients) = model(&k.distortion);
-        let rectification = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
         let text = format!(
-            "# Intrinsics in pixels, pixel (0, 0) is the centre of the top-left pixel; no transform and no Euler \
-             angles. The projection matrix is the camera matrix. {}\n\
+            "# {} The projection matrix is the camera matrix.\n\
              image_width: {}\nimage_height: {}\ncamera_name: {}\n{}distortion_model: {model}\n{}{}{}\
              binning_x: 0\nbinning_y: 0\nroi:\n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  \
              do_rectify: false\n",
-            made_by(result),
+            about_intrinsics(input.result),
             k.width,
             k.height,
-            quoted(&names.camera_name),
+            quoted(&input.names.camera_name),
             matrix("camera_matrix", 3, &camera_matrix(&k)),
             matrix("distortion_coefficients", 1, &coefficients),
-            matrix("rectification_matrix", 3, &rectification),
+            matrix("rectification_matrix", 3, &RECTIFICATION),
             matrix("projection_matrix", 3, &projection_matrix(&k)),
         );
-        Ok(vec![ExportFile { name: "camera_info.yaml".into(), text }])
+        Ok(vec![ExportFile::new("camera_info.yaml", text)])
     }
 
-    fn compare(&self, text: &str, result: &CalibrationResult, names: &ExportNames) -> Result<(), String> {
-        let yaml = Yaml::parse(text)?;
-        let k = intrinsics_of(result).ok_or("no intrinsics")?;
+    fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {
+        let k = input.intrinsics(self.name()).map_err(|e| e.to_string())?;
         let (model, coefficients) = model(&k.distortion);
-        let size = [yaml.number("image_width")?, yaml.number("image_height")?];
-        compare_numbers("the image size", &size, &[f64::from(k.width), f64::from(k.height)])?;
-        compare_text("camera_name", yaml.text("camera_name")?, &names.camera_name)?;
-        compare_text("distortion_model", yaml.text("distortion_model")?, model)?;
-        compare_numbers("camera_matrix", &yaml.numbers("camera_matrix.data")?, &camera_matrix(&k))?;
-        compare_numbers("distortion", &yaml.numbers("distortion_coefficients.data")?, &coefficients)?;
-        compare_numbers("projection_matrix", &yaml.numbers("projection_matrix.data")?, &projection_matrix(&k))?;
-        for key in ["camera_matrix", "distortion_coefficients", "rectification_matrix", "projection_matrix"] {
-            let shape = yaml.number(&format!("{key}.rows"))? * yaml.number(&format!("{key}.cols"))?;
-            let length = yaml.numbers(&format!("{key}.data"))?.len() as f64;
-            compare_numbers(&format!("the shape of {key}"), &[shape], &[length])?;
-        }
-        Ok(())
+        Yaml::parse(&file.text)?.compare(&[
+            ("image_width", Leaf::Number(k.width.into())),
+            ("image_height", Leaf::Number(k.height.into())),
+            ("camera_name", Leaf::text(&input.names.camera_name)),
+            ("camera_matrix.rows", Leaf::Number(3.0)),
+            ("camera_matrix.cols", Leaf::Number(3.0)),
+            ("camera_matrix.data", Leaf::Numbers(camera_matrix(&k).to_vec())),
+            ("distortion_model", Leaf::text(model)),
+            ("distortion_coefficients.rows", Leaf::Number(1.0)),
+            ("distortion_coefficients.cols", Leaf::Number(coefficients.len() as f64)),
+            ("distortion_coefficients.data", Leaf::Numbers(coefficients)),
+            ("rectification_matrix.rows", Leaf::Number(3.0)),
+            ("rectification_matrix.cols", Leaf::Number(3.0)),
+            ("rectification_matrix.data", Leaf::Numbers(RECTIFICATION.to_vec())),
+            ("projection_matrix.rows", Leaf::Number(3.0)),
+            ("projection_matrix.cols", Leaf::Number(4.0)),
+            ("projection_matrix.data", Leaf::Numbers(projection_matrix(&k).to_vec())),
+            ("binning_x", Leaf::Number(0.0)),
+            ("binning_y", Leaf::Number(0.0)),
+            ("roi.x_offset", Leaf::Number(0.0)),
+            ("roi.y_offset", Leaf::Number(0.0)),
+            ("roi.height", Leaf::Number(0.0)),
+            ("roi.width", Leaf::Number(0.0)),
+            ("roi.do_rectify", Leaf::text("false")),
+        ])
     }
 }

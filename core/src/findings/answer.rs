@@ -193,20 +193,16 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
     let (views, _) = curve.now()?;
     let needed = curve.views_for(goal_mm * 1e-3);
     let start = format!("The expected error of {error_mm:.3} mm (95 %) is above the goal of {goal_mm:.3} mm.");
-    Some(match needed.filter(|n| *n <= MOST_TIMES * views) {
-        Some(needed) => {
-            // The curve's error equals the stated one but for rounding, so one more is the least that can help.
-            let more = needed.saturating_sub(views).max(1);
-            let s = super::plural(more);
-            let text = format!("{start} About {more} more view{s} like those gathered will reach it.");
-            finding(FindingCode::GoalNotReached, Severity::Advice, text).with("more_views", more as f64, "")
-        }
-        None => {
-            let text = format!(
-                "{start} More views like these would take too many: tilt and turn the camera more, come closer, or reduce \
-                 the noise."
-            );
-            finding(FindingCode::GoalNotReached, Severity::Advice, text)
-        }
-    })
+    let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {
+        let text = format!(
+            "{start} More views like these would take too many: tilt and turn the camera more, come closer, or reduce the \
+             noise."
+        );
+        return Some(finding(FindingCode::GoalNotReached, Severity::Advice, text));
+    };
+    // The curve's error equals the stated one but for rounding, so one more is the least that can help.
+    let more = needed.saturating_sub(views).max(1);
+    let s = super::plural(more);
+    let text = format!("{start} About {more} more view{s} like those gathered will reach it.");
+    Some(finding(FindingCode::GoalNotReached, Severity::Advice, text).with("more_views", more as f64, ""))
 }

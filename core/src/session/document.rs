@@ -253,12 +253,11 @@ pub(super) fn check_taught(poses: &[TaughtPose]) -> Result<(), EditError> {
         }
         match &pose.goal {
             Goal::Tip(base_from_tip) if !base_from_tip.is_finite() => return refuse("is not finite"),
-            Goal::Tip(_) => {}
             Goal::Joints(joints) if !joints.iter().all(|v| v.is_finite()) => return refuse("is not finite"),
             Goal::Joints(joints) if joints.is_empty() || *joint_count.get_or_insert(joints.len()) != joints.len() => {
                 return refuse("has another number of joint angles than the poses before, or none");
             }
-            Goal::Joints(_) => {}
+            Goal::Tip(_) | Goal::Joints(_) => {}
         }
     }
     Ok(())

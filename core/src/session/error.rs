@@ -28,6 +28,11 @@ impl SessionError {
         Self::new(file, SessionProblem::Unwritable(crate::image_file::one_line(error)))
     }
 
+    /// Whether a change was refused because the session is like that already.
+    pub fn is_no_change(&self) -> bool {
+        matches!(self.problem, SessionProblem::Edit(EditError::NoChange))
+    }
+
     /// Whether what was to be read or used is at fault, and not the disk that was to be written: exit code 2.
     pub fn is_bad_input(&self) -> bool {
         !matches!(self.problem, SessionProblem::Unwritable(_) | SessionProblem::Behind(_) | SessionProblem::Broken)
@@ -83,6 +88,12 @@ pub enum SessionProblem {
         /// What is not known.
         what: String,
     },
+    /// `session.json` was written by a program that knows no journal, after the journal was there.
+    #[error(
+        "was changed by an older program that keeps no journal: move this file out of the folder to go on with the \
+         journal, or move journal.jsonl out to go on with this file"
+    )]
+    OlderProgram,
     /// A change that the session cannot take, or a value that it must not have.
     #[error(transparent)]
     Edit(#[from] EditError),

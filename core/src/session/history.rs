@@ -65,10 +65,10 @@ impl History {
     /// As [`Document::apply`]; [`EditError::UsedNumber`] also for the number of a capture that is gone. Nothing
     /// changes then.
     pub fn apply(&mut self, edit: Edit) -> Result<(), EditError> {
-        if let Edit::AddCapture(record) = &edit {
-            if record.id <= self.last_capture {
-                return Err(EditError::UsedNumber(record.id));
-            }
+        if let Edit::AddCapture(record) = &edit
+            && record.id <= self.last_capture
+        {
+            return Err(EditError::UsedNumber(record.id));
         }
         let after = Arc::new(self.document.apply(&edit)?);
         if let Edit::AddCapture(record) = &edit {

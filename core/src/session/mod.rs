@@ -1,78 +1,85 @@
-//! Session folders: what a capture leaves, and what `calibrate` reads.
+//! Session folders: what a capture leaves, what a person does with it, and what `calibrate` reads.
 //!
 //! ```text
-//! session.json      the session: mode, target, seeds, truth, and every capture with pose, joints and time
-//! dataset.toml      the same folder as a dataset folder, see [`crate::dataset`]
+//! journal.jsonl     everything that was done, entry by entry: the session itself
+//! session.json      the session as it is now: mode, target, seeds, truth, and every capture with pose, joints and time
+//! dataset.toml      the captures in use as a dataset folder, see [`crate::dataset`]
 //! poses.csv
 //! images/0001.png   8-bit RGB
-//! depth/0001.tiff   32-bit float, metres, see [`DepthImage`](crate::depth::DepthImage)
+//! depth/0001.tiff   32-bit float, metres, see [`DepthImage`]
+//! result.json       the last result, see [`Store::write_result`]
 //! ```
 //!
-//! A capture counts from the moment `session.json` names it. That file is replaced as a whole and last, after the
-//! image, the depth and the pose table are on the disk; so a kill or a power cut at any moment leaves a session with
-//! every acknowledged capture. What an interrupted capture leaves besides (an image, a row in `poses.csv`) does no
-//! harm and is overwritten by the next capture.
+//! A change counts from the moment its line in the journal is on the disk; `session.json`, `dataset.toml` and
+//! `poses.csv` follow from the journal and are written again when they lag. So a kill or a power cut at any moment
+//! leaves a session with every acknowledged change, and with everything that can be undone and redone. Files of an
+//! interrupted capture do no harm and are overwritten by the next; files of deleted captures stay, for undo.
+//!
+//! [`Document`] is what a session says, [`Edit`] what may be done to it, [`History`] both with undo, [`Store`] all
+//! three on a disk. The layout is described in `docs/session.md`.
 
+mod capture;
 mod depth;
+mod derived;
 mod document;
 mod edit;
 mod error;
 mod history;
+mod journal;
+mod load;
+mod lock;
 pub(crate) mod pose_record;
+mod save_as;
 mod session_file;
-mod writer;
+mod store;
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use image::RgbImage;
 
+pub use capture::Capture;
 pub use document::{CaptureId, CaptureRecord, Document, GroundTruth, Role, SessionMeta};
 pub use edit::{Edit, EditError, TaughtChange};
 pub use error::{SessionError, SessionProblem};
 pub use history::{History, UNDO_STEPS};
+pub use journal::JOURNAL;
+pub use lock::FolderLock;
 pub use session_file::{FORMAT, MAJOR_VERSION, MINOR_VERSION};
-pub use writer::{Capture, SessionWriter};
+pub use store::Store;
 
 use crate::depth::DepthImage;
-use crate::image_file::{self, one_line};
 
 /// Name of the document in a session folder.
 pub const DOCUMENT: &str = "session.json";
+/// Name of the result in a session folder.
+pub const RESULT: &str = "result.json";
 
-/// A session that was read.
+/// A session that was read, without the right to change it.
 #[derive(Debug, Clone)]
 pub struct Session {
     /// The folder.
     pub folder: PathBuf,
-    /// What was known when it began.
-    pub meta: SessionMeta,
-    /// The captures in their order.
-    pub captures: Vec<CaptureRecord>,
+    /// The session as it was when it was read.
+    pub document: Arc<Document>,
 }
 
 impl Session {
     /// Whether a folder claims to be a session.
     pub fn is_session(folder: &Path) -> bool {
-        folder.join(DOCUMENT).is_file()
+        [DOCUMENT, JOURNAL].iter().any(|name| folder.join(name).is_file())
     }
 
-    /// Reads a session. The files of every capture must be there; they are not decoded.
+    /// Reads a session, also while another program writes it; nothing in the folder is changed. The files of every
+    /// capture must be there; they are not decoded.
     ///
     /// # Errors
-    /// [`SessionError`]: no session, an unknown major version, a damaged document, a file that is gone.
+    /// [`SessionError`]: no session, an unknown major version, a damaged journal, a file that is gone.
     pub fn open(folder: &Path) -> Result<Self, SessionError> {
-        let document = read_document(folder)?;
-        for (i, capture) in document.captures.iter().enumerate() {
-            for name in std::iter::once(&capture.image).chain(&capture.depth) {
-                let path = folder.join(name);
-                if !path.is_file() {
-                    let problem = SessionProblem::Unreadable(format!("captures[{i}] in {DOCUMENT} names this file"));
-                    return Err(SessionError::new(&path, problem));
-                }
-            }
-        }
-        Ok(Self { folder: folder.to_path_buf(), meta: document.meta, captures: document.captures })
+        let loaded = load::load(folder)?;
+        let document = loaded.history.document().clone();
+        load::check_files(folder, &document)?;
+        Ok(Self { folder: folder.to_path_buf(), document })
     }
 
     /// The image of a capture.
@@ -80,8 +87,7 @@ impl Session {
     /// # Errors
     /// [`SessionError`] when it is damaged, truncated or gone.
     pub fn load_rgb(&self, capture: &CaptureRecord) -> Result<RgbImage, SessionError> {
-        let path = self.folder.join(&capture.image);
-        image_file::load_rgb(&path).map_err(|e| SessionError::new(&path, SessionProblem::Unreadable(one_line(&e))))
+        load::rgb(&self.folder, capture)
     }
 
     /// The depth of a capture in metres; `None` when none was recorded.
@@ -89,22 +95,8 @@ impl Session {
     /// # Errors
     /// As [`Self::load_rgb`].
     pub fn load_depth_m(&self, capture: &CaptureRecord) -> Result<Option<DepthImage>, SessionError> {
-        let Some(name) = &capture.depth else { return Ok(None) };
-        let path = self.folder.join(name);
-        depth::load(&path).map(Some).map_err(|e| SessionError::new(&path, SessionProblem::Unreadable(e)))
+        load::depth_m(&self.folder, capture)
     }
-}
-
-fn read_document(folder: &Path) -> Result<Document, SessionError> {
-    let path = folder.join(DOCUMENT);
-    let text = match fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound && folder.is_dir() => {
-            return Err(SessionError::new(folder, SessionProblem::NotASession));
-        }
-        Err(e) => return Err(SessionError::new(&path, SessionProblem::Unreadable(one_line(&e)))),
-    };
-    session_file::from_json(&text).map(|file| file.document).map_err(|problem| SessionError::new(&path, problem))
 }
 
 #[cfg(test)]

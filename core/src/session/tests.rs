@@ -1,3 +1,5 @@
+use std::fs;
+
 use image::Rgb;
 use nalgebra::Matrix3;
 
@@ -33,7 +35,7 @@ pub(super) fn record(id: u32) -> CaptureRecord {
     CaptureRecord {
         id: CaptureId(id),
         image: format!("images/{id:04}.png"),
-        depth: (id % 2 == 0).then(|| format!("depth/{id:04}.tiff")),
+        depth: id.is_multiple_of(2).then(|| format!("depth/{id:04}.tiff")),
         base_from_tip: pose(id as u8),
         joints_rad: Some(vec![0.1, f64::from(id) / 3.0]),
         sim_time_s: None,
@@ -46,24 +48,33 @@ pub(super) fn record(id: u32) -> CaptureRecord {
     }
 }
 
-fn image(seed: u8) -> RgbImage {
+pub(super) fn image(seed: u8) -> RgbImage {
     RgbImage::from_fn(24, 16, |x, y| Rgb([seed, (x * 9) as u8, (y * 13) as u8]))
 }
 
-fn pose(i: u8) -> Pose<Base, Tip> {
+pub(super) fn depth() -> DepthImage {
+    DepthImage::new(24, 16, (0..24 * 16).map(|i| 0.3 + 0.0001 * i as f32).collect()).expect("as many as pixels")
+}
+
+pub(super) fn pose(i: u8) -> Pose<Base, Tip> {
     let q = [0.1, -0.2 * f64::from(i), 0.3, -0.7];
     Pose::from_translation_xyzw([0.1 / 3.0, f64::from(i), -1e-9], q)
 }
 
-fn capture(image: &RgbImage, i: u8) -> Capture<'_> {
-    Capture { image, depth_m: None, base_from_tip: pose(i), joints_rad: None, sim_time_s: None }
-}
-
-fn folder() -> tempfile::TempDir {
+pub(super) fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
-fn names(folder: &Path) -> Vec<String> {
+/// A new session with captures 1, 2, …; it is closed when the store is dropped.
+pub(super) fn store_with(folder: &Path, captures: u8) -> Store {
+    let mut store = Store::create(folder, meta()).expect("create");
+    for i in 1..=captures {
+        store.add_capture(&Capture::new(&image(i), pose(i))).expect("add");
+    }
+    store
+}
+
+pub(super) fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> = fs::read_dir(folder)
         .expect("list")
         .map(|e| e.expect("entry").file_name().to_string_lossy().into_owned())
@@ -76,31 +87,38 @@ fn names(folder: &Path) -> Vec<String> {
 fn a_session_reads_back_bit_for_bit_and_is_a_dataset() {
     let home = folder();
     let dir = home.path().join("new/session");
-    let mut writer = SessionWriter::create(&dir, meta()).expect("create");
-    let depth =
-        DepthImage::new(24, 16, (0..24 * 16).map(|i| 0.3 + 0.0001 * i as f32).collect()).expect("as many as pixels");
+    let mut store = Store::create(&dir, meta()).expect("create");
+    let depth = depth();
     let joints = [0.1, -0.2, 0.3, 0.4, 0.5, 1.0 / 3.0];
     for i in 0..3 {
         let image = image(i);
-        let with_depth = (i != 1).then_some(&depth);
-        let full =
-            Capture { depth_m: with_depth, joints_rad: Some(&joints), sim_time_s: Some(0.05), ..capture(&image, i) };
-        let record = writer.add_capture(&full).expect("add");
-        assert_eq!(record.image, format!("images/000{}.png", i + 1));
+        let full = Capture {
+            depth_m: (i != 1).then_some(&depth),
+            joints_rad: Some(&joints),
+            sim_time_s: Some(0.05),
+            frames: 8,
+            corner_noise_px: Some(0.02),
+            settled_s: Some(0.5),
+            pose_name: Some("front"),
+            ..Capture::new(&image, pose(i))
+        };
+        assert_eq!(store.add_capture(&full).expect("add"), CaptureId(u32::from(i) + 1));
     }
     let session = Session::open(&dir).expect("open");
-    assert_eq!(session.meta, meta());
-    assert_eq!(session.captures, writer.captures());
-    assert_eq!(session.captures[0].joints_rad.as_deref(), Some(&joints[..]));
-    assert_eq!(session.load_rgb(&session.captures[2]).expect("image"), image(2));
-    assert_eq!(session.load_depth_m(&session.captures[2]).expect("depth"), Some(depth));
-    assert_eq!(session.load_depth_m(&session.captures[1]).expect("no depth"), None);
-    let truth = session.meta.ground_truth.as_ref().expect("truth");
+    assert_eq!(session.document.meta, meta());
+    assert_eq!(session.document, *store.document());
+    let captures = &session.document.captures;
+    assert_eq!((captures[0].joints_rad.as_deref(), captures[0].frames), (Some(&joints[..]), 8));
+    assert_eq!(session.load_rgb(&captures[2]).expect("image"), image(2));
+    assert_eq!(session.load_depth_m(&captures[2]).expect("depth"), Some(depth));
+    assert_eq!(session.load_depth_m(&captures[1]).expect("no depth"), None);
+    let truth = session.document.meta.ground_truth.as_ref().expect("truth");
     assert!(truth.links(Mode::EyeInHand).is_some() && truth.links(Mode::EyeToHand).is_none());
 
     let data = Dataset::read(&dir).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!((data.mode, data.target, data.camera), (Some(Mode::EyeInHand), meta().target, meta().camera));
-    for (i, (entry, record)) in data.entries.iter().zip(&session.captures).enumerate() {
+    assert_eq!(data.entries.len(), captures.len());
+    for (i, (entry, record)) in data.entries.iter().zip(captures).enumerate() {
         let bits = |m: &Matrix3<f64>| m.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         let rotation = |p: &Pose<Base, Tip>| bits(p.rotation().to_rotation_matrix().matrix());
         let read = entry.base_from_tip.expect("a pose");
@@ -109,132 +127,117 @@ fn a_session_reads_back_bit_for_bit_and_is_a_dataset() {
         assert_eq!(rotation(&record.base_from_tip), rotation(&pose(i as u8)));
         assert_eq!(data.load_rgb(entry).expect("image"), image(i as u8));
     }
-    assert_eq!(names(&dir), ["dataset.toml", "depth", "images", "poses.csv", "session.json"]);
+    let files = [".lock", "dataset.toml", "depth", "images", "journal.jsonl", "poses.csv", "session.json"];
+    assert_eq!(names(&dir), files);
 }
 
 #[test]
-fn a_folder_of_something_else_is_never_overwritten() {
-    let home = folder();
-    fs::write(home.path().join("thesis.tex"), "years of work").expect("write");
-    let error = SessionWriter::create(home.path(), meta()).expect_err("not empty");
-    assert!(matches!(error.problem, SessionProblem::NotEmpty) && error.is_bad_input(), "{error}");
-    assert_eq!(names(home.path()), ["thesis.tex"]);
-
-    let other = folder();
-    fs::write(other.path().join("session.json"), "{\"format\": \"jupyter\"}").expect("write");
-    let error = SessionWriter::create(other.path(), meta()).expect_err("another program's");
-    assert!(matches!(error.problem, SessionProblem::Format(_)), "{error}");
-    fs::write(other.path().join("session.json"), "{\"format\": \"handeye-session\", \"version\": \"2.0\"}")
-        .expect("write");
-    let error = SessionWriter::create(other.path(), meta()).expect_err("a newer one");
-    assert!(matches!(error.problem, SessionProblem::Version { .. }), "{error}");
-    assert_eq!(names(other.path()), ["session.json"]);
-}
-
-#[test]
-fn a_session_is_replaced_by_a_new_one_without_the_old_captures() {
+fn the_dataset_has_the_captures_in_use_and_no_others() {
     let dir = folder();
-    let mut writer = SessionWriter::create(dir.path(), meta()).expect("create");
-    for i in 0..2 {
-        writer.add_capture(&capture(&image(i), i)).expect("add");
-    }
-    fs::write(dir.path().join("notes.txt"), "mine").expect("write");
-    let mut writer = SessionWriter::create(dir.path(), meta()).expect("create again");
-    assert_eq!(names(&dir.path().join("images")), Vec::<String>::new());
-    writer.add_capture(&capture(&image(7), 7)).expect("add");
-    let session = Session::open(dir.path()).expect("open");
-    assert_eq!(session.captures.len(), 1);
-    assert_eq!(session.load_rgb(&session.captures[0]).expect("image"), image(7));
-    assert!(dir.path().join("notes.txt").exists());
-}
-
-#[test]
-fn a_resumed_session_goes_on_behind_its_last_capture() {
-    let dir = folder();
-    SessionWriter::create(dir.path(), meta()).expect("create").add_capture(&capture(&image(0), 0)).expect("add");
-    // What an interrupted capture leaves: an image and a row that the document does not know, and a half file.
-    let orphan = dir.path().join("images/0002.png");
-    fs::copy(dir.path().join("images/0001.png"), &orphan).expect("copy");
-    let table = dir.path().join("poses.csv");
-    let rows = fs::read_to_string(&table).expect("text") + "images/0002.png,0,0,0,0,0,0,1\n";
-    fs::write(&table, rows).expect("write");
-    fs::write(dir.path().join(".session.json.partial"), "{\"for").expect("write");
-    assert_eq!(Session::open(dir.path()).expect("open").captures.len(), 1);
-    assert_eq!(Dataset::read(dir.path()).expect("a data set").entries.len(), 2);
-
-    let mut writer = SessionWriter::resume(dir.path()).expect("resume");
-    assert_eq!(Dataset::read(dir.path()).expect("a data set").entries.len(), 1);
-    let record = writer.add_capture(&capture(&image(5), 5)).expect("add").clone();
-    assert_eq!(record.image, "images/0002.png");
-    let session = Session::open(dir.path()).expect("open");
-    assert_eq!(session.load_rgb(&session.captures[1]).expect("image"), image(5));
-    assert_eq!(session.meta, meta());
-}
-
-#[test]
-fn a_capture_that_would_spoil_the_session_is_refused_and_leaves_it_as_it_was() {
-    let dir = folder();
-    let mut writer = SessionWriter::create(dir.path(), meta()).expect("create");
-    let good = image(0);
-    writer.add_capture(&capture(&good, 0)).expect("add");
-    let before = fs::read(dir.path().join("session.json")).expect("bytes");
-    let nan = Pose::from_translation_xyzw([f64::NAN, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
-    let depth = DepthImage::new(3, 3, vec![0.5; 9]).expect("nine");
-    let other_size = RgbImage::new(25, 16);
-    let wrong = [
-        Capture { base_from_tip: nan, ..capture(&good, 0) },
-        Capture { depth_m: Some(&depth), ..capture(&good, 0) },
-        Capture { joints_rad: Some(&[f64::INFINITY]), ..capture(&good, 0) },
-        Capture { sim_time_s: Some(f64::NAN), ..capture(&good, 0) },
-        capture(&other_size, 0),
-    ];
-    for capture in wrong {
-        let error = writer.add_capture(&capture).expect_err("a spoiled capture").to_string();
-        assert!(error.contains("images/0002.png") && !error.contains('\n'), "{error}");
-    }
-    assert_eq!(writer.captures().len(), 1);
-    assert_eq!(fs::read(dir.path().join("session.json")).expect("bytes"), before);
-    assert!(Dataset::read(dir.path()).is_ok());
-}
-
-#[test]
-fn a_damaged_session_is_an_error_that_names_the_file() {
-    let dir = folder();
-    let mut writer = SessionWriter::create(dir.path(), meta()).expect("create");
-    writer.add_capture(&capture(&image(0), 0)).expect("add");
-    let path = dir.path().join("session.json");
-    let good = fs::read_to_string(&path).expect("text");
-    let cases = [
-        ("\"1.1\"", "\"2.0\"", "version \"2.0\""),
-        ("\"1.1\"", "\"one\"", "version \"one\""),
-        ("images/0001.png", "images/0009.png", "images/0009.png"),
-        ("images/0001.png", "../0001.png", "not inside of the session"),
-        ("\"rotation_xyzw\": [", "\"rotation_xyzw\": [9.0, 9.0, 9.0, 9.0], \"was\": [", "not a unit quaternion"),
-        ("\"square_m\": 0.015", "\"square_m\": -1", "square_m"),
-        ("\"mode\": \"eye_in_hand\"", "\"mode\": \"eye\"", "eye"),
-        ("\"captures\"", "\"capture\"", "captures"),
-    ];
-    for (from, to, needle) in cases {
-        assert!(good.contains(from), "{from}");
-        // The last pose in the file is that of the capture.
-        let at = good.rfind(from).expect("there");
-        fs::write(&path, format!("{}{to}{}", &good[..at], &good[at + from.len()..])).expect("write");
-        let error = Session::open(dir.path()).expect_err(to).to_string();
-        assert!(error.contains(needle) && !error.contains('\n'), "{to}: {error}");
-    }
-    for cut in [0, 10, good.len() / 2, good.len() - 3] {
-        fs::write(&path, &good[..cut]).expect("write");
-        assert!(Session::open(dir.path()).is_err());
-        assert!(SessionWriter::create(dir.path(), meta()).is_err(), "a damaged session is not thrown away");
-    }
-    fs::write(&path, good.replace("\"1.1\"", "\"1.7\"").replacen('{', "{\"later\": 1,", 1)).expect("write");
-    assert!(Session::open(dir.path()).is_ok(), "a newer minor version reads");
+    let mut store = store_with(dir.path(), 5);
+    let in_dataset = |folder: &Path| -> Vec<String> {
+        let data = Dataset::read(folder).unwrap_or_else(|e| panic!("{e}"));
+        data.entries.into_iter().map(|entry| entry.name).collect()
+    };
+    store.apply(Edit::DeleteCaptures(vec![CaptureId(1)])).expect("delete");
+    store.apply(Edit::SetExcluded { ids: vec![CaptureId(2)], excluded: true }).expect("exclude");
+    store.apply(Edit::SetRole { ids: vec![CaptureId(4)], role: Role::Verification }).expect("set aside");
+    assert_eq!(in_dataset(dir.path()), ["images/0003.png", "images/0005.png"]);
+    store.undo().expect("undo");
+    assert_eq!(in_dataset(dir.path()), ["images/0003.png", "images/0004.png", "images/0005.png"]);
+    let target = TargetSpec::Circles(Grid { columns: 5, rows: 4, square_m: 0.02 });
+    store.apply(Edit::SetTarget(target)).expect("another target");
+    assert_eq!(Dataset::read(dir.path()).expect("a data set").target, target);
 }
 
 #[test]
 fn an_empty_folder_is_not_a_session() {
     let dir = folder();
-    let error = Session::open(dir.path()).expect_err("empty");
-    assert!(matches!(error.problem, SessionProblem::NotASession), "{error}");
-    assert!(Session::open(&dir.path().join("none")).is_err());
+    for error in [Session::open(dir.path()).expect_err("empty"), Store::open(dir.path()).expect_err("empty")] {
+        assert!(matches!(error.problem, SessionProblem::NotASession), "{error}");
+    }
+    assert_eq!(names(dir.path()), Vec::<String>::new(), "a lock was left in a folder that is not a session");
+    assert!(Session::open(&dir.path().join("none")).is_err() && Store::open(&dir.path().join("none")).is_err());
+}
+
+/// The text of a `session.json` of version 1.0, as it was written before there were journals.
+pub(super) fn old_document(images: &[&str]) -> String {
+    let captures: Vec<serde_json::Value> = images
+        .iter()
+        .map(|image| {
+            serde_json::json!({
+                "image": image, "depth": null, "joints_rad": [0.5], "sim_time_s": 1.25,
+                "base_from_tip": {"translation_m": [0.1, 0.2, 0.3], "rotation_xyzw": [0.0, 0.0, 0.6, 0.8]}
+            })
+        })
+        .collect();
+    let mut text = serde_json::to_value(meta()).expect("meta");
+    text["format"] = "handeye-session".into();
+    text["version"] = "1.0".into();
+    text["captures"] = captures.into();
+    text.to_string()
+}
+
+pub(super) fn old_session(folder: &Path, images: &[&str]) {
+    fs::create_dir_all(folder.join("images")).expect("folder");
+    for (i, name) in images.iter().enumerate() {
+        image(i as u8).save(folder.join(name)).expect("image");
+    }
+    fs::write(folder.join(DOCUMENT), old_document(images)).expect("write");
+}
+
+#[test]
+fn a_session_without_a_journal_opens_and_gets_one() {
+    let dir = folder();
+    old_session(dir.path(), &["images/0003.png", "images/first.png", "images/0007.png"]);
+    let read = Session::open(dir.path()).expect("read");
+    let ids: Vec<u32> = read.document.captures.iter().map(|capture| capture.id.0).collect();
+    assert_eq!(ids, [3, 8, 7]);
+    assert_eq!(read.document.captures[0].frames, 1);
+    assert_eq!(names(dir.path()), ["images", "session.json"], "reading has changed the folder");
+
+    let mut store = Store::open(dir.path()).expect("open");
+    assert_eq!(*store.document(), read.document);
+    assert_eq!(store.add_capture(&Capture::new(&image(9), pose(9))).expect("add"), CaptureId(9));
+    store.apply(Edit::DeleteCaptures(vec![CaptureId(9)])).expect("delete");
+    drop(store);
+    let mut store = Store::open(dir.path()).expect("open again");
+    assert_eq!(*store.document(), read.document);
+    store.undo().expect("undo");
+    assert_eq!(store.load_rgb(&store.document().captures[3]).expect("image"), image(9));
+}
+
+#[test]
+fn a_damaged_old_session_is_an_error_that_names_the_file() {
+    let dir = folder();
+    old_session(dir.path(), &["images/0001.png"]);
+    let path = dir.path().join(DOCUMENT);
+    let good = fs::read_to_string(&path).expect("text");
+    let cases = [
+        ("\"1.0\"", "\"2.0\"", "version \"2.0\""),
+        ("\"1.0\"", "\"one\"", "version \"one\""),
+        ("\"handeye-session\"", "\"jupyter\"", "format is \"jupyter\""),
+        ("images/0001.png", "images/0009.png", "images/0009.png"),
+        ("images/0001.png", "../0001.png", "not inside of the session"),
+        ("\"rotation_xyzw\":[0.0,0.0,0.6,", "\"rotation_xyzw\":[9.0,9.0,9.0,", "not a unit quaternion"),
+        ("\"square_m\":0.015", "\"square_m\":-1", "square_m"),
+        ("\"mode\":\"eye_in_hand\"", "\"mode\":\"eye\"", "eye"),
+        ("\"captures\"", "\"capture\"", "captures"),
+    ];
+    for (from, to, needle) in cases {
+        assert!(good.contains(from), "{from}");
+        fs::write(&path, good.replace(from, to)).expect("write");
+        for error in [Session::open(dir.path()).expect_err(to), Store::open(dir.path()).expect_err(to)] {
+            let error = error.to_string();
+            assert!(error.contains(needle) && !error.contains('\n'), "{to}: {error}");
+        }
+    }
+    for cut in [0, 10, good.len() / 2, good.len() - 3] {
+        fs::write(&path, &good[..cut]).expect("write");
+        assert!(Store::open(dir.path()).is_err());
+        let error = Store::create(dir.path(), meta()).expect_err("a damaged session is not thrown away");
+        assert!(matches!(error.problem, SessionProblem::Exists), "{error}");
+    }
+    fs::write(&path, good.replace("\"1.0\"", "\"1.7\"").replacen('{', "{\"later\": 1,", 1)).expect("write");
+    assert!(Session::open(dir.path()).is_ok(), "a newer minor version reads");
 }

@@ -231,7 +231,7 @@ pub fn verify<'a>(
         check.ratio = consistency.as_mut().and_then(|sums| sums.add(calibrated, &points, capture.view, &check));
         checks.push(check);
     }
-    Ok(summary(calibrated, captures, checks, consistency.and_then(|sums| sums.finish())))
+    Ok(summary(calibrated, captures, checks, consistency.and_then(consistency::Sums::finish)))
 }
 
 fn check(

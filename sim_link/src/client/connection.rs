@@ -1,5 +1,6 @@
 //! One conversation with a remote API server: calls, callbacks, time limits, recovery.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -50,8 +51,23 @@ struct Exchange<'a> {
     total_timeout: Duration,
     started: Instant,
     cancel: Option<&'a CancelToken>,
+    grace: Duration,
+    /// When the token was first seen raised.
+    cancelled_at: Cell<Option<Instant>>,
     /// The server has asked this client for something, so it waits for an answer inside the call.
     asked: bool,
+}
+
+impl Exchange<'_> {
+    /// Whether the call was cancelled and had its time to end.
+    fn is_cancelled(&self) -> bool {
+        if !self.cancel.is_some_and(CancelToken::is_cancelled) {
+            return false;
+        }
+        let since = self.cancelled_at.get().unwrap_or_else(Instant::now);
+        self.cancelled_at.set(Some(since));
+        since.elapsed() >= self.grace
+    }
 }
 
 impl Connection {
@@ -101,6 +117,12 @@ impl Connection {
         self.options.total_timeout
     }
 
+    /// Whether the server is there, as far as is known without asking it: after a call that was answered, `false` means
+    /// that it has gone since.
+    pub fn is_connected(&mut self) -> bool {
+        self.transport.connected()
+    }
+
     /// This client's id.
     pub fn uuid(&self) -> &str {
         &self.uuid
@@ -130,6 +152,8 @@ impl Connection {
             total_timeout: options.total_timeout.unwrap_or(self.options.total_timeout),
             started: Instant::now(),
             cancel: options.cancel.as_ref(),
+            grace: options.grace,
+            cancelled_at: Cell::new(None),
             asked: false,
         };
         if self.depth == 0 {
@@ -250,7 +274,7 @@ impl Connection {
 
     /// Ends the call when it is cancelled or too long; `under_way` says whether the server knows of it.
     fn check_limits(&mut self, exchange: &Exchange<'_>, under_way: bool) -> Result<(), LinkError> {
-        let cancelled = exchange.cancel.is_some_and(CancelToken::is_cancelled) || self.options.shutdown.is_cancelled();
+        let cancelled = exchange.is_cancelled() || self.options.shutdown.is_cancelled();
         let elapsed = exchange.started.elapsed();
         if !cancelled && elapsed < exchange.total_timeout {
             return Ok(());
@@ -297,6 +321,7 @@ impl Connection {
             reply_timeout: Some(exchange.reply_timeout),
             total_timeout: Some(left),
             cancel: exchange.cancel.cloned(),
+            grace: exchange.grace,
         };
         self.depth += 1;
         let result = callback(&mut CallbackScope::new(self, options), args);

@@ -42,6 +42,9 @@ pub const INT_IDLE_FPS: i64 = 26;
 /// String parameter: path of the scene file.
 pub const STRING_SCENE_PATH: i64 = 14;
 
+/// Mode of a joint that forces move and a controller holds; in the others it is where it is put.
+pub const JOINT_MODE_DYNAMIC: i64 = 5;
+
 /// Log level: errors. The simulator also raises one.
 pub const LOG_ERRORS: i64 = 420;
 /// Log level: warnings.
@@ -53,3 +56,5 @@ pub const LOG_INFOS: i64 = 450;
 pub const MOTION_RUNNING: i64 = 0;
 /// Result of a motion step: there.
 pub const MOTION_DONE: i64 = 1;
+/// Result of a motion step: at rest somewhere else, because the motion was ended early.
+pub const MOTION_STOPPED: i64 = 2;

@@ -5,9 +5,10 @@
 //! | pose `[x y z qx qy qz qw]` | [`Pose`] |
 //! | matrix, 3×4, row by row: `[R | p]` | [`Pose`] |
 //! | image rows from the bottom up | row 0 on top |
-//! | depth as little-endian `f32`, metres along the optical axis, rows from the bottom up | [`DepthFrame`], row 0 on top |
+//! | depth as little-endian `f32`, metres along the optical axis, rows from the bottom up | [`DepthImage`], row 0 on top |
 //! | vision sensor axes: x left, y up, z forward | [`Camera`]: x right, y down, z forward |
 
+use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::RgbImage;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
@@ -52,27 +53,6 @@ pub enum ConvertError {
         /// Image height in pixels.
         height: u32,
     },
-}
-
-/// A depth image: distance along the optical axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DepthFrame {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// Depths in metres, row by row, row 0 on top; the far clipping plane where nothing was hit.
-    pub metres: Vec<f32>,
-}
-
-impl DepthFrame {
-    /// Depth in metres at a column and a row from the top; `None` outside.
-    pub fn at(&self, column: u32, row: u32) -> Option<f32> {
-        if column >= self.width {
-            return None;
-        }
-        self.metres.get(row as usize * self.width as usize + column as usize).copied()
-    }
 }
 
 /// A pose from CoppeliaSim's seven numbers.
@@ -150,14 +130,15 @@ pub fn rgb_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<RgbImage,
     })
 }
 
-/// A depth image from little-endian `f32` with the bottom row first.
+/// A depth image from little-endian `f32` with the bottom row first. Where nothing was hit, the depth is that of the
+/// far clipping plane.
 ///
 /// # Errors
 /// [`ConvertError::BufferSize`].
-pub fn depth_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<DepthFrame, ConvertError> {
+pub fn depth_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<DepthImage, ConvertError> {
     let flipped = top_row_first(bytes, width, height, 4)?;
     let metres = flipped.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-    Ok(DepthFrame { width, height, metres })
+    Ok(DepthImage { width, height, metres })
 }
 
 fn top_row_first(bytes: &[u8], width: u32, height: u32, bytes_per_pixel: usize) -> Result<Vec<u8>, ConvertError> {

@@ -163,6 +163,12 @@ pub enum LinkError {
         /// Result of the motion generator.
         code: i64,
     },
+    /// Somebody else stopped the motion, and the arm stands.
+    #[error("{task}: the motion was stopped on its way, perhaps by another client; move again when it is clear")]
+    MotionStopped {
+        /// What was asked for.
+        task: &'static str,
+    },
     /// The motion ended elsewhere; inverse kinematics failing is not an error for the simulator.
     #[error(
         "the tip stopped {distance_mm:.2} mm and {angle_deg:.2}° from its goal, which may be out of reach: choose \

@@ -45,13 +45,16 @@ pub struct CallOptions {
     pub total_timeout: Option<Duration>,
     /// Ends the wait within 50 ms when raised.
     pub cancel: Option<CancelToken>,
+    /// How long a cancelled call may still end by itself: giving it up costs this client its record on the server.
+    pub grace: Duration,
 }
 
 impl CallOptions {
     /// For a call that may take `total`, in silence: a server that defers its reply says nothing until it is done.
     /// That it is alive is watched by the connection itself.
     pub fn long(total: Duration, cancel: &CancelToken) -> Self {
-        Self { reply_timeout: Some(total), total_timeout: Some(total), cancel: Some(cancel.clone()) }
+        let total = Some(total);
+        Self { reply_timeout: total, total_timeout: total, cancel: Some(cancel.clone()), grace: Duration::ZERO }
     }
 
     /// The usual limits, and a cancel token.

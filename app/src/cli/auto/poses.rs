@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use handeye_core::poses_file::{self, Goal, TaughtPoses};
+use handeye_core::poses_file::{Goal, TaughtPoses};
 use handeye_sim_link::cell::planning::{ViewOptions, ViewSetup, poses_looking_at};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::MotionLimits;
 
 use super::super::Failure;
+use crate::limits;
 
 /// The ten reference poses, so that they are there wherever the binary is.
 const SEED10: &str = include_str!("../../../../assets/poses/seed10.toml");
@@ -44,12 +45,12 @@ impl Plan {
             .map(<[f64; 6]>::try_from)
             .transpose()
             .map_err(|_wrong_length| Failure::unusable(anyhow::anyhow!("the start needs six joint angles")))?;
-        let l = taught.limits.unwrap_or(DEFAULT_LIMITS);
+        let limits = taught.limits.unwrap_or(limits::TOUR);
         Ok(Self {
             start_joints,
             goals: taught.poses.iter().map(|p| (p.name.clone(), p.goal.clone())).collect(),
-            joint_limits: MotionLimits::uniform(6, l.joint_velocity, l.joint_acceleration, l.joint_jerk),
-            tip_limits: MotionLimits::uniform(4, l.tip_velocity, l.tip_acceleration, l.tip_jerk),
+            joint_limits: limits::of_joints(&limits, 1.0),
+            tip_limits: limits::of_tip(&limits, 1.0),
         })
     }
 
@@ -64,7 +65,6 @@ impl Plan {
         let resolved = meant.resolve(seed).map_err(Failure::unusable)?;
         let options = ViewOptions { count: PLANNED_VIEWS, seed, ..ViewOptions::default() };
         let views = poses_looking_at(&ViewSetup::of(&resolved), &options).map_err(Failure::failed)?;
-        let l = DEFAULT_LIMITS;
         Ok(Self {
             start_joints: Some(resolved.start_joints),
             goals: views
@@ -72,18 +72,8 @@ impl Plan {
                 .enumerate()
                 .map(|(i, view)| (format!("planned {}", i + 1), Goal::Joints(view.joints.to_vec())))
                 .collect(),
-            joint_limits: MotionLimits::uniform(6, l.joint_velocity, l.joint_acceleration, l.joint_jerk),
-            tip_limits: MotionLimits::uniform(4, l.tip_velocity, l.tip_acceleration, l.tip_jerk),
+            joint_limits: limits::of_joints(&limits::TOUR, 1.0),
+            tip_limits: limits::of_tip(&limits::TOUR, 1.0),
         })
     }
 }
-
-/// Limits of the reference poses, for pose files without their own.
-const DEFAULT_LIMITS: poses_file::MotionLimits = poses_file::MotionLimits {
-    joint_velocity: 310.0 * std::f64::consts::PI / 180.0,
-    joint_acceleration: 100.0 * std::f64::consts::PI / 180.0,
-    joint_jerk: 80.0 * std::f64::consts::PI / 180.0,
-    tip_velocity: 30.0,
-    tip_acceleration: 1.0,
-    tip_jerk: 1.0,
-};

@@ -81,8 +81,35 @@ fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Out
         let what = tr!(language, "This capture never enters the fit and tells how good the calibration is");
         capture_ui(ui, Button::new(name).min_size(Vec2::new(0.0, 32.0)), name, what, CapturePurpose::Verify);
         frames_ui(ui, model.view.capture, language, outbox);
+        tour_ui(ui, model, hindrance, outbox);
         selected_ui(ui, model, table, outbox);
     });
+}
+
+/// The whole set from one click: what somebody wants who has never calibrated anything.
+fn tour_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outbox: &mut Outbox) {
+    let language = model.view.language;
+    if model.touring {
+        if ui.button(tr!(language, "Stop the tour")).clicked() {
+            outbox.send(Command::StopTour);
+        }
+        return;
+    }
+    let count = model.document().taught.len();
+    // With captures in the table the tour is in the pane of the taught poses.
+    if count == 0 || !model.document().captures.is_empty() {
+        return;
+    }
+    let name = text!("Run the {count} taught poses", count = count).say(language);
+    let what = tr!(language, "Moves to one taught pose after the other and captures at each");
+    let button = ui.add_enabled(hindrance.is_none(), Button::new(name).min_size(Vec2::new(0.0, 32.0)));
+    let button = match hindrance {
+        Some(why) => button.on_disabled_hover_text(why),
+        None => button.on_hover_text(what),
+    };
+    if button.clicked() {
+        outbox.send(Command::RunTour { purpose: Some(CapturePurpose::Calibrate) });
+    }
 }
 
 /// Why no capture can be taken now.

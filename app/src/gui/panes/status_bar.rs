@@ -6,7 +6,8 @@ use crate::command::{Command, Outbox};
 use crate::gui::numbers;
 use crate::gui::status::STALE_AFTER_S;
 use crate::gui::theme::{CAPTION, Palette};
-use crate::model::{Model, RobotState, RotationFormat, Severity};
+use crate::model::{Model, RobotState, RotationFormat};
+use crate::tr;
 
 /// Shown where a number is not known.
 const UNKNOWN: &str = "–";
@@ -15,42 +16,57 @@ const UNKNOWN: &str = "–";
 pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     // What is on the screen after a loss is history, and looks like it.
+    let language = model.view.language;
     let live = model.control.is_connected();
     let robot = model.robot.as_ref();
-    ui.spacing_mut().item_spacing.x = 20.0;
+    ui.spacing_mut().item_spacing.x = 18.0;
     ui.horizontal(|ui| {
         let colour = if live { palette.text } else { palette.weak };
         let text = |number: fn(&RobotState) -> String| robot.map_or_else(|| UNKNOWN.to_owned(), number);
         field_ui(
             ui,
-            "Tip in base, x y z [mm]",
+            tr!(language, "Tip in base, x y z [mm]"),
             &text(|robot| numbers::translation_mm(&robot.base_from_tip)),
-            20,
+            "−888.8 −888.8 −888.8",
             colour,
         );
         rotation_ui(ui, model, colour, outbox);
-        field_ui(ui, "Joints 1 to 6 [deg]", &text(joints_deg), 41, colour);
-        field_ui(ui, "Simulation", &text(|robot| format!("{:.2} s", robot.sim_time_s)), 9, colour);
+        field_ui(
+            ui,
+            tr!(language, "Joints 1 to 6 [deg]"),
+            &text(joints_deg),
+            "−888.8 −888.8 −888.8 −888.8 −888.8 −888.8",
+            colour,
+        );
+        field_ui(
+            ui,
+            tr!(language, "Simulation"),
+            &text(|robot| format!("{:.2} s", robot.sim_time_s)),
+            "8888.88 s",
+            colour,
+        );
         let stale = model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S);
         let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
-        field_ui(ui, "Image age", &age, 6, if stale { palette.warning } else { palette.text });
-        field_ui(ui, "Dropped", &model.dropped_frames.to_string(), 6, palette.text)
-            .on_hover_text("Pictures that arrived but were replaced by newer ones before the window could show them");
+        field_ui(ui, tr!(language, "Image age"), &age, "88.8 s", if stale { palette.warning } else { palette.text });
+        field_ui(ui, tr!(language, "Dropped"), &model.dropped_frames.to_string(), "88888", palette.text).on_hover_text(
+            tr!(language, "Pictures that arrived but were replaced by newer ones before the window could show them"),
+        );
     });
     ui.add_space(2.0);
     message_ui(ui, model);
 }
 
-/// A caption over a value with room for `digits`, read together by a screen reader.
-fn field_ui(ui: &mut Ui, caption: &str, value: &str, digits: usize, colour: egui::Color32) -> egui::Response {
+/// A caption over a value with room for `sample`, read together by a screen reader.
+fn field_ui(ui: &mut Ui, caption: &str, value: &str, sample: &str, colour: egui::Color32) -> egui::Response {
     let weak = Palette::of(ui).weak;
-    let digit = ui.fonts_mut(|fonts| fonts.glyph_width(&egui::TextStyle::Monospace.resolve(ui.style()), '0'));
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    let room = ui.painter().layout_no_wrap(sample.to_owned(), font, colour).size().x;
     ui.vertical(|ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
         // Nothing moves sideways when a number grows or is not known.
-        ui.set_min_width(digits as f32 * digit);
+        ui.set_min_width(room);
         ui.label(RichText::new(caption).size(CAPTION).color(weak));
-        let label = ui.add(Label::new(RichText::new(value).monospace().color(colour)).extend().sense(Sense::hover()));
+        let label = ui.add(Label::new(RichText::new(value).color(colour)).extend().sense(Sense::hover()));
         label.widget_info(|| {
             let spoken = value.split_whitespace().collect::<Vec<_>>().join(" ");
             egui::WidgetInfo::labeled(egui::WidgetType::Label, true, format!("{caption}: {spoken}"))
@@ -60,9 +76,20 @@ fn field_ui(ui: &mut Ui, caption: &str, value: &str, digits: usize, colour: egui
 }
 
 fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut Outbox) {
-    let (caption, digits, next, name) = match model.view.rotation {
-        RotationFormat::RollPitchYaw => ("Tip in base, roll pitch yaw [deg]", 23, RotationFormat::Quaternion, "quat"),
-        RotationFormat::Quaternion => ("Tip in base, quaternion x y z w", 31, RotationFormat::RollPitchYaw, "rpy"),
+    let language = model.view.language;
+    let (caption, sample, next, name) = match model.view.rotation {
+        RotationFormat::RollPitchYaw => (
+            tr!(language, "Tip in base, roll pitch yaw [deg]"),
+            "−888.88 −888.88 −888.88",
+            RotationFormat::Quaternion,
+            "quat",
+        ),
+        RotationFormat::Quaternion => (
+            tr!(language, "Tip in base, quaternion x y z w"),
+            "−8.8888 −8.8888 −8.8888 −8.8888",
+            RotationFormat::RollPitchYaw,
+            "rpy",
+        ),
     };
     let value = model.robot.as_ref().map_or_else(
         || UNKNOWN.to_owned(),
@@ -71,14 +98,18 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
             RotationFormat::Quaternion => numbers::quaternion(&robot.base_from_tip),
         },
     );
-    ui.horizontal(|ui| {
+    ui.horizontal_top(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
-        field_ui(ui, caption, &value, digits, colour);
+        field_ui(ui, caption, &value, sample, colour);
         let button = ui
-            .add(Button::new(RichText::new(name).size(CAPTION)).min_size(Vec2::new(34.0, 22.0)).small())
+            .vertical(|ui| {
+                ui.add_space(6.0);
+                ui.add(Button::new(RichText::new(name).size(CAPTION)).min_size(Vec2::new(34.0, 22.0)).small())
+            })
+            .inner
             .on_hover_text(match next {
-                RotationFormat::Quaternion => "Write the rotation as a quaternion",
-                RotationFormat::RollPitchYaw => "Write the rotation as roll, pitch and yaw",
+                RotationFormat::Quaternion => tr!(language, "Write the rotation as a quaternion"),
+                RotationFormat::RollPitchYaw => tr!(language, "Write the rotation as roll, pitch and yaw"),
             });
         if button.clicked() {
             outbox.send(Command::SetRotationFormat(next));
@@ -88,16 +119,9 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
 
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
-    let (text, colour) = match model.message() {
+    let (text, colour) = match model.messages.newest() {
         None => (String::new(), palette.weak),
-        Some(message) => {
-            let colour = match message.severity {
-                Severity::Info => palette.weak,
-                Severity::Warning => palette.warning,
-                Severity::Error => palette.tone(crate::gui::theme::Tone::Bad),
-            };
-            (message.text.say(model.view.language), colour)
-        }
+        Some(message) => (message.text.say(model.view.language), palette.severity(message.severity)),
     };
     ui.add(Label::new(RichText::new(text).color(colour)).truncate());
 }

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use handeye_core::dataset::{CameraInput, Dataset, DatasetError};
+use handeye_core::dataset::{Dataset, DatasetError};
 use handeye_core::session::{Capture, Document, Role, SessionError, Store};
 
-use super::{Archive, Beginning, free_folder, timestamp_rfc3339};
+use super::{Archive, free_folder, timestamp_rfc3339};
 use crate::command::Event;
 use crate::model::Severity;
 use crate::session_start;
@@ -46,8 +46,7 @@ impl Archive {
         let dataset = Dataset::read(folder)?;
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let target_folder = free_folder(&self.sessions, &name);
-        let Beginning { mut meta, taught: _ } =
-            Beginning { meta: session_start::meta(None, timestamp_rfc3339()), taught: Vec::new() };
+        let mut meta = session_start::meta(None, timestamp_rfc3339());
         meta.target = dataset.target;
         meta.camera = dataset.camera;
         if let Some(mode) = dataset.mode {

@@ -214,4 +214,6 @@ fn finish(
 }
 
 #[cfg(test)]
+pub(crate) mod simulated;
+#[cfg(test)]
 mod tests;

@@ -10,7 +10,7 @@ use crate::handeye::{HandEyeError, quality};
 use crate::progress::{Stage, Work};
 
 /// Points of a curve at the most: enough for any chart, and a thousand views cost no more than a few hundred.
-const MOST_POINTS: usize = 150;
+const MOST_POINTS: usize = 100;
 
 /// One point of an [`ErrorCurve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,15 +18,15 @@ pub struct ErrorPoint {
     /// Number of views.
     pub views: usize,
     /// Expected error as in [`quality::tip_error_95_m`], metres; `None` where so few views leave a direction of the
-    /// answer free.
+    /// answer free, or so weak that the error would exceed the distance of the board.
     pub tip_error_95_m: Option<f64>,
 }
 
 /// The expected error of a measured point by number of views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorCurve {
-    /// With the first views alone, in their order, from three to all of them. Every number of views up to 150 of them;
-    /// of more, about 150 evenly spaced, the last always among them.
+    /// With the first views alone, in their order, from three to all of them. Every number of views up to a hundred of
+    /// them; of more, a hundred evenly spaced, the last always among them.
     pub gathered: Vec<ErrorPoint>,
     /// Extrapolated to twice as many views, from the next on, spaced alike.
     pub further: Vec<ErrorPoint>,
@@ -42,8 +42,7 @@ impl ErrorCurve {
     /// as many as there are. `None` for a goal that is not positive, or when nothing is known yet.
     pub fn views_for(&self, goal_m: f64) -> Option<usize> {
         let (views, error_m) = self.now()?;
-        // A goal that is not a number fails the comparison too.
-        if !(goal_m > 0.0) {
+        if goal_m.is_nan() || goal_m <= 0.0 {
             return None;
         }
         let needed = views as f64 * (error_m / goal_m).powi(2).max(1.0);
@@ -87,10 +86,13 @@ pub fn error_by_views<'a>(
         }
         if wanted.next_if_eq(&&views).is_some() {
             let covariance = covariance_of(&information, system.shared_count);
-            let tip_error_95_m = covariance.map(|c| {
+            let error_m = covariance.map(|c| {
                 let hand_eye: Matrix6<f64> = c.fixed_view::<6, 6>(0, 0).into_owned();
                 quality::radius_95(&quality::point_covariance(&hand_eye, &solution.reference_point))
             });
+            // Repeated views are not quite singular, by the rounding and the corrections of their poses; an error beyond
+            // the distance of the board says as little, because no derivative holds so far.
+            let tip_error_95_m = error_m.filter(|e| *e <= solution.reference_point.coords.norm());
             gathered.push(ErrorPoint { views, tip_error_95_m });
         }
     }
@@ -159,3 +161,7 @@ pub fn expected_residuals<'a>(
     let rms = |squares: f64| (squares / corners.max(1) as f64).sqrt();
     Ok(ExpectedResiduals { robot_px: rms(robot), prediction_px: rms(robot + shared + corner_squares) })
 }
+
+#[cfg(test)]
+#[path = "prediction_tests.rs"]
+mod tests;

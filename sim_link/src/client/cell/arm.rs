@@ -5,9 +5,12 @@ use std::time::{Duration, Instant};
 
 use handeye_core::frames::{Base, Pose, Tip};
 
-use super::{CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles, require_running};
+use super::hold::Hold;
+use super::truth::{self, GroundTruth};
+use super::{CellInfo, CellObjects, CellPaths, JOINTS, JointAngles, discover, read_joint_angles, require_running};
+use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;
-use crate::client::options::CallOptions;
+use crate::client::options::{CallOptions, ConnectionOptions};
 use crate::client::sim::{JointMotion, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, Sim};
 use handeye_core::progress::CancelToken;
 
@@ -16,6 +19,13 @@ const LONGEST_MOTION: Duration = Duration::from_mins(10);
 
 /// Passes in a row that have to be at rest: one alone may be the turning point of an oscillation.
 const RESTING_PASSES: u32 = 3;
+
+/// How long a pass that is under way may go on after a motion was cancelled: a pass takes a twentieth of a second, but
+/// another client may hold the simulation for ever.
+const BRAKE_GRACE: Duration = Duration::from_millis(300);
+
+/// Longest time to come to rest, in real time. From the fastest motion of the reference tour it takes about two seconds.
+const LONGEST_BRAKING: Duration = Duration::from_secs(10);
 
 /// The built-in cell's function that brakes every motion.
 const STOP_FUNCTION: &str = "handeye.stop";
@@ -54,9 +64,10 @@ impl Default for SettleOptions {
 
 /// The arm of a cell, over a connection of its own.
 pub struct Arm {
-    sim: Sim,
-    objects: Arc<CellObjects>,
-    info: Arc<CellInfo>,
+    pub(super) sim: Sim,
+    pub(super) objects: Arc<CellObjects>,
+    pub(super) info: Arc<CellInfo>,
+    pub(super) hold: Hold,
 }
 
 /// What differs between motions of joints and of the tip.
@@ -97,7 +108,16 @@ impl Motion {
 
 impl Arm {
     pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
-        Self { sim, objects, info }
+        Self { sim, objects, info, hold: Hold::default() }
+    }
+
+    /// Connects once, for an arm without its camera.
+    ///
+    /// # Errors
+    /// As [`super::CellClient::connect`].
+    pub fn connect(endpoint: &Endpoint, options: &ConnectionOptions, paths: &CellPaths) -> Result<Self, LinkError> {
+        let (sim, objects, info) = discover(endpoint, options, paths)?;
+        Ok(Self::new(sim, objects, info))
     }
 
     /// What is known about the cell.
@@ -126,12 +146,21 @@ impl Arm {
         self.sim.get_object_pose(self.objects.tip, ObjectHandle::WORLD)
     }
 
+    /// See [`super::CameraFeed::ground_truth`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn ground_truth(&mut self) -> Result<GroundTruth, LinkError> {
+        truth::read(&mut self.sim, &self.objects, &self.info)
+    }
+
     /// Moves the joints to `goal` (rad) within `limits` and returns when the motion is over; an arm with dynamic joints
     /// still follows for a moment, see [`Arm::settle`].
     ///
     /// # Errors
     /// [`LinkError::JointOutOfRange`] or [`LinkError::BadMotion`] before anything moves; [`LinkError::NotRunning`];
-    /// [`LinkError::Cancelled`] with the arm stopped; [`LinkError::Unsupported`] before CoppeliaSim 4.7.
+    /// [`LinkError::Cancelled`] with the arm stopped, [`LinkError::MotionStopped`] when it was another client that
+    /// stopped it; [`LinkError::Unsupported`] before CoppeliaSim 4.7.
     pub fn move_to_joints(
         &mut self,
         goal: &JointAngles,
@@ -186,16 +215,23 @@ impl Arm {
     /// # Errors
     /// Any [`LinkError`] of a call; the arm may then still move.
     pub fn stop(&mut self) -> Result<(), LinkError> {
-        match self.sim.connection().call(STOP_FUNCTION, Vec::new()) {
-            Ok(_nothing) => return Ok(()),
-            Err(error) if error.is_unknown_function() => {}
-            Err(error) => return Err(error),
+        if self.brake()? {
+            return Ok(());
         }
         for &joint in &self.objects.joints {
             let here_rad = self.sim.get_joint_position(joint)?;
             self.sim.set_joint_target_position(joint, here_rad)?;
         }
         Ok(())
+    }
+
+    /// Has the server brake every motion; `false` when it has no function for that.
+    fn brake(&mut self) -> Result<bool, LinkError> {
+        match self.sim.connection().call(STOP_FUNCTION, Vec::new()) {
+            Ok(_nothing) => Ok(true),
+            Err(error) if error.is_unknown_function() => Ok(false),
+            Err(error) => Err(error),
+        }
     }
 
     /// Waits until the arm stands still, and one complete pass longer, so that images show it so. Returns the simulated
@@ -225,7 +261,8 @@ impl Arm {
             if resting >= RESTING_PASSES {
                 return Ok(after_s);
             }
-            if after_s > options.limit_s {
+            // A simulation that runs faster than it is asked may be past the limit and at rest for long.
+            if resting == 0 && after_s > options.limit_s {
                 return Err(LinkError::NotSettled { after_s, rate_deg_s: rate_rad_s.to_degrees() });
             }
             (before_s, before) = (now_s, now);
@@ -282,19 +319,34 @@ impl Arm {
         cancel: &CancelToken,
     ) -> Result<(), LinkError> {
         let started = Instant::now();
-        let call = CallOptions::cancelled_by(cancel);
+        // A pass that is under way may end: then the motion is still there to be braked.
+        let patient = CallOptions { grace: BRAKE_GRACE, ..CallOptions::cancelled_by(cancel) };
+        let mut braking_since: Option<Instant> = None;
         let outcome = loop {
-            if cancel.is_cancelled() {
-                break Err(LinkError::Cancelled { call: task.to_owned() });
+            if cancel.is_cancelled() && braking_since.is_none() {
+                match self.brake() {
+                    Ok(true) => braking_since = Some(Instant::now()),
+                    Ok(false) => break Err(LinkError::Cancelled { call: task.to_owned() }),
+                    Err(error) => break Err(error),
+                }
             }
-            if started.elapsed() > LONGEST_MOTION {
+            let is_too_long = started.elapsed() > LONGEST_MOTION;
+            if is_too_long || braking_since.is_some_and(|since| since.elapsed() > LONGEST_BRAKING) {
                 break Err(LinkError::Timeout { call: task.to_owned(), after: started.elapsed() });
             }
+            let call = if braking_since.is_some() { CallOptions::default() } else { patient.clone() };
             let stepped = motion.step(&mut self.sim, &mut state);
             // The commanded point takes effect in the pass that follows, also the last one.
             match stepped.and_then(|status| self.sim.step(&call).map(|()| status)) {
                 Ok(MotionStatus::Running) => {}
                 Ok(MotionStatus::Done) => break Ok(()),
+                Ok(MotionStatus::Stopped) => {
+                    motion.cleanup(&mut self.sim, state)?;
+                    return Err(match braking_since {
+                        Some(_) => LinkError::Cancelled { call: task.to_owned() },
+                        None => LinkError::MotionStopped { task },
+                    });
+                }
                 Err(error) => break Err(error),
             }
         };

@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Base, Camera, Pose, Sensor, Tip};
+use handeye_core::depth::DepthImage;
+use handeye_core::frames::{Base, Pose, Tip};
 use handeye_core::image::RgbImage;
 
-use super::truth::{GroundTruth, PublishedTruth, TRUTH_FUNCTION};
-use super::{CellInfo, CellObjects, JointAngles, read_joint_angles};
-use crate::axes::sensor_from_camera;
-use crate::client::convert::DepthFrame;
+use super::hold::Hold;
+use super::truth::{self, GroundTruth};
+use super::{CellInfo, CellObjects, CellPaths, JointAngles, discover, read_joint_angles};
+use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;
+use crate::client::options::ConnectionOptions;
 use crate::client::sim::{ObjectHandle, Sim};
 
 /// How often a frame is read again because the simulation moved on meanwhile.
@@ -22,7 +24,7 @@ pub struct Frame {
     /// Colour image, row 0 on top.
     pub rgb: RgbImage,
     /// Depth image, row 0 on top.
-    pub depth: DepthFrame,
+    pub depth: DepthImage,
     /// Simulated time (s).
     pub sim_time_s: f64,
     /// The tip as the controller reports it.
@@ -36,12 +38,21 @@ pub struct CameraFeed {
     sim: Sim,
     objects: Arc<CellObjects>,
     info: Arc<CellInfo>,
-    can_hold: bool,
+    hold: Hold,
 }
 
 impl CameraFeed {
     pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
-        Self { sim, objects, info, can_hold: true }
+        Self { sim, objects, info, hold: Hold::default() }
+    }
+
+    /// Connects once, for a camera without its arm.
+    ///
+    /// # Errors
+    /// As [`super::CellClient::connect`].
+    pub fn connect(endpoint: &Endpoint, options: &ConnectionOptions, paths: &CellPaths) -> Result<Self, LinkError> {
+        let (sim, objects, info) = discover(endpoint, options, paths)?;
+        Ok(Self::new(sim, objects, info))
     }
 
     /// What is known about the cell.
@@ -64,16 +75,9 @@ impl CameraFeed {
     /// # Errors
     /// [`LinkError::MixedInstants`] when the simulation is never still for long enough; otherwise as for any call.
     pub fn grab(&mut self) -> Result<Frame, LinkError> {
-        if self.can_hold {
-            match self.sim.acquire_lock() {
-                Ok(()) => return self.grab_held(),
-                Err(error) if error.is_unknown_function() => self.can_hold = false,
-                Err(error) => {
-                    // The request may still reach the server, which would then be held with nobody to let go.
-                    self.sim.connection().renew();
-                    return Err(error);
-                }
-            }
+        if let Some(held) = self.hold.acquire(&mut self.sim)? {
+            let outcome = self.read();
+            return held.release(&mut self.sim, outcome);
         }
         for _ in 0..ATTEMPTS {
             let frame = self.read()?;
@@ -82,23 +86,6 @@ impl CameraFeed {
             }
         }
         Err(LinkError::MixedInstants { attempts: ATTEMPTS })
-    }
-
-    fn grab_held(&mut self) -> Result<Frame, LinkError> {
-        let epoch = self.sim.connection().epoch();
-        let outcome = self.read();
-        if self.sim.connection().epoch() == epoch {
-            match self.sim.release_lock() {
-                Ok(()) => return outcome,
-                Err(error) => {
-                    self.sim.connection().renew();
-                    return outcome.and(Err(error));
-                }
-            }
-        }
-        // The conversation broke: a server that is still there must not stay held.
-        self.sim.connection().renew();
-        outcome
     }
 
     fn read(&mut self) -> Result<Frame, LinkError> {
@@ -116,25 +103,13 @@ impl CameraFeed {
     /// that sees this is worth nothing.
     ///
     /// The pose comes from the scene: `tip_from_camera = tip_from_sensor * sensor_from_camera`. Intrinsics are those that
-    /// the cell publishes through [`TRUTH_FUNCTION`], or else those of the sensor's settings, which are exact for
+    /// the cell publishes through [`super::TRUTH_FUNCTION`], or else those of the sensor's settings, which are exact for
     /// CoppeliaSim's own renderer.
     ///
     /// # Errors
     /// [`LinkError::BadTruth`] when something is published that cannot be read; otherwise as for any call.
     pub fn ground_truth(&mut self) -> Result<GroundTruth, LinkError> {
-        let published = match self.sim.connection().call(TRUTH_FUNCTION, Vec::new()) {
-            Ok(reply) => PublishedTruth::parse(&reply.into_map(0)?)?,
-            Err(error) if error.is_unknown_function() => PublishedTruth::default(),
-            Err(error) => return Err(error),
-        };
-        let tip_from_sensor: Pose<Tip, Sensor> = self.sim.get_object_pose(self.objects.camera, self.objects.tip)?;
-        let tip_from_camera: Pose<Tip, Camera> = tip_from_sensor * sensor_from_camera();
-        Ok(GroundTruth {
-            tip_from_camera: published.tip_from_camera.unwrap_or(tip_from_camera),
-            base_from_target: published.base_from_target,
-            intrinsics: published.intrinsics.unwrap_or_else(|| self.camera_intrinsics_nominal()),
-            intrinsics_published: published.intrinsics.is_some(),
-        })
+        truth::read(&mut self.sim, &self.objects, &self.info)
     }
 
     /// See [`CellInfo::camera_intrinsics_nominal`].

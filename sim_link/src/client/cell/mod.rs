@@ -8,7 +8,7 @@
 //! A motion can be left to the server (`sim.moveToConfig`, one call that ends when the arm is there) or taken step by
 //! step (`_init`, then `_step` and `sim.step` for each pass, then `_cleanup`). [`Arm`] takes it step by step: between
 //! two steps the stop button is looked at, and a client that dies leaves an arm that stands still, not one that carries
-//! on. The API has no other way to end a motion of another client. The simulation is not taken into stepping mode for
+//! on. Jogging ([`Arm::jog`]) computes each point here and sends it for one pass, for the same reasons. The API has no other way to end a motion of another client. The simulation is not taken into stepping mode for
 //! it: it keeps its pace, other clients keep theirs, and a crash cannot freeze it; the price is that a slow network
 //! makes the arm pause for a pass now and then on its way, which changes nothing about where it ends.
 //! A server without the step functions gets the single call. Cancelling that ends this client's record on the server
@@ -16,6 +16,10 @@
 
 mod arm;
 mod camera;
+mod hold;
+mod jog;
+mod jog_plan;
+mod reach;
 mod truth;
 
 use std::sync::Arc;
@@ -25,6 +29,9 @@ use handeye_core::frames::{Base, Pose, Tip};
 
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use camera::{CameraFeed, Frame};
+pub use jog::{ArmJog, JogAxes, JogEnd};
+pub use jog_plan::JogObstacle;
+pub use reach::{ArmKinematics, UnknownKinematics};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
 
 use super::endpoint::Endpoint;
@@ -43,6 +50,8 @@ pub type JointAngles = [f64; JOINTS];
 /// Where the parts of the cell are in the scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CellPaths {
+    /// The base of the arm; without it the kinematics of the arm is not known.
+    pub arm: String,
     /// The joints: the first six matches in the order of the tree, from the base up.
     pub joints: String,
     /// The dummy whose pose the controller reports.
@@ -59,6 +68,7 @@ impl Default for CellPaths {
     /// The public UR5 hand-eye scene, which the built-in cell mimics.
     fn default() -> Self {
         Self {
+            arm: "/UR5".to_owned(),
             joints: "/UR5/joint".to_owned(),
             tip: "/UR5/Tip".to_owned(),
             target: "/UR5/Target".to_owned(),
@@ -77,6 +87,8 @@ pub struct CellInfo {
     pub protocol: ProtocolVersion,
     /// Version of the simulator, 41000 is 4.10.0; 0 when it does not tell.
     pub program_version: i64,
+    /// Whether it is a cell of this project, which CoppeliaSim's version number does not tell.
+    pub is_handeye_cell: bool,
     /// Ranges of the joints from the base up.
     pub joint_intervals: [JointInterval; JOINTS],
     /// The colour sensor.
@@ -90,6 +102,8 @@ pub struct CellInfo {
 /// Handles of the cell's objects.
 #[derive(Debug, Clone, PartialEq)]
 struct CellObjects {
+    arm: Option<ObjectHandle>,
+    arm_path: String,
     joints: [ObjectHandle; JOINTS],
     tip: ObjectHandle,
     target: Option<ObjectHandle>,
@@ -248,6 +262,7 @@ impl CellInfo {
             endpoint: sim.connection().endpoint().clone(),
             protocol: sim.connection().version().unwrap_or(ProtocolVersion::V2),
             program_version,
+            is_handeye_cell: truth::is_published(sim)?,
             joint_intervals: std::array::from_fn(|i| joint_intervals[i]),
             optics: sim.get_sensor_optics(objects.camera)?,
             depth_optics: sim.get_sensor_optics(objects.depth)?,
@@ -264,6 +279,8 @@ impl CellObjects {
             *joint = named(found, &format!("{} [{index}]", paths.joints), "joint of the arm")?;
         }
         Ok(Self {
+            arm: sim.find_object(&paths.arm)?,
+            arm_path: paths.arm.clone(),
             joints,
             tip: named(sim.get_object(&paths.tip), &paths.tip, "tip")?,
             target: sim.find_object(&paths.target)?,
@@ -272,6 +289,18 @@ impl CellObjects {
             depth: named(sim.get_object(&paths.depth), &paths.depth, "depth sensor")?,
         })
     }
+}
+
+/// Connects once and finds the objects of the scene.
+fn discover(
+    endpoint: &Endpoint,
+    options: &ConnectionOptions,
+    paths: &CellPaths,
+) -> Result<(Sim, Arc<CellObjects>, Arc<CellInfo>), LinkError> {
+    let mut sim = Sim::connect(endpoint, options.clone())?;
+    let objects = CellObjects::find(&mut sim, paths)?;
+    let info = CellInfo::read(&mut sim, &objects)?;
+    Ok((sim, Arc::new(objects), Arc::new(info)))
 }
 
 /// The server's refusal of a path means that the object is not there.

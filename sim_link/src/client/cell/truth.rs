@@ -2,10 +2,13 @@
 
 use ciborium::Value;
 use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 
+use super::{CellInfo, CellObjects};
+use crate::axes::sensor_from_camera;
 use crate::client::convert;
 use crate::client::error::LinkError;
+use crate::client::sim::Sim;
 use crate::wire::Reader;
 
 /// The function through which a cell publishes its truth; CoppeliaSim has no such function.
@@ -22,6 +25,32 @@ pub struct GroundTruth {
     pub intrinsics: Intrinsics,
     /// Whether the cell published the intrinsics itself; otherwise they follow from the sensor's settings.
     pub intrinsics_published: bool,
+}
+
+/// Whether the server has [`TRUTH_FUNCTION`], which only a cell of this project has.
+pub(super) fn is_published(sim: &mut Sim) -> Result<bool, LinkError> {
+    match sim.connection().call(TRUTH_FUNCTION, Vec::new()) {
+        Ok(_) => Ok(true),
+        Err(error @ LinkError::Remote { .. }) => Ok(!error.is_unknown_function()),
+        Err(error) => Err(error),
+    }
+}
+
+/// See [`super::CameraFeed::ground_truth`].
+pub(super) fn read(sim: &mut Sim, objects: &CellObjects, info: &CellInfo) -> Result<GroundTruth, LinkError> {
+    let published = match sim.connection().call(TRUTH_FUNCTION, Vec::new()) {
+        Ok(reply) => PublishedTruth::parse(&reply.into_map(0)?)?,
+        Err(error) if error.is_unknown_function() => PublishedTruth::default(),
+        Err(error) => return Err(error),
+    };
+    let tip_from_sensor: Pose<Tip, Sensor> = sim.get_object_pose(objects.camera, objects.tip)?;
+    let tip_from_camera: Pose<Tip, Camera> = tip_from_sensor * sensor_from_camera();
+    Ok(GroundTruth {
+        tip_from_camera: published.tip_from_camera.unwrap_or(tip_from_camera),
+        base_from_target: published.base_from_target,
+        intrinsics: published.intrinsics.unwrap_or_else(|| info.camera_intrinsics_nominal()),
+        intrinsics_published: published.intrinsics.is_some(),
+    })
 }
 
 /// What a cell publishes; every part may be absent.

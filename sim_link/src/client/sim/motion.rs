@@ -4,7 +4,7 @@ use ciborium::Value;
 use handeye_core::frames::{Base, Pose, Tip};
 
 use super::{ObjectHandle, Sim};
-use crate::client::constants::{MOTION_DONE, MOTION_RUNNING};
+use crate::client::constants::{MOTION_DONE, MOTION_RUNNING, MOTION_STOPPED};
 use crate::client::convert::seven_from_pose;
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
@@ -109,8 +109,10 @@ pub struct MotionState(Value);
 pub enum MotionStatus {
     /// Not there.
     Running,
-    /// At its end.
+    /// At its goal.
     Done,
+    /// At rest before its goal, because somebody stopped it.
+    Stopped,
 }
 
 /// The two kinds of motions of the API.
@@ -213,6 +215,7 @@ impl Sim {
         match code {
             MOTION_RUNNING => Ok(MotionStatus::Running),
             MOTION_DONE => Ok(MotionStatus::Done),
+            MOTION_STOPPED => Ok(MotionStatus::Stopped),
             code => Err(LinkError::MotionFailed { call, code }),
         }
     }

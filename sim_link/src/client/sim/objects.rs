@@ -5,6 +5,7 @@ use handeye_core::frames::Pose;
 use nalgebra::{Point3, Vector3};
 
 use super::{JointInterval, ObjectHandle, Sim};
+use crate::client::constants;
 use crate::client::convert::{seven_from_pose, twelve_from_pose};
 use crate::client::error::LinkError;
 use crate::wire;
@@ -160,6 +161,15 @@ impl Sim {
     /// Any [`LinkError`] of a call.
     pub fn get_joint_position(&mut self, joint: ObjectHandle) -> Result<f64, LinkError> {
         self.call("sim.getJointPosition", vec![joint.to_value()])?.number(0)
+    }
+
+    /// Whether a joint is moved by forces, so that only its controller can be told where to go; a joint that is not is
+    /// put from place to place.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn is_joint_dynamic(&mut self, joint: ObjectHandle) -> Result<bool, LinkError> {
+        Ok(self.call("sim.getJointMode", vec![joint.to_value()])?.integer(0)? == constants::JOINT_MODE_DYNAMIC)
     }
 
     /// Puts a joint at a position (rad) at once. The simulator clamps to its interval.

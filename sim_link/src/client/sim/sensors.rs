@@ -2,13 +2,14 @@
 
 use ciborium::Value;
 use handeye_core::camera::Intrinsics;
+use handeye_core::depth::DepthImage;
 use handeye_core::image::RgbImage;
 
 use super::{ObjectHandle, Sim};
 use crate::client::constants::{
     DEPTH_IN_METRES, VISION_FAR_CLIPPING, VISION_NEAR_CLIPPING, VISION_PERSPECTIVE, VISION_PERSPECTIVE_ANGLE,
 };
-use crate::client::convert::{self, DepthFrame};
+use crate::client::convert;
 use crate::client::error::LinkError;
 
 /// How a perspective vision sensor sees.
@@ -48,7 +49,7 @@ impl Sim {
     ///
     /// # Errors
     /// As [`Self::get_vision_sensor_image`].
-    pub fn get_vision_sensor_depth(&mut self, sensor: ObjectHandle) -> Result<DepthFrame, LinkError> {
+    pub fn get_vision_sensor_depth(&mut self, sensor: ObjectHandle) -> Result<DepthImage, LinkError> {
         let args = vec![sensor.to_value(), Value::from(DEPTH_IN_METRES)];
         let reply = self.call("sim.getVisionSensorDepth", args)?;
         let (width, height) = reply.resolution(1)?;

@@ -90,7 +90,7 @@ pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &m
             return None;
         }
         Content::Nothing => {
-            empty::empty_ui(ui, &status::before_first_picture(model), outbox);
+            empty::status_ui(ui, &status::before_first_picture(model), language, outbox);
             return None;
         }
     };

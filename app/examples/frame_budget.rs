@@ -1,0 +1,209 @@
+//! What the thread of the window does for a frame, while everything else goes wrong or is hard at work.
+//!
+//!     cargo run --release -p handeye_app --example frame_budget [SECONDS]
+//!
+//! Draws the whole window 60 times a second without a graphics card: events, panes, tessellation. Prints for each
+//! situation the time on the processor and on the clock at the median, the 99th percentile and the worst frame. Time on
+//! the clock has in it what other threads take of two cores.
+
+use std::io::{Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use handeye_app::app::{App, Connect, Start};
+use handeye_app::command::{Command, Event};
+use handeye_app::gui::{Layout, Window};
+use handeye_app::model::{CellSource, MotionGoal, Observed, SessionState, ViewSettings};
+use handeye_app::session_start::{self, BOARD};
+use handeye_app::settings::SettingsFile;
+use handeye_app::text::Text;
+use handeye_app::worker::{Clock, LiveConnector, Waker};
+use handeye_core::camera::Intrinsics;
+use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::image::RgbImage;
+use handeye_core::observation::Corner;
+use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
+
+/// Refresh of a usual screen.
+const PERIOD: Duration = Duration::from_micros(16_667);
+
+/// Bytes per second of the slow line.
+const SLOW_LINE: usize = 1_000_000;
+
+fn main() -> anyhow::Result<()> {
+    let seconds: u64 = std::env::args().nth(1).map_or(Ok(20), |text| text.parse())?;
+    let duration = Duration::from_secs(seconds);
+    println!("{:<34} {:>7} {:>24} {:>24}", "", "frames", "processor p50 p99 max ms", "clock p50 p99 max ms");
+
+    let cell = CellServer::start(CellConfig::new(Scene::reference()?))?;
+    measure("live pictures", CellSource::Address(cell.endpoint()), duration, |_| {})?;
+
+    let silent = TcpListener::bind("127.0.0.1:0")?;
+    let address = format!("tcp://{}", silent.local_addr()?);
+    let _accepting = thread::spawn(move || silent.incoming().map_while(Result::ok).collect::<Vec<TcpStream>>().len());
+    measure("a server that never answers", CellSource::Address(address), duration, |_| {})?;
+
+    let slow = slow_line(&cell.endpoint())?;
+    measure("a line of 1 MB/s", CellSource::Address(slow), duration, |_| {})?;
+
+    measure("a move of 30 s", CellSource::Address(cell.endpoint()), duration.max(Duration::from_secs(35)), |app| {
+        let mut view = app.model().view.jog;
+        view.speed = 0.005;
+        app.apply(Command::SetJog(view));
+        let goal = MotionGoal::Joints([0.4, 0.3, -0.6, 0.2, 1.2, 0.3]);
+        app.apply(Command::Move { goal, what: Text::verbatim("a far place") });
+    })?;
+
+    measure("a solve of 1,000 views", CellSource::Address(cell.endpoint()), duration, |app| thousand_views(app))?;
+    Ok(())
+}
+
+/// Draws the window for a while.
+fn measure(
+    what: &str,
+    source: CellSource,
+    duration: Duration,
+    begin: impl FnOnce(&mut App),
+) -> anyhow::Result<()> {
+    let sessions = std::env::temp_dir().join(format!("handeye-frame-budget-{}", std::process::id()));
+    let began = Instant::now();
+    let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
+    let waker: Waker = Arc::new(|| {});
+    let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
+    let start = Start {
+        source,
+        view: ViewSettings::default(),
+        addresses: Vec::new(),
+        sessions: sessions.clone(),
+        open: None,
+    };
+    let app = App::start(start, connect, clock, waker)?;
+    let ctx = egui::Context::default();
+    let mut window = Window::new(app, Layout::default(), SettingsFile::default(), &ctx);
+    let mut begin = Some(begin);
+    let (mut on_processor, mut on_clock) = (Vec::new(), Vec::new());
+    let warm_up = Duration::from_secs(3);
+    while began.elapsed() < duration + warm_up {
+        let frame = Instant::now();
+        let before = processor_time();
+        let input = egui::RawInput {
+            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1440.0, 900.0))),
+            time: Some(began.elapsed().as_secs_f64()),
+            ..egui::RawInput::default()
+        };
+        window.collect(&ctx);
+        let output = ctx.run_ui(input, |ui| window.window_ui(ui));
+        let drawn = ctx.tessellate(output.shapes, output.pixels_per_point);
+        std::hint::black_box(drawn.len());
+        // The first frames make fonts and connections; they are not what a user waits for.
+        if began.elapsed() > warm_up {
+            on_processor.push((processor_time() - before).as_secs_f64() * 1e3);
+            on_clock.push(frame.elapsed().as_secs_f64() * 1e3);
+            if let Some(begin) = begin.take() {
+                begin(window.app_mut());
+            }
+        }
+        thread::sleep(PERIOD.saturating_sub(frame.elapsed()));
+    }
+    println!("{what:<34} {:>7} {:>24} {:>24}", on_clock.len(), summary(on_processor), summary(on_clock));
+    drop(window);
+    let _gone = std::fs::remove_dir_all(sessions).is_ok();
+    Ok(())
+}
+
+fn summary(mut times_ms: Vec<f64>) -> String {
+    times_ms.sort_by(f64::total_cmp);
+    let at = |part: f64| times_ms.get(((times_ms.len() - 1) as f64 * part).round() as usize).copied().unwrap_or(0.0);
+    format!("{:>7.2} {:>7.2} {:>7.2}", at(0.5), at(0.99), at(1.0))
+}
+
+/// Time of this thread on a processor: first number of its `schedstat`, nanoseconds.
+fn processor_time() -> Duration {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    Duration::from_nanos(text.split_whitespace().next().and_then(|ns| ns.parse().ok()).unwrap_or(0))
+}
+
+/// A line to the server that carries so many bytes a second in each direction.
+fn slow_line(server: &str) -> anyhow::Result<String> {
+    let server = server.trim_start_matches("tcp://").to_owned();
+    let listener = TcpListener::bind("127.0.0.1:0")?;
+    let address = format!("tcp://{}", listener.local_addr()?);
+    thread::spawn(move || {
+        for client in listener.incoming().map_while(Result::ok) {
+            let Ok(server) = TcpStream::connect(&server) else { return };
+            let (Ok(client_too), Ok(server_too)) = (client.try_clone(), server.try_clone()) else { return };
+            thread::spawn(move || trickle(client, server));
+            thread::spawn(move || trickle(server_too, client_too));
+        }
+    });
+    Ok(address)
+}
+
+fn trickle(mut from: TcpStream, mut to: TcpStream) {
+    let mut piece = vec![0; SLOW_LINE / 100];
+    while let Ok(count @ 1..) = from.read(&mut piece) {
+        thread::sleep(Duration::from_secs_f64(count as f64 / SLOW_LINE as f64));
+        if to.write_all(&piece[..count]).is_err() {
+            return;
+        }
+    }
+}
+
+/// A session of 1,000 captures of a made-up cell, which the solver takes up by itself.
+fn thousand_views(app: &mut App) {
+    let camera = Intrinsics::pinhole(640, 480, 589.37);
+    let tip_from_camera: Pose<Tip, Camera> = Pose::from_translation_xyzw([0.05, 0.0, 0.0], [0.0, 0.0, 0.7, 0.7]);
+    let base_from_target: Pose<Base, Target> = Pose::from_translation_xyzw([0.4, 0.1, 0.02], [1.0, 0.0, 0.0, 0.0]);
+    let mut document = Document::new(session_start::meta(None, String::new()));
+    let mut seen = Vec::new();
+    for n in 1..=1000_u32 {
+        let s = f64::from(n);
+        let turn = UnitQuaternion::from_euler_angles(
+            0.45 * (1.7 * s).sin(),
+            0.45 * (2.3 * s).cos(),
+            0.5 * (0.9 * s).sin(),
+        );
+        let middle = BOARD.centre();
+        let camera_from_target: Pose<Camera, Target> = Pose::from_isometry(
+            Translation3::new(0.02 * s.sin(), 0.02 * s.cos(), 0.32 + 0.04 * (1.9 * s).sin())
+                * Isometry3::from_parts(Translation3::identity(), turn)
+                * Translation3::new(-middle.x, -middle.y, 0.0),
+        );
+        let corners: Vec<Corner> = BOARD
+            .points()
+            .iter()
+            .enumerate()
+            .filter_map(|(index, point)| {
+                let px = camera.project(&(camera_from_target.isometry() * point)).ok()?;
+                let off = |phase: f64| 0.07 * (s * 12.9 + index as f64 * 78.2 + phase).sin();
+                Some(Corner { index, px: px + Vector2::new(off(0.0), off(1.0)) })
+            })
+            .collect();
+        document.captures.push(CaptureRecord {
+            id: CaptureId(n),
+            image: format!("images/{n:04}.png"),
+            depth: None,
+            base_from_tip: base_from_target * camera_from_target.inverse() * tip_from_camera.inverse(),
+            joints_rad: None,
+            sim_time_s: None,
+            role: Role::Calibration,
+            excluded: false,
+            frames: 1,
+            corner_noise_px: None,
+            settled_s: None,
+            pose_name: None,
+        });
+        let thumbnail = Arc::new(RgbImage::new(160, 120));
+        seen.push((CaptureId(n), Observed { corners: Some(corners), image_size: (640, 480), thumbnail }));
+    }
+    let state = SessionState { folder: None, document: Arc::new(document), undo: None, redo: None };
+    app.absorb(Event::Document(Box::new(state)));
+    for (id, observed) in seen {
+        app.absorb(Event::Observed { id, target: BOARD, observed: Some(Arc::new(observed)) });
+    }
+}

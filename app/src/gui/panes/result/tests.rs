@@ -1,0 +1,275 @@
+use handeye_core::calibrate::{CameraKnowledge, Observations, ObservedView, ViewStatus};
+use handeye_core::findings::{self, FindingCode, FindingOptions};
+use handeye_core::frames::Pose;
+use handeye_core::handeye::{HandEyeError, Mode};
+use handeye_core::progress::Stage;
+use handeye_core::result::TruthComparison;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::*;
+use crate::command::Command;
+use crate::gui::panes::driven::Driven;
+use crate::gui::sample;
+use crate::model::{Goal, JobId, SolveStatus, Solved};
+use crate::session_start::BOARD;
+use crate::text::{Language, Text};
+
+fn driven(model: Model) -> Driven {
+    Driven::new(result_ui, model)
+}
+
+/// The sample with its answer changed.
+fn changed(change: impl FnOnce(&mut Solved)) -> Model {
+    let mut model = sample::solved();
+    let mut solved = Solved::clone(model.solve.solved.as_ref().expect("solved"));
+    change(&mut solved);
+    model.solve.solved = Some(Arc::new(solved));
+    model
+}
+
+#[test]
+fn without_an_answer_it_says_what_is_missing() {
+    let mut pane = driven(sample::connected());
+    assert!(pane.sees("No calibration yet"));
+    assert!(pane.sees("There are 0."));
+    assert!(!pane.is_enabled("Solve"));
+    *pane.model() = sample::captured();
+    pane.steps();
+    assert!(pane.sees("There are 10."));
+    assert_eq!(pane.click("Solve"), [Command::Solve]);
+}
+
+#[test]
+fn the_headline_is_the_expected_error_and_not_a_residual() {
+    let model = changed(|solved| {
+        solved.result.quality.tip_error_95_mm = Some(0.213);
+        solved.result.quality.rms_px = Some(0.07);
+    });
+    let mut pane = driven(model);
+    assert!(pane.sees("0.213 mm"));
+    assert!(pane.sees("Expected error (95 %)"));
+    assert!(pane.sees("The goal is reached"));
+    assert!(pane.sees("Residuals, which are no accuracy"));
+    assert!(pane.sees("Fit, RMS: 0.070 px"));
+    pane.model().view.goal = Goal(0.1e-3);
+    pane.steps();
+    assert!(pane.sees("The goal is not reached yet"));
+}
+
+#[test]
+fn the_goal_is_typed_in_millimetres_and_sent_in_metres() {
+    let mut pane = driven(sample::solved());
+    pane.type_into("Goal", "0.25");
+    let sent = pane.press(egui::Key::Enter);
+    let last = sent.last().expect("a command");
+    assert!(matches!(last, Command::SetGoal(metres) if (metres - 0.25e-3).abs() < 1e-12), "{sent:?}");
+}
+
+#[test]
+fn the_camera_in_the_tip_is_in_millimetres_with_its_uncertainty() {
+    let model = changed(|solved| {
+        solved.result.truth = Some(TruthComparison {
+            translation_error_mm: Some(0.0415),
+            rotation_error_deg: Some(0.0123),
+            focal_error_percent: Some(0.05),
+        });
+    });
+    let pane = driven(model);
+    assert!(pane.sees("Camera in tip"));
+    // The sample's camera is 50 mm along x and turned by 90° about z.
+    assert!(pane.sees("x y z [mm]: 50.0") || pane.sees("x y z [mm]: 49.9"));
+    assert!(pane.sees("± 95 % [mm]"));
+    assert!(pane.sees("± 95 % [°]"));
+    assert!(pane.sees("Position off by: 0.042 mm") || pane.sees("Position off by: 0.041 mm"));
+    assert!(pane.sees("Rotation off by: 0.0123°"));
+    assert!(pane.sees("Focal length off by: 0.050 %"));
+    assert!(pane.sees("Within the stated 95 %"));
+    assert!(pane.nothing_is_cut_off());
+}
+
+#[test]
+fn a_solve_shows_its_stage_and_can_be_cancelled() {
+    let mut model = sample::captured();
+    model.solve.status = SolveStatus::Running { job: JobId(2), stage: Stage::HeldOut, part: 0.4, since_s: 97.0 };
+    let mut pane = driven(model);
+    assert!(pane.sees("Solving for 3 s: predicting held-out views"));
+    assert_eq!(pane.click("Cancel solving"), [Command::CancelSolve]);
+}
+
+#[test]
+fn a_failed_solve_says_why_and_can_be_tried_again() {
+    let mut model = sample::captured();
+    model.solve.status = SolveStatus::Failed { why: Text::verbatim("Turn the tip by 30° or more.") };
+    let mut pane = driven(model);
+    assert!(pane.sees("Turn the tip by 30° or more."));
+    assert_eq!(pane.click("Solve again"), [Command::Solve]);
+}
+
+#[test]
+fn an_answer_of_earlier_captures_is_marked() {
+    let mut model = sample::solved();
+    model.solve.fresh = false;
+    let mut pane = driven(model);
+    assert!(pane.sees("Out of date"));
+    assert_eq!(pane.click("Solve again"), [Command::Solve]);
+}
+
+#[test]
+fn another_method_is_chosen_from_the_comparison() {
+    let model = changed(|solved| {
+        let failed = solved.calibration.methods.iter_mut().find(|method| method.name == "andreff");
+        failed.expect("andreff").outcome =
+            Err(HandEyeError::NoSolution { method: "andreff", views: 10, reason: "a test says so" });
+    });
+    let mut pane = driven(model);
+    assert!(pane.sees("no answer"));
+    assert_eq!(pane.click("Park & Martin"), [Command::SetMethod("park_martin".to_owned())]);
+    assert!(pane.click("Joint estimate").is_empty(), "it is chosen already");
+}
+
+#[test]
+fn a_camera_beside_the_robot_is_shown_in_the_base() {
+    let model = changed(|solved| {
+        let hand_eye = solved.calibration.hand_eye.expect("a hand-eye");
+        solved.calibration.hand_eye = Some(handeye_core::handeye::HandEye::new(
+            Mode::EyeToHand,
+            hand_eye.mount_from_camera(),
+            hand_eye.anchor_from_target(),
+        ));
+    });
+    assert!(driven(model).sees("Camera in base"));
+}
+
+/// What the sample was calibrated from.
+fn observations(model: &Model) -> Observations {
+    let views = model.document().in_use().map(|record| ObservedView {
+        name: record.image.clone(),
+        base_from_tip: Some(record.base_from_tip),
+        corners: model.observed(record.id).and_then(|observed| observed.corners.clone()),
+        camera_from_target: None,
+        in_fit: true,
+    });
+    Observations {
+        mode: Some(Mode::EyeInHand),
+        target: BOARD,
+        image_size: (640, 480),
+        camera: CameraKnowledge::Estimate { model: crate::observe::DEFAULT_MODEL, start: None },
+        views: views.collect(),
+    }
+}
+
+/// Findings of every code, from the core itself.
+fn every_finding() -> Vec<findings::Finding> {
+    let model = sample::solved();
+    let good = observations(&model);
+    let calibration = model.solve.current().expect("solved").calibration.clone();
+    let mut found = Vec::new();
+    let mut judge = |observations: &Observations, change: &dyn Fn(&mut handeye_core::calibrate::Calibration), goal| {
+        let mut calibration = calibration.clone();
+        change(&mut calibration);
+        found.extend(findings::findings(observations, Some(&calibration), &FindingOptions { goal_mm: Some(goal) }));
+    };
+    let turned = |views: usize, axes: &dyn Fn(usize) -> [f64; 3]| {
+        let mut observations = good.clone();
+        observations.views.truncate(views);
+        for (n, view) in observations.views.iter_mut().enumerate() {
+            let turn = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::from(axes(n)));
+            view.base_from_tip = Some(Pose::from_isometry(nalgebra::Isometry3::from_parts(
+                nalgebra::Translation3::identity(),
+                turn,
+            )));
+        }
+        observations
+    };
+    judge(&good, &|_| (), 1000.0);
+    judge(&good, &|_| (), 1e-9);
+    judge(&good, &|c| c.tip_error_95_m = c.tip_error_95_m.map(|m| m * 1.000_001), 0.95 * 1e3 * calibration.tip_error_95_m.expect("stated"));
+    for views in [1, 2, 5] {
+        judge(&turned(views, &|n| [0.0, 0.0, 0.3 * n as f64]), &|_| (), 1000.0);
+    }
+    judge(&turned(10, &|n| [0.001 * n as f64, 0.0, 0.0]), &|_| (), 1000.0);
+    judge(&turned(10, &|n| [0.5 * (n % 3) as f64, 0.1 * (n % 4) as f64, 0.05 * (n % 5) as f64]), &|_| (), 1000.0);
+    let mut lost = good.clone();
+    lost.views.iter_mut().skip(3).for_each(|view| view.corners = None);
+    judge(&lost, &|_| (), 1000.0);
+    let mut one_lost = good.clone();
+    one_lost.views[0].corners = None;
+    judge(&one_lost, &|_| (), 1000.0);
+    let mut given = good.clone();
+    given.camera = CameraKnowledge::Fixed(sample::intrinsics());
+    given.image_size = (6400, 4800);
+    judge(&given, &|_| (), 1000.0);
+    judge(&Observations { image_size: (6400, 4800), ..good.clone() }, &|_| (), 1000.0);
+    judge(
+        &good,
+        &|c| {
+            for (n, view) in c.views.iter_mut().filter(|view| view.status == ViewStatus::Used).enumerate() {
+                let times = if n == 0 { 100.0 } else { 1.0 };
+                view.influence_m = Some(1e-5 * times);
+                view.rms_px = Some(0.1 * times);
+                view.correction_m = Some(1e-4 * times);
+                view.correction_rad = Some(1e-4 * times);
+                view.camera_from_target = Some(Pose::from_translation_xyzw([0.0, 0.0, 0.4], [0.0, 0.0, 0.0, 1.0]));
+            }
+            c.tip_error_95_m = Some(1e-4);
+            c.heldout_rms_px = Some(3.0);
+            c.expected_heldout_rms_px = Some(1.0);
+            c.robot_effect_px = Some(10.0);
+            let shift = Pose::from_translation_xyzw([0.0, 0.0, 0.02], [0.0, 0.0, 0.0, 1.0]);
+            for method in c.methods.iter_mut().take(1) {
+                if let Ok(solution) = &mut method.outcome {
+                    solution.mount_from_camera = solution.mount_from_camera * shift;
+                }
+            }
+        },
+        1000.0,
+    );
+    judge(
+        &good,
+        &|c| {
+            for (n, method) in c.methods.iter_mut().enumerate() {
+                let shift = Pose::from_translation_xyzw([0.0, 0.02 * n as f64, 0.0], [0.0, 0.0, 0.0, 1.0]);
+                if let Ok(solution) = &mut method.outcome {
+                    solution.mount_from_camera = solution.mount_from_camera * shift;
+                }
+            }
+        },
+        1000.0,
+    );
+    found
+}
+
+#[test]
+fn every_finding_is_said_in_both_languages_with_its_numbers() {
+    let found = every_finding();
+    let codes: BTreeSet<FindingCode> = found.iter().map(|finding| finding.code).collect();
+    assert_eq!(codes.len(), 15, "{codes:?}");
+    for finding in &found {
+        let words = words::of(finding);
+        assert_eq!(words.say(Language::English), finding.text);
+        let chinese = words.say(Language::Chinese);
+        assert_ne!(chinese, finding.text, "not translated");
+        // What is left of Latin words are names of files, methods, units and axes.
+        let latin = chinese.replace("images/", "").split(|c: char| !c.is_ascii_alphabetic()).map(str::to_owned).collect::<Vec<_>>();
+        let kept = ["png", "mm", "px", "RMS", "x", "y", "z", "tsai", "lenz", "park", "martin", "horaud", "andreff", "daniilidis", "shah", "li", ""];
+        let left: Vec<&String> = latin.iter().filter(|word| !kept.contains(&word.as_str())).collect();
+        assert!(left.is_empty(), "{left:?} in {chinese}");
+    }
+}
+
+#[test]
+fn a_finding_that_nobody_translated_is_shown_as_the_core_says_it() {
+    let mut finding = every_finding().remove(0);
+    finding.text = "Something else altogether.".to_owned();
+    assert_eq!(words::of(&finding).say(Language::Chinese), "Something else altogether.");
+}
+
+#[test]
+fn the_pane_is_there_in_chinese() {
+    let mut model = sample::solved();
+    model.view.language = Language::Chinese;
+    let pane = driven(model);
+    assert!(pane.sees("预期误差"));
+    assert!(!pane.sees("Expected error"));
+}

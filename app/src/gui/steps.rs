@@ -1,0 +1,232 @@
+//! How far the calibration has come: what is done, what can be done now, and what stands in the way.
+
+use handeye_core::session::Role;
+
+use crate::model::{Model, Step};
+use crate::text;
+use crate::text::Text;
+
+/// Captures that are asked for before the answer is called good: fewer leave the expected error large and unsure.
+const CAPTURES_WANTED: usize = 10;
+
+/// Captures without which nothing can be solved.
+const CAPTURES_NEEDED: usize = 3;
+
+/// How a step is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepState {
+    /// There is nothing left to do.
+    Done,
+    /// It can be done.
+    Now,
+    /// Something has to come first.
+    Blocked,
+}
+
+/// A step for the user.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StepStatus {
+    /// Which one.
+    pub step: Step,
+    /// How it is doing.
+    pub state: StepState,
+    /// What is there, what is missing or what to do, in a few words.
+    pub line: Text,
+}
+
+/// All that the steps depend on.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own, and any of them can be true")]
+pub struct Facts {
+    /// Robot and camera answer.
+    pub connected: bool,
+    /// A connection was there and is gone.
+    pub lost: bool,
+    /// A picture has come.
+    pub frame_seen: bool,
+    /// The board was found in the newest picture, or in a capture.
+    pub board_seen: bool,
+    /// Captures that enter the fit.
+    pub captures_in_use: usize,
+    /// The solver is at work.
+    pub solving: bool,
+    /// There is an answer for the present captures.
+    pub solved: bool,
+    /// Its expected error [m], 95 %.
+    pub expected_error_m: Option<f64>,
+    /// Captures that test the answer.
+    pub check_captures: usize,
+    /// They were compared with the answer.
+    pub verified: bool,
+    /// Files of the present answer were written.
+    pub exported: bool,
+}
+
+impl Facts {
+    /// What the model says. The only place where the steps look at it.
+    pub fn of(model: &Model) -> Self {
+        let connected = model.control.is_connected() && model.camera.is_connected();
+        let document = model.document();
+        let seen_now = model.detection.as_ref().is_some_and(|detection| detection.corners.is_some());
+        let seen_before = model.observed.values().flatten().any(|observed| observed.corners.is_some());
+        let current = model.solve.current();
+        let written = model.export.written.as_ref().is_some_and(|written| written.files.is_ok());
+        Self {
+            connected,
+            lost: !connected && model.frame.is_some(),
+            frame_seen: model.frame.is_some(),
+            board_seen: seen_now || seen_before,
+            captures_in_use: document.in_use().count(),
+            solving: model.solve.is_running(),
+            solved: current.is_some(),
+            expected_error_m: current.and_then(|solved| solved.calibration.tip_error_95_m),
+            check_captures: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
+            verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
+            exported: written && current.is_some(),
+        }
+    }
+}
+
+/// The steps in their order.
+pub fn steps(model: &Model) -> [StepStatus; 6] {
+    judged(&Facts::of(model))
+}
+
+/// The steps by the facts.
+fn judged(facts: &Facts) -> [StepStatus; 6] {
+    Step::ALL.map(|step| {
+        let (state, line) = match step {
+            Step::Connect => connect(facts),
+            Step::Target => target(facts),
+            Step::Capture => capture(facts),
+            Step::Solve => solve(facts),
+            Step::Verify => verify(facts),
+            Step::Export => export(facts),
+        };
+        StepStatus { step, state, line }
+    })
+}
+
+/// The first step that can be done and is not.
+pub fn next(steps: &[StepStatus]) -> Option<Step> {
+    steps.iter().find(|status| status.state == StepState::Now).map(|status| status.step)
+}
+
+fn connect(facts: &Facts) -> (StepState, Text) {
+    match (facts.connected, facts.frame_seen) {
+        (true, true) => (StepState::Done, text!("Robot and camera")),
+        (true, false) => (StepState::Now, text!("No picture yet")),
+        (false, _) if facts.lost => (StepState::Now, text!("Connection lost")),
+        (false, _) => (StepState::Now, text!("No connection")),
+    }
+}
+
+fn target(facts: &Facts) -> (StepState, Text) {
+    if facts.board_seen {
+        (StepState::Done, text!("Board in view"))
+    } else if facts.frame_seen {
+        (StepState::Now, text!("Board not seen yet"))
+    } else {
+        (StepState::Blocked, text!("Needs a picture"))
+    }
+}
+
+fn capture(facts: &Facts) -> (StepState, Text) {
+    let Facts { captures_in_use: count, .. } = *facts;
+    if count >= CAPTURES_WANTED {
+        (StepState::Done, text!("{count} poses", count = count))
+    } else if count > 0 || facts.board_seen {
+        (StepState::Now, text!("{count} of {wanted} poses", count = count, wanted = CAPTURES_WANTED))
+    } else {
+        (StepState::Blocked, text!("Needs the board"))
+    }
+}
+
+fn solve(facts: &Facts) -> (StepState, Text) {
+    if facts.captures_in_use < CAPTURES_NEEDED {
+        return (StepState::Blocked, text!("Needs {count} poses", count = CAPTURES_NEEDED));
+    }
+    match (facts.solving, facts.solved, facts.expected_error_m) {
+        (true, ..) => (StepState::Now, text!("At work…")),
+        (false, false, _) => (StepState::Now, text!("Ready to solve")),
+        (false, true, Some(error_m)) => {
+            (StepState::Done, text!("±{error} mm (95 %)", error = format!("{:.2}", error_m * 1e3)))
+        }
+        (false, true, None) => (StepState::Done, text!("Solved")),
+    }
+}
+
+fn verify(facts: &Facts) -> (StepState, Text) {
+    match (facts.solved, facts.verified, facts.check_captures) {
+        (false, ..) => (StepState::Blocked, text!("Needs a calibration")),
+        (true, true, count) => (StepState::Done, text!("{count} check poses", count = count)),
+        (true, false, _) => (StepState::Now, text!("No check poses yet")),
+    }
+}
+
+fn export(facts: &Facts) -> (StepState, Text) {
+    match (facts.solved, facts.exported) {
+        (false, _) => (StepState::Blocked, text!("Needs a calibration")),
+        (true, false) => (StepState::Now, text!("Choose formats")),
+        (true, true) => (StepState::Done, text!("Files written")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::text::Language;
+
+    fn said(facts: &Facts) -> Vec<(StepState, String)> {
+        judged(facts).into_iter().map(|status| (status.state, status.line.say(Language::English))).collect()
+    }
+
+    #[test]
+    fn at_first_only_connecting_can_be_done_and_every_other_step_says_what_it_needs() {
+        let steps = said(&Facts::default());
+        assert_eq!(steps[0], (StepState::Now, "No connection".to_owned()));
+        for (state, line) in &steps[1..] {
+            assert_eq!(*state, StepState::Blocked);
+            assert!(line.starts_with("Needs "), "{line}");
+        }
+    }
+
+    #[test]
+    fn captures_are_counted_towards_what_is_wanted() {
+        let mut facts = Facts { connected: true, frame_seen: true, board_seen: true, ..Facts::default() };
+        facts.captures_in_use = 7;
+        assert_eq!(said(&facts)[2], (StepState::Now, "7 of 10 poses".to_owned()));
+        assert_eq!(said(&facts)[3].0, StepState::Now, "three poses are enough to solve");
+        facts.captures_in_use = 10;
+        assert_eq!(said(&facts)[2], (StepState::Done, "10 poses".to_owned()));
+    }
+
+    #[test]
+    fn captures_on_the_disk_can_be_solved_without_a_connection() {
+        let facts = Facts { captures_in_use: 12, board_seen: true, ..Facts::default() };
+        assert_eq!(said(&facts)[0].0, StepState::Now);
+        assert_eq!(said(&facts)[3].0, StepState::Now);
+    }
+
+    #[test]
+    fn an_answer_is_told_by_its_expected_error_and_opens_the_steps_after_it() {
+        let mut facts = Facts { captures_in_use: 10, board_seen: true, solved: true, ..Facts::default() };
+        facts.expected_error_m = Some(0.000_42);
+        assert_eq!(said(&facts)[3], (StepState::Done, "±0.42 mm (95 %)".to_owned()));
+        assert_eq!((said(&facts)[4].0, said(&facts)[5].0), (StepState::Now, StepState::Now));
+        facts.solving = true;
+        assert_eq!(said(&facts)[3].0, StepState::Now, "an answer that is being replaced is not done");
+    }
+
+    #[test]
+    fn a_broken_connection_is_no_longer_done() {
+        let facts = Facts { lost: true, frame_seen: true, board_seen: true, ..Facts::default() };
+        assert_eq!(said(&facts)[0], (StepState::Now, "Connection lost".to_owned()));
+    }
+
+    #[test]
+    fn the_next_step_is_the_first_that_can_be_done() {
+        let facts = Facts { connected: true, frame_seen: true, ..Facts::default() };
+        assert_eq!(next(&judged(&facts)), Some(Step::Target));
+    }
+}

@@ -1,0 +1,96 @@
+//! The way from a connection to exported files, and the parts of the window.
+
+use serde::{Deserialize, Serialize};
+
+/// Steps of a calibration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Step {
+    /// Reach robot and camera.
+    #[default]
+    Connect,
+    /// Say what is looked at.
+    Target,
+    /// Take pictures from many poses.
+    Capture,
+    /// Calibrate.
+    Solve,
+    /// See how good it is on captures that took no part.
+    Verify,
+    /// Write files.
+    Export,
+}
+
+impl Step {
+    /// In their order.
+    pub const ALL: [Self; 6] = [Self::Connect, Self::Target, Self::Capture, Self::Solve, Self::Verify, Self::Export];
+}
+
+/// Parts of the window that can be moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Pane {
+    /// The colour picture.
+    Colour,
+    /// The depth picture.
+    Depth,
+    /// The captures.
+    Poses,
+    /// Residuals, coverage, expected accuracy.
+    Charts,
+    /// All messages.
+    Log,
+    /// Which cell.
+    Connect,
+    /// What is looked at, and what is known of the camera.
+    Target,
+    /// Moves the arm by hand.
+    Jog,
+    /// Taught poses.
+    Taught,
+    /// The calibration.
+    Result,
+    /// How good it is.
+    Verify,
+    /// Files.
+    Export,
+}
+
+impl Pane {
+    /// All of them.
+    pub const ALL: [Self; 12] = [
+        Self::Colour,
+        Self::Depth,
+        Self::Poses,
+        Self::Charts,
+        Self::Log,
+        Self::Connect,
+        Self::Target,
+        Self::Jog,
+        Self::Taught,
+        Self::Result,
+        Self::Verify,
+        Self::Export,
+    ];
+}
+
+/// Windows over the window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Dialog {
+    /// All commands, to type for.
+    Palette,
+    /// All keys.
+    Help,
+    /// What this is.
+    About,
+    /// Where a new session goes.
+    New,
+    /// Which session or data set to open.
+    Open,
+    /// Where a copy of the session goes.
+    SaveAs,
+    /// Which file of taught poses to read.
+    ImportPoses,
+    /// Where taught poses are written.
+    ExportPoses,
+    /// Where exports go.
+    ExportFolder,
+}

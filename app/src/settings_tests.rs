@@ -1,0 +1,111 @@
+use super::*;
+
+fn nothing(_: &str) -> Option<String> {
+    None
+}
+
+fn said(warnings: &[Warning]) -> Vec<String> {
+    warnings.iter().map(|Warning(text)| text.say(Language::English)).collect()
+}
+
+#[test]
+fn what_was_written_is_read_again() {
+    let settings = Settings {
+        view: ViewSettings {
+            theme: ThemeChoice::Light,
+            language: Language::Chinese,
+            rotation: RotationFormat::Quaternion,
+            depth_scale: DepthScale::Full,
+            depth_colours: ColourMap::Viridis,
+            ..ViewSettings::default()
+        },
+        connect: Some("tcp://a:1".to_owned()),
+        addresses: vec!["tcp://a:1".to_owned(), "tcp://b:2".to_owned()],
+        sessions: Some(PathBuf::from("/data/sessions")),
+    };
+    let mut read = Settings::default();
+    assert_eq!(read.read("settings.toml", &settings.written()), []);
+    assert_eq!(read, settings);
+}
+
+#[test]
+fn a_bad_value_is_told_with_its_line_and_key_and_the_others_are_taken() {
+    let mut settings = Settings::default();
+    let content = "# mine\ntheme = \"blue\"\nlanguage = \"zh-CN\"\n\ndepth_scale = 3\ncolour = \"red\"\n";
+    let warnings = said(&settings.read("settings.toml", content));
+    assert_eq!(warnings.len(), 3, "{warnings:?}");
+    assert!(warnings.iter().any(|text| text.contains("line 2") && text.contains("theme") && text.contains("\"dark\"")));
+    assert!(warnings.iter().any(|text| text.contains("line 5") && text.contains("depth_scale")));
+    assert!(warnings.iter().any(|text| text.contains("line 6") && text.contains("colour")));
+    assert_eq!(settings.view.language, Language::Chinese);
+    assert_eq!(settings.view.theme, ThemeChoice::Dark);
+}
+
+#[test]
+fn a_line_that_is_no_toml_is_told_and_the_lines_around_it_are_taken() {
+    let mut settings = Settings::default();
+    let warnings = said(&settings.read("settings.toml", "theme = \"light\"\n= what\nlanguage = \"zh-CN\"\n"));
+    assert!(warnings.iter().any(|text| text.contains("line 2")), "{warnings:?}");
+    assert_eq!(settings.view.theme, ThemeChoice::Light);
+}
+
+#[test]
+fn the_environment_goes_before_the_file_and_does_not_get_into_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("deep").join("settings.toml");
+    std::fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
+    std::fs::write(&path, "theme = \"light\"\nlanguage = \"en\"\n").expect("written");
+    let variable = |name: &str| (name == "HANDEYE_LANGUAGE").then(|| "zh-CN".to_owned());
+    let (mut file, settings, warnings) = SettingsFile::open(Some(path.clone()), variable);
+    assert_eq!(warnings, []);
+    assert_eq!((settings.view.theme, settings.view.language), (ThemeChoice::Light, Language::Chinese));
+    file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view }, &[]).expect("it can be written");
+    let (_, again, _) = SettingsFile::open(Some(path), nothing);
+    assert_eq!((again.view.theme, again.view.language), (ThemeChoice::Dark, Language::English));
+}
+
+#[test]
+fn nothing_is_written_before_something_is_changed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("settings.toml");
+    let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
+    file.keep(settings.view, &[]).expect("there is nothing to do");
+    assert!(!path.exists());
+}
+
+#[test]
+fn earlier_addresses_are_in_the_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("settings.toml");
+    let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
+    let addresses = vec!["tcp://a:1".to_owned(), "tcp://b:1".to_owned()];
+    file.keep(settings.view, &addresses).expect("it can be written");
+    assert_eq!(SettingsFile::open(Some(path), nothing).1.addresses, addresses);
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let blocked = folder.path().join("file");
+    std::fs::write(&blocked, "").expect("written");
+    let (mut file, settings, _) = SettingsFile::open(Some(blocked.join("settings.toml")), nothing);
+    let view = ViewSettings { theme: settings.view.theme.other(), ..settings.view };
+    let Err(Warning(text)) = file.keep(view, &[]) else { panic!("it went well") };
+    assert!(text.say(Language::English).contains("settings.toml"));
+}
+
+#[test]
+fn the_file_is_where_the_folders_of_the_system_are() {
+    let variables = |config: &'static str| {
+        move |name: &str| match name {
+            "XDG_CONFIG_HOME" => Some(config.to_owned()),
+            "HOME" => Some("/home/me".to_owned()),
+            _ => None,
+        }
+    };
+    let path = |config| default_path(variables(config)).expect("there is a home");
+    assert_eq!(path("/cfg"), Path::new("/cfg/handeye-workbench/settings.toml"));
+    assert_eq!(path(""), Path::new("/home/me/.config/handeye-workbench/settings.toml"));
+    assert_eq!(path("relative"), Path::new("/home/me/.config/handeye-workbench/settings.toml"));
+    assert_eq!(default_path(nothing), None);
+}

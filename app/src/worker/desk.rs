@@ -1,0 +1,159 @@
+//! The threads that need no cell: archive, solver, observer and files. They live as long as the application, whatever
+//! it is connected to.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::Builder;
+use std::time::Instant;
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+
+use super::archive::{Archive, ArchiveTask};
+use super::files::{self, FileTask};
+use super::link::Outlet;
+use super::newest::{NewestWins, Started};
+use super::observer::{self, ObserveJob};
+use super::solver::{self, SolveJob};
+use super::vision::Measured;
+use super::{Busy, Clock, JOIN_DEADLINE, MAX_EVENTS, MAX_REQUESTS, Waker};
+use crate::command::Event;
+
+/// Captures that may wait for the disk. The vision thread waits when there are more, and the next capture with it.
+const MAX_CAPTURES: usize = 4;
+
+/// The application's end of these threads.
+pub struct Desk {
+    archive: Option<Sender<ArchiveTask>>,
+    captures: Sender<Measured>,
+    files: Option<Sender<FileTask>>,
+    observer: NewestWins<ObserveJob>,
+    solver: NewestWins<SolveJob>,
+    events: Receiver<Event>,
+    sessions: PathBuf,
+    threads: Vec<Started>,
+}
+
+impl Desk {
+    /// Starts the threads. New sessions go under `sessions`.
+    ///
+    /// # Errors
+    /// When the system has no more threads.
+    pub fn start(sessions: PathBuf, clock: &Clock, waker: &Waker) -> io::Result<Self> {
+        let (event_sender, events) = bounded(MAX_EVENTS);
+        let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
+        let (archive, archive_tasks) = bounded(MAX_REQUESTS);
+        let (captures, measured) = bounded(MAX_CAPTURES);
+        let keeper = Archive::new(sessions.clone(), outlet());
+        let archiving = thread("archive", move || keeper.run(&archive_tasks, &measured))?;
+        let (files, file_tasks) = bounded::<FileTask>(MAX_REQUESTS);
+        let out = outlet();
+        let filing = thread("files", move || {
+            for task in &file_tasks {
+                files::perform(task, &out);
+            }
+        })?;
+        let out = outlet();
+        let (observer, observing) =
+            NewestWins::start("observer", move |job, cancel| observer::observe(&job, cancel, &out))?;
+        let out = outlet();
+        let (solver, solving) = NewestWins::start("solver", move |job, cancel| solver::solve(&job, cancel, &out))?;
+        Ok(Self {
+            archive: Some(archive),
+            captures,
+            files: Some(files),
+            observer,
+            solver,
+            events,
+            sessions,
+            threads: vec![archiving, filing, observing, solving],
+        })
+    }
+
+    /// Hands over what was reported since the last time. Never waits.
+    pub fn drain(&self, mut absorb: impl FnMut(Event)) {
+        for event in self.events.try_iter().take(MAX_EVENTS) {
+            absorb(event);
+        }
+    }
+
+    /// Where captures are handed in.
+    pub fn captures(&self) -> Sender<Measured> {
+        self.captures.clone()
+    }
+
+    /// Where new sessions go.
+    pub fn sessions(&self) -> &Path {
+        &self.sessions
+    }
+
+    /// Asks the archive for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when the disk does not keep up.
+    pub fn archive(&self, task: ArchiveTask) -> Result<(), Busy> {
+        hand_in(self.archive.as_ref(), task)
+    }
+
+    /// Asks for reading or writing.
+    ///
+    /// # Errors
+    /// [`Busy`] when the disk does not keep up.
+    pub fn files(&self, task: FileTask) -> Result<(), Busy> {
+        hand_in(self.files.as_ref(), task)
+    }
+
+    /// Has captures looked at, these alone.
+    pub fn observe(&mut self, job: ObserveJob) {
+        self.observer.submit(job);
+    }
+
+    /// Has a set solved, this one alone.
+    pub fn solve(&mut self, job: SolveJob) {
+        self.solver.submit(job);
+    }
+
+    /// Cancels the solve.
+    pub fn cancel_solve(&self) {
+        self.solver.cancel();
+    }
+}
+
+impl Drop for Desk {
+    /// What was handed to the archive is still written; everything else is cancelled.
+    fn drop(&mut self) {
+        self.observer.end();
+        self.solver.end();
+        self.archive = None;
+        self.files = None;
+        let end = Instant::now() + JOIN_DEADLINE;
+        for Started { handle, done } in self.threads.drain(..) {
+            // A thread whose report nobody takes would wait for ever.
+            while matches!(done.try_recv(), Err(crossbeam_channel::TryRecvError::Empty)) && Instant::now() < end {
+                let _dropped = self.events.recv_timeout(POLL).is_ok();
+            }
+            let name = handle.thread().name().unwrap_or_default().to_owned();
+            if !handle.is_finished() {
+                tracing::warn!(name, "a worker does not end and is left alone");
+            } else if handle.join().is_err() {
+                tracing::error!(name, "a worker ended with a panic");
+            }
+        }
+    }
+}
+
+/// How long the end of the program waits for one report of a worker before it looks again whether it is done.
+const POLL: std::time::Duration = std::time::Duration::from_millis(5);
+
+fn hand_in<Task>(worker: Option<&Sender<Task>>, task: Task) -> Result<(), Busy> {
+    worker.map_or(Err(Busy), |worker| worker.try_send(task).map_err(|_full| Busy))
+}
+
+fn thread(name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<Started> {
+    let (running, done) = bounded(0);
+    let handle = Builder::new().name(name.to_owned()).spawn(move || {
+        let _running: Sender<()> = running;
+        work();
+    })?;
+    Ok(Started { handle, done })
+}

@@ -1,0 +1,307 @@
+//! The workers with the real cell, over sockets.
+
+use std::path::Path;
+
+use handeye_core::frames::Base;
+use handeye_core::poses_file::{Goal, TaughtPoses};
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::cell::{Arm, CellPaths, JointAngles};
+use handeye_sim_link::client::{
+    CallOptions, ConnectionOptions, Endpoint, JointMotion, MotionLimits, Sim, SimulationState,
+};
+
+use super::fake::FakeCell;
+use super::motion_tests::Bench;
+use super::*;
+use crate::model::{Axis, JogFrame, Link, LinkState, MotionGoal, MotionOutcome};
+use crate::text::Language;
+
+/// Only a failure takes so long.
+const PATIENCE: Duration = Duration::from_mins(1);
+
+struct Live {
+    server: CellServer,
+    bench: Bench,
+    /// Another client, to look with.
+    watch: Arm,
+}
+
+fn server(real_time: bool) -> CellServer {
+    let scene = Scene::reference().expect("valid");
+    CellServer::start(CellConfig { real_time: Some(real_time), ..CellConfig::new(scene) }).expect("a free port")
+}
+
+fn source(server: &CellServer) -> CellSource {
+    CellSource::Address(server.endpoint())
+}
+
+fn arm(server: &CellServer) -> Arm {
+    let endpoint: Endpoint = server.endpoint().parse().expect("an address");
+    Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("the scene is whole")
+}
+
+impl Live {
+    fn new(real_time: bool) -> Self {
+        let server = server(real_time);
+        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::new(source(&server)));
+        Self::with(server, &connector)
+    }
+
+    fn with(server: CellServer, connector: &Arc<dyn Connector>) -> Self {
+        let mut watch = arm(&server);
+        watch.sim().start_simulation().expect("a call");
+        let bench = Bench::start(&source(&server), connector);
+        Self { server, bench, watch }
+    }
+
+    fn joints(&mut self) -> JointAngles {
+        self.watch.joint_angles().expect("a call")
+    }
+
+    fn tip(&mut self) -> Pose<Base, Tip> {
+        self.watch.base_from_tip().expect("a call")
+    }
+
+    /// Waits until the first joint is past a position.
+    fn wait_until_moving(&mut self, start: &JointAngles) {
+        let deadline = Instant::now() + PATIENCE;
+        while self.joints() == *start {
+            assert!(Instant::now() < deadline, "nothing moves");
+        }
+    }
+
+    /// Whether nothing moves over a few passes.
+    fn is_at_rest(&mut self) -> bool {
+        let before = self.joints();
+        for _ in 0..5 {
+            self.watch.sim().step(&CallOptions::default()).expect("a pass");
+        }
+        self.joints() == before
+    }
+}
+
+/// Another client's long motion: one call that returns when it is over.
+fn long_motion(server: &CellServer) -> JoinHandle<()> {
+    let endpoint: Endpoint = server.endpoint().parse().expect("an address");
+    std::thread::spawn(move || {
+        let mut sim = Sim::connect(&endpoint, ConnectionOptions::default()).expect("a socket");
+        let joints = (0..6).map(|i| sim.get_object_index("/UR5/joint", i).expect("a joint")).collect();
+        let limits = MotionLimits::uniform(6, 1e-3, 1.0, 10.0);
+        let motion = JointMotion { joints, target_rad: vec![3.0, 0.8, -1.0, 0.0, 1.5, 0.0], limits };
+        sim.move_to_config(&motion, &CallOptions::long(PATIENCE, &CancelToken::default())).expect("it ends");
+    })
+}
+
+#[test]
+fn a_cell_of_this_project_is_called_so_and_its_facts_are_known() {
+    let mut live = Live::new(false);
+    let facts = live.bench.facts();
+    assert!(facts.kinematics_known);
+    let truth = facts.truth.expect("the cell publishes it");
+    assert!((truth.tip_from_camera.translation().x - 0.05).abs() < 1e-12);
+    assert_eq!(facts.joint_ranges_rad, [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6]);
+    let connector = LiveConnector::new(source(&live.server));
+    let connected = connector.connect_motion(&CancelToken::default()).expect("it is there");
+    assert_eq!(connected.server, "Handeye cell");
+}
+
+#[test]
+fn every_pose_of_the_reference_tour_is_reached_at_full_and_at_a_quarter_of_the_speed() {
+    let mut live = Live::new(false);
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/poses/seed10.toml");
+    let tour = TaughtPoses::read(Path::new(file)).expect("the taught poses");
+    let start: JointAngles = tour.start_joints_rad.expect("a start").try_into().expect("six joints");
+    let mut id = 0;
+    for speed in [1.0, 0.25] {
+        let goals = tour.poses.iter().map(|pose| match &pose.goal {
+            Goal::Tip(pose) => MotionGoal::Tip(*pose),
+            Goal::Joints(joints) => MotionGoal::Joints(joints.clone().try_into().expect("six joints")),
+        });
+        for goal in std::iter::once(MotionGoal::Joints(start)).chain(goals) {
+            id += 1;
+            live.bench.move_to(id, goal, speed);
+            assert_eq!(live.bench.moved(id), MotionOutcome::Arrived, "{goal:?} at {speed}");
+            if let MotionGoal::Tip(pose) = goal {
+                let (distance_m, angle_rad) = live.tip().distance_to(&pose);
+                assert!(distance_m < 1e-3 && angle_rad < 0.01, "{distance_m} m, {angle_rad} rad");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_quarter_of_the_speed_takes_four_times_as_long() {
+    let mut live = Live::new(false);
+    let mut goal = live.joints();
+    let mut took_s = [0.0; 2];
+    for (id, (speed, took_s)) in [1.0, 0.25].into_iter().zip(&mut took_s).enumerate() {
+        goal[0] += 0.4;
+        let before_s = live.watch.sim().get_simulation_time().expect("a call");
+        live.bench.move_to(id as u64, MotionGoal::Joints(goal), speed);
+        assert_eq!(live.bench.moved(id as u64), MotionOutcome::Arrived);
+        *took_s = live.watch.sim().get_simulation_time().expect("a call") - before_s;
+    }
+    // Settling and passes lost between two calls add to both.
+    assert!(took_s[1] > 2.0 * took_s[0], "{took_s:?}");
+}
+
+#[test]
+fn what_is_out_of_reach_is_refused_with_the_reason_and_nothing_moves() {
+    let mut live = Live::new(false);
+    let before = live.joints();
+    let mut far = live.tip();
+    far = Pose::from_isometry(nalgebra::Translation3::new(2.0, 0.0, 0.0) * far.isometry());
+    live.bench.move_to(1, MotionGoal::Tip(far), 1.0);
+    let MotionOutcome::Refused(why) = live.bench.moved(1) else { panic!("it was not refused") };
+    let why = why.say(Language::English);
+    assert!(why.contains("cannot go there") && why.contains("closer to the robot"), "{why}");
+    let mut turned = before;
+    turned[2] = 7.0;
+    live.bench.move_to(2, MotionGoal::Joints(turned), 1.0);
+    let MotionOutcome::Refused(why) = live.bench.moved(2) else { panic!("it was not refused") };
+    assert!(why.say(Language::English).contains("joint 3"), "{why:?}");
+    live.bench.move_to(3, MotionGoal::Joints(before), 1.5);
+    assert!(matches!(live.bench.moved(3), MotionOutcome::Refused(_)), "150 % is no speed");
+    assert_eq!(live.joints(), before);
+}
+
+#[test]
+fn nothing_moves_while_the_simulation_rests_and_the_reason_is_told() {
+    let mut live = Live::new(false);
+    live.watch.sim().stop_simulation().expect("a call");
+    while live.watch.sim().get_simulation_state().expect("a call") != SimulationState::Stopped {}
+    live.bench.move_to(1, MotionGoal::Joints([0.0; 6]), 1.0);
+    let MotionOutcome::Refused(why) = live.bench.moved(1) else { panic!("it was not refused") };
+    assert!(why.say(Language::English).contains("stopped"), "{why:?}");
+    live.bench.workers.hold_jog(Jog::Joint { index: 0, forward: true }, 0.5, None);
+    assert!(live.bench.jog_ended().expect("a reason").contains("stopped"));
+}
+
+#[test]
+fn a_stop_brings_the_motion_of_another_client_to_rest() {
+    let mut live = Live::new(true);
+    let start = live.joints();
+    let other = long_motion(&live.server);
+    live.wait_until_moving(&start);
+    live.bench.workers.press_stop();
+    live.bench.stopped();
+    other.join().expect("its call returns, an hour before its time");
+    assert!(live.is_at_rest());
+}
+
+#[test]
+fn a_stop_ends_our_own_motion_where_it_is() {
+    let mut live = Live::new(true);
+    let start = live.joints();
+    let mut goal = start;
+    goal[0] += 3.0;
+    live.bench.move_to(1, MotionGoal::Joints(goal), 0.5);
+    live.wait_until_moving(&start);
+    live.bench.workers.press_stop();
+    assert_eq!(live.bench.moved(1), MotionOutcome::Stopped);
+    assert!(live.is_at_rest());
+    assert!((live.joints()[0] - goal[0]).abs() > 1.0);
+}
+
+#[test]
+fn a_stop_works_while_the_connection_for_motions_hangs() {
+    /// Control is real, motions hang for ever.
+    struct Half {
+        live: LiveConnector,
+        fake: FakeCell,
+    }
+    impl Connector for Half {
+        fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
+            self.live.connect_control(shutdown)
+        }
+        fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
+            self.live.connect_camera(shutdown)
+        }
+        fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
+            self.fake.connect_motion(shutdown)
+        }
+    }
+    let server = server(true);
+    let (fake, release) = FakeCell::that_never_answers();
+    let connector: Arc<dyn Connector> = Arc::new(Half { live: LiveConnector::new(source(&server)), fake });
+    let mut live = Live::with(server, &connector);
+    live.bench.move_to(1, MotionGoal::Joints([0.0; 6]), 1.0);
+    let start = live.joints();
+    let other = long_motion(&live.server);
+    live.wait_until_moving(&start);
+    live.bench.workers.press_stop();
+    live.bench.stopped();
+    other.join().expect("its call returns");
+    assert!(live.is_at_rest());
+    drop(release);
+}
+
+#[test]
+fn a_held_joint_moves_and_stands_when_it_is_let_go() {
+    let mut live = Live::new(true);
+    let start = live.joints();
+    live.bench.workers.hold_jog(Jog::Joint { index: 0, forward: true }, 0.5, None);
+    live.wait_until_moving(&start);
+    live.bench.workers.release_jog();
+    assert_eq!(live.bench.jog_ended(), None);
+    assert!(live.is_at_rest());
+    let now = live.joints();
+    assert!(now[0] > start[0] && now[1..] == start[1..]);
+}
+
+#[test]
+fn a_window_that_dies_leaves_an_arm_that_stands() {
+    let mut live = Live::new(true);
+    let start = live.joints();
+    live.bench.workers.hold_jog(Jog::Joint { index: 0, forward: true }, 0.5, None);
+    live.wait_until_moving(&start);
+    live.bench.set_clock(HELD_S + 0.1);
+    assert!(live.bench.jog_ended().is_some(), "with a reason");
+    assert!(live.is_at_rest());
+}
+
+#[test]
+fn a_stop_ends_a_jog() {
+    let mut live = Live::new(true);
+    let start = live.joints();
+    live.bench.workers.hold_jog(Jog::Joint { index: 0, forward: true }, 0.5, None);
+    live.wait_until_moving(&start);
+    live.bench.workers.press_stop();
+    assert_eq!(live.bench.jog_ended().as_deref(), Some("The arm was stopped"));
+    assert!(live.is_at_rest());
+}
+
+#[test]
+fn a_step_goes_exactly_as_far_as_it_was_asked_to() {
+    let mut live = Live::new(false);
+    let before = live.tip();
+    let camera = live.bench.facts().truth.expect("published").tip_from_camera;
+    let jog = Jog::Translate { frame: JogFrame::Camera, axis: Axis::Z, forward: false };
+    live.bench.workers.jog_step(MotionId(1), jog, [0.01, 0.1], 0.25, Some(camera)).expect("the worker is there");
+    assert_eq!(live.bench.moved(1), MotionOutcome::Arrived);
+    let moved = live.tip().translation() - before.translation();
+    let back = before.rotation() * (camera.rotation() * nalgebra::Vector3::new(0.0, 0.0, -0.01));
+    assert!((moved - back).norm() < 1e-7, "{moved} instead of {back}");
+
+    let jog = Jog::Rotate { frame: JogFrame::Camera, axis: Axis::X, forward: true };
+    live.bench.workers.jog_step(MotionId(2), jog, [0.01, 0.1], 0.25, None).expect("the worker is there");
+    let MotionOutcome::Refused(why) = live.bench.moved(2) else { panic!("nobody knows the camera") };
+    assert!(why.say(Language::English).contains("calibrate first"), "{why:?}");
+}
+
+#[test]
+fn a_server_that_ends_between_two_calls_is_noticed_at_once() {
+    let mut live = Live::new(true);
+    let Live { server, bench, .. } = &mut live;
+    bench.facts();
+    drop(std::mem::replace(server, self::server(true)));
+    let began = Instant::now();
+    let before = bench.next;
+    for link in [Link::Control, Link::Motion] {
+        bench.next = before;
+        bench.until_link(link, |state| matches!(state, LinkState::Lost { .. }));
+    }
+    // The next call would wait for five seconds for a server to come back.
+    assert!(began.elapsed() < Duration::from_secs(3), "{:?}", began.elapsed());
+}

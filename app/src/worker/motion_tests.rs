@@ -1,0 +1,282 @@
+//! The motion worker with a cell that does as it is told.
+
+use std::sync::Mutex;
+use std::sync::PoisonError;
+
+use crossbeam_channel::Receiver;
+
+use super::fake::{FakeCell, FakeMotions};
+use super::*;
+use crate::model::{CellFacts, Link, LinkState, MotionGoal, MotionOutcome};
+use crate::text::{Language, Text};
+
+/// A healthy worker answers within milliseconds; this is for a machine that does something else.
+const PATIENCE: Duration = Duration::from_mins(1);
+
+/// Workers, what they said, and a clock that the test moves.
+pub(super) struct Bench {
+    pub workers: Workers,
+    woken: Receiver<()>,
+    now_s: Arc<Mutex<f64>>,
+    events: Vec<Event>,
+    /// Events before this one have been waited for.
+    pub next: usize,
+}
+
+impl Bench {
+    pub fn start(source: &CellSource, connector: &Arc<dyn Connector>) -> Self {
+        let (wake, woken) = bounded(1);
+        let waker: Waker = Arc::new(move || {
+            // A full channel wakes as well as a fuller one.
+            let _full = wake.try_send(()).is_err();
+        });
+        let now_s = Arc::new(Mutex::new(0.0));
+        let shown = Arc::clone(&now_s);
+        let clock: Clock = Arc::new(move || *shown.lock().unwrap_or_else(PoisonError::into_inner));
+        let view = ViewSettings::default();
+        let workers = Workers::start(source, &view, connector, bounded(1).0, &clock, &waker).expect("threads");
+        let mut bench = Self { workers, woken, now_s, events: Vec::new(), next: 0 };
+        for link in [Link::Control, Link::Motion] {
+            bench.next = 0;
+            bench.until_link(link, LinkState::is_connected);
+        }
+        bench
+    }
+
+    /// The clock of the application shows another time.
+    pub fn set_clock(&self, now_s: f64) {
+        *self.now_s.lock().unwrap_or_else(PoisonError::into_inner) = now_s;
+    }
+
+    /// Collects events until one is as wanted; the next call goes on after it.
+    pub fn until<T>(&mut self, what: &str, wanted: impl Fn(&Event) -> Option<T>) -> T {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            while let Some(event) = self.events.get(self.next) {
+                self.next += 1;
+                if let Some(found) = wanted(event) {
+                    return found;
+                }
+            }
+            let Self { workers, events, .. } = self;
+            let before = events.len();
+            workers.drain(|event| events.push(event));
+            if events.len() == before {
+                assert!(self.woken.recv_deadline(deadline).is_ok(), "waited for {what} in vain, got {:?}", self.events);
+            }
+        }
+    }
+
+    pub fn until_link(&mut self, link: Link, wanted: impl Fn(&LinkState) -> bool) -> LinkState {
+        self.until("a state of a connection", |event| match event {
+            Event::Link { link: which, state } if *which == link && wanted(state) => Some(state.clone()),
+            _ => None,
+        })
+    }
+
+    pub fn moved(&mut self, id: u64) -> MotionOutcome {
+        self.until("the end of a motion", |event| match event {
+            Event::Moved { id: which, outcome } if *which == MotionId(id) => Some(outcome.clone()),
+            _ => None,
+        })
+    }
+
+    pub fn jog_ended(&mut self) -> Option<String> {
+        self.until("the end of a jog", |event| match event {
+            Event::JogEnded { why } => Some(why.as_ref().map(|why| why.say(Language::English))),
+            _ => None,
+        })
+    }
+
+    pub fn stopped(&mut self) {
+        self.until("the confirmation of a stop", |event| matches!(event, Event::Stopped).then_some(()));
+    }
+
+    pub fn facts(&mut self) -> CellFacts {
+        self.next = 0;
+        self.until("what is known of the cell", |event| match event {
+            Event::Cell(facts) => Some(facts.as_ref().clone()),
+            _ => None,
+        })
+    }
+
+    pub fn move_to(&self, id: u64, goal: MotionGoal, speed: f64) {
+        self.workers.move_to(MotionRequest { id: MotionId(id), goal, speed }).expect("the worker is there");
+    }
+
+    /// Events of the ends of motions so far.
+    pub fn ends(&mut self) -> usize {
+        let Self { workers, events, .. } = self;
+        workers.drain(|event| events.push(event));
+        self.events.iter().filter(|event| matches!(event, Event::Moved { .. })).count()
+    }
+}
+
+const HOME: MotionGoal = MotionGoal::Joints([0.0, 0.5, -1.0, 0.0, 1.5, 0.0]);
+const LEFT: Jog = Jog::Joint { index: 0, forward: true };
+const RIGHT: Jog = Jog::Joint { index: 0, forward: false };
+
+fn fake(motions: FakeMotions) -> (FakeCell, Bench) {
+    let cell = FakeCell::new(1);
+    cell.script().motions = motions;
+    let connector: Arc<dyn Connector> = Arc::new(cell.clone());
+    let bench = Bench::start(&CellSource::BuiltIn, &connector);
+    (cell, bench)
+}
+
+/// Waits until the cell has begun so many motions and jogs.
+fn begun(cell: &FakeCell, count: usize) {
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        let script = cell.script();
+        if script.moved.len() + script.jogged.len() >= count {
+            return;
+        }
+        drop(script);
+        assert!(Instant::now() < deadline, "nothing was begun");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn the_facts_of_the_cell_are_told_after_connecting() {
+    let (_cell, mut bench) = fake(FakeMotions::Arrive);
+    assert!(bench.facts().kinematics_known);
+}
+
+#[test]
+fn a_motion_arrives_or_is_refused_with_the_words_of_the_cell() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    bench.move_to(1, HOME, 1.0);
+    assert_eq!(bench.moved(1), MotionOutcome::Arrived);
+    assert_eq!(cell.script().moved, [HOME]);
+    let why = Text::verbatim("the table is in the way");
+    cell.script().motions = FakeMotions::Refuse(why.clone());
+    bench.move_to(2, HOME, 1.0);
+    assert_eq!(bench.moved(2), MotionOutcome::Refused(why));
+    bench.workers.jog_step(MotionId(3), LEFT, [0.01, 0.1], 0.5, None).expect("the worker is there");
+    assert!(matches!(bench.moved(3), MotionOutcome::Refused(_)));
+    assert_eq!(bench.ends(), 3);
+}
+
+#[test]
+fn one_motion_at_a_time_and_a_stop_leaves_none() {
+    let (cell, mut bench) = fake(FakeMotions::Hang);
+    bench.move_to(1, HOME, 1.0);
+    begun(&cell, 1);
+    bench.move_to(2, HOME, 1.0);
+    let MotionOutcome::Refused(why) = bench.moved(2) else { panic!("it was not refused") };
+    assert_eq!(why.say(Language::English), "a motion of the joints is still under way");
+    bench.workers.press_stop();
+    assert_eq!(bench.moved(1), MotionOutcome::Stopped);
+    bench.next = 0;
+    bench.stopped();
+    assert_eq!(bench.ends(), 2);
+    assert_eq!(cell.script().moved, [HOME]);
+    assert_eq!(cell.script().stops, 1);
+    cell.script().motions = FakeMotions::Arrive;
+    bench.move_to(3, HOME, 1.0);
+    assert_eq!(bench.moved(3), MotionOutcome::Arrived, "after a stop the arm moves again");
+}
+
+#[test]
+fn a_motion_can_be_cancelled_without_a_stop() {
+    let (cell, mut bench) = fake(FakeMotions::Hang);
+    bench.move_to(1, HOME, 1.0);
+    begun(&cell, 1);
+    bench.workers.cancel_motion();
+    assert_eq!(bench.moved(1), MotionOutcome::Stopped);
+    assert_eq!(cell.script().stops, 0);
+}
+
+#[test]
+fn nothing_begins_before_a_stop_is_done() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    cell.script().refuse_tasks = Some(PortError::Lost("the cable is out".to_owned()));
+    bench.workers.press_stop();
+    bench.move_to(1, HOME, 1.0);
+    let MotionOutcome::Refused(why) = bench.moved(1) else { panic!("it was not refused") };
+    assert_eq!(why.say(Language::English), "The arm is being stopped");
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    assert_eq!(bench.jog_ended().as_deref(), Some("The arm is being stopped"));
+    cell.script().refuse_tasks = None;
+    bench.stopped();
+    assert!(cell.script().moved.is_empty());
+    assert!(cell.script().jogged.is_empty());
+}
+
+#[test]
+fn a_jog_lasts_for_as_long_as_its_button_is_held() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    begun(&cell, 1);
+    for tenth in 1..20 {
+        bench.set_clock(f64::from(tenth) * 0.1);
+        bench.workers.hold_jog(LEFT, 0.5, None);
+    }
+    bench.workers.release_jog();
+    assert_eq!(bench.jog_ended(), None);
+    assert_eq!(cell.script().jogged.len(), 1, "one jog for all of it");
+}
+
+#[test]
+fn a_window_that_falls_silent_lets_the_arm_go() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    begun(&cell, 1);
+    bench.set_clock(HELD_S + 0.01);
+    let why = bench.jog_ended().expect("a reason");
+    assert!(why.contains("nothing was heard of the button for 0.3 s"), "{why}");
+}
+
+#[test]
+fn a_stop_ends_a_jog_and_the_held_button_does_not_begin_it_again() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    begun(&cell, 1);
+    bench.workers.press_stop();
+    assert_eq!(bench.jog_ended().as_deref(), Some("The arm was stopped"));
+    bench.next = 0;
+    bench.stopped();
+    for tenth in 1..20 {
+        bench.set_clock(f64::from(tenth) * 0.1);
+        bench.workers.hold_jog(LEFT, 0.5, None);
+    }
+    bench.move_to(1, HOME, 1.0);
+    assert_eq!(bench.moved(1), MotionOutcome::Arrived, "the worker has looked");
+    assert_eq!(cell.script().jogged.len(), 1);
+    bench.workers.release_jog();
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    begun(&cell, 3);
+}
+
+#[test]
+fn another_button_takes_over_without_a_word_in_between() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    begun(&cell, 1);
+    bench.workers.hold_jog(RIGHT, 0.5, None);
+    begun(&cell, 2);
+    bench.workers.release_jog();
+    assert_eq!(bench.jog_ended(), None);
+    let ends = bench.events.iter().filter(|event| matches!(event, Event::JogEnded { .. })).count();
+    assert_eq!(ends, 1);
+}
+
+#[test]
+fn a_connection_that_breaks_ends_the_motion_and_the_jog() {
+    let (cell, mut bench) = fake(FakeMotions::Hang);
+    bench.move_to(1, HOME, 1.0);
+    begun(&cell, 1);
+    cell.script().broken = true;
+    assert!(matches!(bench.moved(1), MotionOutcome::Failed(_)));
+    bench.until_link(Link::Motion, |state| matches!(state, LinkState::Lost { .. }));
+    bench.move_to(2, HOME, 1.0);
+    assert!(matches!(bench.moved(2), MotionOutcome::Refused(_)));
+    cell.script().broken = false;
+    bench.until_link(Link::Motion, LinkState::is_connected);
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    begun(&cell, 2);
+    cell.script().broken = true;
+    assert!(bench.jog_ended().is_some());
+}

@@ -1,0 +1,229 @@
+//! The vision thread: looks for the board in the newest picture, and takes captures. It owns no connection; pictures
+//! come to it from the camera worker through a [`Tap`].
+//!
+//! One picture at a time: tasks first, then the capture, which only costs what the pictures of a scene at rest take to
+//! be compared, then the live search. So whatever is asked for is taken up within one search, and a capture that waits
+//! goes on within one search, however long a search takes.
+
+mod capture;
+mod refusal;
+mod search;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, SendTimeoutError, Sender, TryRecvError, never, select};
+use handeye_core::camera::Intrinsics;
+use handeye_core::image_file::gray_from_rgb;
+use handeye_core::target::TargetSpec;
+use handeye_sim_link::client::CancelToken;
+
+pub use capture::{CaptureRequest, Measured, thumbnail};
+use capture::{Look, UnderWay};
+use search::Search;
+
+use super::link::Outlet;
+use super::slot::{LatestSlot, Tap};
+use crate::command::Event;
+use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame};
+
+/// How often the clock is looked at while a capture waits for pictures that do not come.
+const CLOCK_PERIOD: Duration = Duration::from_millis(100);
+
+/// What the vision thread can be asked for.
+#[derive(Debug, Clone)]
+pub enum VisionTask {
+    /// What to look for, from the next picture on. A capture of another board is given up.
+    SetTarget(TargetSpec),
+    /// The camera, for the pose of the board in live pictures.
+    SetIntrinsics(Intrinsics),
+    /// Take a capture. One that is under way is given up.
+    Capture(CaptureRequest),
+    /// Give up the capture that is under way.
+    CancelCapture,
+}
+
+/// The application ends.
+struct Ended;
+
+/// The vision thread.
+pub struct Vision {
+    tap: Arc<Tap<LiveFrame>>,
+    bell: Receiver<()>,
+    tasks: Receiver<VisionTask>,
+    detections: Arc<LatestSlot<LiveDetection>>,
+    measured: Sender<Measured>,
+    outlet: Outlet,
+    shutdown: CancelToken,
+    search: Search,
+    capture: Option<UnderWay>,
+}
+
+impl Vision {
+    /// With everything that it takes from and gives to; closing `tasks` ends it.
+    pub fn new(
+        tap: Arc<Tap<LiveFrame>>,
+        bell: Receiver<()>,
+        tasks: Receiver<VisionTask>,
+        detections: Arc<LatestSlot<LiveDetection>>,
+        measured: Sender<Measured>,
+        outlet: Outlet,
+        shutdown: CancelToken,
+    ) -> Self {
+        let search = Search::default();
+        Self { tap, bell, tasks, detections, measured, outlet, shutdown, search, capture: None }
+    }
+
+    /// Works until the application ends.
+    pub fn run(mut self) {
+        while let Ok(()) = self.turn() {}
+    }
+
+    fn turn(&mut self) -> Result<(), Ended> {
+        self.wait()?;
+        self.take_up_tasks()?;
+        if let Some((frame, dropped)) = self.tap.take() {
+            self.look_at(&frame, dropped)?;
+        }
+        if let Some(capture) = &mut self.capture {
+            capture.machine.pass_time(self.outlet.now_s(), self.tap.heard_s());
+            self.tell_progress();
+        }
+        Ok(())
+    }
+
+    /// Until there is something to do.
+    fn wait(&mut self) -> Result<(), Ended> {
+        let clock = if self.capture.is_some() { crossbeam_channel::after(CLOCK_PERIOD) } else { never() };
+        let task = select! {
+            recv(self.tasks) -> task => Some(task.map_err(|_closed| Ended)?),
+            // The tap is shared with the camera worker and lives as long as this thread, so the bell does too.
+            recv(self.bell) -> _ => None,
+            recv(clock) -> _ => None,
+        };
+        task.map_or(Ok(()), |task| self.take_up(task))
+    }
+
+    fn take_up_tasks(&mut self) -> Result<(), Ended> {
+        loop {
+            if self.shutdown.is_cancelled() {
+                return Err(Ended);
+            }
+            match self.tasks.try_recv() {
+                Ok(task) => self.take_up(task)?,
+                Err(TryRecvError::Empty) => return Ok(()),
+                Err(TryRecvError::Disconnected) => return Err(Ended),
+            }
+        }
+    }
+
+    fn take_up(&mut self, task: VisionTask) -> Result<(), Ended> {
+        match task {
+            VisionTask::SetTarget(target) => {
+                if self.search.target.replace(target).is_some_and(|before| before != target) {
+                    self.refuse(refusal::other_target());
+                }
+            }
+            VisionTask::SetIntrinsics(intrinsics) => self.search.intrinsics = Some(intrinsics),
+            VisionTask::Capture(request) => {
+                self.refuse(refusal::another_capture());
+                self.capture = Some(UnderWay::new(request, self.outlet.now_s()));
+                if self.search.target.is_none() {
+                    self.refuse(refusal::no_target());
+                }
+                self.tell_progress();
+            }
+            VisionTask::CancelCapture => self.refuse(refusal::cancelled()),
+        }
+        if self.shutdown.is_cancelled() { Err(Ended) } else { Ok(()) }
+    }
+
+    fn look_at(&mut self, frame: &LiveFrame, dropped: u64) -> Result<(), Ended> {
+        let grey = gray_from_rgb(&frame.images.rgb);
+        let complete = self.capture.as_mut().is_some_and(|capture| capture.see(frame, &grey));
+        self.tell_progress();
+        let Some(detection) = self.search.live(frame, &grey, dropped) else { return Ok(()) };
+        if let (Some(capture), Some(corners)) = (&mut self.capture, &detection.corners) {
+            capture.machine.saw_board(frame.info.number, corners);
+        }
+        self.detections.put(detection);
+        (self.outlet.waker)();
+        if complete {
+            self.take_up_tasks()?;
+            self.measure(frame)?;
+        }
+        Ok(())
+    }
+
+    /// Measures the average of a capture, whose last picture is `frame`, unless it was given up meanwhile.
+    fn measure(&mut self, frame: &LiveFrame) -> Result<(), Ended> {
+        let Some(target) = self.search.target else { return Ok(()) };
+        let Some(capture) = &mut self.capture else { return Ok(()) };
+        let Some(taken) = capture.machine.finish() else { return Ok(()) };
+        let number = capture.request.number;
+        self.tell(CaptureWait::Measuring);
+        let look = capture::measure(taken, &target);
+        // The search may have taken seconds: what was asked for meanwhile comes first.
+        self.take_up_tasks()?;
+        if self.capture.as_ref().is_none_or(|capture| capture.request.number != number) {
+            return Ok(());
+        }
+        match look {
+            Look::Refused(kind, why) => self.refuse((kind, why)),
+            Look::Good(picture) => {
+                self.tell(CaptureWait::Saving);
+                if let Some(capture) = self.capture.take() {
+                    self.hand_over(picture.into_measured(capture.request, &frame.info))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for the one who writes captures when that one is behind.
+    fn hand_over(&mut self, mut measured: Measured) -> Result<(), Ended> {
+        loop {
+            match self.measured.send_timeout(measured, CLOCK_PERIOD) {
+                Ok(()) => {
+                    (self.outlet.waker)();
+                    return Ok(());
+                }
+                Err(SendTimeoutError::Disconnected(_)) => return Err(Ended),
+                Err(SendTimeoutError::Timeout(_)) if self.shutdown.is_cancelled() => return Err(Ended),
+                Err(SendTimeoutError::Timeout(back)) => measured = back,
+            }
+        }
+    }
+
+    /// Reports what the capture waits for, or that there is none, when it is news.
+    fn tell_progress(&mut self) {
+        match self.capture.as_ref().map(UnderWay::state) {
+            Some(Ok(wait)) => self.tell(wait),
+            Some(Err(why)) => self.refuse(why),
+            None => {}
+        }
+    }
+
+    fn tell(&mut self, wait: CaptureWait) {
+        if let Some(capture) = self.capture.as_mut().filter(|capture| capture.told != Some(wait)) {
+            capture.told = Some(wait);
+            let number = capture.request.number;
+            self.outlet.report(Event::CaptureWaits { number, wait });
+        }
+    }
+
+    /// Ends the capture that is under way, if there is one.
+    fn refuse(&mut self, (kind, why): refusal::Why) {
+        if let Some(capture) = self.capture.take() {
+            let refused = CaptureRefused { kind, why, at_s: self.outlet.now_s() };
+            self.outlet.report(Event::CaptureRefused { number: capture.request.number, refused });
+        }
+    }
+}
+
+#[cfg(test)]
+mod accuracy_tests;
+#[cfg(test)]
+mod bench;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,107 @@
+//! Why there is no capture: what is wrong and what to do, in words.
+
+use handeye_core::capture::{EdgeBlur, NO_PICTURES_S, Refusal};
+use handeye_core::target::TargetSpec;
+use handeye_core::vision::VisionError;
+
+use crate::model::RefusalKind;
+use crate::text;
+use crate::text::Text;
+
+/// Kind and words.
+pub type Why = (RefusalKind, Text);
+
+/// Why no pictures came together.
+pub fn of_machine(refusal: &Refusal) -> Why {
+    match refusal {
+        Refusal::RobotMoves { after_s, rate_rad_s } => {
+            let (seconds, rate) = (format!("{after_s:.0}"), format!("{:.2}", rate_rad_s.to_degrees()));
+            let why = text!(
+                "The robot still moves after {seconds} s: a joint turns at {rate}°/s. Let it come to rest and capture again",
+                seconds = seconds,
+                rate = rate
+            );
+            (RefusalKind::NotSettled, why)
+        }
+        Refusal::PictureChanges { after_s } => {
+            let why = text!(
+                "The robot stands, but the picture still changes after {seconds} s: keep moving things and flickering light \
+                 out of view and capture again",
+                seconds = format!("{after_s:.0}")
+            );
+            (RefusalKind::NotSettled, why)
+        }
+        Refusal::Paused => {
+            let why = text!(
+                "The simulation is paused: no simulated time has passed for {seconds} s. Start it and capture again",
+                seconds = NO_PICTURES_S
+            );
+            (RefusalKind::NotSettled, why)
+        }
+        Refusal::NoPictures => {
+            let why = text!(
+                "No pictures have come for {seconds} s: check the connection to the camera and capture again",
+                seconds = NO_PICTURES_S
+            );
+            (RefusalKind::NoPictures, why)
+        }
+        Refusal::TooSimilar(similar) => {
+            let why = text!(
+                "Capture {id} was taken only {distance} mm and {angle}° from here and says the same: move or turn further and \
+                 capture again",
+                id = similar.id,
+                distance = format!("{:.1}", similar.distance_m * 1e3),
+                angle = format!("{:.1}", similar.angle_rad.to_degrees())
+            );
+            (RefusalKind::TooSimilar, why)
+        }
+    }
+}
+
+/// The board is not in the picture.
+pub fn no_board(target: &TargetSpec) -> Why {
+    let grid = target.grid();
+    let why = text!(
+        "The board was not found: bring all its {columns}×{rows} points into the picture, without reflections, and check \
+         that the target is set to the board that is there",
+        columns = grid.columns,
+        rows = grid.rows
+    );
+    (RefusalKind::NoBoard, why)
+}
+
+/// The picture could not be searched at all.
+pub fn not_searched(error: &VisionError) -> Why {
+    (RefusalKind::NoBoard, text!("The board cannot be looked for: {why}", why = error))
+}
+
+/// Nobody has said what to look for.
+pub fn no_target() -> Why {
+    (RefusalKind::NoBoard, text!("No board is chosen: choose the target and capture again"))
+}
+
+/// The picture is not sharp enough.
+pub fn blurred(blur: &EdgeBlur) -> Why {
+    let why = text!(
+        "The picture is blurred: the board's edges are {edge} px wide, its squares {square} px. Focus the camera, or go \
+         closer if the squares are small, and capture again",
+        edge = format!("{:.1}", blur.edge_width_px()),
+        square = format!("{:.0}", blur.square_px)
+    );
+    (RefusalKind::Blurred, why)
+}
+
+/// The user does not want it any more.
+pub fn cancelled() -> Why {
+    (RefusalKind::Cancelled, text!("The capture was cancelled"))
+}
+
+/// A newer one takes its place.
+pub fn another_capture() -> Why {
+    (RefusalKind::Cancelled, text!("The capture was given up for another one"))
+}
+
+/// It would have been measured on another board.
+pub fn other_target() -> Why {
+    (RefusalKind::Cancelled, text!("The target was changed: capture again"))
+}

@@ -1,0 +1,43 @@
+//! The board in live pictures.
+
+use std::time::Instant;
+
+use handeye_core::camera::Intrinsics;
+use handeye_core::image::GrayImage;
+use handeye_core::target::TargetSpec;
+use handeye_core::vision::{DetectOptions, detect_with, pnp};
+
+use crate::model::{LiveDetection, LiveFrame};
+
+/// What is looked for, and through what.
+#[derive(Debug, Default)]
+pub struct Search {
+    pub target: Option<TargetSpec>,
+    pub intrinsics: Option<Intrinsics>,
+}
+
+impl Search {
+    /// Looks for the board the quick way; `None` while there is no board to look for.
+    pub fn live(&self, frame: &LiveFrame, grey: &GrayImage, dropped: u64) -> Option<LiveDetection> {
+        let target = self.target?;
+        let began = Instant::now();
+        let (corners, problem) = match detect_with(grey, &target, DetectOptions::live()) {
+            Ok(corners) => (corners, None),
+            Err(problem) => (None, Some(problem)),
+        };
+        let camera_from_target = corners.as_deref().zip(self.intrinsics).and_then(|(corners, intrinsics)| {
+            pnp::camera_from_target(corners, &target, &intrinsics)
+                .inspect_err(|error| tracing::debug!(%error, "the board has no pose"))
+                .ok()
+        });
+        Some(LiveDetection {
+            frame: frame.info.number,
+            corners,
+            camera_from_target,
+            base_from_tip: frame.info.base_from_tip,
+            took_s: began.elapsed().as_secs_f64(),
+            problem,
+            dropped,
+        })
+    }
+}

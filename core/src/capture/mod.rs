@@ -1,0 +1,63 @@
+//! Taking a capture: when robot and picture have come to rest, what the average of some pictures is, and whether it is
+//! any good. Decisions only: pictures come in with their times, nothing here waits, reads a clock or knows a thread.
+//!
+//! | part | decides |
+//! | --- | --- |
+//! | [`Watch`] | whether joints and picture are at rest |
+//! | [`Average`] | the mean of pictures and depths |
+//! | [`Scatter`] | how much corners differ from picture to picture |
+//! | [`EdgeBlur`] | how blurred the board's edges are |
+//! | [`nearest_similar`] | whether there is a capture from almost the same pose |
+//! | [`Machine`] | what comes next, from the request to the average |
+//! | [`observe_image`] | corners and blur of a picture, fresh or from a file |
+
+mod average;
+mod machine;
+#[cfg(feature = "opencv")]
+mod observe;
+mod picture;
+mod scatter;
+mod sharpness;
+mod similar;
+mod watch;
+
+pub use average::Average;
+pub use machine::{Machine, NO_PICTURES_S, Plan, Progress, Refusal, Taken, Wait};
+#[cfg(feature = "opencv")]
+pub use observe::{Sighting, observe_gray, observe_image};
+pub use scatter::Scatter;
+pub use sharpness::{EdgeBlur, MAX_BLUR_SHARE};
+pub use similar::{Similar, nearest_similar};
+pub use watch::{Rest, STILL_RATE_RAD_S, Watch};
+
+use image::{GrayImage, RgbImage};
+
+use crate::depth::DepthImage;
+
+/// A pair of pictures with what is known of its instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Shot<'a> {
+    /// Counts pictures.
+    pub number: u64,
+    /// Simulated time [s].
+    pub sim_time_s: f64,
+    /// When it arrived, on the clock of whoever asks [s].
+    pub received_s: f64,
+    /// Positions of the joints [rad].
+    pub joints_rad: &'a [f64],
+    /// Colour.
+    pub rgb: &'a RgbImage,
+    /// The same in grey, see [`crate::image_file::gray_from_rgb`].
+    pub grey: &'a GrayImage,
+    /// Depth.
+    pub depth: &'a DepthImage,
+    /// The depth sensor's far plane [m]: depths there are no surface.
+    pub far_plane_m: f32,
+}
+
+#[cfg(test)]
+mod machine_tests;
+#[cfg(test)]
+mod parts_tests;
+#[cfg(test)]
+mod synthetic;

@@ -1,0 +1,43 @@
+//! What a kept picture is worth: the board's corners and how blurred its edges are.
+
+use image::{GrayImage, RgbImage};
+
+use super::EdgeBlur;
+use crate::image_file::gray_from_rgb;
+use crate::observation::Corner;
+use crate::target::TargetSpec;
+use crate::vision::{self, VisionError};
+
+/// The board in a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sighting {
+    /// All its points.
+    pub corners: Vec<Corner>,
+    /// How blurred it is; `None` for a board without straight edges, or too small to tell.
+    pub blur: Option<EdgeBlur>,
+}
+
+/// Finds the board with all effort and measures its blur. A capture and a picture read from a file go through here, so
+/// that a session that is opened again gives the numbers that it had. `None` when the board is not in the picture; a
+/// miss may take some seconds per megapixel.
+///
+/// # Errors
+/// As [`vision::detect`].
+pub fn observe_image(rgb: &RgbImage, target: &TargetSpec) -> Result<Option<Sighting>, VisionError> {
+    observe_gray(&gray_from_rgb(rgb), target)
+}
+
+/// [`observe_image`] of a picture in grey.
+///
+/// # Errors
+/// As [`vision::detect`].
+pub fn observe_gray(grey: &GrayImage, target: &TargetSpec) -> Result<Option<Sighting>, VisionError> {
+    let found = vision::detect(grey, target)?;
+    Ok(found.map(|corners| {
+        let blur = match target {
+            TargetSpec::Chessboard(grid) => EdgeBlur::measure(grey, &corners, grid),
+            TargetSpec::Circles(_) => None,
+        };
+        Sighting { corners, blur }
+    }))
+}

@@ -1,0 +1,308 @@
+//! The points of a jog, one per pass: along a fixed path, within limits of speed and acceleration, to a stop before
+//! whatever is in the way. Nothing here knows a connection or a clock.
+
+use handeye_core::frames::{Base, Pose, Tip};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use super::reach::ArmKinematics;
+use super::{JOINTS, JointAngles};
+use crate::cell::kinematics::{IkError, JointLimits};
+
+/// Fastest jog of a joint [rad/s]: two thirds of what the model of the arm allows its joints by default.
+const JOINT_SPEED: f64 = 60.0 * std::f64::consts::PI / 180.0;
+/// Half of what it allows [rad/s²]: from full speed a joint stops within 10°.
+const JOINT_ACCELERATION: f64 = 180.0 * std::f64::consts::PI / 180.0;
+/// Fastest jog of the tip along a line [m/s]: the reduced speed at which ISO 10218-1 lets people be near an arm.
+const LINE_SPEED: f64 = 0.25;
+/// From full speed the tip stops within 31 mm [m/s²].
+const LINE_ACCELERATION: f64 = 1.0;
+/// Fastest turn of the tip [rad/s].
+const TURN_SPEED: f64 = 45.0 * std::f64::consts::PI / 180.0;
+/// From full speed it stops within 6° [rad/s²].
+const TURN_ACCELERATION: f64 = 180.0 * std::f64::consts::PI / 180.0;
+
+/// Fastest joint while the tip is jogged [rad/s]: what the model of the arm allows its joints by default.
+const JOINT_RATE: f64 = 90.0 * std::f64::consts::PI / 180.0;
+
+/// Near a singular position the tip slows down so that no joint exceeds its rate; below this share of the fastest speed
+/// it is not getting anywhere, and stops.
+const CRAWL: f64 = 0.02;
+
+/// Points of the way to a standstill that are looked at before each step.
+const LOOK_AHEAD: usize = 8;
+
+/// Points of a step of known length that are looked at before it begins.
+const STEP_SAMPLES: usize = 64;
+
+/// A joint that turns by more between two neighbouring points of a path has changed to another configuration [rad].
+const JUMP_RAD: f64 = 0.5;
+
+/// How often a step that is too fast is halved before it is given up: to less than the crawl.
+const SLOWER_STEPS: usize = 6;
+
+/// Closer to its end than this [m, rad] a path is at its end.
+const AT_END: f64 = 1e-9;
+
+/// Why a jog goes no further.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum JogObstacle {
+    /// A joint is at the end of its range.
+    #[error("joint {joint} is at the end of its range, {limit_deg:.1}°")]
+    JointRange {
+        /// Counted from 1 at the base.
+        joint: usize,
+        /// The end.
+        limit_deg: f64,
+    },
+    /// The arm reaches no further.
+    #[error(transparent)]
+    Reach(IkError),
+    /// The joints would have to turn at once by a lot for the tip to move on by a little.
+    #[error(
+        "the arm is stretched, or two of its axes are in line: joint {joint} would turn too fast; go another way or \
+         move single joints"
+    )]
+    Singular {
+        /// The fastest joint, counted from 1 at the base.
+        joint: usize,
+    },
+}
+
+/// Where a jog leads.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Path<'a> {
+    /// One joint from its start; `sign` is 1 or −1.
+    Joint { index: usize, sign: f64, start: JointAngles, limits: [Option<[f64; 2]>; JOINTS] },
+    /// The tip from its start, along a unit vector of the base.
+    Line { kinematics: &'a ArmKinematics, start: Pose<Base, Tip>, along: Vector3<f64> },
+    /// The tip about an axis of the base through a point.
+    Turn { kinematics: &'a ArmKinematics, start: Pose<Base, Tip>, about: Vector3<f64>, centre: Vector3<f64> },
+}
+
+impl Path<'_> {
+    /// Fastest speed and acceleration along it.
+    fn limits(&self) -> [f64; 2] {
+        match self {
+            Self::Joint { .. } => [JOINT_SPEED, JOINT_ACCELERATION],
+            Self::Line { .. } => [LINE_SPEED, LINE_ACCELERATION],
+            Self::Turn { .. } => [TURN_SPEED, TURN_ACCELERATION],
+        }
+    }
+
+    /// The joints after a distance, from those at a point shortly before.
+    fn joints_at(&self, distance: f64, before: &JointAngles) -> Result<JointAngles, JogObstacle> {
+        match self {
+            Self::Joint { index, sign, start, .. } => {
+                let mut joints = *start;
+                joints[*index] += sign * distance;
+                Ok(joints)
+            }
+            Self::Line { kinematics, start, along } => {
+                let moved = Translation3::from(along * distance) * start.isometry();
+                nearest(kinematics, &Pose::from_isometry(moved), before)
+            }
+            Self::Turn { kinematics, start, about, centre } => {
+                let turn = UnitQuaternion::new(about * distance);
+                let turn_about_centre = Isometry3::from_parts(Translation3::from(centre - turn * centre), turn);
+                nearest(kinematics, &Pose::from_isometry(turn_about_centre * start.isometry()), before)
+            }
+        }
+    }
+
+    /// How far it leads, where that is known beforehand.
+    fn end(&self) -> Option<(f64, JogObstacle)> {
+        let Self::Joint { index, sign, start, limits } = self else { return None };
+        let [min_rad, max_rad] = limits[*index]?;
+        let limit_rad = if *sign > 0.0 { max_rad } else { min_rad };
+        let obstacle = JogObstacle::JointRange { joint: index + 1, limit_deg: limit_rad.to_degrees() };
+        Some((((limit_rad - start[*index]) * sign).max(0.0), obstacle))
+    }
+}
+
+/// The joints of the same configuration of the arm, or what is in the way.
+fn nearest(
+    kinematics: &ArmKinematics,
+    goal: &Pose<Base, Tip>,
+    before: &JointAngles,
+) -> Result<JointAngles, JogObstacle> {
+    // Without the ranges first: within them the nearest may be another configuration, and a jump.
+    let half_turn = std::f64::consts::PI;
+    let around = JointLimits { min_rad: before.map(|q| q - half_turn), max_rad: before.map(|q| q + half_turn) };
+    let joints = kinematics.reach_within(goal, before, &around).map_err(JogObstacle::Reach)?;
+    let (fastest, by_rad) = largest_change(before, &joints);
+    if by_rad > JUMP_RAD {
+        return Err(JogObstacle::Singular { joint: fastest + 1 });
+    }
+    match kinematics.limits().first_violation(&joints) {
+        None => Ok(joints),
+        Some(joint) => {
+            let limits = kinematics.limits();
+            let over = joints[joint] > limits.max_rad[joint];
+            let limit_rad = if over { limits.max_rad[joint] } else { limits.min_rad[joint] };
+            Err(JogObstacle::JointRange { joint: joint + 1, limit_deg: limit_rad.to_degrees() })
+        }
+    }
+}
+
+fn largest_change(from: &JointAngles, to: &JointAngles) -> (usize, f64) {
+    (0..JOINTS)
+        .map(|i| (i, (to[i] - from[i]).abs()))
+        .fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
+}
+
+/// The fastest speed for the next `dt_s` from which the rest of a distance is enough to stop.
+fn stopping_speed(distance: f64, acceleration: f64, dt_s: f64) -> f64 {
+    let left = distance.max(0.0);
+    // Of v·dt + v²/2a = distance, written so that nothing cancels.
+    2.0 * left / (dt_s + (dt_s * dt_s + 2.0 * left / acceleration).sqrt())
+}
+
+/// A jog under way.
+#[derive(Debug)]
+pub(super) struct JogPlan<'a> {
+    path: Path<'a>,
+    dt_s: f64,
+    /// Where it ends by itself.
+    length: Option<f64>,
+    distance: f64,
+    speed: f64,
+    joints: JointAngles,
+    obstacle: Option<JogObstacle>,
+}
+
+impl<'a> JogPlan<'a> {
+    /// From a standstill at `joints`, in passes of `dt_s`; with a `length` [m, rad] it ends there.
+    ///
+    /// # Errors
+    /// What is in the way of a given length.
+    pub fn new(path: Path<'a>, joints: JointAngles, dt_s: f64, length: Option<f64>) -> Result<Self, JogObstacle> {
+        let plan = Self { path, dt_s, length, distance: 0.0, speed: 0.0, joints, obstacle: None };
+        plan.check_length()?;
+        Ok(plan)
+    }
+
+    fn check_length(&self) -> Result<(), JogObstacle> {
+        let Some(length) = self.length else { return Ok(()) };
+        if let Some((end, obstacle)) = self.path.end()
+            && length > end + AT_END
+        {
+            return Err(obstacle);
+        }
+        let [fastest, _] = self.path.limits();
+        let mut joints = self.joints;
+        for sample in 1..=STEP_SAMPLES {
+            let between = length / STEP_SAMPLES as f64;
+            let next = self.path.joints_at(between * sample as f64, &joints)?;
+            self.rate_limit(&joints, &next, between, fastest)?;
+            joints = next;
+        }
+        Ok(())
+    }
+
+    /// The joints for the next pass; `share` of the fastest speed is wanted, and a standstill with `None`.
+    pub fn advance(&mut self, share: Option<f64>) -> JointAngles {
+        let [fastest, acceleration] = self.path.limits();
+        let wanted = share.filter(|share| share.is_finite()).map_or(0.0, |share| share.clamp(0.0, 1.0) * fastest);
+        let change = acceleration * self.dt_s;
+        let next = wanted.clamp((self.speed - change).max(0.0), self.speed + change);
+        self.speed = next.min(self.free_speed(next));
+        if let Err(obstacle) = self.step() {
+            (self.speed, self.obstacle) = (0.0, Some(obstacle));
+        }
+        self.joints
+    }
+
+    /// Moves on for one pass, more slowly if a joint would be too fast: what lies between the points that were looked
+    /// at may be worse than they are.
+    fn step(&mut self) -> Result<(), JogObstacle> {
+        let mut joint = 0;
+        for _ in 0..SLOWER_STEPS {
+            let mut distance = self.distance + self.speed * self.dt_s;
+            if let Some(length) = self.length
+                && length - distance < AT_END
+            {
+                distance = length;
+            }
+            let joints = self.path.joints_at(distance, &self.joints)?;
+            let (fastest, by_rad) = largest_change(&self.joints, &joints);
+            if by_rad <= JOINT_RATE * self.dt_s {
+                (self.joints, self.distance) = (joints, distance);
+                return Ok(());
+            }
+            joint = fastest + 1;
+            self.speed /= 2.0;
+        }
+        Err(JogObstacle::Singular { joint })
+    }
+
+    /// Whether it stands.
+    pub fn is_at_rest(&self) -> bool {
+        self.speed <= AT_END || self.is_at_end()
+    }
+
+    /// Whether its length is behind it.
+    pub fn is_at_end(&self) -> bool {
+        self.length.is_some_and(|length| self.distance >= length)
+    }
+
+    /// What is in the way, once it slows down for it.
+    pub fn obstacle(&self) -> Option<JogObstacle> {
+        self.obstacle
+    }
+
+    /// The fastest speed up to `speed` that leaves the way to stop, and no joint faster than it may be.
+    fn free_speed(&mut self, speed: f64) -> f64 {
+        let [fastest, acceleration] = self.path.limits();
+        let stopping = |distance: f64| stopping_speed(distance, acceleration, self.dt_s);
+        let mut free = speed;
+        self.obstacle = None;
+        if let Some(length) = self.length {
+            free = free.min(stopping(length - self.distance));
+        }
+        if let Some((end, obstacle)) = self.path.end() {
+            let bound = stopping(end - self.distance);
+            if bound < free {
+                (free, self.obstacle) = (bound, Some(obstacle));
+            }
+            return free;
+        }
+        let between = (speed * self.dt_s + speed * speed / (2.0 * acceleration)) / LOOK_AHEAD as f64;
+        if between <= 0.0 {
+            return free;
+        }
+        let mut joints = self.joints;
+        for sample in 1..=LOOK_AHEAD {
+            let behind = between * (sample - 1) as f64;
+            let ahead = self.path.joints_at(self.distance + between * sample as f64, &joints).and_then(|next| {
+                let rate_limit = self.rate_limit(&joints, &next, between, fastest)?;
+                Ok((next, rate_limit))
+            });
+            match ahead {
+                Ok((next, rate_limit)) => {
+                    free = free.min((rate_limit * rate_limit + 2.0 * acceleration * behind).sqrt());
+                    joints = next;
+                }
+                Err(obstacle) => {
+                    self.obstacle = Some(obstacle);
+                    return free.min(stopping(behind));
+                }
+            }
+        }
+        free
+    }
+
+    /// The speed along the path at which the fastest joint has its rate.
+    fn rate_limit(&self, from: &JointAngles, to: &JointAngles, between: f64, fastest: f64) -> Result<f64, JogObstacle> {
+        if matches!(self.path, Path::Joint { .. }) {
+            return Ok(fastest);
+        }
+        let (joint, by_rad) = largest_change(from, to);
+        let limit = JOINT_RATE * between / by_rad.max(f64::MIN_POSITIVE);
+        if limit < CRAWL * fastest { Err(JogObstacle::Singular { joint: joint + 1 }) } else { Ok(limit.min(fastest)) }
+    }
+}
+
+#[cfg(test)]
+#[path = "jog_plan_tests.rs"]
+mod tests;

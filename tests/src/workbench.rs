@@ -1,0 +1,82 @@
+//! The workbench without its window: what a user clicks is a command, what a user sees is the model.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use handeye_app::app::{App, Connect, Start};
+use handeye_app::command::Command;
+use handeye_app::model::{CellSource, Model, ViewSettings};
+use handeye_app::text::Language;
+use handeye_app::worker::{Clock, LiveConnector, Waker};
+
+/// Longer than anything that a test waits for takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(180);
+
+/// An application at work.
+pub struct Workbench {
+    app: App,
+    woken: std::sync::mpsc::Receiver<()>,
+}
+
+impl Workbench {
+    /// Starts it; new sessions go under `sessions`.
+    ///
+    /// # Panics
+    /// When there are no more threads.
+    pub fn start(source: CellSource, sessions: &Path, open: Option<PathBuf>) -> Self {
+        let (wake, woken) = std::sync::mpsc::sync_channel(1);
+        let waker: Waker = Arc::new(move || {
+            // A channel that is full wakes as well.
+            let _full = wake.try_send(()).is_err();
+        });
+        let began = Instant::now();
+        let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
+        let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
+        let start = Start {
+            source,
+            view: ViewSettings::default(),
+            addresses: Vec::new(),
+            sessions: sessions.to_path_buf(),
+            open,
+        };
+        match App::start(start, connect, clock, waker) {
+            Ok(app) => Self { app, woken },
+            Err(error) => panic!("no threads: {error}"),
+        }
+    }
+
+    /// What the window would show.
+    pub fn model(&self) -> &Model {
+        self.app.model()
+    }
+
+    /// A click.
+    pub fn click(&mut self, command: Command) {
+        self.app.apply(command);
+    }
+
+    /// Waits until the model is like that.
+    ///
+    /// # Panics
+    /// When that does not happen, with what the window says by then.
+    pub fn until(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            self.app.collect();
+            if is_so(self.app.model()) {
+                return;
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            assert!(!left.is_zero(), "waiting for {what}; the window says:\n{}", self.said());
+            // Also without a wake: time itself is part of the model.
+            let _woken = self.woken.recv_timeout(left.min(Duration::from_millis(100))).is_ok();
+        }
+    }
+
+    /// All messages so far.
+    pub fn said(&self) -> String {
+        let messages = self.app.model().messages.iter();
+        messages.map(|message| message.text.say(Language::English)).collect::<Vec<_>>().join("\n")
+    }
+}

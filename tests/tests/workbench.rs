@@ -1,0 +1,175 @@
+//! A whole calibration by what a user clicks, on the built-in cell over its real socket.
+
+use std::path::Path;
+
+use handeye_app::command::Command;
+use handeye_app::model::{CapturePurpose, CellSource, Model, SolveStatus};
+use handeye_core::result::CalibrationResult;
+use handeye_core::session::{CaptureId, Role};
+use handeye_tests::workbench::Workbench;
+
+fn connected(model: &Model) -> bool {
+    model.control.is_connected()
+        && model.camera.is_connected()
+        && model.mover.is_connected()
+        && model.frame.is_some()
+        && model.cell.is_some()
+}
+
+fn idle_and_fresh(model: &Model) -> bool {
+    model.solve.status == SolveStatus::Idle && model.solve.fresh
+}
+
+/// The built-in cell with the ten reference poses captured and solved.
+fn toured(sessions: &Path) -> Workbench {
+    let mut bench = Workbench::start(CellSource::BuiltIn, sessions, None);
+    bench.until("a cell", connected);
+    bench.click(Command::RunTour { purpose: Some(CapturePurpose::Calibrate) });
+    bench.until("the end of the tour", |model| !model.touring);
+    bench.until("a solution", idle_and_fresh);
+    bench
+}
+
+fn result_beside(session: &Path) -> CalibrationResult {
+    CalibrationResult::read(&session.join("result.json")).expect("a result beside the session")
+}
+
+#[test]
+fn ten_poses_are_visited_captured_solved_verified_and_exported() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut bench = toured(folder.path());
+    let model = bench.model();
+    assert_eq!(model.document().captures.len(), 10, "{}", bench.said());
+    let solved = model.solve.current().expect("solved");
+    let truth = solved.result.truth.clone().expect("the cell publishes its truth");
+    assert!(truth.translation_error_mm.is_some_and(|mm| mm < 0.5), "{truth:?}");
+    assert!(truth.rotation_error_deg.is_some_and(|deg| deg < 0.03), "{truth:?}");
+    assert!(truth.focal_error_percent.is_some_and(|percent| percent < 0.2), "{truth:?}");
+
+    // One more from between two poses, which verifies and never enters the fit.
+    bench.click(Command::GoToCapture(CaptureId(3)));
+    bench.until("the arm at pose 3", |model| model.motion == handeye_app::model::Motion::Idle);
+    bench.click(Command::SetCaptureOptions(handeye_app::model::CaptureOptions {
+        least_distance_m: 0.0,
+        least_angle_rad: 0.0,
+        ..Default::default()
+    }));
+    bench.click(Command::Capture(CapturePurpose::Verify));
+    bench.until("the verification", |model| {
+        model.solve.current().is_some_and(|solved| matches!(solved.verification, Some(Ok(_))))
+    });
+    let solved = bench.model().solve.current().expect("solved").clone();
+    let Some(Ok(verification)) = &solved.verification else { panic!("verified") };
+    assert_eq!(solved.captures.len(), 10, "a capture that verifies is not in the fit");
+    assert!(verification.rms_px < 0.5 && verification.centre_rms_m < 0.5e-3, "{verification:?}");
+
+    bench.click(Command::Export);
+    bench.until("the exports", |model| model.export.written.is_some());
+    let written = bench.model().export.written.clone().expect("written");
+    let files = written.files.expect("files");
+    assert!(files.len() >= 4 && files.iter().all(|file| file.is_file()), "{files:?}");
+}
+
+#[test]
+fn deleting_and_excluding_solve_again_and_undo_brings_the_same_answer_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut bench = toured(folder.path());
+    let before = bench.model().solve.current().expect("solved").result.clone();
+
+    bench.click(Command::Delete(vec![CaptureId(2), CaptureId(5)]));
+    bench.until("eight captures", |model| model.document().captures.len() == 8 && idle_and_fresh(model));
+    assert_ne!(bench.model().solve.current().expect("solved").result.hand_eye, before.hand_eye);
+    bench.click(Command::SetExcluded { ids: vec![CaptureId(7)], excluded: true });
+    bench.until("seven in the fit", |model| model.document().in_use().count() == 7 && idle_and_fresh(model));
+    for _ in 0..2 {
+        bench.until("something to undo", |model| model.session.undo.is_some());
+        bench.click(Command::Undo);
+    }
+    bench.until("ten captures", |model| model.document().in_use().count() == 10 && idle_and_fresh(model));
+    assert_eq!(bench.model().solve.current().expect("solved").result, before, "to the last bit");
+    bench.click(Command::Redo);
+    bench.until("eight captures", |model| model.document().captures.len() == 8);
+}
+
+#[test]
+fn a_session_is_opened_again_as_it_was_and_solves_to_the_same_bits_as_the_command_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut bench = toured(folder.path());
+    bench.click(Command::SetExcluded { ids: vec![CaptureId(4)], excluded: true });
+    bench.click(Command::SetPurpose { ids: vec![CaptureId(6)], purpose: CapturePurpose::Verify });
+    bench.until("the changes", |model| model.document().in_use().count() == 8 && idle_and_fresh(model));
+    let session = bench.model().session.folder.clone().expect("a folder");
+    let (document, solved) = (bench.model().session.document.clone(), bench.model().solve.current().cloned());
+    let undo = bench.model().session.undo.clone();
+    drop(bench);
+    let kept = result_beside(&session);
+
+    let address = CellSource::Address("tcp://127.0.0.1:1".to_owned());
+    let mut again = Workbench::start(address, folder.path(), Some(session.clone()));
+    again.until("the session", |model| model.session.folder.is_some() && idle_and_fresh(model));
+    let model = again.model();
+    assert_eq!(model.session.document, document);
+    assert_eq!(model.session.undo, undo, "what could be undone still can");
+    assert_eq!(model.document().capture(CaptureId(6)).map(|it| it.role), Some(Role::Verification));
+    let resolved = model.solve.current().expect("solved");
+    let solved = solved.expect("solved");
+    assert_eq!(resolved.result.hand_eye, solved.result.hand_eye);
+    assert_eq!(resolved.result.quality, solved.result.quality);
+    assert_eq!(resolved.result.views, solved.result.views);
+
+    let by_command_line = tempfile::tempdir().expect("a folder").path().join("result.json");
+    std::fs::create_dir_all(by_command_line.parent().expect("a parent")).expect("a folder");
+    let status = std::process::Command::new(handeye_tests::handeye_binary())
+        .args(["calibrate", "--quiet"])
+        .arg(&session)
+        .arg("--json")
+        .arg(&by_command_line)
+        .stdout(std::process::Stdio::null())
+        .status()
+        .expect("handeye runs");
+    assert!(status.success());
+    let cli = CalibrationResult::read(&by_command_line).expect("a result");
+    assert_eq!(cli.hand_eye, kept.hand_eye);
+    assert_eq!(cli.target, kept.target);
+    assert_eq!(cli.intrinsics, kept.intrinsics);
+    assert_eq!(cli.quality, kept.quality);
+    assert_eq!(cli.provenance.input_sha256, kept.provenance.input_sha256);
+}
+
+#[test]
+fn a_stop_ends_the_tour_and_keeps_what_was_captured() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut bench = Workbench::start(CellSource::BuiltIn, folder.path(), None);
+    bench.until("a cell", connected);
+    bench.click(Command::RunTour { purpose: Some(CapturePurpose::Calibrate) });
+    bench.until("two captures", |model| model.document().captures.len() >= 2);
+    bench.click(Command::Stop);
+    bench.until("the arm at rest", |model| !model.touring && !model.stop_pending);
+    let kept = bench.model().document().captures.len();
+    assert!((2..10).contains(&kept), "{kept}");
+    let joints = |bench: &Workbench| bench.model().robot.as_ref().map(|robot| robot.joints_rad);
+    let sim_time = |model: &Model| model.robot.as_ref().map_or(0.0, |robot| robot.sim_time_s);
+    // It brakes within its limits, which takes a moment of simulated time.
+    let stopped_s = sim_time(bench.model());
+    bench.until("a second at rest", |model| sim_time(model) > stopped_s + 1.5);
+    let (at_rest, at_s) = (joints(&bench), sim_time(bench.model()));
+    bench.until("another second", |model| sim_time(model) > at_s + 1.0);
+    assert_eq!(joints(&bench), at_rest, "the arm moves on after a stop");
+    assert_eq!(bench.model().document().captures.len(), kept);
+}
+
+#[test]
+fn a_session_that_cannot_be_opened_says_why_and_leaves_the_present_one_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let broken = folder.path().join("broken");
+    std::fs::create_dir(&broken).expect("a folder");
+    std::fs::write(broken.join("session.json"), "{ \"format\": \"handeye-session\", \"vers").expect("a file");
+    let address = CellSource::Address("tcp://127.0.0.1:1".to_owned());
+    let mut bench = Workbench::start(address, folder.path(), None);
+    bench.click(Command::NewSession(Some(folder.path().join("mine"))));
+    bench.until("a session", |model| model.session.folder.is_some());
+    bench.click(Command::Open(broken));
+    bench.until("the answer", |model| !model.opening);
+    assert!(bench.said().contains("was not opened"), "{}", bench.said());
+    assert_eq!(bench.model().session.name().as_deref(), Some("mine"));
+}
