@@ -132,10 +132,12 @@ pub fn nothing_yet_ui(ui: &mut Ui, title: &str, detail: &str) {
     ui.allocate_ui_with_layout(size, egui::Layout::top_down(egui::Align::Center), |ui| {
         ui.set_min_size(size);
         ui.add_space(((size.y - 60.0) * 0.42).max(0.0));
-        ui.set_max_width(TEXT_WIDTH.min(size.x - 24.0).max(0.0));
-        ui.label(egui::RichText::new(title).size(15.0).color(palette.text));
-        ui.add_space(4.0);
-        let detail = egui::RichText::new(detail).color(palette.weak);
-        ui.add(egui::Label::new(detail).wrap().halign(egui::Align::Center));
+        ui.scope(|ui| {
+            ui.set_max_width(TEXT_WIDTH.min(size.x - 24.0).max(0.0));
+            ui.label(egui::RichText::new(title).size(15.0).color(palette.text));
+            ui.add_space(4.0);
+            let detail = egui::RichText::new(detail).color(palette.weak);
+            ui.add(egui::Label::new(detail).wrap().halign(egui::Align::Center));
+        });
     });
 }

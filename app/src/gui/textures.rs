@@ -16,15 +16,6 @@ pub const CRISP_FROM: f32 = 4.0;
 /// Thumbnails that are kept; those that were not seen for longest go first.
 const MOST_THUMBNAILS: usize = 256;
 
-/// Which pictures are shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Source {
-    /// The live frame of this number.
-    Live(u64),
-    /// The recorded pictures of a capture.
-    Review(CaptureId),
-}
-
 /// Textures of the pictures that are shown, live or recorded, and of the thumbnails.
 #[derive(Default)]
 pub struct LiveTextures {
@@ -35,7 +26,8 @@ pub struct LiveTextures {
     /// Small pictures of captures.
     pub thumbnails: Thumbnails,
     review_range_m: Option<[f32; 2]>,
-    shown: Option<(Source, bool)>,
+    /// What was uploaded, and whether crisp; kept, so that no other pictures can be taken for them.
+    shown: Option<(Arc<FrameImages>, bool)>,
     #[cfg(test)]
     uploads: u64,
 }
@@ -44,25 +36,22 @@ impl LiveTextures {
     /// Uploads the pictures that are to be shown, unless they are there already.
     pub fn update(&mut self, ctx: &Context, model: &Model) {
         self.thumbnails.pass += 1;
-        let wanted: Option<(Source, &Arc<FrameImages>)> = match &model.review {
-            Some(review) => review.images.as_ref().map(|images| (Source::Review(review.id), images)),
-            None => model.frame.as_ref().map(|frame| (Source::Live(frame.info.number), &frame.images)),
+        let images = match &model.review {
+            Some(review) => review.images.as_ref(),
+            None => model.frame.as_ref().map(|frame| &frame.images),
         };
-        let Some((source, images)) = wanted else { return };
+        let Some(images) = images else { return };
         let crisp = model.viewport.zoom >= CRISP_FROM;
-        if self.shown == Some((source, crisp)) {
+        if self.shown.as_ref().is_some_and(|(shown, was_crisp)| Arc::ptr_eq(shown, images) && *was_crisp == crisp) {
             return;
         }
         upload(ctx, &mut self.rgb, "rgb", &images.rgb, crisp);
         upload(ctx, &mut self.depth, "depth", &images.depth_coloured, crisp);
-        self.review_range_m = match source {
-            Source::Live(_) => None,
-            Source::Review(_) => {
-                let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
-                depth_view::range_of(&images.depth, far_plane_m, None)
-            }
-        };
-        self.shown = Some((source, crisp));
+        self.review_range_m = model.review.as_ref().and_then(|_| {
+            let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
+            depth_view::range_of(&images.depth, far_plane_m, None)
+        });
+        self.shown = Some((images.clone(), crisp));
         #[cfg(test)]
         {
             self.uploads += 1;

@@ -1,5 +1,7 @@
 //! What lies over a picture in words: how fresh it is, that it is recorded, how a capture goes.
 
+use std::path::PathBuf;
+
 use egui::{
     Align, Align2, Color32, CornerRadius, Id, Layout, Rect, RichText, Sense, Spinner, Stroke, StrokeKind, Ui,
     UiBuilder, Vec2, WidgetInfo, WidgetType,
@@ -39,6 +41,9 @@ pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, poin
         );
         let colour = if stale { Palette::of(ui).warning } else { Color32::from_gray(215) };
         lines.push((words.say(language), colour));
+    }
+    if shown.capture.is_none() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_none()) {
+        lines.push((tr!(language, "Board not found").to_owned(), Marks::over_pictures().review));
     }
     let overlays = model.view.overlays;
     if overlays.residuals && has_residuals(model, shown) {
@@ -176,8 +181,9 @@ fn plate_ui(ui: &mut Ui, room: Rect, tone: Tone, words: &str, action_ui: impl Fn
 }
 
 /// What is remembered to see that a capture is new.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Newest {
+    session: Option<PathBuf>,
     id: Option<CaptureId>,
     since_s: f64,
 }
@@ -188,14 +194,16 @@ fn flash(ui: &Ui, model: &Model, room: Rect) {
     let id = model.document().captures.last().map(|capture| capture.id);
     let now_s = ui.input(|input| input.time);
     let kept: Option<Newest> = ui.data(|data| data.get_temp(key));
-    let newest = match kept {
-        // What was there when the window opened is not new, and neither is what an undo brings into sight.
-        None => Newest { id, since_s: f64::NEG_INFINITY },
-        Some(kept) if id > kept.id => Newest { id, since_s: now_s },
-        Some(kept) => Newest { id, ..kept },
+    let since_s = match &kept {
+        Some(kept) if kept.session != model.session.folder => f64::NEG_INFINITY,
+        Some(kept) if id > kept.id => now_s,
+        Some(kept) => kept.since_s,
+        // What was there when the window opened is not new.
+        None => f64::NEG_INFINITY,
     };
+    let newest = Newest { session: model.session.folder.clone(), id, since_s };
     ui.data_mut(|data| data.insert_temp(key, newest));
-    let part = (now_s - newest.since_s) / FLASH_S;
+    let part = (now_s - since_s) / FLASH_S;
     if (0.0..1.0).contains(&part) {
         let alpha = (110.0 * (1.0 - part)) as u8;
         ui.painter().rect_filled(room, CornerRadius::ZERO, Color32::from_white_alpha(alpha));
