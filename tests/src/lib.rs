@@ -1,5 +1,6 @@
 //! Support for the end-to-end tests: where things are, and how to run them as a user does.
 
+pub mod desktop;
 pub mod workbench;
 
 use std::io::{BufRead as _, BufReader};

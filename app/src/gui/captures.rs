@@ -50,12 +50,8 @@ pub struct CaptureRow {
     pub influence_mm: Option<f64>,
     /// Noise of a corner of its picture [px].
     pub corner_noise_px: Option<f64>,
-    /// The residuals are larger than those of the others.
-    pub large_residual: bool,
-    /// The robot's pose was corrected more than those of the others.
-    pub large_correction: bool,
-    /// The answer leans on it.
-    pub influential: bool,
+    /// What the calibration finds remarkable about it.
+    pub found: Vec<FindingCode>,
 }
 
 impl CaptureRow {
@@ -197,9 +193,7 @@ fn plain_row(model: &Model, record: &CaptureRecord) -> CaptureRow {
         correction_deg: None,
         influence_mm: None,
         corner_noise_px: record.corner_noise_px,
-        large_residual: false,
-        large_correction: false,
-        influential: false,
+        found: Vec::new(),
     }
 }
 
@@ -233,12 +227,7 @@ fn add_findings(rows: &mut [CaptureRow], document: &Document, findings: &[Findin
     for finding in findings {
         for view in &finding.views {
             let Some(at) = document.captures.iter().position(|record| record.image == *view) else { continue };
-            match finding.code {
-                FindingCode::LargeResidual => rows[at].large_residual = true,
-                FindingCode::LargeCorrection => rows[at].large_correction = true,
-                FindingCode::InfluentialView => rows[at].influential = true,
-                _ => {}
-            }
+            rows[at].found.push(finding.code);
         }
     }
 }

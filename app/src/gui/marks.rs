@@ -44,7 +44,7 @@ const LIGHT: Marks = Marks {
     fit: Color32::from_rgb(38, 116, 224),
     verify: Color32::from_rgb(132, 72, 208),
     excluded: Color32::from_rgb(150, 156, 168),
-    review: Color32::from_rgb(214, 138, 16),
+    review: Color32::from_rgb(180, 106, 0),
     on_review: Color32::from_rgb(255, 255, 255),
     on_accent: Color32::from_rgb(255, 255, 255),
     ..OVER_PICTURES

@@ -26,6 +26,7 @@ mod testing;
 mod textures;
 mod theme;
 mod toasts;
+mod widget_list;
 mod window;
 
 use std::sync::Arc;
@@ -78,6 +79,9 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let mut app = App::start(start, connect, clock, waker)?;
         for warning in warnings {
             app.absorb(warning.into());
+        }
+        if let Some(file) = variable(widget_list::VARIABLE) {
+            creation.egui_ctx.add_plugin(widget_list::WidgetList::new(file.into()));
         }
         let layout = stored_layout(creation.storage);
         Ok(Box::new(Window::new(app, layout, file, &creation.egui_ctx)) as Box<dyn eframe::App>)

@@ -21,6 +21,9 @@ pub struct PaneState {
     pub pointed: Option<ImagePoint>,
 }
 
+/// As long as a frame on a usual screen, so that two clicks can be a double click [s].
+const STEP_S: f32 = 1.0 / 60.0;
+
 /// A pane under test.
 pub struct PaneHarness {
     /// For what the functions below do not do.
@@ -31,7 +34,7 @@ impl PaneHarness {
     /// A pane of a size.
     pub fn new(model: Model, size: Vec2, pane_ui: fn(&mut Ui, &mut PaneState)) -> Self {
         let state = PaneState { model, outbox: Outbox::default(), textures: LiveTextures::default(), pointed: None };
-        let harness = Harness::builder().with_size(size).build_ui_state(
+        let harness = Harness::builder().with_size(size).with_step_dt(STEP_S).build_ui_state(
             move |ui, state: &mut PaneState| {
                 state.textures.update(ui.ctx(), &state.model);
                 pane_ui(ui, state);

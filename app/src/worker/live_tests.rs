@@ -18,7 +18,7 @@ use crate::model::{Axis, JogFrame, Link, LinkState, MotionGoal, MotionOutcome};
 use crate::text::Language;
 
 /// Only a failure takes so long.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 struct Live {
     server: CellServer,
@@ -44,11 +44,11 @@ fn arm(server: &CellServer) -> Arm {
 impl Live {
     fn new(real_time: bool) -> Self {
         let server = server(real_time);
-        let connector = Arc::new(LiveConnector::new(source(&server)));
-        Self::with(server, connector)
+        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::new(source(&server)));
+        Self::with(server, &connector)
     }
 
-    fn with(server: CellServer, connector: Arc<dyn Connector>) -> Self {
+    fn with(server: CellServer, connector: &Arc<dyn Connector>) -> Self {
         let mut watch = arm(&server);
         watch.sim().start_simulation().expect("a call");
         let bench = Bench::start(&source(&server), connector);
@@ -138,7 +138,6 @@ fn a_quarter_of_the_speed_takes_four_times_as_long() {
     for (id, (speed, took_s)) in [1.0, 0.25].into_iter().zip(&mut took_s).enumerate() {
         goal[0] += 0.4;
         let before_s = live.watch.sim().get_simulation_time().expect("a call");
-        // Stepping holds the passes that this client does not ask for, so none is lost between two calls.
         live.bench.move_to(id as u64, MotionGoal::Joints(goal), speed);
         assert_eq!(live.bench.moved(id as u64), MotionOutcome::Arrived);
         *took_s = live.watch.sim().get_simulation_time().expect("a call") - before_s;
@@ -225,8 +224,8 @@ fn a_stop_works_while_the_connection_for_motions_hangs() {
     }
     let server = server(true);
     let (fake, release) = FakeCell::that_never_answers();
-    let connector = Half { live: LiveConnector::new(source(&server)), fake };
-    let mut live = Live::with(server, Arc::new(connector));
+    let connector: Arc<dyn Connector> = Arc::new(Half { live: LiveConnector::new(source(&server)), fake });
+    let mut live = Live::with(server, &connector);
     live.bench.move_to(1, MotionGoal::Joints([0.0; 6]), 1.0);
     let start = live.joints();
     let other = long_motion(&live.server);

@@ -11,7 +11,7 @@ use crate::model::{CellFacts, Link, LinkState, MotionGoal, MotionOutcome};
 use crate::text::{Language, Text};
 
 /// A healthy worker answers within milliseconds; this is for a machine that does something else.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// Workers, what they said, and a clock that the test moves.
 pub(super) struct Bench {
@@ -24,7 +24,7 @@ pub(super) struct Bench {
 }
 
 impl Bench {
-    pub fn start(source: &CellSource, connector: Arc<dyn Connector>) -> Self {
+    pub fn start(source: &CellSource, connector: &Arc<dyn Connector>) -> Self {
         let (wake, woken) = bounded(1);
         let waker: Waker = Arc::new(move || {
             // A full channel wakes as well as a fuller one.
@@ -33,7 +33,8 @@ impl Bench {
         let now_s = Arc::new(Mutex::new(0.0));
         let shown = Arc::clone(&now_s);
         let clock: Clock = Arc::new(move || *shown.lock().unwrap_or_else(PoisonError::into_inner));
-        let workers = Workers::start(source, &ViewSettings::default(), &connector, bounded(1).0, &clock, &waker).expect("threads");
+        let view = ViewSettings::default();
+        let workers = Workers::start(source, &view, connector, bounded(1).0, &clock, &waker).expect("threads");
         let mut bench = Self { workers, woken, now_s, events: Vec::new(), next: 0 };
         for link in [Link::Control, Link::Motion] {
             bench.next = 0;
@@ -118,7 +119,8 @@ const RIGHT: Jog = Jog::Joint { index: 0, forward: false };
 fn fake(motions: FakeMotions) -> (FakeCell, Bench) {
     let cell = FakeCell::new(1);
     cell.script().motions = motions;
-    let bench = Bench::start(&CellSource::BuiltIn, Arc::new(cell.clone()));
+    let connector: Arc<dyn Connector> = Arc::new(cell.clone());
+    let bench = Bench::start(&CellSource::BuiltIn, &connector);
     (cell, bench)
 }
 

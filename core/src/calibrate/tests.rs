@@ -104,7 +104,7 @@ fn the_correction_of_a_view_is_the_error_that_its_robot_pose_was_given() {
 
 #[test]
 fn starting_the_camera_from_a_choice_of_views_leaves_the_joint_answer_where_it_is() {
-    // 80 views: the camera starts from thirty of them, and in the second run from what all of them say.
+    // 80 views: the camera starts from thirty of them, and in the second run from thirty others and a focal length given.
     let t = set(80, 55);
     let chosen = t.observations(true);
     let a = solve(&chosen, Method::Joint);

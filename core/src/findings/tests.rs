@@ -54,7 +54,7 @@ fn a_good_session_has_no_warning_and_says_when_the_goal_is_reached() {
 
 #[test]
 fn the_views_that_a_goal_takes_are_those_that_reach_it() {
-    // Ten sets of ten views, each with the goal of half its error: four times the views, so thirty more.
+    // Half the error takes four times the ten views, so thirty more.
     let t = set(10, 82);
     let observations = t.observations(false);
     let calibration = solve(&observations);
@@ -191,7 +191,7 @@ fn a_robot_worse_than_the_corners_is_said_to_limit_the_answer_and_an_exact_one_i
 }
 
 #[test]
-fn a_wrong_square_makes_predictions_worse_than_the_noise_explains_or_the_robot_noisy() {
+fn a_prediction_within_the_noise_is_no_finding_and_one_twice_as_bad_is() {
     // With views of the same kind a held-out error within the noise is the rule.
     for seed in 93..98 {
         let found = of_trial(&set(20, seed), false, &FindingOptions::default());

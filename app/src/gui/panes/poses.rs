@@ -81,8 +81,35 @@ fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Out
         let what = tr!(language, "This capture never enters the fit and tells how good the calibration is");
         capture_ui(ui, Button::new(name).min_size(Vec2::new(0.0, 32.0)), name, what, CapturePurpose::Verify);
         frames_ui(ui, model.view.capture, language, outbox);
+        tour_ui(ui, model, hindrance, outbox);
         selected_ui(ui, model, table, outbox);
     });
+}
+
+/// The whole set from one click: what somebody wants who has never calibrated anything.
+fn tour_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outbox: &mut Outbox) {
+    let language = model.view.language;
+    if model.touring {
+        if ui.button(tr!(language, "Stop the tour")).clicked() {
+            outbox.send(Command::StopTour);
+        }
+        return;
+    }
+    let count = model.document().taught.len();
+    // With captures in the table the tour is in the pane of the taught poses.
+    if count == 0 || !model.document().captures.is_empty() {
+        return;
+    }
+    let name = text!("Run the {count} taught poses", count = count).say(language);
+    let what = tr!(language, "Moves to one taught pose after the other and captures at each");
+    let button = ui.add_enabled(hindrance.is_none(), Button::new(name).min_size(Vec2::new(0.0, 32.0)));
+    let button = match hindrance {
+        Some(why) => button.on_disabled_hover_text(why),
+        None => button.on_hover_text(what),
+    };
+    if button.clicked() {
+        outbox.send(Command::RunTour { purpose: Some(CapturePurpose::Calibrate) });
+    }
 }
 
 /// Why no capture can be taken now.
@@ -105,7 +132,8 @@ fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: crate::text::Langua
     let name = tr!(language, "Pictures to average");
     let mut frames = options.frames;
     let suffix = if frames == 1 { tr!(language, " picture") } else { tr!(language, " pictures") };
-    let drag = DragValue::new(&mut frames).range(1..=MOST_FRAMES).speed(0.1).suffix(suffix);
+    let prefix = tr!(language, "mean of ");
+    let drag = DragValue::new(&mut frames).range(1..=MOST_FRAMES).speed(0.1).prefix(prefix).suffix(suffix);
     let what = tr!(language, "The mean of several pictures has less noise: four pictures halve it");
     let response = ui.add(drag).on_hover_text(what);
     response.widget_info(|| WidgetInfo {
@@ -135,19 +163,19 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
         return;
     }
     let count = ids.len();
-    ui.label(RichText::new(text!("{count} selected", count = count).say(language)).color(Palette::of(ui).weak));
     let all_out = ids.iter().all(|&id| table.row(id).is_some_and(|row| row.excluded));
-    let name = if all_out { tr!(language, "Include selected") } else { tr!(language, "Exclude selected") };
-    let what = if all_out {
-        tr!(language, "Puts the selected captures back to what they were for")
+    let (name, what) = if all_out {
+        let what = tr!(language, "Puts the selected captures back to what they were for");
+        (text!("Include {count}", count = count), what)
     } else {
-        tr!(language, "Takes the selected captures out of fit and verification; they stay in the session")
+        let what = tr!(language, "Takes the selected captures out of fit and verification; they stay in the session");
+        (text!("Exclude {count}", count = count), what)
     };
-    if ui.button(name).on_hover_text(what).clicked() {
+    if ui.button(name.say(language)).on_hover_text(what).clicked() {
         outbox.send(Command::SetExcluded { ids: ids.clone(), excluded: !all_out });
     }
     let what = tr!(language, "Deletes the selected captures; undo brings them back");
-    if ui.button(tr!(language, "Delete selected")).on_hover_text(what).clicked() {
+    if ui.button(text!("Delete {count}", count = count).say(language)).on_hover_text(what).clicked() {
         outbox.send(Command::Delete(ids));
     }
 }

@@ -110,7 +110,7 @@ impl Arm {
         }
         let path = self.path(jog, &start)?;
         match JogPlan::new(path, start, self.info.time_step_s, length) {
-            Ok(plan) => self.follow(plan, start, &dynamic, held),
+            Ok(plan) => self.follow(plan, start, dynamic, held),
             Err(obstacle) => Ok(JogEnd::Obstacle(obstacle)),
         }
     }
@@ -119,7 +119,7 @@ impl Arm {
         &mut self,
         mut plan: JogPlan<'_>,
         start: JointAngles,
-        dynamic: &[bool; JOINTS],
+        dynamic: [bool; JOINTS],
         held: &mut dyn FnMut() -> Option<f64>,
     ) -> Result<JogEnd, LinkError> {
         let mut sent = start;
@@ -157,7 +157,7 @@ impl Arm {
         share: Option<f64>,
         sent: &mut JointAngles,
         seen_s: &mut f64,
-        dynamic: &[bool; JOINTS],
+        dynamic: [bool; JOINTS],
     ) -> Result<Pass, LinkError> {
         let now_s = self.sim.get_simulation_time()?;
         // The clock of a simulation that is started anew goes back.

@@ -76,8 +76,12 @@ impl Scale {
             }
             Self::Logarithmic { from, to } => {
                 let decades = (to / from).log10();
-                // Few numbers per decade over many decades.
-                let per_decade: &[f64] = if decades < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+                // The fewer per decade the more decades there are.
+                let per_decade: &[f64] = match decades {
+                    0.0..0.9 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
+                    0.9..2.5 => &[1.0, 2.0, 5.0],
+                    _ => &[1.0],
+                };
                 let first = from.log10().floor() as i32;
                 let last = to.log10().ceil() as i32;
                 (first..=last)

@@ -153,7 +153,12 @@ fn plate_ui(ui: &mut Ui, room: Rect, tone: Tone, words: &str, action_ui: impl Fn
     const HEIGHT: f32 = 40.0;
     let palette = Palette::of(ui);
     let width = (room.width() - 24.0).clamp(0.0, 560.0);
-    let galley = ui.painter().layout(words.to_owned(), egui::FontId::proportional(14.0), palette.text, (width - 130.0).max(60.0));
+    let galley = ui.painter().layout(
+        words.to_owned(),
+        egui::FontId::proportional(14.0),
+        palette.text,
+        (width - 130.0).max(60.0),
+    );
     let size = Vec2::new((galley.size().x + 130.0).min(width), HEIGHT.max(galley.size().y + 18.0));
     let rect = Align2::CENTER_BOTTOM.align_size_within_rect(size, room.shrink(12.0));
     let edge = Stroke::new(1.0, palette.tone(tone));

@@ -94,7 +94,7 @@ fn corners(painter: &Painter, corners: &[Corner], target: &TargetSpec, place: &P
     let radius = (place.points_per_px() * 1.6).clamp(2.5, 9.0);
     let under = Color32::from_black_alpha((130.0 * strength) as u8);
     let mut shapes = Vec::with_capacity(3 * corners.len());
-    for pair in corners.windows(2) {
+    for pair in corners.windows(2).filter(|pair| pair[0].index / columns == pair[1].index / columns) {
         let colour = marks::of_board_row(pair[0].index / columns, grid.rows).gamma_multiply(0.8 * strength);
         let line = [screen(place, &pair[0].px), screen(place, &pair[1].px)];
         shapes.push(Shape::line_segment(line, Stroke::new(1.2, colour)));
@@ -143,13 +143,13 @@ fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &Targe
     };
     // An answer of another set of captures is drawn, but does not shine.
     let colour = Marks::over_pictures().predicted.gamma_multiply(if model.solve.fresh { 1.0 } else { 0.5 });
-    let (around, inside) = board_lines(target);
-    for [from, to] in &inside {
+    let lines = board_lines(target);
+    for [from, to] in &lines.inside {
         for piece in projector.line(from, to) {
             painter.line(piece, Stroke::new(1.0, colour.gamma_multiply(0.45)));
         }
     }
-    for [from, to] in &around {
+    for [from, to] in &lines.around {
         for piece in projector.line(from, to) {
             marks::outlined_line(painter, &piece, 1.8, colour);
         }

@@ -50,16 +50,28 @@ impl Projector<'_> {
     }
 }
 
-/// The lines of a board: those around it first, then those through its points.
-pub fn board_lines(target: &TargetSpec) -> (Vec<[Point3<f64>; 2]>, Vec<[Point3<f64>; 2]>) {
+/// A straight line of the board.
+pub type BoardLine = [Point3<f64>; 2];
+
+/// The lines of a board.
+pub struct BoardLines {
+    /// Around it.
+    pub around: Vec<BoardLine>,
+    /// Through its points.
+    pub inside: Vec<BoardLine>,
+}
+
+/// The lines of a board.
+pub fn board_lines(target: &TargetSpec) -> BoardLines {
     let grid = target.grid();
     let side = grid.square_m;
     let point = |column: f64, row: f64| Point3::new(column * side, row * side, 0.0);
     let (right, bottom) = (grid.columns as f64 - 1.0, grid.rows as f64 - 1.0);
     // A chessboard has one more row of squares around its inner corners.
-    let corners = [point(-1.0, -1.0), point(right + 1.0, -1.0), point(right + 1.0, bottom + 1.0), point(-1.0, bottom + 1.0)];
+    let corners =
+        [point(-1.0, -1.0), point(right + 1.0, -1.0), point(right + 1.0, bottom + 1.0), point(-1.0, bottom + 1.0)];
     let around = (0..4).map(|i| [corners[i], corners[(i + 1) % 4]]).collect();
     let rows = (0..grid.rows).map(|row| [point(0.0, row as f64), point(right, row as f64)]);
     let columns = (0..grid.columns).map(|column| [point(column as f64, 0.0), point(column as f64, bottom)]);
-    (around, rows.chain(columns).collect())
+    BoardLines { around, inside: rows.chain(columns).collect() }
 }

@@ -21,6 +21,8 @@ pub fn readout_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>) {
         return;
     };
     ui.spacing_mut().item_spacing.y = 2.0;
+    // Lines of text, lower than a row of buttons.
+    ui.spacing_mut().interact_size.y = 17.0;
     ui.vertical(|ui| {
         ui.add_space(4.0);
         ui.horizontal(|ui| pixel_ui(ui, model, shown, point, rgb));
@@ -36,7 +38,7 @@ fn pixel_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>, point: ImagePoint, [r
     ui.painter().rect(swatch, CornerRadius::same(3), theme::pixel([red, green, blue]), edge, StrokeKind::Inside);
     let far_plane_m = shown.far_plane_m;
     let depth = match shown.images.depth_at(point, far_plane_m) {
-        DepthSample::Metres(depth_m) => format!("{depth_m:.4} m"),
+        DepthSample::Metres(depth_m) => format!("{depth_m:.3} m"),
         DepthSample::Far => text!("over {depth} m", depth = format!("{far_plane_m:.2}")).say(language),
         DepthSample::Invalid => tr!(language, "none").to_owned(),
     };

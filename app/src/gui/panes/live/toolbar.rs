@@ -69,7 +69,8 @@ fn exaggeration_ui(ui: &mut Ui, overlays: &mut Overlays, name: &str) {
     let drag = DragValue::new(&mut overlays.exaggeration).range(EXAGGERATIONS).speed(1.0).max_decimals(0).prefix("× ");
     let response = ui.add(drag).on_hover_text(name);
     let value = overlays.exaggeration;
-    response.widget_info(|| WidgetInfo { value: Some(value), ..WidgetInfo::labeled(WidgetType::DragValue, true, name) });
+    response
+        .widget_info(|| WidgetInfo { value: Some(value), ..WidgetInfo::labeled(WidgetType::DragValue, true, name) });
 }
 
 /// Colour map and range of the depth picture.
@@ -80,7 +81,11 @@ pub fn depth_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         ui.spacing_mut().button_padding.x = 7.0;
         for (map, name, what) in [
             (ColourMap::Turbo, tr!(language, "Turbo"), tr!(language, "A rainbow of even steps: shows the most detail")),
-            (ColourMap::Viridis, tr!(language, "Viridis"), tr!(language, "Even in brightness, and for every kind of eye")),
+            (
+                ColourMap::Viridis,
+                tr!(language, "Viridis"),
+                tr!(language, "Even in brightness, and for every kind of eye"),
+            ),
             (ColourMap::Grey, tr!(language, "Grey"), tr!(language, "Near is dark, far is light")),
         ] {
             let chosen = model.view.depth_colours == map;

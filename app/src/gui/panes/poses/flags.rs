@@ -1,5 +1,7 @@
 //! What is remarkable about a capture, why, and what to do.
 
+use handeye_core::findings::FindingCode;
+
 use crate::gui::captures::{CaptureRow, Seen};
 use crate::gui::theme::Tone;
 use crate::text::Language;
@@ -32,9 +34,10 @@ pub fn weight(row: &CaptureRow) -> u8 {
         Seen::NoBoard => return 8,
         Seen::Board | Seen::NotYet => {}
     }
-    4 * u8::from(row.large_residual)
-        + 2 * u8::from(row.large_correction)
-        + u8::from(row.influential)
+    let has = |code, weight| if row.found.contains(&code) { weight } else { 0 };
+    has(FindingCode::LargeResidual, 4)
+        + has(FindingCode::LargeCorrection, 2)
+        + has(FindingCode::InfluentialView, 1)
         + u8::from(row.excluded)
 }
 
@@ -76,6 +79,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
     if let (Some(rms_px), Some(line_px)) = (row.rms_px, circumstances.outlier_line_px)
         && rms_px > line_px
         && !row.verifies()
+        && !row.excluded
     {
         let (rms, line) = (format!("{rms_px:.3}"), format!("{line_px:.3}"));
         let why = text!(
@@ -85,7 +89,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         );
         flag(Some(Tone::Warning), tr!(language, "Above the line"), why.say(language));
     }
-    if row.large_residual {
+    if row.found.contains(&FindingCode::LargeResidual) {
         let why = tr!(
             language,
             "Its corners fit much worse than those of the other captures. Look at its picture: blur, a reflection or a \
@@ -93,7 +97,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         );
         flag(Some(Tone::Warning), tr!(language, "Large residual"), why.to_owned());
     }
-    if row.large_correction {
+    if row.found.contains(&FindingCode::LargeCorrection) {
         let why = tr!(
             language,
             "The robot's pose had to be corrected much more than at the other captures. Perhaps the arm was not at rest, \
@@ -101,7 +105,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         );
         flag(Some(Tone::Warning), tr!(language, "Large correction"), why.to_owned());
     }
-    if row.influential {
+    if row.found.contains(&FindingCode::InfluentialView) {
         let why = tr!(
             language,
             "The answer leans on this one capture. That is no error, but more captures like it would make the answer \

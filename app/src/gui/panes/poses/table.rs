@@ -48,8 +48,8 @@ pub fn table_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, thumbnails: &m
             bring_into_view(ui, model, &ids, &mut look, place);
             let first = (viewport.top() / HEIGHT).floor().max(0.0) as usize;
             let last = ((viewport.bottom() / HEIGHT).ceil().max(0.0) as usize).min(order.len());
-            for at in first.min(last)..last {
-                let row = &table.rows[order[at]];
+            for (at, &index) in order.iter().enumerate().take(last).skip(first) {
+                let row = &table.rows[index];
                 let circumstances =
                     Circumstances { outlier_line_px: model.outlier_line_px, refused_here: refused_here(model, row.id) };
                 let response = row_ui(ui, model, row, place(at), circumstances, thumbnails, outbox);

@@ -1,0 +1,174 @@
+//! The window on a screen of its own (Xvfb), pressed by a real mouse and keyboard (xdotool).
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Longest wait for something to show.
+const PATIENCE: Duration = Duration::from_secs(240);
+/// Between two looks at the list of controls.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// A screen with the workbench on it. Both end when it is dropped.
+pub struct Desktop {
+    screen: Child,
+    window: Child,
+    display: String,
+    widgets: PathBuf,
+    shots: PathBuf,
+    clicks: u32,
+    _home: tempfile::TempDir,
+}
+
+/// A control on the screen.
+#[derive(Debug, Clone, PartialEq)]
+struct Widget {
+    label: String,
+    role: String,
+    centre: (f64, f64),
+    enabled: bool,
+}
+
+/// Whether the programs are there that a [`Desktop`] needs; says which is missing.
+pub fn is_possible(test: &str) -> bool {
+    let missing: Vec<&str> = ["Xvfb", "xdotool", "import"].into_iter().filter(|program| !is_there(program)).collect();
+    if !missing.is_empty() {
+        eprintln!("{test}: skipped, not installed: {}", missing.join(", "));
+    }
+    missing.is_empty()
+}
+
+fn is_there(program: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
+}
+
+impl Desktop {
+    /// Starts screen and window; screenshots go to `shots`.
+    ///
+    /// # Panics
+    /// When one of them does not start.
+    pub fn start(width: u32, height: u32, shots: &Path, arguments: &[&str]) -> Self {
+        let home = tempfile::tempdir().expect("a folder");
+        // The screen chooses a free number and says which.
+        let mut screen = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", &format!("{width}x{height}x24"), "-nolisten", "tcp"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts");
+        let mut number = String::new();
+        let stdout = screen.stdout.take().expect("its output");
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number).expect("a number");
+        let display = format!(":{}", number.trim());
+        let widgets = home.path().join("widgets");
+        let window = Command::new(crate::handeye_binary())
+            .arg("gui")
+            .args(arguments)
+            .env("DISPLAY", &display)
+            .env("HOME", home.path())
+            .env("XDG_CONFIG_HOME", home.path().join("config"))
+            .env("XDG_DATA_HOME", home.path().join("data"))
+            .env_remove("WAYLAND_DISPLAY")
+            .env("LIBGL_ALWAYS_SOFTWARE", "1")
+            .env("HANDEYE_WIDGETS", &widgets)
+            .spawn()
+            .expect("the workbench starts");
+        std::fs::create_dir_all(shots).expect("a folder");
+        Self { screen, window, display, widgets, shots: shots.to_path_buf(), clicks: 0, _home: home }
+    }
+
+    /// Clicks of the mouse and presses of keys so far.
+    pub fn clicks(&self) -> u32 {
+        self.clicks
+    }
+
+    /// The home folder of the user.
+    pub fn home(&self) -> &Path {
+        self._home.path()
+    }
+
+    fn widgets(&self) -> Vec<Widget> {
+        let list = std::fs::read_to_string(&self.widgets).unwrap_or_default();
+        let widget = |line: &str| {
+            let node: serde_json::Value = serde_json::from_str(line).ok()?;
+            let at = |index: usize| node["rect"][index].as_f64();
+            Some(Widget {
+                label: node["label"].as_str()?.to_owned(),
+                role: node["role"].as_str()?.to_owned(),
+                centre: ((at(0)? + at(2)?) / 2.0, (at(1)? + at(3)?) / 2.0),
+                enabled: node["enabled"].as_bool()?,
+            })
+        };
+        list.lines().filter_map(widget).collect()
+    }
+
+    /// Waits until something whose label contains a text is on the screen.
+    ///
+    /// # Panics
+    /// When it does not come; the screen is photographed.
+    pub fn until_seen(&mut self, text: &str) {
+        self.until(&format!("{text:?}"), |widgets| widgets.iter().any(|widget| widget.label.contains(text)));
+    }
+
+    fn until(&mut self, what: &str, is_so: impl Fn(&[Widget]) -> bool) {
+        let deadline = Instant::now() + PATIENCE;
+        while !is_so(&self.widgets()) {
+            if Instant::now() > deadline {
+                self.photograph("gave-up");
+                let labels: Vec<String> = self.widgets().into_iter().map(|widget| widget.label).collect();
+                panic!("waiting for {what}; there are {labels:#?}");
+            }
+            assert!(self.window.try_wait().ok().flatten().is_none(), "the workbench has ended while waiting for {what}");
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// Clicks the button whose label is, or begins with, a text.
+    ///
+    /// # Panics
+    /// When there is none that can be pressed.
+    pub fn click(&mut self, label: &str) {
+        let pressable = |widget: &Widget| {
+            widget.enabled && widget.role != "Label" && (widget.label == label || widget.label.starts_with(label))
+        };
+        self.until(&format!("the button {label:?}"), |widgets| widgets.iter().any(pressable));
+        let widgets = self.widgets();
+        let exact = widgets.iter().find(|widget| pressable(widget) && widget.label == label);
+        let (x, y) = exact.or_else(|| widgets.iter().find(|widget| pressable(widget))).expect("it was there").centre;
+        self.mouse(&["mousemove", &format!("{x:.0}"), &format!("{y:.0}"), "click", "1"]);
+        self.clicks += 1;
+    }
+
+    /// Presses a key by its name, for example `space` or `ctrl+z`.
+    pub fn press(&mut self, key: &str) {
+        self.mouse(&["key", key]);
+        self.clicks += 1;
+    }
+
+    fn mouse(&self, arguments: &[&str]) {
+        let done = Command::new("xdotool").args(arguments).env("DISPLAY", &self.display).status();
+        assert!(done.is_ok_and(|status| status.success()), "xdotool {arguments:?}");
+    }
+
+    /// A picture of the screen, `NAME.png`; the pointer is moved out of the way first.
+    pub fn photograph(&self, name: &str) {
+        self.mouse(&["mousemove", "700", "12"]);
+        std::thread::sleep(Duration::from_millis(700));
+        let file = self.shots.join(format!("{name}.png"));
+        let taken = Command::new("import")
+            .args(["-window", "root"])
+            .arg(&file)
+            .env("DISPLAY", &self.display)
+            .status();
+        assert!(taken.is_ok_and(|status| status.success()), "{}", file.display());
+    }
+}
+
+impl Drop for Desktop {
+    fn drop(&mut self) {
+        for child in [&mut self.window, &mut self.screen] {
+            let _ended = child.kill().and_then(|()| child.wait()).is_ok();
+        }
+    }
+}

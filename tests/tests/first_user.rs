@@ -1,0 +1,56 @@
+//! The way of somebody who opens the workbench for the first time, by real mouse and keyboard on a screen of its own.
+//!
+//! Screenshots go to `$HANDEYE_SCREENSHOTS`, or else beside the build.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use handeye_tests::desktop::{self, Desktop};
+
+#[test]
+fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
+    if !desktop::is_possible("first_user") {
+        return;
+    }
+    let shots = std::env::var_os("HANDEYE_SCREENSHOTS")
+        .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("first_user"), PathBuf::from);
+    let mut desktop = Desktop::start(1440, 900, &shots, &[]);
+    let began = Instant::now();
+    desktop.until_seen("Connected to the built-in cell");
+    desktop.until_seen("Board in view");
+    desktop.photograph("1-connected");
+
+    desktop.click("Run the 10 taught poses");
+    desktop.until_seen("4 of 10 poses");
+    desktop.photograph("2-capturing");
+    desktop.until_seen("10 poses");
+    desktop.until_seen("Tour ended");
+    desktop.click("4 Solve");
+    desktop.until_seen("Expected error");
+    desktop.photograph("3-solved");
+
+    // Somewhere between the poses, for a capture that never enters the fit.
+    desktop.click("Jog");
+    desktop.click("Step 50 mm");
+    desktop.click("Move +Z");
+    desktop.until_seen("The arm is at rest");
+    desktop.click("5 Verify");
+    desktop.click("Capture for verification");
+    desktop.until_seen("Middle of the board");
+    desktop.photograph("4-verified");
+
+    desktop.click("6 Export");
+    desktop.click("Export 4 formats");
+    desktop.until_seen("read back and compared");
+    desktop.photograph("5-exported");
+    let took = began.elapsed();
+    println!("first user: {} clicks, {:.0} s on the clock", desktop.clicks(), took.as_secs_f64());
+    assert!(desktop.clicks() <= 15, "{} clicks", desktop.clicks());
+    // The built-in cell keeps pace with real time, so the clock is at least the simulated time.
+    assert!(took < Duration::from_secs(180) || cfg!(debug_assertions), "{took:?}");
+    let sessions = desktop.home().join("handeye-sessions");
+    let session = std::fs::read_dir(&sessions).expect("the sessions").flatten().next().expect("a session").path();
+    for file in ["result.json", "exports/calibration.json", "exports/opencv.yaml"] {
+        assert!(session.join(file).is_file(), "{file}");
+    }
+}
