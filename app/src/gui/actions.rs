@@ -103,7 +103,12 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
             keys: &[],
             command: connected.then_some(Command::Capture(CapturePurpose::Verify)),
         },
-        action(tr!(language, "Delete the selected captures"), Group::Work, DELETE, Command::Delete(model.selection.clone())),
+        Action {
+            name: tr!(language, "Delete the selected captures"),
+            group: Group::Work,
+            keys: DELETE,
+            command: (!model.selection.is_empty()).then(|| Command::Delete(model.selection.clone())),
+        },
         action(tr!(language, "Solve"), Group::Work, &[], Command::Solve),
         action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation),
         action(tr!(language, "Try to connect now"), Group::Work, &[], Command::Reconnect),

@@ -41,7 +41,7 @@ impl Silent {
     pub fn of_size(source: CellSource, size: Vec2) -> Self {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
-        cell.script().refusals = vec![PortError::Hopeless("not in this test".to_owned()); 3];
+        cell.script().refusals = vec![PortError::Hopeless("not in this test".to_owned()); 2];
         let connect: Connect = Arc::new(move |_source| Arc::new(cell.clone()) as Arc<dyn Connector>);
         let clock: Clock = Arc::new(|| 100.0);
         let (wake, woken) = crossbeam_channel::bounded(1);
@@ -55,10 +55,12 @@ impl Silent {
             open: None,
         };
         let mut app = App::start(start, connect, clock, waker).expect("threads");
-        while ![Link::Control, Link::Camera, Link::Motion]
-            .iter()
-            .all(|&link| matches!(app.model().link(link), LinkState::Failed { .. }))
-        {
+        // The fake's line for motions refuses nobody; it has nothing to report once it is there.
+        let settled = |app: &App| {
+            let failed = |link| matches!(app.model().link(link), LinkState::Failed { .. });
+            failed(Link::Control) && failed(Link::Camera) && app.model().mover.is_connected()
+        };
+        while !settled(&app) {
             woken.recv_timeout(std::time::Duration::from_secs(20)).expect("the workers report");
             app.collect();
         }
