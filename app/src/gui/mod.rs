@@ -4,6 +4,8 @@
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
 mod app;
+#[cfg_attr(not(test), expect(dead_code, reason = "the frame of the window shows them"))]
+mod dialogs;
 mod numbers;
 mod panes;
 #[cfg(test)]

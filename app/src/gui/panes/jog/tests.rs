@@ -120,7 +120,7 @@ fn keys_jog_only_when_they_are_switched_on_and_no_field_is_edited() {
     pane.harness.key_up(Key::PageDown);
     pane.steps();
 
-    pane.harness.get_by_label("J1").click();
+    pane.harness.get_by_label("J1 of the goal").click();
     pane.steps();
     pane.commands();
     pane.harness.key_down(Key::ArrowRight);
@@ -168,7 +168,7 @@ fn a_slider_moves_its_joint_when_it_is_let_go_and_not_before() {
 #[test]
 fn numbers_are_moved_to() {
     let mut pane = driven(sample::connected());
-    pane.type_into("J3", "-45");
+    pane.type_into("J3 of the goal", "-45");
     pane.press(Key::Enter);
     let sent = pane.click("Move there");
     let [Command::Move { goal: MotionGoal::Joints(joints_rad), .. }] = &sent[..] else { panic!("{sent:?}") };

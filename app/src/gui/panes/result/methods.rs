@@ -25,7 +25,7 @@ pub fn methods_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outb
         for heading in [
             tr!(language, "Method"),
             tr!(language, "from answer [mm]"),
-            tr!(language, "[°]"),
+            "[°]",
             tr!(language, "Status"),
         ] {
             ui.label(RichText::new(heading).small().color(weak));

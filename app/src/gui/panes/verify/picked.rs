@@ -55,7 +55,7 @@ fn point_ui(ui: &mut Ui, model: &Model, caption: &str, point: &Result<MeasuredPo
         Ok(point) => {
             parts::stated_ui(ui, caption, &millimetres(&(point.in_base.point().coords * 1e3)));
             if let Some(sigma_m) = point.sigma_m() {
-                parts::stated_ui(ui, tr!(model.view.language, "± 1 σ [mm]"), &millimetres(&(sigma_m * 1e3)));
+                parts::stated_ui(ui, "± 1 σ [mm]", &millimetres(&(sigma_m * 1e3)));
             }
         }
     }
