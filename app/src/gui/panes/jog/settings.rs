@@ -58,7 +58,8 @@ fn step_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut 
     parts::row_ui(ui, tr!(language, "Step [mm, °]"), |ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 7.0;
-        let hold = (JogStep::Hold, tr!(language, "Hold").to_owned(), tr!(language, "Moves as long as it is held").to_owned());
+        let hold =
+            (JogStep::Hold, tr!(language, "Hold").to_owned(), tr!(language, "Moves as long as it is held").to_owned());
         let steps = STEPS.map(|(mm, deg)| {
             let step = JogStep::Step { metres: mm * 1e-3, radians: deg.to_radians() };
             (step, format!("{mm}"), text!("Step {mm} mm, {deg}°", mm = mm, deg = deg).say(language))

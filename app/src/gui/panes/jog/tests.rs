@@ -181,7 +181,8 @@ fn a_typed_tip_pose_is_millimetres_and_degrees_in_the_base() {
     let mut model = sample::connected();
     if let Some(robot) = &mut model.robot {
         let quarter = std::f64::consts::FRAC_PI_4;
-        robot.base_from_tip = Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
+        robot.base_from_tip =
+            Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
     }
     let expected = model.robot.as_ref().map(|robot| robot.base_from_tip).expect("a robot");
     let mut pane = driven(model);

@@ -89,9 +89,7 @@ pub fn truth_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     let (colour, verdict) = match against.is_within {
         None => return,
         Some(true) => (palette.good, text!("Within the stated 95 %")),
-        Some(false) => {
-            (palette.warning, text!("Outside the stated 95 %: that happens to 5 of 100 right calibrations"))
-        }
+        Some(false) => (palette.warning, text!("Outside the stated 95 %: that happens to 5 of 100 right calibrations")),
     };
     ui.horizontal(|ui| {
         parts::dot_ui(ui, colour);

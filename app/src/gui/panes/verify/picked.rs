@@ -43,7 +43,10 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
     parts::hint_ui(
         ui,
-        tr!(language, "± is one standard deviation, as far as the calibration causes it; what the picture adds comes on top."),
+        tr!(
+            language,
+            "± is one standard deviation, as far as the calibration causes it; what the picture adds comes on top."
+        ),
     );
 }
 
