@@ -237,14 +237,12 @@ impl SettingsFile {
         (Self { path, in_file, last_view }, settings, warnings)
     }
 
-    /// Writes the file when the user has changed something since the last time.
-    ///
-    /// # Errors
-    /// When it cannot be written; it is not tried again before the next change.
-    pub fn keep(&mut self, view: ViewSettings, addresses: &[String]) -> Result<(), Warning> {
+    /// What is to be written when the user has changed how the window looks, or an address is new; a worker does it.
+    pub fn keep(&mut self, view: ViewSettings, addresses: &[String]) -> Option<SettingsWrite> {
         if view == self.last_view && *addresses == self.in_file.addresses {
-            return Ok(());
+            return None;
         }
+        let before_text = self.in_file.written();
         // What the environment says and the user did not touch stays out of the file.
         let ViewSettings { theme, language, rotation, depth_scale, depth_colours, .. } = view;
         let (before, kept) = (self.last_view, &mut self.in_file.view);
@@ -255,19 +253,33 @@ impl SettingsFile {
         keep(&mut kept.depth_colours, before.depth_colours, depth_colours);
         self.last_view = view;
         self.in_file.addresses = addresses.to_vec();
-        self.write()
+        let content = self.in_file.written();
+        let path = self.path.clone().filter(|_| content != before_text)?;
+        Some(SettingsWrite { path, content })
     }
+}
 
-    fn write(&self) -> Result<(), Warning> {
-        let Some(path) = &self.path else { return Ok(()) };
+/// A settings file that is to be written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SettingsWrite {
+    path: PathBuf,
+    content: String,
+}
+
+impl SettingsWrite {
+    /// Writes it, as a whole or not at all.
+    ///
+    /// # Errors
+    /// When it cannot be written; it is not tried again before the next change.
+    pub fn perform(&self) -> Result<(), Warning> {
         let write = || {
-            if let Some(folder) = path.parent() {
+            if let Some(folder) = self.path.parent() {
                 std::fs::create_dir_all(folder)?;
             }
-            handeye_core::atomic_file::write(path, self.in_file.written().as_bytes())
+            handeye_core::atomic_file::write(&self.path, self.content.as_bytes())
         };
         write().map_err(|error: io::Error| {
-            Warning(text!("The settings were not written to {file}: {error}", file = path.display(), error = error))
+            Warning(text!("The settings were not written to {file}: {error}", file = self.path.display(), error = error))
         })
     }
 }

@@ -4,6 +4,10 @@ fn nothing(_: &str) -> Option<String> {
     None
 }
 
+fn write(wanted: Option<SettingsWrite>) -> Result<(), Warning> {
+    wanted.expect("something has changed").perform()
+}
+
 fn said(warnings: &[Warning]) -> Vec<String> {
     warnings.iter().map(|Warning(text)| text.say(Language::English)).collect()
 }
@@ -59,7 +63,7 @@ fn the_environment_goes_before_the_file_and_does_not_get_into_it() {
     let (mut file, settings, warnings) = SettingsFile::open(Some(path.clone()), variable);
     assert_eq!(warnings, []);
     assert_eq!((settings.view.theme, settings.view.language), (ThemeChoice::Light, Language::Chinese));
-    file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view }, &[]).expect("it can be written");
+    write(file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view }, &[])).expect("it can be written");
     let (_, again, _) = SettingsFile::open(Some(path), nothing);
     assert_eq!((again.view.theme, again.view.language), (ThemeChoice::Dark, Language::English));
 }
@@ -69,7 +73,7 @@ fn nothing_is_written_before_something_is_changed() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("settings.toml");
     let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
-    file.keep(settings.view, &[]).expect("there is nothing to do");
+    assert_eq!(file.keep(settings.view, &[]), None, "there is nothing to do");
     assert!(!path.exists());
 }
 
@@ -79,7 +83,7 @@ fn earlier_addresses_are_in_the_file() {
     let path = folder.path().join("settings.toml");
     let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
     let addresses = vec!["tcp://a:1".to_owned(), "tcp://b:1".to_owned()];
-    file.keep(settings.view, &addresses).expect("it can be written");
+    write(file.keep(settings.view, &addresses)).expect("it can be written");
     assert_eq!(SettingsFile::open(Some(path), nothing).1.addresses, addresses);
 }
 
@@ -90,7 +94,7 @@ fn a_file_that_cannot_be_written_is_told() {
     std::fs::write(&blocked, "").expect("written");
     let (mut file, settings, _) = SettingsFile::open(Some(blocked.join("settings.toml")), nothing);
     let view = ViewSettings { theme: settings.view.theme.other(), ..settings.view };
-    let Err(Warning(text)) = file.keep(view, &[]) else { panic!("it went well") };
+    let Err(Warning(text)) = write(file.keep(view, &[])) else { panic!("it went well") };
     assert!(text.say(Language::English).contains("settings.toml"));
 }
 

@@ -21,7 +21,8 @@ use std::sync::Arc;
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
 use crate::text;
-use crate::worker::{Clock, Connector, Desk, Waker, Workers};
+use crate::settings::SettingsWrite;
+use crate::worker::{Clock, Connector, Desk, FileTask, Waker, Workers};
 
 /// Makes what connects to a cell.
 pub type Connect = Arc<dyn Fn(&CellSource) -> Arc<dyn Connector> + Send + Sync>;
@@ -214,6 +215,12 @@ impl App {
             Event::Exported(written) => self.written(written),
             Event::Notice { severity, text } => self.say(severity, text),
         }
+    }
+
+    /// Has the settings written.
+    pub fn write_settings(&mut self, settings: SettingsWrite) {
+        let asked = self.desk.files(FileTask::Settings(settings));
+        self.expect(text!("The settings were not written"), asked);
     }
 
     /// Tells the user when a worker did not take a request.

@@ -5,6 +5,7 @@
 
 mod actions;
 mod captures;
+mod dialogs;
 mod fonts;
 mod help;
 mod icons;

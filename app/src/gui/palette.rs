@@ -6,7 +6,7 @@ use egui::{
 };
 
 use super::actions::{self, Action};
-use super::help;
+use super::dialogs;
 use super::theme::{CAPTION, Palette};
 use crate::command::{Command, Outbox};
 use crate::model::Model;
@@ -47,7 +47,7 @@ impl CommandPalette {
             frame.show(ui, |ui| self.content_ui(ui, &found, step != 0, language)).inner
         });
         let clicked = shown.inner;
-        let outside = help::pressed_outside(ctx, shown.response.rect);
+        let outside = dialogs::pressed_outside(ctx, shown.response.rect);
         let choice = if enter { Some(self.chosen) } else { clicked };
         if let Some(action) = choice.and_then(|index| found.get(index)) {
             if let Some(command) = &action.command {

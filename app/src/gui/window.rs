@@ -1,12 +1,13 @@
 //! The window: collects what happened, draws the panes, applies what the user wants.
 
+use std::path::Path;
 use std::time::Duration;
 
 use egui::Ui;
 
 use super::actions;
 use super::fonts;
-use super::help;
+use super::dialogs;
 use super::layout::{self, Layout};
 use super::palette::CommandPalette;
 use super::panes;
@@ -65,14 +66,14 @@ impl Window {
             return;
         }
         self.keyboard(ui.ctx());
+        self.dropped(ui.ctx());
         let Self { app, textures, outbox, layout, palette, .. } = self;
         let model = app.model();
         textures.live.update(ui.ctx(), model);
         panes::all_ui(ui, model, textures, layout, outbox);
-        match model.dialog {
-            None => {}
-            Some(Dialog::Palette) => palette.palette_ui(ui.ctx(), model, outbox),
-            Some(dialog) => help::dialog_ui(ui.ctx(), dialog, model, outbox),
+        dialogs::dialogs_ui(ui.ctx(), model, outbox);
+        if model.dialog == Some(Dialog::Palette) {
+            palette.palette_ui(ui.ctx(), model, outbox);
         }
         if outbox.is_empty() {
             ui.request_repaint_after(CLOCK_PERIOD);
@@ -97,6 +98,14 @@ impl Window {
         }
     }
 
+    /// A session or a data set that is dropped on the window is opened.
+    fn dropped(&mut self, ctx: &egui::Context) {
+        let dropped = ctx.input(|input| input.raw.dropped_files.last().and_then(|file| file.path().map(Path::to_path_buf)));
+        if let Some(folder) = dropped {
+            self.outbox.send(Command::Open(folder));
+        }
+    }
+
     fn apply_all(&mut self) {
         let commands: Vec<_> = self.outbox.drain().collect();
         for (command, place) in commands {
@@ -104,8 +113,8 @@ impl Window {
             self.apply(command);
         }
         let model = self.app.model();
-        if let Err(warning) = self.settings.keep(model.view, &model.addresses) {
-            self.app.absorb(warning.into());
+        if let Some(settings) = self.settings.keep(model.view, &model.addresses) {
+            self.app.write_settings(settings);
         }
     }
 

@@ -98,7 +98,7 @@ pub struct FolderEntry {
     pub kind: FolderKind,
 }
 
-/// What a folder is to this program.
+/// What an entry of a folder is to this program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum FolderKind {
     /// A session.
@@ -107,6 +107,8 @@ pub enum FolderKind {
     Dataset,
     /// Something else.
     Plain,
+    /// No folder but a file of taught poses.
+    File,
 }
 
 /// The content of a folder.
@@ -114,6 +116,6 @@ pub enum FolderKind {
 pub struct FolderListing {
     /// Which folder.
     pub folder: PathBuf,
-    /// Its folders by name; or why it cannot be read.
+    /// Its folders and files of poses by name; or why it cannot be read.
     pub entries: Result<Vec<FolderEntry>, String>,
 }

@@ -16,6 +16,7 @@ use crate::depth_view;
 use crate::model::{
     FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written,
 };
+use crate::settings::SettingsWrite;
 use crate::text;
 
 /// What can be asked for.
@@ -44,6 +45,8 @@ pub enum FileTask {
     },
     /// Read taught poses.
     ReadPoses(PathBuf),
+    /// Write the settings.
+    Settings(SettingsWrite),
     /// Write taught poses.
     WritePoses {
         /// Where.
@@ -79,6 +82,11 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
         FileTask::Export { job, formats, folder } => {
             let files = write(&job, &formats, &folder);
             outlet.report(Event::Exported(Written { folder, files }));
+        }
+        FileTask::Settings(settings) => {
+            if let Err(warning) = settings.perform() {
+                outlet.report(warning.into());
+            }
         }
         FileTask::ReadPoses(file) => match TaughtPoses::read(&file) {
             Ok(taught) => outlet.report(Event::PosesRead { poses: taught.poses }),
@@ -124,17 +132,19 @@ fn pictures(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Resul
     Ok(FrameImages { rgb, depth, depth_coloured })
 }
 
-/// Folders with what they are, sessions first.
+/// Folders with what they are, sessions first, and files of poses.
 fn list(folder: PathBuf) -> FolderListing {
     let read = || -> std::io::Result<Vec<FolderEntry>> {
         let mut entries = Vec::new();
         for entry in std::fs::read_dir(&folder)? {
             let path = entry?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            if !path.is_dir() || name.starts_with('.') {
+            let kind = if path.is_dir() { kind_of(&path) } else { FolderKind::File };
+            let is_poses = path.extension().is_some_and(|extension| extension == "toml");
+            if name.starts_with('.') || (kind == FolderKind::File && !is_poses) {
                 continue;
             }
-            entries.push(FolderEntry { name, kind: kind_of(&path) });
+            entries.push(FolderEntry { name, kind });
         }
         entries.sort_by(|a, b| (a.kind, &a.name).cmp(&(b.kind, &b.name)));
         Ok(entries)

@@ -82,6 +82,7 @@ impl Driven {
     /// Whether everything is inside the width of the pane.
     pub fn nothing_is_cut_off(&self) -> bool {
         let width = self.harness.ctx.content_rect().width();
-        self.harness.query_all_by(|_| true).all(|node| node.rect().max.x <= width + 0.5)
+        let placed = self.harness.query_all_by(|node| node.raw_bounds().is_some());
+        placed.into_iter().all(|node| node.rect().max.x <= width + 0.5)
     }
 }

@@ -25,9 +25,10 @@ pub fn export_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if let Some(reason) = blocked(model) {
             parts::notice_ui(ui, Tone::Warning, reason, |_| ());
         }
-        formats::formats_ui(ui, model, outbox);
+        // First, so that what the pane is for is never out of sight.
         written::write_ui(ui, model, outbox);
         written::written_ui(ui, model);
+        formats::formats_ui(ui, model, outbox);
         names::names_ui(ui, model, outbox);
         preview::preview_ui(ui, model);
     });

@@ -1,8 +1,8 @@
 //! Small parts that panes share: sections, stated numbers, notices, and signs that need no font.
 
 use egui::{
-    Align, Button, CornerRadius, Frame, Id, Label, Layout, Margin, Response, RichText, ScrollArea, Sense, Shape, Stroke,
-    Ui, Vec2, WidgetInfo, WidgetType,
+    Align, Button, CornerRadius, Frame, Id, Label, Layout, Margin, Response, RichText, ScrollArea, Sense, Shape,
+    Stroke, Ui, Vec2, WidgetInfo, WidgetType,
 };
 
 use crate::gui::theme::{CAPTION, Palette, Tone};

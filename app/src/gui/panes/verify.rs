@@ -30,7 +30,10 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         match model.solve.solved.as_ref().map(|solved| (solved, &solved.verification)) {
             None => parts::hint_ui(ui, tr!(language, "There is no calibration to verify yet.")),
             Some((_, None)) => {
-                parts::hint_ui(ui, tr!(language, "No captures for verification yet. Ten say something about the average."));
+                parts::hint_ui(
+                    ui,
+                    tr!(language, "No captures for verification yet. Ten say something about the average."),
+                );
             }
             Some((_, Some(Err(error)))) => {
                 let why = Text::verbatim(error.to_string());

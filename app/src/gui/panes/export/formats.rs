@@ -21,7 +21,8 @@ pub fn formats_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 outbox.send(Command::ChooseFormats(BTreeSet::new()));
             }
             if ui.small_button(tr!(language, "Choose all")).clicked() {
-                let possible = export::formats().iter().map(|format| format.name()).filter(|name| is_possible(model, name));
+                let possible =
+                    export::formats().iter().map(|format| format.name()).filter(|name| is_possible(model, name));
                 outbox.send(Command::ChooseFormats(possible.map(str::to_owned).collect()));
             }
         });

@@ -54,7 +54,7 @@ pub fn names_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             if response.changed() {
                 draft.from = Some(model.export.names.clone());
             }
-            is_left |= response.lost_focus();
+            is_left |= response.lost_focus() && draft.from.is_some();
             ui.end_row();
         }
     });
@@ -62,6 +62,8 @@ pub fn names_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         Err(error) => parts::notice_ui(ui, Tone::Bad, &error.to_string(), |_| ()),
         Ok(()) if is_left && draft.names != model.export.names => {
             outbox.send(Command::SetExportNames(draft.names.clone()));
+            // It is shown as it was until the names are taken.
+            draft.from = None;
         }
         Ok(()) => {}
     }

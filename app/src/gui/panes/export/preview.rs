@@ -31,7 +31,8 @@ fn file_ui(ui: &mut Ui, model: &Model, file: &PreviewFile) {
     ScrollArea::both().id_salt(("preview", &file.name)).max_height(MOST_HEIGHT).show(ui, |ui| {
         // A field that cannot be changed, so that parts of it can be selected and copied.
         let mut text = file.text.as_str();
-        let field = TextEdit::multiline(&mut text).font(FontId::monospace(12.0)).desired_width(f32::INFINITY).desired_rows(4);
+        let field =
+            TextEdit::multiline(&mut text).font(FontId::monospace(12.0)).desired_width(f32::INFINITY).desired_rows(4);
         let response = ui.add(field);
         let said = text!("Text of {file}", file = &file.name).say(language);
         response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &said));

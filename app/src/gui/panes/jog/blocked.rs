@@ -38,9 +38,8 @@ impl Blocked {
         };
         let knows_kinematics = model.cell.as_ref().is_none_or(|cell| cell.kinematics_known);
         let tip = arm.or_else(|| {
-            (!knows_kinematics).then(|| {
-                tr!(language, "This arm's kinematics is not known, so only its joints can be moved")
-            })
+            (!knows_kinematics)
+                .then(|| tr!(language, "This arm's kinematics is not known, so only its joints can be moved"))
         });
         Self { arm, tip, can_start: resting.is_some() }
     }

@@ -58,7 +58,8 @@ fn step_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut 
     parts::row_ui(ui, tr!(language, "Step [mm, °]"), |ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 7.0;
-        let hold = (JogStep::Hold, tr!(language, "Hold").to_owned(), tr!(language, "Moves as long as it is held").to_owned());
+        let hold =
+            (JogStep::Hold, tr!(language, "Hold").to_owned(), tr!(language, "Moves as long as it is held").to_owned());
         let steps = STEPS.map(|(mm, deg)| {
             let step = JogStep::Step { metres: mm * 1e-3, radians: deg.to_radians() };
             (step, format!("{mm}"), text!("Step {mm} mm, {deg}°", mm = mm, deg = deg).say(language))
@@ -86,11 +87,7 @@ fn speed_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut
             outbox.send(Command::SetJog(JogSettings { speed: percent / 100.0, ..settings }));
         }
         let share = percent / 100.0;
-        let text = text!(
-            "{percent} % · {line} mm/s",
-            percent = format!("{percent:.0}"),
-            line = format!("{:.0}", LINE_SPEED_M_S * 1e3 * share)
-        );
+        let text = format!("{percent:.0} % · {:.0} mm/s", LINE_SPEED_M_S * 1e3 * share);
         let more = text!(
             "At the most {line} mm/s along a line, {turn}°/s about an axis, {joint}°/s for a joint",
             line = format!("{:.0}", LINE_SPEED_M_S * 1e3 * share),
@@ -98,6 +95,6 @@ fn speed_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut
             joint = format!("{:.1}", JOINT_SPEED_DEG_S * share)
         );
         let colour = Palette::of(ui).text;
-        ui.label(RichText::new(text.say(language)).color(colour)).on_hover_text(more.say(language));
+        ui.label(RichText::new(text).color(colour)).on_hover_text(more.say(language));
     });
 }

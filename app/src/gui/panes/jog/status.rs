@@ -66,7 +66,7 @@ pub fn tip_ui(ui: &mut Ui, model: &Model) {
             format!("base_from_tip: translation_m = [{x}, {y}, {z}], rotation_xyzw = [{qx}, {qy}, {qz}, {qw}]")
         });
     });
-    parts::stated_ui(ui, tr!(language, "x y z [mm]"), &numbers::translation_mm(pose));
+    parts::stated_ui(ui, "x y z [mm]", &numbers::translation_mm(pose));
     match model.view.rotation {
         RotationFormat::RollPitchYaw => {
             parts::stated_ui(ui, tr!(language, "roll pitch yaw [°]"), &numbers::rpy_deg(pose))

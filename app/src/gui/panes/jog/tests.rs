@@ -120,7 +120,7 @@ fn keys_jog_only_when_they_are_switched_on_and_no_field_is_edited() {
     pane.harness.key_up(Key::PageDown);
     pane.steps();
 
-    pane.harness.get_by_label("J1").click();
+    pane.harness.get_by_label("J1 of the goal").click();
     pane.steps();
     pane.commands();
     pane.harness.key_down(Key::ArrowRight);
@@ -168,7 +168,7 @@ fn a_slider_moves_its_joint_when_it_is_let_go_and_not_before() {
 #[test]
 fn numbers_are_moved_to() {
     let mut pane = driven(sample::connected());
-    pane.type_into("J3", "-45");
+    pane.type_into("J3 of the goal", "-45");
     pane.press(Key::Enter);
     let sent = pane.click("Move there");
     let [Command::Move { goal: MotionGoal::Joints(joints_rad), .. }] = &sent[..] else { panic!("{sent:?}") };
@@ -181,7 +181,8 @@ fn a_typed_tip_pose_is_millimetres_and_degrees_in_the_base() {
     let mut model = sample::connected();
     if let Some(robot) = &mut model.robot {
         let quarter = std::f64::consts::FRAC_PI_4;
-        robot.base_from_tip = Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
+        robot.base_from_tip =
+            Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
     }
     let expected = model.robot.as_ref().map(|robot| robot.base_from_tip).expect("a robot");
     let mut pane = driven(model);

@@ -1,6 +1,6 @@
 //! A place to move to, in numbers.
 
-use egui::{Button, DragValue, Grid, Id, RichText, Ui};
+use egui::{Button, DragValue, Grid, Id, RichText, Ui, WidgetInfo, WidgetType};
 use handeye_core::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
@@ -103,14 +103,16 @@ fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
                 let [low, high] = range_rad(model, index).map(f64::to_degrees);
                 low..=high
             };
-            let label = ui.label(RichText::new(name).small().color(weak));
+            ui.label(RichText::new(name).small().color(weak));
             let field = DragValue::new(value)
                 .range(range)
                 .clamp_existing_to_range(false)
                 .speed(0.1)
                 .max_decimals(2)
                 .suffix(if is_length { " mm" } else { "°" });
-            ui.add(field).labelled_by(label.id);
+            let response = ui.add(field);
+            let said = text!("{name} of the goal", name = name).say(model.view.language);
+            response.widget_info(|| WidgetInfo { label: Some(said.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
             if index % 3 == 2 {
                 ui.end_row();
             }

@@ -44,9 +44,9 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     parts::hint_ui(ui, meaning);
     let within = solved.calibration.hand_eye_covariance.as_ref().map(|c| Within95::new(&pose, c));
     let deg = |radians: [f64; 3]| radians.map(f64::to_degrees);
-    parts::stated_ui(ui, tr!(language, "x y z [mm]"), &numbers::row(translation_mm.as_slice(), 3, 9));
+    parts::stated_ui(ui, "x y z [mm]", &numbers::row(translation_mm.as_slice(), 3, 9));
     if let Some(within) = &within {
-        parts::stated_ui(ui, tr!(language, "± 95 % [mm]"), &numbers::row(&within.translation_m.map(|m| m * 1e3), 3, 9));
+        parts::stated_ui(ui, "± 95 % [mm]", &numbers::row(&within.translation_m.map(|m| m * 1e3), 3, 9));
     }
     match model.view.rotation {
         RotationFormat::RollPitchYaw => {
@@ -59,7 +59,7 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     };
     match &within {
         Some(within) => {
-            parts::stated_ui(ui, tr!(language, "± 95 % [°]"), &numbers::row(&deg(within.rotation_rad), 4, 9))
+            parts::stated_ui(ui, "± 95 % [°]", &numbers::row(&deg(within.rotation_rad), 4, 9))
                 .on_hover_text(tr!(language, "About the x, y and z axis of the camera"));
         }
         None => parts::hint_ui(ui, tr!(language, "A closed form states no uncertainty.")),
@@ -89,9 +89,7 @@ pub fn truth_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     let (colour, verdict) = match against.is_within {
         None => return,
         Some(true) => (palette.good, text!("Within the stated 95 %")),
-        Some(false) => {
-            (palette.warning, text!("Outside the stated 95 %: that happens to 5 of 100 right calibrations"))
-        }
+        Some(false) => (palette.warning, text!("Outside the stated 95 %: that happens to 5 of 100 right calibrations")),
     };
     ui.horizontal(|ui| {
         parts::dot_ui(ui, colour);

@@ -5,7 +5,7 @@ use egui::{Align, CornerRadius, DragValue, Frame, Label, Layout, Margin, RichTex
 use crate::command::{Command, Outbox};
 use crate::gui::theme::{Palette, Tone};
 use crate::model::{Model, Solved};
-use crate::{text, tr};
+use crate::tr;
 
 /// Size of the number.
 const FIGURE: f32 = 28.0;
@@ -29,7 +29,7 @@ pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Out
             ui.set_min_width(ui.available_width());
             ui.horizontal(|ui| {
                 let figure = match error_mm {
-                    Some(error_mm) => text!("{error} mm", error = format!("{error_mm:.3}")).say(language),
+                    Some(error_mm) => format!("{error_mm:.3} mm"),
                     None => tr!(language, "Not known").to_owned(),
                 };
                 ui.label(RichText::new(figure).size(FIGURE).color(palette.text));
@@ -62,6 +62,8 @@ fn goal_ui(ui: &mut Ui, model: &Model, goal_mm: f64, outbox: &mut Outbox) {
     let mut goal_mm = goal_mm;
     // From the right: the field first, then its name.
     let field = DragValue::new(&mut goal_mm).range(0.001..=1000.0).speed(0.01).max_decimals(3).suffix(" mm");
+    // Half a number is no goal.
+    let field = field.update_while_editing(false);
     let response = ui.add(field).on_hover_text(tr!(language, "The error that is good enough for what you do"));
     let name = ui.label(RichText::new(tr!(language, "Goal")).color(Palette::of(ui).weak));
     if response.labelled_by(name.id).changed() {

@@ -22,12 +22,7 @@ pub fn methods_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outb
     let answer = solved.calibration.hand_eye.map(|hand_eye| hand_eye.mount_from_camera());
     Grid::new("methods").num_columns(4).spacing([12.0, 4.0]).striped(true).show(ui, |ui| {
         let weak = Palette::of(ui).weak;
-        for heading in [
-            tr!(language, "Method"),
-            tr!(language, "from answer [mm]"),
-            tr!(language, "[°]"),
-            tr!(language, "Status"),
-        ] {
+        for heading in [tr!(language, "Method"), tr!(language, "from answer [mm]"), "[°]", tr!(language, "Status")] {
             ui.label(RichText::new(heading).small().color(weak));
         }
         ui.end_row();

@@ -69,8 +69,11 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     };
     if model.solve.fresh {
         ui.horizontal(|ui| {
-            let how =
-                text!("Solved from {count} captures in {time} s", count = solved.captures.len(), time = seconds(solved.took_s));
+            let how = text!(
+                "Solved from {count} captures in {time} s",
+                count = solved.captures.len(),
+                time = seconds(solved.took_s)
+            );
             let weak = Palette::of(ui).weak;
             ui.label(RichText::new(how.say(language)).color(weak));
             if ui.button(tr!(language, "Solve again")).clicked() {

@@ -175,16 +175,18 @@ fn every_finding() -> Vec<findings::Finding> {
         observations.views.truncate(views);
         for (n, view) in observations.views.iter_mut().enumerate() {
             let turn = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::from(axes(n)));
-            view.base_from_tip = Some(Pose::from_isometry(nalgebra::Isometry3::from_parts(
-                nalgebra::Translation3::identity(),
-                turn,
-            )));
+            view.base_from_tip =
+                Some(Pose::from_isometry(nalgebra::Isometry3::from_parts(nalgebra::Translation3::identity(), turn)));
         }
         observations
     };
     judge(&good, &|_| (), 1000.0);
     judge(&good, &|_| (), 1e-9);
-    judge(&good, &|c| c.tip_error_95_m = c.tip_error_95_m.map(|m| m * 1.000_001), 0.95 * 1e3 * calibration.tip_error_95_m.expect("stated"));
+    judge(
+        &good,
+        &|c| c.tip_error_95_m = c.tip_error_95_m.map(|m| m * 1.000_001),
+        0.95 * 1e3 * calibration.tip_error_95_m.expect("stated"),
+    );
     for views in [1, 2, 5] {
         judge(&turned(views, &|n| [0.0, 0.0, 0.3 * n as f64]), &|_| (), 1000.0);
     }
@@ -251,8 +253,30 @@ fn every_finding_is_said_in_both_languages_with_its_numbers() {
         let chinese = words.say(Language::Chinese);
         assert_ne!(chinese, finding.text, "not translated");
         // What is left of Latin words are names of files, methods, units and axes.
-        let latin = chinese.replace("images/", "").split(|c: char| !c.is_ascii_alphabetic()).map(str::to_owned).collect::<Vec<_>>();
-        let kept = ["png", "mm", "px", "RMS", "x", "y", "z", "tsai", "lenz", "park", "martin", "horaud", "andreff", "daniilidis", "shah", "li", ""];
+        let latin = chinese
+            .replace("images/", "")
+            .split(|c: char| !c.is_ascii_alphabetic())
+            .map(str::to_owned)
+            .collect::<Vec<_>>();
+        let kept = [
+            "png",
+            "mm",
+            "px",
+            "RMS",
+            "x",
+            "y",
+            "z",
+            "tsai",
+            "lenz",
+            "park",
+            "martin",
+            "horaud",
+            "andreff",
+            "daniilidis",
+            "shah",
+            "li",
+            "",
+        ];
         let left: Vec<&String> = latin.iter().filter(|word| !kept.contains(&word.as_str())).collect();
         assert!(left.is_empty(), "{left:?} in {chinese}");
     }

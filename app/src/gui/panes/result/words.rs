@@ -12,10 +12,7 @@ use crate::tr;
 /// A finding that can be said in every language.
 pub fn of(finding: &Finding) -> Text {
     let said = finding.text.as_str();
-    templates(finding.code)
-        .iter()
-        .find_map(|template| matched(template, said))
-        .unwrap_or_else(|| Text::verbatim(said))
+    templates(finding.code).iter().find_map(|template| matched(template, said)).unwrap_or_else(|| Text::verbatim(said))
 }
 
 fn templates(code: FindingCode) -> Vec<&'static str> {
@@ -108,10 +105,7 @@ fn parts() -> [&'static str; 21] {
         tr!(en, "nothing was seen at the {places}"),
         tr!(en, "The intrinsics are given, so this matters little"),
         tr!(en, "Bring the board there: the lens is only known where it was seen"),
-        tr!(
-            en,
-            "Most of them do, so the views determine the answer weakly: add views with more tilt and turn."
-        ),
+        tr!(en, "Most of them do, so the views determine the answer weakly: add views with more tilt and turn."),
         tr!(en, "The others agree; these weigh noise badly and are for comparison only."),
         tr!(en, "About {more} more views like those gathered will reach it."),
         tr!(en, "About {more} more view like those gathered will reach it."),
@@ -141,8 +135,7 @@ fn matched(template: &'static str, said: &str) -> Option<Text> {
     let mut values = Vec::new();
     while let Some((name, after)) = places.strip_prefix('{').and_then(|inside| inside.split_once('}')) {
         let (literal, next) = after.split_at(after.find('{').unwrap_or(after.len()));
-        let (value, left) =
-            if next.is_empty() { (rest.strip_suffix(literal)?, "") } else { rest.split_once(literal)? };
+        let (value, left) = if next.is_empty() { (rest.strip_suffix(literal)?, "") } else { rest.split_once(literal)? };
         values.push((name, part(value)));
         (rest, places) = (left, next);
     }

@@ -26,11 +26,14 @@ pub fn captures_ui(
         let weak = Palette::of(ui).weak;
         for (heading, what) in [
             (tr!(language, "Capture"), tr!(language, "Click to see its picture")),
-            (tr!(language, "mm"), tr!(language, "Middle of the board: as seen from as predicted")),
-            (tr!(language, "°"), tr!(language, "Orientation of the board: as seen from as predicted")),
-            (tr!(language, "px"), tr!(language, "Corners: as seen from as predicted, RMS")),
+            ("mm", tr!(language, "Middle of the board: as seen from as predicted")),
+            ("°", tr!(language, "Orientation of the board: as seen from as predicted")),
+            ("px", tr!(language, "Corners: as seen from as predicted, RMS")),
             (tr!(language, "depth mm"), tr!(language, "Measured depth minus that of the predicted board, median")),
-            (tr!(language, "ratio"), tr!(language, "Squared error over what the stated uncertainty expects: 1 on average")),
+            (
+                tr!(language, "ratio"),
+                tr!(language, "Squared error over what the stated uncertainty expects: 1 on average"),
+            ),
         ] {
             ui.label(RichText::new(heading).small().color(weak)).on_hover_text(what);
         }

@@ -43,7 +43,10 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
     parts::hint_ui(
         ui,
-        tr!(language, "± is one standard deviation, as far as the calibration causes it; what the picture adds comes on top."),
+        tr!(
+            language,
+            "± is one standard deviation, as far as the calibration causes it; what the picture adds comes on top."
+        ),
     );
 }
 
@@ -55,7 +58,7 @@ fn point_ui(ui: &mut Ui, model: &Model, caption: &str, point: &Result<MeasuredPo
         Ok(point) => {
             parts::stated_ui(ui, caption, &millimetres(&(point.in_base.point().coords * 1e3)));
             if let Some(sigma_m) = point.sigma_m() {
-                parts::stated_ui(ui, tr!(model.view.language, "± 1 σ [mm]"), &millimetres(&(sigma_m * 1e3)));
+                parts::stated_ui(ui, "± 1 σ [mm]", &millimetres(&(sigma_m * 1e3)));
             }
         }
     }
