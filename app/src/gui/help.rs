@@ -1,14 +1,10 @@
 //! The keys and what they do.
 
-use egui::{
-    Align, Align2, Area, Context, CornerRadius, Frame, Grid, Id, Label, Layout, Margin, Order, Rect, RichText,
-    ScrollArea, Stroke, Ui,
-};
+use egui::{CornerRadius, Frame, Grid, Label, Margin, RichText, ScrollArea, Stroke, Ui};
 
 use super::actions::{self, Action, Group};
 use super::theme::{self, Palette, TITLE};
-use crate::command::{Command, Outbox};
-use crate::model::{Dialog, Model};
+use crate::model::Model;
 use crate::tr;
 
 /// All keys.

@@ -1,6 +1,5 @@
 //! The window: collects what happened, draws the panes, applies what the user wants.
 
-use std::path::Path;
 use std::time::Duration;
 
 use egui::Ui;
@@ -100,7 +99,7 @@ impl Window {
 
     /// A session or a data set that is dropped on the window is opened.
     fn dropped(&mut self, ctx: &egui::Context) {
-        let dropped = ctx.input(|input| input.raw.dropped_files.last().and_then(|file| file.path().map(Path::to_path_buf)));
+        let dropped = ctx.input(|input| input.raw.dropped_files.last().map(|file| file.path().to_path_buf()));
         if let Some(folder) = dropped {
             self.outbox.send(Command::Open(folder));
         }

@@ -129,7 +129,7 @@ fn act(model: &Model, purpose: &Purpose, state: &mut State, outbox: &mut Outbox)
     let Some(command) = purpose.command(state.typed.trim()) else { return };
     outbox.send(command);
     if purpose.is_awaited {
-        state.asked = Some(Asked { before: model.message().map(|message| message.id), frames: 0 });
+        state.asked = Some(Asked { before: model.messages.newest().map(|message| message.number), frames: 0 });
     } else {
         outbox.send(Command::SetDialog(None));
     }
@@ -153,7 +153,7 @@ fn follow(model: &Model, state: &mut State, outbox: &mut Outbox) {
 fn trouble(model: &Model, state: &State) -> Option<String> {
     let asked = state.asked.as_ref()?;
     let message = model.messages.iter().rev().find(|message| message.severity == Severity::Error)?;
-    let is_later = asked.before.is_none_or(|before| message.id > before);
+    let is_later = asked.before.is_none_or(|before| message.number > before);
     is_later.then(|| message.text.say(model.view.language))
 }
 

@@ -13,7 +13,7 @@ mod jog;
 mod live;
 mod log;
 mod menu;
-mod parts;
+pub mod parts;
 mod poses;
 mod result;
 mod status_bar;
