@@ -4,7 +4,7 @@ use egui::{Ui, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
-use super::textures::LiveTextures;
+use super::textures::Textures;
 use super::theme;
 use crate::command::{Command, Outbox};
 use crate::model::{ImagePoint, Model};
@@ -16,7 +16,7 @@ pub struct PaneState {
     /// What the user wants.
     pub outbox: Outbox,
     /// The pictures.
-    pub textures: LiveTextures,
+    pub textures: Textures,
     /// The pixel under the pointer, of panes that give one.
     pub pointed: Option<ImagePoint>,
 }
@@ -33,10 +33,10 @@ pub struct PaneHarness {
 impl PaneHarness {
     /// A pane of a size.
     pub fn new(model: Model, size: Vec2, pane_ui: fn(&mut Ui, &mut PaneState)) -> Self {
-        let state = PaneState { model, outbox: Outbox::default(), textures: LiveTextures::default(), pointed: None };
+        let state = PaneState { model, outbox: Outbox::default(), textures: Textures::default(), pointed: None };
         let harness = Harness::builder().with_size(size).with_step_dt(STEP_S).build_ui_state(
             move |ui, state: &mut PaneState| {
-                state.textures.update(ui.ctx(), &state.model);
+                state.textures.live.update(ui.ctx(), &state.model);
                 pane_ui(ui, state);
             },
             state,

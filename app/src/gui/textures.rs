@@ -16,15 +16,13 @@ pub const CRISP_FROM: f32 = 4.0;
 /// Thumbnails that are kept; those that were not seen for longest go first.
 const MOST_THUMBNAILS: usize = 256;
 
-/// Textures of the pictures that are shown, live or recorded, and of the thumbnails.
+/// Textures of the pictures that are shown, live or recorded.
 #[derive(Default)]
 pub struct LiveTextures {
     /// Colour.
     pub rgb: Option<TextureHandle>,
     /// Depth in colours.
     pub depth: Option<TextureHandle>,
-    /// Small pictures of captures.
-    pub thumbnails: Thumbnails,
     review_range_m: Option<[f32; 2]>,
     /// What was uploaded, and whether crisp; kept, so that no other pictures can be taken for them.
     shown: Option<(Arc<FrameImages>, bool)>,
@@ -35,7 +33,6 @@ pub struct LiveTextures {
 impl LiveTextures {
     /// Uploads the pictures that are to be shown, unless they are there already.
     pub fn update(&mut self, ctx: &Context, model: &Model) {
-        self.thumbnails.pass += 1;
         let images = match &model.review {
             Some(review) => review.images.as_ref(),
             None => model.frame.as_ref().map(|frame| &frame.images),
@@ -105,8 +102,6 @@ pub struct Textures {
 #[derive(Default)]
 pub struct Thumbnails {
     textures: HashMap<CaptureId, Thumbnail>,
-    /// Counts the frames of the window.
-    pass: u64,
     #[cfg(test)]
     uploads: u64,
 }
@@ -115,6 +110,7 @@ struct Thumbnail {
     texture: TextureHandle,
     /// What it shows: kept, so that another picture of the same capture can be told from it.
     picture: Arc<RgbImage>,
+    /// Frame of the window in which it was last drawn.
     last_seen: u64,
 }
 
@@ -125,18 +121,21 @@ impl Thumbnails {
         if is_new && self.textures.len() >= MOST_THUMBNAILS {
             self.forget_oldest();
         }
-        let (pass, picture) = (self.pass, &observed.thumbnail);
+        let (frame, picture) = (ctx.cumulative_frame_nr(), &observed.thumbnail);
         #[cfg(test)]
         {
             self.uploads += u64::from(is_new);
         }
-        let new =
-            || Thumbnail { texture: load(ctx, "thumbnail", picture, false), picture: picture.clone(), last_seen: pass };
+        let new = || Thumbnail {
+            texture: load(ctx, "thumbnail", picture, false),
+            picture: picture.clone(),
+            last_seen: frame,
+        };
         let kept = self.textures.entry(id).or_insert_with(new);
         if !Arc::ptr_eq(&kept.picture, picture) {
             *kept = new();
         }
-        kept.last_seen = pass;
+        kept.last_seen = frame;
         &kept.texture
     }
 
@@ -149,5 +148,32 @@ impl Thumbnails {
     #[cfg(test)]
     pub fn uploads(&self) -> u64 {
         self.uploads
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thumbnails_on_the_screen_stay_however_many_were_seen_before() {
+        let ctx = Context::default();
+        let mut thumbnails = Thumbnails::default();
+        let observed = Observed { corners: None, image_size: (4, 3), thumbnail: Arc::new(RgbImage::new(4, 3)) };
+        let mut frame = |ids: std::ops::RangeInclusive<u32>| {
+            ctx.run_ui(egui::RawInput::default(), |_| {
+                for id in ids.clone() {
+                    thumbnails.of(&ctx, CaptureId(id), &observed);
+                }
+            })
+            .drop_without_applying_deltas();
+            thumbnails.uploads()
+        };
+        for last in (20..=600).rev().step_by(10) {
+            frame(last - 10..=last);
+        }
+        let before = frame(1..=8);
+        assert_eq!(frame(1..=8), before, "the first ones are not thrown out for one another");
+        assert!(thumbnails.textures.len() <= MOST_THUMBNAILS);
     }
 }

@@ -17,14 +17,14 @@ use crate::text::Text;
 fn colour(model: Model) -> PaneHarness {
     PaneHarness::new(model, vec2(660.0, 580.0), |ui, state| {
         let PaneState { model, textures, outbox, pointed } = state;
-        *pointed = colour_ui(ui, model, textures, outbox);
+        *pointed = colour_ui(ui, model, &textures.live, outbox);
     })
 }
 
 fn depth(model: Model) -> PaneHarness {
     PaneHarness::new(model, vec2(660.0, 580.0), |ui, state| {
         let PaneState { model, textures, outbox, pointed } = state;
-        *pointed = depth_ui(ui, model, textures, outbox);
+        *pointed = depth_ui(ui, model, &textures.live, outbox);
     })
 }
 
@@ -153,12 +153,12 @@ fn a_drag_moves_a_zoomed_picture_with_the_pointer() {
 #[test]
 fn recorded_pictures_of_another_session_are_not_taken_for_those_of_the_same_number() {
     let mut pane = colour(reviewed(3));
-    let uploads = pane.harness.state().textures.uploads();
+    let uploads = pane.harness.state().textures.live.uploads();
     pane.steps();
-    assert_eq!(pane.harness.state().textures.uploads(), uploads);
+    assert_eq!(pane.harness.state().textures.live.uploads(), uploads);
     pane.model().review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::pictures())) });
     pane.steps();
-    assert_eq!(pane.harness.state().textures.uploads(), uploads + 1);
+    assert_eq!(pane.harness.state().textures.live.uploads(), uploads + 1);
 }
 
 #[test]
