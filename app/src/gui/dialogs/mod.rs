@@ -3,7 +3,7 @@
 mod about;
 mod folders;
 
-use egui::{Context, Id, Modal, Ui};
+use egui::{Context, Frame, Id, Margin, Modal, Ui};
 
 use crate::command::{Command, Outbox};
 use crate::model::{Dialog, Model};
@@ -23,9 +23,11 @@ pub fn dialogs_ui(ctx: &Context, model: &Model, outbox: &mut Outbox) {
 /// Over everything else; Esc and a click beside it close it.
 fn modal_ui(ctx: &Context, outbox: &mut Outbox, content_ui: impl FnOnce(&mut Ui, &mut Outbox)) {
     let response = Modal::new(Id::new("dialog")).show(ctx, |ui| {
-        ui.set_width(WIDTH.min(ctx.content_rect().width() - 40.0));
-        ui.spacing_mut().item_spacing.y = 8.0;
-        content_ui(ui, outbox);
+        Frame::new().inner_margin(Margin::same(12)).show(ui, |ui| {
+            ui.set_width(WIDTH.min(ctx.content_rect().width() - 60.0));
+            ui.spacing_mut().item_spacing.y = 8.0;
+            content_ui(ui, outbox);
+        });
     });
     if response.should_close() {
         outbox.send(Command::SetDialog(None));

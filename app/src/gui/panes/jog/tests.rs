@@ -132,7 +132,7 @@ fn keys_jog_only_when_they_are_switched_on_and_no_field_is_edited() {
 fn frame_step_and_speed_are_chosen() {
     let mut pane = driven(sample::connected());
     let before = pane.model().view.jog;
-    let sent = pane.click("Camera axes");
+    let sent = pane.click("Camera");
     assert!(matches!(sent[..], [Command::SetJog(jog)] if jog.frame == JogFrame::Camera && jog.step == before.step));
     let sent = pane.click("Step 10 mm, 10°");
     let [Command::SetJog(jog)] = sent[..] else { panic!("{sent:?}") };
