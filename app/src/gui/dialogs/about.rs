@@ -31,7 +31,7 @@ pub fn about_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ] {
         parts::stated_ui(ui, what, licence);
     }
-    parts::hint_ui(ui, tr!(language, "It talks to the cell it is connected to and to nothing else."));
+    parts::hint_ui(ui, tr!(language, "It needs no network but the connection to the cell."));
     ui.vertical_centered(|ui| {
         if ui.button(tr!(language, "Close")).clicked() {
             outbox.send(Command::SetDialog(None));

@@ -81,14 +81,14 @@ fn keys(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, outbox
     };
     if let Some(entry) = to.and_then(|to| shown.get(to)) {
         state.selected = to;
-        if !purpose.is_named {
+        if !purpose.is_named() {
             state.typed = purpose::joined(&current(model), &entry.name);
         }
     }
     if pressed(ui, Key::Enter) {
         match state.selected.and_then(|at| shown.get(at)) {
             Some(entry) => activate(model, purpose, state, entry, outbox),
-            None if purpose.enters_typed && Path::new(state.typed.trim()) != current(model) => {
+            None if purpose.enters_typed() && Path::new(state.typed.trim()) != current(model) => {
                 go(purpose, state, PathBuf::from(state.typed.trim()), outbox);
             }
             None => act(model, purpose, state, outbox),
@@ -128,7 +128,7 @@ fn go(purpose: &Purpose, state: &mut State, folder: PathBuf, outbox: &mut Outbox
 fn act(model: &Model, purpose: &Purpose, state: &mut State, outbox: &mut Outbox) {
     let Some(command) = purpose.command(state.typed.trim()) else { return };
     outbox.send(command);
-    if purpose.is_awaited {
+    if purpose.is_awaited() {
         state.asked = Some(Asked { before: model.messages.newest().map(|message| message.number), frames: 0 });
     } else {
         outbox.send(Command::SetDialog(None));

@@ -6,7 +6,7 @@ use egui_kittest::kittest::Queryable as _;
 use super::*;
 use crate::gui::panes::driven::Driven;
 use crate::gui::sample;
-use crate::model::{FolderEntry, FolderKind, FolderListing, Message, RecentSession, Severity};
+use crate::model::{FolderEntry, FolderKind, FolderListing, Messages, RecentSession, Severity};
 use crate::text::Text;
 
 fn shown_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -85,11 +85,11 @@ fn the_dialog_closes_when_the_session_is_there_and_says_why_when_it_is_not() {
     assert!(!pane.commands().contains(&Command::SetDialog(None)), "it is still being opened");
     pane.model().opening = false;
     let text = Text::verbatim("The session is of a later version.");
-    pane.model().messages.push_back(Message { id: 3, dismissed: false, severity: Severity::Error, text, at_s: 100.0 });
+    pane.model().messages.say(Severity::Error, text, 100.0);
     pane.steps();
     assert!(pane.sees("The session is of a later version."));
     assert!(pane.commands().is_empty());
-    pane.model().messages.clear();
+    pane.model().messages = Messages::default();
     pane.steps();
     assert_eq!(pane.commands(), [Command::SetDialog(None)]);
 }

@@ -1,8 +1,8 @@
 //! Small parts that panes share: sections, stated numbers, notices, and signs that need no font.
 
 use egui::{
-    Align, Button, CornerRadius, Frame, Id, Label, Layout, Margin, Response, RichText, ScrollArea, Sense, Shape,
-    Stroke, Ui, Vec2, WidgetInfo, WidgetType,
+    Align, Button, CornerRadius, Frame, Id, Label, Layout, Margin, ProgressBar, Response, RichText, ScrollArea, Sense,
+    Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType,
 };
 
 use crate::gui::theme::{CAPTION, Palette, Tone};
@@ -27,8 +27,16 @@ pub fn body_ui(ui: &mut Ui, salt: &str, content_ui: impl FnOnce(&mut Ui)) {
 
 /// A heading within a pane.
 pub fn section_ui(ui: &mut Ui, title: &str) {
+    section_with_ui(ui, title, |_| ());
+}
+
+/// A heading, and what stands beside it.
+pub fn section_with_ui(ui: &mut Ui, title: &str, beside_ui: impl FnOnce(&mut Ui)) {
     ui.add_space(6.0);
-    ui.label(RichText::new(title).strong().size(13.5).color(Palette::of(ui).text));
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(title).strong().size(13.5).color(Palette::of(ui).text));
+        beside_ui(ui);
+    });
 }
 
 /// A sentence that explains.
@@ -68,7 +76,12 @@ pub fn notice_ui<R>(ui: &mut Ui, tone: Tone, text: &str, below_ui: impl FnOnce(&
 /// A caption and its value, read together by a screen reader.
 pub fn stated_ui(ui: &mut Ui, caption: &str, value: &str) -> Response {
     let colour = Palette::of(ui).text;
-    row_ui(ui, caption, |ui| value_ui(ui, caption, value, colour))
+    ui.scope(|ui| {
+        // Numbers stand closer than controls do.
+        ui.spacing_mut().interact_size.y = 18.0;
+        row_ui(ui, caption, |ui| value_ui(ui, caption, value, colour))
+    })
+    .inner
 }
 
 /// A value in figures of one width, with the caption that a screen reader says before it.
@@ -109,6 +122,22 @@ pub fn dot_ui(ui: &mut Ui, colour: egui::Color32) {
 /// A button that does nothing while there is a reason, which it then says.
 pub fn gated_ui(ui: &mut Ui, reason: Option<&str>, button: Button<'_>) -> Response {
     ui.add_enabled(reason.is_none(), button).on_disabled_hover_text(reason.unwrap_or_default())
+}
+
+/// A bar of progress, 0 to 1, with what it says aloud and a button that ends it; tells whether that was clicked.
+pub fn progress_ui(ui: &mut Ui, part: f32, said: &str, end: &str) -> bool {
+    ui.label(RichText::new(said).color(Palette::of(ui).text));
+    ui.horizontal(|ui| {
+        // From the right, so that the bar gets what the button leaves.
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let clicked = ui.button(end).clicked();
+            let bar = ProgressBar::new(part).desired_width(ui.available_width()).desired_height(10.0);
+            ui.add(bar).widget_info(|| WidgetInfo::labeled(WidgetType::ProgressIndicator, true, said));
+            clicked
+        })
+        .inner
+    })
+    .inner
 }
 
 /// A button that puts a text on the clipboard; `what` tells it from others.

@@ -46,7 +46,7 @@ pub fn recent_ui(ui: &mut Ui, model: &Model, state: &mut State, outbox: &mut Out
 /// Entries that matter to a dialog.
 pub fn shown<'a>(model: &'a Model, purpose: &Purpose) -> Vec<&'a FolderEntry> {
     let Some(Ok(entries)) = model.folder.as_ref().map(|listing| &listing.entries) else { return Vec::new() };
-    entries.iter().filter(|entry| purpose.shows_files || entry.kind != FolderKind::File).collect()
+    entries.iter().filter(|entry| purpose.shows_files() || entry.kind != FolderKind::File).collect()
 }
 
 /// The listing.
@@ -91,14 +91,14 @@ fn entry_ui(
         let said = if mark.is_empty() { entry.name.clone() } else { format!("{}, {mark}", entry.name) };
         response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, is_selected, &said));
         if response.clicked() {
-            if purpose.is_named && entry.kind != FolderKind::File {
+            if purpose.is_named() && entry.kind != FolderKind::File {
                 go(purpose, state, folder.join(&entry.name), outbox);
             } else {
                 state.selected = Some(at);
                 state.typed = purpose::joined(folder, &entry.name);
             }
         }
-        if response.double_clicked() && !purpose.is_named {
+        if response.double_clicked() && !purpose.is_named() {
             activate(model, purpose, state, entry, outbox);
         }
         if is_selected {

@@ -22,14 +22,6 @@ pub struct Purpose {
     pub action: &'static str,
     /// What the empty field says.
     pub empty_hint: &'static str,
-    /// Whether the last part of the path is a new name, which stays when another folder is listed.
-    pub is_named: bool,
-    /// Whether Enter on a path that was typed lists it first.
-    pub enters_typed: bool,
-    /// Whether files are shown.
-    pub shows_files: bool,
-    /// Whether the dialog stays until it is known how it went.
-    pub is_awaited: bool,
 }
 
 impl Purpose {
@@ -67,7 +59,6 @@ impl Purpose {
                 tr!(language, "Open"),
             ),
         };
-        let is_pose_file = matches!(dialog, Dialog::ImportPoses | Dialog::ExportPoses);
         Self {
             dialog: dialog.clone(),
             title,
@@ -78,11 +69,27 @@ impl Purpose {
             } else {
                 tr!(language, "A path")
             },
-            is_named: matches!(dialog, Dialog::SaveAs | Dialog::New | Dialog::ExportPoses),
-            enters_typed: matches!(dialog, Dialog::Open | Dialog::ImportPoses),
-            shows_files: is_pose_file,
-            is_awaited: matches!(dialog, Dialog::Open | Dialog::SaveAs | Dialog::New),
         }
+    }
+
+    /// Whether the last part of the path is a new name, which stays when another folder is listed.
+    pub fn is_named(&self) -> bool {
+        matches!(self.dialog, Dialog::SaveAs | Dialog::New | Dialog::ExportPoses)
+    }
+
+    /// Whether Enter on a path that was typed lists it first.
+    pub fn enters_typed(&self) -> bool {
+        matches!(self.dialog, Dialog::Open | Dialog::ImportPoses)
+    }
+
+    /// Whether files are shown.
+    pub fn shows_files(&self) -> bool {
+        matches!(self.dialog, Dialog::ImportPoses | Dialog::ExportPoses)
+    }
+
+    /// Whether the dialog stays until it is known how it went.
+    pub fn is_awaited(&self) -> bool {
+        matches!(self.dialog, Dialog::Open | Dialog::SaveAs | Dialog::New)
     }
 
     /// What the path is at first.
@@ -106,7 +113,7 @@ impl Purpose {
 
     /// The path when another folder is listed.
     pub fn path_in(&self, folder: &Path, typed: &str) -> String {
-        match Path::new(typed.trim()).file_name().filter(|_| self.is_named) {
+        match Path::new(typed.trim()).file_name().filter(|_| self.is_named()) {
             Some(name) => folder.join(name).display().to_string(),
             None if self.dialog == Dialog::New => joined(folder, "session"),
             None => folder.display().to_string(),

@@ -14,8 +14,7 @@ use crate::{text, tr};
 /// The list.
 pub fn formats_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    ui.horizontal(|ui| {
-        parts::section_ui(ui, tr!(language, "Formats"));
+    parts::section_with_ui(ui, tr!(language, "Formats"), |ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if ui.small_button(tr!(language, "Choose none")).clicked() {
                 outbox.send(Command::ChooseFormats(BTreeSet::new()));

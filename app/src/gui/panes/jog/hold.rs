@@ -47,8 +47,8 @@ impl Hold {
     pub fn finish(self, ui: &Ui, outbox: &mut Outbox) {
         let has_focus = ui.input(|input| input.focused);
         let now = self.now.filter(|_| has_focus);
-        if self.before.is_some() && self.before == now {
-            now.into_iter().for_each(|jog| outbox.send(Command::JogHeld(jog)));
+        if let Some(jog) = now.filter(|_| self.before == now) {
+            outbox.send(Command::JogHeld(jog));
         } else {
             if self.before.is_some() {
                 outbox.send(Command::JogReleased);

@@ -130,8 +130,8 @@ fn slider_ui(
     }
     let limits = text!(
         "From {low}° to {high}°. Drag to choose, let go to move there; the mark is where the joint is",
-        low = format!("{low:.0}"),
-        high = format!("{high:.0}")
+        low = numbers::fixed(low, 0, 0),
+        high = numbers::fixed(high, 0, 0)
     );
     response.on_hover_text(limits.say(language));
 }

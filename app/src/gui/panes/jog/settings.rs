@@ -33,7 +33,7 @@ pub fn frame_name(frame: JogFrame, language: Language) -> &'static str {
     match frame {
         JogFrame::Base => tr!(language, "Base"),
         JogFrame::Tip => tr!(language, "Tip"),
-        JogFrame::Camera => tr!(language, "Camera axes"),
+        JogFrame::Camera => tr!(language, "Camera"),
     }
 }
 

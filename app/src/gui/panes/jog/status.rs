@@ -58,8 +58,7 @@ pub fn tip_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let Some(robot) = &model.robot else { return };
     let pose = &robot.base_from_tip;
-    ui.horizontal(|ui| {
-        parts::section_ui(ui, tr!(language, "Tip in base"));
+    parts::section_with_ui(ui, tr!(language, "Tip in base"), |ui| {
         parts::copy_ui(ui, language, tr!(language, "the tip pose"), || {
             let [x, y, z]: [f64; 3] = pose.translation().into();
             let [qx, qy, qz, qw] = pose.xyzw();

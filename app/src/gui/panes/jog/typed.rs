@@ -12,6 +12,8 @@ use crate::gui::theme::Palette;
 use crate::model::{Model, MotionGoal, RobotState};
 use crate::{text, tr};
 
+/// Width of a field.
+const FIELD: f32 = 84.0;
 /// No arm on a table reaches further [mm].
 const FARTHEST_MM: f64 = 10_000.0;
 
@@ -110,7 +112,7 @@ fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
                 .speed(0.1)
                 .max_decimals(2)
                 .suffix(if is_length { " mm" } else { "°" });
-            let response = ui.add(field);
+            let response = ui.add_sized([FIELD, ui.spacing().interact_size.y], field);
             let said = text!("{name} of the goal", name = name).say(model.view.language);
             response.widget_info(|| WidgetInfo { label: Some(said.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
             if index % 3 == 2 {

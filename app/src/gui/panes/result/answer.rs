@@ -32,8 +32,7 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     };
     let pose = hand_eye.mount_from_camera();
     let translation_mm = pose.translation() * 1e3;
-    ui.horizontal(|ui| {
-        parts::section_ui(ui, title);
+    parts::section_with_ui(ui, title, |ui| {
         ui.label(RichText::new(name).monospace().color(Palette::of(ui).weak));
         parts::copy_ui(ui, language, name, || {
             let [x, y, z]: [f64; 3] = pose.translation().into();

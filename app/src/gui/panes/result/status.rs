@@ -1,6 +1,6 @@
 //! What the solver does, and what to do when it has no answer.
 
-use egui::{Button, ProgressBar, RichText, Ui, WidgetInfo, WidgetType};
+use egui::{Button, RichText, Ui};
 use handeye_core::progress::Stage;
 
 use crate::command::{Command, Outbox};
@@ -35,15 +35,9 @@ fn running_ui(ui: &mut Ui, model: &Model, stage: Stage, part: f64, since_s: f64,
     let seconds = (model.now_s - since_s).max(0.0) as u64;
     let doing = stage_name(stage, language);
     let text = text!("Solving for {seconds} s: {doing}", seconds = seconds, doing = doing).say(language);
-    ui.label(RichText::new(&text).color(Palette::of(ui).text));
-    ui.horizontal(|ui| {
-        let width = (ui.available_width() - 110.0).max(80.0);
-        let bar = ui.add(ProgressBar::new(part as f32).desired_width(width).desired_height(10.0));
-        bar.widget_info(|| WidgetInfo::labeled(WidgetType::ProgressIndicator, true, &text));
-        if ui.button(tr!(language, "Cancel solving")).clicked() {
-            outbox.send(Command::CancelSolve);
-        }
-    });
+    if parts::progress_ui(ui, part as f32, &text, tr!(language, "Cancel solving")) {
+        outbox.send(Command::CancelSolve);
+    }
     if model.solve.solved.is_some() && !model.solve.fresh {
         parts::hint_ui(ui, tr!(language, "The numbers below are of the earlier captures until it is done."));
     }

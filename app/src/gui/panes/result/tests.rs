@@ -94,6 +94,7 @@ fn a_solve_shows_its_stage_and_can_be_cancelled() {
     model.solve.status = SolveStatus::Running { job: JobId(2), stage: Stage::HeldOut, part: 0.4, since_s: 97.0 };
     let mut pane = driven(model);
     assert!(pane.sees("Solving for 3 s: predicting held-out views"));
+    assert!(pane.nothing_is_cut_off());
     assert_eq!(pane.click("Cancel solving"), [Command::CancelSolve]);
 }
 

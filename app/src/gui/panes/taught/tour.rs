@@ -1,11 +1,10 @@
 //! Visiting all poses, and how that goes.
 
-use egui::{Button, ProgressBar, RichText, Ui, WidgetInfo, WidgetType};
+use egui::{Button, Ui};
 
 use super::immovable;
 use crate::command::{Command, Outbox};
 use crate::gui::panes::parts;
-use crate::gui::theme::Palette;
 use crate::model::{CapturePurpose, Model, StopOutcome, Tour};
 use crate::{text, tr};
 
@@ -57,16 +56,9 @@ fn progress_ui(ui: &mut Ui, model: &Model, tour: &Tour, outbox: &mut Outbox) {
         None => text!("All {of} poses were visited", of = of),
     }
     .say(language);
-    ui.label(RichText::new(&said).color(Palette::of(ui).text));
-    ui.horizontal(|ui| {
-        let width = (ui.available_width() - 110.0).max(80.0);
-        let part = done as f32 / of.max(1) as f32;
-        let bar = ui.add(ProgressBar::new(part).desired_width(width).desired_height(10.0));
-        bar.widget_info(|| WidgetInfo::labeled(WidgetType::ProgressIndicator, true, &said));
-        if ui.button(tr!(language, "Stop tour")).clicked() {
-            outbox.send(Command::StopTour);
-        }
-    });
+    if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop tour")) {
+        outbox.send(Command::StopTour);
+    }
 }
 
 fn summary_ui(ui: &mut Ui, model: &Model, tour: &Tour) {

@@ -37,9 +37,8 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     point_ui(ui, model, tr!(language, "From the board [mm]"), &picked.from_board);
     if let (Ok(depth), Ok(board)) = (&picked.from_depth, &picked.from_board) {
         let difference_mm = (depth.in_base.point() - board.in_base.point()) * 1e3;
-        let length = format!("{:.2}", difference_mm.norm());
-        let said = format!("{}  |{length}|", millimetres(&difference_mm));
-        parts::stated_ui(ui, tr!(language, "Difference [mm]"), &said);
+        parts::stated_ui(ui, tr!(language, "Difference [mm]"), &millimetres(&difference_mm));
+        parts::stated_ui(ui, tr!(language, "Its length [mm]"), &numbers::fixed(difference_mm.norm(), 2, 8));
     }
     parts::hint_ui(
         ui,

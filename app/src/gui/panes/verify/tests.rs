@@ -93,7 +93,7 @@ fn a_picked_point_is_measured_twice_and_the_difference_is_stated() {
     assert!(pane.sees("Pixel 320, 240"));
     assert!(pane.sees("± 1 σ [mm]"));
     // Ten millimetres deeper along a ray that is almost the optical axis.
-    assert!(pane.sees("|10.00|"));
+    assert!(pane.sees("Its length [mm]: 10.00"));
     assert_eq!(pane.click("Clear the point"), [Command::Pick(None)]);
     let without = Text::verbatim("No depth at this pixel");
     if let Some(picked) = &mut pane.model().picked {
