@@ -88,6 +88,12 @@ impl App {
         &self.model
     }
 
+    /// Goes on from a model that a test has made up. The workers do not hear of it.
+    #[cfg(test)]
+    pub fn replace_model(&mut self, model: Model) {
+        self.model = model;
+    }
+
     /// Takes in what the workers have reported. Never waits for them.
     pub fn collect(&mut self) {
         self.absorb(Event::Tick { now_s: (self.clock)() });

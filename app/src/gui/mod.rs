@@ -20,6 +20,8 @@ mod rail;
 #[cfg(test)]
 mod sample;
 mod session;
+#[cfg(test)]
+mod snapshot_tests;
 mod status;
 mod steps;
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use handeye_core::calibrate::{self, CameraKnowledge, Method, Observations, ObservedView};
 use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{ColourMap, DepthImage};
+use handeye_core::export::{self, ExportInput};
 use handeye_core::findings::{self, FindingOptions};
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::handeye::{HandEye, Mode};
@@ -18,7 +19,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
 
 use crate::model::{
     CellFacts, CellSource, FrameImages, FrameInfo, JobId, LinkState, LiveDetection, LiveFrame, Model, Observed,
-    RobotState, SessionState, Simulation, Solved, Truth, ViewSettings,
+    PreviewFile, RobotState, SessionState, Simulation, Solved, Truth, ViewSettings,
 };
 use crate::session_start::{self, BOARD};
 use crate::{observe, truth};
@@ -203,6 +204,20 @@ pub fn solved() -> Model {
         took_s: 0.2,
     }));
     model.solve.fresh = true;
+    model
+}
+
+/// The same, with the text of every file as it would be written.
+pub fn previewed() -> Model {
+    let mut model = solved();
+    let solved = model.solve.current().expect("solved").clone();
+    for format in export::formats() {
+        let files = export::preview(*format, &ExportInput::new(&solved.result, &model.export.names));
+        let files = files.map_err(|error| error.to_string()).map(|files| {
+            files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect()
+        });
+        model.export.previews.insert(format.name().to_owned(), files);
+    }
     model
 }
 

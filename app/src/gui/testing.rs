@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Vec2, vec2};
-use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
+use egui_kittest::{Harness, HarnessBuilder};
 use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
@@ -14,7 +14,9 @@ use super::layout::Layout;
 use super::window::Window;
 use crate::app::{App, Connect, Start};
 use crate::command::{Command, Event};
-use crate::model::{CellSource, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation, ViewSettings};
+use crate::model::{
+    CellSource, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation, ViewSettings,
+};
 use crate::settings::SettingsFile;
 use crate::worker::fake::FakeCell;
 use crate::worker::{Clock, Connector, PortError, Waker};
@@ -39,6 +41,11 @@ impl Silent {
 
     /// The same in another size.
     pub fn of_size(source: CellSource, size: Vec2) -> Self {
+        Self::built(source, Harness::builder().with_size(size))
+    }
+
+    /// The same in a harness that is set up otherwise, as to make pictures.
+    pub fn built(source: CellSource, builder: HarnessBuilder<Window>) -> Self {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
         cell.script().refusals = vec![PortError::Hopeless("not in this test".to_owned()); 2];
@@ -58,13 +65,14 @@ impl Silent {
         // The fake's line for motions refuses nobody; it has nothing to report once it is there.
         let settled = |app: &App| {
             let failed = |link| matches!(app.model().link(link), LinkState::Failed { .. });
-            failed(Link::Control) && failed(Link::Camera) && app.model().mover.is_connected()
+            let prepared = !app.model().document().taught.is_empty();
+            failed(Link::Control) && failed(Link::Camera) && app.model().mover.is_connected() && prepared
         };
         while !settled(&app) {
             woken.recv_timeout(std::time::Duration::from_secs(20)).expect("the workers report");
             app.collect();
         }
-        let harness = Harness::builder().with_size(size).build_ui_state(
+        let harness = builder.build_ui_state(
             |ui, window: &mut Window| {
                 let ctx = ui.ctx().clone();
                 window.collect(&ctx);
@@ -100,6 +108,12 @@ impl Silent {
     /// The application.
     pub fn app(&mut self) -> &mut App {
         self.harness.state_mut().app()
+    }
+
+    /// Shows something else.
+    pub fn show_model(&mut self, model: Model) {
+        self.app().replace_model(model);
+        self.steps();
     }
 
     /// Lets something happen.

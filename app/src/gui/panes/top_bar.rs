@@ -74,7 +74,7 @@ fn frame_rate_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let text = match model.frame_age_s() {
         Some(age_s) if age_s > STALE_AFTER_S => tr!(language, "no new pictures").to_owned(),
-        _ => format!("{:.0} fps", frame.info.rate_hz),
+        _ => text!("{rate} fps", rate = format!("{:.0}", frame.info.rate_hz)).say(language),
     };
     ui.label(RichText::new("·").color(palette.weak));
     ui.label(RichText::new(text).color(palette.weak)).on_hover_text(tr!(language, "Pictures that arrive per second"));

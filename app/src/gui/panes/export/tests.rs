@@ -2,26 +2,16 @@ use std::path::PathBuf;
 
 use egui::Key;
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::export::{self, ExportInput};
 
 use super::*;
 use crate::command::Command;
 use crate::gui::panes::driven::Driven;
 use crate::gui::sample;
-use crate::model::{Dialog, PreviewFile, Written};
+use crate::model::{Dialog, Written};
 
 /// The sample with previews as the worker makes them.
 fn model() -> Model {
-    let mut model = sample::solved();
-    let solved = model.solve.current().expect("solved").clone();
-    for format in export::formats() {
-        let files = export::preview(*format, &ExportInput::new(&solved.result, &model.export.names));
-        let files = files.map_err(|error| error.to_string()).map(|files| {
-            files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect()
-        });
-        model.export.previews.insert(format.name().to_owned(), files);
-    }
-    model
+    sample::previewed()
 }
 
 fn driven(model: Model) -> Driven {

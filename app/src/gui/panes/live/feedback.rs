@@ -39,7 +39,7 @@ pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, poin
             age = format!("{age_s:.1}"),
             dropped = model.dropped_frames
         );
-        let colour = if stale { Palette::of(ui).warning } else { Color32::from_gray(215) };
+        let colour = if stale { Marks::over_pictures().review } else { Color32::from_gray(215) };
         lines.push((words.say(language), colour));
     }
     if shown.capture.is_none() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_none()) {
