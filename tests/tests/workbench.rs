@@ -140,6 +140,7 @@ fn a_session_is_opened_again_as_it_was_and_solves_to_the_same_bits_as_the_comman
     assert_eq!(cli.target, kept.target);
     assert_eq!(cli.intrinsics, kept.intrinsics);
     assert_eq!(cli.quality, kept.quality);
+    assert_eq!(cli.views, kept.views, "the excluded one included");
     assert_eq!(cli.provenance.input_sha256, kept.provenance.input_sha256);
 }
 
