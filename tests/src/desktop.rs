@@ -119,7 +119,10 @@ impl Desktop {
                 let labels: Vec<String> = self.widgets().into_iter().map(|widget| widget.label).collect();
                 panic!("waiting for {what}; there are {labels:#?}");
             }
-            assert!(self.window.try_wait().ok().flatten().is_none(), "the workbench has ended while waiting for {what}");
+            assert!(
+                self.window.try_wait().ok().flatten().is_none(),
+                "the workbench has ended while waiting for {what}"
+            );
             std::thread::sleep(LOOK);
         }
     }
@@ -156,11 +159,7 @@ impl Desktop {
         self.mouse(&["mousemove", "700", "12"]);
         std::thread::sleep(Duration::from_millis(700));
         let file = self.shots.join(format!("{name}.png"));
-        let taken = Command::new("import")
-            .args(["-window", "root"])
-            .arg(&file)
-            .env("DISPLAY", &self.display)
-            .status();
+        let taken = Command::new("import").args(["-window", "root"]).arg(&file).env("DISPLAY", &self.display).status();
         assert!(taken.is_ok_and(|status| status.success()), "{}", file.display());
     }
 }

@@ -103,11 +103,8 @@ impl App {
             camera_from_target: None,
             in_fit: it.is_in_use(),
         });
-        let verification = document
-            .captures
-            .iter()
-            .filter(|it| it.role == Role::Verification && !it.excluded)
-            .filter_map(|it| {
+        let verification =
+            document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).filter_map(|it| {
                 let corners = self.corners(it.id)?.clone();
                 Some((it.id, View { name: it.image.clone(), base_from_tip: it.base_from_tip, corners }))
             });
@@ -173,7 +170,10 @@ impl App {
                 self.send_intrinsics();
                 self.preview_exports();
                 if self.desk.archive(ArchiveTask::Result(result)).is_err() {
-                    self.say(Severity::Warning, text!("The result was not kept beside the session; solve again to keep it"));
+                    self.say(
+                        Severity::Warning,
+                        text!("The result was not kept beside the session; solve again to keep it"),
+                    );
                 }
             }
             SolveOutcome::Failed(why) => self.no_answer(why),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, Method, ObservedView, Observations};
+use handeye_core::calibrate::{self, Method, Observations, ObservedView};
 use handeye_core::dataset::Dataset;
 use handeye_core::export::{self, ExportInput, ExportNames};
 use handeye_core::progress::CancelToken;

@@ -37,15 +37,15 @@ use anyhow::anyhow;
 use eframe::NativeOptions;
 use egui::ViewportBuilder;
 
-use crate::cli::GuiArgs;
 use crate::app::{App, Connect, Start};
+use crate::cli::GuiArgs;
 use crate::command::Event;
 use crate::model::CellSource;
 use crate::settings::{self, SettingsFile};
 use crate::worker::{Clock, LiveConnector, Waker};
 pub use layout::Layout;
-pub use window::Window;
 use window::Remembered;
+pub use window::Window;
 
 /// Name under which the system keeps layout and size of the window.
 const APP_ID: &str = "handeye-workbench";

@@ -14,7 +14,9 @@ use super::layout::Layout;
 use super::window::Window;
 use crate::app::{App, Connect, Start};
 use crate::command::{Command, Event};
-use crate::model::{CellSource, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation, ViewSettings};
+use crate::model::{
+    CellSource, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation, ViewSettings,
+};
 use crate::settings::SettingsFile;
 use crate::worker::fake::FakeCell;
 use crate::worker::{Clock, Connector, PortError, Waker};

@@ -6,8 +6,8 @@ use egui::Ui;
 use serde::{Deserialize, Serialize};
 
 use super::actions;
-use super::fonts;
 use super::dialogs;
+use super::fonts;
 use super::layout::{self, Layout};
 use super::palette::CommandPalette;
 use super::panes;

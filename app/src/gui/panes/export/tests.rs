@@ -16,9 +16,9 @@ fn model() -> Model {
     let solved = model.solve.current().expect("solved").clone();
     for format in export::formats() {
         let files = export::preview(*format, &ExportInput::new(&solved.result, &model.export.names));
-        let files = files.map_err(|error| error.to_string()).map(|files| {
-            files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect()
-        });
+        let files = files
+            .map_err(|error| error.to_string())
+            .map(|files| files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect());
         model.export.previews.insert(format.name().to_owned(), files);
     }
     model

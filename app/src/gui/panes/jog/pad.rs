@@ -108,8 +108,8 @@ fn letter(axis: Axis) -> &'static str {
 fn axis_colour(ui: &Ui, axis: Axis) -> Color32 {
     let palette = Palette::of(ui);
     match axis {
-        Axis::X => palette.bad,
-        Axis::Y => palette.good,
+        Axis::X => palette.axis_x,
+        Axis::Y => palette.axis_y,
         Axis::Z => palette.accent,
     }
 }

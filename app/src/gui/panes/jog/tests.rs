@@ -6,9 +6,7 @@ use super::*;
 use crate::command::Command;
 use crate::gui::panes::driven::Driven;
 use crate::gui::sample;
-use crate::model::{
-    Axis, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Severity, Simulation,
-};
+use crate::model::{Axis, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Severity, Simulation};
 use crate::text::Text;
 
 fn driven(model: Model) -> Driven {
