@@ -48,7 +48,8 @@ impl Desktop {
     ///
     /// # Panics
     /// When one of them does not start.
-    pub fn start(width: u32, height: u32, shots: &Path, arguments: &[&str]) -> Self {
+    pub fn start(size: (u32, u32), shots: &Path, arguments: &[&str], environment: &[(&str, &str)]) -> Self {
+        let (width, height) = size;
         let home = tempfile::tempdir().expect("a folder");
         // The screen chooses a free number and says which.
         let mut screen = Command::new("Xvfb")
@@ -72,6 +73,7 @@ impl Desktop {
             .env_remove("WAYLAND_DISPLAY")
             .env("LIBGL_ALWAYS_SOFTWARE", "1")
             .env("HANDEYE_WIDGETS", &widgets)
+            .envs(environment.iter().copied())
             .spawn()
             .expect("the workbench starts");
         std::fs::create_dir_all(shots).expect("a folder");

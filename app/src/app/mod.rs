@@ -231,3 +231,6 @@ impl App {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

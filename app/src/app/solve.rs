@@ -64,6 +64,9 @@ impl App {
     }
 
     fn solve(&mut self) {
+        // From here on what an earlier job reports is of no interest.
+        self.numbers.job = JobId(self.numbers.job.0 + 1);
+        let id = self.numbers.job;
         self.model.solve.fresh = false;
         let document = Arc::clone(&self.model.session.document);
         let seen = document.in_use().filter(|it| self.corners(it.id).is_some()).count();
@@ -82,8 +85,6 @@ impl App {
             };
             return;
         }
-        self.numbers.job = JobId(self.numbers.job.0 + 1);
-        let id = self.numbers.job;
         let since_s = self.model.now_s;
         self.model.solve.status = SolveStatus::Running { job: id, stage: Stage::Intrinsics, part: 0.0, since_s };
         let job = self.job(id, &document);
