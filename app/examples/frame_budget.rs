@@ -64,24 +64,14 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// Draws the window for a while.
-fn measure(
-    what: &str,
-    source: CellSource,
-    duration: Duration,
-    begin: impl FnOnce(&mut App),
-) -> anyhow::Result<()> {
+fn measure(what: &str, source: CellSource, duration: Duration, begin: impl FnOnce(&mut App)) -> anyhow::Result<()> {
     let sessions = std::env::temp_dir().join(format!("handeye-frame-budget-{}", std::process::id()));
     let began = Instant::now();
     let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
     let waker: Waker = Arc::new(|| {});
     let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
-    let start = Start {
-        source,
-        view: ViewSettings::default(),
-        addresses: Vec::new(),
-        sessions: sessions.clone(),
-        open: None,
-    };
+    let start =
+        Start { source, view: ViewSettings::default(), addresses: Vec::new(), sessions: sessions.clone(), open: None };
     let app = App::start(start, connect, clock, waker)?;
     let ctx = egui::Context::default();
     let mut window = Window::new(app, Layout::default(), SettingsFile::default(), &ctx);
@@ -163,11 +153,8 @@ fn thousand_views(app: &mut App) {
     let mut seen = Vec::new();
     for n in 1..=1000_u32 {
         let s = f64::from(n);
-        let turn = UnitQuaternion::from_euler_angles(
-            0.45 * (1.7 * s).sin(),
-            0.45 * (2.3 * s).cos(),
-            0.5 * (0.9 * s).sin(),
-        );
+        let turn =
+            UnitQuaternion::from_euler_angles(0.45 * (1.7 * s).sin(), 0.45 * (2.3 * s).cos(), 0.5 * (0.9 * s).sin());
         let middle = BOARD.centre();
         let camera_from_target: Pose<Camera, Target> = Pose::from_isometry(
             Translation3::new(0.02 * s.sin(), 0.02 * s.cos(), 0.32 + 0.04 * (1.9 * s).sin())

@@ -12,10 +12,8 @@ pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7
 /// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.
 pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
     let ground_truth = truth.and_then(|truth| {
-        let links = HandEye::EyeInHand {
-            tip_from_camera: truth.tip_from_camera,
-            base_from_target: truth.base_from_target?,
-        };
+        let links =
+            HandEye::EyeInHand { tip_from_camera: truth.tip_from_camera, base_from_target: truth.base_from_target? };
         Some(GroundTruth::new(&links, Some(truth.intrinsics)))
     });
     SessionMeta {

@@ -279,7 +279,11 @@ impl SettingsWrite {
             handeye_core::atomic_file::write(&self.path, self.content.as_bytes())
         };
         write().map_err(|error: io::Error| {
-            Warning(text!("The settings were not written to {file}: {error}", file = self.path.display(), error = error))
+            Warning(text!(
+                "The settings were not written to {file}: {error}",
+                file = self.path.display(),
+                error = error
+            ))
         })
     }
 }

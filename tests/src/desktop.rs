@@ -48,7 +48,8 @@ impl Desktop {
     ///
     /// # Panics
     /// When one of them does not start.
-    pub fn start(width: u32, height: u32, shots: &Path, arguments: &[&str]) -> Self {
+    pub fn start(size: (u32, u32), shots: &Path, arguments: &[&str], environment: &[(&str, &str)]) -> Self {
+        let (width, height) = size;
         let home = tempfile::tempdir().expect("a folder");
         // The screen chooses a free number and says which.
         let mut screen = Command::new("Xvfb")
@@ -72,6 +73,7 @@ impl Desktop {
             .env_remove("WAYLAND_DISPLAY")
             .env("LIBGL_ALWAYS_SOFTWARE", "1")
             .env("HANDEYE_WIDGETS", &widgets)
+            .envs(environment.iter().copied())
             .spawn()
             .expect("the workbench starts");
         std::fs::create_dir_all(shots).expect("a folder");
@@ -119,7 +121,10 @@ impl Desktop {
                 let labels: Vec<String> = self.widgets().into_iter().map(|widget| widget.label).collect();
                 panic!("waiting for {what}; there are {labels:#?}");
             }
-            assert!(self.window.try_wait().ok().flatten().is_none(), "the workbench has ended while waiting for {what}");
+            assert!(
+                self.window.try_wait().ok().flatten().is_none(),
+                "the workbench has ended while waiting for {what}"
+            );
             std::thread::sleep(LOOK);
         }
     }
@@ -156,11 +161,7 @@ impl Desktop {
         self.mouse(&["mousemove", "700", "12"]);
         std::thread::sleep(Duration::from_millis(700));
         let file = self.shots.join(format!("{name}.png"));
-        let taken = Command::new("import")
-            .args(["-window", "root"])
-            .arg(&file)
-            .env("DISPLAY", &self.display)
-            .status();
+        let taken = Command::new("import").args(["-window", "root"]).arg(&file).env("DISPLAY", &self.display).status();
         assert!(taken.is_ok_and(|status| status.success()), "{}", file.display());
     }
 }

@@ -14,7 +14,7 @@ fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
     }
     let shots = std::env::var_os("HANDEYE_SCREENSHOTS")
         .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("first_user"), PathBuf::from);
-    let mut desktop = Desktop::start(1440, 900, &shots, &[]);
+    let mut desktop = Desktop::start((1440, 900), &shots, &[], &[]);
     let began = Instant::now();
     desktop.until_seen("Connected to the built-in cell");
     desktop.until_seen("Board in view");
@@ -53,4 +53,19 @@ fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
     for file in ["result.json", "exports/calibration.json", "exports/opencv.yaml"] {
         assert!(session.join(file).is_file(), "{file}");
     }
+
+    // The same session again, as a reader of Chinese who likes it light; nothing was said to be saved.
+    let session = session.to_string_lossy().into_owned();
+    let copy = tempfile::tempdir().expect("a folder");
+    let kept = copy.path().join("标定");
+    let copied = std::process::Command::new("cp").arg("-r").arg(&session).arg(&kept).status();
+    assert!(copied.is_ok_and(|status| status.success()));
+    drop(desktop);
+    let environment = [("HANDEYE_LANGUAGE", "zh-CN"), ("HANDEYE_THEME", "light")];
+    let arguments = ["--session", kept.to_str().expect("a name")];
+    let mut desktop = Desktop::start((1440, 900), &shots, &arguments, &environment);
+    desktop.until_seen("已看到标定板");
+    desktop.click("4 求解");
+    desktop.until_seen("预期误差（95 %）");
+    desktop.photograph("zh-solved");
 }

@@ -140,6 +140,7 @@ fn a_session_is_opened_again_as_it_was_and_solves_to_the_same_bits_as_the_comman
     assert_eq!(cli.target, kept.target);
     assert_eq!(cli.intrinsics, kept.intrinsics);
     assert_eq!(cli.quality, kept.quality);
+    assert_eq!(cli.views, kept.views, "the excluded one included");
     assert_eq!(cli.provenance.input_sha256, kept.provenance.input_sha256);
 }
 
@@ -181,4 +182,49 @@ fn a_session_that_cannot_be_opened_says_why_and_leaves_the_present_one_alone() {
         !model.opening && model.messages.iter().any(said)
     });
     assert_eq!(bench.model().session.name().as_deref(), Some("mine"));
+}
+
+#[test]
+fn a_server_that_never_answers_is_left_for_a_cell_and_the_session_stays_open() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = format!("tcp://{}", silent.local_addr().expect("an address"));
+    let mut bench = Workbench::start(CellSource::Address(address), folder.path(), None);
+    bench.click(Command::NewSession(Some(folder.path().join("mine"))));
+    bench.until("a session", |model| model.session.folder.is_some());
+
+    let cell = CellServer::start(CellConfig::new(Scene::reference().expect("the scene"))).expect("a cell");
+    bench.click(Command::Connect(CellSource::Address(cell.endpoint())));
+    bench.until("the cell", |model| model.control.is_connected() && model.camera.is_connected());
+    bench.click(Command::StartSimulation);
+    bench.until("the board in a picture", |model| {
+        model.detection.as_ref().is_some_and(|detection| detection.corners.is_some())
+    });
+    assert_eq!(bench.model().session.name().as_deref(), Some("mine"));
+    assert_eq!(bench.model().addresses.len(), 1);
+}
+
+#[test]
+fn recorded_images_and_poses_are_opened_as_a_session_and_stay_as_they_are() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (bench, cell) = toured(&folder.path().join("sessions"));
+    let recorded = bench.model().session.folder.clone().expect("a session");
+    let expected = bench.model().solve.current().expect("solved").result.hand_eye.clone();
+    drop((bench, cell));
+    // What another program would have written: images, poses and their description, and nothing of ours.
+    let dataset = folder.path().join("recorded");
+    std::fs::create_dir_all(dataset.join("images")).expect("a folder");
+    for file in ["dataset.toml", "poses.csv"] {
+        std::fs::copy(recorded.join(file), dataset.join(file)).expect("copied");
+    }
+    for image in std::fs::read_dir(recorded.join("images")).expect("images").flatten() {
+        std::fs::copy(image.path(), dataset.join("images").join(image.file_name())).expect("copied");
+    }
+    let address = CellSource::Address("tcp://127.0.0.1:1".to_owned());
+    let mut bench = Workbench::start(address, &folder.path().join("others"), None);
+    bench.click(Command::Open(dataset.clone()));
+    bench.until("its answer", idle_and_fresh);
+    assert_eq!(bench.model().document().captures.len(), 10);
+    assert_eq!(bench.model().solve.current().expect("solved").result.hand_eye, expected, "to the last bit");
+    assert!(!dataset.join("session.json").exists(), "the data set is as it was");
 }

@@ -99,8 +99,12 @@ impl App {
         match (self.model.link(link).clone(), before.is_connected()) {
             (LinkState::Connected { server, address }, false) => {
                 let text = match link {
-                    Link::Control => text!("Robot connected to {server} at {address}", server = server, address = address),
-                    Link::Camera => text!("Camera connected to {server} at {address}", server = server, address = address),
+                    Link::Control => {
+                        text!("Robot connected to {server} at {address}", server = server, address = address)
+                    }
+                    Link::Camera => {
+                        text!("Camera connected to {server} at {address}", server = server, address = address)
+                    }
                     Link::Motion => return,
                 };
                 self.say(Severity::Info, text);

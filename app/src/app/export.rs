@@ -49,14 +49,10 @@ impl App {
 
     pub(super) fn written(&mut self, written: Written) {
         self.model.export.writing = false;
-        let folder = written.folder.display().to_string();
         match &written.files {
             Ok(files) => {
                 let count = files.len();
-                self.say(
-                    Severity::Info,
-                    text!("{count} files written to {folder}, read back and compared", count = count, folder = folder),
-                );
+                self.say(Severity::Info, text!("{count} files written, read back and compared", count = count));
             }
             Err(why) => self.say(Severity::Error, text!("Nothing was exported: {why}", why = why)),
         }

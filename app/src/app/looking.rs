@@ -36,7 +36,8 @@ impl App {
                     | Dialog::ExportFolder
             )
         ) {
-            let folder = self.model.folder.as_ref().map_or_else(|| self.desk.sessions().to_path_buf(), |it| it.folder.clone());
+            let folder =
+                self.model.folder.as_ref().map_or_else(|| self.desk.sessions().to_path_buf(), |it| it.folder.clone());
             self.list_folder(folder);
         }
     }

@@ -20,8 +20,8 @@ use std::sync::Arc;
 
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
-use crate::text;
 use crate::settings::SettingsWrite;
+use crate::text;
 use crate::worker::{Clock, Connector, Desk, FileTask, Waker, Workers};
 
 /// Makes what connects to a cell.
@@ -238,3 +238,5 @@ impl App {
     }
 }
 
+#[cfg(test)]
+mod tests;

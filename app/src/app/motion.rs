@@ -61,7 +61,10 @@ impl App {
     /// A press of a jog button: one step, or the beginning of holding it.
     pub(super) fn jog(&mut self, jog: Jog) {
         match self.model.view.jog.step {
-            JogStep::Hold => self.hold_jog(jog),
+            JogStep::Hold => {
+                self.hold_jog(jog);
+                self.model.motion = Motion::Jogging(jog);
+            }
             JogStep::Step { metres, radians } => {
                 self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
                 let id = self.numbers.motion;
@@ -77,12 +80,12 @@ impl App {
         }
     }
 
+    /// The button is still held. A jog that has ended by itself does not begin anew before the next press.
     pub(super) fn hold_jog(&mut self, jog: Jog) {
         if self.model.view.jog.step != JogStep::Hold {
             return;
         }
         self.workers.hold_jog(jog, self.model.view.jog.speed, self.camera_on_tip());
-        self.model.motion = Motion::Jogging(jog);
     }
 
     pub(super) fn release_jog(&mut self) {

@@ -205,7 +205,11 @@ impl App {
         self.model.review = Some(Review { id, images: None });
         let capture = self.model.document().capture(id).cloned();
         let (Some(folder), Some(capture)) = (self.model.session.folder.clone(), capture) else { return };
-        let asked = self.desk.files(FileTask::Review { folder, capture: Box::new(capture), colours: self.model.view.depth_colours });
+        let asked = self.desk.files(FileTask::Review {
+            folder,
+            capture: Box::new(capture),
+            colours: self.model.view.depth_colours,
+        });
         self.expect(text!("The capture is not shown"), asked);
     }
 

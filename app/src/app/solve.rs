@@ -64,6 +64,9 @@ impl App {
     }
 
     fn solve(&mut self) {
+        // From here on what an earlier job reports is of no interest.
+        self.numbers.job = JobId(self.numbers.job.0 + 1);
+        let id = self.numbers.job;
         self.model.solve.fresh = false;
         let document = Arc::clone(&self.model.session.document);
         let seen = document.in_use().filter(|it| self.corners(it.id).is_some()).count();
@@ -82,8 +85,6 @@ impl App {
             };
             return;
         }
-        self.numbers.job = JobId(self.numbers.job.0 + 1);
-        let id = self.numbers.job;
         let since_s = self.model.now_s;
         self.model.solve.status = SolveStatus::Running { job: id, stage: Stage::Intrinsics, part: 0.0, since_s };
         let job = self.job(id, &document);
@@ -103,11 +104,8 @@ impl App {
             camera_from_target: None,
             in_fit: it.is_in_use(),
         });
-        let verification = document
-            .captures
-            .iter()
-            .filter(|it| it.role == Role::Verification && !it.excluded)
-            .filter_map(|it| {
+        let verification =
+            document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).filter_map(|it| {
                 let corners = self.corners(it.id)?.clone();
                 Some((it.id, View { name: it.image.clone(), base_from_tip: it.base_from_tip, corners }))
             });
@@ -173,7 +171,10 @@ impl App {
                 self.send_intrinsics();
                 self.preview_exports();
                 if self.desk.archive(ArchiveTask::Result(result)).is_err() {
-                    self.say(Severity::Warning, text!("The result was not kept beside the session; solve again to keep it"));
+                    self.say(
+                        Severity::Warning,
+                        text!("The result was not kept beside the session; solve again to keep it"),
+                    );
                 }
             }
             SolveOutcome::Failed(why) => self.no_answer(why),

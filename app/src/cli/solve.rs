@@ -4,25 +4,48 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, Method, Observations};
+use handeye_core::calibrate::{self, Method, Observations, ObservedView};
 use handeye_core::dataset::Dataset;
 use handeye_core::export::{self, ExportInput, ExportNames};
 use handeye_core::progress::CancelToken;
 use handeye_core::result::CalibrationResult;
+use handeye_core::session::{self, Role, Session};
 
 use super::Failure;
 use crate::observe::{ObserveError, observe};
 
 /// Name of the result in a session.
-pub const RESULT_FILE: &str = "result.json";
+pub const RESULT_FILE: &str = session::RESULT;
 
 /// Reads a folder, finds the target in its images and calibrates.
 pub fn folder(path: &Path, method: Method) -> Result<CalibrationResult, Failure> {
     let dataset = Dataset::read(path).map_err(Failure::unusable)?;
     let cancel = cancel_on_ctrl_c();
-    let observations = observations(&dataset, &cancel)?;
+    let mut observations = observations(&dataset, &cancel)?;
+    if Session::is_session(path) {
+        add_excluded(path, &mut observations)?;
+    }
     let digest = dataset.input_sha256().map_err(Failure::unusable)?;
     solve(&observations, method, Some(digest), &cancel)
+}
+
+/// Captures that were taken out of the fit stand in the result as such, and in their place, as when the window solves.
+fn add_excluded(folder: &Path, observations: &mut Observations) -> Result<(), Failure> {
+    let session = Session::open(folder).map_err(Failure::unusable)?;
+    let fitted = session.document.captures.iter().filter(|capture| capture.role == Role::Calibration);
+    for (index, capture) in fitted.enumerate() {
+        if capture.excluded && index <= observations.views.len() {
+            let view = ObservedView {
+                name: capture.image.clone(),
+                base_from_tip: Some(capture.base_from_tip),
+                corners: None,
+                camera_from_target: None,
+                in_fit: false,
+            };
+            observations.views.insert(index, view);
+        }
+    }
+    Ok(())
 }
 
 /// Calibrates observations and states the result.
@@ -33,11 +56,7 @@ pub fn solve(
     cancel: &CancelToken,
 ) -> Result<CalibrationResult, Failure> {
     let calibration = calibrate::calibrate(observations, method, cancel).map_err(Failure::failed)?;
-    let name = match method {
-        Method::Joint => "joint",
-        Method::ClosedForm(name) => name,
-    };
-    let options = BTreeMap::from([("method".to_owned(), serde_json::Value::from(name))]);
+    let options = BTreeMap::from([("method".to_owned(), serde_json::Value::from(method.name()))]);
     Ok(calibration.to_result(env!("CARGO_PKG_VERSION"), input_sha256, options))
 }
 

@@ -39,12 +39,14 @@ use anyhow::anyhow;
 use eframe::NativeOptions;
 use egui::ViewportBuilder;
 
-use crate::cli::GuiArgs;
 use crate::app::{App, Connect, Start};
+use crate::cli::GuiArgs;
+use crate::command::Event;
 use crate::model::CellSource;
 use crate::settings::{self, SettingsFile};
 use crate::worker::{Clock, LiveConnector, Waker};
 pub use layout::Layout;
+use window::Remembered;
 pub use window::Window;
 
 /// Name under which the system keeps layout and size of the window.
@@ -72,14 +74,16 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
         let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
+        let remembered = Remembered::stored(creation.storage);
         let start = Start {
             source,
-            view: settings.view,
+            view: remembered.view(settings.view),
             addresses: settings.addresses.clone(),
             sessions: settings.sessions_folder(variable),
             open: args.session,
         };
         let mut app = App::start(start, connect, clock, waker)?;
+        app.absorb(Event::Recent(remembered.recent));
         for warning in warnings {
             app.absorb(warning.into());
         }

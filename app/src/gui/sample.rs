@@ -51,7 +51,9 @@ fn camera_from_target(n: u32) -> Pose<Camera, Target> {
     let turn = UnitQuaternion::from_euler_angles(0.45 * (1.7 * n).sin(), 0.45 * (2.3 * n).cos(), 0.5 * (0.9 * n).sin());
     let centre = Translation3::new(0.02 * (1.1 * n).sin(), 0.02 * (0.7 * n).cos(), 0.32 + 0.04 * (1.9 * n).sin());
     let half = BOARD.centre();
-    Pose::from_isometry(centre * Isometry3::from_parts(Translation3::identity(), turn) * Translation3::new(-half.x, -half.y, 0.0))
+    Pose::from_isometry(
+        centre * Isometry3::from_parts(Translation3::identity(), turn) * Translation3::new(-half.x, -half.y, 0.0),
+    )
 }
 
 fn base_from_tip(n: u32) -> Pose<Base, Tip> {
@@ -104,7 +106,8 @@ pub fn pictures() -> FrameImages {
 pub fn connected() -> Model {
     let mut model = Model::new(CellSource::BuiltIn, ViewSettings::default());
     model.now_s = 100.0;
-    let connected = LinkState::Connected { address: "tcp://127.0.0.1:1".to_owned(), server: "built-in cell".to_owned() };
+    let connected =
+        LinkState::Connected { address: "tcp://127.0.0.1:1".to_owned(), server: "built-in cell".to_owned() };
     model.control = connected.clone();
     model.camera = connected.clone();
     model.mover = connected;
@@ -115,7 +118,7 @@ pub fn connected() -> Model {
         simulation: Simulation::Running,
     });
     model.cell = Some(CellFacts {
-        joint_ranges_rad: [Some([-6.28, 6.28]); 6],
+        joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
         nominal_intrinsics: intrinsics(),
         kinematics_known: true,
         truth: Some(Truth {
@@ -154,8 +157,7 @@ pub fn captured() -> Model {
     document.captures = (1..=FITTED + VERIFYING).map(record).collect();
     for n in 1..=FITTED + VERIFYING {
         let thumbnail = RgbImage::from_fn(160, 120, |column, row| Rgb([column as u8, row as u8, (20 * n) as u8]));
-        let observed =
-            Observed { corners: Some(corners(n)), image_size: (640, 480), thumbnail: Arc::new(thumbnail) };
+        let observed = Observed { corners: Some(corners(n)), image_size: (640, 480), thumbnail: Arc::new(thumbnail) };
         model.observed.insert(CaptureId(n), Some(Arc::new(observed)));
     }
     let folder = Some(PathBuf::from("sessions/sample"));
@@ -213,9 +215,9 @@ pub fn previewed() -> Model {
     let solved = model.solve.current().expect("solved").clone();
     for format in export::formats() {
         let files = export::preview(*format, &ExportInput::new(&solved.result, &model.export.names));
-        let files = files.map_err(|error| error.to_string()).map(|files| {
-            files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect()
-        });
+        let files = files
+            .map_err(|error| error.to_string())
+            .map(|files| files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect());
         model.export.previews.insert(format.name().to_owned(), files);
     }
     model

@@ -159,7 +159,7 @@ fn solve(facts: &Facts) -> (StepState, Text) {
 fn verify(facts: &Facts) -> (StepState, Text) {
     match (facts.solved, facts.verified, facts.check_captures) {
         (false, ..) => (StepState::Blocked, text!("Needs a calibration")),
-        (true, true, count) => (StepState::Done, text!("{count} check poses", count = count)),
+        (true, true, count) => (StepState::Done, text!("Check poses: {count}", count = count)),
         (true, false, _) => (StepState::Now, text!("No check poses yet")),
     }
 }

@@ -48,6 +48,7 @@ impl LiveTextures {
             let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
             depth_view::range_of(&images.depth, far_plane_m, None)
         });
+        tracing::trace!("picture shown");
         self.shown = Some((images.clone(), crisp));
         #[cfg(test)]
         {

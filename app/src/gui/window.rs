@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use egui::Ui;
+use serde::{Deserialize, Serialize};
 
 use super::actions;
-use super::fonts;
 use super::dialogs;
+use super::fonts;
 use super::layout::{self, Layout};
 use super::palette::CommandPalette;
 use super::panes;
@@ -14,11 +15,49 @@ use super::textures::Textures;
 use super::theme;
 use crate::app::App;
 use crate::command::{Command, Outbox};
-use crate::model::{Dialog, ThemeChoice};
+use crate::model::{
+    CaptureOptions, Dialog, Goal, JogSettings, Model, Overlays, RecentSession, ThemeChoice, ViewSettings,
+};
 use crate::settings::SettingsFile;
 
 /// Redraws at least this often, because ages and durations are shown.
 const CLOCK_PERIOD: Duration = Duration::from_millis(250);
+
+/// What is remembered from one start to the next besides settings and layout.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Remembered {
+    overlays: Overlays,
+    jog: JogSettings,
+    capture: CaptureOptions,
+    goal: Goal,
+    /// Sessions that were open, newest first.
+    pub recent: Vec<RecentSession>,
+}
+
+impl Remembered {
+    /// Key in eframe's storage.
+    const STORAGE_KEY: &str = "remembered";
+    /// So many sessions are remembered.
+    const SESSIONS: usize = 12;
+
+    fn of(model: &Model) -> Self {
+        let ViewSettings { overlays, jog, capture, goal, .. } = model.view;
+        let recent = model.recent.iter().take(Self::SESSIONS).cloned().collect();
+        Self { overlays, jog, capture, goal, recent }
+    }
+
+    /// As it was at the end of the last time; the defaults when that cannot be read.
+    pub fn stored(storage: Option<&dyn eframe::Storage>) -> Self {
+        storage.and_then(|storage| eframe::get_value(storage, Self::STORAGE_KEY)).unwrap_or_default()
+    }
+
+    /// Settings with what is remembered here.
+    pub fn view(&self, settings: ViewSettings) -> ViewSettings {
+        let Self { overlays, jog, capture, goal, recent: _ } = self;
+        ViewSettings { overlays: *overlays, jog: *jog, capture: *capture, goal: *goal, ..settings }
+    }
+}
 
 /// Application, graphics, and what concerns nothing but the window: where panes are, which dialog is open.
 pub struct Window {
@@ -169,6 +208,7 @@ impl eframe::App for Window {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, layout::STORAGE_KEY, &self.layout);
+        eframe::set_value(storage, Remembered::STORAGE_KEY, &Remembered::of(self.app.model()));
     }
 }
 

@@ -21,9 +21,9 @@ use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{ColourMap, DepthImage, DepthSample};
 use handeye_core::frames::{Base, Camera, Pose, Tip};
 use handeye_core::handeye::HandEye;
+use handeye_core::image::RgbImage;
 use handeye_core::session::{CaptureId, Document};
 use handeye_core::verify::Calibrated;
-use handeye_core::image::RgbImage;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 

@@ -16,7 +16,9 @@ use super::files::kind_of;
 use super::link::Outlet;
 use super::vision::Measured;
 use crate::command::Event;
-use crate::model::{CapturePurpose, CaptureRefused, CaptureWait, FolderKind, Observed, RefusalKind, SessionState, Severity};
+use crate::model::{
+    CapturePurpose, CaptureRefused, CaptureWait, FolderKind, Observed, RefusalKind, SessionState, Severity,
+};
 use crate::text;
 use crate::text::Text;
 

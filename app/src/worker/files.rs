@@ -13,9 +13,7 @@ use handeye_core::session::{CaptureRecord, Session};
 use super::link::Outlet;
 use crate::command::Event;
 use crate::depth_view;
-use crate::model::{
-    FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written,
-};
+use crate::model::{FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written};
 use crate::settings::SettingsWrite;
 use crate::text;
 
@@ -119,16 +117,12 @@ fn pictures(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Resul
     let rgb = session.load_rgb(capture).map_err(|error| error.to_string())?;
     let depth = session.load_depth_m(capture).map_err(|error| error.to_string())?;
     let (width, height) = rgb.dimensions();
-    let depth = depth.unwrap_or_else(|| DepthImage {
-        width,
-        height,
-        metres: vec![f32::NAN; width as usize * height as usize],
-    });
+    let depth =
+        depth.unwrap_or_else(|| DepthImage { width, height, metres: vec![f32::NAN; width as usize * height as usize] });
     // A recorded depth has its far plane in it: nothing lies behind.
     let far_plane_m = depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
     let [near_m, far_m] = depth_view::range_of(&depth, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
-    let depth_coloured =
-        depth.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
+    let depth_coloured = depth.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
     Ok(FrameImages { rgb, depth, depth_coloured })
 }
 
@@ -168,9 +162,9 @@ fn preview(job: &ExportJob) -> Vec<(String, Result<Vec<PreviewFile>, String>)> {
     export::formats()
         .iter()
         .map(|format| {
-            let files = export::preview(*format, &job.input()).map_err(|error| error.to_string()).map(|files| {
-                files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect()
-            });
+            let files = export::preview(*format, &job.input())
+                .map_err(|error| error.to_string())
+                .map(|files| files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect());
             (format.name().to_owned(), files)
         })
         .collect()

@@ -58,9 +58,7 @@ pub use solver::SolveJob;
 pub use vision::{CaptureRequest, Measured, VisionTask};
 
 use crate::command::Event;
-use crate::model::{
-    CellSource, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings,
-};
+use crate::model::{CellSource, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings};
 use camera::Camera;
 use control::Control;
 use link::{Duty, LinkLoop, Outlet};

@@ -30,10 +30,7 @@ impl<Job: Send + 'static> NewestWins<Job> {
     ///
     /// # Errors
     /// When the system has no more threads.
-    pub fn start(
-        name: &str,
-        mut work: impl FnMut(Job, &CancelToken) + Send + 'static,
-    ) -> io::Result<(Self, Started)> {
+    pub fn start(name: &str, mut work: impl FnMut(Job, &CancelToken) + Send + 'static) -> io::Result<(Self, Started)> {
         let jobs: Arc<LatestSlot<(Job, CancelToken)>> = Arc::default();
         let (wake, woken) = bounded::<()>(1);
         let (running, done) = bounded(0);

@@ -47,5 +47,9 @@ fn look(job: &ObserveJob, capture: &CaptureRecord) -> Result<Observed, String> {
     let path = job.folder.join(&capture.image);
     let rgb = handeye_core::image_file::load_rgb(&path).map_err(|error| error.to_string())?;
     let seen = observe_image(&rgb, &job.target).map_err(|error| error.to_string())?;
-    Ok(Observed { corners: seen.map(|seen| seen.corners), image_size: rgb.dimensions(), thumbnail: Arc::new(vision::thumbnail(&rgb)) })
+    Ok(Observed {
+        corners: seen.map(|seen| seen.corners),
+        image_size: rgb.dimensions(),
+        thumbnail: Arc::new(vision::thumbnail(&rgb)),
+    })
 }

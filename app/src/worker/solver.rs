@@ -80,11 +80,8 @@ fn answer(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) -> Result<Solve
     let findings = findings::findings(&job.observations, Some(&calibration), &options);
     let calibrated = Calibrated::new(&calibration).ok();
     let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
-        let captures: Vec<CheckCapture<'_>> = job
-            .verification
-            .iter()
-            .map(|(_, view)| CheckCapture { view, depth: None, far_m: f32::INFINITY })
-            .collect();
+        let captures: Vec<CheckCapture<'_>> =
+            job.verification.iter().map(|(_, view)| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
         verify::verify(calibrated, &job.observations.target, &captures, work)
     });
     if let Some(Err(VerifyError::Cancelled)) = verification {

@@ -4,7 +4,7 @@
 mod about;
 mod folders;
 
-use egui::{Align, Align2, Area, Context, Frame, Id, Layout, Margin, Order, Rect, ScrollArea, Ui};
+use egui::{Align, Align2, Area, Context, Frame, Id, Key, Layout, Margin, Order, Rect, Ui};
 
 use super::help;
 use crate::command::{Command, Outbox};
@@ -21,43 +21,35 @@ pub fn dialogs_ui(ctx: &Context, model: &Model, outbox: &mut Outbox) {
     match &model.dialog {
         None | Some(Dialog::Palette) => folders::forget(ctx),
         Some(Dialog::Help) => {
-            over_ui(ctx, WIDE, model, outbox, |ui, _| help::keys_ui(ui, model));
+            over_ui(ctx, WIDE, outbox, |ui, outbox| {
+                help::keys_ui(ui, model);
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    if ui.button(tr!(model.view.language, "Close")).clicked() {
+                        outbox.send(Command::SetDialog(None));
+                    }
+                });
+            });
         }
-        Some(Dialog::About) => over_ui(ctx, NARROW, model, outbox, |ui, outbox| about::about_ui(ui, model, outbox)),
+        Some(Dialog::About) => over_ui(ctx, NARROW, outbox, |ui, outbox| about::about_ui(ui, model, outbox)),
         Some(dialog) => {
-            over_ui(ctx, NARROW, model, outbox, |ui, outbox| folders::folders_ui(ui, model, dialog, outbox));
+            over_ui(ctx, NARROW, outbox, |ui, outbox| folders::folders_ui(ui, model, dialog, outbox));
         }
     }
 }
 
-/// Over the window, until it is closed or something else is pressed.
-fn over_ui(
-    ctx: &Context,
-    width: f32,
-    model: &Model,
-    outbox: &mut Outbox,
-    content_ui: impl FnOnce(&mut Ui, &mut Outbox),
-) {
-    let room = ctx.content_rect();
-    let width = width.min(room.width() - 80.0);
+/// Over the window, until Esc or until something else is pressed.
+fn over_ui(ctx: &Context, width: f32, outbox: &mut Outbox, content_ui: impl FnOnce(&mut Ui, &mut Outbox)) {
+    let width = width.min(ctx.content_rect().width() - 80.0);
     let area = Area::new(Id::new("dialog")).order(Order::Foreground).anchor(Align2::CENTER_CENTER, [0.0, -20.0]);
     let shown = area.show(ctx, |ui| {
         Frame::popup(ui.style()).inner_margin(Margin::same(22)).show(ui, |ui| {
             ui.set_width(width);
-            ScrollArea::vertical().max_height((room.height() - 160.0).max(120.0)).show(ui, |ui| {
-                ui.set_width(width);
-                content_ui(ui, outbox);
-            });
-            ui.add_space(14.0);
-            let row = egui::vec2(width, ui.spacing().interact_size.y);
-            ui.allocate_ui_with_layout(row, Layout::right_to_left(Align::Center), |ui| {
-                ui.button(tr!(model.view.language, "Close")).clicked()
-            })
-            .inner
-        })
-        .inner
+            ui.spacing_mut().item_spacing.y = 8.0;
+            content_ui(ui, outbox);
+        });
     });
-    if shown.inner || pressed_outside(ctx, shown.response.rect) {
+    let escaped = ctx.input(|input| input.key_pressed(Key::Escape));
+    if escaped || pressed_outside(ctx, shown.response.rect) {
         outbox.send(Command::SetDialog(None));
     }
 }

@@ -158,9 +158,8 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
         let out = table.rows.len() - fit - verify;
         let words = text!("{fit} in the fit · {verify} verify · {out} excluded", fit = fit, verify = verify, out = out);
         if !table.rows.is_empty() {
-            // In one piece on the next line when there is no room, and not broken inside.
-            let words = RichText::new(words.say(language)).color(Palette::of(ui).weak);
-            ui.add(egui::Label::new(words).extend());
+            // As a whole on the next line when there is no room.
+            ui.add(egui::Label::new(RichText::new(words.say(language)).color(Palette::of(ui).weak)).extend());
         }
         return;
     }

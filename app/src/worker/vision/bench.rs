@@ -19,9 +19,8 @@ use super::super::{Clock, Connector, LiveConnector, Waker, Workers};
 use super::{CaptureRequest, LatestSlot, Measured, Outlet, Tap, Vision, VisionTask};
 use crate::command::Event;
 use crate::model::{
-    ViewSettings,
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellSource, DepthScale, FrameImages, FrameInfo,
-    LiveDetection, LiveFrame,
+    LiveDetection, LiveFrame, ViewSettings,
 };
 
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });

@@ -9,15 +9,15 @@ use super::{JOINTS, JointAngles};
 use crate::cell::kinematics::{IkError, JointLimits};
 
 /// Fastest jog of a joint [rad/s]: two thirds of what the model of the arm allows its joints by default.
-const JOINT_SPEED: f64 = 60.0 * std::f64::consts::PI / 180.0;
+pub const JOINT_SPEED: f64 = 60.0 * std::f64::consts::PI / 180.0;
 /// Half of what it allows [rad/s²]: from full speed a joint stops within 10°.
 const JOINT_ACCELERATION: f64 = 180.0 * std::f64::consts::PI / 180.0;
 /// Fastest jog of the tip along a line [m/s]: the reduced speed at which ISO 10218-1 lets people be near an arm.
-const LINE_SPEED: f64 = 0.25;
+pub const LINE_SPEED: f64 = 0.25;
 /// From full speed the tip stops within 31 mm [m/s²].
 const LINE_ACCELERATION: f64 = 1.0;
 /// Fastest turn of the tip [rad/s].
-const TURN_SPEED: f64 = 45.0 * std::f64::consts::PI / 180.0;
+pub const TURN_SPEED: f64 = 45.0 * std::f64::consts::PI / 180.0;
 /// From full speed it stops within 6° [rad/s²].
 const TURN_ACCELERATION: f64 = 180.0 * std::f64::consts::PI / 180.0;
 

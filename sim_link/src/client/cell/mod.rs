@@ -31,7 +31,10 @@ use handeye_core::frames::{Base, Pose, Tip};
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use camera::{CameraFeed, Frame};
 pub use jog::{ArmJog, JogAxes, JogEnd};
-pub use jog_plan::JogObstacle;
+pub use jog_plan::{
+    JOINT_SPEED as JOG_JOINT_SPEED_RAD_S, JogObstacle, LINE_SPEED as JOG_LINE_SPEED_M_S,
+    TURN_SPEED as JOG_TURN_SPEED_RAD_S,
+};
 pub use reach::{ArmKinematics, UnknownKinematics};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
 

@@ -1,7 +1,7 @@
 //! Hold to move: a jog begins when a button or key goes down and ends when it goes up, when the pointer leaves the
 //! button, or when the window loses the focus.
 
-use egui::{Id, Response, Ui};
+use egui::{Button, Id, Response, RichText, Sense, Ui};
 
 use crate::command::{Command, Outbox};
 use crate::gui::panes::parts;
@@ -17,6 +17,12 @@ pub struct Hold {
 
 fn id() -> Id {
     Id::new("jog that is held")
+}
+
+/// A button to be held. One that senses clicks alone is let go by egui after 0.8 s or a few points of movement, when
+/// neither can be a click any more.
+pub fn button(face: RichText) -> Button<'static> {
+    Button::new(face).sense(Sense::click_and_drag())
 }
 
 impl Hold {

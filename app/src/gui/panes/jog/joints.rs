@@ -1,10 +1,10 @@
 //! The joints: where each is, where it is sent, and buttons that jog it.
 
-use egui::{Button, Id, RichText, Shape, Slider, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
+use egui::{Id, RichText, Shape, Slider, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
 use handeye_sim_link::client::cell::JointAngles;
 
 use super::blocked::Blocked;
-use super::hold::Hold;
+use super::hold::{self, Hold};
 use crate::command::{Command, Outbox};
 use crate::gui::numbers;
 use crate::gui::panes::parts;
@@ -76,7 +76,7 @@ fn row_ui(
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.label(RichText::new(format!("J{joint}")).color(palette.weak));
         for (sign, forward) in [("−", false), ("+", true)] {
-            let response = ui.add(Button::new(RichText::new(sign).strong()).min_size(Vec2::new(26.0, 24.0)).small());
+            let response = ui.add(hold::button(RichText::new(sign).strong()).min_size(Vec2::new(26.0, 24.0)).small());
             let name = text!("Jog joint {joint} {sign}", joint = joint, sign = sign).say(language);
             let enabled = ui.is_enabled();
             response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, enabled, &name));

@@ -1,9 +1,9 @@
 //! Jogging along and about the axes of a frame, with buttons and keys.
 
-use egui::{Button, Color32, Id, Key, RichText, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
+use egui::{Color32, Id, Key, RichText, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
 
 use super::blocked::Blocked;
-use super::hold::Hold;
+use super::hold::{self, Hold};
 use super::settings::frame_name;
 use crate::gui::panes::parts;
 use crate::gui::theme::Palette;
@@ -42,7 +42,7 @@ pub fn pad_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, hold: &mut Hold) {
                         let jog = jog_of(frame, axis, is_forward, turn);
                         let sign = if is_forward { "+" } else { "−" };
                         let face = RichText::new(sign).strong().color(colour);
-                        let button = Button::new(face)
+                        let button = hold::button(face)
                             .min_size(Vec2::new(wide, 28.0))
                             .stroke(Stroke::new(1.0, colour.gamma_multiply(0.5)));
                         let name = name(axis, is_forward, turn, language);
@@ -108,8 +108,8 @@ fn letter(axis: Axis) -> &'static str {
 fn axis_colour(ui: &Ui, axis: Axis) -> Color32 {
     let palette = Palette::of(ui);
     match axis {
-        Axis::X => palette.bad,
-        Axis::Y => palette.good,
+        Axis::X => palette.axis_x,
+        Axis::Y => palette.axis_y,
         Axis::Z => palette.accent,
     }
 }

@@ -1,6 +1,7 @@
 //! How the tip is jogged: whose axes, how far, how fast.
 
 use egui::{RichText, Slider, Ui, WidgetInfo, WidgetType};
+use handeye_sim_link::client::cell::{JOG_JOINT_SPEED_RAD_S, JOG_LINE_SPEED_M_S, JOG_TURN_SPEED_RAD_S};
 
 use crate::command::{Command, Outbox};
 use crate::gui::panes::parts;
@@ -8,13 +9,6 @@ use crate::gui::theme::Palette;
 use crate::model::{JogFrame, JogSettings, JogStep, Model};
 use crate::text::Language;
 use crate::{text, tr};
-
-/// The fastest jog along a line [m/s], of the arm's client.
-const LINE_SPEED_M_S: f64 = 0.25;
-/// The fastest jog about an axis [°/s].
-const TURN_SPEED_DEG_S: f64 = 45.0;
-/// The fastest jog of a joint [°/s].
-const JOINT_SPEED_DEG_S: f64 = 60.0;
 
 /// Steps in millimetres, and in degrees for what turns: 50° at once would be a surprise.
 const STEPS: [(f64, f64); 5] = [(0.1, 0.1), (1.0, 1.0), (5.0, 5.0), (10.0, 10.0), (50.0, 30.0)];
@@ -87,12 +81,12 @@ fn speed_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut
             outbox.send(Command::SetJog(JogSettings { speed: percent / 100.0, ..settings }));
         }
         let share = percent / 100.0;
-        let text = format!("{percent:.0} % · {:.0} mm/s", LINE_SPEED_M_S * 1e3 * share);
+        let text = format!("{percent:.0} % · {:.0} mm/s", JOG_LINE_SPEED_M_S * 1e3 * share);
         let more = text!(
             "At the most {line} mm/s along a line, {turn}°/s about an axis, {joint}°/s for a joint",
-            line = format!("{:.0}", LINE_SPEED_M_S * 1e3 * share),
-            turn = format!("{:.1}", TURN_SPEED_DEG_S * share),
-            joint = format!("{:.1}", JOINT_SPEED_DEG_S * share)
+            line = format!("{:.0}", JOG_LINE_SPEED_M_S * 1e3 * share),
+            turn = format!("{:.1}", JOG_TURN_SPEED_RAD_S.to_degrees() * share),
+            joint = format!("{:.1}", JOG_JOINT_SPEED_RAD_S.to_degrees() * share)
         );
         let colour = Palette::of(ui).text;
         ui.label(RichText::new(text).color(colour)).on_hover_text(more.say(language));

@@ -6,9 +6,7 @@ use super::*;
 use crate::command::Command;
 use crate::gui::panes::driven::Driven;
 use crate::gui::sample;
-use crate::model::{
-    Axis, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Severity, Simulation,
-};
+use crate::model::{Axis, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Severity, Simulation};
 use crate::text::Text;
 
 fn driven(model: Model) -> Driven {
@@ -19,14 +17,18 @@ fn forward_x() -> Jog {
     Jog::Translate { frame: JogFrame::Base, axis: Axis::X, forward: true }
 }
 
-/// Presses a button and holds it for three frames.
+/// Presses a button and holds it for longer than any click takes, with a hand that is not quite still.
 fn hold(pane: &mut Driven, label: &str) -> Vec<Command> {
     pane.commands();
     let at = pane.harness.get_by_label(label).rect().center();
     pane.harness.hover_at(at);
     pane.harness.step();
     pane.harness.drag_at(at);
-    pane.harness.run_steps(3);
+    for n in 0..20 {
+        pane.harness.step();
+        pane.harness.hover_at(at + egui::vec2(0.5 * n as f32, 0.0));
+    }
+    pane.harness.step();
     pane.commands()
 }
 
@@ -35,7 +37,7 @@ fn a_button_moves_from_the_press_to_the_release() {
     let mut pane = driven(sample::connected());
     let held = hold(&mut pane, "Move +X");
     assert_eq!(held.first(), Some(&Command::Jog(forward_x())), "{held:?}");
-    assert!(held.len() > 1 && held[1..].iter().all(|command| *command == Command::JogHeld(forward_x())), "{held:?}");
+    assert!(held.len() >= 20 && held[1..].iter().all(|command| *command == Command::JogHeld(forward_x())), "{held:?}");
     let at = pane.harness.get_by_label("Move +X").rect().center();
     pane.harness.drop_at(at);
     pane.steps();

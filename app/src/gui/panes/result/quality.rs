@@ -57,6 +57,7 @@ pub fn noise_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     ));
 }
 
-fn stated(ui: &mut Ui, caption: &str, value: Option<impl AsRef<str>>) -> egui::Response {
-    parts::stated_ui(ui, caption, value.as_ref().map_or("–", AsRef::as_ref))
+#[expect(clippy::needless_pass_by_value, reason = "made where it is stated")]
+fn stated(ui: &mut Ui, caption: &str, value: Option<String>) -> egui::Response {
+    parts::stated_ui(ui, caption, value.as_deref().unwrap_or("–"))
 }

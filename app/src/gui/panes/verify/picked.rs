@@ -20,8 +20,8 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             tr!(
                 language,
-                "Pick a point of the board in the colour picture. Its place in the base is then measured twice: from \
-                 the depth at the pixel, and from the board as it is seen."
+                "In the step Verify, click a point of the board in the live picture. Its place in the base is then \
+                 measured twice: from the depth at the pixel, and from the board as it is seen."
             ),
         );
         return;

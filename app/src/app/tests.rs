@@ -1,0 +1,135 @@
+use std::time::{Duration, Instant};
+
+use handeye_core::session::CaptureId;
+
+use super::*;
+use crate::model::{
+    CapturePurpose, DepthScale, Jog, Link, LinkState, Motion, MotionOutcome, SolveStatus, StopOutcome, ThemeChoice, Tour,
+};
+use crate::text::{Language, Text};
+use crate::worker::fake::FakeCell;
+
+struct Bench {
+    app: App,
+    _sessions: tempfile::TempDir,
+}
+
+fn bench(cell: &FakeCell) -> Bench {
+    let cell = cell.clone();
+    let connect: Connect = Arc::new(move |_source| Arc::new(cell.clone()) as Arc<dyn Connector>);
+    let clock: Clock = Arc::new(|| 3.0);
+    let waker: Waker = Arc::new(|| {});
+    let sessions = tempfile::tempdir().expect("a folder");
+    let start = Start {
+        source: CellSource::BuiltIn,
+        view: ViewSettings::default(),
+        addresses: Vec::new(),
+        sessions: sessions.path().to_path_buf(),
+        open: None,
+    };
+    Bench { app: App::start(start, connect, clock, waker).expect("threads"), _sessions: sessions }
+}
+
+fn said(app: &App) -> String {
+    app.model().messages.newest().map_or_else(String::new, |message| message.text.say(Language::English))
+}
+
+#[test]
+fn commands_return_at_once_while_the_cell_never_answers() {
+    let (cell, release) = FakeCell::that_never_answers();
+    let mut bench = bench(&cell);
+    let began = Instant::now();
+    let jog = Jog::Joint { index: 0, forward: true };
+    for _ in 0..50 {
+        for command in [
+            Command::Stop,
+            Command::StartSimulation,
+            Command::Reconnect,
+            Command::SetDepthScale(DepthScale::Full),
+            Command::SetTheme(ThemeChoice::Light),
+            Command::JogHeld(jog),
+            Command::JogReleased,
+            Command::Capture(CapturePurpose::Calibrate),
+            Command::GoToTaught("first".to_owned()),
+            Command::Solve,
+        ] {
+            bench.app.apply(command);
+            bench.app.collect();
+        }
+    }
+    // 500 commands; a single one that waited for a reply would wait for ever.
+    assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+    drop(release);
+}
+
+#[test]
+fn a_lost_connection_is_said_and_a_retry_does_not_hide_why() {
+    let mut bench = bench(&FakeCell::new(0));
+    let connected = LinkState::Connected { address: "tcp://a:1".to_owned(), server: "sim".to_owned() };
+    let why = "the cable is out".to_owned();
+    bench.app.absorb(Event::Link { link: Link::Camera, state: connected });
+    let lost = LinkState::Lost { since_s: 1.0, why: why.clone(), attempt: 0 };
+    bench.app.absorb(Event::Link { link: Link::Camera, state: lost });
+    assert_eq!(said(&bench.app), "Camera connection lost: the cable is out");
+    let retrying = LinkState::Retrying { since_s: 1.0, why, attempt: 1 };
+    bench.app.absorb(Event::Link { link: Link::Camera, state: retrying });
+    assert_eq!(said(&bench.app), "Camera connection lost: the cable is out");
+}
+
+#[test]
+fn a_stop_without_connection_points_to_the_emergency_stop() {
+    let mut bench = bench(&FakeCell::new(0));
+    bench.app.absorb(Event::Link { link: Link::Control, state: LinkState::StartingCell { why: None } });
+    bench.app.apply(Command::Stop);
+    assert!(said(&bench.app).contains("emergency stop"), "{}", said(&bench.app));
+    assert!(bench.app.model().stop_pending);
+    bench.app.absorb(Event::Stopped);
+    assert!(!bench.app.model().stop_pending);
+}
+
+#[test]
+fn commands_and_events_survive_being_written_down() {
+    let commands = [
+        Command::Stop,
+        Command::PointAt(None),
+        Command::SetTheme(ThemeChoice::Light),
+        Command::Delete(vec![CaptureId(3)]),
+        Command::RunTour { purpose: Some(CapturePurpose::Verify) },
+    ];
+    for command in commands {
+        let text = serde_json::to_string(&command).expect("it can be written");
+        assert_eq!(serde_json::from_str::<Command>(&text).expect("it can be read"), command);
+    }
+    let state = LinkState::Lost { since_s: 1.5, why: "gone".to_owned(), attempt: 2 };
+    let text = serde_json::to_string(&Event::Link { link: Link::Control, state: state.clone() }).expect("written");
+    let Event::Link { state: read, .. } = serde_json::from_str(&text).expect("read") else { panic!("another event") };
+    assert_eq!(read, state);
+}
+
+#[test]
+fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_tour() {
+    let mut bench = bench(&FakeCell::new(0));
+    bench.app.model.touring = true;
+    let names = vec!["a".to_owned(), "b".to_owned()];
+    bench.app.model.tour = Some(Tour { names, purpose: None, outcomes: Vec::new(), began_s: 0.0 });
+    let id = bench.app.numbers.motion;
+    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Refused(Text::verbatim("too far")) });
+    let tour = bench.app.model().tour.clone().expect("the tour");
+    assert!(matches!(tour.outcomes.as_slice(), [StopOutcome::Skipped(_), ..]), "{tour:?}");
+
+    bench.app.model.touring = true;
+    let id = bench.app.numbers.motion;
+    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Stopped });
+    assert!(!bench.app.model().touring);
+    assert_eq!(bench.app.model().motion, Motion::Idle);
+}
+
+#[test]
+fn an_answer_to_an_earlier_question_is_not_shown() {
+    let mut bench = bench(&FakeCell::new(0));
+    bench.app.numbers.job = JobId(7);
+    bench.app.model.solve.status = SolveStatus::Idle;
+    let outcome = crate::command::SolveOutcome::Failed(Text::verbatim("old"));
+    bench.app.absorb(Event::SolveEnded { job: JobId(6), outcome });
+    assert_eq!(bench.app.model().solve.status, SolveStatus::Idle);
+}
