@@ -33,7 +33,7 @@ mod widget_list;
 mod window;
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
 use eframe::NativeOptions;
@@ -51,6 +51,9 @@ pub use window::Window;
 
 /// Name under which the system keeps layout and size of the window.
 const APP_ID: &str = "handeye-workbench";
+
+/// What the workers report within this time is drawn at once: a picture and the board in it, the robot's state.
+const GATHER: Duration = Duration::from_millis(20);
 
 /// Opens the window and returns when it is closed.
 ///
@@ -70,7 +73,7 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
     };
     let open = move |creation: &eframe::CreationContext<'_>| {
         let ctx = creation.egui_ctx.clone();
-        let waker: Waker = Arc::new(move || ctx.request_repaint());
+        let waker: Waker = Arc::new(move || ctx.request_repaint_after(GATHER));
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
         let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
