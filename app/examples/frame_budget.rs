@@ -59,7 +59,7 @@ fn main() -> anyhow::Result<()> {
         app.apply(Command::Move { goal, what: Text::verbatim("a far place") });
     })?;
 
-    measure("a solve of 1,000 views", CellSource::Address(cell.endpoint()), duration, |app| thousand_views(app))?;
+    measure("a solve of 1,000 views", CellSource::Address(cell.endpoint()), duration, thousand_views)?;
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Longest wait for something to show.
-const PATIENCE: Duration = Duration::from_secs(240);
+const PATIENCE: Duration = Duration::from_mins(4);
 /// Between two looks at the list of controls.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -17,7 +17,7 @@ pub struct Desktop {
     widgets: PathBuf,
     shots: PathBuf,
     clicks: u32,
-    _home: tempfile::TempDir,
+    home: tempfile::TempDir,
 }
 
 /// A control on the screen.
@@ -77,7 +77,7 @@ impl Desktop {
             .spawn()
             .expect("the workbench starts");
         std::fs::create_dir_all(shots).expect("a folder");
-        Self { screen, window, display, widgets, shots: shots.to_path_buf(), clicks: 0, _home: home }
+        Self { screen, window, display, widgets, shots: shots.to_path_buf(), clicks: 0, home }
     }
 
     /// Clicks of the mouse and presses of keys so far.
@@ -87,7 +87,7 @@ impl Desktop {
 
     /// The home folder of the user.
     pub fn home(&self) -> &Path {
-        self._home.path()
+        self.home.path()
     }
 
     fn widgets(&self) -> Vec<Widget> {
@@ -98,7 +98,7 @@ impl Desktop {
             Some(Widget {
                 label: node["label"].as_str()?.to_owned(),
                 role: node["role"].as_str()?.to_owned(),
-                centre: ((at(0)? + at(2)?) / 2.0, (at(1)? + at(3)?) / 2.0),
+                centre: (f64::midpoint(at(0)?, at(2)?), f64::midpoint(at(1)?, at(3)?)),
                 enabled: node["enabled"].as_bool()?,
             })
         };

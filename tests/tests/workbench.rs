@@ -48,7 +48,7 @@ fn ten_poses_are_visited_captured_solved_verified_and_exported() {
     let model = bench.model();
     assert_eq!(model.document().captures.len(), 10, "{}", bench.said());
     let solved = model.solve.current().expect("solved");
-    let truth = solved.result.truth.clone().expect("the cell publishes its truth");
+    let truth = solved.result.truth.expect("the cell publishes its truth");
     assert!(truth.translation_error_mm.is_some_and(|mm| mm < 0.5), "{truth:?}");
     assert!(truth.rotation_error_deg.is_some_and(|deg| deg < 0.03), "{truth:?}");
     assert!(truth.focal_error_percent.is_some_and(|percent| percent < 0.2), "{truth:?}");

@@ -53,7 +53,6 @@ impl App {
             addresses.insert(0, address.clone());
             addresses.truncate(ADDRESSES);
         }
-        self.model.source = source.clone();
         self.model.robot = None;
         self.model.frame = None;
         self.model.cell = None;
@@ -77,6 +76,7 @@ impl App {
             }
             Err(error) => self.say(Severity::Error, text!("The connection was not begun: {error}", error = error)),
         }
+        self.model.source = source;
         self.model.capture = None;
         self.send_target();
     }

@@ -231,7 +231,7 @@ impl App {
 
     /// Tells the user when a worker did not take a request.
     fn expect<Refused>(&mut self, failure: text::Text, asked: Result<(), Refused>) {
-        if asked.is_err() {
+        if let Err(_refused) = asked {
             let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);
             self.say(Severity::Warning, text);
         }

@@ -125,10 +125,10 @@ impl App {
 
 /// A name that no pose has.
 fn free_name(poses: &[TaughtPose]) -> String {
-    (poses.len() + 1..)
-        .map(|number| format!("pose {number}"))
-        .find(|name| poses.iter().all(|pose| pose.name != *name))
-        .unwrap_or_default()
+    let is_free = |name: &String| poses.iter().all(|pose| pose.name != *name);
+    // One of them is free: there are more numbers than poses.
+    let numbers = poses.len() + 1..=2 * poses.len() + 1;
+    numbers.map(|number| format!("pose {number}")).find(is_free).unwrap_or_default()
 }
 
 #[cfg(test)]

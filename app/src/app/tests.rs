@@ -4,7 +4,8 @@ use handeye_core::session::CaptureId;
 
 use super::*;
 use crate::model::{
-    CapturePurpose, DepthScale, Jog, Link, LinkState, Motion, MotionOutcome, SolveStatus, StopOutcome, ThemeChoice, Tour,
+    CapturePurpose, DepthScale, Jog, Link, LinkState, Motion, MotionOutcome, SolveStatus, StopOutcome, ThemeChoice,
+    Tour,
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::FakeCell;

@@ -11,6 +11,7 @@ use crate::text::Text;
 /// What is drawn over the pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, and all combinations make sense")]
 pub struct Overlays {
     /// Corners that were found, coloured by row.
     pub corners: bool,

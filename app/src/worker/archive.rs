@@ -161,13 +161,12 @@ impl Archive {
 
     /// The session that is open; one is begun when there is something to keep and none is.
     fn store(&mut self) -> Result<&mut Store, SessionError> {
-        let store = match self.store.take() {
-            Some(store) => store,
-            None => {
-                let store = self.create(None)?;
-                self.outlet.notice(Severity::Info, text!("New session in {folder}", folder = store.folder().display()));
-                store
-            }
+        let store = if let Some(store) = self.store.take() {
+            store
+        } else {
+            let store = self.create(None)?;
+            self.outlet.notice(Severity::Info, text!("New session in {folder}", folder = store.folder().display()));
+            store
         };
         Ok(self.store.insert(store))
     }

@@ -44,20 +44,20 @@ pub fn forget(ctx: &Context) {
 }
 
 /// The dialog.
-pub fn folders_ui(ui: &mut Ui, model: &Model, dialog: &Dialog, outbox: &mut Outbox) {
+pub fn folders_ui(ui: &mut Ui, model: &Model, dialog: Dialog, outbox: &mut Outbox) {
     let language = model.view.language;
     let purpose = Purpose::of(dialog, language);
     let mut state: State = parts::remembered(ui, id());
-    let is_new = state.dialog.as_ref() != Some(dialog);
+    let is_new = state.dialog != Some(dialog);
     if is_new {
-        state = State { dialog: Some(dialog.clone()), typed: purpose.first_path(model), ..State::default() };
+        state = State { dialog: Some(dialog), typed: purpose.first_path(model), ..State::default() };
         outbox.send(Command::ListFolder(purpose::first_folder(model)));
     }
     keys(ui, model, &purpose, &mut state, outbox);
     ui.label(RichText::new(purpose.title).size(16.0).color(Palette::of(ui).text));
     parts::hint_ui(ui, purpose.hint);
     path_ui(ui, model, &purpose, &mut state, is_new, outbox);
-    if *dialog == Dialog::Open {
+    if dialog == Dialog::Open {
         list::recent_ui(ui, model, &mut state, outbox);
     }
     list::entries_ui(ui, model, &purpose, &mut state, outbox);

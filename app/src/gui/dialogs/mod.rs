@@ -18,7 +18,7 @@ const WIDE: f32 = 680.0;
 
 /// The dialog that is open; the command palette is drawn elsewhere.
 pub fn dialogs_ui(ctx: &Context, model: &Model, outbox: &mut Outbox) {
-    match &model.dialog {
+    match model.dialog {
         None | Some(Dialog::Palette) => folders::forget(ctx),
         Some(Dialog::Help) => {
             over_ui(ctx, WIDE, outbox, |ui, outbox| {

@@ -21,7 +21,7 @@ pub fn timestamp_rfc3339() -> String {
 
 /// A folder of that name that is not there yet.
 pub fn free_folder(under: &Path, name: &str) -> PathBuf {
-    (1_u32..)
+    (1..u32::MAX)
         .map(|n| if n == 1 { under.join(name) } else { under.join(format!("{name}-{n}")) })
         .find(|folder| !folder.exists())
         .unwrap_or_else(|| under.join(name))

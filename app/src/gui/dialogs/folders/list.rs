@@ -37,7 +37,7 @@ pub fn recent_ui(ui: &mut Ui, model: &Model, state: &mut State, outbox: &mut Out
                 state.typed.clone_from(&path);
             }
             if response.double_clicked() {
-                act(model, &Purpose::of(&Dialog::Open, language), state, outbox);
+                act(model, &Purpose::of(Dialog::Open, language), state, outbox);
             }
         });
     }

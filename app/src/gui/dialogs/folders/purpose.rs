@@ -26,7 +26,7 @@ pub struct Purpose {
 
 impl Purpose {
     /// In the language of the window.
-    pub fn of(dialog: &Dialog, language: Language) -> Self {
+    pub fn of(dialog: Dialog, language: Language) -> Self {
         let (title, hint, action) = match dialog {
             Dialog::SaveAs => (
                 tr!(language, "Save a copy of the session"),
@@ -60,11 +60,11 @@ impl Purpose {
             ),
         };
         Self {
-            dialog: dialog.clone(),
+            dialog,
             title,
             hint,
             action,
-            empty_hint: if *dialog == Dialog::New {
+            empty_hint: if dialog == Dialog::New {
                 tr!(language, "Empty: a new folder among the sessions")
             } else {
                 tr!(language, "A path")
