@@ -13,6 +13,7 @@ fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
         return;
     }
     let shots = std::env::var_os("HANDEYE_SCREENSHOTS")
+        .filter(|folder| !folder.is_empty())
         .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("first_user"), PathBuf::from);
     let mut desktop = Desktop::start((1440, 900), &shots, &[], &[]);
     let began = Instant::now();
@@ -47,7 +48,7 @@ fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
     println!("first user: {} clicks, {:.0} s on the clock", desktop.clicks(), took.as_secs_f64());
     assert!(desktop.clicks() <= 15, "{} clicks", desktop.clicks());
     // The built-in cell keeps pace with real time, so the clock is at least the simulated time.
-    assert!(took < Duration::from_secs(180) || cfg!(debug_assertions), "{took:?}");
+    assert!(took < Duration::from_mins(3) || cfg!(debug_assertions), "{took:?}");
     let sessions = desktop.home().join("handeye-sessions");
     let session = std::fs::read_dir(&sessions).expect("the sessions").flatten().next().expect("a session").path();
     for file in ["result.json", "exports/calibration.json", "exports/opencv.yaml"] {

@@ -69,6 +69,8 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
             .with_title("Handeye Workbench")
             .with_inner_size([1440.0, 900.0])
             .with_min_inner_size([1024.0, 700.0]),
+        // There are no gradients to smooth, and without a graphics card every pixel would cost more.
+        dithering: false,
         ..NativeOptions::default()
     };
     let open = move |creation: &eframe::CreationContext<'_>| {
