@@ -27,7 +27,7 @@ fn colours_are_averaged_and_rounded_and_depths_leave_holes_out() {
     assert_eq!(depth.metres[1], 3.5, "far, not a surface at the mean of far and nothing");
     assert_eq!(depth.metres[2], 0.0);
     assert_eq!(depth.metres[3], 2.0);
-    let (other, _) = (RgbImage::new(3, 2), ());
+    let other = RgbImage::new(3, 2);
     assert!(!average.add(&other, &depth, 3.5), "another size");
     assert_eq!(average.frames(), 3);
 }
