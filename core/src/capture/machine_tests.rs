@@ -246,7 +246,8 @@ fn a_pose_that_there_is_already_is_named_with_its_distance() {
 #[test]
 fn the_average_has_its_pictures_and_their_scatter_and_no_others() {
     let mut machine = Machine::new(plan(16), REQUESTED_S);
-    let corner = |number: u64| Corner { index: 0, px: Vector2::new(if number.is_multiple_of(2) { 1.0 } else { -1.0 }, 5.0) };
+    let corner =
+        |number: u64| Corner { index: 0, px: Vector2::new(if number.is_multiple_of(2) { 1.0 } else { -1.0 }, 5.0) };
     let mut sum = 0.0;
     for instant in pictures(3.0, |_| 0.0) {
         let progress = machine.see(&Pose::identity(), &instant.shot());
