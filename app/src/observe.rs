@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use handeye_core::calibrate::{CameraKnowledge, Observations, ObservedView};
 use handeye_core::camera::Distortion;
-use handeye_core::dataset::{Dataset, DatasetError, Entry};
+use handeye_core::dataset::{CameraInput, Dataset, DatasetError, Entry};
 use handeye_core::observation::Corner;
 use handeye_core::progress::CancelToken;
 use handeye_core::vision::{self, VisionError};
@@ -70,13 +70,14 @@ pub fn observe(
         target: dataset.target,
         // Only pose pairs come without a size, and they need none.
         image_size: dataset.image_size.unwrap_or_default(),
-        camera: camera_knowledge(dataset),
+        camera: camera_knowledge(dataset.camera.as_ref()),
         views,
     })
 }
 
-fn camera_knowledge(dataset: &Dataset) -> CameraKnowledge {
-    match &dataset.camera {
+/// What a data set or a session says of its camera, for the solver.
+pub fn camera_knowledge(camera: Option<&CameraInput>) -> CameraKnowledge {
+    match camera {
         None => CameraKnowledge::Estimate { model: DEFAULT_MODEL, start: None },
         Some(input) => match input.intrinsics {
             Some(intrinsics) if input.fixed => CameraKnowledge::Fixed(intrinsics),

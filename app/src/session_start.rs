@@ -9,6 +9,9 @@ use crate::model::Truth;
 /// The board of the reference scene.
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
+/// The ten reference poses, so that they are there wherever the binary is.
+pub const REFERENCE_POSES: &str = include_str!("../../assets/poses/seed10.toml");
+
 /// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.
 pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
     let ground_truth = truth.and_then(|truth| {

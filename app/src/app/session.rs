@@ -11,9 +11,7 @@ use handeye_core::target::TargetSpec;
 
 use super::App;
 use super::taught::reference_poses;
-use crate::model::{
-    CapturePurpose, Dialog, FrameImages, Observed, RecentSession, Review, SessionState, Severity, SolveState,
-};
+use crate::model::{CapturePurpose, Dialog, FrameImages, Observed, RecentSession, Review, SessionState, Severity};
 use crate::session_start;
 use crate::text;
 use crate::text::Text;
@@ -127,14 +125,14 @@ impl App {
     /// The document is now like this, on the disk.
     pub(super) fn document_changed(&mut self, state: SessionState) {
         let before = std::mem::replace(&mut self.model.session, state);
-        let (old, new) = (&before.document, &self.model.session.document);
+        let (old, new) = (&before.document, Arc::clone(&self.model.session.document));
         let target_changed = old.meta.target != new.meta.target || before.folder.is_none();
         let another = before.folder != self.model.session.folder && before.folder.is_some();
         if old.meta.target != new.meta.target || another {
             self.model.observed.clear();
         }
         if another {
-            self.model.solve = SolveState::default();
+            self.forget_solve();
             self.model.picked = None;
         }
         if let Some(names) = &new.export_names

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use handeye_core::calibrate::{CameraKnowledge, Method, Observations, ObservedView};
+use handeye_core::calibrate::{Method, Observations, ObservedView};
 use handeye_core::observation::{Corner, View};
 use handeye_core::progress::Stage;
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
 
 use super::App;
 use crate::command::SolveOutcome;
-use crate::model::{Goal, JobId, Severity, SolveStatus};
-use crate::observe::DEFAULT_MODEL;
+use crate::model::{Goal, JobId, Severity, SolveState, SolveStatus};
+use crate::observe::camera_knowledge;
 use crate::text;
 use crate::text::Text;
 use crate::worker::{ArchiveTask, SolveJob};
@@ -115,7 +115,7 @@ impl App {
                 mode: Some(document.meta.mode),
                 target: document.meta.target,
                 image_size: self.image_size(),
-                camera: camera_knowledge(document),
+                camera: camera_knowledge(document.meta.camera.as_ref()),
                 views: views.collect(),
             },
             captures: fitted.iter().map(|it| it.id).collect(),
@@ -129,6 +129,14 @@ impl App {
     /// Width and height of the pictures in pixels: all captures of a session have the same.
     fn image_size(&self) -> (u32, u32) {
         self.model.observed.values().flatten().map(|observed| observed.image_size).next().unwrap_or_default()
+    }
+
+    /// Forgets question and answer: they are of another session.
+    pub(super) fn forget_solve(&mut self) {
+        self.desk.cancel_solve();
+        self.numbers.job = JobId(self.numbers.job.0 + 1);
+        self.asked = None;
+        self.model.solve = SolveState::default();
     }
 
     pub(super) fn cancel_solve(&mut self) {
@@ -170,7 +178,8 @@ impl App {
                 self.model.solve.solved = Some(solved);
                 self.send_intrinsics();
                 self.preview_exports();
-                if self.desk.archive(ArchiveTask::Result(result)).is_err() {
+                let Some(folder) = self.model.session.folder.clone() else { return };
+                if self.desk.archive(ArchiveTask::Result { folder, result }).is_err() {
                     self.say(
                         Severity::Warning,
                         text!("The result was not kept beside the session; solve again to keep it"),
@@ -184,15 +193,5 @@ impl App {
 
     fn no_answer(&mut self, why: Text) {
         self.model.solve.status = SolveStatus::Failed { why };
-    }
-}
-
-fn camera_knowledge(document: &Document) -> CameraKnowledge {
-    match &document.meta.camera {
-        None => CameraKnowledge::Estimate { model: DEFAULT_MODEL, start: None },
-        Some(input) => match input.intrinsics {
-            Some(intrinsics) if input.fixed => CameraKnowledge::Fixed(intrinsics),
-            start => CameraKnowledge::Estimate { model: input.model, start },
-        },
     }
 }

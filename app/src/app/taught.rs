@@ -7,11 +7,9 @@ use handeye_core::session::{Edit, TaughtChange};
 
 use super::App;
 use crate::model::{MotionGoal, MotionOutcome, Severity};
+use crate::session_start::REFERENCE_POSES;
 use crate::text;
 use crate::worker::FileTask;
-
-/// The ten reference poses, so that they are there wherever the binary is.
-pub const REFERENCE_POSES: &str = include_str!("../../../assets/poses/seed10.toml");
 
 /// The reference poses.
 pub fn reference_poses() -> Vec<TaughtPose> {

@@ -3,6 +3,7 @@ use std::time::{Duration, Instant};
 use handeye_core::session::CaptureId;
 
 use super::*;
+use crate::gui::sample;
 use crate::model::{
     CapturePurpose, DepthScale, Jog, Link, LinkState, Motion, MotionOutcome, SolveStatus, StopOutcome, ThemeChoice,
     Tour,
@@ -132,5 +133,21 @@ fn an_answer_to_an_earlier_question_is_not_shown() {
     bench.app.model.solve.status = SolveStatus::Idle;
     let outcome = crate::command::SolveOutcome::Failed(Text::verbatim("old"));
     bench.app.absorb(Event::SolveEnded { job: JobId(6), outcome });
+    assert_eq!(bench.app.model().solve.status, SolveStatus::Idle);
+}
+
+#[test]
+fn an_answer_of_the_session_before_does_not_get_into_another_one() {
+    let mut bench = bench(&FakeCell::new(0));
+    let mut state = bench.app.model().session.clone();
+    state.folder = Some(PathBuf::from("first"));
+    bench.app.absorb(Event::Document(Box::new(state.clone())));
+    let job = bench.app.numbers.job;
+    // Its captures have yet to be looked at, so that nothing new is solved before the old answer comes.
+    state.folder = Some(PathBuf::from("second"));
+    state.document = sample::captured().session.document;
+    bench.app.absorb(Event::Document(Box::new(state)));
+    let outcome = crate::command::SolveOutcome::Failed(Text::verbatim("of the first session"));
+    bench.app.absorb(Event::SolveEnded { job, outcome });
     assert_eq!(bench.app.model().solve.status, SolveStatus::Idle);
 }

@@ -12,7 +12,6 @@ use handeye_core::poses_file::Goal;
 use handeye_core::progress::CancelToken;
 use handeye_core::result::CalibrationResult;
 use handeye_core::session::{Capture, FolderLock, GroundTruth, Session, SessionMeta, Store};
-use handeye_core::target::{Grid, TargetSpec};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths, Frame, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError};
@@ -21,6 +20,7 @@ use time::macros::format_description;
 
 use super::cell::SceneArg;
 use super::{Failure, report, solve};
+use crate::session_start::BOARD;
 use crate::truth;
 use poses::Plan;
 
@@ -48,9 +48,6 @@ pub struct AutoArgs {
     #[arg(long)]
     real_time: bool,
 }
-
-/// The board of the reference scene.
-const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
 pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();

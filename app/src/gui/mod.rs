@@ -18,7 +18,7 @@ mod pane_harness;
 mod panes;
 mod rail;
 #[cfg(test)]
-mod sample;
+pub mod sample;
 mod session;
 #[cfg(test)]
 mod snapshot_tests;

@@ -63,7 +63,12 @@ pub enum ArchiveTask {
     /// Make the last change again that was taken back.
     Redo,
     /// Keep a result beside the captures it came from.
-    Result(Box<CalibrationResult>),
+    Result {
+        /// The session that it is of; another one that is open by now does not get it.
+        folder: PathBuf,
+        /// The result.
+        result: Box<CalibrationResult>,
+    },
 }
 
 /// The session thread.
@@ -124,7 +129,7 @@ impl Archive {
             ArchiveTask::Edit(edit) => self.change(|store| store.apply(*edit)),
             ArchiveTask::Undo => self.change(Store::undo),
             ArchiveTask::Redo => self.change(Store::redo),
-            ArchiveTask::Result(result) => self.keep_result(*result),
+            ArchiveTask::Result { folder, result } => self.keep_result(&folder, *result),
         }
     }
 
@@ -241,8 +246,8 @@ impl Archive {
     }
 
     /// The digest of the input is that of the files, so that the command line and the window write the same result.
-    fn keep_result(&mut self, mut result: CalibrationResult) {
-        let Some(store) = &mut self.store else { return };
+    fn keep_result(&mut self, folder: &Path, mut result: CalibrationResult) {
+        let Some(store) = self.store.as_mut().filter(|store| store.folder() == folder) else { return };
         let digest = Dataset::read(store.folder()).and_then(|dataset| dataset.input_sha256());
         match digest {
             Ok(digest) => result.provenance.input_sha256 = Some(digest),

@@ -9,9 +9,7 @@ use handeye_sim_link::client::MotionLimits;
 
 use super::super::Failure;
 use crate::limits;
-
-/// The ten reference poses, so that they are there wherever the binary is.
-const SEED10: &str = include_str!("../../../../assets/poses/seed10.toml");
+use crate::session_start::REFERENCE_POSES;
 
 /// How many views `--poses auto` plans.
 const PLANNED_VIEWS: usize = 20;
@@ -32,7 +30,9 @@ impl Plan {
     /// The poses of that name or file; `auto` plans views of the scene's board.
     pub fn find(what: &str, scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
         match what {
-            "seed10" => Self::taught(&TaughtPoses::parse(Path::new("seed10"), SEED10).map_err(Failure::failed)?),
+            "seed10" => {
+                Self::taught(&TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES).map_err(Failure::failed)?)
+            }
             "auto" => Self::planned(scene, seed),
             file => Self::taught(&TaughtPoses::read(Path::new(file)).map_err(Failure::unusable)?),
         }
