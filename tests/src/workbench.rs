@@ -11,7 +11,7 @@ use handeye_app::text::Language;
 use handeye_app::worker::{Clock, LiveConnector, Waker};
 
 /// Longer than anything that a test waits for takes on a busy machine.
-const PATIENCE: Duration = Duration::from_mins(3);
+const PATIENCE: Duration = Duration::from_mins(6);
 
 /// An application at work.
 pub struct Workbench {

@@ -23,10 +23,10 @@ fn idle_and_fresh(model: &Model) -> bool {
     model.solve.status == SolveStatus::Idle && model.solve.fresh
 }
 
-/// A cell whose time runs as fast as it can, with the ten reference poses captured and solved. The cell comes with it.
+/// A cell that keeps pace with real time, with the ten reference poses captured and solved. The cell comes with it.
 fn toured(sessions: &Path) -> (Workbench, CellServer) {
     let scene = Scene::reference().expect("the scene");
-    let cell = CellServer::start(CellConfig { real_time: Some(false), ..CellConfig::new(scene) }).expect("a cell");
+    let cell = CellServer::start(CellConfig { real_time: Some(true), ..CellConfig::new(scene) }).expect("a cell");
     let mut bench = Workbench::start(CellSource::Address(cell.endpoint()), sessions, None);
     bench.until("a cell", connected);
     bench.click(Command::StartSimulation);
