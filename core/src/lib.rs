@@ -26,6 +26,8 @@ pub mod se3;
 pub mod session;
 pub mod target;
 #[cfg(feature = "opencv")]
+pub mod track;
+#[cfg(feature = "opencv")]
 pub mod verify;
 #[cfg(feature = "opencv")]
 pub mod vision;

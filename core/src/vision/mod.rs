@@ -9,8 +9,8 @@ mod chessboard;
 mod circles;
 mod detect;
 mod order;
-mod saddle;
-mod subpixel;
+pub(crate) mod saddle;
+pub(crate) mod subpixel;
 
 pub mod intrinsics;
 pub mod pnp;
@@ -149,4 +149,4 @@ mod intrinsics_tests;
 #[cfg(test)]
 mod pnp_tests;
 #[cfg(test)]
-mod rendered;
+pub(crate) mod rendered;

@@ -233,7 +233,7 @@ fn normal_equations(
 }
 
 /// Derivative of a pixel by `delta` in `project(pose * exp(delta) * point)`.
-pub(super) fn px_by_pose(
+pub(crate) fn px_by_pose(
     px_by_point: &nalgebra::Matrix2x3<f64>,
     rotation: &Matrix3<f64>,
     point: &Point3<f64>,

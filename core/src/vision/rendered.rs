@@ -10,7 +10,7 @@ use crate::camera::Intrinsics;
 use crate::target::Grid;
 
 /// A picture of a chessboard by a pinhole camera.
-pub(super) struct Scene {
+pub(crate) struct Scene {
     pub camera: Intrinsics,
     pub grid: Grid,
     pub camera_from_target: Isometry3<f64>,
@@ -153,7 +153,7 @@ fn blur(levels: &mut [f64], width: usize, height: usize, sigma: f64) {
 /// `camera_from_target` with the camera `distance_m` from the board's middle, looked at from `tilt` off its normal
 /// in the direction `azimuth`, then turned by `roll` around the optical axis; the board's middle is imaged
 /// `offset_px` from the principal point.
-pub(super) fn looking_at(
+pub(crate) fn looking_at(
     grid: &Grid,
     camera: &Intrinsics,
     distance_m: f64,

@@ -27,7 +27,7 @@ const FURTHEST: f64 = 0.12;
 
 /// The saddle point near `start`, for a corner whose nearest neighbour is `spacing` pixels away; `None` where there is
 /// no saddle.
-pub(super) fn refine(image: &GrayImage, start: &Vector2<f64>, spacing: f64) -> Option<Vector2<f64>> {
+pub(crate) fn refine(image: &GrayImage, start: &Vector2<f64>, spacing: f64) -> Option<Vector2<f64>> {
     let sigma = (SIGMA_PER_SPACING * spacing).clamp(SIGMA_PX.0, SIGMA_PX.1);
     let mut at = *start;
     for _ in 0..FITS {

@@ -281,7 +281,7 @@ fn normal_equations(patch: &Patch, x: &Parameters) -> (f64, SMatrix<f64, 9, 9>, 
 }
 
 /// erf(x) to 1.5·10⁻⁷ and its derivative. Abramowitz & Stegun 1964, 7.1.26.
-fn erf_and_slope(x: f64) -> (f64, f64) {
+pub(crate) fn erf_and_slope(x: f64) -> (f64, f64) {
     const A: [f64; 5] = [0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429];
     let gauss = (-x * x).exp();
     let t = 1.0 / (1.0 + 0.3275911 * x.abs());

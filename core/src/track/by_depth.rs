@@ -1,0 +1,158 @@
+//! The board from depths: every corner becomes a point by its own depth, and a rigid board is laid through the points.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+
+use super::pose;
+use super::{ByDepth, Picture, Seen};
+use crate::depth::{DepthImage, DepthSample};
+use crate::frames::{Base, Camera, PointIn, Pose};
+use crate::observation::Corner;
+use crate::se3;
+use crate::target::TargetSpec;
+use crate::verify::Calibrated;
+
+/// Points that fix a board with one to spare, so that a wrong one shows.
+const MIN_POINTS: usize = 4;
+/// Measurements around a corner that make a median where not all four around it are there.
+const MIN_AROUND: usize = 3;
+/// Depths around a corner that differ by more than this part are those of two surfaces: a board seen at 80° from its
+/// normal, with a pixel of 1/500, has 1 %.
+const ONE_SURFACE: f64 = 0.02;
+/// Points off by more than this many standard deviations (from the median) are not on the board.
+const OUTLIER: f64 = 4.0;
+/// The median of a normal error's size is this part of its standard deviation.
+const MEDIAN_SIZE: f64 = 0.6745;
+/// Depths are never called outliers below this [m]: a depth camera's steps.
+const FLOOR_M: f64 = 1e-3;
+const ROUNDS: usize = 4;
+
+/// A corner with depth.
+struct Point {
+    index: usize,
+    on_board: Point3<f64>,
+    in_camera: Point3<f64>,
+}
+
+/// The board by the depths at the corners `seen`; `None` when fewer than four corners, or corners on one line only, have
+/// one. The pose by corners serves to tell depths of the board from depths of something else, no more.
+pub(super) fn by_depth(
+    picture: &Picture<'_>,
+    depth: &DepthImage,
+    seen: &Seen,
+    calibrated: &Calibrated,
+    target: &TargetSpec,
+) -> Option<ByDepth> {
+    let base_from_camera = calibrated.base_from_camera(&picture.base_from_tip);
+    let mut points: Vec<Point> = Vec::with_capacity(seen.corners.len());
+    for corner in &seen.corners {
+        if let Some(in_camera) = point_at(depth, corner, picture.far_plane_m, calibrated) {
+            points.push(Point { index: corner.index, on_board: target.grid().point(corner.index), in_camera });
+        }
+    }
+    // One wrong offset of all depths must not empty the set, hence the deviation from the median.
+    let ahead: Vec<f64> =
+        points.iter().map(|p| p.in_camera.z - (seen.camera_from_target.isometry() * p.on_board).z).collect();
+    let middle = median(ahead.clone())?;
+    let off: Vec<f64> = ahead.iter().map(|a| (a - middle).abs()).collect();
+    let reach = reach(&off);
+    let mut off = off.into_iter();
+    points.retain(|_| off.next().is_some_and(|off| off <= reach));
+    let camera_from_target = fit(&mut points, target)?;
+    let squares: f64 = points.iter().map(|p| (camera_from_target * p.on_board - p.in_camera).norm_squared()).sum();
+    let first = points.iter().find(|p| p.index == 0);
+    Some(ByDepth {
+        base_from_target: base_from_camera * Pose::from_isometry(camera_from_target),
+        first_corner_in_base: first.map(|p| in_base(&base_from_camera, p.in_camera)),
+        corners: points.len(),
+        rms_m: (squares / points.len() as f64).sqrt(),
+    })
+}
+
+fn in_base(base_from_camera: &Pose<Base, Camera>, point: Point3<f64>) -> Point3<f64> {
+    (*base_from_camera * PointIn::<Camera>::new(point)).point()
+}
+
+/// Where the ray through the corner has the corner's depth.
+fn point_at(depth: &DepthImage, corner: &Corner, far_m: f32, calibrated: &Calibrated) -> Option<Point3<f64>> {
+    let depth_m = depth_at(depth, corner.px, far_m)?;
+    let ray = calibrated.intrinsics.unproject(&corner.px).ok()?;
+    (ray.z > 0.0).then(|| Point3::from(ray.into_inner() * (depth_m / ray.z)))
+}
+
+/// Between four pixels of one surface by their inverse depths, which are linear over a plane; next to a pixel without
+/// measurement, or at an edge, the median of the pixels around.
+fn depth_at(depth: &DepthImage, px: Vector2<f64>, far_m: f32) -> Option<f64> {
+    let measured = |column: f64, row: f64| {
+        if column < 0.0 || row < 0.0 {
+            return None;
+        }
+        match depth.sample(column as u32, row as u32, far_m) {
+            // A far plane of its own keeps infinity out where the sensor states none.
+            DepthSample::Metres(m) if m.is_finite() => Some(f64::from(m)),
+            _ => None,
+        }
+    };
+    let (u, v) = (px.x.floor(), px.y.floor());
+    let four = [measured(u, v), measured(u + 1.0, v), measured(u, v + 1.0), measured(u + 1.0, v + 1.0)];
+    if let [Some(a), Some(b), Some(c), Some(d)] = four {
+        let (low, high) = (a.min(b).min(c).min(d), a.max(b).max(c).max(d));
+        if high - low <= ONE_SURFACE * low {
+            let (s, t) = (px.x - u, px.y - v);
+            let inverse = (1.0 - t) * ((1.0 - s) / a + s / b) + t * ((1.0 - s) / c + s / d);
+            return Some(1.0 / inverse);
+        }
+    }
+    let (u, v) = (px.x.round(), px.y.round());
+    let mut around = Vec::with_capacity(9);
+    for (du, dv) in [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)] {
+        around.extend(measured(u + f64::from(du), v + f64::from(dv)));
+    }
+    if around.len() < MIN_AROUND { None } else { median(around) }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+fn reach(off: &[f64]) -> f64 {
+    (OUTLIER * median(off.to_vec()).unwrap_or(0.0) / MEDIAN_SIZE).max(FLOOR_M)
+}
+
+/// Rigid fit; points that do not fit are taken out of the set.
+fn fit(points: &mut Vec<Point>, target: &TargetSpec) -> Option<Isometry3<f64>> {
+    let mut pose = None;
+    for _ in 0..ROUNDS {
+        let spread = 0.4 * target.grid().square_m;
+        if points.len() < MIN_POINTS || !pose::spans(points.iter().map(|p| p.on_board), spread) {
+            return None;
+        }
+        let found = rigid(points);
+        pose = Some(found);
+        let off: Vec<f64> = points.iter().map(|p| (found * p.on_board - p.in_camera).norm()).collect();
+        let reach = reach(&off);
+        if off.iter().all(|off| *off <= reach) {
+            break;
+        }
+        let mut off = off.into_iter();
+        points.retain(|_| off.next().is_some_and(|off| off <= reach));
+    }
+    pose
+}
+
+/// Kabsch 1976, "A solution for the best rotation to relate two sets of vectors".
+fn rigid(points: &[Point]) -> Isometry3<f64> {
+    let count = points.len().max(1) as f64;
+    let from: Vector3<f64> = points.iter().map(|p| p.on_board.coords).sum::<Vector3<f64>>() / count;
+    let to: Vector3<f64> = points.iter().map(|p| p.in_camera.coords).sum::<Vector3<f64>>() / count;
+    let mut cross = Matrix3::zeros();
+    for point in points {
+        cross += (point.in_camera.coords - to) * (point.on_board.coords - from).transpose();
+    }
+    let rotation = UnitQuaternion::from_rotation_matrix(&se3::nearest_rotation(&cross));
+    Isometry3::from_parts(Translation3::from(to - rotation * from), rotation)
+}
+
+#[cfg(test)]
+#[path = "by_depth_tests.rs"]
+mod tests;

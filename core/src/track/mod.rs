@@ -1,0 +1,169 @@
+//! Following the board from picture to picture: where it is in the base frame, how fast it moves, and how sure that is.
+//!
+//! | part | does |
+//! | --- | --- |
+//! | [`Tracker`] | corners near where they are expected, pose, filter; lost and found |
+//! | [`Keep`] | where the tip has to be, so that the camera keeps its view of the board |
+//!
+//! Nothing here reads a clock or knows a thread: time is the simulated (or recorded) time of the pictures.
+
+mod by_depth;
+mod corner;
+mod error;
+mod filter;
+mod glance;
+mod goal;
+mod motion;
+mod noise;
+mod pose;
+mod sight;
+#[cfg(test)]
+mod stage;
+mod tracker;
+
+use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
+
+use crate::depth::DepthImage;
+use crate::frames::{Base, Camera, Pose, Target, Tip};
+use crate::image::GrayImage;
+use crate::observation::Corner;
+use crate::target::TargetSpec;
+use crate::verify::Calibrated;
+
+pub use error::TrackError;
+pub use goal::{Keep, TipGoal};
+pub use tracker::Tracker;
+
+/// What a tracker works with.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The board.
+    pub target: TargetSpec,
+    /// Camera and hand-eye, with their uncertainty where it is known.
+    pub calibrated: Calibrated,
+    /// How the board may move.
+    pub motion: MotionModel,
+}
+
+/// The board's velocity is constant but for white noise in its acceleration, of these densities.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionModel {
+    /// Of the acceleration of its centre [m/s²/√Hz].
+    pub acceleration: f64,
+    /// Of its angular acceleration [rad/s²/√Hz].
+    pub angular_acceleration: f64,
+    /// How long [s] the board is assumed to go on as it went while it is not seen; after that it is lost.
+    pub coast_s: f64,
+}
+
+/// A picture with its circumstances.
+#[derive(Debug, Clone, Copy)]
+pub struct Picture<'a> {
+    /// Its time [s]; must grow from picture to picture, a step back starts the tracker anew.
+    pub time_s: f64,
+    /// The picture.
+    pub grey: &'a GrayImage,
+    /// Depth of the same instant and the same camera, where there is one.
+    pub depth: Option<&'a DepthImage>,
+    /// Depths there and beyond are no surface [m].
+    pub far_plane_m: f32,
+    /// The tip at the same instant.
+    pub base_from_tip: Pose<Base, Tip>,
+}
+
+/// Whether the board is followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum State {
+    /// It has not been seen yet.
+    Searching,
+    /// It is seen.
+    Tracking {
+        /// Corners that are seen.
+        corners: usize,
+        /// Corners that there are.
+        of: usize,
+    },
+    /// It is not seen in this picture, and is assumed to go on as it went.
+    Coasting {
+        /// Time of the last picture in which it was seen [s].
+        since_s: f64,
+    },
+    /// It has not been seen for too long; nothing is known of where it is.
+    Lost {
+        /// Time of the last picture in which it was seen [s].
+        since_s: f64,
+    },
+}
+
+/// The board in one picture alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// Corners that are seen; not all of them where the board is partly hidden.
+    pub corners: Vec<Corner>,
+    /// The board in the camera, by PnP.
+    pub camera_from_target: Pose<Camera, Target>,
+    /// The board in the base, by way of the calibration and the pose of the tip.
+    pub base_from_target: Pose<Base, Target>,
+    /// Covariance of `base_from_target` from the noise of the corners: right perturbation `[t; r]`, m and rad.
+    pub covariance: Matrix6<f64>,
+    /// RMS of the distances between corners and their model [px].
+    pub rms_px: f64,
+}
+
+/// The board from depths at its corners: pixel and depth, then camera, tip and base. No model of the lens enters the
+/// distance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ByDepth {
+    /// The rigid pose that fits the points best.
+    pub base_from_target: Pose<Base, Target>,
+    /// The first corner of the board by its own depth alone, in base axes; `None` without a depth there.
+    pub first_corner_in_base: Option<Point3<f64>>,
+    /// Corners with a depth.
+    pub corners: usize,
+    /// RMS distance of the points from the fitted board [m].
+    pub rms_m: f64,
+}
+
+/// Where the board is by all pictures so far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// For this time [s].
+    pub time_s: f64,
+    /// The board.
+    pub base_from_target: Pose<Base, Target>,
+    /// Covariance of `base_from_target` from corners and model of motion, the calibration being taken as exact: right
+    /// perturbation `[t; r]`, m and rad.
+    pub covariance: Matrix6<f64>,
+    /// Velocity of the board's origin, in base axes [m/s].
+    pub velocity_m_s: Vector3<f64>,
+    /// Angular velocity of the board, in base axes [rad/s].
+    pub angular_velocity_rad_s: Vector3<f64>,
+}
+
+impl Estimate {
+    /// The same board at another time, going on as it goes. The covariance stays that of its own time; the tracker
+    /// ([`Tracker::at`]) knows how it grows.
+    #[must_use]
+    pub fn carried_to(&self, time_s: f64) -> Self {
+        let after_s = time_s - self.time_s;
+        let turn = UnitQuaternion::from_scaled_axis(self.angular_velocity_rad_s * after_s);
+        let place = Translation3::from(self.base_from_target.translation() + self.velocity_m_s * after_s);
+        let carried = Isometry3::from_parts(place, turn * self.base_from_target.rotation());
+        Self { time_s, base_from_target: Pose::from_isometry(carried), ..self.clone() }
+    }
+}
+
+/// What a picture has brought.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Update {
+    /// Time of the picture [s].
+    pub time_s: f64,
+    /// Whether the board is followed.
+    pub state: State,
+    /// This picture alone.
+    pub seen: Option<Seen>,
+    /// The depths of this picture alone.
+    pub by_depth: Option<ByDepth>,
+    /// All pictures so far; `None` while searching and when lost.
+    pub estimate: Option<Estimate>,
+}

@@ -1,0 +1,286 @@
+//! From picture to picture: what is expected, what is seen, and whether it can be the board.
+
+use nalgebra::Matrix6;
+
+use super::by_depth::by_depth;
+use super::filter::{Filter, Sight};
+use super::noise::CornerNoise;
+use super::sight::{Board, Expected, Eye};
+use super::{Estimate, Picture, Seen, Setup, State, TrackError, Update};
+use crate::frames::{Base, Camera, Pose};
+use crate::target::TargetSpec;
+
+/// Corners are searched within this many standard deviations of where they are expected.
+const SEARCH: f64 = 2.5;
+/// Sights that do not fit what is expected but fit each other, after which they are believed: one is a mistake, two may
+/// be the same mistake, three in a row are a board that was moved.
+const SIGHTS_TO_MOVE: usize = 3;
+/// Pictures between two searches of the whole picture in vain: a picture with corners enough, but no whole board, takes
+/// several times as long as one with a board.
+const PAUSE: usize = 3;
+/// Blur of the edges before any was measured, 1σ [px]: a lens in focus.
+const USUAL_BLUR_PX: f64 = 0.8;
+
+/// Follows a board. One picture after the other goes in, and where the board is comes out.
+///
+/// Every picture is taken by itself first: corners near where the board is expected, or the whole picture searched for the
+/// whole board where nothing is expected or nothing was found there; then a pose with its covariance. A filter for
+/// constant velocity joins the pictures. The mathematics is in `docs/tracking.md`.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    setup: Setup,
+    filter: Option<Filter>,
+    /// Sights that the filter did not believe, and how many.
+    elsewhere: Option<(Filter, usize)>,
+    /// Time of the last picture that the filter believed [s].
+    believed_s: Option<f64>,
+    first_dark: bool,
+    blur_px: f64,
+    noise: CornerNoise,
+    /// Pictures that are not to be searched as a whole.
+    pause: usize,
+    last: Option<Update>,
+}
+
+impl Tracker {
+    /// Checks what it will work with.
+    ///
+    /// # Errors
+    /// [`TrackError::Intrinsics`], [`TrackError::NoHandEye`], [`TrackError::TargetTooSmall`], [`TrackError::BadSquare`],
+    /// [`TrackError::BadMotion`].
+    pub fn new(setup: Setup) -> Result<Self, TrackError> {
+        setup.calibrated.intrinsics.validate().map_err(|source| TrackError::Intrinsics { source })?;
+        if !setup.calibrated.hand_eye.mount_from_camera().is_finite() {
+            return Err(TrackError::NoHandEye);
+        }
+        let grid = setup.target.grid();
+        if grid.columns < 3 || grid.rows < 3 {
+            return Err(TrackError::TargetTooSmall { columns: grid.columns, rows: grid.rows });
+        }
+        if !(grid.square_m.is_finite() && grid.square_m > 0.0) {
+            return Err(TrackError::BadSquare { square_m: grid.square_m });
+        }
+        setup.motion.check()?;
+        let noise = CornerNoise::new(setup.calibrated.uncertainty.as_ref().map(|u| u.noise.corner_px));
+        Ok(Self {
+            setup,
+            filter: None,
+            elsewhere: None,
+            believed_s: None,
+            first_dark: true,
+            blur_px: USUAL_BLUR_PX,
+            noise,
+            pause: 0,
+            last: None,
+        })
+    }
+
+    /// What it works with.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// Forgets every picture.
+    pub fn reset(&mut self) {
+        self.filter = None;
+        self.elsewhere = None;
+        self.believed_s = None;
+        self.first_dark = true;
+        self.blur_px = USUAL_BLUR_PX;
+        self.noise.forget();
+        self.pause = 0;
+        self.last = None;
+    }
+
+    /// Takes a picture in. A picture of the same time as the one before changes nothing and gets the same answer; an
+    /// earlier one starts the tracker anew.
+    ///
+    /// A board that is not in the picture is no error: [`Update::state`] says so.
+    ///
+    /// # Errors
+    /// [`TrackError::OtherSize`], [`TrackError::NotFinite`], [`TrackError::BadTime`], which leave the tracker as it was;
+    /// [`TrackError::Vision`].
+    pub fn see(&mut self, picture: &Picture<'_>) -> Result<Update, TrackError> {
+        self.check(picture)?;
+        if let Some(last) = &self.last {
+            if last.time_s == picture.time_s {
+                return Ok(last.clone());
+            }
+            if last.time_s > picture.time_s {
+                self.reset();
+            }
+        }
+        let base_from_camera = self.setup.calibrated.base_from_camera(&picture.base_from_tip);
+        let filter = self.expected(picture.time_s);
+        let board = self.look(picture, &base_from_camera, filter.as_ref())?;
+        self.filter = filter;
+        let seen = board.and_then(|board| self.seen(board, &base_from_camera));
+        let believed = seen.as_ref().is_some_and(|seen| self.believe(picture.time_s, seen));
+        if self.filter.is_none() {
+            self.elsewhere = None;
+        }
+        let by_depth = seen
+            .as_ref()
+            .zip(picture.depth)
+            .and_then(|(seen, depth)| by_depth(picture, depth, seen, &self.setup.calibrated, &self.setup.target));
+        let update = Update {
+            time_s: picture.time_s,
+            state: self.state(if believed { seen.as_ref() } else { None }),
+            seen,
+            by_depth,
+            estimate: self.filter.as_ref().map(Filter::estimate),
+        };
+        self.last = Some(update.clone());
+        Ok(update)
+    }
+
+    /// Where the board will be at `time_s` if it goes on as it went, and how sure that is; `None` while nothing is known
+    /// of it, for a time before the last picture, and for one for which it would be lost.
+    pub fn at(&self, time_s: f64) -> Option<Estimate> {
+        let known_s = self.filter.as_ref()?.time_s();
+        (time_s >= known_s).then(|| self.expected(time_s))?.map(|filter| filter.estimate())
+    }
+
+    fn check(&self, picture: &Picture<'_>) -> Result<(), TrackError> {
+        let time_s = picture.time_s;
+        if !time_s.is_finite() {
+            return Err(TrackError::BadTime { time_s });
+        }
+        if !picture.base_from_tip.is_finite() {
+            return Err(TrackError::NotFinite { time_s });
+        }
+        let camera = &self.setup.calibrated.intrinsics;
+        let depth = picture.depth.map(|depth| ("depth image", (depth.width, depth.height)));
+        for (what, (width, height)) in [("picture", picture.grey.dimensions())].into_iter().chain(depth) {
+            if (width, height) != (camera.width, camera.height) {
+                let (camera_width, camera_height) = (camera.width, camera.height);
+                return Err(TrackError::OtherSize { what, width, height, camera_width, camera_height });
+            }
+        }
+        Ok(())
+    }
+
+    /// The filter at `time_s`; `None` when the board has not been seen for too long.
+    fn expected(&self, time_s: f64) -> Option<Filter> {
+        let believed_s = self.believed_s?;
+        if time_s - believed_s > self.setup.motion.coast_s {
+            return None;
+        }
+        let mut filter = self.filter.clone()?;
+        filter.predict(time_s);
+        Some(filter)
+    }
+
+    fn look(
+        &mut self,
+        picture: &Picture<'_>,
+        base_from_camera: &Pose<Base, Camera>,
+        filter: Option<&Filter>,
+    ) -> Result<Option<Board>, TrackError> {
+        let eye = Eye { image: picture.grey, target: &self.setup.target, camera: &self.setup.calibrated.intrinsics };
+        let expected = filter.map(|filter| self.in_picture(filter, base_from_camera));
+        let mut near = None;
+        if let Some(expected) = &expected
+            && matches!(self.setup.target, TargetSpec::Chessboard(_))
+        {
+            near = eye.near(expected);
+            // A part of the board could be another part of it, when it is not known well where to expect it.
+            let whole = near.as_ref().is_some_and(|board| board.corners.len() == self.setup.target.grid().len());
+            if near.is_some() && (whole || !eye.is_vague(expected)) {
+                return Ok(near);
+            }
+        }
+        if self.pause > 0 {
+            self.pause -= 1;
+            return Ok(near);
+        }
+        if !eye.may_show_all() {
+            return Ok(near);
+        }
+        let board = eye.anywhere(expected.as_ref().map(|e| &e.camera_from_target))?;
+        if board.is_none() {
+            self.pause = PAUSE;
+        }
+        Ok(board.or(near))
+    }
+
+    fn in_picture(&self, filter: &Filter, base_from_camera: &Pose<Base, Camera>) -> Expected {
+        let camera_from_target = *(base_from_camera.inverse() * filter.base_from_target()).isometry();
+        let (shift_m, turn_rad) = filter.sigmas();
+        let centre = self.setup.target.centre();
+        let depth_m = (camera_from_target * centre).z.max(1e-3);
+        let off_m = shift_m + turn_rad * centre.coords.norm();
+        let radius_px = SEARCH * off_m * self.setup.calibrated.intrinsics.fx / depth_m;
+        Expected { camera_from_target, radius_px, blur_px: self.blur_px, first_dark: self.first_dark }
+    }
+
+    /// Pose and covariance of a board in the picture, and what the next picture can use of it.
+    fn seen(&mut self, board: Board, base_from_camera: &Pose<Base, Camera>) -> Option<Seen> {
+        let inverse = board.fit.information.cholesky()?.inverse();
+        let variance = self.noise.variance(board.fit.cost, board.fit.count());
+        self.blur_px = board.blur_px.unwrap_or(self.blur_px);
+        self.first_dark = board.first_dark.unwrap_or(self.first_dark);
+        let camera_from_target = Pose::from_isometry(board.fit.pose);
+        let seen = Seen {
+            rms_px: board.fit.rms_px(),
+            corners: board.corners,
+            camera_from_target,
+            base_from_target: *base_from_camera * camera_from_target,
+            covariance: symmetric(&(inverse * variance)),
+        };
+        let usable = seen.base_from_target.is_finite() && seen.covariance.iter().all(|v| v.is_finite());
+        usable.then_some(seen)
+    }
+
+    /// Whether a sight is taken for the board; the filter then has it.
+    fn believe(&mut self, time_s: f64, seen: &Seen) -> bool {
+        let centre = self.setup.target.centre();
+        let sight = Sight::new(&seen.base_from_target, &seen.covariance, &centre);
+        let start = || Filter::new(self.setup.motion, centre, time_s, &sight);
+        let Some(filter) = &mut self.filter else {
+            self.filter = Some(start());
+            self.believed_s = Some(time_s);
+            return true;
+        };
+        let there = self.elsewhere.take().map(|(mut there, count)| {
+            there.predict(time_s);
+            (there, count)
+        });
+        // The longer the filter coasts the more it would take in, a board put elsewhere as one thrown there too.
+        let nearer = there
+            .as_ref()
+            .and_then(|(there, _)| there.distance_squared(&sight))
+            .is_some_and(|distance| filter.distance_squared(&sight).is_none_or(|own| distance < own));
+        if !nearer && filter.update(&sight) {
+            self.believed_s = Some(time_s);
+            return true;
+        }
+        let agrees = there.and_then(|(mut there, count)| there.update(&sight).then_some((there, count + 1)));
+        let (there, count) = agrees.unwrap_or_else(|| (start(), 1));
+        if count < SIGHTS_TO_MOVE {
+            self.elsewhere = Some((there, count));
+            return false;
+        }
+        self.filter = Some(there);
+        self.believed_s = Some(time_s);
+        true
+    }
+
+    fn state(&self, believed: Option<&Seen>) -> State {
+        let of = self.setup.target.grid().len();
+        match (believed, self.believed_s) {
+            (Some(seen), _) => State::Tracking { corners: seen.corners.len(), of },
+            (None, None) => State::Searching,
+            (None, Some(since_s)) if self.filter.is_some() => State::Coasting { since_s },
+            (None, Some(since_s)) => State::Lost { since_s },
+        }
+    }
+}
+
+fn symmetric(m: &Matrix6<f64>) -> Matrix6<f64> {
+    0.5 * (m + m.transpose())
+}
+
+#[cfg(test)]
+#[path = "tracker_tests.rs"]
+mod tests;
