@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 use ciborium::Value;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::ConnectionOptions;
+use handeye_sim_link::client::cell::{CameraFeed, CellPaths};
 use handeye_sim_link::wire::{self, Reader as _};
 
 type Failure = Box<dyn std::error::Error>;
@@ -37,20 +39,41 @@ impl Client {
     }
 }
 
-/// Calls per second and the slowest call.
-fn rate(seconds: f64, mut call: impl FnMut(u32) -> Result<(), Failure>) -> Result<(f64, Duration), Failure> {
+/// How fast calls are.
+struct Rate {
+    per_second: f64,
+    slowest: Duration,
+    /// What the cell's thread had of the processor per call; where the kernel does not tell (Linux does), nothing.
+    processor: Option<Duration>,
+}
+
+fn rate(seconds: f64, mut call: impl FnMut(u32) -> Result<(), Failure>) -> Result<Rate, Failure> {
     let (start, mut count, mut slowest) = (Instant::now(), 0, Duration::ZERO);
+    let processor = processor_of_cell();
     while start.elapsed().as_secs_f64() < seconds {
         let before = Instant::now();
         call(count)?;
         slowest = slowest.max(before.elapsed());
         count += 1;
     }
-    Ok((f64::from(count) / start.elapsed().as_secs_f64(), slowest))
+    let processor = processor_of_cell().zip(processor).map(|(after, before)| after.saturating_sub(before) / count);
+    Ok(Rate { per_second: f64::from(count) / start.elapsed().as_secs_f64(), slowest, processor })
+}
+
+/// Processor time of the thread that serves the cell, which other programs on the machine do not lengthen.
+fn processor_of_cell() -> Option<Duration> {
+    let is_cell =
+        |task: &std::path::Path| std::fs::read_to_string(task.join("comm")).is_ok_and(|name| name == "cell\n");
+    let tasks = std::fs::read_dir("/proc/self/task").ok()?;
+    let task = tasks.filter_map(Result::ok).map(|entry| entry.path()).find(|task| is_cell(task))?;
+    let text = std::fs::read_to_string(task.join("schedstat")).ok()?;
+    text.split_whitespace().next()?.parse().ok().map(Duration::from_nanos)
 }
 
 fn main() -> Result<(), Failure> {
-    for (name, scene) in [("reference", Scene::reference()?), ("realistic", Scene::realistic()?)] {
+    for (name, scene) in
+        [("reference", Scene::reference()?), ("realistic", Scene::realistic()?), ("tracking", Scene::tracking()?)]
+    {
         let server = CellServer::start(CellConfig { real_time: Some(false), ..CellConfig::new(scene) })?;
         let client = Client::new(&server.endpoint())?;
         let (camera, depth) = (client.handle("/UR5/3D_camera")?, client.handle("/UR5/3D_camera/depth")?);
@@ -58,8 +81,9 @@ fn main() -> Result<(), Failure> {
         client.call("sim.setStepping", vec![Value::from(true)])?;
         client.call("sim.startSimulation", vec![])?;
         client.call("sim.step", vec![])?;
-        let report = |what: &str, (rate, slowest): (f64, Duration)| {
-            println!("{name}: {what}: {rate:.0}/s, {:.3} ms each, slowest {slowest:?}", 1e3 / rate);
+        let report = |what: &str, Rate { per_second, slowest, processor }: Rate| {
+            let used = processor.map(|used| format!(", {used:.2?} of the cell's processor")).unwrap_or_default();
+            println!("{name}: {what}: {per_second:.0}/s, {:.3} ms each, slowest {slowest:.1?}{used}", 1e3 / per_second);
         };
         report("getJointPosition", rate(2.0, |_| client.call("sim.getJointPosition", vec![joint.clone()]).map(drop))?);
         report("step", rate(2.0, |_| client.call("sim.step", vec![]).map(drop))?);
@@ -72,6 +96,13 @@ fn main() -> Result<(), Failure> {
             client.call("sim.step", vec![]).map(drop)
         };
         report("setJointPosition + step + getVisionSensorImg", rate(4.0, |count| step(count).and_then(|()| image()))?);
+        let mut feed =
+            CameraFeed::connect(&server.endpoint().parse()?, &ConnectionOptions::default(), &CellPaths::default())?;
+        let both = |count: u32| step(count).and_then(|()| image()).and_then(|()| depths());
+        report("the same with both images", rate(4.0, both)?);
+        let mut grab = || feed.grab().map(drop).map_err(Failure::from);
+        report("the same as a frame of the client", rate(4.0, |count| step(count).and_then(|()| grab()))?);
+        report("a frame of the client, nothing new", rate(2.0, |_| grab())?);
         report("the same with getVisionSensorDepth", rate(4.0, |count| step(count).and_then(|()| depths()))?);
     }
     Ok(())

@@ -3,9 +3,11 @@
 //! Positions are radians or metres, whatever the caller's degrees of freedom are; velocities, accelerations and jerks
 //! are their derivatives by seconds. Nothing here knows a clock: a motion moves on by the `dt` that it is given.
 
+mod course;
 mod joint;
 mod pose;
 
+pub use course::{Course, braked};
 pub use joint::{JointMotion, shortest_way};
 pub use pose::{PoseMotion, PoseStep};
 

@@ -57,6 +57,23 @@ impl Renderer {
         self.finish_rgb(self.trace(scene, true), imaging, seed)
     }
 
+    /// As [`Self::render_rgb`], with the depths of an ideal sensor, which cost nothing more; see [`Self::sense_depth`].
+    pub fn render_rgb_with_ideal_depth(
+        &self,
+        scene: &RenderScene,
+        imaging: &Imaging,
+        seed: u64,
+    ) -> (RgbImage, Vec<f32>) {
+        let mut traced = self.trace(scene, true);
+        let depths_m = std::mem::take(&mut traced.depths_m);
+        (self.finish_rgb(traced, imaging, seed), depths_m)
+    }
+
+    /// What the sensor makes of ideal depths: the same, bit for bit, as [`Self::render_depth`] of their scene.
+    pub fn sense_depth(&self, ideal_m: Vec<f32>, imaging: &Imaging, seed: u64) -> Vec<f32> {
+        self.finish_depth(ideal_m, imaging, seed)
+    }
+
     /// The depth of [`Self::render`] alone, bit for bit, at a fraction of its cost.
     pub fn render_depth(&self, scene: &RenderScene, imaging: &Imaging, seed: u64) -> Vec<f32> {
         self.finish_depth(self.trace(scene, false).depths_m, imaging, seed)

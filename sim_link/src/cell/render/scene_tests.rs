@@ -139,6 +139,40 @@ fn a_body_before_the_board_hides_it_and_one_behind_does_not_show() {
 }
 
 #[test]
+fn what_lies_close_behind_a_tilted_board_changes_no_pixel() {
+    let tilted =
+        Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.5), UnitQuaternion::from_euler_angles(0.4, -0.3, 0.2));
+    // Half a millimetre behind the sheet, and a little smaller so that it shows on no side.
+    let plate = Shape::Box { half_extents: Vector3::new(0.095, 0.07, 0.002) };
+    let plate = Solid::new(plate, tilted * Translation3::new(0.0, 0.0, 0.0025), [0.9, 0.1, 0.1]);
+    let pictures = [scene(vec![plate]), scene(Vec::new())].map(|mut scene| {
+        scene.board.world_from_target = tilted * Translation3::new(-0.0675, -0.045, 0.0);
+        renderer().render(&scene, &Imaging::default(), 0)
+    });
+    assert!(pictures[0] == pictures[1]);
+}
+
+#[test]
+fn a_wall_that_fills_the_picture_has_one_colour_and_the_depth_of_its_plane() {
+    let turned = UnitQuaternion::from_euler_angles(0.3, -0.2, 0.0);
+    let wall = Shape::Box { half_extents: Vector3::new(3.0, 3.0, 0.1) };
+    let pose = Isometry3::from_parts(Translation3::new(0.0, 0.0, 1.1), turned);
+    let picture =
+        renderer().render(&without_board(vec![Solid::new(wall, pose, [0.4, 0.5, 0.6])]), &Imaging::default(), 0);
+    let colour = picture.rgb.get_pixel(80, 60);
+    assert!(picture.rgb.pixels().all(|pixel| pixel == colour));
+    let normal = turned * Vector3::z();
+    let offset = normal.dot(&(pose * Point3::new(0.0, 0.0, -0.1)).coords);
+    let camera = small_camera();
+    for (i, depth) in picture.depth_m.iter().enumerate() {
+        let px = nalgebra::Vector2::new((i % 160) as f64, (i / 160) as f64);
+        let ray = camera.unproject(&px).expect("a pinhole");
+        let expected = offset / normal.dot(&(ray.into_inner() / ray.z));
+        assert!((f64::from(*depth) - expected).abs() < 1e-6, "pixel {i}: {depth} instead of {expected}");
+    }
+}
+
+#[test]
 fn the_back_of_the_sheet_is_plain() {
     let mut scene = scene(Vec::new());
     let half_turn = Isometry3::rotation(Vector3::y() * std::f64::consts::PI);

@@ -64,7 +64,7 @@ impl Rays {
     }
 
     /// Least and greatest value of a linear form over the directions.
-    fn range(&self, form: &Vec3) -> (f64, f64) {
+    pub fn range(&self, form: &Vec3) -> (f64, f64) {
         let middle = form[0] * self.middle[0] + form[1] * self.middle[1] + form[2];
         let half = form[0].abs() * self.half[0] + form[1].abs() * self.half[1];
         (middle - half, middle + half)

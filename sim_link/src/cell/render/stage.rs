@@ -137,17 +137,24 @@ impl Stage {
         let mut candidates = Vec::new();
         let mut hidden_beyond = self.far_m;
         let mut is_covered = false;
+        let mut cover = None;
         for (index, piece) in self.pieces.iter().enumerate() {
             let Some(reach) = piece.surface.reach(rays) else { continue };
             if let Some(farthest) = reach.covers_within
                 && reach.nearest >= self.near_m
             {
                 is_covered |= farthest < self.far_m;
-                hidden_beyond = hidden_beyond.min(farthest);
+                if farthest < hidden_beyond {
+                    hidden_beyond = farthest;
+                    cover = Some(piece);
+                }
             }
             candidates.push(Candidate { piece: index as u16, nearest: reach.nearest });
         }
-        candidates.retain(|candidate| candidate.nearest <= hidden_beyond);
+        candidates.retain(|candidate| {
+            let piece = &self.pieces[candidate.piece as usize];
+            candidate.nearest <= hidden_beyond && !cover.is_some_and(|cover| piece.is_behind(cover, rays))
+        });
         candidates.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
         let casters = if with_shadows { self.casters_for(&candidates, rays) } else { Vec::new() };
         is_covered &= candidates.len() == 1;
@@ -211,7 +218,23 @@ impl Stage {
             return Some(BACKGROUND);
         };
         let piece = &self.pieces[first.piece as usize];
-        let (true, Paint::Ground(_, ground)) = (sight.is_covered, &piece.paint) else { return None };
+        let (true, Surface::Facet(facet)) = (sight.is_covered, &piece.surface) else { return None };
+        // Every ray hits the facet, so that its outline need not be looked at.
+        let depth_along = |ray: &Ray| 1.0 / dot(facet.inverse_depth(), &ray.direction());
+        let ground = match &piece.paint {
+            Paint::Ground(_, ground) => ground,
+            Paint::Flat(colour) => {
+                (0..count).for_each(|i| put(depth_along(&ray_at(i)), *colour));
+                return Some(piece.face);
+            }
+            Paint::Print(print) => {
+                for ray in (0..count).map(ray_at) {
+                    put(depth_along(&ray), print.colour(&ray, &piece.surface, &self.lamp));
+                }
+                return Some(piece.face);
+            }
+            Paint::Coat(_) => return None,
+        };
         let sunlit = |point: &Vec3| self.sunlit(sight, piece, point, &ground.towards);
         let shadows: Option<&dyn Fn(&Vec3) -> f32> = if sight.casters.is_empty() { None } else { Some(&sunlit) };
         ground.paint(count, ray_at, self.background, shadows, put);
@@ -243,6 +266,17 @@ impl Stage {
         let sunlit = if coat.is_ground() { self.sunlit(sight, piece, &point, &self.lamp.towards(&point)) } else { 1.0 };
         let spot = Spot { ray: direction, by_pixel: ray.by_pixel, point, normal, sunlit };
         coat.colour_at(&spot, &self.lamp, self.background)
+    }
+}
+
+impl Piece {
+    /// Whether it is flat and all of it that a tile may see lies behind the plane of another flat piece.
+    fn is_behind(&self, cover: &Self, rays: &Rays) -> bool {
+        let (Surface::Facet(back), Surface::Facet(front)) = (&self.surface, &cover.surface) else { return false };
+        // Depths compete after they were multiplied by the lead.
+        let [back, front] =
+            [(back, self.lead), (front, cover.lead)].map(|(facet, lead)| facet.inverse_depth().map(|c| c / lead));
+        rays.range(&scale_add(-1.0, &back, &front)).0 > 0.0
     }
 }
 

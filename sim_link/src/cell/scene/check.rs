@@ -174,7 +174,7 @@ fn check_lens(intrinsics: &Intrinsics) -> Check {
 }
 
 fn check_board(board: &BoardSpec) -> Check {
-    let BoardSpec { columns, rows, square_m, paper_m, plane, random_offset_mm, random_offset_deg } = board;
+    let BoardSpec { columns, rows, square_m, paper_m, plane, random_offset_mm, random_offset_deg, motion } = board;
     for (field, value) in [("board.columns", *columns), ("board.rows", *rows)] {
         if !(2..=MAX_CORNERS).contains(&value) {
             return violation(field, &value, format!("from 2 to {MAX_CORNERS} inner corners"));
@@ -192,7 +192,8 @@ fn check_board(board: &BoardSpec) -> Check {
     }
     pose("board.plane", plane)?;
     in_range("board.random_offset_mm", *random_offset_mm, 0.0, 1000.0)?;
-    in_range("board.random_offset_deg", *random_offset_deg, 0.0, 45.0)
+    in_range("board.random_offset_deg", *random_offset_deg, 0.0, 45.0)?;
+    motion.check("board.motion.")
 }
 
 fn check_image(image: &ImageSpec) -> Check {

@@ -4,6 +4,7 @@
 //! exact, without noise or distortion. Lengths are in metres and angles in degrees where the name does not say
 //! otherwise; poses are a position and a quaternion x, y, z, w.
 
+mod board_motion;
 mod check;
 mod error;
 mod errors_of_robot;
@@ -15,6 +16,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+pub use board_motion::{BoardMotionSpec, BoardPath, UnknownPath};
 pub use error::SceneError;
 pub use errors_of_robot::RobotErrors;
 pub use resolved::{ResolvedScene, ResolvedSolid};
@@ -24,6 +26,7 @@ pub use spec::{
 
 const REFERENCE: &str = include_str!("../../../../assets/scenes/reference.toml");
 const REALISTIC: &str = include_str!("../../../../assets/scenes/realistic.toml");
+const TRACKING: &str = include_str!("../../../../assets/scenes/tracking.toml");
 
 /// A scene file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -100,6 +103,14 @@ impl Scene {
     /// None as long as the file that is built in is valid, which a test asserts.
     pub fn realistic() -> Result<Self, SceneError> {
         Self::parse(REALISTIC, "assets/scenes/realistic.toml")
+    }
+
+    /// The realistic cell with a board that moves in a circle, and pictures that come as fast as a camera's.
+    ///
+    /// # Errors
+    /// None as long as the file that is built in is valid, which a test asserts.
+    pub fn tracking() -> Result<Self, SceneError> {
+        Self::parse(TRACKING, "assets/scenes/tracking.toml")
     }
 
     /// Checks every number, and draws what is random in the scene.

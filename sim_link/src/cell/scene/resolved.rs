@@ -7,6 +7,7 @@ use handeye_core::target::{Grid, TargetSpec};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 use super::Scene;
+use super::board_motion::BoardMotionSpec;
 use super::errors_of_robot::{RobotErrors, gaussian};
 use super::spec::{
     BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo, SimulationSpec,
@@ -44,6 +45,8 @@ pub struct ResolvedScene {
     pub base_from_target: Pose<Base, Target>,
     /// Pose of the printed sheet (`/Plane`) in the world: origin in its centre, z out of the printed side.
     pub world_from_plane: Isometry3<f64>,
+    /// How it moves from the start of the simulation on.
+    pub board_motion: BoardMotionSpec,
     /// What is printed on it.
     pub target: TargetSpec,
     /// Size of the sheet along x and y of the plane, metres.
@@ -120,6 +123,7 @@ pub(super) fn resolve(scene: &Scene, seed: u64) -> ResolvedScene {
         tip_from_sensor: tip_from_camera * sensor_from_camera().inverse(),
         base_from_target: Pose::from_isometry(world_from_plane * plane_from_target(board)),
         world_from_plane,
+        board_motion: board.motion,
         target,
         paper_m: board.paper_m,
         start_joints: robot.start_joints_deg.map(f64::to_radians),

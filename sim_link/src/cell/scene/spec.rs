@@ -4,6 +4,7 @@ use handeye_core::camera::Distortion;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
+use super::board_motion::BoardMotionSpec;
 use crate::cell::kinematics::JointAngles;
 
 /// cos 45° = sin 45°, for quaternions of quarter and half turns.
@@ -176,6 +177,8 @@ pub struct BoardSpec {
     pub random_offset_mm: f64,
     /// Random rotation of the sheet: 1σ per axis, degrees. Drawn once from the seed.
     pub random_offset_deg: f64,
+    /// How it moves from the start of the simulation on.
+    pub motion: BoardMotionSpec,
 }
 
 impl Default for BoardSpec {
@@ -188,6 +191,7 @@ impl Default for BoardSpec {
             plane: PoseSpec { position_m: [-0.125, -0.4, 0.802], rotation_xyzw: [0.0, HALF_SQRT, HALF_SQRT, 0.0] },
             random_offset_mm: 0.0,
             random_offset_deg: 0.0,
+            motion: BoardMotionSpec::default(),
         }
     }
 }

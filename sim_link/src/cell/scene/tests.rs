@@ -1,6 +1,7 @@
 use super::*;
 use crate::axes::sensor_from_camera;
 use crate::cell::kinematics::{forward, inverse_nearest};
+use crate::cell::motion::Course;
 use crate::cell::planning::ViewSetup;
 use handeye_core::frames::{Base, PointIn, Pose, Tip};
 use nalgebra::{Point3, Vector2, Vector3};
@@ -40,11 +41,44 @@ fn the_defaults_are_the_reference_scene() {
 }
 
 #[test]
-fn both_scenes_that_are_built_in_are_valid_and_keep_their_numbers_as_files() {
-    for scene in [Scene::reference().unwrap(), Scene::realistic().unwrap()] {
+fn the_scenes_that_are_built_in_are_valid_and_keep_their_numbers_as_files() {
+    for scene in [Scene::reference().unwrap(), Scene::realistic().unwrap(), Scene::tracking().unwrap()] {
         scene.resolve(7).unwrap();
         let text = toml::to_string(&scene).unwrap();
         assert_eq!(Scene::from_toml(&text).unwrap(), scene);
+    }
+}
+
+#[test]
+fn the_tracking_scene_is_the_realistic_one_but_for_its_time_step_and_the_motion_of_its_board() {
+    let mut scene = Scene::tracking().unwrap();
+    assert_eq!((scene.simulation.time_step_s, scene.board.motion.path), (0.03, BoardPath::Circle));
+    assert_eq!((scene.board.motion.speed_m_s, scene.board.motion.size_m), (0.1, 0.04));
+    scene.simulation.time_step_s = SimulationSpec::default().time_step_s;
+    scene.board.motion = BoardMotionSpec::default();
+    assert_eq!(scene, Scene::realistic().unwrap());
+}
+
+#[test]
+fn every_path_of_usual_size_keeps_the_board_in_view_of_the_arm_at_its_start() {
+    for scene in [Scene::reference().unwrap(), Scene::tracking().unwrap()] {
+        let resolved = scene.resolve(1).unwrap();
+        let tip = resolved.reported_tip(&resolved.start_joints);
+        let plane_from_target = resolved.world_from_plane.inv_mul(resolved.base_from_target.isometry());
+        for path in BoardPath::ALL {
+            let course = Course::new(&BoardMotionSpec { path, ..BoardMotionSpec::default() }, 1);
+            for tenth in 0..600 {
+                let offset = course.offset(f64::from(tenth) * 0.1);
+                let base_from_target = resolved.world_from_plane * offset * plane_from_target;
+                let moved =
+                    ResolvedScene { base_from_target: Pose::from_isometry(base_from_target), ..resolved.clone() };
+                for point in moved.target.points() {
+                    let px = pixel(&moved, &tip, point);
+                    let inside = px.x > 5.0 && px.y > 5.0 && px.x < 634.0 && px.y < 474.0;
+                    assert!(inside, "{path} after {} s: {px}", f64::from(tenth) * 0.1);
+                }
+            }
+        }
     }
 }
 
@@ -233,10 +267,13 @@ fn a_solid_on_the_board_goes_where_the_board_goes() {
 
 #[test]
 fn mistakes_in_a_file_are_found_at_their_line() {
-    let cases: [(&str, usize, &str); 9] = [
+    let cases: [(&str, usize, &str); 12] = [
         ("[camera]\nnear = 0.1\n", 2, "camera.near"),
         ("[camera]\nwidth = 640\nheight = \"tall\"\n", 3, "camera.height"),
         ("[robot\n", 1, ""),
+        ("[board.motion]\npath = \"spiral\"\n", 2, "board.motion.path"),
+        ("[board.motion]\npath = \"step\"\ntilt_deg = 31.0\n", 3, "board.motion.tilt_deg"),
+        ("[board.motion]\npath = \"circle\"\nsize_m = 0.01\nspeed_m_s = 0.21\n", 4, "board.motion.speed_m_s"),
         // Not written down: the line of its table.
         ("\n[camera]\n\nnear_m = 5.0\n", 2, "camera.far_m"),
         ("\n[camera]\nfx = 500.0\n", 2, "camera.fy"),

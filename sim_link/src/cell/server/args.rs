@@ -130,6 +130,14 @@ impl Args {
         self.read_or(at, "a boolean", default, |value| value.boolean().or_else(|| value.number().map(|n| n != 0.0)))
     }
 
+    /// A boolean; numbers count as they do in C.
+    ///
+    /// # Errors
+    /// Missing, or neither.
+    pub fn boolean(&self, at: usize) -> Result<bool, ApiError> {
+        self.read(at, "a boolean", |value| value.boolean().or_else(|| value.number().map(|n| n != 0.0)))
+    }
+
     /// A text.
     ///
     /// # Errors
@@ -260,6 +268,14 @@ impl<'a> Fields<'a> {
     /// Something else is there.
     pub fn boolean(&self, name: &'static str) -> Result<Option<bool>, ApiError> {
         self.read(name, Reader::boolean)
+    }
+
+    /// A text.
+    ///
+    /// # Errors
+    /// Something else is there.
+    pub fn text(&self, name: &'static str) -> Result<Option<&'a str>, ApiError> {
+        self.read(name, Reader::text)
     }
 
     /// A list of numbers.

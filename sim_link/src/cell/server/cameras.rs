@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use handeye_core::camera::Intrinsics;
-use nalgebra::{Unit, Vector3};
+use nalgebra::{Isometry3, Unit, Vector3};
 
 use super::message;
 use super::stage::{Stage, out_of_sight};
@@ -56,6 +56,27 @@ impl Source {
     }
 }
 
+/// Depths without noise that came with a colour image. A depth sensor at the same place sees the same.
+#[derive(Debug)]
+struct IdealDepths {
+    moment: Arc<Moment>,
+    world_from_sensor: Isometry3<f64>,
+    intrinsics: Intrinsics,
+    range_m: (f64, f64),
+    metres: Vec<f32>,
+}
+
+impl IdealDepths {
+    /// What a sensor saw in a moment, if it is this.
+    fn of(&self, handle: Handle, sensor: &VisionSensor, moment: &Arc<Moment>) -> Option<Vec<f32>> {
+        let is_same = Arc::ptr_eq(&self.moment, moment)
+            && moment.pose(handle) == Some(&self.world_from_sensor)
+            && self.intrinsics == sensor.intrinsics
+            && self.range_m == (sensor.near_m, sensor.far_m);
+        is_same.then(|| self.metres.clone())
+    }
+}
+
 /// All cameras of the cell.
 #[derive(Debug)]
 pub struct Cameras {
@@ -67,6 +88,7 @@ pub struct Cameras {
     renderers: Vec<Renderer>,
     ranges_m: Vec<(f64, f64)>,
     pictures: BTreeMap<(Handle, Channel), (Source, Picture)>,
+    ideal_depths: Option<IdealDepths>,
 }
 
 impl Cameras {
@@ -93,6 +115,7 @@ impl Cameras {
             renderers: Vec::new(),
             ranges_m: Vec::new(),
             pictures: BTreeMap::new(),
+            ideal_depths: None,
         }
     }
 
@@ -158,16 +181,30 @@ impl Cameras {
         };
         let seed = frame_seed(self.seed, handle, shown.pass);
         let imaging = self.imaging;
-        let renderer = self.renderer(sensor);
         match channel {
             Channel::Colour => {
-                let picture = renderer.render_rgb(&scene, &imaging, seed);
+                let (picture, metres) = self.renderer(sensor).render_rgb_with_ideal_depth(&scene, &imaging, seed);
+                self.ideal_depths = shown.moment.pose(handle).map(|world_from_sensor| IdealDepths {
+                    moment: Arc::clone(&shown.moment),
+                    world_from_sensor: *world_from_sensor,
+                    intrinsics: sensor.intrinsics,
+                    range_m: (sensor.near_m, sensor.far_m),
+                    metres,
+                });
                 bottom_up(picture.as_raw(), 3 * width)
             }
             Channel::Depth => {
-                let depth = renderer.render_depth(&scene, &imaging, seed);
-                let bytes: Vec<u8> = depth.iter().flat_map(|d| d.to_le_bytes()).collect();
-                bottom_up(&bytes, 4 * width)
+                let known = self.ideal_depths.as_ref().and_then(|ideal| ideal.of(handle, sensor, &shown.moment));
+                let renderer = self.renderer(sensor);
+                let depth = match known {
+                    Some(ideal_m) => renderer.sense_depth(ideal_m, &imaging, seed),
+                    None => renderer.render_depth(&scene, &imaging, seed),
+                };
+                let mut bytes = Vec::with_capacity(4 * depth.len());
+                for row in depth.chunks_exact(width.max(1)).rev() {
+                    bytes.extend(row.iter().flat_map(|metres| metres.to_le_bytes()));
+                }
+                bytes
             }
         }
     }
@@ -176,11 +213,11 @@ impl Cameras {
     fn scene(&self, handle: Handle, moment: &Moment, stage: &Stage) -> Option<RenderScene> {
         let world_from_camera = moment.pose(handle)? * sensor_from_camera().isometry();
         let mut board = self.board.clone();
-        if let Some(world_from_plane) = moment.pose(stage.plane) {
+        if let Some(world_from_plane) = moment.seen(stage.plane) {
             board.world_from_target = world_from_plane * stage.plane_from_target;
         }
         let placed = |(object, solid): &(Handle, Solid)| {
-            let world_from_shape = moment.pose(*object)? * solid.world_from_shape;
+            let world_from_shape = moment.seen(*object)? * solid.world_from_shape;
             Some(Solid { world_from_shape, ..solid.clone() })
         };
         let solids = stage.solids.iter().filter_map(placed).collect();
@@ -209,7 +246,9 @@ impl Cameras {
 
 /// Turns an image upside down: the renderer starts at the top, the API at the bottom.
 fn bottom_up(bytes: &[u8], row_bytes: usize) -> Vec<u8> {
-    bytes.chunks_exact(row_bytes.max(1)).rev().flatten().copied().collect()
+    let mut turned = Vec::with_capacity(bytes.len());
+    bytes.chunks_exact(row_bytes.max(1)).rev().for_each(|row| turned.extend_from_slice(row));
+    turned
 }
 
 /// A seed of its own for every frame of every sensor. Steele, Lea, Flood 2014, "Fast splittable pseudorandom number

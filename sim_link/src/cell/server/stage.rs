@@ -5,9 +5,10 @@ use std::cell::RefCell;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::cell::kinematics::{JOINTS, JointAngles, forward};
+use crate::cell::motion::Course;
 use crate::cell::render::{Finish, Shape, Solid, props};
 use crate::cell::scene::{RelativeTo, ResolvedScene, RobotErrors, Scene};
-use crate::cell::world::{Faults, Handle, Joint, Kind, Tree, VisionSensor, World, WorldError, turn_z};
+use crate::cell::world::{Carrier, Faults, Handle, Joint, Kind, Tree, VisionSensor, World, WorldError, turn_z};
 
 /// Handles of the objects that the cell itself has to find again.
 #[derive(Debug, Clone)]
@@ -57,6 +58,8 @@ pub fn build(scene: &Scene, resolved: &ResolvedScene) -> Result<(World, Stage), 
     let mut world = World::default();
     world.tree = builder.tree;
     world.set_faults(Box::new(ArmFaults::new(joints, tip, resolved.robot_errors)));
+    world.set_robot(joints.to_vec(), tip);
+    world.carrier = Some(Carrier::new(plane, Course::new(&resolved.board_motion, resolved.seed)));
     world.set_time_step(resolved.simulation.time_step_s)?;
     let plane_from_target = resolved.world_from_plane.inv_mul(resolved.base_from_target.isometry());
     let stage = Stage { arm, joints, connection, tip, camera, plane, plane_from_target, solids: builder.solids };
@@ -188,7 +191,7 @@ impl Faults for ArmFaults {
     }
 }
 
-/// A pose that no camera sees, for the board of a world from which it was removed.
+/// A pose that no camera sees, for a board that is hidden or was removed.
 pub fn out_of_sight() -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(0.0, 0.0, -1e5), UnitQuaternion::identity())
 }

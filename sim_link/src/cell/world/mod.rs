@@ -3,6 +3,7 @@
 //! The robot exists twice. Clients see it as its controller does ([`Chain::Reported`]); cameras see it as it stands
 //! ([`Chain::Actual`]), with whatever errors the scene gives its joints.
 
+pub mod carrier;
 pub mod error;
 pub mod joint;
 pub mod paths;
@@ -15,10 +16,11 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
+pub use carrier::Carrier;
 pub use error::WorldError;
 pub use joint::{DriveLimits, Joint};
 pub use poses::Flagged;
-pub use sensor::{Moment, Shown, VisionSensor};
+pub use sensor::{Moment, Reported, Shown, VisionSensor};
 pub use simulation::{Simulation, State};
 pub use tree::{Chain, Handle, Kind, Object, Tree, turn_z};
 
@@ -26,6 +28,13 @@ pub use tree::{Chain, Handle, Kind, Object, Tree, turn_z};
 pub trait Faults: std::fmt::Debug + Send {
     /// Sets the displacements of the objects. Called once per pass, after the joints have moved.
     fn apply(&mut self, tree: &mut Tree);
+}
+
+/// The objects whose state belongs to every picture.
+#[derive(Debug, Clone)]
+struct Robot {
+    joints: Vec<Handle>,
+    tip: Handle,
 }
 
 /// The object tree with its simulation.
@@ -37,6 +46,9 @@ pub struct World {
     /// Passes over the life of the world.
     pass: u64,
     faults: Option<Box<dyn Faults>>,
+    /// What moves by itself.
+    pub carrier: Option<Carrier>,
+    robot: Option<Robot>,
     latest: Option<Arc<Moment>>,
 }
 
@@ -45,6 +57,11 @@ impl World {
     pub fn set_faults(&mut self, faults: Box<dyn Faults>) {
         self.faults = Some(faults);
         self.apply_faults();
+    }
+
+    /// Names the joints and the tip whose reported state is kept with what the sensors show.
+    pub fn set_robot(&mut self, joints: Vec<Handle>, tip: Handle) {
+        self.robot = Some(Robot { joints, tip });
     }
 
     /// The simulation's state and time.
@@ -75,7 +92,7 @@ impl World {
         self.simulation.stop();
     }
 
-    /// Runs the rest of a pass: joints on their way move on, sensors take in what there is to see, time advances.
+    /// Runs the rest of a pass: joints on their way and what is carried move on, sensors take in what there is to see, time advances.
     /// Nothing happens unless the simulation is advancing.
     pub fn run_pass(&mut self) {
         if !self.simulation.is_advancing() {
@@ -87,9 +104,12 @@ impl World {
                 joint.advance(time_step_s);
             }
         }
+        if let Some(carrier) = &mut self.carrier {
+            carrier.advance(&mut self.tree, time_step_s);
+        }
         self.pass += 1;
         self.apply_faults();
-        let shown = self.look();
+        let shown = self.look(self.simulation.time_after_pass_s());
         for (_, object) in self.tree.iter_mut() {
             if let Kind::VisionSensor(sensor) = &mut object.kind
                 && !sensor.explicit
@@ -99,6 +119,9 @@ impl World {
         }
         if self.simulation.end_pass() {
             self.simulation.restore(&mut self.tree);
+            if let Some(carrier) = &mut self.carrier {
+                carrier.reset();
+            }
             self.apply_faults();
             for (_, object) in self.tree.iter_mut() {
                 if let Kind::VisionSensor(sensor) = &mut object.kind {
@@ -116,7 +139,7 @@ impl World {
         if !self.tree.sensor(handle)?.explicit {
             return Err(WorldError::NotExplicitlyHandled);
         }
-        let shown = self.look();
+        let shown = self.look(self.simulation.time_s());
         self.tree.sensor_mut(handle)?.shown = Some(shown);
         Ok(())
     }
@@ -132,19 +155,31 @@ impl World {
 
     /// Where everything that can see or be seen really is. The moment is the same one as long as nothing of that has
     /// moved, so that what was computed from it stays valid; dummies come and go unseen.
-    fn look(&mut self) -> Shown {
+    fn look(&mut self, time_s: f64) -> Shown {
         let poses: Vec<(Handle, Isometry3<f64>)> = self
             .tree
             .iter()
             .filter(|(_, object)| matches!(object.kind, Kind::Shape | Kind::VisionSensor(_)))
             .filter_map(|(handle, _)| Some((handle, self.tree.world_pose(handle, Chain::Actual).ok()?)))
             .collect();
+        let hidden: Vec<Handle> =
+            self.tree.iter().filter(|(_, object)| object.hidden).map(|(handle, _)| handle).collect();
         let moment = match &self.latest {
-            Some(latest) if latest.poses == poses => Arc::clone(latest),
-            _ => Arc::new(Moment { poses }),
+            Some(latest) if latest.poses == poses && latest.hidden == hidden => Arc::clone(latest),
+            _ => Arc::new(Moment { poses, hidden }),
         };
         self.latest = Some(Arc::clone(&moment));
-        Shown { pass: self.pass, moment }
+        Shown { pass: self.pass, time_s, reported: self.reported(), moment }
+    }
+
+    /// `None` while the robot is not complete: clients may remove its parts.
+    fn reported(&self) -> Option<Reported> {
+        let Robot { joints, tip } = self.robot.as_ref()?;
+        let position = |&joint: &Handle| Some(self.tree.joint(joint).ok()?.position_rad());
+        Some(Reported {
+            joints_rad: joints.iter().map(position).collect::<Option<Vec<f64>>>()?,
+            world_from_tip: self.tree.world_pose(*tip, Chain::Reported).ok()?,
+        })
     }
 
     fn apply_faults(&mut self) {

@@ -12,6 +12,8 @@ use super::tree::Handle;
 pub struct Moment {
     /// `world_from_object` of everything that can see or be seen.
     pub poses: Vec<(Handle, Isometry3<f64>)>,
+    /// What of that was not to be seen, in ascending order.
+    pub hidden: Vec<Handle>,
 }
 
 impl Moment {
@@ -20,6 +22,20 @@ impl Moment {
         // Handles are taken in ascending order.
         self.poses.binary_search_by_key(&handle, |(h, _)| *h).ok().map(|index| &self.poses[index].1)
     }
+
+    /// Where an object was, if it was to be seen.
+    pub fn seen(&self, handle: Handle) -> Option<&Isometry3<f64>> {
+        self.pose(handle).filter(|_| self.hidden.binary_search(&handle).is_err())
+    }
+}
+
+/// How the robot's controller had the robot at one sensing phase.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reported {
+    /// Positions of the joints from the base up, radians.
+    pub joints_rad: Vec<f64>,
+    /// The tip by these positions.
+    pub world_from_tip: Isometry3<f64>,
 }
 
 /// What a sensor's buffers show.
@@ -27,6 +43,10 @@ impl Moment {
 pub struct Shown {
     /// Simulation pass that it was taken in, counted over the life of the world: every pass has its own image noise.
     pub pass: u64,
+    /// Simulated time, seconds: what the clock says once that pass is over.
+    pub time_s: f64,
+    /// The robot at that time; `None` if there was none.
+    pub reported: Option<Reported>,
     /// Where everything was; shared by all passes in which nothing moved.
     pub moment: Arc<Moment>,
 }

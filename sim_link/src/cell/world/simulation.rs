@@ -52,6 +52,7 @@ struct Before {
     parent: Option<Handle>,
     local: Isometry3<f64>,
     joint_rad: Option<f64>,
+    hidden: bool,
 }
 
 impl Default for Simulation {
@@ -82,6 +83,11 @@ impl Simulation {
     /// Simulated seconds since the start; keeps its last value after the end.
     pub fn time_s(&self) -> f64 {
         self.time_s
+    }
+
+    /// What [`Self::time_s`] is once the pass under way is over.
+    pub(super) fn time_after_pass_s(&self) -> f64 {
+        (self.passes + 1) as f64 * self.time_step_s
     }
 
     /// Length of one pass in seconds.
@@ -119,7 +125,8 @@ impl Simulation {
                             Kind::Joint(joint) => Some(joint.position_rad()),
                             _ => None,
                         };
-                        Before { handle, parent: object.parent(), local: *object.local(), joint_rad }
+                        let (parent, local) = (object.parent(), *object.local());
+                        Before { handle, parent, local, joint_rad, hidden: object.hidden }
                     })
                     .collect();
             }
@@ -162,12 +169,13 @@ impl Simulation {
     /// one under the old parent.
     pub(super) fn restore(&mut self, tree: &mut Tree) {
         (self.pause_wanted, self.stop_wanted) = (false, false);
-        for Before { handle, parent, local, joint_rad } in std::mem::take(&mut self.before_start) {
+        for Before { handle, parent, local, joint_rad, hidden } in std::mem::take(&mut self.before_start) {
             // What was removed meanwhile stays removed.
             let Ok(object) = tree.get_mut(handle) else { continue };
             if let (Kind::Joint(joint), Some(position_rad)) = (&mut object.kind, joint_rad) {
                 joint.reset(position_rad);
             }
+            object.hidden = hidden;
             if object.parent() == parent {
                 object.local = local;
             }

@@ -69,6 +69,8 @@ pub struct Object {
     pub kind: Kind,
     /// Whether it is the base of a model, which `:` in a path looks for.
     pub model_base: bool,
+    /// Not seen by any camera from the next pass on; what hangs on it is.
+    pub hidden: bool,
     parent: Option<Handle>,
     children: Vec<Handle>,
     /// Pose in the parent's frame; in the frame that moves, if the parent is a joint.
@@ -137,6 +139,7 @@ impl Tree {
                 alias,
                 kind,
                 model_base: false,
+                hidden: false,
                 parent,
                 children: Vec::new(),
                 local: parent_from_object,

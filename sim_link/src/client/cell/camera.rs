@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 
 use super::hold::Hold;
-use super::truth::{self, GroundTruth};
+use super::truth::{self, GroundTruth, ShownMoment};
 use super::{CellInfo, CellObjects, CellPaths, JointAngles, discover, read_joint_angles};
 use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;
@@ -31,6 +31,8 @@ pub struct Frame {
     pub base_from_tip: Pose<Base, Tip>,
     /// Positions of the joints (rad).
     pub joints: JointAngles,
+    /// Where the board is in these images, if the cell publishes it. For comparison only.
+    pub base_from_target_true: Option<Pose<Base, Target>>,
 }
 
 /// The camera of a cell, over a connection of its own.
@@ -39,11 +41,14 @@ pub struct CameraFeed {
     objects: Arc<CellObjects>,
     info: Arc<CellInfo>,
     hold: Hold,
+    /// Whether the server tells what its images show, as far as is known.
+    tells_moment: bool,
 }
 
 impl CameraFeed {
     pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
-        Self { sim, objects, info, hold: Hold::default() }
+        let tells_moment = info.is_handeye_cell;
+        Self { sim, objects, info, hold: Hold::default(), tells_moment }
     }
 
     /// Connects once, for a camera without its arm.
@@ -72,6 +77,10 @@ impl CameraFeed {
     /// arm at rest only once it has settled, see [`super::Arm::settle`]; while the simulation is stopped they are not
     /// renewed at all.
     ///
+    /// A built-in cell tells what it was that the images show, and all of the frame is of that pass. Elsewhere, and
+    /// before the first pass, poses and time are those of now: a joint that was put elsewhere since the last pass is
+    /// there already, and not yet in the images.
+    ///
     /// # Errors
     /// [`LinkError::MixedInstants`] when the simulation is never still for long enough; otherwise as for any call.
     pub fn grab(&mut self) -> Result<Frame, LinkError> {
@@ -89,6 +98,31 @@ impl CameraFeed {
     }
 
     fn read(&mut self) -> Result<Frame, LinkError> {
+        let Some(shown) = self.shown()? else { return self.read_present() };
+        Ok(Frame {
+            rgb: self.sim.get_vision_sensor_image(self.objects.camera)?,
+            depth: self.sim.get_vision_sensor_depth(self.objects.depth)?,
+            sim_time_s: shown.sim_time_s,
+            base_from_tip: shown.base_from_tip,
+            joints: shown.joints,
+            base_from_target_true: shown.base_from_target,
+        })
+    }
+
+    fn shown(&mut self) -> Result<Option<ShownMoment>, LinkError> {
+        if !self.tells_moment {
+            return Ok(None);
+        }
+        match truth::shown_moment(&mut self.sim) {
+            Err(error) if error.is_unknown_function() => {
+                self.tells_moment = false;
+                Ok(None)
+            }
+            outcome => outcome,
+        }
+    }
+
+    fn read_present(&mut self) -> Result<Frame, LinkError> {
         // Time first: without a hold it is compared with the time after everything else.
         Ok(Frame {
             sim_time_s: self.sim.get_simulation_time()?,
@@ -96,6 +130,7 @@ impl CameraFeed {
             joints: read_joint_angles(&mut self.sim, &self.objects.joints)?,
             rgb: self.sim.get_vision_sensor_image(self.objects.camera)?,
             depth: self.sim.get_vision_sensor_depth(self.objects.depth)?,
+            base_from_target_true: None,
         })
     }
 

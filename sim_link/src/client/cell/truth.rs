@@ -4,7 +4,7 @@ use ciborium::Value;
 use handeye_core::camera::{Distortion, Intrinsics};
 use handeye_core::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 
-use super::{CellInfo, CellObjects};
+use super::{CellInfo, CellObjects, JointAngles};
 use crate::axes::sensor_from_camera;
 use crate::client::convert;
 use crate::client::error::LinkError;
@@ -13,6 +13,9 @@ use crate::wire::Reader;
 
 /// The function through which a cell publishes its truth; CoppeliaSim has no such function.
 pub const TRUTH_FUNCTION: &str = "handeye.truth";
+
+/// The function through which a cell tells of the pass that its images show.
+const MOMENT_FUNCTION: &str = "handeye.moment";
 
 /// The truth about a simulated cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,6 +79,33 @@ impl PublishedTruth {
             base_from_target: map.get("base_from_target").map(|v| pose(v, "base_from_target")).transpose()?,
         })
     }
+}
+
+/// The pass that the images of a cell show.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ShownMoment {
+    pub sim_time_s: f64,
+    pub joints: JointAngles,
+    pub base_from_tip: Pose<Base, Tip>,
+    pub base_from_target: Option<Pose<Base, Target>>,
+}
+
+/// What the images show, from a cell that has [`MOMENT_FUNCTION`]; `None` when they show nothing yet, or not any more.
+///
+/// # Errors
+/// [`LinkError::BadTruth`] when a part cannot be computed with; otherwise as for any call.
+pub(super) fn shown_moment(sim: &mut Sim) -> Result<Option<ShownMoment>, LinkError> {
+    let map = sim.connection().call(MOMENT_FUNCTION, Vec::new())?.into_map(0)?;
+    let Some(sim_time_s) = map.get("sim_time").and_then(Reader::number) else { return Ok(None) };
+    let joints = map.get("joints").and_then(Reader::numbers).unwrap_or_default();
+    let joints = joints.try_into().map_err(|other: Vec<f64>| bad(format!("joints: {} numbers", other.len())))?;
+    let tip = map.get("tip").ok_or_else(|| bad("no tip"))?;
+    Ok(Some(ShownMoment {
+        sim_time_s,
+        joints,
+        base_from_tip: pose(tip, "tip")?,
+        base_from_target: map.get("base_from_target").map(|v| pose(v, "base_from_target")).transpose()?,
+    }))
 }
 
 fn bad(reason: impl Into<String>) -> LinkError {

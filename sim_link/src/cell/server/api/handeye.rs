@@ -7,11 +7,20 @@ use nalgebra::Isometry3;
 
 use super::{Call, Effect, Outcome, Table, nothing, one};
 use crate::axes::sensor_from_camera;
-use crate::cell::scene::RobotErrors;
+use crate::cell::motion::Course;
+use crate::cell::scene::{BoardMotionSpec, BoardPath, RobotErrors};
+use crate::cell::server::args::ApiError;
 use crate::cell::world::{Chain, Flagged, poses};
-use crate::wire;
+use crate::wire::{self, Reader as _};
 
-pub(super) const FUNCTIONS: Table = &[("truth", truth), ("stop", stop), ("setBoardPose", set_board_pose)];
+pub(super) const FUNCTIONS: Table = &[
+    ("truth", truth),
+    ("moment", moment),
+    ("stop", stop),
+    ("setBoardPose", set_board_pose),
+    ("moveBoard", move_board),
+    ("showBoard", show_board),
+];
 
 fn pose(pose: &Isometry3<f64>) -> Value {
     wire::floats(poses::to_numbers(pose, false))
@@ -50,6 +59,26 @@ fn truth(call: &mut Call<'_>) -> Outcome {
         ),
         ("seed", Value::from(scene.seed)),
     ]))
+}
+
+/// The pass that the images of the colour sensor show, all of one instant: `sim_time` in seconds, `joints` in radians
+/// and the pose `tip` as the controller had them, and `base_from_target`, where the board really was, hidden or not.
+///
+/// What clients set between two passes is in the next moment, as it is in the next image. The map is empty while there
+/// is nothing in the images: before the first pass and after the end of a simulation. A part that a client has removed
+/// from the scene is missing.
+fn moment(call: &mut Call<'_>) -> Outcome {
+    let (tree, stage) = (&call.cell.world.tree, &call.cell.stage);
+    let Some(shown) = tree.sensor(stage.camera)?.shown() else { return one(wire::map([])) };
+    let mut fields = vec![("sim_time", Value::Float(shown.time_s))];
+    if let Some(reported) = &shown.reported {
+        fields.push(("joints", wire::floats(reported.joints_rad.iter().copied())));
+        fields.push(("tip", pose(&reported.world_from_tip)));
+    }
+    if let Some(world_from_plane) = shown.moment.pose(stage.plane) {
+        fields.push(("base_from_target", pose(&(world_from_plane * stage.plane_from_target))));
+    }
+    one(wire::map(fields))
 }
 
 fn intrinsics(camera: &Intrinsics) -> Value {
@@ -92,5 +121,45 @@ fn set_board_pose(call: &mut Call<'_>) -> Outcome {
     let base_from_plane = base_from_target * call.cell.stage.plane_from_target.inverse();
     let plane = Flagged { handle: call.cell.stage.plane, joint_base: false, wxyz: false };
     poses::set(&mut call.cell.world.tree, plane, poses::HANDLE_WORLD, &base_from_plane)?;
+    nothing()
+}
+
+/// Has the board go along a path from where it stands, `{path, speed_m_s, size_m, tilt_deg, seed}` with all but the path
+/// optional, as in the scene file. A path that it is on is brought to rest meanwhile; `still` does only that. Without a
+/// seed it is the cell's. While the simulation is stopped this is for the next one only.
+fn move_board(call: &mut Call<'_>) -> Outcome {
+    const NAMES: [&str; 5] = ["path", "speed_m_s", "size_m", "tilt_deg", "seed"];
+    let fields = call.args.map_or_empty(0)?;
+    for (key, _) in fields.entries() {
+        let key = key.text().unwrap_or_default();
+        if !NAMES.contains(&key) {
+            return Err(ApiError::Other(format!("there is no field {key:?}; there are {}.", NAMES.join(", "))));
+        }
+    }
+    let path = fields.text("path")?.ok_or(ApiError::Field { problem: "missing", name: "path" })?;
+    let path: BoardPath = path.parse().map_err(|error| ApiError::Other(format!("{error}.")))?;
+    let usual = BoardMotionSpec::default();
+    let motion = BoardMotionSpec {
+        path,
+        speed_m_s: fields.number("speed_m_s")?.unwrap_or(usual.speed_m_s),
+        size_m: fields.number("size_m")?.unwrap_or(usual.size_m),
+        tilt_deg: fields.number("tilt_deg")?.unwrap_or(usual.tilt_deg),
+    };
+    motion.validate().map_err(|reason| ApiError::Other(format!("{reason}.")))?;
+    let seed = match fields.integer("seed")? {
+        Some(seed) => u64::try_from(seed).map_err(|_negative| ApiError::Field { problem: "invalid", name: "seed" })?,
+        None => call.cell.scene.seed,
+    };
+    if let Some(carrier) = &mut call.cell.world.carrier {
+        carrier.follow(Course::new(&motion, seed));
+    }
+    nothing()
+}
+
+/// Hides the board from the cameras or shows it again, from the next pass on: the sheet with its print, not what holds
+/// it. The end of the simulation brings back what was before its start.
+fn show_board(call: &mut Call<'_>) -> Outcome {
+    let is_shown = call.args.boolean(0)?;
+    call.cell.world.tree.get_mut(call.cell.stage.plane)?.hidden = !is_shown;
     nothing()
 }

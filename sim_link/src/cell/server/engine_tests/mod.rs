@@ -1,3 +1,4 @@
+mod board;
 mod calls;
 mod fuzz;
 mod motions;
