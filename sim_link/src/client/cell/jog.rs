@@ -1,28 +1,19 @@
 //! Jogging: the arm moves for as long as somebody holds a button, or by a small step.
 //!
-//! The next point is computed here and sent for one pass of the simulation, as `sim.moveToConfig` does it inside the
-//! server: a joint that is moved by forces gets a new target position, any other is put there. So the arm stands within
-//! a pass when this client hangs, dies, or loses its connection. As long as it lives, it comes to rest within the
-//! limits of acceleration.
+//! The next point is computed here and sent for one pass of the simulation, so the arm stands within a pass when this
+//! client hangs, dies, or loses its connection. As long as it lives, it comes to rest within the limits of acceleration.
 
 use handeye_core::frames::{Base, Camera, Pose, Tip};
 use nalgebra::Vector3;
 
 use super::jog_plan::{JogObstacle, JogPlan, Path};
 use super::reach::ArmKinematics;
-use super::sentinel::Sentinel;
-use super::{Arm, JOINTS, JointAngles, read_joint_angles, require_running};
+use super::stream::{Pass, Point, Stream};
+use super::{Arm, JOINTS, JointAngles, require_running};
 use crate::client::error::LinkError;
-use crate::client::options::CallOptions;
 
 /// What the arm is asked for, in messages.
 const TASK: &str = "jogging the arm";
-
-/// A joint that is where it is put may be off by rounding [rad].
-const PLACED_OFF_RAD: f64 = 1e-6;
-
-/// A joint moved by forces lags behind: by a few degrees at full speed, as its controller is tuned [rad].
-const DRIVEN_OFF_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 
 /// A jog of the arm.
 #[derive(Debug, Clone, Copy)]
@@ -104,7 +95,6 @@ impl Arm {
         if let Some(value) = length.filter(|length| !(length.is_finite() && *length >= 0.0)) {
             return Err(LinkError::BadMotion { what: "the length", expected: "zero or more", value });
         }
-        let dynamic = self.dynamic_joints()?;
         let start = self.joint_angles()?;
         if let ArmJog::Line { kinematics, .. } | ArmJog::Turn { kinematics, .. } = jog
             && !kinematics.fits(&start, &self.base_from_tip()?)
@@ -114,48 +104,32 @@ impl Arm {
         let path = self.path(jog, &start)?;
         match JogPlan::new(path, start, self.info.time_step_s, length) {
             Ok(plan) => {
-                let mut sentinel = Sentinel::begin(&mut self.sim, &self.info)?;
-                match self.follow(plan, start, dynamic, &mut sentinel, held) {
-                    Err(error) if error.is_connection_loss() => Err(error),
-                    outcome => sentinel.end(&mut self.sim).and(outcome),
-                }
+                let mut stream = Stream::begin(self, start)?;
+                let outcome = self.send_jog(plan, &mut stream, held);
+                stream.end(self, outcome)
             }
             Err(obstacle) => Ok(JogEnd::Obstacle(obstacle)),
         }
     }
 
-    fn follow(
+    fn send_jog(
         &mut self,
         mut plan: JogPlan<'_>,
-        start: JointAngles,
-        dynamic: [bool; JOINTS],
-        sentinel: &mut Sentinel,
+        stream: &mut Stream,
         held: &mut dyn FnMut() -> Option<f64>,
     ) -> Result<JogEnd, LinkError> {
-        let mut sent = start;
-        let mut seen_s = f64::NEG_INFINITY;
-        let mut is_stopped = false;
         loop {
             let mut share = held();
-            // All joints go to a point in the same pass, however slow the network.
-            let lock = self.hold.acquire(&mut self.sim)?;
-            let pass = sentinel.is_stopped(&mut self.sim).and_then(|now| {
-                is_stopped |= now;
-                share = share.filter(|_| !is_stopped);
-                self.send_next(&mut plan, share, &mut sent, &mut seen_s, dynamic)
-            });
-            let pass = match lock {
-                Some(lock) => lock.release(&mut self.sim, pass)?,
-                None => pass?,
-            };
-            // A point takes effect in the pass that follows, also the last one.
-            self.sim.step(&CallOptions::default())?;
+            let pass = stream.pass(self, |slot| {
+                share = share.filter(|_| !slot.is_stopped);
+                Point { joints: plan.advance(share), target: None }
+            })?;
             match pass {
                 Pass::NotFollowing(joint) => return Ok(JogEnd::NotFollowing { joint: joint + 1 }),
                 Pass::None => require_running(&mut self.sim, TASK)?,
                 Pass::Sent if plan.is_at_end() => return Ok(JogEnd::Arrived),
                 Pass::Sent if plan.is_at_rest() => match plan.obstacle() {
-                    _ if is_stopped => return Ok(JogEnd::Stopped),
+                    _ if stream.is_stopped() => return Ok(JogEnd::Stopped),
                     _ if share.is_none() => return Ok(JogEnd::Released),
                     Some(obstacle) => return Ok(JogEnd::Obstacle(obstacle)),
                     // Held at a speed of nothing.
@@ -164,47 +138,6 @@ impl Arm {
                 Pass::Sent => {}
             }
         }
-    }
-
-    /// Sends the next point, if a pass has gone by since the last one and the joints are where they were sent.
-    fn send_next(
-        &mut self,
-        plan: &mut JogPlan<'_>,
-        share: Option<f64>,
-        sent: &mut JointAngles,
-        seen_s: &mut f64,
-        dynamic: [bool; JOINTS],
-    ) -> Result<Pass, LinkError> {
-        let now_s = self.sim.get_simulation_time()?;
-        // The clock of a simulation that is started anew goes back.
-        if now_s == *seen_s {
-            return Ok(Pass::None);
-        }
-        *seen_s = now_s;
-        let joints = read_joint_angles(&mut self.sim, &self.objects.joints)?;
-        let tolerance = |joint: usize| if dynamic[joint] { DRIVEN_OFF_RAD } else { PLACED_OFF_RAD };
-        if let Some(joint) = (0..JOINTS).find(|&i| difference_rad(joints[i], sent[i]) > tolerance(i)) {
-            return Ok(Pass::NotFollowing(joint));
-        }
-        let next = plan.advance(share);
-        for joint in (0..JOINTS).filter(|&i| next[i] != sent[i]) {
-            let handle = self.objects.joints[joint];
-            if dynamic[joint] {
-                self.sim.set_joint_target_position(handle, next[joint])?;
-            } else {
-                self.sim.set_joint_position(handle, next[joint])?;
-            }
-        }
-        *sent = next;
-        Ok(Pass::Sent)
-    }
-
-    fn dynamic_joints(&mut self) -> Result<[bool; JOINTS], LinkError> {
-        let mut dynamic = [false; JOINTS];
-        for (dynamic, &joint) in dynamic.iter_mut().zip(&self.objects.joints) {
-            *dynamic = self.sim.is_joint_dynamic(joint)?;
-        }
-        Ok(dynamic)
     }
 
     fn path<'a>(&self, jog: &ArmJog<'a>, start: &JointAngles) -> Result<Path<'a>, LinkError> {
@@ -227,13 +160,6 @@ impl Arm {
             }
         }
     }
-}
-
-enum Pass {
-    /// None has gone by.
-    None,
-    Sent,
-    NotFollowing(usize),
 }
 
 impl JogAxes {
@@ -260,11 +186,4 @@ impl JogAxes {
             Self::Camera(tip_from_camera) => (*base_from_tip * *tip_from_camera).translation(),
         }
     }
-}
-
-/// Between two angles, the short way round: a joint that turns without end comes back from the other side.
-fn difference_rad(a: f64, b: f64) -> f64 {
-    let turn = std::f64::consts::TAU;
-    let rest = (a - b).rem_euclid(turn);
-    rest.min(turn - rest)
 }

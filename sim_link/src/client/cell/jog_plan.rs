@@ -121,7 +121,7 @@ impl Path<'_> {
 }
 
 /// The joints of the same configuration of the arm, or what is in the way.
-fn nearest(
+pub(super) fn nearest(
     kinematics: &ArmKinematics,
     goal: &Pose<Base, Tip>,
     before: &JointAngles,
@@ -145,7 +145,7 @@ fn nearest(
     }
 }
 
-fn largest_change(from: &JointAngles, to: &JointAngles) -> (usize, f64) {
+pub(super) fn largest_change(from: &JointAngles, to: &JointAngles) -> (usize, f64) {
     (0..JOINTS)
         .map(|i| (i, (to[i] - from[i]).abs()))
         .fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })

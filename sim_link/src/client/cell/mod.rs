@@ -8,19 +8,24 @@
 //! A motion can be left to the server (`sim.moveToConfig`, one call that ends when the arm is there) or taken step by
 //! step (`_init`, then `_step` and `sim.step` for each pass, then `_cleanup`). [`Arm`] takes it step by step: between
 //! two steps the stop button is looked at, and a client that dies leaves an arm that stands still, not one that carries
-//! on. Jogging ([`Arm::jog`]) computes each point here and sends it for one pass, for the same reasons. The API has no other way to end a motion of another client. The simulation is not taken into stepping mode for
-//! it: it keeps its pace, other clients keep theirs, and a crash cannot freeze it; the price is that a slow network
-//! makes the arm pause for a pass now and then on its way, which changes nothing about where it ends.
+//! on. Jogging ([`Arm::jog`]) and following ([`Arm::follow`]) compute each point here and send it for one pass, for the
+//! same reasons. The API has no other way to end a motion of another client. The simulation is not taken into stepping
+//! mode for it: it keeps its pace, other clients keep theirs, and a crash cannot freeze it; the price is that a slow
+//! network makes the arm pause for a pass now and then on its way, which changes nothing about where it ends.
 //! A server without the step functions gets the single call. Cancelling that ends this client's record on the server
 //! and with it, on CoppeliaSim, the motion; the arm is told to stay where it is in either case.
 
 mod arm;
+mod board;
 mod camera;
+mod follow;
+mod follow_plan;
 mod hold;
 mod jog;
 mod jog_plan;
 mod reach;
 mod sentinel;
+mod stream;
 mod truth;
 
 use std::sync::Arc;
@@ -29,7 +34,9 @@ use handeye_core::camera::Intrinsics;
 use handeye_core::frames::{Base, Pose, Tip};
 
 pub use arm::{Arm, MotionTolerance, SettleOptions};
+pub use board::{BoardMotion, BoardPath, UnknownPath};
 pub use camera::{CameraFeed, Frame};
+pub use follow::{FollowEnd, FollowGoal, FollowLimits, FollowMoment, FollowWish, Workspace};
 pub use jog::{ArmJog, JogAxes, JogEnd};
 pub use jog_plan::{
     JOINT_SPEED as JOG_JOINT_SPEED_RAD_S, JogObstacle, LINE_SPEED as JOG_LINE_SPEED_M_S,

@@ -11,8 +11,11 @@ use crate::client::error::LinkError;
 use crate::client::sim::Sim;
 use crate::wire;
 
-/// Slow enough to last for longer than anybody holds a button, and quick to brake.
+/// Slow enough to be quick to brake.
 const SPEED: f64 = 1e-3;
+
+/// At that speed more than a day away: an arm may follow for long.
+const END: f64 = 100.0;
 
 /// A motion of nothing. CoppeliaSim has no stop for all clients, so there it is not begun.
 pub(super) struct Sentinel(Option<Value>);
@@ -26,7 +29,7 @@ impl Sentinel {
         let one = |value: f64| wire::floats([value]);
         let motion = wire::map([
             ("pos", one(0.0)),
-            ("targetPos", one(1.0)),
+            ("targetPos", one(END)),
             ("maxVel", one(SPEED)),
             ("maxAccel", one(1.0)),
             ("maxJerk", one(1000.0)),

@@ -24,6 +24,7 @@ struct World {
     follow: f64,
     missing: Vec<&'static str>,
     truth: Option<Value>,
+    moment: Option<Value>,
     passes_per_image: u32,
     cancel_at_step: Option<(u32, CancelToken)>,
     die_in: Option<&'static str>,
@@ -49,6 +50,7 @@ fn world() -> Shared {
         follow: 1.0,
         missing: Vec::new(),
         truth: None,
+        moment: None,
         passes_per_image: 0,
         cancel_at_step: None,
         die_in: None,
@@ -120,6 +122,11 @@ impl World {
                 Some(truth) => ret([truth.clone()]),
                 None => err("No such function: handeye.truth"),
             },
+            "handeye.moment" => match &self.moment {
+                Some(moment) => ret([moment.clone()]),
+                None => err("No such function: handeye.moment"),
+            },
+            "handeye.moveBoard" | "handeye.showBoard" => err(&format!("No such function: {name}")),
             _ => self.motion(name, args),
         }
     }
@@ -477,3 +484,6 @@ fn what_the_cell_publishes_goes_before_what_the_scene_shows() {
         assert!(matches!(cell.client.ground_truth(), Err(LinkError::BadTruth { .. })));
     }
 }
+
+#[path = "moment_tests.rs"]
+mod moment;

@@ -1,0 +1,145 @@
+//! Sending the arm one point per pass of the simulation.
+//!
+//! A point is sent as `sim.moveToConfig` does it inside the server: a joint that is moved by forces gets a new target
+//! position, any other is put there. So the arm stands within a pass when this client hangs, dies, or loses its
+//! connection.
+//!
+//! A client that is too slow for the simulation misses passes, and the arm stands in them. It still gets the next point
+//! of its plan, one step of one pass: to make up for the passes it would have to move faster than it may.
+
+use handeye_core::frames::{Base, Pose, Tip};
+
+use super::sentinel::Sentinel;
+use super::{Arm, JOINTS, JointAngles, read_joint_angles};
+use crate::client::error::LinkError;
+use crate::client::options::CallOptions;
+use crate::client::sim::ObjectHandle;
+
+/// A joint that is where it is put may be off by rounding [rad].
+const PLACED_OFF_RAD: f64 = 1e-6;
+
+/// A joint moved by forces lags behind: by a few degrees at full speed, as its controller is tuned [rad].
+const DRIVEN_OFF_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
+
+/// Points under way to an arm that nobody else moves.
+pub(super) struct Stream {
+    sentinel: Sentinel,
+    dynamic: [bool; JOINTS],
+    sent: JointAngles,
+    seen_s: Option<f64>,
+    is_stopped: bool,
+}
+
+/// The pass for which a point is wanted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slot {
+    /// Simulated time [s]; the point takes effect in the pass that begins now.
+    pub now_s: f64,
+    /// Since the point before [s], negative after a new start of the simulation; `None` for the first point.
+    pub since_last_s: Option<f64>,
+    /// A client had the cell stop everything.
+    pub is_stopped: bool,
+}
+
+/// What is sent in a pass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point {
+    /// Where the joints go [rad].
+    pub joints: JointAngles,
+    /// Where the target dummy goes, if anywhere.
+    pub target: Option<Pose<Base, Tip>>,
+}
+
+/// What became of a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pass {
+    /// None has gone by since the last point.
+    None,
+    /// A point was sent, and the pass is over.
+    Sent,
+    /// This joint, counted from 0, is not where it was sent; nothing was sent.
+    NotFollowing(usize),
+}
+
+impl Stream {
+    /// For an arm that stands at `start`.
+    pub fn begin(arm: &mut Arm, start: JointAngles) -> Result<Self, LinkError> {
+        let mut dynamic = [false; JOINTS];
+        for (dynamic, &joint) in dynamic.iter_mut().zip(&arm.objects.joints) {
+            *dynamic = arm.sim.is_joint_dynamic(joint)?;
+        }
+        let sentinel = Sentinel::begin(&mut arm.sim, &arm.info)?;
+        Ok(Self { sentinel, dynamic, sent: start, seen_s: None, is_stopped: false })
+    }
+
+    /// Tidies up behind the last point, unless the connection is gone.
+    pub fn end<T>(self, arm: &mut Arm, outcome: Result<T, LinkError>) -> Result<T, LinkError> {
+        match outcome {
+            Err(error) if error.is_connection_loss() => Err(error),
+            outcome => self.sentinel.end(&mut arm.sim).and(outcome),
+        }
+    }
+
+    /// Whether a client had the cell stop everything since it began.
+    pub fn is_stopped(&self) -> bool {
+        self.is_stopped
+    }
+
+    /// Whether a point was sent at this simulated time already.
+    pub fn has_sent_at(&self, now_s: f64) -> bool {
+        self.seen_s == Some(now_s)
+    }
+
+    /// Sends the next point, if a pass has gone by since the last one and the joints are where they were sent, and waits
+    /// for the end of the pass. `next` is called while the simulation is held, so it must be quick.
+    pub fn pass(&mut self, arm: &mut Arm, next: impl FnOnce(&Slot) -> Point) -> Result<Pass, LinkError> {
+        // All joints go to a point in the same pass, however slow the network.
+        let lock = arm.hold.acquire(&mut arm.sim)?;
+        let pass = self.sentinel.is_stopped(&mut arm.sim).and_then(|now| {
+            self.is_stopped |= now;
+            self.send(arm, next)
+        });
+        let pass = match lock {
+            Some(lock) => lock.release(&mut arm.sim, pass)?,
+            None => pass?,
+        };
+        // A point takes effect in the pass that follows, also the last one.
+        arm.sim.step(&CallOptions::default())?;
+        Ok(pass)
+    }
+
+    fn send(&mut self, arm: &mut Arm, next: impl FnOnce(&Slot) -> Point) -> Result<Pass, LinkError> {
+        let now_s = arm.sim.get_simulation_time()?;
+        if self.has_sent_at(now_s) {
+            return Ok(Pass::None);
+        }
+        let since_last_s = self.seen_s.map(|seen_s| now_s - seen_s);
+        self.seen_s = Some(now_s);
+        let joints = read_joint_angles(&mut arm.sim, &arm.objects.joints)?;
+        let tolerance = |joint: usize| if self.dynamic[joint] { DRIVEN_OFF_RAD } else { PLACED_OFF_RAD };
+        if let Some(joint) = (0..JOINTS).find(|&i| difference_rad(joints[i], self.sent[i]) > tolerance(i)) {
+            return Ok(Pass::NotFollowing(joint));
+        }
+        let point = next(&Slot { now_s, since_last_s, is_stopped: self.is_stopped });
+        for joint in (0..JOINTS).filter(|&i| point.joints[i] != self.sent[i]) {
+            let (handle, position_rad) = (arm.objects.joints[joint], point.joints[joint]);
+            if self.dynamic[joint] {
+                arm.sim.set_joint_target_position(handle, position_rad)?;
+            } else {
+                arm.sim.set_joint_position(handle, position_rad)?;
+            }
+        }
+        self.sent = point.joints;
+        if let (Some(dummy), Some(pose)) = (arm.objects.target, &point.target) {
+            arm.sim.set_object_pose(dummy, ObjectHandle::WORLD, pose)?;
+        }
+        Ok(Pass::Sent)
+    }
+}
+
+/// Between two angles, the short way round: a joint that turns without end comes back from the other side.
+fn difference_rad(a: f64, b: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    let rest = (a - b).rem_euclid(turn);
+    rest.min(turn - rest)
+}
