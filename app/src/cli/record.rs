@@ -1,0 +1,72 @@
+//! What commands without a window note for Rerun.
+
+use std::sync::Arc;
+
+use handeye_core::image::RgbImage;
+use handeye_core::session::Store;
+use handeye_sim_link::client::LinkError;
+use handeye_sim_link::client::cell::{Arm, CellInfo, Frame, GroundTruth};
+
+use crate::model::{CellFacts, FrameImages, FrameInfo, Truth};
+use crate::rerun_log::{Entry, Recorder};
+
+/// The cell and what it publishes of itself.
+pub fn cell(recorder: &Recorder, arm: &mut Arm, truth: &GroundTruth) -> Result<(), LinkError> {
+    if recorder.is_on() {
+        recorder.note(Entry::Cell(Arc::new(facts(arm, truth)?)));
+    }
+    Ok(())
+}
+
+fn facts(arm: &mut Arm, truth: &GroundTruth) -> Result<CellFacts, LinkError> {
+    let kinematics_known = arm.kinematics()?.is_ok();
+    let info = arm.info();
+    Ok(CellFacts {
+        joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
+        nominal_intrinsics: info.camera_intrinsics_nominal(),
+        kinematics_known,
+        truth: Some(known(truth)),
+    })
+}
+
+/// What the cell publishes of itself, as the solver's report compares it.
+pub fn known(truth: &GroundTruth) -> Truth {
+    let GroundTruth { tip_from_camera, base_from_target, intrinsics, .. } = *truth;
+    Truth { tip_from_camera, base_from_target, intrinsics }
+}
+
+/// A capture: the robot, the picture, and the session with it.
+pub fn capture(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame, session: &Store) {
+    if recorder.is_on() {
+        picture(recorder, info, number, frame);
+        document(recorder, session);
+    }
+}
+
+/// The robot and the picture.
+pub fn picture(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame) {
+    let Frame { rgb, depth, sim_time_s, base_from_tip, joints, base_from_target_true } = frame;
+    recorder.note(Entry::Robot { sim_time_s, base_from_tip, joints_rad: joints });
+    let depth_range_m = [info.depth_optics.near_m as f32, info.depth_optics.far_m as f32];
+    let info = FrameInfo {
+        number,
+        sim_time_s,
+        // There is no clock of a window here.
+        received_s: sim_time_s,
+        rate_hz: 0.0,
+        depth_range_m,
+        far_plane_m: depth_range_m[1],
+        base_from_tip,
+        joints_rad: joints,
+        base_from_target_true,
+    };
+    // The colours of depths are the window's; a viewer has its own.
+    let depth_coloured = RgbImage::default();
+    recorder.note(Entry::Picture { info, images: Arc::new(FrameImages { rgb, depth, depth_coloured }) });
+}
+
+/// The session as it is now.
+pub fn document(recorder: &Recorder, session: &Store) {
+    let folder = Some(session.folder().to_path_buf());
+    recorder.note(Entry::Document { folder, document: Arc::clone(session.document()) });
+}

@@ -1,0 +1,147 @@
+//! How the viewer is arranged in each step of the workflow.
+
+use handeye_core::handeye::Mode;
+use rerun::blueprint::components::PanelState;
+use rerun::blueprint::{
+    Blueprint, ContainerLike, Horizontal, SelectionPanel, Spatial2DView, Spatial3DView, Tabs, TextDocumentView,
+    TextLogView, TimePanel, TimeSeriesView, Vertical,
+};
+
+use super::scene::paths;
+use crate::model::Step;
+
+/// The arrangement for a step. Steps before the first capture share that of capturing, exporting that of solving.
+pub fn of(step: Step) -> Blueprint {
+    match step {
+        Step::Connect | Step::Target | Step::Capture => capture(),
+        Step::Solve | Step::Export => solve(),
+        Step::Verify => verify(),
+        Step::Track => track(),
+    }
+}
+
+/// Live: what robot and camera do now.
+fn capture() -> Blueprint {
+    let right = Vertical::new([
+        Tabs::new(live_pictures("Camera")).into(),
+        Tabs::new([plot("Joints", paths::PLOT_JOINTS), log()]).into(),
+    ])
+    .with_row_shares(vec![2.0, 1.0]);
+    arranged(cell("Cell", &[]), right.into(), paths::SIM_TIMELINE)
+}
+
+/// Capture by capture: how the answer came about.
+fn solve() -> Blueprint {
+    let pictures = live_pictures("Picture of the capture").into_iter().chain([selected_picture()]);
+    let right = Vertical::new([
+        Tabs::new(pictures).into(),
+        Tabs::new([
+            report(),
+            plot("Residuals [px]", "plots/residual"),
+            plot("Expected error [mm]", paths::PLOT_EXPECTED),
+        ])
+        .into(),
+    ]);
+    let cell = cell("Captures and board", &["- /base/track/**", "- /base/points"]);
+    arranged(cell, right.into(), paths::CAPTURE_TIMELINE)
+}
+
+/// Where the calibration puts the board, against where it is seen.
+fn verify() -> Blueprint {
+    let pictures = live_pictures("Prediction in the live picture").into_iter().chain([selected_picture()]);
+    let right = Vertical::new([
+        Tabs::new(pictures).into(),
+        Tabs::new([plot("Residuals [px]", "plots/residual"), report(), log()]).into(),
+    ]);
+    let cell = cell("Cell and predicted boards", &["- /base/track/**", "- /base/points"]);
+    arranged(cell, right.into(), paths::SIM_TIMELINE)
+}
+
+/// The board as it moves.
+fn track() -> Blueprint {
+    let right = Vertical::new([
+        Tabs::new(live_pictures("Camera")).into(),
+        plots("Position [mm]", &[paths::PLOT_TRACK_ERROR, paths::PLOT_TRACK_SIGMA]),
+        plots("From picture to pose [ms]", &[paths::PLOT_LATENCY]),
+        Tabs::new([plot("Joints", paths::PLOT_JOINTS), log()]).into(),
+    ]);
+    arranged(cell("Tracking", &["- /base/captures/**"]), right.into(), paths::SIM_TIMELINE)
+}
+
+fn arranged(left: ContainerLike, right: ContainerLike, timeline: &str) -> Blueprint {
+    Blueprint::new(Horizontal::new([left, right]).with_column_shares(vec![3.0, 2.0]))
+        .with_auto_views(false)
+        .with_auto_layout(false)
+        .with_time_panel(TimePanel::new().with_state(PanelState::Collapsed).with_timeline(timeline))
+        .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
+}
+
+/// Everything with a place, without what the step does not need.
+fn cell(name: &str, without: &[&str]) -> ContainerLike {
+    // The points that a viewer makes of a depth image reach to the far plane, and hide the arm in front of them.
+    let depths = LENSES.map(|mode| format!("- /{}/{}", lens(mode), paths::DEPTH));
+    let contents =
+        ["+ $origin/**", "- /plots/**", "- /selected/**"].iter().chain(without).map(|query| (*query).to_owned());
+    Spatial3DView::new(name).with_origin("/").with_contents(contents.chain(depths)).into()
+}
+
+/// Where a camera may be.
+const LENSES: [Mode; 2] = [Mode::EyeInHand, Mode::EyeToHand];
+
+fn lens(mode: Mode) -> String {
+    paths::below(paths::camera(mode), paths::LENS)
+}
+
+/// The live picture, of a camera on the tip or beside the robot: whichever there is. The one on the tip is in front.
+fn live_pictures(name: &str) -> [ContainerLike; 2] {
+    LENSES.map(|mode| {
+        let name = match mode {
+            Mode::EyeInHand => name,
+            Mode::EyeToHand => "Camera beside the robot",
+        };
+        let no_depth = format!("- /{}/{}", lens(mode), paths::DEPTH);
+        Spatial2DView::new(name).with_origin(lens(mode)).with_contents(["+ $origin/**".to_owned(), no_depth]).into()
+    })
+}
+
+fn selected_picture() -> ContainerLike {
+    Spatial2DView::new("Selected capture").with_origin(paths::SELECTED).into()
+}
+
+fn plot(name: &str, origin: &str) -> ContainerLike {
+    TimeSeriesView::new(name).with_origin(origin).into()
+}
+
+fn plots(name: &str, series: &[&str]) -> ContainerLike {
+    let contents = series.iter().map(|path| format!("+ /{path}"));
+    TimeSeriesView::new(name).with_origin("/").with_contents(contents).into()
+}
+
+fn report() -> ContainerLike {
+    TextDocumentView::new("Report").with_origin(paths::REPORT).into()
+}
+
+fn log() -> ContainerLike {
+    TextLogView::new("Log").with_origin(paths::LOG).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use rerun::RecordingStreamBuilder;
+    use rerun::blueprint::BlueprintActivation;
+    use rerun::log::LogMsg;
+
+    use super::*;
+
+    #[test]
+    fn every_step_has_an_arrangement_that_a_viewer_is_told_to_take() {
+        for step in Step::ALL {
+            let (rec, storage) = RecordingStreamBuilder::new("handeye-workbench").memory().expect("a recording");
+            let activation = BlueprintActivation { make_active: true, make_default: true };
+            of(step).send(&rec, activation).expect("sent");
+            rec.flush_blocking().expect("flushed");
+            let is_told = |message: &LogMsg| matches!(message, LogMsg::BlueprintActivationCommand(_));
+            assert!(storage.take().iter().any(is_told), "{step:?}");
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! What is recorded. Plain data that costs the sender no more than a few reference counts.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::session::{CaptureId, Document};
+use handeye_sim_link::client::cell::JointAngles;
+
+use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved, Step, Tracked};
+
+/// Something to record.
+#[derive(Debug, Clone)]
+pub enum Entry {
+    /// A cell was connected; its truth, where it publishes one.
+    Cell(Arc<CellFacts>),
+    /// The robot.
+    Robot {
+        /// Simulated time [s].
+        sim_time_s: f64,
+        /// The tip as the controller reports it.
+        base_from_tip: Pose<Base, Tip>,
+        /// Joints [rad].
+        joints_rad: JointAngles,
+    },
+    /// A live picture.
+    Picture {
+        /// When and from where.
+        info: FrameInfo,
+        /// The pixels.
+        images: Arc<FrameImages>,
+    },
+    /// The board in a live picture.
+    Detection(Arc<LiveDetection>),
+    /// The session is now like this; its images are below the folder.
+    Document {
+        /// The folder of the session.
+        folder: Option<PathBuf>,
+        /// The captures.
+        document: Arc<Document>,
+    },
+    /// Corners of a capture.
+    Observed {
+        /// Which capture.
+        id: CaptureId,
+        /// What was seen.
+        observed: Arc<Observed>,
+    },
+    /// A calibration.
+    Solved(Arc<Solved>),
+    /// A picture in which the board was tracked.
+    Tracked(Arc<Tracked>),
+    /// Captures that are selected in the window.
+    Selected(Vec<CaptureId>),
+    /// The step of the workflow, which decides what is shown.
+    Step(Step),
+    /// A line of the log.
+    Said {
+        /// How much it matters.
+        severity: Severity,
+        /// The words, in English.
+        words: String,
+    },
+}

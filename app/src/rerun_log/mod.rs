@@ -1,0 +1,39 @@
+//! The recording for Rerun: everything that happens, in 3D and on a time line.
+//!
+//! The application notes [`Entry`]s with a [`Recorder`]; noting never waits. Two threads write what was noted, each with a
+//! queue and a stream of its own, so that a viewer that hangs does not keep anything from the disk:
+//!
+//! | thread | writes to | how much |
+//! | --- | --- | --- |
+//! | `rerun-file` | a file, as a rule beside the session | what lasts, and a little of what is live |
+//! | `rerun-viewer` | a server of ours for viewers, or a viewer elsewhere | everything, as fast as the viewer reads |
+//!
+//! What lasts (captures, calibrations, messages) is kept for a viewer that is opened later. What is live (pictures, the
+//! robot) is only of interest while it is new: what cannot be written in time is left out and counted.
+//! `docs/rerun_viewers.md` has the bounds.
+
+pub mod blueprint;
+mod choice;
+mod entry;
+mod file;
+mod lasting;
+mod native;
+mod page;
+mod pump;
+mod queue;
+mod recorder;
+mod report;
+mod reports;
+pub mod scene;
+mod serving;
+mod stream;
+mod viewer;
+
+pub use choice::{ChoiceError, RerunChoice};
+pub use entry::Entry;
+pub use recorder::{Pace, Recorder, RecorderOptions};
+pub use scene::{RecordError, SceneWriter};
+pub use viewer::ViewerWish;
+
+/// Under which viewers keep layouts and recordings of this program.
+pub const APPLICATION_ID: &str = "handeye-workbench";

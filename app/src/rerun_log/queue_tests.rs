@@ -1,0 +1,113 @@
+use std::sync::Arc;
+
+use handeye_core::depth::DepthImage;
+use handeye_core::frames::Pose;
+use handeye_core::image::RgbImage;
+
+use super::*;
+use crate::model::{FrameImages, FrameInfo, Severity};
+
+const SOON: Duration = Duration::from_secs(20);
+const AT_ONCE: Duration = Duration::from_millis(1);
+
+fn rates(rate: Rate) -> Rates {
+    Rates { robot: rate, picture: rate, detection: rate, tracked: rate }
+}
+
+fn robot(sim_time_s: f64) -> Entry {
+    Entry::Robot { sim_time_s, base_from_tip: Pose::identity(), joints_rad: [0.0; 6] }
+}
+
+fn picture(number: u64) -> Entry {
+    let info = FrameInfo {
+        number,
+        sim_time_s: 0.0,
+        received_s: 0.0,
+        rate_hz: 0.0,
+        depth_range_m: [0.0, 1.0],
+        far_plane_m: 1.0,
+        base_from_tip: Pose::identity(),
+        joints_rad: [0.0; 6],
+        base_from_target_true: None,
+    };
+    let depth = DepthImage::new(1, 1, vec![1.0]).expect("a picture");
+    let images = FrameImages { rgb: RgbImage::new(1, 1), depth, depth_coloured: RgbImage::new(1, 1) };
+    Entry::Picture { info, images: Arc::new(images) }
+}
+
+fn said(words: &str) -> Entry {
+    Entry::Said { severity: Severity::Info, words: words.to_owned() }
+}
+
+fn number(next: Next) -> u64 {
+    match next {
+        Next::Live(Entry::Picture { info, .. }) => info.number,
+        other => panic!("no picture but {other:?}"),
+    }
+}
+
+#[test]
+fn a_writer_that_never_writes_leaves_a_short_queue_with_everything_that_lasts() {
+    let queue = Queue::new(&rates(Rate::newest_every(Duration::ZERO)));
+    for round in 0..2000 {
+        queue.put(picture(round));
+        queue.put(robot(round as f64));
+        queue.put(Entry::Selected(Vec::new()));
+    }
+    queue.put(said("the last words"));
+    assert_eq!(queue.len(), 4, "a picture, a state, a selection and a message");
+    assert!(matches!(queue.next(SOON), Next::Lasting(Item::Entry(Entry::Selected(_)))));
+    assert!(matches!(queue.next(SOON), Next::Lasting(Item::Entry(Entry::Said { .. }))));
+    assert_eq!(number(queue.next(SOON)), 1999, "the newest picture");
+}
+
+#[test]
+fn a_command_that_ends_has_every_picture_written_as_long_as_the_writer_keeps_up() {
+    let queue = Queue::new(&rates(Rate::all(3)));
+    for round in 0..5 {
+        queue.put(picture(round));
+    }
+    queue.end();
+    assert_eq!([2, 3, 4].map(|_| number(queue.next(SOON))), [2, 3, 4]);
+    assert!(matches!(queue.next(SOON), Next::End));
+}
+
+#[test]
+fn pictures_that_come_too_often_are_thinned_and_not_counted_as_lost() {
+    let queue = Queue::new(&rates(Rate::newest_every(Duration::from_hours(1))));
+    queue.put(picture(1));
+    assert_eq!(number(queue.next(SOON)), 1);
+    queue.put(picture(2));
+    queue.put(picture(3));
+    assert!(matches!(queue.next(AT_ONCE), Next::Idle), "it is not time yet");
+    assert_eq!(queue.left_out(), 0);
+    queue.end();
+    assert_eq!(number(queue.next(SOON)), 3, "the end does not wait for its time");
+}
+
+#[test]
+fn pictures_that_a_slow_writer_did_not_take_are_counted() {
+    let queue = Queue::new(&rates(Rate::newest_every(Duration::ZERO)));
+    let began = Instant::now();
+    let mut put = 0;
+    while queue.left_out() < 3 {
+        queue.put(picture(put));
+        put += 1;
+        std::thread::yield_now();
+        assert!(began.elapsed() < SOON);
+    }
+    assert!(began.elapsed() >= SLOW);
+}
+
+#[test]
+fn what_lasts_goes_before_what_is_live_and_a_waiting_writer_is_woken() {
+    let queue = Arc::new(Queue::new(&rates(Rate::newest_every(Duration::ZERO))));
+    queue.put(picture(1));
+    queue.put(said("hello"));
+    assert!(matches!(queue.next(SOON), Next::Lasting(_)));
+    assert_eq!(number(queue.next(SOON)), 1);
+    let waiting = Arc::clone(&queue);
+    let writer = std::thread::spawn(move || matches!(waiting.next(SOON), Next::Lasting(_)));
+    queue.put(said("again"));
+    assert!(writer.join().expect("no panic"));
+}

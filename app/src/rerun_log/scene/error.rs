@@ -1,0 +1,68 @@
+//! What can go wrong with a recording.
+
+use std::path::PathBuf;
+
+/// Why something is not in the recording.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// The stream did not take it.
+    #[error("{path} could not be recorded: {source}")]
+    Stream {
+        /// Which entity.
+        path: String,
+        /// What the stream said.
+        source: Box<rerun::RecordingStreamError>,
+    },
+    /// A file of a capture cannot be read; everything else of the entry is recorded.
+    #[error("{} of capture {capture} is not in the recording: {reason}", file.display())]
+    File {
+        /// Which capture.
+        capture: u32,
+        /// Which file.
+        file: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The result has numbers that its file format does not allow; everything else of the entry is recorded.
+    #[error("the result is not in the recording as JSON: {reason}")]
+    Result {
+        /// Which.
+        reason: String,
+    },
+    /// A picture could not be compressed; everything else of the entry is recorded.
+    #[error("a picture of {width}×{height} could not be compressed for {path}: {reason}")]
+    Picture {
+        /// Which entity.
+        path: String,
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// What the encoder said.
+        reason: String,
+    },
+}
+
+/// Goes on after what concerns one thing only, and keeps the first of such errors.
+#[derive(Debug, Default)]
+pub(super) struct Faults(Option<RecordError>);
+
+impl Faults {
+    /// An error of the stream is passed on at once.
+    pub fn tolerate(&mut self, outcome: Result<(), RecordError>) -> Result<(), RecordError> {
+        match outcome {
+            Err(stream @ RecordError::Stream { .. }) => Err(stream),
+            Err(error) => {
+                self.0.get_or_insert(error);
+                Ok(())
+            }
+            Ok(()) => Ok(()),
+        }
+    }
+
+    /// The first error.
+    pub fn finish(self) -> Result<(), RecordError> {
+        self.0.map_or(Ok(()), Err)
+    }
+}

@@ -1,0 +1,356 @@
+//! The scene in the recording: entries of the application become entities of Rerun.
+//!
+//! One [`SceneWriter`] writes one recording. It keeps what later entries need from earlier ones (camera, board, captures)
+//! and nothing else; pictures of captures are read from the session's folder when they are written.
+//!
+//! | part | writes |
+//! | --- | --- |
+//! | `robot` | arm, tip, the way that the tip went |
+//! | `camera` | the live camera: place, picture, depths, points in the base |
+//! | `captures` | a frustum per capture with picture, corners, residuals, boards |
+//! | `result` | the board as calibrated, uncertainties, numbers, report |
+//! | `truth` | what a simulated cell says is true |
+//! | `track` | the board as it is tracked |
+//!
+//! What happens between captures has no time on the time line `capture`; there robot and camera are as they were when
+//! the capture was taken, so that stepping through it shows one capture after the other.
+
+mod camera;
+mod captures;
+mod convert;
+mod error;
+mod known;
+pub mod paths;
+mod pen;
+mod result;
+mod robot;
+pub mod style;
+mod track;
+mod truth;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::session::{CaptureId, Document};
+use handeye_sim_link::client::cell::JointAngles;
+use rerun::{AsComponents, RecordingStream, TextLog, TextLogLevel};
+
+pub use error::RecordError;
+
+use super::Entry;
+use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved};
+use captures::Captures;
+use convert::{axes, corner_marks, no_axes, transform};
+use error::Faults;
+use known::{Known, Truth};
+use paths::below;
+use pen::{Clock, Instant, Pen};
+use robot::{Arm, Trail};
+
+/// Depths and points of live pictures are recorded once in this time [s, simulated]: they are ten times the size of the
+/// picture, and what they show changes slowly.
+const DEPTH_EVERY_S: f64 = 1.0;
+
+/// Turns entries into entities, see the [module](self).
+#[derive(Debug)]
+pub struct SceneWriter {
+    clock: Clock,
+    known: Known,
+    arm: Arm,
+    session_trail: Trail,
+    connection_trail: Trail,
+    captures: Captures,
+    /// Number and time [s] of the newest picture.
+    newest_picture: Option<(u64, f64)>,
+    depth_at_s: Option<f64>,
+}
+
+impl Default for SceneWriter {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl SceneWriter {
+    /// For a recording in which there is nothing yet.
+    pub fn new() -> Self {
+        Self {
+            clock: Clock::default(),
+            known: Known::default(),
+            arm: Arm::new(),
+            session_trail: Trail::new(paths::TRAJECTORY_SESSION, style::PAST_WAY),
+            connection_trail: Trail::new(paths::TRAJECTORY_CONNECTION, style::WAY),
+            captures: Captures::default(),
+            newest_picture: None,
+            depth_at_s: None,
+        }
+    }
+
+    /// What is there at all times: axes of the world, names of series. Once per recording, before anything else.
+    ///
+    /// # Errors
+    /// [`RecordError::Stream`].
+    pub fn begin(&mut self, rec: &RecordingStream) -> Result<(), RecordError> {
+        let pen = Pen::new(rec);
+        pen.write_static("/", &rerun::ViewCoordinates::RIGHT_HAND_Z_UP())?;
+        pen.write_static(paths::BASE, &axes(style::LARGE_AXES))?;
+        pen.write_static(paths::PLOT_JOINTS, &robot::joint_series())?;
+        for (path, name) in result::SERIES {
+            pen.write_static(path, &result::named(name))?;
+        }
+        Ok(())
+    }
+
+    /// Writes what an entry says, on the time lines of [`paths`]. The stream may be another one from call to call, as
+    /// long as all of them are of one recording.
+    ///
+    /// # Errors
+    /// [`RecordError::Stream`] when the recording takes nothing more. Other errors concern one picture or document, and
+    /// the rest of the entry is written.
+    pub fn write(&mut self, rec: &RecordingStream, entry: &Entry) -> Result<(), RecordError> {
+        let pen = Pen::new(rec);
+        match entry {
+            Entry::Cell(facts) => self.cell(pen, facts),
+            Entry::Robot { sim_time_s, base_from_tip, joints_rad } => {
+                self.robot(pen, *sim_time_s, base_from_tip, joints_rad)
+            }
+            Entry::Picture { info, images } => self.picture(pen, info, images),
+            Entry::Detection(detection) => self.detection(pen, detection),
+            Entry::Document { folder, document } => self.document(pen, folder.clone(), document),
+            Entry::Observed { id, observed } => self.observed(pen, *id, observed),
+            Entry::Solved(solved) => self.solved(pen, solved),
+            Entry::Tracked(tracked) => {
+                self.clock.tick(tracked.update.time_s);
+                pen.at(self.clock.live());
+                track::write(pen, &self.known, tracked)
+            }
+            Entry::Selected(ids) => self.selected(pen, ids),
+            // The arrangement of the viewer is no part of the scene, see `blueprint`.
+            Entry::Step(_) => Ok(()),
+            Entry::Said { severity, words } => {
+                pen.at(self.clock.now());
+                let level = match severity {
+                    Severity::Info => TextLogLevel::INFO,
+                    Severity::Warning => TextLogLevel::WARN,
+                    Severity::Error => TextLogLevel::ERROR,
+                };
+                pen.write(paths::LOG, &TextLog::new(words.as_str()).with_level(level))
+            }
+        }
+    }
+
+    fn cell(&mut self, pen: Pen<'_>, facts: &Arc<CellFacts>) -> Result<(), RecordError> {
+        self.arm.reconnected(facts.kinematics_known);
+        self.known.cell = Some(Arc::clone(facts));
+        pen.at(self.clock.now());
+        self.connection_trail.restart(pen)?;
+        if self.known.truth().is_none() {
+            pen.clear(paths::TRUTH)?;
+        }
+        self.surroundings(pen)
+    }
+
+    /// What follows from cell, document and calibration together.
+    fn surroundings(&self, pen: Pen<'_>) -> Result<(), RecordError> {
+        camera::write_camera(pen, &self.known)?;
+        self.known.base_from_tip.map_or(Ok(()), |tip| truth::write(pen, &self.known, &tip))
+    }
+
+    fn robot(
+        &mut self,
+        pen: Pen<'_>,
+        sim_time_s: f64,
+        base_from_tip: &Pose<Base, Tip>,
+        joints: &JointAngles,
+    ) -> Result<(), RecordError> {
+        self.clock.tick(sim_time_s);
+        pen.at(self.clock.live());
+        self.tip(pen, base_from_tip, Some(joints))?;
+        robot::write_joints(pen, joints)?;
+        // The way is one line on every time line.
+        pen.at(self.clock.now());
+        self.trails(pen, base_from_tip)
+    }
+
+    fn tip(
+        &mut self,
+        pen: Pen<'_>,
+        base_from_tip: &Pose<Base, Tip>,
+        joints: Option<&JointAngles>,
+    ) -> Result<(), RecordError> {
+        let is_first = self.known.base_from_tip.replace(*base_from_tip).is_none();
+        robot::write_tip(pen, base_from_tip)?;
+        if let Some(joints) = joints {
+            self.arm.write(pen, base_from_tip, joints)?;
+        }
+        if is_first {
+            truth::write(pen, &self.known, base_from_tip)
+        } else {
+            truth::write_camera(pen, &self.known, base_from_tip)
+        }
+    }
+
+    fn trails(&mut self, pen: Pen<'_>, base_from_tip: &Pose<Base, Tip>) -> Result<(), RecordError> {
+        let to = base_from_tip.translation();
+        self.session_trail.go(pen, &to)?;
+        self.connection_trail.go(pen, &to)
+    }
+
+    fn picture(&mut self, pen: Pen<'_>, info: &FrameInfo, images: &FrameImages) -> Result<(), RecordError> {
+        self.clock.tick(info.sim_time_s);
+        self.newest_picture = Some((info.number, self.clock.sim_time_s));
+        self.known.far_plane_m = Some(info.far_plane_m);
+        pen.at(self.clock.live());
+        self.tip(pen, &info.base_from_tip, Some(&info.joints_rad))?;
+        if let Some(board) = &info.base_from_target_true {
+            truth::write_board(pen, &self.known, board)?;
+        }
+        let mut faults = Faults::default();
+        faults.tolerate(camera::write_picture(pen, &self.known, &images.rgb))?;
+        camera::write_prediction(pen, &self.known, &info.base_from_tip)?;
+        let age_s = self.depth_at_s.map(|at| self.clock.sim_time_s - at);
+        // A negative age is a simulation that was started again.
+        if age_s.is_none_or(|age| !(0.0..DEPTH_EVERY_S).contains(&age)) {
+            self.depth_at_s = Some(self.clock.sim_time_s);
+            let rgb = Some(&images.rgb);
+            faults.tolerate(camera::write_depth(pen, &self.known, &info.base_from_tip, &images.depth, rgb))?;
+        }
+        faults.finish()
+    }
+
+    fn detection(&mut self, pen: Pen<'_>, detection: &LiveDetection) -> Result<(), RecordError> {
+        let of_picture = self.newest_picture.filter(|(number, _)| *number == detection.frame);
+        let live = self.clock.live();
+        pen.at(Instant { sim_time_s: of_picture.map_or(live.sim_time_s, |(_, time)| Some(time)), ..live });
+        let corners = detection.corners.as_deref().unwrap_or_default();
+        pen.write(&below(&camera::lens(&self.known), paths::CORNERS), &corner_marks(corners, style::SEEN))?;
+        result::number(pen, paths::PLOT_SEARCH, Some(detection.took_s * 1e3))?;
+        let board = below(paths::camera(self.known.mode()), paths::SEEN_BOARD);
+        match detection.camera_from_target.filter(|_| self.known.mount().is_some()) {
+            Some(seen) => pen.write(&board, &[&transform(&seen) as &dyn AsComponents, &axes(style::SMALL_AXES)]),
+            None => pen.write(&board, &no_axes()),
+        }
+    }
+
+    fn document(&mut self, pen: Pen<'_>, folder: Option<PathBuf>, document: &Arc<Document>) -> Result<(), RecordError> {
+        let mode_before = self.known.mode();
+        let meta = &document.meta;
+        self.known.target = Some(meta.target);
+        self.known.document_mode = Some(meta.mode);
+        self.known.document_truth = meta
+            .ground_truth
+            .as_ref()
+            .and_then(|truth| Some(Truth::of_links(&truth.links(meta.mode)?, truth.intrinsics)));
+        // Camera and truth as they were before the first of the new captures.
+        pen.at(self.clock.now());
+        if self.known.mode() != mode_before {
+            pen.clear(paths::camera(mode_before))?;
+            pen.clear(paths::board(mode_before))?;
+        }
+        self.surroundings(pen)?;
+        let changes = self.captures.update(folder, document, &mut self.clock);
+        pen.at(self.clock.now());
+        for id in &changes.gone {
+            pen.clear(&paths::capture(*id))?;
+        }
+        let mut faults = Faults::default();
+        for id in changes.new {
+            self.new_capture(pen, id, &mut faults)?;
+        }
+        pen.at(self.clock.now());
+        for shown in changes.changed.iter().filter_map(|id| self.captures.get(*id)) {
+            self.captures.write_place(pen, &self.known, shown)?;
+        }
+        faults.finish()
+    }
+
+    /// A capture with its picture; on the time line of captures also robot and camera as they were.
+    fn new_capture(&mut self, pen: Pen<'_>, id: CaptureId, faults: &mut Faults) -> Result<(), RecordError> {
+        let Some(shown) = self.captures.get(id) else { return Ok(()) };
+        let (record, taken) = (shown.record.clone(), shown.taken);
+        let is_live = self.clock.is_live;
+        // Robot and camera that are seen live are elsewhere by now.
+        let as_taken = Instant { sim_time_s: taken.sim_time_s.filter(|_| !is_live), ..taken };
+        pen.at(as_taken);
+        let live_tip = self.known.base_from_tip;
+        let joints: Option<JointAngles> = record.joints_rad.as_deref().and_then(|joints| joints.try_into().ok());
+        self.tip(pen, &record.base_from_tip, joints.as_ref())?;
+        robot::write_joints(pen, record.joints_rad.as_deref().unwrap_or_default())?;
+        if is_live {
+            self.known.base_from_tip = live_tip;
+        } else {
+            self.trails(pen, &record.base_from_tip)?;
+        }
+        let picture = self.captures.picture(&record);
+        if let Ok(Some(picture)) = &picture {
+            pen.write(&below(&camera::lens(&self.known), paths::PICTURE), picture)?;
+        }
+        match self.captures.depth(&record) {
+            Ok(Some((depth, rgb))) => {
+                let tip = &record.base_from_tip;
+                faults.tolerate(camera::write_depth(pen, &self.known, tip, &depth, Some(&rgb)))?;
+            }
+            Ok(None) => {}
+            Err(error) => faults.tolerate(Err(error))?,
+        }
+        pen.at(taken);
+        if let Some(shown) = self.captures.get(id) {
+            self.captures.write_place(pen, &self.known, shown)?;
+            // Those of one that comes back are known already.
+            if shown.corners.is_some() {
+                Captures::write_marks(pen, &self.known, shown, &below(&paths::capture(id), paths::LENS))?;
+                Captures::write_boards(pen, &self.known, shown)?;
+            }
+        }
+        match picture {
+            Ok(Some(picture)) => {
+                let lens = below(&paths::capture(id), paths::LENS);
+                pen.write(&below(&lens, paths::PICTURE), &picture)
+            }
+            Ok(None) => Ok(()),
+            Err(error) => faults.tolerate(Err(error)),
+        }
+    }
+
+    fn observed(&mut self, pen: Pen<'_>, id: CaptureId, observed: &Observed) -> Result<(), RecordError> {
+        let is_live = self.clock.is_live;
+        let Some(shown) = self.captures.observe(id, observed.corners.clone()) else { return Ok(()) };
+        pen.at(shown.taken);
+        Captures::write_marks(pen, &self.known, shown, &below(&paths::capture(id), paths::LENS))?;
+        Captures::write_boards(pen, &self.known, shown)?;
+        pen.at(Instant { sim_time_s: shown.taken.sim_time_s.filter(|_| !is_live), ..shown.taken });
+        let corners = shown.corners.as_deref().unwrap_or_default();
+        pen.write(&below(&camera::lens(&self.known), paths::CORNERS), &corner_marks(corners, style::SEEN))
+    }
+
+    fn solved(&mut self, pen: Pen<'_>, solved: &Arc<Solved>) -> Result<(), RecordError> {
+        self.known.solved = Some(Arc::clone(solved));
+        pen.at(self.clock.now());
+        let mut faults = Faults::default();
+        faults.tolerate(result::write(pen, &self.known, solved))?;
+        if let Some(tip) = &self.known.base_from_tip {
+            truth::write(pen, &self.known, tip)?;
+            camera::write_prediction(pen, &self.known, tip)?;
+        }
+        self.captures.write_all(pen, &self.known)?;
+        faults.finish()
+    }
+
+    fn selected(&mut self, pen: Pen<'_>, ids: &[CaptureId]) -> Result<(), RecordError> {
+        pen.at(self.clock.now());
+        let changed = self.captures.select(ids);
+        for shown in changed.iter().filter_map(|id| self.captures.get(*id)) {
+            self.captures.write_place(pen, &self.known, shown)?;
+        }
+        let Some(shown) = self.captures.newest_selected() else { return pen.clear(paths::SELECTED) };
+        Captures::write_marks(pen, &self.known, shown, paths::SELECTED)?;
+        match self.captures.picture(&shown.record)? {
+            Some(picture) => pen.write(&below(paths::SELECTED, paths::PICTURE), &picture),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

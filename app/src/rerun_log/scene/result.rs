@@ -1,0 +1,83 @@
+//! A calibration: the board, how uncertain it is, the numbers, and the report.
+
+use handeye_core::handeye::HandEye;
+use rerun::{AsComponents, Scalars, SeriesLines, TextDocument};
+
+use super::camera::write_camera;
+use super::convert::{axes, board_points, ellipsoid, of_position, outline, transform};
+use super::error::RecordError;
+use super::known::Known;
+use super::paths::{self, below};
+use super::pen::Pen;
+use super::style;
+use crate::model::Solved;
+use crate::rerun_log::report;
+
+/// Names of the series, for all times.
+pub(super) const SERIES: [(&str, &str); 11] = [
+    (paths::PLOT_RMS, "residual of the fit [px]"),
+    (paths::PLOT_HELDOUT, "residual of views held out [px]"),
+    (paths::PLOT_VERIFIED, "error of prediction, verification [px]"),
+    (paths::PLOT_EXPECTED, "expected error, 95 % [mm]"),
+    (paths::PLOT_LATENCY, "picture to pose [ms]"),
+    (paths::PLOT_SEARCH, "search for the board [ms]"),
+    (paths::PLOT_TRACK_ERROR, "tracked position against the truth [mm]"),
+    (paths::PLOT_TRACK_TURN, "tracked orientation against the truth [°]"),
+    (paths::PLOT_TRACK_SIGMA, "stated for the position, 95 % [mm]"),
+    (paths::PLOT_TRACK_RATE, "poses per second [1/s]"),
+    (paths::PLOT_TRACK_SPEED, "speed of the board [mm/s]"),
+];
+
+/// A number of a plot.
+pub(super) fn number(pen: Pen<'_>, path: &str, value: Option<f64>) -> Result<(), RecordError> {
+    match value.filter(|value| value.is_finite()) {
+        Some(value) => pen.write(path, &Scalars::single(value)),
+        None => Ok(()),
+    }
+}
+
+/// Names a series.
+pub(super) fn named(name: &str) -> SeriesLines {
+    SeriesLines::new().with_names([name])
+}
+
+/// The calibration that `known` has just learnt.
+pub(super) fn write(pen: Pen<'_>, known: &Known, solved: &Solved) -> Result<(), RecordError> {
+    let calibration = &solved.calibration;
+    write_camera(pen, known)?;
+    if let Some(hand_eye) = &calibration.hand_eye {
+        write_board(pen, known, hand_eye, solved)?;
+        let camera = below(paths::camera(hand_eye.mode()), paths::UNCERTAINTY);
+        match &calibration.hand_eye_covariance {
+            Some(c) => {
+                pen.write(&camera, &ellipsoid(&of_position(c), style::UNCERTAINTY_FACTOR, style::ESTIMATED))?;
+            }
+            None => pen.clear(&camera)?,
+        }
+    }
+    number(pen, paths::PLOT_RMS, calibration.rms_px)?;
+    number(pen, paths::PLOT_HELDOUT, calibration.heldout_rms_px)?;
+    number(pen, paths::PLOT_EXPECTED, calibration.tip_error_95_m.map(|metres| metres * 1e3))?;
+    let verification = solved.verification.as_ref().and_then(|outcome| outcome.as_ref().ok());
+    number(pen, paths::PLOT_VERIFIED, verification.map(|verification| verification.rms_px))?;
+    pen.write(paths::REPORT, &TextDocument::from_markdown(report::markdown(solved)))?;
+    let json = solved.result.to_json().map_err(|error| RecordError::Result { reason: error.to_string() })?;
+    pen.write(paths::RESULT, &TextDocument::new(json))
+}
+
+fn write_board(pen: Pen<'_>, known: &Known, hand_eye: &HandEye, solved: &Solved) -> Result<(), RecordError> {
+    let Some(target) = known.target else { return Ok(()) };
+    let path = paths::board(hand_eye.mode());
+    let place = match hand_eye {
+        HandEye::EyeInHand { base_from_target, .. } => transform(base_from_target),
+        HandEye::EyeToHand { tip_from_target, .. } => transform(tip_from_target),
+    };
+    pen.write(path, &[&place as &dyn AsComponents, &axes(style::AXES)])?;
+    pen.write(&below(path, paths::OUTLINE), &outline(&target, style::ESTIMATED))?;
+    pen.write(&below(path, paths::CORNERS), &board_points(&target, style::ESTIMATED))?;
+    let uncertainty = below(path, paths::UNCERTAINTY);
+    match &solved.calibration.target_covariance {
+        Some(c) => pen.write(&uncertainty, &ellipsoid(&of_position(c), style::UNCERTAINTY_FACTOR, style::ESTIMATED)),
+        None => pen.clear(&uncertainty),
+    }
+}

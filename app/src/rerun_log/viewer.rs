@@ -1,0 +1,217 @@
+//! Opening viewers, each on a thread of its own: programs are started and looked after, which takes its time.
+
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, MutexGuard, PoisonError};
+use std::thread::Builder;
+use std::time::Duration;
+
+use rerun::sink::{GrpcSink, GrpcSinkConnectionState};
+
+use super::native;
+use super::page::Page;
+use super::recorder::Shared;
+use super::serving::Servers;
+use super::stream::{SharedSink, Target};
+use crate::model::{Severity, ViewerState};
+use crate::text;
+use crate::text::Text;
+
+/// A native viewer that ends this soon has not been able to show anything.
+const GRACE: Duration = Duration::from_secs(3);
+
+/// A viewer that is connected to has answered by then.
+const CONNECT: Duration = Duration::from_secs(10);
+
+/// Between two looks at a connection.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Which viewer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ViewerWish {
+    /// The native one, or the web viewer where there is none.
+    Best,
+    /// The native one.
+    Native,
+    /// The web viewer.
+    Web,
+    /// One that runs already, at this address.
+    Connect(String),
+}
+
+/// The viewers that are open.
+#[derive(Default)]
+pub struct Viewers {
+    servers: Option<Servers>,
+    page: Option<Page>,
+}
+
+/// Opens a viewer unless one is being opened.
+pub(super) fn open(shared: &Arc<Shared>, wish: ViewerWish) {
+    if let Err(state) = shared.reports.begin_opening() {
+        let text = match state {
+            ViewerState::Native => text!("The Rerun viewer is open already"),
+            ViewerState::Connected { url } => text!("The recording goes to the viewer at {url} already", url = url),
+            _ => text!("The Rerun viewer is being opened"),
+        };
+        shared.reports.notice(Severity::Info, text);
+        return;
+    }
+    let work = Arc::clone(shared);
+    let started = Builder::new().name("rerun-opener".to_owned()).spawn(move || {
+        let opened = match wish {
+            ViewerWish::Best => work.native().or_else(|why| {
+                tracing::info!("{}", why.say(crate::text::Language::English));
+                work.web()
+            }),
+            ViewerWish::Native => work.native(),
+            ViewerWish::Web => work.web(),
+            ViewerWish::Connect(url) => work.connect(&url),
+        };
+        if let Err(why) = opened {
+            work.failed(why);
+        }
+    });
+    if let Err(error) = started {
+        shared.failed(text!("No viewer was opened: {error}", error = error));
+    }
+}
+
+impl Shared {
+    fn viewers(&self) -> MutexGuard<'_, Viewers> {
+        self.viewers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn failed(&self, why: Text) {
+        self.reports.notice(Severity::Warning, why.clone());
+        self.reports.set_viewer(ViewerState::Failed(why));
+    }
+
+    /// The addresses from which viewers read.
+    fn serve(&self) -> Result<[String; 2], Text> {
+        let mut viewers = self.viewers();
+        if let Some(servers) = &viewers.servers {
+            return Ok(servers.urls());
+        }
+        let servers = Servers::start().map_err(|error| text!("No viewer was opened: {error}", error = error))?;
+        self.write_to_viewers(servers.target());
+        let urls = servers.urls();
+        viewers.servers = Some(servers);
+        Ok(urls)
+    }
+
+    fn native(&self) -> Result<(), Text> {
+        let program = native::find()?;
+        let urls = self.serve()?;
+        let cannot = |error: std::io::Error| {
+            text!(
+                "The native Rerun viewer {program} does not start: {error}",
+                program = program.display(),
+                error = error
+            )
+        };
+        let mut child = native::start(&program, &urls).map_err(cannot)?;
+        if let Some(status) = native::wait(&mut child, GRACE, || self.has_ended()).map_err(cannot)?
+            && !status.success()
+        {
+            return Err(text!(
+                "The native Rerun viewer ended at once ({status}): it needs a screen and Vulkan or OpenGL",
+                status = status
+            ));
+        }
+        self.reports.set_viewer(ViewerState::Native);
+        self.watch(child);
+        Ok(())
+    }
+
+    /// Waits until the user closes the viewer.
+    fn watch(&self, mut child: Child) {
+        let ended = native::wait(&mut child, Duration::MAX, || self.has_ended());
+        tracing::debug!(?ended, "the native viewer is not looked after any more");
+        if self.has_ended() {
+            return;
+        }
+        let mut viewers = self.viewers();
+        let page = viewers.page.as_ref().map(|page| page.url().to_owned());
+        if let Some(url) = page {
+            self.reports.set_viewer(ViewerState::Web { url });
+            return;
+        }
+        // Nobody looks: writing for viewers would only cost time.
+        self.leave_viewers();
+        viewers.servers = None;
+        drop(viewers);
+        self.reports.set_viewer(ViewerState::Closed);
+    }
+
+    fn web(&self) -> Result<(), Text> {
+        let urls = self.serve()?;
+        let mut viewers = self.viewers();
+        let url = if let Some(page) = &viewers.page {
+            page.url().to_owned()
+        } else {
+            let page = Page::start(&urls).map_err(|error| text!("No viewer was opened: {error}", error = error))?;
+            viewers.page.insert(page).url().to_owned()
+        };
+        drop(viewers);
+        self.reports.set_viewer(ViewerState::Web { url: url.clone() });
+        if self.open_browser {
+            let text = if browse(&url) {
+                text!("The recording is shown in the browser: {url}", url = url)
+            } else {
+                text!("The recording is shown at {url}: open it in a browser", url = url)
+            };
+            self.reports.notice(Severity::Info, text);
+        }
+        Ok(())
+    }
+
+    fn connect(&self, url: &str) -> Result<(), Text> {
+        let uri = url.parse().map_err(|error| {
+            text!("{url} is not the address of a Rerun viewer: {why}", url = url, why = format!("{error}"))
+        })?;
+        let uri: rerun::external::re_uri::ProxyUri = uri;
+        let sink = Arc::new(GrpcSink::new(uri));
+        let shared = SharedSink(Arc::clone(&sink) as Arc<dyn rerun::sink::LogSink>);
+        self.write_to_viewers(Target::Viewers { lasting: shared.clone(), live: shared });
+        let began = std::time::Instant::now();
+        let mut told = ViewerState::Opening;
+        while !self.has_ended() {
+            let now = match sink.status() {
+                GrpcSinkConnectionState::Connecting { .. } if began.elapsed() < CONNECT => ViewerState::Opening,
+                GrpcSinkConnectionState::Connecting { .. } => ViewerState::Failed(text!(
+                    "Nobody answers at {url}: start a viewer there; it is tried on",
+                    url = url
+                )),
+                GrpcSinkConnectionState::Connected => ViewerState::Connected { url: url.to_owned() },
+                GrpcSinkConnectionState::Disconnected(_) => {
+                    self.leave_viewers();
+                    return Err(text!("The viewer at {url} has gone", url = url));
+                }
+            };
+            if now != told {
+                told.clone_from(&now);
+                self.reports.set_viewer(now);
+            }
+            std::thread::sleep(LOOK);
+        }
+        Ok(())
+    }
+}
+
+/// Has the system show a page; whether it was asked.
+fn browse(url: &str) -> bool {
+    if std::env::var_os("DISPLAY").is_none() && std::env::var_os("WAYLAND_DISPLAY").is_none() {
+        // Some systems would start a browser in the terminal.
+        return false;
+    }
+    let asked =
+        Command::new("xdg-open").arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    match asked {
+        Ok(mut child) => {
+            let waited = Builder::new().name("xdg-open".to_owned()).spawn(move || child.wait());
+            tracing::debug!(?waited, "xdg-open");
+            true
+        }
+        Err(_not_there) => false,
+    }
+}
