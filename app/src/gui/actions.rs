@@ -74,13 +74,14 @@ const OPEN: &[KeyboardShortcut] = &[ctrl(Key::O)];
 const SAVE: &[KeyboardShortcut] = &[ctrl(Key::S)];
 const PALETTE: &[KeyboardShortcut] = &[ctrl(Key::K), ctrl(Key::P)];
 const KEYS: &[KeyboardShortcut] = &[plain(Key::F1), plain(Key::Questionmark)];
-const STEPS: [&[KeyboardShortcut]; 6] = [
+const STEPS: [&[KeyboardShortcut]; 7] = [
     &[plain(Key::Num1)],
     &[plain(Key::Num2)],
     &[plain(Key::Num3)],
     &[plain(Key::Num4)],
     &[plain(Key::Num5)],
     &[plain(Key::Num6)],
+    &[plain(Key::Num7)],
 ];
 
 /// All of it, in the order of the help.
@@ -138,6 +139,12 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
         action(tr!(language, "Light theme"), Group::Window, &[], Command::SetTheme(ThemeChoice::Light)),
         action(tr!(language, "Dark theme"), Group::Window, &[], Command::SetTheme(ThemeChoice::Dark)),
         action(tr!(language, "Reset layout"), Group::Window, &[], Command::ResetLayout),
+        Action {
+            name: tr!(language, "Open the recording in Rerun"),
+            group: Group::Window,
+            keys: &[],
+            command: model.rerun.on.then_some(Command::OpenRerun),
+        },
         action(tr!(language, "About"), Group::Window, &[], open(Dialog::About)),
     ]);
     for other in Language::ALL {

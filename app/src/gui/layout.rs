@@ -8,18 +8,20 @@ use crate::model::{Pane, Step};
 /// Key of the layout in eframe's storage.
 pub const STORAGE_KEY: &str = "layout";
 
-/// The pictures in the upper row.
-const PICTURES: [Pane; 2] = [Pane::Colour, Pane::Depth];
+/// The upper left: what the camera sees.
+const PICTURE: [Pane; 1] = [Pane::Colour];
+/// The tabs at the upper right: the same in space.
+const SPACE: [Pane; 2] = [Pane::Depth, Pane::Scene];
 /// The tabs at the lower left: what there is.
 const RECORDS: [Pane; 3] = [Pane::Poses, Pane::Charts, Pane::Log];
 /// The tabs at the lower right: what is done.
-const TOOLS: [Pane; 7] =
-    [Pane::Connect, Pane::Target, Pane::Jog, Pane::Taught, Pane::Result, Pane::Verify, Pane::Export];
+const TOOLS: [Pane; 8] =
+    [Pane::Connect, Pane::Target, Pane::Jog, Pane::Taught, Pane::Result, Pane::Verify, Pane::Export, Pane::Track];
 
 /// Share of the height for the pictures.
 const UPPER: f32 = 0.56;
-/// Share of the lower row's width for the records.
-const LOWER_LEFT: f32 = 0.5;
+/// Share of the lower row's width for the records: the tabs of the tools all fit beside it in the smallest window.
+const LOWER_LEFT: f32 = 0.47;
 
 /// A pane in the tree, by name, so that a layout of another version of the program can still be read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,6 +58,7 @@ fn panes_of(step: Step) -> &'static [Pane] {
         Step::Solve => &[Pane::Charts, Pane::Result],
         Step::Verify => &[Pane::Poses, Pane::Verify],
         Step::Export => &[Pane::Export],
+        Step::Track => &[Pane::Scene, Pane::Track],
     }
 }
 
@@ -66,12 +69,11 @@ impl Default for Layout {
             let children = panes.iter().map(|&pane| tiles.insert_pane(Slot::from(pane))).collect();
             tiles.insert_tab_tile(children)
         };
-        let pictures = PICTURES.map(|pane| tabs(&[pane]));
-        let (records, tools) = (tabs(&RECORDS), tabs(&TOOLS));
+        let (picture, space, records, tools) = (tabs(&PICTURE), tabs(&SPACE), tabs(&RECORDS), tabs(&TOOLS));
         let mut row = |[left, right]: [TileId; 2], part| {
             tiles.insert_container(Linear::new_binary(LinearDir::Horizontal, [left, right], part))
         };
-        let upper = row(pictures, 0.5);
+        let upper = row([picture, space], 0.5);
         let lower = row([records, tools], LOWER_LEFT);
         let root = tiles.insert_container(Linear::new_binary(LinearDir::Vertical, [upper, lower], UPPER));
         Self { tree: Tree::new("panes", root, tiles) }
@@ -107,7 +109,8 @@ impl Layout {
 
     /// Adds a pane to the tabs where its kin are; `false` when there are none.
     fn add(&mut self, pane: Pane) -> bool {
-        let kin: &[Pane] = [&PICTURES[..], &RECORDS, &TOOLS].into_iter().find(|all| all.contains(&pane)).unwrap_or(&[]);
+        let groups = [&PICTURE[..], &SPACE, &RECORDS, &TOOLS];
+        let kin: &[Pane] = groups.into_iter().find(|all| all.contains(&pane)).unwrap_or(&[]);
         let home = kin
             .iter()
             .filter_map(|&kin| self.tree.tiles.find_pane(&Slot::from(kin)))

@@ -23,6 +23,17 @@ fn a_pane_of_another_version_goes_and_a_new_one_comes_to_its_kin() {
 }
 
 #[test]
+fn a_layout_from_before_the_3d_pane_gets_it_beside_the_depth_picture_and_behind_it() {
+    let text = serde_json::to_string(&Layout::default()).expect("it can be written").replace("\"Scene\"", "\"Gone\"");
+    let layout: Layout = serde_json::from_str(&text).expect("a layout");
+    let layout = layout.brought_up_to_date();
+    let parent = |pane| layout.tree.tiles.parent_of(layout.tree.tiles.find_pane(&Slot::from(pane)).expect("there"));
+    assert_eq!(parent(Pane::Scene), parent(Pane::Depth));
+    assert_ne!(parent(Pane::Scene), parent(Pane::Colour));
+    assert!(layout.is_in_front(Pane::Depth));
+}
+
+#[test]
 fn a_layout_without_a_root_or_with_all_panes_gone_is_the_first_one_again() {
     let empty = Layout { tree: Tree::empty("panes") };
     assert_eq!(empty.brought_up_to_date(), Layout::default());

@@ -28,6 +28,8 @@ pub struct Marks {
     pub axes: [Color32; 3],
     /// A point that was picked.
     pub picked: Color32,
+    /// Where a simulated cell says that something is.
+    pub truth: Color32,
 }
 
 const DARK: Marks = Marks {
@@ -37,6 +39,7 @@ const DARK: Marks = Marks {
     review: Color32::from_rgb(240, 176, 64),
     on_review: Color32::from_rgb(30, 22, 6),
     on_accent: Color32::from_rgb(10, 22, 40),
+    truth: Color32::from_rgb(255, 124, 192),
     ..OVER_PICTURES
 };
 
@@ -47,6 +50,9 @@ const LIGHT: Marks = Marks {
     review: Color32::from_rgb(180, 106, 0),
     on_review: Color32::from_rgb(255, 255, 255),
     on_accent: Color32::from_rgb(255, 255, 255),
+    predicted: Color32::from_rgb(0, 140, 170),
+    axes: [Color32::from_rgb(208, 44, 44), Color32::from_rgb(24, 138, 74), Color32::from_rgb(36, 96, 220)],
+    truth: Color32::from_rgb(190, 24, 120),
     ..OVER_PICTURES
 };
 
@@ -62,6 +68,7 @@ const OVER_PICTURES: Marks = Marks {
     on_accent: Color32::from_rgb(10, 22, 40),
     axes: [Color32::from_rgb(255, 82, 82), Color32::from_rgb(82, 214, 112), Color32::from_rgb(88, 148, 255)],
     picked: Color32::from_rgb(255, 92, 200),
+    truth: Color32::from_rgb(255, 124, 192),
 };
 
 impl Marks {

@@ -43,6 +43,7 @@ use crate::app::{App, Connect, Start};
 use crate::cli::GuiArgs;
 use crate::command::Event;
 use crate::model::CellSource;
+use crate::rerun_log::RerunChoice;
 use crate::settings::{self, SettingsFile};
 use crate::worker::{Clock, LiveConnector, Waker};
 pub use layout::Layout;
@@ -86,6 +87,7 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
             addresses: settings.addresses.clone(),
             sessions: settings.sessions_folder(variable),
             open: args.session,
+            rerun: args.rerun.choice(RerunChoice::Record),
         };
         let mut app = App::start(start, connect, clock, waker)?;
         app.absorb(Event::Recent(remembered.recent));

@@ -1,7 +1,7 @@
 //! Numbers as text, always of the same width so that they do not dance: the fonts have digits of equal width, and what
 //! pads them is as wide as a digit.
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::frames::{Base, Pose};
 
 /// A space as wide as a digit.
 const FIGURE_SPACE: &str = "\u{2007}";
@@ -21,24 +21,26 @@ pub fn row(values: &[f64], decimals: usize, width: usize) -> String {
 }
 
 /// Translation in millimetres.
-pub fn translation_mm(pose: &Pose<Base, Tip>) -> String {
+pub fn translation_mm<Src>(pose: &Pose<Base, Src>) -> String {
     let translation = pose.translation() * 1e3;
     row(translation.as_slice(), 1, 6)
 }
 
 /// Roll, pitch and yaw in degrees: R = Rz(yaw) · Ry(pitch) · Rx(roll).
-pub fn rpy_deg(pose: &Pose<Base, Tip>) -> String {
+pub fn rpy_deg<Src>(pose: &Pose<Base, Src>) -> String {
     let (roll, pitch, yaw) = pose.rotation().euler_angles();
     row(&[roll.to_degrees(), pitch.to_degrees(), yaw.to_degrees()], 2, 7)
 }
 
 /// Quaternion x, y, z, w with w ≥ 0.
-pub fn quaternion(pose: &Pose<Base, Tip>) -> String {
+pub fn quaternion<Src>(pose: &Pose<Base, Src>) -> String {
     row(&pose.xyzw(), 4, 7)
 }
 
 #[cfg(test)]
 mod tests {
+    use handeye_core::frames::Tip;
+
     use super::*;
 
     fn plain(text: &str) -> String {
@@ -56,7 +58,8 @@ mod tests {
     #[test]
     fn a_tip_pose_is_written_in_millimetres_and_degrees() {
         let quarter = std::f64::consts::FRAC_PI_4;
-        let pose = Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
+        let pose =
+            Pose::<Base, Tip>::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
         assert_eq!(plain(&translation_mm(&pose)), " 110.0  −16.0  847.0");
         assert_eq!(plain(&rpy_deg(&pose)), "   0.00    0.00   90.00");
         assert_eq!(plain(&quaternion(&pose)), " 0.0000  0.0000  0.7071  0.7071");

@@ -14,12 +14,16 @@ use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::observation::{Corner, View};
 use handeye_core::progress::CancelToken;
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
+use handeye_core::track::{ByDepth, Estimate, Seen, State, Update};
 use handeye_core::verify::{self, Calibrated, CheckCapture};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
+use handeye_sim_link::cell::kinematics::{JointLimits, inverse_nearest};
+use handeye_sim_link::client::cell::JointAngles;
+use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
-    CellFacts, CellSource, FrameImages, FrameInfo, JobId, LinkState, LiveDetection, LiveFrame, Model, Observed,
-    PreviewFile, RobotState, SessionState, Simulation, Solved, Truth, ViewSettings,
+    BoardMotion, BoardPath, CellFacts, CellSource, FollowStatus, FollowWish, FrameImages, FrameInfo, JobId, LinkState,
+    LiveDetection, LiveFrame, Model, Observed, PreviewFile, RobotState, SessionState, Simulation, Solved, TrackError,
+    TrackPoint, TrackState, Tracked, Truth, ViewSettings,
 };
 use crate::session_start::{self, BOARD};
 use crate::{observe, truth};
@@ -136,6 +140,7 @@ pub fn connected() -> Model {
         far_plane_m: 3.5,
         base_from_tip: base_from_tip(1),
         joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0],
+        base_from_target_true: Some(base_from_target()),
     };
     model.frame = Some(LiveFrame { info, images: Arc::new(pictures()) });
     model.detection = Some(LiveDetection {
@@ -221,6 +226,103 @@ pub fn previewed() -> Model {
         model.export.previews.insert(format.name().to_owned(), files);
     }
     model
+}
+
+/// Pictures per second of the tracked board.
+const TRACK_HZ: f64 = 20.0;
+
+/// The tracked board at a time: a circle of 30 mm in its plane, twice a minute.
+fn moving_board(time_s: f64) -> Pose<Base, Target> {
+    let (sin, cos) = (std::f64::consts::TAU * time_s / 30.0).sin_cos();
+    base_from_target().perturbed(&Vector6::new(0.03 * cos, 0.03 * sin, 0.0, 0.0, 0.0, 0.0))
+}
+
+/// A millimetre or so that is the same in every run.
+fn small(time_s: f64, size: f64) -> Vector6<f64> {
+    Vector6::from_fn(|row, _| size * (13.7 * time_s + 2.1 * row as f64).sin())
+}
+
+fn track_point(time_s: f64) -> TrackPoint {
+    let is_known = !(12.0..13.5).contains(&time_s);
+    let error = TrackError { position_m: 0.25e-3 + 0.15e-3 * (3.1 * time_s).sin(), rotation_rad: 1e-3 };
+    TrackPoint {
+        time_s,
+        position_m: is_known.then(|| moving_board(time_s).translation().into()),
+        position_95_m: is_known.then_some(0.5e-3 + if time_s < 14.0 { 0.3e-3 } else { 0.0 }),
+        error: is_known.then_some(error),
+        latency_s: 0.012,
+    }
+}
+
+/// The same, with the board tracked on its way along a circle for half a minute, and followed by the arm.
+pub fn tracking() -> Model {
+    let mut model = solved();
+    let time_s = 30.0;
+    let truth = moving_board(time_s);
+    let seen = Seen {
+        corners: corners(1),
+        camera_from_target: camera_from_target(1),
+        base_from_target: truth.perturbed(&small(time_s, 0.4e-3)),
+        covariance: Matrix6::identity() * 1e-8,
+        rms_px: 0.08,
+    };
+    let by_depth = ByDepth {
+        base_from_target: truth.perturbed(&small(time_s + 0.3, 0.9e-3)),
+        first_corner_in_base: None,
+        corners: 66,
+        rms_m: 0.4e-3,
+    };
+    let estimate = Estimate {
+        time_s,
+        base_from_target: truth.perturbed(&small(time_s, 0.2e-3)),
+        covariance: Matrix6::from_diagonal(&Vector6::new(1e-8, 1e-8, 4e-8, 1e-7, 1e-7, 2e-8)),
+        velocity_m_s: Vector3::new(0.0, -6.3e-3, 0.0),
+        angular_velocity_rad_s: Vector3::zeros(),
+    };
+    let error = Some(TrackError { position_m: 0.31e-3, rotation_rad: 0.9e-3 });
+    model.track = TrackState {
+        on: true,
+        wish: Some(FollowWish::KeepView),
+        follow: FollowStatus::Following { distance_m: 1.2e-3, angle_rad: 4e-3 },
+        newest: Some(Arc::new(Tracked {
+            frame: 1,
+            update: Update {
+                time_s,
+                state: State::Tracking { corners: 68, of: 70 },
+                seen: Some(seen),
+                by_depth: Some(by_depth),
+                estimate: Some(estimate),
+            },
+            latency_s: 0.012,
+            rate_hz: TRACK_HZ,
+            error,
+            truth: Some(truth),
+        })),
+        history: (0..=(time_s * TRACK_HZ) as u32).map(|n| track_point(f64::from(n) / TRACK_HZ)).collect(),
+        board: BoardMotion { path: BoardPath::Circle, speed_m_s: 0.05 },
+        board_hidden: false,
+    };
+    if let Some(frame) = &mut model.frame {
+        frame.info.base_from_target_true = Some(truth);
+    }
+    let (from, to) = (base_from_tip(2).translation(), base_from_tip(1).translation());
+    for n in 0..=60 {
+        let part = f64::from(n) / 60.0;
+        let arc = Vector3::new(0.0, 0.0, 0.05 * (std::f64::consts::PI * part).sin());
+        model.trail.add((from + (to - from) * part + arc).into());
+    }
+    if let Some(robot) = &mut model.robot {
+        robot.joints_rad = joints_at(&robot.base_from_tip);
+    }
+    model
+}
+
+/// The joints with which the arm of the reference scene has its tip there.
+fn joints_at(base_from_tip: &Pose<Base, Tip>) -> JointAngles {
+    let (base_from_arm, tool) = (Translation3::new(0.0, 0.0, 0.025), Translation3::new(0.0, 0.0, 0.017));
+    let arm_from_connection = base_from_arm.inverse() * base_from_tip.isometry() * tool.inverse();
+    let near = [0.0, 0.8, -1.5, 0.5, 1.5, 0.0];
+    inverse_nearest(&arm_from_connection, &near, &JointLimits::default()).expect("within reach")
 }
 
 #[test]

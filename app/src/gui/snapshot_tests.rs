@@ -166,3 +166,18 @@ fn snapshot_of_the_export() {
 fn snapshot_of_the_verification() {
     looks_like("verify_dark_zh", DARK, CHINESE, State::new(sample::solved()).at(Step::Verify));
 }
+
+#[test]
+fn snapshot_of_tracking() {
+    looks_like("track_dark_en", DARK, ENGLISH, State::new(sample::tracking()).at(Step::Track));
+}
+
+#[test]
+fn snapshot_of_the_cell_in_three_dimensions() {
+    let mut model = sample::tracking();
+    model.track = crate::model::TrackState::default();
+    model.selection = vec![handeye_core::session::CaptureId(4)];
+    model.scene.distance_m = 1.4;
+    model.scene.centre_m = [0.2, 0.0, 0.25];
+    looks_like("scene_light_zh", LIGHT, CHINESE, State::new(model).with(&[Pane::Scene, Pane::Poses]));
+}

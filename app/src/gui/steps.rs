@@ -60,6 +60,10 @@ pub struct Facts {
     pub verified: bool,
     /// Files of the present answer were written.
     pub exported: bool,
+    /// The board is being tracked.
+    pub tracking: bool,
+    /// It is, but it is not seen.
+    pub out_of_sight: bool,
 }
 
 impl Facts {
@@ -83,17 +87,19 @@ impl Facts {
             check_captures: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
             verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
             exported: written && current.is_some(),
+            tracking: model.track.on,
+            out_of_sight: model.track.newest.as_ref().is_some_and(|newest| newest.update.estimate.is_none()),
         }
     }
 }
 
 /// The steps in their order.
-pub fn steps(model: &Model) -> [StepStatus; 6] {
+pub fn steps(model: &Model) -> [StepStatus; 7] {
     judged(&Facts::of(model))
 }
 
 /// The steps by the facts.
-fn judged(facts: &Facts) -> [StepStatus; 6] {
+fn judged(facts: &Facts) -> [StepStatus; 7] {
     Step::ALL.map(|step| {
         let (state, line) = match step {
             Step::Connect => connect(facts),
@@ -102,6 +108,7 @@ fn judged(facts: &Facts) -> [StepStatus; 6] {
             Step::Solve => solve(facts),
             Step::Verify => verify(facts),
             Step::Export => export(facts),
+            Step::Track => track(facts),
         };
         StepStatus { step, state, line }
     })
@@ -172,6 +179,16 @@ fn export(facts: &Facts) -> (StepState, Text) {
     }
 }
 
+fn track(facts: &Facts) -> (StepState, Text) {
+    match (facts.solved, facts.connected, facts.tracking) {
+        (false, ..) => (StepState::Blocked, text!("Needs a calibration")),
+        (true, false, _) => (StepState::Blocked, text!("Needs a connection")),
+        (true, true, false) => (StepState::Now, text!("Follow the board")),
+        (true, true, true) if facts.out_of_sight => (StepState::Now, text!("Board out of sight")),
+        (true, true, true) => (StepState::Done, text!("Tracking")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -216,6 +233,20 @@ mod tests {
         assert_eq!((said(&facts)[4].0, said(&facts)[5].0), (StepState::Now, StepState::Now));
         facts.solving = true;
         assert_eq!(said(&facts)[3].0, StepState::Now, "an answer that is being replaced is not done");
+    }
+
+    #[test]
+    fn tracking_needs_a_calibration_and_a_connection_and_a_board_that_is_lost_is_to_be_found() {
+        let mut facts = Facts { captures_in_use: 10, board_seen: true, ..Facts::default() };
+        assert_eq!(said(&facts)[6], (StepState::Blocked, "Needs a calibration".to_owned()));
+        facts.solved = true;
+        assert_eq!(said(&facts)[6], (StepState::Blocked, "Needs a connection".to_owned()));
+        facts.connected = true;
+        assert_eq!(said(&facts)[6], (StepState::Now, "Follow the board".to_owned()));
+        facts.tracking = true;
+        assert_eq!(said(&facts)[6], (StepState::Done, "Tracking".to_owned()));
+        facts.out_of_sight = true;
+        assert_eq!(said(&facts)[6], (StepState::Now, "Board out of sight".to_owned()));
     }
 
     #[test]

@@ -17,6 +17,7 @@ use crate::command::{Command, Event};
 use crate::model::{
     CellSource, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation, ViewSettings,
 };
+use crate::rerun_log::RerunChoice;
 use crate::settings::SettingsFile;
 use crate::worker::fake::FakeCell;
 use crate::worker::{Clock, Connector, PortError, Waker};
@@ -59,6 +60,7 @@ impl Silent {
             view: ViewSettings::default(),
             addresses: Vec::new(),
             sessions: folder.path().to_path_buf(),
+            rerun: RerunChoice::Off,
             open: None,
         };
         let mut app = App::start(start, connect, clock, waker).expect("threads");
@@ -207,6 +209,7 @@ pub fn frame(number: u64) -> Event {
         far_plane_m: 3.5,
         base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
         joints_rad: [0.0; 6],
+        base_from_target_true: None,
     };
     Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) }
 }

@@ -182,10 +182,10 @@ fn nothing_is_cut_off_at_the_smallest_size() {
 #[test]
 fn every_tab_of_the_first_layout_is_wholly_seen_at_the_smallest_size() {
     let mut silent = Silent::of_size(CellSource::BuiltIn, vec2(1024.0, 700.0));
-    let right = silent.harness.get_by_label("Export").rect();
+    let right = silent.harness.get_by_label("Track").rect();
     assert!(right.max.x < 1024.0 - 8.0, "{right:?}");
-    silent.click("Export");
-    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Export));
+    silent.click("Track");
+    assert!(silent.harness.state_mut().layout().is_in_front(Pane::Track));
 }
 
 #[test]

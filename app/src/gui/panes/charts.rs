@@ -1,7 +1,7 @@
 //! Charts of the captures and of the calibration.
 
 mod accuracy;
-mod axes;
+pub(super) mod axes;
 mod bars;
 mod coverage;
 

@@ -15,12 +15,15 @@ mod log;
 mod menu;
 pub mod parts;
 mod poses;
+mod rerun_button;
 mod result;
+mod scene;
 mod status_bar;
 mod target;
 mod taught;
 mod tiles;
 mod top_bar;
+mod track;
 mod verify;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
@@ -85,6 +88,8 @@ pub fn title(pane: Pane, language: Language) -> &'static str {
         Pane::Result => tr!(language, "Result"),
         Pane::Verify => tr!(language, "Verify"),
         Pane::Export => tr!(language, "Export"),
+        Pane::Track => tr!(language, "Track"),
+        Pane::Scene => tr!(language, "3D"),
     }
 }
 
@@ -97,5 +102,6 @@ pub fn step_name(step: Step, language: Language) -> &'static str {
         Step::Solve => tr!(language, "Solve"),
         Step::Verify => tr!(language, "Verify"),
         Step::Export => tr!(language, "Export"),
+        Step::Track => tr!(language, "Track"),
     }
 }

@@ -4,7 +4,7 @@ use egui::{Color32, CornerRadius, FontId, Id, Response, Sense, Shape, Stroke, St
 use egui::{WidgetInfo, WidgetText, WidgetType};
 use egui_tiles::{Behavior, ResizeState, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 
-use super::{charts, connect, export, jog, live, log, poses, result, target, taught, verify};
+use super::{charts, connect, export, jog, live, log, poses, result, scene, target, taught, track, verify};
 use crate::command::{Command, Outbox};
 use crate::gui::fonts;
 use crate::gui::layout::{Layout, Slot};
@@ -15,7 +15,7 @@ use crate::model::{ImagePoint, Model, Pane};
 /// Height of a row of tabs.
 const TABS: f32 = 34.0;
 /// Room at each side of a tab's title.
-const TAB_MARGIN: f32 = 7.5;
+const TAB_MARGIN: f32 = 6.0;
 /// No tile is dragged smaller than this.
 const SMALLEST: f32 = 150.0;
 
@@ -64,6 +64,8 @@ impl Panes<'_> {
             Pane::Result => result::result_ui(ui, model, outbox),
             Pane::Verify => verify::verify_ui(ui, model, outbox),
             Pane::Export => export::export_ui(ui, model, outbox),
+            Pane::Track => track::track_ui(ui, model, outbox),
+            Pane::Scene => scene::scene_ui(ui, model, outbox),
         }
     }
 }

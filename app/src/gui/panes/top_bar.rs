@@ -2,7 +2,7 @@
 
 use egui::{Align, Button, Label, Layout, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
 
-use super::menu;
+use super::{menu, rerun_button};
 use crate::command::{Command, Outbox};
 use crate::gui::icons::{self, Icon};
 use crate::gui::session::{self, SessionFacts};
@@ -35,6 +35,7 @@ pub fn top_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             history_ui(ui, Icon::Redo, redo, language, outbox);
             let undo = (tr!(language, "Undo"), session.undo.as_ref(), Command::Undo);
             history_ui(ui, Icon::Undo, undo, language, outbox);
+            rerun_button::rerun_button_ui(ui, &model.rerun, language, outbox);
             ui.spacing_mut().item_spacing.x = 8.0;
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                 connection_ui(ui, &status::connection(model), language);

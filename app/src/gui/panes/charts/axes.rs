@@ -21,6 +21,11 @@ pub enum Scale {
         /// The upper end.
         to: f64,
     },
+    /// From a value to the same value with the other sign.
+    Symmetric {
+        /// The upper end.
+        to: f64,
+    },
     /// By factors, between two values.
     Logarithmic {
         /// The lower end, over 0.
@@ -33,8 +38,12 @@ pub enum Scale {
 impl Scale {
     /// From 0 to a little more than the largest value.
     pub fn linear(largest: f64) -> Self {
-        let largest = if largest.is_finite() && largest > 0.0 { largest } else { 1.0 };
-        Self::Linear { to: largest * 1.12 }
+        Self::Linear { to: beyond(largest) }
+    }
+
+    /// From a little less than the largest value below 0 to a little more than it above.
+    pub fn symmetric(largest: f64) -> Self {
+        Self::Symmetric { to: beyond(largest) }
     }
 
     /// Over all values that are finite and over 0.
@@ -55,6 +64,7 @@ impl Scale {
     pub fn part(self, value: f64) -> f64 {
         match self {
             Self::Linear { to } => value / to,
+            Self::Symmetric { to } => 0.5 * (value / to + 1.0),
             Self::Logarithmic { from, to } => (value.max(f64::MIN_POSITIVE) / from).ln() / (to / from).ln(),
         }
     }
@@ -63,6 +73,7 @@ impl Scale {
     pub fn value(self, part: f64) -> f64 {
         match self {
             Self::Linear { to } => part * to,
+            Self::Symmetric { to } => (2.0 * part - 1.0) * to,
             Self::Logarithmic { from, to } => from * (to / from).powf(part),
         }
     }
@@ -73,6 +84,11 @@ impl Scale {
             Self::Linear { to } => {
                 let step = round_step(to / count.max(1) as f64);
                 (0..).map(|i| f64::from(i) * step).take_while(|tick| *tick <= to).take(50).collect()
+            }
+            Self::Symmetric { to } => {
+                let step = round_step(2.0 * to / count.max(1) as f64);
+                let most = ((to / step) as i32).min(25);
+                (-most..=most).map(|i| f64::from(i) * step).collect()
             }
             Self::Logarithmic { from, to } => {
                 let decades = (to / from).log10();
@@ -93,6 +109,11 @@ impl Scale {
     }
 }
 
+/// A little more than the largest value, or 1 where there is none.
+fn beyond(largest: f64) -> f64 {
+    if largest.is_finite() && largest > 0.0 { largest * 1.12 } else { 1.12 }
+}
+
 /// 1, 2 or 5 times a power of ten, at least as large as a number.
 fn round_step(least: f64) -> f64 {
     if !(least.is_finite() && least > 0.0) {
@@ -108,7 +129,7 @@ pub fn short(value: f64) -> String {
         return "0".to_owned();
     }
     let decimals = (2.0 - value.abs().log10().floor()).clamp(0.0, 6.0) as usize;
-    let text = format!("{value:.decimals$}");
+    let text = format!("{value:.decimals$}").replace('-', "−");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
@@ -169,6 +190,7 @@ mod tests {
     fn numbers_on_axes_are_round_and_within_them() {
         assert_eq!(Scale::Linear { to: 0.23 }.ticks(5), [0.0, 0.05, 0.1, 0.15000000000000002, 0.2]);
         assert_eq!(Scale::Logarithmic { from: 0.15, to: 6.0 }.ticks(5), [0.2, 0.5, 1.0, 2.0, 5.0]);
+        assert_eq!(Scale::Symmetric { to: 11.0 }.ticks(4), [-10.0, 0.0, 10.0]);
         assert!(Scale::linear(f64::NAN).ticks(4).len() > 1);
         assert_eq!(Scale::logarithmic([f64::INFINITY, -1.0].into_iter()), Scale::Logarithmic { from: 0.1, to: 1.0 });
         for (value, words) in [(0.0, "0"), (0.15000000000000002, "0.15"), (20.0, "20"), (1500.0, "1500")] {
@@ -178,7 +200,9 @@ mod tests {
 
     #[test]
     fn a_place_on_an_axis_is_the_place_of_its_value() {
-        for scale in [Scale::Linear { to: 0.7 }, Scale::Logarithmic { from: 0.1, to: 30.0 }] {
+        for scale in
+            [Scale::Linear { to: 0.7 }, Scale::Symmetric { to: 3.0 }, Scale::Logarithmic { from: 0.1, to: 30.0 }]
+        {
             for part in [0.0, 0.3, 1.0] {
                 assert!((scale.part(scale.value(part)) - part).abs() < 1e-12);
             }

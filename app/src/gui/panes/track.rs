@@ -1,0 +1,81 @@
+//! The board as it is tracked, and the arm that follows it.
+
+mod blocked;
+mod cell_board;
+mod follow;
+mod plots;
+mod pose;
+mod state;
+
+use egui::{Ui, Vec2};
+
+use super::parts;
+use crate::command::{Command, Outbox};
+use crate::gui::theme::Tone;
+use crate::model::Model;
+use crate::tr;
+use blocked::Blocked;
+
+/// From this width on numbers stand beside the rest.
+const TWO_COLUMNS: f32 = 560.0;
+/// Distance of the columns.
+const GUTTER: f32 = 22.0;
+
+/// The pane.
+pub fn track_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let blocked = Blocked::of(model);
+    parts::body_ui(ui, "track", |ui| {
+        tracking_ui(ui, model, &blocked, outbox);
+        if ui.available_width() < TWO_COLUMNS {
+            follow::follow_ui(ui, model, &blocked, outbox);
+            pose::pose_ui(ui, model);
+            plots::plots_ui(ui, model);
+            cell_board::board_ui(ui, model, &blocked, outbox);
+            return;
+        }
+        let width = (ui.available_width() - GUTTER) / 2.0;
+        ui.horizontal_top(|ui| {
+            ui.spacing_mut().item_spacing.x = GUTTER;
+            let column = |ui: &mut Ui, content_ui: &mut dyn FnMut(&mut Ui)| {
+                ui.allocate_ui_with_layout(Vec2::new(width, 0.0), egui::Layout::top_down(egui::Align::Min), |ui| {
+                    ui.spacing_mut().item_spacing = Vec2::new(8.0, 6.0);
+                    ui.set_width(width);
+                    content_ui(ui);
+                });
+            };
+            column(ui, &mut |ui| {
+                pose::pose_ui(ui, model);
+            });
+            column(ui, &mut |ui| {
+                follow::follow_ui(ui, model, &blocked, outbox);
+                cell_board::board_ui(ui, model, &blocked, outbox);
+                plots::plots_ui(ui, model);
+            });
+        });
+    });
+}
+
+/// Start, stop, and how it goes.
+fn tracking_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outbox) {
+    let language = model.view.language;
+    ui.horizontal_wrapped(|ui| {
+        if model.track.on {
+            if ui.button(tr!(language, "Stop tracking")).clicked() {
+                outbox.send(Command::SetTracking(false));
+            }
+        } else {
+            let button = egui::Button::new(tr!(language, "Start tracking"));
+            let what = tr!(language, "Look for the board in every picture and tell where it is in the base");
+            if parts::gated_ui(ui, blocked.tracking, button).on_hover_text(what).clicked() {
+                outbox.send(Command::SetTracking(true));
+            }
+        }
+        state::state_ui(ui, model);
+    });
+    if let Some(reason) = blocked.tracking {
+        parts::notice_ui(ui, Tone::Warning, reason, |_| ());
+    }
+}
+
+#[cfg(test)]
+mod tests;
