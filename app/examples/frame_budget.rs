@@ -2,6 +2,10 @@
 //!
 //!     cargo run --release -p handeye_app --example frame_budget [SECONDS]
 //!
+//! The first two lines are the same work without and with a recording for Rerun, and the last two with a viewer as well:
+//! one that reads, and one that is stopped (`rerun` on the `PATH`; left out without). `pictures/s` counts those that the
+//! window got, `MB` is the memory of the program.
+//!
 //! Draws the whole window 60 times a second without a graphics card: events, panes, tessellation. Prints for each
 //! situation the median, the 99th percentile and the worst of the frames on the clock, what other threads take of the
 //! processor included, and how many shapes the last frame had.
@@ -15,7 +19,8 @@ use std::time::{Duration, Instant};
 use handeye_app::app::{App, Connect, Start};
 use handeye_app::command::{Command, Event};
 use handeye_app::gui::{Layout, Window};
-use handeye_app::model::{CellSource, MotionGoal, Observed, SessionState, ViewSettings};
+use handeye_app::model::{CellSource, MotionGoal, Observed, SessionState, ViewSettings, ViewerState};
+use handeye_app::rerun_log::RerunChoice;
 use handeye_app::session_start::{self, BOARD};
 use handeye_app::settings::SettingsFile;
 use handeye_app::text::Text;
@@ -27,6 +32,8 @@ use handeye_core::observation::Corner;
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::ConnectionOptions;
+use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
 
 /// Refresh of a usual screen.
@@ -38,10 +45,24 @@ const SLOW_LINE: usize = 1_000_000;
 fn main() -> anyhow::Result<()> {
     let seconds: u64 = std::env::args().nth(1).map_or(Ok(20), |text| text.parse())?;
     let duration = Duration::from_secs(seconds);
-    println!("{:<30} {:>7} {:>9} {:>26}", "", "frames", "shapes", "ms: median, 99 %, worst");
+    println!(
+        "{:<30} {:>7} {:>9} {:>26} {:>10} {:>6}",
+        "", "frames", "shapes", "ms: median, 99 %, worst", "pictures/s", "MB"
+    );
 
     let cell = CellServer::start(CellConfig::new(Scene::reference()?))?;
-    measure("live pictures", CellSource::Address(cell.endpoint()), duration, |_| {})?;
+    // A cell at an address starts its simulation when it is told to; without passes there are no new pictures.
+    let endpoint = cell.endpoint().parse()?;
+    let mut starter = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())?;
+    starter.arm().sim().start_simulation()?;
+    let live = || CellSource::Address(cell.endpoint());
+    // In turns, so that what else the machine does falls on both.
+    for round in 1..=2 {
+        measure(&format!("live pictures, round {round}"), live(), duration, |_| {})?;
+        recorded(&format!("the same, recorded, round {round}"), live(), duration, RerunChoice::Record, |_| {})?;
+    }
+    recorded("a viewer that reads", live(), duration, RerunChoice::Web, |app| read(app, false))?;
+    recorded("a viewer that is stopped", live(), duration, RerunChoice::Web, |app| read(app, true))?;
 
     let silent = TcpListener::bind("127.0.0.1:0")?;
     let address = format!("tcp://{}", silent.local_addr()?);
@@ -63,20 +84,73 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Draws the window for a while.
+/// Starts a viewer without a window that reads the recording; stops it at once, or lets it read. It ends with this program.
+fn read(app: &App, stopped: bool) {
+    let ViewerState::Web { url } = &app.model().rerun.viewer else { return };
+    let decoded = url.replace("%2B", "+").replace("%3A", ":").replace("%2F", "/");
+    let sources = decoded.split("&url=").skip(1);
+    let file = std::env::temp_dir().join(format!("handeye-frame-budget-{}-{stopped}.rrd", std::process::id()));
+    let script = if stopped {
+        "sleep 3; kill -STOP -- -$viewer; sleep 60; kill -KILL -- -$viewer"
+    } else {
+        "sleep 40; kill -- -$viewer"
+    };
+    let script = format!("setsid \"$@\" & viewer=$!; {script}; rm -f \"$0\"");
+    let started = std::process::Command::new("sh")
+        .args(["-c", &script])
+        .arg(&file)
+        .args(["rerun", "--bind", "127.0.0.1", "--port", "auto", "--save"])
+        .arg(&file)
+        .args(sources)
+        .env("CI", "true")
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn();
+    if let Err(error) = started {
+        println!("no viewer: {error}");
+    }
+}
+
+/// Memory of this program [MB].
+fn resident_mb() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap_or_default();
+    line.split_whitespace().next().and_then(|number| number.parse::<u64>().ok()).unwrap_or(0) / 1000
+}
+
+/// Draws the window for a while, without a recording.
 fn measure(what: &str, source: CellSource, duration: Duration, begin: impl FnOnce(&mut App)) -> anyhow::Result<()> {
+    recorded(what, source, duration, RerunChoice::Off, begin)
+}
+
+/// Draws the window for a while.
+fn recorded(
+    what: &str,
+    source: CellSource,
+    duration: Duration,
+    rerun: RerunChoice,
+    begin: impl FnOnce(&mut App),
+) -> anyhow::Result<()> {
     let sessions = std::env::temp_dir().join(format!("handeye-frame-budget-{}", std::process::id()));
     let began = Instant::now();
     let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
     let waker: Waker = Arc::new(|| {});
     let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
-    let start =
-        Start { source, view: ViewSettings::default(), addresses: Vec::new(), sessions: sessions.clone(), open: None };
+    let start = Start {
+        source,
+        view: ViewSettings::default(),
+        addresses: Vec::new(),
+        // A session, so that there is a file to record into.
+        open: Some(sessions.join("session")),
+        sessions: sessions.clone(),
+        rerun,
+    };
     let app = App::start(start, connect, clock, waker)?;
     let ctx = egui::Context::default();
     let mut window = Window::new(app, Layout::default(), SettingsFile::default(), &ctx);
     let mut begin = Some(begin);
     let (mut times_ms, mut shapes) = (Vec::new(), 0);
+    let mut first_picture = None;
     let warm_up = Duration::from_secs(3);
     while began.elapsed() < duration + warm_up {
         let frame = Instant::now();
@@ -86,19 +160,31 @@ fn measure(what: &str, source: CellSource, duration: Duration, begin: impl FnOnc
             ..egui::RawInput::default()
         };
         window.collect(&ctx);
-        let output = ctx.run_ui(input, |ui| window.window_ui(ui));
+        let mut output = ctx.run_ui(input, |ui| window.window_ui(ui));
+        // There is no graphics card that wants them.
+        output.textures_delta.clear();
         shapes = output.shapes.len();
         std::hint::black_box(ctx.tessellate(output.shapes, output.pixels_per_point).len());
         // The first frames make fonts and connections; they are not what a user waits for.
         if began.elapsed() > warm_up {
             times_ms.push(frame.elapsed().as_secs_f64() * 1e3);
+            if let (None, Some(picture)) = (first_picture, &window.app_mut().model().frame) {
+                first_picture = Some((picture.info.number, Instant::now()));
+            }
             if let Some(begin) = begin.take() {
                 begin(window.app_mut());
             }
         }
         thread::sleep(PERIOD.saturating_sub(frame.elapsed()));
     }
-    println!("{what:<30} {:>7} {shapes:>9} {:>26}", times_ms.len(), summary(times_ms));
+    let newest = window.app_mut().model().frame.as_ref().map_or(0, |picture| picture.info.number);
+    let rate_hz = first_picture.map_or(0.0, |(first, at)| (newest - first) as f64 / at.elapsed().as_secs_f64());
+    println!(
+        "{what:<30} {:>7} {shapes:>9} {:>26} {rate_hz:>10.1} {:>6}",
+        times_ms.len(),
+        summary(times_ms),
+        resident_mb()
+    );
     drop(window);
     let _gone = std::fs::remove_dir_all(sessions).is_ok();
     Ok(())

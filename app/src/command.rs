@@ -16,10 +16,11 @@ use handeye_core::target::TargetSpec;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{
-    CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, DepthScale, Dialog,
-    FolderListing, FrameImages, FrameInfo, ImagePoint, JobId, Jog, JogSettings, Link, LinkState, LiveDetection,
-    MotionGoal, MotionId, MotionOutcome, Observed, Overlays, Pane, Preview, RecentSession, RobotState, RotationFormat,
-    SessionState, Severity, Solved, Step, ThemeChoice, Viewport, Written,
+    BoardMotion, CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, DepthScale,
+    Dialog, FolderListing, FollowStatus, FollowWish, FrameImages, FrameInfo, ImagePoint, JobId, Jog, JogSettings, Link,
+    LinkState, LiveDetection, MotionGoal, MotionId, MotionOutcome, Observed, Overlays, Pane, Preview, RecentSession,
+    RerunState, RobotState, RotationFormat, SceneView, SessionState, Severity, Solved, Step, ThemeChoice, Tracked,
+    Viewport, Written,
 };
 use crate::text::{Language, Text};
 
@@ -75,6 +76,8 @@ pub enum Command {
     SetOverlays(Overlays),
     /// Which part of the pictures is shown, and how large.
     SetViewport(Viewport),
+    /// From where the 3D pane looks.
+    SetSceneView(SceneView),
     /// The colours of depths.
     SetDepthColours(ColourMap),
     /// Remember the place of the arm as a taught pose.
@@ -175,6 +178,16 @@ pub enum Command {
     SaveAs(PathBuf),
     /// Read the folders in a folder.
     ListFolder(PathBuf),
+    /// Track the board in every picture, or no more.
+    SetTracking(bool),
+    /// Have the arm follow the board; `None` has it come to rest.
+    SetFollow(Option<FollowWish>),
+    /// Have the simulated cell move its board.
+    MoveBoard(BoardMotion),
+    /// Hide the board of the simulated cell, or show it again.
+    HideBoard(bool),
+    /// Look at the recording in Rerun.
+    OpenRerun,
     /// Bring a pane to the front.
     ShowPane(Pane),
     /// Put every pane where it was at first.
@@ -305,6 +318,19 @@ pub enum Event {
     },
     /// Sessions that were open before.
     Recent(Vec<RecentSession>),
+    /// The board in the newest picture that was tracked.
+    #[serde(skip)]
+    Tracked(Arc<Tracked>),
+    /// The board is tracked no more.
+    TrackFailed {
+        /// Why, and what to do.
+        why: Text,
+    },
+    /// The arm follows the board, or does not.
+    #[serde(skip)]
+    Follow(FollowStatus),
+    /// The recording is in another state.
+    Rerun(RerunState),
     /// Something to tell the user.
     Notice {
         /// How much it matters.

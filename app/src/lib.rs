@@ -9,6 +9,7 @@ pub mod limits;
 pub mod model;
 pub mod observe;
 pub mod parallel;
+pub mod rerun_log;
 pub mod session_start;
 pub mod settings;
 pub mod text;

@@ -1,5 +1,8 @@
 //! What a new session begins with.
 
+use std::collections::BTreeMap;
+
+use handeye_core::calibrate::Method;
 use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::session::{GroundTruth, SessionMeta};
 use handeye_core::target::{Grid, TargetSpec};
@@ -11,6 +14,15 @@ pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7
 
 /// The ten reference poses, so that they are there wherever the binary is.
 pub const REFERENCE_POSES: &str = include_str!("../../assets/poses/seed10.toml");
+
+/// Where a result says which board it was made with, among the options that it depends on.
+pub const TARGET_OPTION: &str = "target";
+
+/// What a result depends on besides its data.
+pub fn solve_options(method: Method, target: &TargetSpec) -> BTreeMap<String, serde_json::Value> {
+    let target = serde_json::to_value(target).unwrap_or_default();
+    BTreeMap::from([("method".to_owned(), method.name().into()), (TARGET_OPTION.to_owned(), target)])
+}
 
 /// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.
 pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
@@ -25,7 +37,7 @@ pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
         mode: Mode::EyeInHand,
         target: BOARD,
         camera: None,
-        seeds: std::collections::BTreeMap::new(),
+        seeds: BTreeMap::new(),
         ground_truth,
     }
 }

@@ -145,6 +145,7 @@ const CHINESE: &[(&str, &str)] = &[
     ("poses", include_str!("../../assets/text/zh-CN/poses.toml")),
     ("result", include_str!("../../assets/text/zh-CN/result.toml")),
     ("session", include_str!("../../assets/text/zh-CN/session.toml")),
+    ("track", include_str!("../../assets/text/zh-CN/track.toml")),
 ];
 
 fn chinese() -> &'static BTreeMap<String, String> {

@@ -3,7 +3,7 @@
 use std::thread::Builder;
 
 use super::App;
-use crate::model::{CellFacts, CellSource, Link, LinkState, Motion, Severity};
+use crate::model::{BoardMotion, CellFacts, CellSource, Link, LinkState, Motion, Severity, Trail};
 use crate::text;
 use crate::worker::{CameraTask, ControlTask, Request, Workers};
 
@@ -78,7 +78,11 @@ impl App {
         }
         self.model.source = source;
         self.model.capture = None;
+        self.model.track.board = BoardMotion::default();
+        self.model.track.board_hidden = false;
+        self.model.trail = Trail::default();
         self.send_target();
+        self.send_tracking();
     }
 
     pub(super) fn cell_found(&mut self, facts: CellFacts) {

@@ -9,10 +9,12 @@ mod export;
 mod looking;
 mod messages;
 mod motion;
+mod recording;
 mod session;
 mod solve;
 mod taught;
 mod tour;
+mod track;
 
 use std::io;
 use std::path::PathBuf;
@@ -20,6 +22,7 @@ use std::sync::Arc;
 
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
+use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice};
 use crate::settings::SettingsWrite;
 use crate::text;
 use crate::worker::{Clock, Connector, Desk, FileTask, Waker, Workers};
@@ -39,6 +42,8 @@ pub struct Start {
     pub sessions: PathBuf,
     /// A session or data set to open at once; where there is none, a session is begun there.
     pub open: Option<PathBuf>,
+    /// Where the recording for Rerun goes.
+    pub rerun: RerunChoice,
 }
 
 /// Model and workers.
@@ -53,6 +58,8 @@ pub struct App {
     numbers: Numbers,
     /// The question that the solver was asked last.
     asked: Option<solve::Question>,
+    recorder: Recorder,
+    recorded: recording::Recorded,
 }
 
 /// The last numbers that were given to requests.
@@ -61,20 +68,30 @@ struct Numbers {
     capture: u64,
     job: JobId,
     motion: MotionId,
+    /// The motion that follows the board.
+    follow: Option<MotionId>,
 }
 
 impl App {
     /// Starts the workers; they connect by themselves.
     ///
     /// # Errors
-    /// When the system has no more threads.
+    /// When the system has no more threads, or the file of the recording cannot be made.
     pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
-        let Start { source, view, addresses, sessions, open } = start;
+        let Start { source, view, addresses, sessions, open, rerun } = start;
+        let recorder = Recorder::start(RecorderOptions {
+            choice: rerun,
+            pace: Pace::Live,
+            beside_session: true,
+            open_browser: true,
+            waker: Arc::clone(&waker),
+        })?;
         let desk = Desk::start(sessions, &clock, &waker)?;
         let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
         let model = Model { addresses, ..Model::new(source, view) };
         let numbers = Numbers::default();
-        let mut app = Self { model, workers, desk, connect, clock, waker, numbers, asked: None };
+        let recorded = recording::Recorded::default();
+        let mut app = Self { model, workers, desk, connect, clock, waker, numbers, asked: None, recorder, recorded };
         app.prepare_session();
         app.send_target();
         if let Some(folder) = open {
@@ -100,9 +117,11 @@ impl App {
         let mut events = Vec::new();
         self.workers.drain(|event| events.push(event));
         self.desk.drain(|event| events.push(event));
+        self.recorder.drain(|event| events.push(event));
         for event in events {
             self.absorb(event);
         }
+        self.record_changes();
     }
 
     /// Applies the commands of a frame of the window.
@@ -128,6 +147,7 @@ impl App {
             Command::SetDepthColours(colours) => self.set_depth_colours(colours),
             Command::SetOverlays(overlays) => self.model.view.overlays = overlays,
             Command::SetViewport(viewport) => self.model.viewport = viewport,
+            Command::SetSceneView(view) => self.model.scene = view,
             Command::PointAt(point) => self.model.cursor = point,
             Command::Pick(pixel) => self.pick(pixel),
             Command::GoToStep(step) => self.model.step = step,
@@ -178,6 +198,12 @@ impl App {
             Command::SetGoal(goal) => self.set_goal(goal),
             Command::SetOutlierLine(line_px) => self.model.outlier_line_px = line_px,
 
+            Command::SetTracking(on) => self.set_tracking(on),
+            Command::SetFollow(wish) => self.set_follow(wish),
+            Command::MoveBoard(motion) => self.move_board(motion),
+            Command::HideBoard(hidden) => self.hide_board(hidden),
+            Command::OpenRerun => self.open_rerun(),
+
             Command::ChooseFormats(formats) => self.model.export.chosen = formats,
             Command::ShowFormat(format) => self.model.export.shown = format,
             Command::SetExportNames(names) => self.set_export_names(names),
@@ -188,10 +214,14 @@ impl App {
 
     /// Takes in what happened.
     pub fn absorb(&mut self, event: Event) {
+        self.record(&event);
         match event {
             Event::Tick { now_s } => self.model.now_s = now_s,
             Event::Link { link, state } => self.link_changed(link, state),
-            Event::Robot(robot) => self.model.robot = Some(robot),
+            Event::Robot(robot) => {
+                self.model.trail.add(robot.base_from_tip.translation().into());
+                self.model.robot = Some(robot);
+            }
             Event::Cell(facts) => self.cell_found(*facts),
             Event::Stopped => self.stopped(),
             Event::Frame { info, dropped, images } => {
@@ -219,6 +249,10 @@ impl App {
             Event::SolveEnded { job, outcome } => self.solve_ended(job, outcome),
             Event::Previews(previews) => self.model.export.previews = previews.into_iter().collect(),
             Event::Exported(written) => self.written(written),
+            Event::Tracked(tracked) => self.tracked(tracked),
+            Event::TrackFailed { why } => self.track_failed(why),
+            Event::Follow(status) => self.follow_goes(status),
+            Event::Rerun(state) => self.model.rerun = state,
             Event::Notice { severity, text } => self.say(severity, text),
         }
     }

@@ -46,6 +46,9 @@ impl App {
         if self.model.touring && id == self.numbers.motion {
             self.tour_moved(&outcome);
         }
+        if self.numbers.follow == Some(id) {
+            return self.follow_ended(outcome);
+        }
         match outcome {
             MotionOutcome::Arrived => {}
             MotionOutcome::Stopped => self.say(Severity::Warning, text!("Stopped on the way to {what}", what = what)),

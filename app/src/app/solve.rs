@@ -137,6 +137,7 @@ impl App {
         self.numbers.job = JobId(self.numbers.job.0 + 1);
         self.asked = None;
         self.model.solve = SolveState::default();
+        self.set_tracking(false);
     }
 
     pub(super) fn cancel_solve(&mut self) {
@@ -177,6 +178,7 @@ impl App {
                 let result = Box::new(solved.result.clone());
                 self.model.solve.solved = Some(solved);
                 self.send_intrinsics();
+                self.send_tracking();
                 self.preview_exports();
                 let Some(folder) = self.model.session.folder.clone() else { return };
                 if self.desk.archive(ArchiveTask::Result { folder, result }).is_err() {

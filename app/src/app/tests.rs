@@ -28,6 +28,7 @@ fn bench(cell: &FakeCell) -> Bench {
         addresses: Vec::new(),
         sessions: sessions.path().to_path_buf(),
         open: None,
+        rerun: RerunChoice::Off,
     };
     Bench { app: App::start(start, connect, clock, waker).expect("threads"), _sessions: sessions }
 }

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use handeye_core::calibrate::Method;
-use handeye_core::depth::DepthImage;
 use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::poses_file::Goal;
 use handeye_core::progress::CancelToken;
@@ -19,9 +18,10 @@ use time::OffsetDateTime;
 use time::macros::format_description;
 
 use super::cell::SceneArg;
-use super::{Failure, report, solve};
+use super::{Failure, RerunArg, record, report, rerun_arg, solve};
+use crate::model::Step;
+use crate::rerun_log::{Entry, Pace, Recorder, RerunChoice};
 use crate::session_start::BOARD;
-use crate::truth;
 use poses::Plan;
 
 /// Options of `handeye auto`.
@@ -47,6 +47,8 @@ pub struct AutoArgs {
     /// Run the built-in cell like real time instead of as fast as it can.
     #[arg(long)]
     real_time: bool,
+    #[command(flatten)]
+    rerun: RerunArg,
 }
 
 pub fn run(args: &AutoArgs) -> Result<(), Failure> {
@@ -58,6 +60,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     }
     let scene = args.scene.load()?;
     let plan = Plan::find(&args.poses, &scene, args.seed)?;
+    let recorder = args.rerun.start(RerunChoice::Record, Pace::Everything, true)?;
     let server = match args.connect {
         Some(_) => None,
         None => Some(
@@ -82,7 +85,10 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
 
     keep_earlier_session(&folder)?;
     let mut session = Store::create(&folder, meta(&truth, args.seed)?).map_err(Failure::failed)?;
-    let captured = capture_all(&mut cell, &plan, args.real_time, &mut session, &cancel);
+    recorder.note(Entry::Step(Step::Capture));
+    record::document(&recorder, &session);
+    record::cell(&recorder, cell.arm(), &truth).map_err(Failure::failed)?;
+    let captured = capture_all(&mut cell, &plan, args.real_time, &mut session, &recorder, &cancel);
     // Whatever happened on the way, the arm is not left moving and the simulation not running or waiting for steps.
     let ended = cell.stop().and_then(|()| {
         let sim = cell.arm().sim();
@@ -100,9 +106,10 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     drop(cell);
     drop(server);
 
-    let mut result = solve::folder(&folder, Method::Joint)?;
-    result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
-    finish(&session, args.json.as_deref(), &result)
+    let solution = solve::folder(&folder, Method::Joint, Some(record::known(&truth)), &cancel)?;
+    finish(&session, args.json.as_deref(), solution.result())?;
+    solution.note(&recorder);
+    rerun_arg::finish(recorder, &cancel)
 }
 
 fn finish(session: &Store, json: Option<&Path>, result: &CalibrationResult) -> Result<(), Failure> {
@@ -167,8 +174,10 @@ fn capture_all(
     plan: &Plan,
     real_time: bool,
     session: &mut Store,
+    recorder: &Recorder,
     cancel: &CancelToken,
 ) -> Result<(), Failure> {
+    let info = cell.info().clone();
     // Stepped, a pass takes as long as it takes, and the same command gives the same pictures on every machine.
     let sim = cell.arm().sim();
     sim.set_stepping(!real_time).and_then(|()| sim.start_simulation()).map_err(Failure::failed)?;
@@ -197,17 +206,16 @@ fn capture_all(
         cell.arm().settle(&SettleOptions::default(), cancel).map_err(Failure::failed)?;
         let frame = cell.grab().map_err(Failure::failed)?;
         store(session, &frame, name)?;
+        record::capture(recorder, &info, index as u64 + 1, frame, session);
         tracing::info!("pose {} of {} captured ({name})", index + 1, plan.goals.len());
     }
     Ok(())
 }
 
 fn store(session: &mut Store, frame: &Frame, pose_name: &str) -> Result<(), Failure> {
-    let depth =
-        DepthImage::new(frame.depth.width, frame.depth.height, frame.depth.metres.clone()).map_err(Failure::failed)?;
     session
         .add_capture(&Capture {
-            depth_m: Some(&depth),
+            depth_m: Some(&frame.depth),
             joints_rad: Some(&frame.joints),
             sim_time_s: Some(frame.sim_time_s),
             pose_name: Some(pose_name),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::scene::{BoardPath, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 
 use super::{Failure, solve};
@@ -26,6 +26,36 @@ pub struct CellArgs {
     /// Let simulated time run as fast as it can instead of like real time.
     #[arg(long)]
     fast: bool,
+    /// Have the board move: still, circle, figure_eight, random_walk or step; as the scene says if not given.
+    #[arg(long, value_name = "PATH")]
+    board_path: Option<BoardPath>,
+    /// Mean speed of the board in m/s; as the scene says if not given.
+    #[arg(long, value_name = "SPEED")]
+    board_speed: Option<f64>,
+    /// How far the path of the board reaches in m; as the scene says if not given.
+    #[arg(long, value_name = "SIZE")]
+    board_size: Option<f64>,
+    /// Largest angle in degrees by which the board is turned on its way; as the scene says if not given.
+    #[arg(long, value_name = "ANGLE")]
+    board_tilt: Option<f64>,
+    /// Simulated time from picture to picture in s; as the scene says if not given.
+    #[arg(long, value_name = "SECONDS")]
+    time_step: Option<f64>,
+}
+
+impl CellArgs {
+    /// The scene with what the options say about it.
+    fn scene(&self) -> Result<Scene, Failure> {
+        let mut scene = self.scene.load()?;
+        let motion = &mut scene.board.motion;
+        motion.path = self.board_path.unwrap_or(motion.path);
+        motion.speed_m_s = self.board_speed.unwrap_or(motion.speed_m_s);
+        motion.size_m = self.board_size.unwrap_or(motion.size_m);
+        motion.tilt_deg = self.board_tilt.unwrap_or(motion.tilt_deg);
+        motion.validate().map_err(|reason| Failure::unusable(anyhow::anyhow!("the motion of the board: {reason}")))?;
+        scene.simulation.time_step_s = self.time_step.unwrap_or(scene.simulation.time_step_s);
+        Ok(scene)
+    }
 }
 
 /// The option `--scene`.
@@ -57,7 +87,7 @@ const POLL: Duration = Duration::from_millis(100);
 
 pub fn run(args: &CellArgs) -> Result<(), Failure> {
     let server = CellServer::start(CellConfig {
-        scene: args.scene.load()?,
+        scene: args.scene()?,
         seed: args.seed,
         bind: args.bind.clone(),
         port: args.port,

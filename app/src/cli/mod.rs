@@ -8,8 +8,11 @@ mod calibrate;
 mod cell;
 mod export;
 mod failure;
-mod report;
+mod record;
+pub(crate) mod report;
+pub mod rerun_arg;
 mod solve;
+mod track;
 
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
@@ -18,6 +21,7 @@ use clap::{Args, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 pub use failure::Failure;
+pub use rerun_arg::RerunArg;
 
 /// Calibrates a robot's camera: live in a window, or from the command line.
 #[derive(Debug, Parser)]
@@ -44,6 +48,9 @@ enum Command {
     /// Solve a session or a dataset folder.
     #[command(after_help = "Example:\n  handeye calibrate my_robot_images --json result.json")]
     Calibrate(calibrate::CalibrateArgs),
+    /// Track the board live with a calibration, and have the arm follow it.
+    #[command(after_help = "Example:\n  handeye track --calibration session/result.json --follow --frames 600")]
+    Track(track::TrackArgs),
     /// Write calibration files from a solved session or a result JSON.
     #[command(after_help = "Example:\n  handeye export session --format ros_camera_info easy_handeye2 --out files")]
     Export(export::ExportArgs),
@@ -58,11 +65,14 @@ pub struct GuiArgs {
     /// Session folder to open, or to create.
     #[arg(long, value_name = "DIR")]
     pub session: Option<std::path::PathBuf>,
+    /// Where the recording goes; beside the session if not given.
+    #[command(flatten)]
+    pub rerun: RerunArg,
 }
 
 /// Runs the program with the arguments of the process.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse_from(rerun_arg::joined(std::env::args_os())) {
         Ok(cli) => cli,
         Err(error) => {
             // `--help` and `--version` are answers, not errors; clap prints each to its proper stream.
@@ -75,10 +85,11 @@ pub fn main() -> ExitCode {
     };
     start_logging(cli.quiet);
     let result = match cli.command.unwrap_or_else(|| Command::Gui(GuiArgs::default())) {
-        Command::Gui(args) => crate::gui::run(args).map_err(Failure::failed),
+        Command::Gui(args) => args.rerun.check().and_then(|()| crate::gui::run(args).map_err(Failure::failed)),
         Command::Cell(args) => cell::run(&args),
         Command::Auto(args) => auto::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Track(args) => track::run(&args),
         Command::Export(args) => export::run(&args),
     };
     match result {
@@ -90,9 +101,11 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Messages of level INFO and above to standard error, errors only with `--quiet`; `RUST_LOG` overrides.
+/// Messages of level INFO and above to standard error, errors only with `--quiet`; `RUST_LOG` overrides. The libraries of
+/// Rerun (`re_…`) warn of things that users can do nothing about.
 fn start_logging(quiet: bool) {
-    let default = if quiet { "error" } else { "warn,handeye_app=info,handeye_core=info,handeye_sim_link=info" };
+    let default =
+        if quiet { "error" } else { "warn,handeye_app=info,handeye_core=info,handeye_sim_link=info,re_=error" };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
     tracing_subscriber::fmt()
         .with_env_filter(filter)

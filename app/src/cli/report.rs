@@ -31,21 +31,38 @@ macro_rules! line {
 }
 
 fn headline(out: &mut String, result: &CalibrationResult) {
-    let what = match result.mode {
+    line!(out, "{}", title(result));
+    if let Some(expected) = expected_error(result) {
+        line!(out, "  {expected}");
+    }
+}
+
+/// What was calibrated.
+pub fn title(result: &CalibrationResult) -> &'static str {
+    match result.mode {
         Some(Mode::EyeInHand) => "Hand-eye calibration, camera on the tip",
         Some(Mode::EyeToHand) => "Hand-eye calibration, camera beside the robot",
         None => "Intrinsic calibration, no robot poses",
-    };
-    line!(out, "{what}");
+    }
+}
+
+/// What a user of the calibration can expect; `None` for a camera alone.
+pub fn expected_error(result: &CalibrationResult) -> Option<String> {
     match result.quality.tip_error_95_mm {
-        Some(error) => {
-            line!(
-                out,
-                "  expected error of a measured point: below {error:.3} mm in 95 % of cases, where the target was seen"
-            );
-        }
-        None if result.mode.is_some() => line!(out, "  expected error: not known for this method"),
-        None => {}
+        Some(error) => Some(format!(
+            "expected error of a measured point: below {error:.3} mm in 95 % of cases, where the target was seen"
+        )),
+        None => result.mode.is_some().then(|| "expected error: not known for this method".to_owned()),
+    }
+}
+
+/// What became of a view.
+pub fn status(status: ViewStatus) -> &'static str {
+    match status {
+        ViewStatus::Used => "used",
+        ViewStatus::Excluded => "excluded",
+        ViewStatus::Outlier => "outlier",
+        ViewStatus::NoTarget => "target not found",
     }
 }
 
@@ -138,12 +155,7 @@ fn methods(out: &mut String, result: &CalibrationResult) {
 fn views(out: &mut String, result: &CalibrationResult) {
     line!(out, "views");
     for view in &result.views {
-        let status = match view.status {
-            ViewStatus::Used => "used",
-            ViewStatus::Excluded => "excluded",
-            ViewStatus::Outlier => "outlier",
-            ViewStatus::NoTarget => "target not found",
-        };
+        let status = status(view.status);
         let rms = view.rms_px.map_or_else(String::new, |v| format!("  {v:.4} px"));
         let influence = view.influence_mm.map_or_else(String::new, |v| format!("  influence {v:.3} mm"));
         line!(out, "  {:<24} {status}{rms}{influence}", view.name);

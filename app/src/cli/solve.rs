@@ -4,35 +4,123 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, Method, Observations, ObservedView};
+use handeye_core::calibrate::{Method, Observations, ObservedView};
 use handeye_core::dataset::Dataset;
 use handeye_core::export::{self, ExportInput, ExportNames};
+use handeye_core::handeye::Mode;
 use handeye_core::progress::CancelToken;
 use handeye_core::result::CalibrationResult;
-use handeye_core::session::{self, Role, Session};
+use handeye_core::session::{self, CaptureId, CaptureRecord, Document, Role, Session, SessionMeta};
 
 use super::Failure;
+use crate::model::{Goal, JobId, Observed, Solved, Step, Truth};
 use crate::observe::{ObserveError, observe};
+use crate::rerun_log::{Entry, Recorder};
+use crate::worker::{self, SolveJob};
 
 /// Name of the result in a session.
 pub const RESULT_FILE: &str = session::RESULT;
 
-/// Reads a folder, finds the target in its images and calibrates.
-pub fn folder(path: &Path, method: Method) -> Result<CalibrationResult, Failure> {
-    let dataset = Dataset::read(path).map_err(Failure::unusable)?;
-    let cancel = cancel_on_ctrl_c();
-    let mut observations = observations(&dataset, &cancel)?;
-    if Session::is_session(path) {
-        add_excluded(path, &mut observations)?;
+/// The answer for a folder, with all that led to it.
+pub struct Solution {
+    folder: PathBuf,
+    document: Arc<Document>,
+    observations: Observations,
+    solved: Arc<Solved>,
+}
+
+impl Solution {
+    /// The document that is written.
+    pub fn result(&self) -> &CalibrationResult {
+        &self.solved.result
     }
+
+    /// Records captures, corners and answer.
+    pub fn note(&self, recorder: &Recorder) {
+        if !recorder.is_on() {
+            return;
+        }
+        recorder.note(Entry::Step(Step::Solve));
+        let (folder, document) = (Some(self.folder.clone()), Arc::clone(&self.document));
+        recorder.note(Entry::Document { folder, document });
+        for (view, id) in self.observations.views.iter().zip(&self.solved.captures) {
+            let observed = Observed {
+                corners: view.corners.clone(),
+                image_size: self.observations.image_size,
+                // Nobody looks at small copies here.
+                thumbnail: Arc::default(),
+            };
+            recorder.note(Entry::Observed { id: *id, observed: Arc::new(observed) });
+        }
+        recorder.note(Entry::Solved(Arc::clone(&self.solved)));
+    }
+}
+
+/// Reads a folder, finds the target in its images and calibrates. The truth is only compared with.
+pub fn folder(path: &Path, method: Method, truth: Option<Truth>, cancel: &CancelToken) -> Result<Solution, Failure> {
+    let dataset = Dataset::read(path).map_err(Failure::unusable)?;
+    let mut observations = observations(&dataset, cancel)?;
+    let document = if Session::is_session(path) {
+        let session = Session::open(path).map_err(Failure::unusable)?;
+        add_excluded(&session.document, &mut observations);
+        session.document
+    } else {
+        Arc::new(as_document(&dataset))
+    };
     let digest = dataset.input_sha256().map_err(Failure::unusable)?;
-    solve(&observations, method, Some(digest), &cancel)
+    let id_of = |view: &ObservedView| {
+        let capture = document.captures.iter().find(|capture| capture.image == view.name);
+        capture.map_or(CaptureId(0), |capture| capture.id)
+    };
+    let job = SolveJob {
+        id: JobId(0),
+        captures: observations.views.iter().map(id_of).collect(),
+        observations,
+        verification: Vec::new(),
+        method,
+        goal_m: Goal::default().0,
+        truth,
+    };
+    let mut solved = worker::answer(&job, cancel.into()).map_err(Failure::failed)?;
+    solved.result.provenance.input_sha256 = Some(digest);
+    let SolveJob { observations, .. } = job;
+    Ok(Solution { folder: path.to_path_buf(), document, observations, solved: Arc::new(solved) })
+}
+
+/// A data set as a session would have it.
+fn as_document(dataset: &Dataset) -> Document {
+    let mut document = Document::new(SessionMeta {
+        created: String::new(),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        mode: dataset.mode.unwrap_or(Mode::EyeInHand),
+        target: dataset.target,
+        camera: dataset.camera,
+        seeds: BTreeMap::new(),
+        ground_truth: None,
+    });
+    for (entry, number) in dataset.entries.iter().zip(1..) {
+        let Some(base_from_tip) = entry.base_from_tip else { continue };
+        document.captures.push(CaptureRecord {
+            id: CaptureId(number),
+            image: entry.name.clone(),
+            depth: None,
+            base_from_tip,
+            joints_rad: None,
+            sim_time_s: None,
+            role: Role::Calibration,
+            excluded: false,
+            frames: 1,
+            corner_noise_px: None,
+            settled_s: None,
+            pose_name: None,
+        });
+    }
+    document
 }
 
 /// Captures that were taken out of the fit stand in the result as such, and in their place, as when the window solves.
-fn add_excluded(folder: &Path, observations: &mut Observations) -> Result<(), Failure> {
-    let session = Session::open(folder).map_err(Failure::unusable)?;
-    let fitted = session.document.captures.iter().filter(|capture| capture.role == Role::Calibration);
+fn add_excluded(document: &Document, observations: &mut Observations) {
+    let fitted = document.captures.iter().filter(|capture| capture.role == Role::Calibration);
     for (index, capture) in fitted.enumerate() {
         if capture.excluded && index <= observations.views.len() {
             let view = ObservedView {
@@ -45,19 +133,6 @@ fn add_excluded(folder: &Path, observations: &mut Observations) -> Result<(), Fa
             observations.views.insert(index, view);
         }
     }
-    Ok(())
-}
-
-/// Calibrates observations and states the result.
-pub fn solve(
-    observations: &Observations,
-    method: Method,
-    input_sha256: Option<String>,
-    cancel: &CancelToken,
-) -> Result<CalibrationResult, Failure> {
-    let calibration = calibrate::calibrate(observations, method, cancel).map_err(Failure::failed)?;
-    let options = BTreeMap::from([("method".to_owned(), serde_json::Value::from(method.name()))]);
-    Ok(calibration.to_result(env!("CARGO_PKG_VERSION"), input_sha256, options))
 }
 
 /// Finds the target in every image, with a line of progress.

@@ -7,8 +7,11 @@ mod capture;
 mod export;
 mod messages;
 mod motion;
+mod rerun;
 mod session;
 mod solve;
+mod track;
+mod trail;
 mod view;
 mod workflow;
 
@@ -19,7 +22,7 @@ use std::sync::Arc;
 use handeye_core::calibrate::Method;
 use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{ColourMap, DepthImage, DepthSample};
-use handeye_core::frames::{Base, Camera, Pose, Tip};
+use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::handeye::HandEye;
 use handeye_core::image::RgbImage;
 use handeye_core::session::{CaptureId, Document};
@@ -31,16 +34,20 @@ pub use capture::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
 pub use export::{ExportState, Preview, PreviewFile, Written};
+pub use handeye_sim_link::client::cell::BoardPath;
 pub use messages::{Message, Messages};
 pub use motion::{
     Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
 };
+pub use rerun::{RerunState, ViewerState};
 pub use session::{
     FolderEntry, FolderKind, FolderListing, Observed, RecentSession, Review, SessionState, StopOutcome, Tour,
 };
 pub use solve::{JobId, SolveState, SolveStatus, Solved};
-pub use view::{Overlays, PickedPoint, Viewport, exports_of};
+pub use track::{BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked};
+pub use trail::{MAX_TRAIL_POINTS, Trail};
+pub use view::{Overlays, PickedPoint, SceneView, Viewport, exports_of};
 pub use workflow::{Dialog, Pane, Step};
 
 use crate::session_start;
@@ -165,6 +172,8 @@ pub struct FrameInfo {
     pub base_from_tip: Pose<Base, Tip>,
     /// The joints at the same instant [rad].
     pub joints_rad: JointAngles,
+    /// Where the board was at that instant, if the cell publishes it; only ever compared with.
+    pub base_from_target_true: Option<Pose<Base, Target>>,
 }
 
 /// The pixels of a frame.
@@ -384,6 +393,14 @@ pub struct Model {
     pub recent: Vec<RecentSession>,
     /// The part of the pictures that is shown.
     pub viewport: Viewport,
+    /// From where the 3D pane looks.
+    pub scene: SceneView,
+    /// Where the tip went.
+    pub trail: Trail,
+    /// The board as it is tracked, and the arm that follows it.
+    pub track: TrackState,
+    /// The recording for Rerun.
+    pub rerun: RerunState,
 }
 
 impl Model {
@@ -431,6 +448,10 @@ impl Model {
             folder: None,
             recent: Vec::new(),
             viewport: Viewport::default(),
+            scene: SceneView::default(),
+            trail: Trail::default(),
+            track: TrackState::default(),
+            rerun: RerunState::default(),
         }
     }
 

@@ -48,6 +48,31 @@ impl Default for Viewport {
     }
 }
 
+/// From where the 3D pane looks at the cell: an eye that circles about a point, with z of the base upwards.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SceneView {
+    /// The point in the middle of the pane, in the base [m].
+    pub centre_m: [f64; 3],
+    /// Direction from there to the eye, about z of the base and counted from its x [rad].
+    pub azimuth_rad: f64,
+    /// The same over the ground: from −π/2, straight from below, to π/2, straight from above [rad].
+    pub elevation_rad: f64,
+    /// Distance of the eye from there [m].
+    pub distance_m: f64,
+}
+
+impl Default for SceneView {
+    /// Obliquely from above, with an arm of this size and what it reaches in view.
+    fn default() -> Self {
+        Self {
+            centre_m: [0.0, -0.1, 0.45],
+            azimuth_rad: -35.0_f64.to_radians(),
+            elevation_rad: 22.0_f64.to_radians(),
+            distance_m: 1.9,
+        }
+    }
+}
+
 /// A point that was picked in the live picture.
 #[derive(Debug, Clone)]
 pub struct PickedPoint {

@@ -18,11 +18,14 @@ pub enum Step {
     Verify,
     /// Write files.
     Export,
+    /// Use the calibration: follow the board.
+    Track,
 }
 
 impl Step {
     /// In their order.
-    pub const ALL: [Self; 6] = [Self::Connect, Self::Target, Self::Capture, Self::Solve, Self::Verify, Self::Export];
+    pub const ALL: [Self; 7] =
+        [Self::Connect, Self::Target, Self::Capture, Self::Solve, Self::Verify, Self::Export, Self::Track];
 }
 
 /// Parts of the window that can be moved.
@@ -52,11 +55,15 @@ pub enum Pane {
     Verify,
     /// Files.
     Export,
+    /// The board as it is tracked, and the arm that follows it.
+    Track,
+    /// Arm, cameras and board in three dimensions.
+    Scene,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::Colour,
         Self::Depth,
         Self::Poses,
@@ -69,6 +76,8 @@ impl Pane {
         Self::Result,
         Self::Verify,
         Self::Export,
+        Self::Track,
+        Self::Scene,
     ];
 }
 

@@ -1,6 +1,5 @@
 //! The camera worker: fetches pictures, colours the depth, and puts the newest pair where window and vision find it.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,18 +8,13 @@ use handeye_sim_link::client::CancelToken;
 
 use super::link::{Duty, Outlet};
 use super::port::{CameraPort, Connected, Connector, PortError, RawFrame};
+use super::rate::RateMeter;
 use super::slot::{LatestSlot, Tap};
 use crate::depth_view;
 use crate::model::{DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};
 
 /// Rest between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
 const PERIOD: Duration = Duration::from_millis(15);
-
-/// Over so many frames the rate is measured.
-const RATE_FRAMES: usize = 20;
-
-/// A gap this long [s] ends the stream that the rate is measured of.
-const RATE_GAP_S: f64 = 2.0;
 
 /// What the camera worker can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,6 +75,7 @@ impl Camera {
             far_plane_m,
             base_from_tip: raw.base_from_tip,
             joints_rad: raw.joints_rad,
+            base_from_target_true: raw.base_from_target_true,
         };
         Ok(LiveFrame { info, images: Arc::new(FrameImages { rgb: raw.rgb, depth: raw.depth, depth_coloured }) })
     }
@@ -127,49 +122,5 @@ impl Duty for Camera {
         // A resting simulation would otherwise show the old colours until it runs.
         self.seen_sim_time_s = None;
         Ok(())
-    }
-}
-
-/// Frames per second, from the times at which they arrived.
-#[derive(Debug, Default)]
-struct RateMeter {
-    arrivals_s: VecDeque<f64>,
-}
-
-impl RateMeter {
-    fn arrived(&mut self, at_s: f64) {
-        if self.arrivals_s.back().is_some_and(|last_s| at_s - last_s > RATE_GAP_S) {
-            self.arrivals_s.clear();
-        }
-        if self.arrivals_s.len() == RATE_FRAMES {
-            self.arrivals_s.pop_front();
-        }
-        self.arrivals_s.push_back(at_s);
-    }
-
-    /// 0 before the second frame.
-    fn rate_hz(&self) -> f64 {
-        match (self.arrivals_s.front(), self.arrivals_s.back()) {
-            (Some(first_s), Some(last_s)) if last_s > first_s => {
-                (self.arrivals_s.len() - 1) as f64 / (last_s - first_s)
-            }
-            _ => 0.0,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_rate_is_that_of_the_present_stream() {
-        let mut rate = RateMeter::default();
-        rate.arrived(0.0);
-        assert_eq!(rate.rate_hz(), 0.0);
-        for i in 0..50 {
-            rate.arrived(100.0 + f64::from(i) * 0.04);
-        }
-        assert!((rate.rate_hz() - 25.0).abs() < 1e-9, "{}", rate.rate_hz());
     }
 }

@@ -10,7 +10,7 @@ use super::link::{Duty, Outlet};
 use super::port::{Connected, Connector, ControlPort, PortError};
 use super::slot::LatestSlot;
 use crate::command::Event;
-use crate::model::{CellSource, Link, RobotState, Severity, Simulation};
+use crate::model::{BoardMotion, CellSource, Link, RobotState, Severity, Simulation};
 use crate::text;
 
 /// Rest between two readings: numbers that change faster cannot be read, and each reading draws the window.
@@ -48,12 +48,16 @@ impl StopLine {
 }
 
 /// What the control worker can be asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ControlTask {
     /// Look at the [`StopLine`] now.
     CheckStop,
     /// Let simulated time advance.
     StartSimulation,
+    /// Move the board of a simulated cell.
+    MoveBoard(BoardMotion),
+    /// Hide it, or show it again.
+    HideBoard(bool),
 }
 
 /// The duty of the control worker.
@@ -120,7 +124,7 @@ impl Duty for Control {
 
     fn perform(&mut self, port: Option<&mut Self::Port>, task: Self::Task, outlet: &Outlet) -> Result<(), PortError> {
         let Some(port) = port else {
-            if task == ControlTask::StartSimulation {
+            if matches!(task, ControlTask::StartSimulation) {
                 let text = text!("The simulation cannot be started: there is no connection to the cell");
                 outlet.notice(Severity::Warning, text);
             }
@@ -139,6 +143,18 @@ impl Duty for Control {
                 }
                 Err(error) => Err(error),
             },
+            ControlTask::MoveBoard(motion) => board_answer(port.move_board(&motion), outlet),
+            ControlTask::HideBoard(hidden) => board_answer(port.hide_board(hidden), outlet),
         }
+    }
+}
+
+fn board_answer(answer: Result<(), PortError>, outlet: &Outlet) -> Result<(), PortError> {
+    match answer {
+        Err(PortError::Refused(why)) => {
+            outlet.notice(Severity::Warning, text!("The board stays as it is: {why}", why = why));
+            Ok(())
+        }
+        answer => answer,
     }
 }

@@ -8,9 +8,10 @@ use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
+use handeye_sim_link::client::cell::{FollowMoment, FollowWish};
 
 use super::port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
-use crate::model::{CellFacts, MotionGoal, MotionOutcome, RobotState, Simulation};
+use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, RobotState, Simulation};
 use crate::text::Text;
 
 /// Width and height of the fake pictures in pixels.
@@ -50,6 +51,10 @@ pub struct Script {
     pub moved: Vec<MotionGoal>,
     /// Jogs and steps that were begun.
     pub jogged: Vec<JogRequest>,
+    /// How the board was told to move.
+    pub board: BoardMotion,
+    /// Whether it was told to hide.
+    pub board_hidden: bool,
 }
 
 /// A cell that tests control. Clones are the same cell.
@@ -73,6 +78,8 @@ impl FakeCell {
             motions: FakeMotions::Arrive,
             moved: Vec::new(),
             jogged: Vec::new(),
+            board: BoardMotion::default(),
+            board_hidden: false,
         };
         Self { script: Arc::new(Mutex::new(script)), hang: None }
     }
@@ -176,6 +183,16 @@ impl ControlPort for FakeCell {
         script.stops += 1;
         Ok(())
     }
+
+    fn move_board(&mut self, motion: &BoardMotion) -> Result<(), PortError> {
+        self.answer()?.board = *motion;
+        Ok(())
+    }
+
+    fn hide_board(&mut self, hidden: bool) -> Result<(), PortError> {
+        self.answer()?.board_hidden = hidden;
+        Ok(())
+    }
 }
 
 impl FakeCell {
@@ -233,6 +250,13 @@ impl MotionPort for FakeCell {
         }
         Ok(None)
     }
+
+    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
+        let RobotState { base_from_tip, joints_rad, .. } = self.state()?;
+        let sim_time_s = || self.script().frames as f64 * 0.05;
+        let moment = |sim_time_s| FollowMoment { sim_time_s, joints_rad, base_from_tip };
+        self.end_of_motion(|_| {}, || wish(&moment(sim_time_s())) != FollowWish::End)
+    }
 }
 
 impl CameraPort for FakeCell {
@@ -256,6 +280,7 @@ impl CameraPort for FakeCell {
             sim_time_s: script.frames as f64 * 0.05,
             base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
             joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0],
+            base_from_target_true: None,
         })
     }
 

@@ -5,12 +5,12 @@ use std::sync::{Mutex, PoisonError};
 
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{Arm, CameraFeed, CellInfo, CellPaths};
+use handeye_sim_link::client::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState};
 
 use super::live_motion::LiveMotion;
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
-use crate::model::{CellFacts, CellSource, RobotState, Simulation, Truth};
+use crate::model::{BoardMotion, CellFacts, CellSource, RobotState, Simulation, Truth};
 
 /// Why nothing answers any more.
 const CLOSED: &str = "the server closed the connection; start it again if it has ended";
@@ -173,6 +173,15 @@ impl ControlPort for LiveControl {
     fn stop(&mut self) -> Result<(), PortError> {
         self.arm.stop().map_err(port_error)
     }
+
+    fn move_board(&mut self, motion: &BoardMotion) -> Result<(), PortError> {
+        let motion = cell::BoardMotion::along(motion.path, motion.speed_m_s);
+        self.arm.move_board(&motion).map_err(port_error)
+    }
+
+    fn hide_board(&mut self, hidden: bool) -> Result<(), PortError> {
+        self.arm.show_board(!hidden).map_err(port_error)
+    }
 }
 
 struct LiveCamera {
@@ -193,6 +202,7 @@ impl CameraPort for LiveCamera {
             sim_time_s: frame.sim_time_s,
             base_from_tip: frame.base_from_tip,
             joints_rad: frame.joints,
+            base_from_target_true: frame.base_from_target_true,
         })
     }
 

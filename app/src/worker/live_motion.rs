@@ -1,7 +1,8 @@
 //! The arm of a cell over the remote API, as the motion worker drives it.
 
 use handeye_sim_link::client::cell::{
-    Arm, ArmJog, ArmKinematics, JogAxes, JogEnd, JogObstacle, MotionTolerance, SettleOptions, UnknownKinematics,
+    Arm, ArmJog, ArmKinematics, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes, JogEnd, JogObstacle,
+    MotionTolerance, SettleOptions, UnknownKinematics,
 };
 use handeye_sim_link::client::{CancelToken, LinkError};
 use nalgebra::Vector3;
@@ -114,6 +115,38 @@ impl MotionPort for LiveMotion {
             Err(error) => Ok(Some(Text::verbatim(error.to_string()))),
         }
     }
+
+    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
+        let kinematics = match &self.kinematics {
+            Ok(kinematics) => kinematics,
+            Err(why) => {
+                return Ok(MotionOutcome::Refused(text!(
+                    "The arm cannot follow, because its kinematics is not known: {why}",
+                    why = why
+                )));
+            }
+        };
+        match self.arm.follow(kinematics, &FollowLimits::default(), wish) {
+            Ok(end) => Ok(outcome_of_following(end)),
+            Err(error) => outcome_of(error, &CancelToken::default()),
+        }
+    }
+}
+
+fn outcome_of_following(end: FollowEnd) -> MotionOutcome {
+    MotionOutcome::Failed(match end {
+        FollowEnd::Released | FollowEnd::Stopped => return MotionOutcome::Stopped,
+        FollowEnd::Workspace => text!("The goal is outside the box in which the tip may follow"),
+        FollowEnd::JointLimit { joint } => text!("Joint {joint} is at the end of its range", joint = joint),
+        FollowEnd::Singular => {
+            text!(
+                "The arm is nearly stretched, close to its column, or two of its axes are in line: it cannot follow there. \
+                 Jog it to where it has more room and start again"
+            )
+        }
+        FollowEnd::NotFollowing { joint } => not_following(joint),
+        FollowEnd::OtherTip => other_tip(),
+    })
 }
 
 /// Why a share of the fastest speed is none.

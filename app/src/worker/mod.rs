@@ -15,6 +15,7 @@ mod camera;
 mod control;
 mod desk;
 mod files;
+mod follow_line;
 mod jog_line;
 mod link;
 mod live;
@@ -24,6 +25,7 @@ mod motion_desk;
 mod newest;
 mod observer;
 mod port;
+mod rate;
 mod reconnect;
 mod slot;
 mod solver;
@@ -46,6 +48,7 @@ pub use camera::CameraTask;
 pub use control::{ControlTask, StopLine};
 pub use desk::Desk;
 pub use files::{ExportJob, FileTask};
+pub use follow_line::FollowLine;
 pub use jog_line::HELD_S;
 pub use link::Request;
 pub use live::LiveConnector;
@@ -54,18 +57,20 @@ pub use motion_desk::{MotionDesk, MotionTask};
 pub use observer::ObserveJob;
 pub use port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
 pub use slot::LatestSlot;
-pub use solver::SolveJob;
-pub use vision::{CaptureRequest, Measured, VisionTask};
+pub use solver::{SolveJob, answer};
+pub use vision::{CaptureRequest, Measured, VisionTask, error_of};
 
 use crate::command::Event;
-use crate::model::{CellSource, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, ViewSettings};
+use crate::model::{
+    CellSource, FollowWish, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, Tracked, ViewSettings,
+};
 use camera::Camera;
 use control::Control;
 use link::{Duty, LinkLoop, Outlet};
 use motion::Motions;
 use reconnect::Reconnect;
 use slot::Tap;
-use vision::Vision;
+use vision::{Sights, Vision};
 
 /// Tells the window that there is something to look at. Called from any thread.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -100,6 +105,8 @@ pub struct Workers {
     robot: Arc<LatestSlot<RobotState>>,
     frames: Arc<LatestSlot<LiveFrame>>,
     detections: Arc<LatestSlot<LiveDetection>>,
+    tracked: Arc<LatestSlot<Tracked>>,
+    follow: Arc<FollowLine>,
     shutdown: CancelToken,
     threads: Vec<Thread>,
 }
@@ -132,11 +139,15 @@ impl Workers {
         let tap = Arc::new(tap);
         let duty = Camera::new(view, Arc::clone(&workers.frames), Arc::clone(&tap));
         workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
-        let duty = Motions::new(Arc::clone(&workers.desk));
+        let duty = Motions::new(Arc::clone(&workers.desk), Arc::clone(&workers.follow));
         workers.motion = Some(workers.spawn("motion", duty, source, connector, outlet())?);
         let (sender, tasks) = bounded(MAX_REQUESTS);
-        let detections = Arc::clone(&workers.detections);
-        let vision = Vision::new(tap, bell, tasks, detections, captures, outlet(), workers.shutdown.clone());
+        let sights = Sights {
+            detections: Arc::clone(&workers.detections),
+            tracked: Arc::clone(&workers.tracked),
+            follow: Arc::clone(&workers.follow),
+        };
+        let vision = Vision::new(tap, bell, tasks, sights, captures, outlet(), workers.shutdown.clone());
         workers.run("vision", move || vision.run())?;
         workers.vision = Some(sender);
         Ok(workers)
@@ -156,6 +167,8 @@ impl Workers {
             robot: Arc::default(),
             frames: Arc::default(),
             detections: Arc::default(),
+            tracked: Arc::default(),
+            follow: Arc::default(),
             shutdown: CancelToken::default(),
             threads: Vec::new(),
         }
@@ -205,6 +218,12 @@ impl Workers {
         if let Some((detection, _)) = self.detections.take() {
             absorb(Event::Detection(Box::new(detection)));
         }
+        if let Some((tracked, _)) = self.tracked.take() {
+            absorb(Event::Tracked(Arc::new(tracked)));
+        }
+        if let Some(status) = self.follow.take_status() {
+            absorb(Event::Follow(status));
+        }
     }
 
     /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached, over the control
@@ -242,6 +261,15 @@ impl Workers {
     ) -> Result<(), Busy> {
         let length = if matches!(jog, Jog::Translate { .. }) { metres } else { radians };
         self.begin(MotionTask::JogStep { id, request: JogRequest { jog, tip_from_camera, speed }, length })
+    }
+
+    /// Has the arm follow the board that is tracked, until [`Self::cancel_motion`], a stop, or the board is lost. Reported
+    /// as [`Self::move_to`]; why it ended by itself is the reason of a motion that failed.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn follow(&self, id: MotionId, wish: FollowWish) -> Result<(), Busy> {
+        self.begin(MotionTask::Follow { id, wish })
     }
 
     /// Ends the motion that is under way, without a stop of everything else.

@@ -4,13 +4,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use handeye_sim_link::client::CancelToken;
+use handeye_sim_link::client::cell::{FollowMoment, FollowWish as ArmWish};
 
+use super::follow_line::FollowLine;
 use super::jog_line::Held;
 use super::link::{Duty, Outlet};
 use super::motion_desk::{MotionDesk, MotionTask, Work};
 use super::port::{Connected, Connector, JogRequest, MotionPort, PortError};
 use crate::command::Event;
-use crate::model::{Link, MotionOutcome};
+use crate::model::{FollowWish, Link, MotionOutcome};
 use crate::text;
 
 /// Rest between two looks at the connection. Work does not wait for it: the worker is woken.
@@ -23,12 +25,13 @@ pub struct MotionLook;
 /// The duty of the motion worker.
 pub struct Motions {
     desk: Arc<MotionDesk>,
+    line: Arc<FollowLine>,
 }
 
 impl Motions {
-    /// With the place where it is told what to do.
-    pub fn new(desk: Arc<MotionDesk>) -> Self {
-        Self { desk }
+    /// With the places where it is told what to do, and where the board is.
+    pub fn new(desk: Arc<MotionDesk>, line: Arc<FollowLine>) -> Self {
+        Self { desk, line }
     }
 
     fn run(
@@ -41,6 +44,7 @@ impl Motions {
         let outcome = match task {
             MotionTask::Move(request) => port.move_to(&request.goal, request.speed, cancel),
             MotionTask::JogStep { request, length, .. } => port.jog_step(request, *length, cancel),
+            MotionTask::Follow { wish, .. } => self.follow(port, *wish, cancel),
         };
         // First, so that what the window asks for next is not refused.
         self.desk.done();
@@ -52,6 +56,23 @@ impl Motions {
         };
         outlet.report(Event::Moved { id: task.id(), outcome: reported });
         ended
+    }
+
+    fn follow(
+        &self,
+        port: &mut dyn MotionPort,
+        wish: FollowWish,
+        cancel: &CancelToken,
+    ) -> Result<MotionOutcome, PortError> {
+        self.line.begin(wish);
+        let mut wanted = |moment: &FollowMoment| {
+            if cancel.is_cancelled() { ArmWish::End } else { self.line.wish(moment) }
+        };
+        let outcome = port.follow(&mut wanted)?;
+        Ok(match (outcome, self.line.take_ended()) {
+            (MotionOutcome::Stopped, Some(why)) if !cancel.is_cancelled() => MotionOutcome::Failed(why),
+            (outcome, _) => outcome,
+        })
     }
 
     fn jog(&self, port: &mut dyn MotionPort, request: &JogRequest, outlet: &Outlet) -> Result<(), PortError> {

@@ -9,7 +9,7 @@ use super::Waker;
 use super::jog_line::{HELD_S, Held, JogLine};
 use super::port::JogRequest;
 use crate::command::Event;
-use crate::model::{MotionGoal, MotionId, MotionOutcome, MotionRequest};
+use crate::model::{FollowWish, MotionGoal, MotionId, MotionOutcome, MotionRequest};
 use crate::text;
 use crate::text::Text;
 
@@ -27,6 +27,13 @@ pub enum MotionTask {
         /// How far: metres for translations, radians for turns and joints.
         length: f64,
     },
+    /// After the board, until it is cancelled.
+    Follow {
+        /// Its number.
+        id: MotionId,
+        /// What is wanted.
+        wish: FollowWish,
+    },
 }
 
 impl MotionTask {
@@ -34,7 +41,7 @@ impl MotionTask {
     pub fn id(&self) -> MotionId {
         match self {
             Self::Move(request) => request.id,
-            Self::JogStep { id, .. } => *id,
+            Self::JogStep { id, .. } | Self::Follow { id, .. } => *id,
         }
     }
 
@@ -43,6 +50,7 @@ impl MotionTask {
             Self::Move(MotionRequest { goal: MotionGoal::Joints(_), .. }) => text!("a motion of the joints"),
             Self::Move(MotionRequest { goal: MotionGoal::Tip(_), .. }) => text!("a motion of the tip"),
             Self::JogStep { .. } => text!("a step"),
+            Self::Follow { .. } => text!("following the board"),
         }
     }
 }

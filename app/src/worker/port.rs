@@ -1,12 +1,12 @@
 //! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
 
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::{Base, Camera, Pose, Tip};
+use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_sim_link::client::cell::{FollowMoment, FollowWish, JointAngles};
 
-use crate::model::{CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
+use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
 use crate::text::Text;
 
 /// Why a port has no answer.
@@ -80,6 +80,18 @@ pub trait ControlPort: Send {
     /// # Errors
     /// [`PortError`]; the arm may then still move.
     fn stop(&mut self) -> Result<(), PortError>;
+
+    /// Has a simulated cell move its board.
+    ///
+    /// # Errors
+    /// [`PortError`], [`PortError::Refused`] by a cell that cannot.
+    fn move_board(&mut self, motion: &BoardMotion) -> Result<(), PortError>;
+
+    /// Has a simulated cell hide its board or show it again.
+    ///
+    /// # Errors
+    /// As [`Self::move_board`].
+    fn hide_board(&mut self, hidden: bool) -> Result<(), PortError>;
 }
 
 /// A jog that is asked for: for as long as a button is held, or by a step.
@@ -121,6 +133,13 @@ pub trait MotionPort: Send {
     /// # Errors
     /// As [`Self::move_to`].
     fn jog(&mut self, request: &JogRequest, held: &mut dyn FnMut() -> Option<f64>) -> Result<Option<Text>, PortError>;
+
+    /// Leads the tip where `wish` wants it, pass by pass, and returns when the arm stands: [`MotionOutcome::Stopped`] when
+    /// that was wished or a stop came, and why otherwise.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError>;
 }
 
 /// Pictures as they come from the cell.
@@ -136,6 +155,8 @@ pub struct RawFrame {
     pub base_from_tip: Pose<Base, Tip>,
     /// The joints at that instant [rad].
     pub joints_rad: JointAngles,
+    /// Where the board was at that instant, if the cell publishes it.
+    pub base_from_target_true: Option<Pose<Base, Target>>,
 }
 
 /// The camera.

@@ -1,7 +1,6 @@
 //! The solver: calibrates the newest set of captures, and checks the answer on the captures that never entered it.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -16,6 +15,7 @@ use handeye_core::verify::{self, Calibrated, CheckCapture, VerifyError};
 use super::link::Outlet;
 use crate::command::{Event, SolveOutcome};
 use crate::model::{JobId, Solved, Truth};
+use crate::session_start;
 use crate::text;
 use crate::text::Text;
 use crate::truth;
@@ -45,8 +45,19 @@ pub struct SolveJob {
 pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
     let id = job.id;
     let began_s = outlet.now_s();
+    let told = Cell::new(None::<Progress>);
+    let progress = |now: Progress| {
+        let tell = told.get().is_none_or(|before| {
+            before.stage != now.stage || (now.fraction() - before.fraction()).abs() >= PROGRESS_STEP
+        });
+        if tell {
+            told.set(Some(now));
+            outlet.report(Event::SolveProgress { job: id, stage: now.stage, part: now.fraction() });
+        }
+    };
+    let work = Work { cancel, progress: &progress };
     // A defect in a solver must not take the captures with it.
-    let solved = catch_unwind(AssertUnwindSafe(|| answer(job, cancel, outlet)));
+    let solved = catch_unwind(AssertUnwindSafe(|| answer(job, work)));
     let outcome = match solved {
         Ok(Ok(solved)) => SolveOutcome::Solved(Arc::new(Solved { took_s: outlet.now_s() - began_s, ..solved })),
         Ok(Err(CalibrateError::HandEye(HandEyeError::Cancelled))) => SolveOutcome::Cancelled,
@@ -58,20 +69,13 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
     outlet.report(Event::SolveEnded { job: id, outcome });
 }
 
-fn answer(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) -> Result<Solved, CalibrateError> {
-    let told = Cell::new(None::<Progress>);
-    let progress = |now: Progress| {
-        let tell = told.get().is_none_or(|before| {
-            before.stage != now.stage || (now.fraction() - before.fraction()).abs() >= PROGRESS_STEP
-        });
-        if tell {
-            told.set(Some(now));
-            outlet.report(Event::SolveProgress { job: job.id, stage: now.stage, part: now.fraction() });
-        }
-    };
-    let work = Work { cancel, progress: &progress };
+/// The calibration of a job with all that is said about it: one path for the window and the command line.
+///
+/// # Errors
+/// [`CalibrateError`].
+pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> {
     let calibration = calibrate::calibrate(&job.observations, job.method, work)?;
-    let options = BTreeMap::from([("method".to_owned(), serde_json::Value::from(job.method.name()))]);
+    let options = session_start::solve_options(job.method, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);

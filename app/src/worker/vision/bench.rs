@@ -16,7 +16,7 @@ use handeye_sim_link::client::cell::{CellClient, CellPaths, GroundTruth};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions};
 
 use super::super::{Clock, Connector, LiveConnector, Waker, Workers};
-use super::{CaptureRequest, LatestSlot, Measured, Outlet, Tap, Vision, VisionTask};
+use super::{CaptureRequest, LatestSlot, Measured, Outlet, Sights, Tap, Vision, VisionTask};
 use crate::command::Event;
 use crate::model::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellSource, DepthScale, FrameImages, FrameInfo,
@@ -71,7 +71,7 @@ impl Table {
             Arc::clone(&tap),
             bell,
             tasks,
-            Arc::clone(&detections),
+            Sights { detections: Arc::clone(&detections), ..Sights::default() },
             measured_sender,
             outlet,
             shutdown.clone(),
@@ -103,6 +103,7 @@ impl Table {
             far_plane_m: 3.5,
             base_from_tip: Pose::identity(),
             joints_rad: [0.0; 6],
+            base_from_target_true: None,
         };
         let depth = DepthImage { width: 1, height: 1, metres: vec![0.5] };
         let images = FrameImages { rgb: rgb.clone(), depth, depth_coloured: RgbImage::new(1, 1) };

@@ -8,24 +8,31 @@
 mod capture;
 mod refusal;
 mod search;
+mod tracking;
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, SendTimeoutError, Sender, TryRecvError, never, select};
 use handeye_core::camera::Intrinsics;
+use handeye_core::image::GrayImage;
 use handeye_core::image_file::gray_from_rgb;
 use handeye_core::target::TargetSpec;
+use handeye_core::track::Setup;
 use handeye_sim_link::client::CancelToken;
 
 pub use capture::{CaptureRequest, Measured, thumbnail};
 use capture::{Look, UnderWay};
 use search::Search;
+use tracking::Tracking;
+pub use tracking::error_of;
 
+use super::follow_line::FollowLine;
 use super::link::Outlet;
 use super::slot::{LatestSlot, Tap};
 use crate::command::Event;
-use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame};
+use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
+use crate::text::Text;
 
 /// How often the clock is looked at while a capture waits for pictures that do not come.
 const CLOCK_PERIOD: Duration = Duration::from_millis(100);
@@ -41,6 +48,19 @@ pub enum VisionTask {
     Capture(CaptureRequest),
     /// Give up the capture that is under way.
     CancelCapture,
+    /// Track the board, instead of only finding it; `None` does so no more. A capture goes before.
+    Track(Option<Box<Setup>>),
+}
+
+/// Where the newest sights of the board are put.
+#[derive(Clone, Default)]
+pub struct Sights {
+    /// For the window: corners and pose in the camera.
+    pub detections: Arc<LatestSlot<LiveDetection>>,
+    /// For the window: the board in the base.
+    pub tracked: Arc<LatestSlot<Tracked>>,
+    /// For the arm.
+    pub follow: Arc<FollowLine>,
 }
 
 /// The application ends.
@@ -51,11 +71,12 @@ pub struct Vision {
     tap: Arc<Tap<LiveFrame>>,
     bell: Receiver<()>,
     tasks: Receiver<VisionTask>,
-    detections: Arc<LatestSlot<LiveDetection>>,
+    sights: Sights,
     measured: Sender<Measured>,
     outlet: Outlet,
     shutdown: CancelToken,
     search: Search,
+    tracking: Option<Tracking>,
     capture: Option<UnderWay>,
 }
 
@@ -65,13 +86,13 @@ impl Vision {
         tap: Arc<Tap<LiveFrame>>,
         bell: Receiver<()>,
         tasks: Receiver<VisionTask>,
-        detections: Arc<LatestSlot<LiveDetection>>,
+        sights: Sights,
         measured: Sender<Measured>,
         outlet: Outlet,
         shutdown: CancelToken,
     ) -> Self {
         let search = Search::default();
-        Self { tap, bell, tasks, detections, measured, outlet, shutdown, search, capture: None }
+        Self { tap, bell, tasks, sights, measured, outlet, shutdown, search, tracking: None, capture: None }
     }
 
     /// Works until the application ends.
@@ -134,6 +155,7 @@ impl Vision {
                 self.tell_progress();
             }
             VisionTask::CancelCapture => self.refuse(refusal::cancelled()),
+            VisionTask::Track(setup) => self.track(setup),
         }
         if self.shutdown.is_cancelled() { Err(Ended) } else { Ok(()) }
     }
@@ -142,17 +164,46 @@ impl Vision {
         let grey = gray_from_rgb(&frame.images.rgb);
         let complete = self.capture.as_mut().is_some_and(|capture| capture.see(frame, &grey));
         self.tell_progress();
+        if self.capture.is_none() && self.tracking.is_some() {
+            self.track_in(frame, &grey, dropped);
+            return Ok(());
+        }
         let Some(detection) = self.search.live(frame, &grey, dropped) else { return Ok(()) };
         if let (Some(capture), Some(corners)) = (&mut self.capture, &detection.corners) {
             capture.machine.saw_board(frame.info.number, corners);
         }
-        self.detections.put(detection);
+        self.sights.detections.put(detection);
         (self.outlet.waker)();
         if complete {
             self.take_up_tasks()?;
             self.measure(frame)?;
         }
         Ok(())
+    }
+
+    fn track(&mut self, setup: Option<Box<Setup>>) {
+        // The tracker before takes its leave of the arm first.
+        self.tracking = None;
+        let Some(setup) = setup else { return };
+        match Tracking::new(*setup, Arc::clone(&self.sights.follow)) {
+            Ok(tracking) => self.tracking = Some(tracking),
+            Err(error) => self.outlet.report(Event::TrackFailed { why: Text::verbatim(error.to_string()) }),
+        }
+    }
+
+    fn track_in(&mut self, frame: &LiveFrame, grey: &GrayImage, dropped: u64) {
+        let Some(tracking) = &mut self.tracking else { return };
+        match tracking.see(frame, grey, dropped, &|| self.outlet.now_s()) {
+            Ok((tracked, detection)) => {
+                self.sights.detections.put(detection);
+                self.sights.tracked.put(tracked);
+                (self.outlet.waker)();
+            }
+            Err(error) => {
+                self.tracking = None;
+                self.outlet.report(Event::TrackFailed { why: Text::verbatim(error.to_string()) });
+            }
+        }
     }
 
     /// Measures the average of a capture, whose last picture is `frame`, unless it was given up meanwhile.

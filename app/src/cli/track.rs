@@ -1,0 +1,131 @@
+//! `handeye track`: tracks the board live, and has the arm follow it.
+
+mod calibration;
+mod document;
+mod live;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use handeye_core::track::{MotionModel, Setup};
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::Endpoint;
+use handeye_sim_link::client::cell::{BoardMotion, BoardPath};
+
+use super::cell::SceneArg;
+use super::{Failure, RerunArg, rerun_arg, solve};
+use crate::model::FollowWish;
+use crate::rerun_log::{Pace, RerunChoice};
+use live::{Job, Live, Task};
+
+/// Options of `handeye track`.
+#[derive(Debug, Args)]
+pub struct TrackArgs {
+    /// Address of a CoppeliaSim or cell; without it the built-in cell is started, with a board that moves.
+    #[arg(long, value_name = "ADDR")]
+    connect: Option<String>,
+    /// The calibration: a result JSON, or a session that is solved.
+    #[arg(long, value_name = "FILE")]
+    calibration: PathBuf,
+    /// Have the arm keep the view of the board that it has at the beginning.
+    #[arg(long)]
+    follow: bool,
+    /// With --follow: bring the tip to this corner of the board instead, counted from 0.
+    #[arg(long, value_name = "INDEX", requires = "follow")]
+    corner: Option<usize>,
+    /// Move the tip once to this corner of the board, counted from 0, with the orientation that it has; then end.
+    #[arg(long, value_name = "INDEX", conflicts_with = "follow")]
+    reach: Option<usize>,
+    /// With --corner and --reach: how far the tip stays off the board, millimetres.
+    #[arg(long, value_name = "MM", default_value_t = 100.0)]
+    stand_off: f64,
+    /// End after so many pictures; without it, at Ctrl-C.
+    #[arg(long, value_name = "N")]
+    frames: Option<u64>,
+    /// Write every pose and a summary as JSON to this file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// The chessboard, if the calibration does not say it: inner corners along x and y, and the square.
+    #[arg(long, value_name = "COLUMNSxROWSxMM")]
+    target: Option<String>,
+    #[command(flatten)]
+    scene: SceneArg,
+    /// Seed of everything random in the built-in cell.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// How the built-in cell moves its board: still, circle, figure_eight, random_walk or step; a circle if neither this
+    /// nor the scene says it.
+    #[arg(long, value_name = "PATH", conflicts_with = "connect")]
+    board_path: Option<BoardPath>,
+    /// How fast, metres per second; as the scene says if not given.
+    #[arg(long, value_name = "SPEED", conflicts_with = "connect")]
+    board_speed: Option<f64>,
+    #[command(flatten)]
+    rerun: RerunArg,
+}
+
+pub fn run(args: &TrackArgs) -> Result<(), Failure> {
+    let cancel = solve::cancel_on_ctrl_c();
+    if args.connect.is_some() && args.scene.is_given() {
+        return Err(Failure::unusable(anyhow::anyhow!(
+            "--scene describes the built-in cell and --connect takes another: give one of them"
+        )));
+    }
+    let (calibrated, said_target) = calibration::read(&args.calibration)?;
+    let target = match &args.target {
+        Some(text) => calibration::chessboard(text)?,
+        None => said_target.ok_or_else(|| {
+            Failure::unusable(anyhow::anyhow!(
+                "{} does not say which board it was made with: give --target, for example --target 10x7x15",
+                args.calibration.display()
+            ))
+        })?,
+    };
+    let mut scene = args.scene.load()?;
+    // The arm first has to look at the board.
+    let motion = std::mem::take(&mut scene.board.motion);
+    let path = args.board_path.unwrap_or(if motion.path == BoardPath::Still { BoardPath::Circle } else { motion.path });
+    let board = BoardMotion {
+        size_m: Some(motion.size_m),
+        tilt_deg: Some(motion.tilt_deg),
+        ..BoardMotion::along(path, args.board_speed.unwrap_or(motion.speed_m_s))
+    };
+    let server = if args.connect.is_some() {
+        None
+    } else {
+        let config = CellConfig { seed: args.seed, real_time: Some(true), ..CellConfig::new(scene) };
+        Some(CellServer::start(config).map_err(Failure::failed)?)
+    };
+    let address = args.connect.clone().or_else(|| server.as_ref().map(CellServer::endpoint)).unwrap_or_default();
+    let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
+    if let Some(index) = args.corner.or(args.reach).filter(|&index| index >= target.grid().len()) {
+        return Err(Failure::unusable(anyhow::anyhow!(
+            "there is no corner {index}: a {target} has corners 0 to {}",
+            target.grid().len() - 1
+        )));
+    }
+    let stand_off_m = args.stand_off * 1e-3;
+    if !(stand_off_m.is_finite() && stand_off_m >= 0.0) {
+        return Err(Failure::unusable(anyhow::anyhow!("{} mm is no distance: give 0 or more", args.stand_off)));
+    }
+    let task = match (args.follow, args.corner, args.reach) {
+        (_, _, Some(index)) => Task::Reach { index, stand_off_m },
+        (true, Some(index), None) => Task::Follow(FollowWish::Corner { index, stand_off_m }),
+        (true, None, None) => Task::Follow(FollowWish::KeepView),
+        (false, _, None) => Task::Watch,
+    };
+    let recorder = args.rerun.start(RerunChoice::Off, Pace::Live, false)?;
+    let job = Job {
+        recorder: &recorder,
+        setup: Setup { target, calibrated, motion: MotionModel::default() },
+        task,
+        frames: args.frames,
+        // The board of somebody else's cell is not ours to move, nor is the arm before it follows.
+        own_cell: server.is_some().then_some(board),
+    };
+    let mut document = document::Document::begin(args.json.as_deref(), &args.calibration)?;
+    let summary = Live::connect(&endpoint)?.run(&job, &cancel, &mut |tracked| document.add(tracked))?;
+    document.finish(&summary)?;
+    print!("{}", summary.text());
+    rerun_arg::finish(recorder, &cancel)
+}

@@ -1,0 +1,106 @@
+//! The JSON of a track: written picture by picture, so that hours of it need no memory, and readable whenever it ends.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use handeye_core::frames::{Base, Pose, Target};
+use handeye_core::track::State;
+use serde_json::{Value, json};
+
+use super::live::Summary;
+use crate::cli::Failure;
+use crate::model::Tracked;
+
+/// The file, or nothing where none is wanted.
+pub struct Document {
+    open: Option<(PathBuf, BufWriter<File>)>,
+    written: u64,
+}
+
+impl Document {
+    /// Begins a file.
+    pub fn begin(file: Option<&Path>, calibration: &Path) -> Result<Self, Failure> {
+        let Some(path) = file else { return Ok(Self { open: None, written: 0 }) };
+        let made = File::create(path)
+            .map_err(|error| Failure::unusable(anyhow::anyhow!("{} cannot be written: {error}", path.display())))?;
+        let mut document = Self { open: Some((path.to_path_buf(), BufWriter::new(made))), written: 0 };
+        let calibration = json!(calibration.display().to_string());
+        document.write(&format!(
+            "{{ \"format\": \"handeye-track\", \"version\": 1,\n  \"calibration\": {calibration},\n  \"frames\": ["
+        ))?;
+        Ok(document)
+    }
+
+    /// Adds a picture.
+    pub fn add(&mut self, tracked: &Tracked) -> Result<(), Failure> {
+        if self.open.is_none() {
+            return Ok(());
+        }
+        let comma = if self.written == 0 { "" } else { "," };
+        self.written += 1;
+        self.write(&format!("{comma}\n    {}", frame(tracked)))
+    }
+
+    /// Ends the file.
+    pub fn finish(mut self, summary: &Summary) -> Result<(), Failure> {
+        if self.open.is_none() {
+            return Ok(());
+        }
+        self.write(&format!("\n  ],\n  \"summary\": {} }}\n", summary.json()))?;
+        match &mut self.open {
+            Some((path, file)) => file.flush().map_err(|error| cannot_write(path, &error)),
+            None => Ok(()),
+        }
+    }
+
+    fn write(&mut self, text: &str) -> Result<(), Failure> {
+        let Some((path, file)) = &mut self.open else { return Ok(()) };
+        file.write_all(text.as_bytes()).map_err(|error| cannot_write(path, &error))
+    }
+}
+
+fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::failed(anyhow::anyhow!("{} cannot be written: {error}", path.display()))
+}
+
+fn pose(pose: &Pose<Base, Target>) -> Value {
+    let translation_m: [f64; 3] = pose.translation().into();
+    json!({ "parent_frame": "base", "child_frame": "target", "translation_m": translation_m, "rotation_xyzw": pose.xyzw() })
+}
+
+fn frame(tracked: &Tracked) -> Value {
+    let update = &tracked.update;
+    let (state, corners) = match update.state {
+        State::Searching => ("searching", 0),
+        State::Tracking { corners, .. } => ("tracking", corners),
+        State::Coasting { .. } => ("coasting", 0),
+        State::Lost { .. } => ("lost", 0),
+    };
+    let estimate = update.estimate.as_ref().map(|estimate| {
+        let rows: [[f64; 6]; 6] = std::array::from_fn(|i| std::array::from_fn(|j| estimate.covariance[(i, j)]));
+        let velocity: [f64; 3] = estimate.velocity_m_s.into();
+        let turn: [f64; 3] = estimate.angular_velocity_rad_s.into();
+        let mut value = pose(&estimate.base_from_target);
+        value["covariance"] = json!(rows);
+        value["velocity_m_s"] = json!(velocity);
+        value["angular_velocity_rad_s"] = json!(turn);
+        value
+    });
+    let first_corner: Option<[f64; 3]> =
+        update.by_depth.as_ref().and_then(|by_depth| by_depth.first_corner_in_base).map(|point| point.coords.into());
+    json!({
+        "time_s": update.time_s,
+        "state": state,
+        "corners": corners,
+        "base_from_target": estimate,
+        "by_pnp": update.seen.as_ref().map(|seen| pose(&seen.base_from_target)),
+        "by_depth": update.by_depth.as_ref().map(|by_depth| pose(&by_depth.base_from_target)),
+        "first_corner_by_depth_m": first_corner,
+        "rms_px": update.seen.as_ref().map(|seen| seen.rms_px),
+        "latency_ms": tracked.latency_s * 1e3,
+        "truth": tracked.truth.as_ref().map(pose),
+        "error": tracked.error.map(|error| json!({
+            "position_mm": error.position_m * 1e3, "rotation_deg": error.rotation_rad.to_degrees() })),
+    })
+}

@@ -1,0 +1,364 @@
+//! Tracking without a window: pictures in, poses out, and the arm on a thread of its own.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::thread::Builder;
+use std::time::{Duration, Instant};
+
+use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::image_file::gray_from_rgb;
+use handeye_core::poses_file::{Goal, TaughtPoses};
+use handeye_core::progress::CancelToken;
+use handeye_core::track::{Estimate, Keep, Picture, Setup, State, Tracker};
+use handeye_sim_link::client::cell::{
+    Arm, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment, FollowWish as ArmWish,
+    MotionTolerance, SettleOptions,
+};
+use handeye_sim_link::client::{ConnectionOptions, Endpoint};
+use serde_json::{Value, json};
+
+use crate::cli::{Failure, record};
+use crate::limits;
+use crate::model::{FollowStatus, FollowWish, Step, Tracked};
+use crate::rerun_log::{Entry, Recorder};
+use crate::session_start::REFERENCE_POSES;
+use crate::text::{Language, Text};
+use crate::worker::{FollowLine, error_of};
+
+/// Rest between two looks at the clock of the cell.
+const LOOK: Duration = Duration::from_millis(2);
+
+/// A line of progress every so often [s].
+const PROGRESS_S: f64 = 2.0;
+
+/// What the arm does about the board.
+#[derive(Debug, Clone, Copy)]
+pub enum Task {
+    /// Nothing.
+    Watch,
+    /// It follows.
+    Follow(FollowWish),
+    /// It moves once, when the board has been seen for a while.
+    Reach {
+        /// To this corner.
+        index: usize,
+        /// So far off the board [m].
+        stand_off_m: f64,
+    },
+}
+
+/// Pictures before the arm reaches for a corner: the filter has settled by then.
+const PICTURES_BEFORE_REACH: u64 = 15;
+
+/// What to do.
+pub struct Job<'a> {
+    /// Where it is recorded.
+    pub recorder: &'a Recorder,
+    /// What is tracked, and with what.
+    pub setup: Setup,
+    /// What the arm does.
+    pub task: Task,
+    /// How many pictures.
+    pub frames: Option<u64>,
+    /// The cell belongs to this program: how its board moves.
+    pub own_cell: Option<BoardMotion>,
+}
+
+/// Connections to a cell.
+pub struct Live {
+    arm: Arm,
+    feed: CameraFeed,
+}
+
+/// What came out of it.
+#[derive(Debug, Default)]
+pub struct Summary {
+    frames: u64,
+    tracked: u64,
+    took_s: f64,
+    latencies_s: Vec<f64>,
+    position: Squares,
+    rotation: Squares,
+    follow_distance: Squares,
+    follow_angle: Squares,
+    follow_ended: Option<String>,
+}
+
+/// Root mean square of what comes in.
+#[derive(Debug, Default)]
+struct Squares {
+    sum: f64,
+    count: u64,
+}
+
+impl Squares {
+    fn add(&mut self, value: f64) {
+        self.sum += value * value;
+        self.count += 1;
+    }
+
+    fn rms(&self) -> Option<f64> {
+        (self.count > 0).then(|| (self.sum / self.count as f64).sqrt())
+    }
+}
+
+impl Live {
+    /// Connects to arm and camera.
+    pub fn connect(endpoint: &Endpoint) -> Result<Self, Failure> {
+        let cell = CellClient::connect(endpoint, &ConnectionOptions::default(), &CellPaths::default())
+            .map_err(Failure::failed)?;
+        let (arm, feed) = cell.split();
+        Ok(Self { arm, feed })
+    }
+
+    /// Tracks until there are pictures enough or it is cancelled. The arm is at rest when it returns.
+    pub fn run(
+        mut self,
+        job: &Job<'_>,
+        cancel: &CancelToken,
+        publish: &mut dyn FnMut(&Tracked) -> Result<(), Failure>,
+    ) -> Result<Summary, Failure> {
+        if let Some(board) = &job.own_cell {
+            self.prepare_own_cell(board, cancel)?;
+        }
+        if job.recorder.is_on() {
+            let truth = self.arm.ground_truth().map_err(Failure::failed)?;
+            record::cell(job.recorder, &mut self.arm, &truth).map_err(Failure::failed)?;
+            job.recorder.note(Entry::Step(Step::Track));
+        }
+        let line = Arc::new(FollowLine::default());
+        line.set_up(Some(job.setup.clone()));
+        let Self { mut arm, feed } = self;
+        let wish = match job.task {
+            Task::Watch => return Self::watch(feed, job, job.frames, &line, cancel, &|| false, publish).map(|it| it.0),
+            Task::Reach { index, stand_off_m } => {
+                let pictures = Some(job.frames.unwrap_or(PICTURES_BEFORE_REACH));
+                let (summary, newest) = Self::watch(feed, job, pictures, &line, cancel, &|| false, publish)?;
+                reach(&mut arm, job, newest, index, stand_off_m, cancel)?;
+                return Ok(summary);
+            }
+            Task::Follow(wish) => wish,
+        };
+        let end = CancelToken::default();
+        line.begin(wish);
+        let kinematics = arm.kinematics().map_err(Failure::failed)?.map_err(Failure::failed)?;
+        let (end_of_arm, line_of_arm) = (end.clone(), Arc::clone(&line));
+        let arm_thread = Builder::new()
+            .name("follow".to_owned())
+            .spawn(move || {
+                // Nothing to follow before the board has been seen.
+                while !line_of_arm.is_seen() && !end_of_arm.is_cancelled() {
+                    std::thread::sleep(LOOK);
+                }
+                let mut wanted = |moment: &FollowMoment| {
+                    if end_of_arm.is_cancelled() { ArmWish::End } else { line_of_arm.wish(moment) }
+                };
+                arm.follow(&kinematics, &FollowLimits::default(), &mut wanted)
+            })
+            .map_err(Failure::failed)?;
+        let watched = Self::watch(feed, job, job.frames, &line, cancel, &|| arm_thread.is_finished(), publish);
+        end.cancel();
+        let followed = arm_thread
+            .join()
+            .map_err(|_panic| Failure::failed(anyhow::anyhow!("the thread that moves the arm ended with a panic")))?;
+        let (mut summary, _newest) = watched?;
+        summary.follow_ended = match followed.map_err(Failure::failed)? {
+            FollowEnd::Released => line.take_ended().map(|why: Text| why.say(Language::English)),
+            end => Some(format!("{end:?}")),
+        };
+        Ok(summary)
+    }
+
+    /// Has the arm of the cell that this program started look at the board, and the board move.
+    fn prepare_own_cell(&mut self, board: &BoardMotion, cancel: &CancelToken) -> Result<(), Failure> {
+        self.arm.sim().start_simulation().map_err(Failure::failed)?;
+        let poses = TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES).map_err(Failure::failed)?;
+        let goals = poses.poses.iter().filter_map(|taught| match &taught.goal {
+            Goal::Tip(goal) => Some(goal),
+            Goal::Joints(_) => None,
+        });
+        // Close to its column the arm has no room to follow.
+        let from_column = |goal: &Pose<Base, Tip>| goal.translation().xy().norm();
+        if let Some(first) = goals.max_by(|a, b| from_column(a).total_cmp(&from_column(b))) {
+            let limits = limits::of_tip(&limits::TOUR, 1.0);
+            self.arm
+                .move_to_pose(first, &limits, &MotionTolerance::default(), cancel)
+                .and_then(|()| self.arm.settle(&SettleOptions::default(), cancel).map(|_| ()))
+                .map_err(Failure::failed)?;
+        }
+        self.arm.move_board(board).map_err(Failure::failed)
+    }
+
+    fn watch(
+        mut feed: CameraFeed,
+        job: &Job<'_>,
+        frames: Option<u64>,
+        line: &FollowLine,
+        cancel: &CancelToken,
+        arm_stands: &dyn Fn() -> bool,
+        publish: &mut dyn FnMut(&Tracked) -> Result<(), Failure>,
+    ) -> Result<(Summary, Option<Estimate>), Failure> {
+        let mut newest = None;
+        let mut tracker = Tracker::new(job.setup.clone()).map_err(Failure::unusable)?;
+        let far_plane_m = feed.info().depth_optics.far_m as f32;
+        let mut summary = Summary::default();
+        let began = Instant::now();
+        let mut seen_s = f64::NEG_INFINITY;
+        let mut next_line_s = PROGRESS_S;
+        while !cancel.is_cancelled() && !arm_stands() && frames.is_none_or(|frames| summary.frames < frames) {
+            let now_s = feed.sim().get_simulation_time().map_err(Failure::failed)?;
+            if now_s == seen_s {
+                std::thread::sleep(LOOK);
+                continue;
+            }
+            let frame = feed.grab().map_err(Failure::failed)?;
+            let received = Instant::now();
+            seen_s = frame.sim_time_s;
+            let update = tracker
+                .see(&Picture {
+                    time_s: frame.sim_time_s,
+                    grey: &gray_from_rgb(&frame.rgb),
+                    depth: Some(&frame.depth),
+                    far_plane_m,
+                    base_from_tip: frame.base_from_tip,
+                })
+                .map_err(Failure::failed)?;
+            line.see(&update);
+            let truth = frame.base_from_target_true;
+            let error = update
+                .estimate
+                .as_ref()
+                .zip(truth)
+                .map(|(estimate, truth)| error_of(&estimate.base_from_target, &truth, &job.setup.target));
+            let took_s = began.elapsed().as_secs_f64();
+            let tracked = Tracked {
+                frame: summary.frames + 1,
+                update,
+                latency_s: received.elapsed().as_secs_f64(),
+                rate_hz: (summary.frames + 1) as f64 / took_s,
+                error,
+                truth,
+            };
+            newest.clone_from(&tracked.update.estimate);
+            summary.add(&tracked, line.take_status().as_ref(), took_s);
+            publish(&tracked)?;
+            if job.recorder.is_on() {
+                let info = feed.info().clone();
+                record::picture(job.recorder, &info, summary.frames, frame);
+                job.recorder.note(Entry::Tracked(Arc::new(tracked.clone())));
+            }
+            if took_s > next_line_s {
+                next_line_s = took_s + PROGRESS_S;
+                tracing::info!("{}", progress(&tracked));
+            }
+        }
+        Ok((summary, newest))
+    }
+}
+
+/// Moves the tip once to where a corner is by the newest estimate.
+fn reach(
+    arm: &mut Arm,
+    job: &Job<'_>,
+    newest: Option<Estimate>,
+    index: usize,
+    stand_off_m: f64,
+    cancel: &CancelToken,
+) -> Result<(), Failure> {
+    let estimate = newest.ok_or_else(|| {
+        Failure::failed(anyhow::anyhow!("the board is not seen: move the arm or the board until the camera sees it"))
+    })?;
+    let base_from_tip_orientation = arm.base_from_tip().map_err(Failure::failed)?.rotation();
+    let keep = Keep::Corner { index, stand_off_m, base_from_tip_orientation };
+    let goal = keep.tip_goal(&estimate, &job.setup.calibrated, &job.setup.target).ok_or_else(|| {
+        Failure::unusable(anyhow::anyhow!("only a camera on the tip can lead it to the board; this one stands beside"))
+    })?;
+    let kinematics = arm.kinematics().map_err(Failure::failed)?;
+    if let Ok(kinematics) = &kinematics {
+        let joints = arm.joint_angles().map_err(Failure::failed)?;
+        kinematics.reach(&goal.base_from_tip, &joints).map_err(Failure::failed)?;
+    }
+    let limits = limits::of_tip(&limits::TOUR, 1.0);
+    arm.move_to_pose(&goal.base_from_tip, &limits, &MotionTolerance::default(), cancel).map_err(Failure::failed)
+}
+
+fn progress(tracked: &Tracked) -> String {
+    let state = match tracked.update.state {
+        State::Searching => "searching for the board".to_owned(),
+        State::Tracking { corners, of } => format!("{corners} of {of} corners"),
+        State::Coasting { since_s } => format!("not seen since {since_s:.2} s"),
+        State::Lost { since_s } => format!("lost since {since_s:.2} s"),
+    };
+    let place = tracked.update.estimate.as_ref().map_or_else(String::new, |estimate| {
+        let at = estimate.base_from_target.translation() * 1e3;
+        format!(", at {:.2} {:.2} {:.2} mm", at.x, at.y, at.z)
+    });
+    format!("{:.2} s: {state}{place}, {:.1} pictures/s", tracked.update.time_s, tracked.rate_hz)
+}
+
+impl Summary {
+    fn add(&mut self, tracked: &Tracked, follow: Option<&FollowStatus>, took_s: f64) {
+        self.frames += 1;
+        self.took_s = took_s;
+        self.tracked += u64::from(matches!(tracked.update.state, State::Tracking { .. }));
+        self.latencies_s.push(tracked.latency_s);
+        if let Some(error) = tracked.error {
+            self.position.add(error.position_m);
+            self.rotation.add(error.rotation_rad);
+        }
+        if let Some(&FollowStatus::Following { distance_m, angle_rad }) = follow {
+            self.follow_distance.add(distance_m);
+            self.follow_angle.add(angle_rad);
+        }
+    }
+
+    fn latency_s(&self) -> Option<f64> {
+        let mut sorted = self.latencies_s.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied()
+    }
+
+    fn rate_hz(&self) -> f64 {
+        if self.took_s > 0.0 { self.frames as f64 / self.took_s } else { 0.0 }
+    }
+
+    /// For programs.
+    pub fn json(&self) -> Value {
+        json!({
+            "frames": self.frames,
+            "tracked": self.tracked,
+            "rate_hz": self.rate_hz(),
+            "latency_median_ms": self.latency_s().map(|s| s * 1e3),
+            "position_rms_mm": self.position.rms().map(|m| m * 1e3),
+            "rotation_rms_deg": self.rotation.rms().map(f64::to_degrees),
+            "follow_distance_rms_mm": self.follow_distance.rms().map(|m| m * 1e3),
+            "follow_angle_rms_deg": self.follow_angle.rms().map(f64::to_degrees),
+            "follow_ended": self.follow_ended,
+        })
+    }
+
+    /// For people.
+    pub fn text(&self) -> String {
+        let mut lines = vec![format!(
+            "tracked in {} of {} pictures, {:.1} pictures/s, {:.1} ms from picture to pose (median)",
+            self.tracked,
+            self.frames,
+            self.rate_hz(),
+            self.latency_s().unwrap_or_default() * 1e3
+        )];
+        if let (Some(m), Some(rad)) = (self.position.rms(), self.rotation.rms()) {
+            let deg = rad.to_degrees();
+            let mm = m * 1e3;
+            lines.push(format!("against the cell's truth: {mm:.3} mm and {deg:.4}° RMS at the middle of the board"));
+        }
+        if let (Some(m), Some(rad)) = (self.follow_distance.rms(), self.follow_angle.rms()) {
+            let deg = rad.to_degrees();
+            let mm = m * 1e3;
+            lines.push(format!("the tip from its goal: {mm:.2} mm and {deg:.3}° RMS, the way there included"));
+        }
+        if let Some(why) = &self.follow_ended {
+            lines.push(format!("following ended by itself: {why}"));
+        }
+        lines.join("\n") + "\n"
+    }
+}

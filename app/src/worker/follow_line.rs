@@ -1,0 +1,141 @@
+//! The way of the tracked board to the arm: what the vision thread saw last, and where the tip has to be for it. It goes
+//! past the window, which may be busy. No thread, no clock: time is that of the simulation.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::track::{Estimate, Keep, Setup, State, TipGoal, Update};
+use handeye_sim_link::client::cell::{FollowGoal, FollowMoment, FollowWish as ArmWish};
+
+use crate::model::{FollowStatus, FollowWish};
+use crate::text;
+use crate::text::Text;
+
+/// How far [s] the motion of the board is thought on from the newest picture: a few pictures, so that one that comes late
+/// does not end everything, and less than what an arm at its speed limit makes of a wrong guess.
+const LONGEST_GUESS_S: f64 = 0.4;
+
+/// What the arm is to do about the board.
+#[derive(Default)]
+pub struct FollowLine {
+    inner: Mutex<Inner>,
+}
+
+#[derive(Default)]
+struct Inner {
+    setup: Option<Setup>,
+    newest: Option<Update>,
+    aim: Option<Aim>,
+    ended: Option<Text>,
+    status: Option<FollowStatus>,
+}
+
+enum Aim {
+    /// To be fixed at the first pass, from where the arm is by then.
+    Wished(FollowWish),
+    Fixed(Keep),
+}
+
+impl FollowLine {
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What is tracked from now on, or that nothing is.
+    pub fn set_up(&self, setup: Option<Setup>) {
+        let mut inner = self.inner();
+        inner.setup = setup;
+        inner.newest = None;
+    }
+
+    /// A picture was tracked.
+    pub fn see(&self, update: &Update) {
+        self.inner().newest = Some(update.clone());
+    }
+
+    /// Whether the board is seen.
+    pub fn is_seen(&self) -> bool {
+        self.inner().newest.as_ref().is_some_and(|newest| matches!(newest.state, State::Tracking { .. }))
+    }
+
+    /// What the arm is to do from its next pass on.
+    pub fn begin(&self, wish: FollowWish) {
+        let mut inner = self.inner();
+        inner.aim = Some(Aim::Wished(wish));
+        inner.ended = None;
+    }
+
+    /// Why following has ended by itself since it began.
+    pub fn take_ended(&self) -> Option<Text> {
+        self.inner().ended.take()
+    }
+
+    /// How it goes, when that is news.
+    pub fn take_status(&self) -> Option<FollowStatus> {
+        self.inner().status.take()
+    }
+
+    /// What the arm is to do in a pass.
+    pub fn wish(&self, moment: &FollowMoment) -> ArmWish {
+        let mut inner = self.inner();
+        match inner.goal(moment) {
+            Ok(goal) => {
+                inner.status = Some(distance(&goal.base_from_tip, &moment.base_from_tip));
+                ArmWish::Towards(FollowGoal {
+                    base_from_tip: goal.base_from_tip,
+                    velocity_m_s: goal.velocity_m_s,
+                    angular_velocity_rad_s: goal.angular_velocity_rad_s,
+                })
+            }
+            Err(why) => {
+                inner.ended.get_or_insert(why);
+                ArmWish::End
+            }
+        }
+    }
+}
+
+impl Inner {
+    fn goal(&mut self, moment: &FollowMoment) -> Result<TipGoal, Text> {
+        let setup = self.setup.as_ref().ok_or_else(|| text!("The board is not tracked: start tracking first"))?;
+        let newest = self.newest.as_ref().ok_or_else(|| text!("The board has not been seen yet"))?;
+        let (Some(estimate), State::Tracking { .. } | State::Coasting { .. }) = (&newest.estimate, newest.state) else {
+            return Err(text!("The board was lost: bring it into view and start again"));
+        };
+        let ahead_s = moment.sim_time_s - estimate.time_s;
+        // The clock of a simulation that is started anew goes back.
+        if !(-LONGEST_GUESS_S..=LONGEST_GUESS_S).contains(&ahead_s) {
+            return Err(text!(
+                "The newest picture is {age} s old: the camera fell silent",
+                age = format!("{ahead_s:.1}")
+            ));
+        }
+        let now = estimate.carried_to(moment.sim_time_s);
+        let keep = match self.aim.take() {
+            Some(Aim::Fixed(keep)) => keep,
+            Some(Aim::Wished(wish)) => fixed(wish, &now, setup, &moment.base_from_tip),
+            None => return Err(text!("The arm was not asked to follow")),
+        };
+        let goal = keep.tip_goal(&now, &setup.calibrated, &setup.target);
+        self.aim = Some(Aim::Fixed(keep));
+        goal.ok_or_else(|| text!("Only a camera on the tip can follow: this one stands beside the robot"))
+    }
+}
+
+fn fixed(wish: FollowWish, now: &Estimate, setup: &Setup, base_from_tip: &Pose<Base, Tip>) -> Keep {
+    match wish {
+        FollowWish::KeepView => {
+            let base_from_camera = setup.calibrated.base_from_camera(base_from_tip);
+            Keep::View(base_from_camera.inverse() * now.base_from_target)
+        }
+        FollowWish::KeepPose(camera_from_target) => Keep::View(camera_from_target),
+        FollowWish::Corner { index, stand_off_m } => {
+            Keep::Corner { index, stand_off_m, base_from_tip_orientation: base_from_tip.rotation() }
+        }
+    }
+}
+
+fn distance(goal: &Pose<Base, Tip>, tip: &Pose<Base, Tip>) -> FollowStatus {
+    let apart = tip.inverse() * *goal;
+    FollowStatus::Following { distance_m: apart.translation().norm(), angle_rad: apart.rotation().angle() }
+}
