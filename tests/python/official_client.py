@@ -78,10 +78,11 @@ def metres(sim, handle):
     return np.frombuffer(depths, '<f4').reshape(height, width)[::-1].astype(float)
 
 
-def corners_in_camera(sim, truth):
-    """The board's inner corners in the camera's OpenCV axes, from the reported tip pose and the truth."""
-    world_from_camera = matrix(sim.getObjectPose(sim.getObject('/UR5/Tip'))) @ matrix(truth['tip_from_camera'])
-    camera_from_target = np.linalg.inv(world_from_camera) @ matrix(truth['base_from_target'])
+def corners_in_camera(sim, truth, moment=None):
+    """The board's inner corners in the camera's OpenCV axes, by the truth, now or at the moment of the images."""
+    moment = moment or {'tip': sim.getObjectPose(sim.getObject('/UR5/Tip')), **truth}
+    world_from_camera = matrix(moment['tip']) @ matrix(truth['tip_from_camera'])
+    camera_from_target = np.linalg.inv(world_from_camera) @ matrix(moment['base_from_target'])
     target = truth['target']
     grid = [[c * target['square_m'], r * target['square_m'], 0, 1]
             for r in range(target['rows']) for c in range(target['columns'])]
@@ -205,6 +206,39 @@ def test_image_is_the_projection_of_the_board(client, sim):
         square = pixels[[0, 1, columns, columns + 1]].mean(axis=0).round().astype(int)
         white = pixels[[1, 2, columns + 1, columns + 2]].mean(axis=0).round().astype(int)
         assert grey[square[1], square[0]] < 60 < 120 < grey[white[1], white[0]], 'the first square is dark'
+
+
+def test_a_moving_board_is_where_the_moment_has_it(client, sim):
+    camera, joints = sim.getObject('/UR5/3D_camera'), joints_of(sim)
+    handeye = client.require('handeye')
+    truth = handeye.truth()
+    assert handeye.moment() == {}, 'there is no image yet'
+    sim.setStepping(True)
+    sim.startSimulation()
+    handeye.moveBoard({'path': 'random_walk', 'speed_m_s': 0.1, 'seed': 3})
+    for number in range(30):
+        for joint, angle in zip(joints, START):
+            sim.setJointPosition(joint, angle + 0.03 * math.sin(0.4 * number))
+        sim.step()
+        # Put, but not in the images yet.
+        sim.setJointPosition(joints[0], START[0])
+        if number % 6 == 5:
+            moment = handeye.moment()
+            near([moment['sim_time'], moment['joints'][0]],
+                 [sim.getSimulationTime(), START[0] + 0.03 * math.sin(0.4 * number)])
+            grey = picture(sim, camera).mean(axis=2)
+            pixels = project(corners_in_camera(sim, truth, moment), truth['intrinsics'])
+            errors = np.array([refine(grey, p) - p for p in pixels])
+            assert np.abs(errors).max() < 0.1, f'corners are off by up to {np.abs(errors).max():.3f} px'
+    handeye.showBoard(False)
+    sim.step()
+    x, y = pixels.mean(axis=0).round().astype(int)
+    assert np.ptp(picture(sim, camera)[y - 20:y + 20, x - 20:x + 20]) < 60, 'no print is seen'
+    fails("missing 'path' field", handeye.moveBoard, {})
+    fails('there is no path "spiral"', handeye.moveBoard, {'path': 'spiral'})
+    fails('speed_m_s is 5, it must be', handeye.moveBoard, {'path': 'circle', 'speed_m_s': 5})
+    sim.stopSimulation(True)
+    near(handeye.truth()['base_from_target'], truth['base_from_target'])
 
 
 def test_depth_is_the_distance_along_the_axis(client, sim):

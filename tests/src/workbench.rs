@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use handeye_app::app::{App, Connect, Start};
 use handeye_app::command::Command;
 use handeye_app::model::{CellSource, Model, ViewSettings};
+use handeye_app::rerun_log::RerunChoice;
 use handeye_app::text::Language;
 use handeye_app::worker::{Clock, LiveConnector, Waker};
 
@@ -20,11 +21,19 @@ pub struct Workbench {
 }
 
 impl Workbench {
-    /// Starts it; new sessions go under `sessions`.
+    /// Starts it; new sessions go under `sessions`. It records as the window does.
     ///
     /// # Panics
     /// When there are no more threads.
     pub fn start(source: CellSource, sessions: &Path, open: Option<PathBuf>) -> Self {
+        Self::start_recording(source, sessions, open, RerunChoice::Record)
+    }
+
+    /// Starts it with a recording for Rerun that goes elsewhere.
+    ///
+    /// # Panics
+    /// When there are no more threads, or the recording cannot be made.
+    pub fn start_recording(source: CellSource, sessions: &Path, open: Option<PathBuf>, rerun: RerunChoice) -> Self {
         let (wake, woken) = std::sync::mpsc::sync_channel(1);
         let waker: Waker = Arc::new(move || {
             // A channel that is full wakes as well.
@@ -39,6 +48,7 @@ impl Workbench {
             addresses: Vec::new(),
             sessions: sessions.to_path_buf(),
             open,
+            rerun,
         };
         match App::start(start, connect, clock, waker) {
             Ok(app) => Self { app, woken },
