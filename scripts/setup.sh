@@ -32,6 +32,7 @@ mesa-vulkan-drivers : pictures of the window in the tests
 xvfb : the window is driven by a real mouse in the tests
 xdotool : the window is driven by a real mouse in the tests
 imagemagick : the window is driven by a real mouse in the tests
+chromium : the recording is looked at in a browser in the tests
 PACKAGES
   return 0
 }
