@@ -113,29 +113,6 @@ fn the_wheel_zooms_and_a_double_click_shows_the_first_view() {
     assert_eq!(pane.commands().last(), Some(&Command::SetSceneView(SceneView::default())));
 }
 
-/// Prints what a frame costs; `cargo test -p handeye_app --lib drawn_many_times -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-fn forty_captures_are_drawn_many_times() {
-    let mut model = sample::tracking();
-    let mut document = (*model.session.document).clone();
-    let first = document.captures.clone();
-    document.captures.extend(first.iter().cycle().take(28).enumerate().map(|(index, record)| {
-        let id = CaptureId(100 + index as u32);
-        handeye_core::session::CaptureRecord { id, ..record.clone() }
-    }));
-    assert_eq!(document.captures.len(), 40);
-    model.session.document = std::sync::Arc::new(document);
-    let mut pane = pane(model);
-    let frames = 200;
-    let begin = std::time::Instant::now();
-    for _ in 0..frames {
-        pane.harness.step();
-    }
-    let ms = begin.elapsed().as_secs_f64() * 1e3 / f64::from(frames);
-    println!("{ms:.2} ms a frame, with the layout and the tree for screen readers");
-}
-
 #[test]
 fn a_capture_is_selected_by_a_click_on_its_frustum() {
     let mut pane = pane(sample::solved());
