@@ -134,8 +134,17 @@ impl MotionPort for LiveMotion {
 }
 
 fn outcome_of_following(end: FollowEnd) -> MotionOutcome {
-    MotionOutcome::Failed(match end {
-        FollowEnd::Released | FollowEnd::Stopped => return MotionOutcome::Stopped,
+    match end {
+        FollowEnd::Released | FollowEnd::Stopped => MotionOutcome::Stopped,
+        obstacle => MotionOutcome::Failed(end_of_following(obstacle)),
+    }
+}
+
+/// Why the arm came to rest.
+pub fn end_of_following(end: FollowEnd) -> Text {
+    match end {
+        FollowEnd::Released => text!("it was released"),
+        FollowEnd::Stopped => text!("The arm was stopped"),
         FollowEnd::Workspace => text!("The goal is outside the box in which the tip may follow"),
         FollowEnd::JointLimit { joint } => text!("Joint {joint} is at the end of its range", joint = joint),
         FollowEnd::Singular => {
@@ -146,7 +155,7 @@ fn outcome_of_following(end: FollowEnd) -> MotionOutcome {
         }
         FollowEnd::NotFollowing { joint } => not_following(joint),
         FollowEnd::OtherTip => other_tip(),
-    })
+    }
 }
 
 /// Why a share of the fastest speed is none.

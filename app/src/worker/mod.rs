@@ -29,6 +29,7 @@ mod rate;
 mod reconnect;
 mod slot;
 mod solver;
+mod tracking;
 mod vision;
 
 #[cfg(test)]
@@ -52,13 +53,15 @@ pub use follow_line::FollowLine;
 pub use jog_line::HELD_S;
 pub use link::Request;
 pub use live::LiveConnector;
+pub use live_motion::end_of_following;
 pub use motion::MotionLook;
 pub use motion_desk::{MotionDesk, MotionTask};
 pub use observer::ObserveJob;
 pub use port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
 pub use slot::LatestSlot;
 pub use solver::{SolveJob, answer};
-pub use vision::{CaptureRequest, Measured, VisionTask, error_of};
+pub use tracking::{Sight, Tracking};
+pub use vision::{CaptureRequest, Measured, VisionTask};
 
 use crate::command::Event;
 use crate::model::{

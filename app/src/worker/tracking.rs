@@ -1,15 +1,26 @@
-//! Tracking the board in live pictures: every picture becomes a pose of the board, for the window and for the arm.
+//! Tracking the board in live pictures: every picture becomes a pose of the board, for who watches and for the arm.
 
 use std::sync::Arc;
 
 use handeye_core::frames::{Base, Pose, Target};
-use handeye_core::image::GrayImage;
 use handeye_core::target::TargetSpec;
 use handeye_core::track::{Picture, Setup, TrackError as CannotTrack, Tracker};
 
-use crate::model::{LiveDetection, LiveFrame, TrackError, Tracked};
-use crate::worker::follow_line::FollowLine;
-use crate::worker::rate::RateMeter;
+use super::follow_line::FollowLine;
+use super::rate::RateMeter;
+use crate::model::{TrackError, Tracked};
+
+/// A picture with what is known of it.
+pub struct Sight<'a> {
+    /// Counts pictures.
+    pub number: u64,
+    /// When it arrived.
+    pub received_s: f64,
+    /// The picture.
+    pub picture: Picture<'a>,
+    /// Where the board was, if the cell publishes it; only ever compared with.
+    pub base_from_target_true: Option<Pose<Base, Target>>,
+}
 
 /// A tracker at work.
 pub struct Tracking {
@@ -30,53 +41,29 @@ impl Tracking {
         Ok(Self { tracker: Tracker::new(setup)?, target, line, rate: RateMeter::default() })
     }
 
-    /// The board in a picture, at a time on the clock of the pictures' arrival.
+    /// The board in a picture; `now_s` is on the clock of its arrival.
     ///
     /// # Errors
     /// As [`Tracker::see`].
-    pub fn see(
-        &mut self,
-        frame: &LiveFrame,
-        grey: &GrayImage,
-        dropped: u64,
-        now_s: &dyn Fn() -> f64,
-    ) -> Result<(Tracked, LiveDetection), CannotTrack> {
-        let info = &frame.info;
-        let began_s = now_s();
-        let update = self.tracker.see(&Picture {
-            time_s: info.sim_time_s,
-            grey,
-            depth: Some(&frame.images.depth),
-            far_plane_m: info.far_plane_m,
-            base_from_tip: info.base_from_tip,
-        })?;
+    pub fn see(&mut self, sight: &Sight<'_>, now_s: &dyn Fn() -> f64) -> Result<Tracked, CannotTrack> {
+        let update = self.tracker.see(&sight.picture)?;
         self.line.see(&update);
         let published_s = now_s();
         self.rate.arrived(published_s);
-        let detection = LiveDetection {
-            frame: info.number,
-            corners: update.seen.as_ref().map(|seen| seen.corners.clone()),
-            camera_from_target: update.seen.as_ref().map(|seen| seen.camera_from_target),
-            base_from_tip: info.base_from_tip,
-            took_s: published_s - began_s,
-            problem: None,
-            dropped,
-        };
-        let truth = info.base_from_target_true;
+        let truth = sight.base_from_target_true;
         let error = update
             .estimate
             .as_ref()
             .zip(truth)
             .map(|(estimate, truth)| error_of(&estimate.base_from_target, &truth, &self.target));
-        let tracked = Tracked {
-            frame: info.number,
-            latency_s: published_s - info.received_s,
+        Ok(Tracked {
+            frame: sight.number,
+            latency_s: published_s - sight.received_s,
             rate_hz: self.rate.rate_hz(),
             update,
             error,
             truth,
-        };
-        Ok((tracked, detection))
+        })
     }
 }
 
@@ -87,7 +74,7 @@ impl Drop for Tracking {
 }
 
 /// How far an estimate is from the truth, at the middle of the board.
-pub fn error_of(estimate: &Pose<Base, Target>, truth: &Pose<Base, Target>, target: &TargetSpec) -> TrackError {
+fn error_of(estimate: &Pose<Base, Target>, truth: &Pose<Base, Target>, target: &TargetSpec) -> TrackError {
     let centre = target.centre();
     TrackError {
         position_m: (estimate.isometry() * centre - truth.isometry() * centre).norm(),

@@ -9,7 +9,7 @@ use handeye_core::frames::{Base, Pose, Tip};
 use handeye_core::image_file::gray_from_rgb;
 use handeye_core::poses_file::{Goal, TaughtPoses};
 use handeye_core::progress::CancelToken;
-use handeye_core::track::{Estimate, Keep, Picture, Setup, State, Tracker};
+use handeye_core::track::{Estimate, Keep, Picture, Setup, State};
 use handeye_sim_link::client::cell::{
     Arm, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment, FollowWish as ArmWish,
     MotionTolerance, SettleOptions,
@@ -23,7 +23,7 @@ use crate::model::{FollowStatus, FollowWish, Step, Tracked};
 use crate::rerun_log::{Entry, Recorder};
 use crate::session_start::REFERENCE_POSES;
 use crate::text::{Language, Text};
-use crate::worker::{FollowLine, error_of};
+use crate::worker::{FollowLine, Sight, Tracking, end_of_following};
 
 /// Rest between two looks at the clock of the cell.
 const LOOK: Duration = Duration::from_millis(2);
@@ -127,13 +127,16 @@ impl Live {
             job.recorder.note(Entry::Step(Step::Track));
         }
         let line = Arc::new(FollowLine::default());
-        line.set_up(Some(job.setup.clone()));
+        // It lives until the arm stands: an arm that follows looks at what is tracked.
+        let mut tracking = Tracking::new(job.setup.clone(), Arc::clone(&line)).map_err(Failure::unusable)?;
+        let tracking = &mut tracking;
         let Self { mut arm, feed } = self;
         let wish = match job.task {
-            Task::Watch => return Self::watch(feed, job, job.frames, &line, cancel, &|| false, publish).map(|it| it.0),
+            Task::Watch => {
+                return Self::watch(feed, tracking, job, &line, cancel, &|| false, publish).map(|it| it.0);
+            }
             Task::Reach { index, stand_off_m } => {
-                let pictures = Some(job.frames.unwrap_or(PICTURES_BEFORE_REACH));
-                let (summary, newest) = Self::watch(feed, job, pictures, &line, cancel, &|| false, publish)?;
+                let (summary, newest) = Self::watch(feed, tracking, job, &line, cancel, &|| false, publish)?;
                 reach(&mut arm, job, newest, index, stand_off_m, cancel)?;
                 return Ok(summary);
             }
@@ -156,7 +159,7 @@ impl Live {
                 arm.follow(&kinematics, &FollowLimits::default(), &mut wanted)
             })
             .map_err(Failure::failed)?;
-        let watched = Self::watch(feed, job, job.frames, &line, cancel, &|| arm_thread.is_finished(), publish);
+        let watched = Self::watch(feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), publish);
         end.cancel();
         let followed = arm_thread
             .join()
@@ -164,7 +167,7 @@ impl Live {
         let (mut summary, _newest) = watched?;
         summary.follow_ended = match followed.map_err(Failure::failed)? {
             FollowEnd::Released => line.take_ended().map(|why: Text| why.say(Language::English)),
-            end => Some(format!("{end:?}")),
+            end => Some(end_of_following(end).say(Language::English)),
         };
         Ok(summary)
     }
@@ -191,15 +194,18 @@ impl Live {
 
     fn watch(
         mut feed: CameraFeed,
+        tracking: &mut Tracking,
         job: &Job<'_>,
-        frames: Option<u64>,
         line: &FollowLine,
         cancel: &CancelToken,
         arm_stands: &dyn Fn() -> bool,
         publish: &mut dyn FnMut(&Tracked) -> Result<(), Failure>,
     ) -> Result<(Summary, Option<Estimate>), Failure> {
+        let frames = match job.task {
+            Task::Reach { .. } => Some(job.frames.unwrap_or(PICTURES_BEFORE_REACH)),
+            Task::Watch | Task::Follow(_) => job.frames,
+        };
         let mut newest = None;
-        let mut tracker = Tracker::new(job.setup.clone()).map_err(Failure::unusable)?;
         let far_plane_m = feed.info().depth_optics.far_m as f32;
         let mut summary = Summary::default();
         let began = Instant::now();
@@ -212,39 +218,27 @@ impl Live {
                 continue;
             }
             let frame = feed.grab().map_err(Failure::failed)?;
-            let received = Instant::now();
+            let received_s = began.elapsed().as_secs_f64();
             seen_s = frame.sim_time_s;
-            let update = tracker
-                .see(&Picture {
+            let sight = Sight {
+                number: summary.frames + 1,
+                received_s,
+                picture: Picture {
                     time_s: frame.sim_time_s,
                     grey: &gray_from_rgb(&frame.rgb),
                     depth: Some(&frame.depth),
                     far_plane_m,
                     base_from_tip: frame.base_from_tip,
-                })
-                .map_err(Failure::failed)?;
-            line.see(&update);
-            let truth = frame.base_from_target_true;
-            let error = update
-                .estimate
-                .as_ref()
-                .zip(truth)
-                .map(|(estimate, truth)| error_of(&estimate.base_from_target, &truth, &job.setup.target));
-            let took_s = began.elapsed().as_secs_f64();
-            let tracked = Tracked {
-                frame: summary.frames + 1,
-                update,
-                latency_s: received.elapsed().as_secs_f64(),
-                rate_hz: (summary.frames + 1) as f64 / took_s,
-                error,
-                truth,
+                },
+                base_from_target_true: frame.base_from_target_true,
             };
+            let tracked = tracking.see(&sight, &|| began.elapsed().as_secs_f64()).map_err(Failure::failed)?;
+            let took_s = began.elapsed().as_secs_f64();
             newest.clone_from(&tracked.update.estimate);
             summary.add(&tracked, line.take_status().as_ref(), took_s);
             publish(&tracked)?;
             if job.recorder.is_on() {
-                let info = feed.info().clone();
-                record::picture(job.recorder, &info, summary.frames, frame);
+                record::picture(job.recorder, feed.info(), summary.frames, frame);
                 job.recorder.note(Entry::Tracked(Arc::new(tracked.clone())));
             }
             if took_s > next_line_s {

@@ -8,7 +8,6 @@
 mod capture;
 mod refusal;
 mod search;
-mod tracking;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,18 +17,17 @@ use handeye_core::camera::Intrinsics;
 use handeye_core::image::GrayImage;
 use handeye_core::image_file::gray_from_rgb;
 use handeye_core::target::TargetSpec;
-use handeye_core::track::Setup;
+use handeye_core::track::{Picture, Setup};
 use handeye_sim_link::client::CancelToken;
 
 pub use capture::{CaptureRequest, Measured, thumbnail};
 use capture::{Look, UnderWay};
 use search::Search;
-use tracking::Tracking;
-pub use tracking::error_of;
 
 use super::follow_line::FollowLine;
 use super::link::Outlet;
 use super::slot::{LatestSlot, Tap};
+use super::tracking::{Sight, Tracking};
 use crate::command::Event;
 use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
 use crate::text::Text;
@@ -193,9 +191,32 @@ impl Vision {
 
     fn track_in(&mut self, frame: &LiveFrame, grey: &GrayImage, dropped: u64) {
         let Some(tracking) = &mut self.tracking else { return };
-        match tracking.see(frame, grey, dropped, &|| self.outlet.now_s()) {
-            Ok((tracked, detection)) => {
-                self.sights.detections.put(detection);
+        let info = &frame.info;
+        let began_s = self.outlet.now_s();
+        let sight = Sight {
+            number: info.number,
+            received_s: info.received_s,
+            picture: Picture {
+                time_s: info.sim_time_s,
+                grey,
+                depth: Some(&frame.images.depth),
+                far_plane_m: info.far_plane_m,
+                base_from_tip: info.base_from_tip,
+            },
+            base_from_target_true: info.base_from_target_true,
+        };
+        match tracking.see(&sight, &|| self.outlet.now_s()) {
+            Ok(tracked) => {
+                let seen = tracked.update.seen.as_ref();
+                self.sights.detections.put(LiveDetection {
+                    frame: info.number,
+                    corners: seen.map(|seen| seen.corners.clone()),
+                    camera_from_target: seen.map(|seen| seen.camera_from_target),
+                    base_from_tip: info.base_from_tip,
+                    took_s: self.outlet.now_s() - began_s,
+                    problem: None,
+                    dropped,
+                });
                 self.sights.tracked.put(tracked);
                 (self.outlet.waker)();
             }
