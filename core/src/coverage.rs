@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     fn corners(px: &[[f64; 2]]) -> Vec<Corner> {
-        px.iter().enumerate().map(|(index, p)| Corner { index, px: Vector2::from(*p) }).collect()
+        px.iter().enumerate().map(|(index, p)| Corner::new(index, Vector2::from(*p))).collect()
     }
 
     #[test]

@@ -3,7 +3,9 @@
 //! Conventions (frames, units, pixel origin, order of tangent vectors) are in `docs/conventions.md`.
 //! Everything here is deterministic: no clock, no thread, no hidden seed.
 
+pub mod arm;
 pub mod atomic_file;
+pub mod board_shape;
 #[cfg(feature = "opencv")]
 pub mod calibrate;
 pub mod camera;
@@ -11,15 +13,21 @@ pub mod capture;
 pub mod coverage;
 pub mod dataset;
 pub mod depth;
+#[cfg(feature = "opencv")]
+pub mod doctor;
 pub mod export;
 #[cfg(feature = "opencv")]
 pub mod findings;
+pub mod findings_record;
 pub mod frames;
 pub mod handeye;
 pub mod image_file;
+pub mod intrinsics;
 mod json_text;
 pub mod observation;
 pub mod poses_file;
+#[cfg(feature = "opencv")]
+pub mod print;
 pub mod progress;
 pub mod result;
 pub mod se3;

@@ -26,7 +26,7 @@ impl CancelToken {
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Stage {
-    /// The camera from the corners alone. One step that cannot be interrupted, on a bounded number of views.
+    /// The camera from the corners alone, as one step.
     Intrinsics,
     /// The target's pose in every view; counts views.
     TargetPoses,

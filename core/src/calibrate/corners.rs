@@ -3,44 +3,92 @@
 use nalgebra::Point3;
 
 use super::lens::Lens;
+use super::refine::{self, Refined};
 use super::{
-    CalibrateError, Calibration, CornerResidual, Method, Observations, ViewResult, ViewStatus, best_start,
+    CalibrateError, Calibration, CornerResidual, Method, Observations, Options, ShapeEstimate, ViewResult, ViewStatus,
     check_motion, chosen, closed_forms,
 };
+use crate::board_shape::BoardPoints;
 use crate::camera::Intrinsics;
 use crate::frames::{Camera, Pose, Target};
 use crate::handeye::closed_form::ClosedFormSolution;
-use crate::handeye::joint::{self, JointProblem, JointStart, camera_from_target, prediction};
-use crate::handeye::{HandEye, Mode, PosePair, quality, subset};
+use crate::handeye::joint::{self, JointProblem, camera_from_target};
+use crate::handeye::{HandEye, Mode, PosePair, quality};
 use crate::observation::{Corner, View};
 use crate::progress::Work;
 
 /// Least number of views with the target in sight.
 pub(crate) const NEED: usize = 3;
 
-pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -> Result<Calibration, CalibrateError> {
+pub fn calibrate(
+    observations: &Observations,
+    method: Method,
+    options: Options,
+    work: &Work<'_>,
+) -> Result<Calibration, CalibrateError> {
     let seen: Vec<Seen<'_>> = observations.views.iter().enumerate().filter_map(Seen::new).collect();
     if seen.len() < NEED {
         return Err(too_few(observations, seen.len()));
     }
-    let refined = observations.mode.is_some() && method == Method::Joint;
-    let lens = Lens::find(observations, &seen, refined, work)?;
+    let (seen, wrong, lens) = believable(observations, seen, options, work)?;
     let mut calibration = without_hand_eye(observations, &seen, &lens);
+    for index in wrong {
+        calibration.views[index].status = ViewStatus::Outlier;
+    }
     let Some(mode) = observations.mode else { return Ok(calibration) };
 
-    let (views, pairs) = with_robot(mode, &seen, &lens)?;
+    let (mut views, pairs) = with_robot(mode, &seen, &lens)?;
     check_motion(&pairs)?;
     calibration.methods = closed_forms(&pairs, work)?;
-    let points = observations.target.points();
-    let problem = JointProblem { mode, points: &points, views: &views, free_intrinsics: lens.free, noise: None };
+    let board = BoardPoints::new(&observations.target.points());
+    let problem = JointProblem::new(mode, &board, &views);
     match method {
         Method::ClosedForm(name) => {
             let solution = chosen(&calibration.methods, name)?;
             take_closed_form(&mut calibration, &solution, &problem, &seen, &lens);
         }
-        Method::Joint => take_joint(&mut calibration, &problem, &seen, &lens, work)?,
+        Method::Joint => {
+            let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods)?;
+            let mut own = lens.camera_from_target.clone();
+            refine::renumber(&mut views, &mut own, &begin.turned, &observations.target);
+            let mut refined =
+                refine::refine(&JointProblem::new(mode, &board, &views), &own, &lens, &begin, options, work)?;
+            let kept = refined.screened.kept_views();
+            let problem = JointProblem { weights: refined.weights, ..JointProblem::new(mode, &board, &kept) };
+            let problem = refine::kept_problem(&problem, &kept, &refined.screened.solution);
+            refine::judge(&mut calibration, &problem, &mut refined.screened.solution, work)?;
+            take_joint(&mut calibration, &problem, &refined, &seen);
+        }
     }
     Ok(calibration)
+}
+
+/// How many times the typical residual of a view's own pose a view may have before its corners are taken as wrong: a target
+/// numbered wrongly or found in something else misses by whole squares.
+const WRONG_CORNERS: f64 = 8.0;
+/// Residuals below this, in pixels, are no sign of wrong corners however good the others are.
+const FINE_PX: f64 = 1.0;
+
+/// The views whose corners make sense as an image of the target, those whose do not, and the camera by the former.
+fn believable<'a>(
+    observations: &Observations,
+    seen: Vec<Seen<'a>>,
+    options: Options,
+    work: &Work<'_>,
+) -> Result<(Vec<Seen<'a>>, Vec<usize>, Lens), CalibrateError> {
+    let lens = Lens::find(observations, &seen, work)?;
+    let mut sorted = lens.rms_px.clone();
+    sorted.sort_by(f64::total_cmp);
+    let limit = (WRONG_CORNERS * sorted[sorted.len() / 2]).max(FINE_PX);
+    let good = lens.rms_px.iter().filter(|rms| **rms <= limit).count();
+    if options.keep_outliers || good == seen.len() || good < NEED {
+        return Ok((seen, Vec::new(), lens));
+    }
+    let (kept, wrong): (Vec<_>, Vec<_>) = seen.into_iter().zip(&lens.rms_px).partition(|(_, rms)| **rms <= limit);
+    let kept: Vec<Seen<'a>> = kept.into_iter().map(|(s, _)| s).collect();
+    let wrong = wrong.into_iter().map(|(s, _)| s.index).collect();
+    let lens = Lens::find(observations, &kept, work)?;
+    Ok((kept, wrong, lens))
 }
 
 /// Whether it is the target that is missing, or views that were left out.
@@ -102,6 +150,10 @@ fn without_hand_eye(observations: &Observations, seen: &[Seen<'_>], lens: &Lens)
         heldout_rms_px: None,
         expected_heldout_rms_px: None,
         robot_effect_px: None,
+        small_sample: None,
+        widening: None,
+        shape: None,
+        joint_offsets: None,
         tip_error_95_m: None,
         reference_point: None,
         error_curve: None,
@@ -118,7 +170,10 @@ fn with_robot(mode: Mode, seen: &[Seen<'_>], lens: &Lens) -> Result<(Vec<View>, 
         let Some(base_from_tip) = s.view.base_from_tip else {
             return Err(CalibrateError::NoRobotPose { name: s.view.name.clone() });
         };
-        views.push(View { name: s.view.name.clone(), base_from_tip, corners: s.corners.to_vec() });
+        views.push(View {
+            tip_by_joint: s.view.tip_by_joint.clone(),
+            ..View::new(s.view.name.clone(), base_from_tip, s.corners.to_vec())
+        });
         pairs.push(PosePair {
             anchor_from_mount: mode.anchor_from_mount(&base_from_tip),
             camera_from_target: *camera_from_target,
@@ -127,56 +182,60 @@ fn with_robot(mode: Mode, seen: &[Seen<'_>], lens: &Lens) -> Result<(Vec<View>, 
     Ok((views, pairs))
 }
 
-fn take_joint(
-    calibration: &mut Calibration,
-    problem: &JointProblem<'_>,
-    seen: &[Seen<'_>],
-    lens: &Lens,
-    work: &Work<'_>,
-) -> Result<(), CalibrateError> {
-    let start = best_start(&calibration.methods, |s| capped_misfit(problem, lens, s))?;
-    let start = JointStart {
-        mount_from_camera: start.mount_from_camera,
-        anchor_from_target: start.anchor_from_target,
-        intrinsics: lens.intrinsics,
-    };
-    let solution = joint::estimate(problem, &start, *work)?;
-    let from_solution = JointStart {
-        mount_from_camera: solution.hand_eye.mount_from_camera(),
-        anchor_from_target: solution.hand_eye.anchor_from_target(),
-        intrinsics: solution.intrinsics,
-    };
-    // Leaving out a fifth of so many views changes their noise levels by a few percent, and finding them again would
-    // take longer than everything else.
-    let known = (problem.views.len() > subset::MOST_VIEWS).then_some(solution.noise);
-    let folds = JointProblem { noise: known, ..*problem };
-    calibration.heldout_rms_px = quality::held_out_rms_px(&folds, &from_solution, *work)?;
-    let expected = prediction::expected_residuals(problem, &solution, *work)?;
-    calibration.expected_heldout_rms_px = Some(expected.prediction_px);
-    calibration.robot_effect_px = Some(expected.robot_px);
-    calibration.error_curve = Some(prediction::error_by_views(problem, &solution, *work)?);
-    calibration.shared_covariance = Some(solution.covariance.clone());
+fn take_joint(calibration: &mut Calibration, problem: &JointProblem<'_>, refined: &Refined, seen: &[Seen<'_>]) {
+    let screened = &refined.screened;
+    let solution = &screened.solution;
+    calibration.shared_covariance = Some(solution.links_and_lens_covariance());
     calibration.hand_eye_covariance = Some(solution.hand_eye_covariance());
     calibration.target_covariance = Some(solution.target_covariance());
+    calibration.small_sample = Some(solution.small_sample);
     if let Some(sigma) = solution.intrinsics_sigma().first_chunk::<4>() {
         calibration.intrinsics_sigma = Some(*sigma);
     }
-    calibration.tip_error_95_m = Some(quality::tip_error_95_m(&solution));
+    let estimated = solution.free.warp || solution.free.scale;
+    calibration.shape = estimated.then(|| ShapeEstimate {
+        shape: solution.shape,
+        warp_sigma_m: solution.warp_covariance().map(|c| [c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
+        scale_sigma: solution.scale_sigma(),
+    });
+    calibration.joint_offsets.clone_from(&refined.joints);
+    calibration.tip_error_95_m = Some(quality::tip_error_95_m(solution));
     calibration.reference_point = Some(solution.reference_point);
     calibration.noise = Some(solution.noise);
     calibration.rms_px = Some(solution.rms_px);
     calibration.intrinsics = Some(solution.intrinsics);
     calibration.hand_eye = Some(solution.hand_eye);
-    for (s, fit) in seen.iter().zip(&solution.views) {
+    let points = problem.board.points(&solution.shape);
+    for (i, s) in seen.iter().enumerate() {
         let view = &mut calibration.views[s.index];
-        view.rms_px = Some(fit.rms_px);
-        view.influence_m = fit.influence_m;
-        view.correction_m = Some(fit.correction.fixed_rows::<3>(0).norm());
-        view.correction_rad = Some(fit.correction.fixed_rows::<3>(3).norm());
-        view.residuals = residuals(&solution.intrinsics, &fit.camera_from_target, problem.points, s.corners);
-        view.camera_from_target = Some(fit.camera_from_target);
+        view.distance = screened.distances.get(i).copied();
+        view.renumbered = refined.turned.contains(&i);
+        view.corners_aside = screened.corners.iter().filter(|(v, _)| *v == i).map(|(_, index)| *index).collect();
+        let corners = &screened.views[i].corners;
+        let fit = screened.kept.binary_search(&i).ok().map(|place| &solution.views[place]);
+        let pose = match fit {
+            Some(fit) => fit.camera_from_target,
+            // Where the others expect it: that is what it does not fit.
+            None => camera_from_target(
+                problem.mode,
+                &joint::base_from_tip_by_joints(&screened.views[i], &solution.joint_offsets_rad),
+                &solution.hand_eye.mount_from_camera(),
+                &solution.hand_eye.anchor_from_target(),
+            ),
+        };
+        view.residuals = residuals(&solution.intrinsics, &pose, &points, corners);
+        view.camera_from_target = Some(pose);
+        if let Some(fit) = fit {
+            view.rms_px = Some(fit.rms_px);
+            view.influence_m = fit.influence_m;
+            view.correction_m = Some(fit.correction.fixed_rows::<3>(0).norm());
+            view.correction_rad = Some(fit.correction.fixed_rows::<3>(3).norm());
+        } else {
+            view.status = ViewStatus::Outlier;
+            let squares: f64 = view.residuals.iter().map(|r| r.residual_px.norm_squared()).sum();
+            view.rms_px = (!view.residuals.is_empty()).then(|| (squares / view.residuals.len() as f64).sqrt());
+        }
     }
-    Ok(())
 }
 
 /// A closed form has no correction of robot poses: its residuals are those of the bare chain.
@@ -199,7 +258,7 @@ fn take_closed_form(
             &solution.anchor_from_target,
         );
         result.rms_px = view_rms.is_finite().then_some(view_rms);
-        result.residuals = residuals(&lens.intrinsics, &pose, problem.points, s.corners);
+        result.residuals = residuals(&lens.intrinsics, &pose, problem.board.drawn(), s.corners);
         result.camera_from_target = Some(pose);
         rms.push((view_rms, view.corners.len()));
     }
@@ -222,19 +281,8 @@ fn residuals(
     corners.iter().map(residual).collect::<Option<_>>().unwrap_or_default()
 }
 
-/// Residual [px] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.
-const CAP_PX: f64 = 50.0;
-
-/// Over the views that the closed forms saw.
-fn capped_misfit(problem: &JointProblem<'_>, lens: &Lens, solution: &ClosedFormSolution) -> f64 {
-    subset::spread(problem.views.len(), subset::MOST_VIEWS)
-        .into_iter()
-        .map(|i| squared_residuals(problem, &lens.intrinsics, solution, &problem.views[i], CAP_PX))
-        .sum()
-}
-
 /// Sum of squared residuals of one view by the bare chain; a point without an image counts as the cap.
-fn squared_residuals(
+pub(super) fn squared_residuals(
     problem: &JointProblem<'_>,
     intrinsics: &Intrinsics,
     solution: &ClosedFormSolution,
@@ -251,7 +299,7 @@ fn squared_residuals(
         .iter()
         .map(|corner| {
             let residual = intrinsics
-                .project(&(chain.isometry() * problem.points[corner.index]))
+                .project(&(chain.isometry() * problem.board.drawn()[corner.index]))
                 .map_or(cap_px, |px| (px - corner.px).norm());
             residual.min(cap_px).powi(2)
         })

@@ -6,22 +6,24 @@
 mod corners;
 mod lens;
 mod pairs;
+mod refine;
 mod to_result;
 
-use nalgebra::{DMatrix, Matrix6, Point3, Vector2};
+use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
 
+use crate::board_shape::BoardShape;
 use crate::camera::{Distortion, Intrinsics};
 use crate::frames::{Base, Camera, Pose, Target, Tip};
 use crate::handeye::closed_form::{self, ClosedFormSolution};
-use crate::handeye::joint::Noise;
+use crate::handeye::joint::outliers::Distance;
 use crate::handeye::joint::prediction::ErrorCurve;
+use crate::handeye::joint::{Noise, SmallSample};
+use crate::handeye::widening::Widening;
 use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, subset};
 use crate::observation::Corner;
 use crate::progress::{Stage, Work};
 use crate::target::TargetSpec;
 use crate::vision::VisionError;
-
-pub use lens::{LENS_START_VIEWS, MOST_LENS_VIEWS};
 
 /// What was observed, from a dataset folder, a session or a live capture.
 #[derive(Debug, Clone)]
@@ -47,6 +49,8 @@ pub struct ObservedView {
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// The corners; `None` when the target was not found.
     pub corners: Option<Vec<Corner>>,
+    /// How the tip turns with each joint, as in [`crate::observation::View::tip_by_joint`]; empty where it is not known.
+    pub tip_by_joint: Vec<Vector6<f64>>,
     /// A target pose measured elsewhere, used when there are no corners.
     pub camera_from_target: Option<Pose<Camera, Target>>,
     /// Whether the view takes part; one that does not is listed as [`ViewStatus::Excluded`] and touches no number.
@@ -98,6 +102,43 @@ impl Method {
         }
         closed_form::by_name(name).map(|m| Self::ClosedForm(m.name()))
     }
+}
+
+/// What may be changed about a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Options {
+    /// Keep views and corners that do not fit the others; without it they are set aside and named.
+    pub keep_outliers: bool,
+    /// Estimate the true size of the target, which the robot's translations tell.
+    pub free_scale: bool,
+    /// Try constant offsets of the robot's joints, and take them when held-out views say so.
+    pub joint_offsets: bool,
+}
+
+/// Offsets of the robot's joints as the data see them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointOffsets {
+    /// To be added to the reported angles, radians.
+    pub offsets_rad: Vec<f64>,
+    /// Their standard deviations, radians.
+    pub sigma_rad: Vec<f64>,
+    /// Error on held-out views without them, pixels.
+    pub heldout_before_px: f64,
+    /// And with them.
+    pub heldout_after_px: f64,
+    /// Whether the answer uses them.
+    pub accepted: bool,
+}
+
+/// The shape of the target where it is not the one drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeEstimate {
+    /// The shape.
+    pub shape: BoardShape,
+    /// Standard deviations of the two warps, metres; `None` when the target is taken as flat.
+    pub warp_sigma_m: Option<[f64; 2]>,
+    /// Standard deviation of the scale; `None` when the stated size is taken as exact.
+    pub scale_sigma: Option<f64>,
 }
 
 /// Why there is no calibration.
@@ -181,6 +222,14 @@ pub struct Calibration {
     /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow
     /// stays in the answer.
     pub robot_effect_px: Option<f64>,
+    /// How the error of the hand-eye transform is distributed in units of its covariance; of the joint estimate only.
+    pub small_sample: Option<SmallSample>,
+    /// Whether the covariances are true to the data, and by how much they were widened; of the joint estimate only.
+    pub widening: Option<Widening>,
+    /// The shape of the target when it was estimated.
+    pub shape: Option<ShapeEstimate>,
+    /// What an attempt at joint offsets gave; `None` when there was none.
+    pub joint_offsets: Option<JointOffsets>,
     /// Expected error of a measured point where the camera saw the target, 95 %, metres.
     pub tip_error_95_m: Option<f64>,
     /// Where that error is stated: camera coordinates, metres.
@@ -223,6 +272,12 @@ pub struct ViewResult {
     pub residuals: Vec<CornerResidual>,
     /// The target's pose as fitted, by the same chain as the residuals.
     pub camera_from_target: Option<Pose<Camera, Target>>,
+    /// How far the view is from what the others expect of it; of the joint estimate only.
+    pub distance: Option<Distance>,
+    /// Corners of it that were set aside, by their index.
+    pub corners_aside: Vec<usize>,
+    /// Whether its target was numbered from the other end than detected, to agree with the others.
+    pub renumbered: bool,
 }
 
 impl ViewResult {
@@ -237,6 +292,9 @@ impl ViewResult {
             correction_rad: None,
             residuals: Vec::new(),
             camera_from_target: None,
+            distance: None,
+            corners_aside: Vec::new(),
+            renumbered: false,
         }
     }
 }
@@ -259,6 +317,8 @@ pub enum ViewStatus {
     Used,
     /// The caller left it out.
     Excluded,
+    /// It does not fit the others and was set aside; it takes part again with [`Options::keep_outliers`].
+    Outlier,
     /// The target was not found in it.
     NoTarget,
 }
@@ -273,9 +333,7 @@ pub enum ViewStatus {
 /// # Many views
 /// Work that grows faster than the number of views is done on a choice of them, the same every time. Of more than
 /// [`subset::MOST_VIEWS`] views so many go into the closed forms, and the fits that leave views out keep the noise levels
-/// of the whole. Of more than [`MOST_LENS_VIEWS`] views [`LENS_START_VIEWS`] start the intrinsics, which the joint estimate
-/// refines with all of them; without a robot, or with a closed form, the intrinsics and their standard deviations stay
-/// those of [`MOST_LENS_VIEWS`] views.
+/// of the whole. The intrinsics and the joint estimate take all views.
 ///
 /// # Errors
 /// [`CalibrateError`] says what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
@@ -284,13 +342,26 @@ pub fn calibrate<'a>(
     method: Method,
     work: impl Into<Work<'a>>,
 ) -> Result<Calibration, CalibrateError> {
+    calibrate_with(observations, method, Options::default(), work)
+}
+
+/// As [`calibrate`], with options.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_with<'a>(
+    observations: &Observations,
+    method: Method,
+    options: Options,
+    work: impl Into<Work<'a>>,
+) -> Result<Calibration, CalibrateError> {
     let work = work.into();
     let used = || observations.views.iter().filter(|v| v.in_fit);
     let only_poses = used().all(|v| v.corners.is_none()) && used().any(|v| v.camera_from_target.is_some());
     if only_poses {
         pairs::calibrate(observations, method, &work)
     } else {
-        corners::calibrate(observations, method, &work)
+        corners::calibrate(observations, method, options, &work)
     }
 }
 

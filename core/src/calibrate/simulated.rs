@@ -16,6 +16,7 @@ impl Trial {
             name: view.name.clone(),
             base_from_tip: Some(view.base_from_tip),
             corners: Some(view.corners.clone()),
+            tip_by_joint: Vec::new(),
             camera_from_target: None,
             in_fit: true,
         };

@@ -8,6 +8,12 @@ fn solve(observations: &Observations, method: Method) -> Calibration {
     calibrate(observations, method, &CancelToken::default()).expect("solves")
 }
 
+/// Every view counts, however wrong.
+fn solve_all(observations: &Observations) -> Calibration {
+    let keep = Options { keep_outliers: true, ..Options::default() };
+    calibrate_with(observations, Method::Joint, keep, &CancelToken::default()).expect("solves")
+}
+
 fn set(views: usize, seed: u64) -> Trial {
     trial(Mode::EyeInHand, views, &REALISTIC, camera(), seed)
 }
@@ -91,7 +97,7 @@ fn the_correction_of_a_view_is_the_error_that_its_robot_pose_was_given() {
         let (along, about) = (sight * metres, sight * radians);
         let wrong = nalgebra::Vector6::new(along.x, along.y, along.z, about.x, about.y, about.z);
         t.views[7].base_from_tip = t.views[7].base_from_tip.perturbed(&wrong);
-        let view = solve(&t.observations(false), Method::Joint).views[7].clone();
+        let view = solve_all(&t.observations(false)).views[7].clone();
         (view.correction_m.expect("joint"), view.correction_rad.expect("joint").to_degrees())
     };
     let (metres, _) = solved_with(0.01, 0.0);
@@ -139,7 +145,8 @@ fn stages_come_in_order_and_each_begins_with_nothing_done() {
 #[test]
 fn every_stage_ends_when_it_is_cancelled() {
     let observations = set(8, 57).observations(true);
-    let stages = [Stage::TargetPoses, Stage::ClosedForms, Stage::Joint, Stage::HeldOut, Stage::Prediction];
+    let stages =
+        [Stage::Intrinsics, Stage::TargetPoses, Stage::ClosedForms, Stage::Joint, Stage::HeldOut, Stage::Prediction];
     for stage in stages {
         let cancel = CancelToken::default();
         let later = RefCell::new(false);
@@ -162,10 +169,71 @@ fn of_many_views_the_closed_forms_see_a_choice_and_the_joint_estimate_all() {
     let mut t = set(160, 58);
     let chosen = subset::spread(160, subset::MOST_VIEWS);
     let other = (0..160).find(|i| !chosen.contains(i)).expect("ten are not chosen");
-    let before = solve(&t.observations(false), Method::Joint);
+    let before = solve_all(&t.observations(false));
     t.views[other].base_from_tip = t.views[other].base_from_tip.perturbed(&nalgebra::Vector6::repeat(0.01));
-    let after = solve(&t.observations(false), Method::Joint);
+    let after = solve_all(&t.observations(false));
     assert_eq!(before.methods, after.methods);
     assert_ne!(before.hand_eye, after.hand_eye);
     assert!(after.views[other].correction_m > before.views[other].correction_m.map(|m| m + 0.005));
+}
+
+#[test]
+fn a_wrong_view_is_an_outlier_and_changes_nothing_and_can_be_kept() {
+    let healthy = set(12, 60);
+    let mut t = set(12, 60);
+    t.views[5].base_from_tip = t.views[5].base_from_tip.perturbed(&nalgebra::Vector6::repeat(0.02));
+    let c = solve(&t.observations(true), Method::Joint);
+    assert_eq!(c.views[5].status, ViewStatus::Outlier);
+    let distance = c.views[5].distance.expect("judged");
+    assert!(distance.of_limit > 1.0 && distance.metres > 0.01, "{distance:?}");
+    assert!(c.views[5].influence_m.is_none() && c.views[5].rms_px > Some(5.0));
+    let mut without = healthy.observations(true);
+    without.views[5].in_fit = false;
+    assert!(off_in_sigmas(&c, &solve(&without, Method::Joint)) < 0.05);
+    let kept = solve_all(&t.observations(true));
+    assert_eq!(kept.views[5].status, ViewStatus::Used);
+    assert!(kept.tip_error_95_m > c.tip_error_95_m.map(|e| 3.0 * e), "its noise is counted");
+}
+
+#[test]
+fn a_bent_target_is_found_and_the_answer_allows_for_it() {
+    // 3 mm over 135 mm, the noise of a good robot. The flat model is off by many times what it states.
+    let mut t = set(20, 61);
+    let bent = crate::board_shape::BoardShape { warp_m: [0.003, 0.001], scale: 1.0 };
+    for (view, pose) in t.views.iter_mut().zip(&t.true_camera_from_target) {
+        for corner in &mut view.corners {
+            let flat = t.intrinsics.project(&(pose.isometry() * t.points[corner.index])).expect("in front");
+            let point = t.board.point(corner.index, &bent);
+            corner.px += t.intrinsics.project(&(pose.isometry() * point)).expect("in front") - flat;
+        }
+    }
+    let c = solve(&t.observations(true), Method::Joint);
+    let found = c.shape.expect("bent");
+    let sigma = found.warp_sigma_m.expect("estimated");
+    for ((found_m, bent_m), sigma) in found.shape.warp_m.iter().zip(bent.warp_m).zip(sigma) {
+        assert!((found_m - bent_m).abs() < 4.0 * sigma && sigma < 1e-4, "{found:?}");
+    }
+    let error = c.hand_eye.expect("a robot").mount_from_camera().distance_to(&t.mount_from_camera).0;
+    assert!(error < 1e-3, "{error} m");
+    let flat = solve(&set(20, 61).observations(true), Method::Joint);
+    assert!(flat.shape.is_none(), "a flat target is taken as flat");
+}
+
+#[test]
+fn the_size_of_the_target_is_found_when_it_is_asked_for() {
+    let mut t = set(20, 62);
+    let large = crate::board_shape::BoardShape { scale: 1.02, ..crate::board_shape::BoardShape::default() };
+    for (view, pose) in t.views.iter_mut().zip(&t.true_camera_from_target) {
+        for corner in &mut view.corners {
+            let stated = t.intrinsics.project(&(pose.isometry() * t.points[corner.index])).expect("in front");
+            let point = t.board.point(corner.index, &large);
+            corner.px += t.intrinsics.project(&(pose.isometry() * point)).expect("in front") - stated;
+        }
+    }
+    let options = Options { free_scale: true, ..Options::default() };
+    let observations = t.observations(false);
+    let c = calibrate_with(&observations, Method::Joint, options, &CancelToken::default()).expect("solves");
+    let found = c.shape.expect("estimated");
+    let sigma = found.scale_sigma.expect("estimated");
+    assert!((found.shape.scale - 1.02).abs() < 4.0 * sigma && sigma < 2e-3, "{found:?}");
 }

@@ -3,7 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::{Calibration, ViewStatus};
-use crate::result::{self, CalibrationResult, IntrinsicsEstimate, Provenance, Quality};
+use crate::handeye::joint::SmallSample;
+use crate::result::{
+    self, BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, Provenance,
+    Quality, WideningRecord,
+};
 
 impl Calibration {
     /// The result document. `options` are what the answer depends on besides the input.
@@ -28,6 +32,7 @@ impl Calibration {
             },
             methods: self.methods.iter().map(method).collect(),
             views: self.views.iter().map(view).collect(),
+            estimate: self.small_sample.map(|sample| self.details(&sample)),
             provenance: Provenance {
                 tool_version: tool_version.to_owned(),
                 input_sha256,
@@ -39,6 +44,32 @@ impl Calibration {
             result.set_links(links, self.hand_eye_covariance.as_ref(), self.target_covariance.as_ref());
         }
         result
+    }
+
+    fn details(&self, sample: &SmallSample) -> EstimateDetails {
+        EstimateDetails {
+            reference_point_m: self.reference_point.map(|p| p.coords.into()),
+            degrees_of_freedom: Some(sample.degrees_of_freedom).filter(|v| v.is_finite()),
+            region_scale: Some(sample.scale),
+            view_sigma_px: self.noise.map(|n| n.view_px),
+            widening: self.widening.as_ref().map(|w| WideningRecord {
+                factor: w.factor.sqrt(),
+                by: w.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
+            }),
+            board: self.shape.map(|s| BoardEstimate {
+                warp_mm: s.shape.warp_m.map(|m| m * 1e3),
+                warp_sigma_mm: s.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
+                scale: s.shape.scale,
+                scale_sigma: s.scale_sigma,
+            }),
+            joint_offsets: self.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
+                offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
+                sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),
+                heldout_before_px: j.heldout_before_px,
+                heldout_after_px: j.heldout_after_px,
+                accepted: j.accepted,
+            }),
+        }
     }
 }
 
@@ -55,9 +86,13 @@ fn view(view: &super::ViewResult) -> result::ViewResult {
         status: match view.status {
             ViewStatus::Used => result::ViewStatus::Used,
             ViewStatus::Excluded => result::ViewStatus::Excluded,
+            ViewStatus::Outlier => result::ViewStatus::Outlier,
             ViewStatus::NoTarget => result::ViewStatus::NoTarget,
         },
         rms_px: view.rms_px,
         influence_mm: view.influence_m.map(|m| m * 1e3),
+        distance: view.distance.map(|d| d.of_limit).filter(|d| d.is_finite()),
+        corners_aside: view.corners_aside.clone(),
+        renumbered: view.renumbered,
     }
 }

@@ -246,14 +246,13 @@ fn a_pose_that_there_is_already_is_named_with_its_distance() {
 #[test]
 fn the_average_has_its_pictures_and_their_scatter_and_no_others() {
     let mut machine = Machine::new(plan(16), REQUESTED_S);
-    let corner =
-        |number: u64| Corner { index: 0, px: Vector2::new(if number.is_multiple_of(2) { 1.0 } else { -1.0 }, 5.0) };
+    let corner = |number: u64| Corner::new(0, Vector2::new(if number.is_multiple_of(2) { 1.0 } else { -1.0 }, 5.0));
     let mut sum = 0.0;
     for instant in pictures(3.0, |_| 0.0) {
         let progress = machine.see(&Pose::identity(), &instant.shot());
         machine.saw_board(instant.number, &[corner(instant.number)]);
         // A second look at a picture that is not in the average does not count.
-        machine.saw_board(instant.number + 1, &[corner(7), Corner { index: 0, px: Vector2::new(900.0, 0.0) }]);
+        machine.saw_board(instant.number + 1, &[corner(7), Corner::new(0, Vector2::new(900.0, 0.0))]);
         if instant.number >= 3 {
             sum += f64::from(instant.grey.get_pixel(5, 5).0[0]);
         }

@@ -11,7 +11,7 @@ use crate::vision::{self, VisionError};
 /// The board in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
-    /// All its points.
+    /// Its points in sight.
     pub corners: Vec<Corner>,
     /// How blurred it is; `None` for a board without straight edges, or too small to tell.
     pub blur: Option<EdgeBlur>,
@@ -36,7 +36,8 @@ pub fn observe_gray(grey: &GrayImage, target: &TargetSpec) -> Result<Option<Sigh
     Ok(found.map(|corners| {
         let blur = match target {
             TargetSpec::Chessboard(grid) => EdgeBlur::measure(grey, &corners, grid),
-            TargetSpec::Circles(_) => None,
+            // No lattice of bare squares whose edges could be followed from corner to corner.
+            _ => None,
         };
         Sighting { corners, blur }
     }))

@@ -44,7 +44,7 @@ fn the_scatter_is_that_of_one_picture_whatever_the_places_of_the_corners() {
                 .filter(|i| i % 3 > 0 || picture % 2 == 0)
                 .map(|index| {
                     let at = Vector2::new(index as f64 * 9.0, 100.0 - index as f64);
-                    Corner { index, px: at + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)) }
+                    Corner::new(index, at + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)))
                 })
                 .collect();
             if picture < 2 {
@@ -102,6 +102,6 @@ fn a_board_too_small_or_without_contrast_has_no_blur() {
     let board = Board::new();
     let flat = picture(board.size, &vec![100.0; 320 * 240], 3.0, 1);
     assert_eq!(EdgeBlur::measure(&flat, &board.corners(), &GRID), None);
-    let stray = [Corner { index: 999, px: Vector2::new(f64::NAN, 0.0) }];
+    let stray = [Corner::new(999, Vector2::new(f64::NAN, 0.0))];
     assert_eq!(EdgeBlur::measure(&flat, &stray, &GRID), None);
 }

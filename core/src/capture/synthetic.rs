@@ -43,7 +43,7 @@ impl Board {
         (0..GRID.len())
             .map(|index| {
                 let on_board = Vector2::new((index % GRID.columns) as f64, (index / GRID.columns) as f64);
-                Corner { index, px: self.origin + turn * on_board * self.square_px }
+                Corner::new(index, self.origin + turn * on_board * self.square_px)
             })
             .collect()
     }

@@ -12,11 +12,14 @@
 //! `anchor_from_mount_i * mount_from_camera * camera_from_target_i = anchor_from_target` for every view `i`.
 
 pub mod closed_form;
+pub mod consensus;
+mod draw;
 pub mod joint;
 pub mod motion;
 pub mod pose_graph;
 pub mod quality;
 pub mod subset;
+pub mod widening;
 
 use serde::{Deserialize, Serialize};
 

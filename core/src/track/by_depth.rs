@@ -46,7 +46,7 @@ pub(super) fn by_depth(
     let mut points: Vec<Point> = Vec::with_capacity(seen.corners.len());
     for corner in &seen.corners {
         if let Some(in_camera) = point_at(depth, corner, picture.far_plane_m, calibrated) {
-            points.push(Point { index: corner.index, on_board: target.grid().point(corner.index), in_camera });
+            points.push(Point { index: corner.index, on_board: target.point(corner.index), in_camera });
         }
     }
     // One wrong offset of all depths must not empty the set, hence the deviation from the median.

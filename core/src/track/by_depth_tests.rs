@@ -17,9 +17,8 @@ fn measured(change: impl Fn(u32, u32, &mut f32)) -> Option<ByDepth> {
         change(i as u32 % depth.width, i as u32 / depth.width, metres);
     }
     let corners: Vec<Corner> = (0..GRID.len())
-        .map(|index| Corner {
-            index,
-            px: watch.stage.camera.project(&(in_camera * GRID.point(index))).expect("in front"),
+        .map(|index| {
+            Corner::new(index, watch.stage.camera.project(&(in_camera * GRID.point(index))).expect("in front"))
         })
         .collect();
     let seen = Seen {

@@ -54,11 +54,11 @@ impl Keep {
                 }
             }
             Self::Corner { index, stand_off_m, base_from_tip_orientation } => {
-                if index >= target.grid().len() {
+                if index >= target.len() {
                     return None;
                 }
                 // z points into the board.
-                let on_target = target.grid().point(index) - Vector3::z() * stand_off_m;
+                let on_target = target.point(index) - Vector3::z() * stand_off_m;
                 let at = (estimate.base_from_target.isometry() * on_target).coords;
                 TipGoal {
                     base_from_tip: Isometry3::from_parts(Translation3::from(at), base_from_tip_orientation).into(),

@@ -66,7 +66,7 @@ pub(super) struct Eye<'a> {
 }
 
 impl Eye<'_> {
-    fn grid(&self) -> &Grid {
+    fn grid(&self) -> Grid {
         self.target.grid()
     }
 
@@ -114,6 +114,10 @@ impl Eye<'_> {
     /// Looks around the places expected; `None` when too few corners are there, or when the pattern goes on beyond the
     /// board, so that it is seen shifted by whole squares.
     pub fn near(&self, expected: &Expected) -> Option<Board> {
+        // Others have no corners of bare squares.
+        if !matches!(self.target, TargetSpec::Chessboard(_)) {
+            return None;
+        }
         let rough = self.rough(expected)?;
         let mut found: Vec<(usize, corner::Found)> = self
             .places(&rough, expected.first_dark)
@@ -123,7 +127,7 @@ impl Eye<'_> {
         let usual = median(found.iter().map(|(_, corner)| corner.contrast))?;
         found.retain(|(_, corner)| corner.contrast >= MIN_CONTRAST_PART * usual);
         let blur_px = median(found.iter().map(|(_, corner)| corner.blur_px));
-        let corners: Vec<Corner> = found.into_iter().map(|(index, corner)| Corner { index, px: corner.px }).collect();
+        let corners: Vec<Corner> = found.into_iter().map(|(index, corner)| Corner::new(index, corner.px)).collect();
         let board = self.fitted(&corners, &rough, blur_px)?;
         if board.corners.len() < self.grid().len() && self.goes_on(&board.fit.pose, expected) {
             return None;
@@ -140,7 +144,7 @@ impl Eye<'_> {
             .iter()
             .filter_map(|(i, place)| {
                 let reach = radius.min((MAX_RADIUS * place.spacing()).max(MIN_RADIUS_PX));
-                Some((self.grid().point(*i), corner::roughly(self.image, place, reach)?))
+                Some((self.target.point(*i), corner::roughly(self.image, place, reach)?))
             })
             .collect();
         self.check(seen.iter().map(|(point, _)| *point))?;
@@ -169,7 +173,7 @@ impl Eye<'_> {
     }
 
     fn seen(&self, corners: &[Corner]) -> Vec<Seen> {
-        corners.iter().map(|corner| (self.grid().point(corner.index), corner.px)).collect()
+        corners.iter().map(|corner| (self.target.point(corner.index), corner.px)).collect()
     }
 
     /// The mirrored pose, when the corners speak clearly for it.
@@ -197,7 +201,7 @@ impl Eye<'_> {
     pub fn may_show_all(&self) -> bool {
         match self.target {
             TargetSpec::Chessboard(grid) => glance::may_show(self.image, grid.len()),
-            TargetSpec::Circles(_) => true,
+            _ => true,
         }
     }
 
@@ -233,7 +237,7 @@ impl Eye<'_> {
     fn number_like(&self, expected: &Isometry3<f64>, corners: &mut [Corner]) {
         let count = self.grid().len();
         let distance = |index: usize, px: Vector2<f64>| {
-            self.camera.project(&(expected * self.grid().point(index))).map_or(0.0, |at| (at - px).norm_squared())
+            self.camera.project(&(expected * self.target.point(index))).map_or(0.0, |at| (at - px).norm_squared())
         };
         let as_is: f64 = corners.iter().map(|corner| distance(corner.index, corner.px)).sum();
         let turned: f64 = corners.iter().map(|corner| distance(count - 1 - corner.index, corner.px)).sum();

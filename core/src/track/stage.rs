@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::{MotionModel, Picture, Setup, Tracker, Update};
+use crate::board_shape::BoardShape;
 use crate::camera::{Distortion, Intrinsics};
 use crate::depth::DepthImage;
 use crate::frames::{Base, Camera, Pose, Target, Tip};
@@ -152,6 +153,7 @@ pub fn tip_from_camera() -> Pose<Tip, Camera> {
 
 pub fn calibrated() -> Calibrated {
     Calibrated {
+        shape: BoardShape::default(),
         hand_eye: HandEye::EyeInHand { tip_from_camera: tip_from_camera(), base_from_target: Pose::identity() },
         intrinsics: lens(),
         hand_eye_covariance: None,

@@ -185,7 +185,7 @@ impl Tracker {
         {
             near = eye.near(expected);
             // A part of the board could be another part of it, when it is not known well where to expect it.
-            let whole = near.as_ref().is_some_and(|board| board.corners.len() == self.setup.target.grid().len());
+            let whole = near.as_ref().is_some_and(|board| board.corners.len() == self.setup.target.len());
             if near.is_some() && (whole || !eye.is_vague(expected)) {
                 return Ok(near);
             }
@@ -267,7 +267,7 @@ impl Tracker {
     }
 
     fn state(&self, believed: Option<&Seen>) -> State {
-        let of = self.setup.target.grid().len();
+        let of = self.setup.target.len();
         match (believed, self.believed_s) {
             (Some(seen), _) => State::Tracking { corners: seen.corners.len(), of },
             (None, None) => State::Searching,

@@ -3,7 +3,7 @@
 //! The pose error of a capture, `e_i = log(predicted⁻¹ * seen)`, is to first order
 //! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and the free
 //! intrinsics, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP. With
-//! `B_i = D_i Σ_robot D_iᵀ + corner_px² (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
+//! `B_i = D_i Σ_robot D_iᵀ + (corner_px² + view_px²) (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
 //! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
 //! `√(12 n)`. The inverse is by the matrix inversion lemma, so the cost is linear in the number of captures.
 //!
@@ -12,9 +12,9 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Point3, SMatrix, Vector6};
 
 use super::{Calibrated, CaptureCheck, Uncertainty};
-use crate::camera::MAX_PARAMETERS;
+use crate::board_shape::{BoardPoints, BoardShape};
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::equations::PoseEquations;
+use crate::handeye::joint::equations::{FreeForm, MAX_FORM, PoseEquations, Seen};
 use crate::observation::View;
 use crate::se3;
 
@@ -62,7 +62,7 @@ impl Sums {
     /// `None` when the covariance is not one.
     pub fn new(uncertainty: &Uncertainty) -> Option<Self> {
         let n = uncertainty.covariance.nrows();
-        if !(12..=12 + MAX_PARAMETERS).contains(&n) || uncertainty.covariance.ncols() != n {
+        if !(12..=12 + MAX_FORM).contains(&n) || uncertainty.covariance.ncols() != n {
             return None;
         }
         let (m, rad) = (uncertainty.noise.robot_m.powi(2), uncertainty.noise.robot_rad.powi(2));
@@ -70,7 +70,7 @@ impl Sums {
             root: Cholesky::new(uncertainty.covariance.clone())?.l(),
             covariance: uncertainty.covariance.clone(),
             robot_variance: Vector6::new(m, m, m, rad, rad, rad),
-            corner_variance: uncertainty.noise.corner_px.powi(2),
+            corner_variance: uncertainty.noise.corner_px.powi(2) + uncertainty.noise.view_px.powi(2),
             captures: 0,
             plain: 0.0,
             gradient: DVector::zeros(n),
@@ -95,13 +95,20 @@ impl Sums {
         );
         let n = self.covariance.nrows();
         let seen = check.seen_camera_from_target.isometry();
-        let equations = PoseEquations::new(&calibrated.intrinsics, seen, points, &view.corners, n > 12).ok()?;
+        let seen_through = Seen {
+            intrinsics: &calibrated.intrinsics,
+            board: &BoardPoints::new(points),
+            shape: &BoardShape::default(),
+            corners: &view.corners,
+            whiteners: &[],
+        };
+        let equations = PoseEquations::new(&seen_through, seen, FreeForm::only_lens(n > 12)).ok()?;
         let pose_covariance = Cholesky::new(equations.pose)?.inverse();
-        let lens = pose_covariance * equations.pose_by_lens;
-        let mut by_shared = SMatrix::<f64, 6, { 12 + MAX_PARAMETERS }>::zeros();
+        let lens = pose_covariance * equations.pose_by_form;
+        let mut by_shared = SMatrix::<f64, 6, { 12 + MAX_FORM }>::zeros();
         by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
-        by_shared.fixed_view_mut::<6, MAX_PARAMETERS>(0, 12).copy_from(&lens);
+        by_shared.fixed_view_mut::<6, MAX_FORM>(0, 12).copy_from(&lens);
         let by_shared = by_shared.columns(0, n).into_owned();
         let own = chain.by_correction * Matrix6::from_diagonal(&self.robot_variance) * chain.by_correction.transpose()
             + pose_covariance * self.corner_variance;

@@ -10,6 +10,7 @@ mod points;
 
 use nalgebra::{DMatrix, Isometry3, Matrix6, Point3, Vector3};
 
+use crate::board_shape::{BoardPoints, BoardShape};
 use crate::calibrate::{Calibration, CornerResidual};
 use crate::camera::{CameraError, Intrinsics};
 use crate::depth::{DepthImage, DepthSample};
@@ -32,6 +33,8 @@ pub struct Calibrated {
     pub hand_eye: HandEye,
     /// The camera.
     pub intrinsics: Intrinsics,
+    /// The shape of the target.
+    pub shape: BoardShape,
     /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
     pub hand_eye_covariance: Option<Matrix6<f64>>,
     /// What says how large errors may be; of a joint estimate.
@@ -179,7 +182,8 @@ impl Calibrated {
             .noise
             .zip(calibration.shared_covariance.clone())
             .map(|(noise, covariance)| Uncertainty { noise, covariance });
-        Ok(Self { hand_eye, intrinsics, hand_eye_covariance: calibration.hand_eye_covariance, uncertainty })
+        let shape = calibration.shape.map_or_else(BoardShape::default, |estimate| estimate.shape);
+        Ok(Self { hand_eye, intrinsics, shape, hand_eye_covariance: calibration.hand_eye_covariance, uncertainty })
     }
 
     /// Where the camera is when the robot reports this pose.
@@ -219,7 +223,7 @@ pub fn verify<'a>(
     if captures.is_empty() {
         return Err(VerifyError::NoCaptures);
     }
-    let points = target.points();
+    let points = BoardPoints::new(&target.points()).points(&calibrated.shape);
     let mut consistency = calibrated.uncertainty.as_ref().and_then(consistency::Sums::new);
     let mut checks = Vec::with_capacity(captures.len());
     for (done, capture) in captures.iter().enumerate() {

@@ -4,7 +4,9 @@ use nalgebra::{DVector, Point3, Vector6};
 
 use super::chain::Chain;
 use super::normal::System;
+use super::view_block::Layout;
 use super::{JointProblem, JointSolution, JointStart, Noise};
+use crate::board_shape::BoardShape;
 use crate::camera::Intrinsics;
 use crate::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::handeye::HandEyeError;
@@ -26,6 +28,9 @@ pub struct State {
     pub mount_from_camera: Pose<Mount, Camera>,
     pub anchor_from_target: Pose<Anchor, Target>,
     pub intrinsics: Intrinsics,
+    pub shape: BoardShape,
+    /// Empty when the joints are not free.
+    pub joints_rad: Vec<f64>,
     pub corrections: Vec<Vector6<f64>>,
 }
 
@@ -35,6 +40,8 @@ impl State {
             mount_from_camera: start.mount_from_camera,
             anchor_from_target: start.anchor_from_target,
             intrinsics: start.intrinsics,
+            shape: start.shape,
+            joints_rad: vec![0.0; problem.joint_count()],
             corrections: vec![Vector6::zeros(); problem.views.len()],
         }
     }
@@ -45,23 +52,51 @@ impl State {
             mount_from_camera: solution.hand_eye.mount_from_camera(),
             anchor_from_target: solution.hand_eye.anchor_from_target(),
             intrinsics: solution.intrinsics,
+            shape: solution.shape,
+            joints_rad: solution.joint_offsets_rad.clone(),
             corrections: solution.views.iter().map(|view| view.correction).collect(),
         }
     }
 
+    pub fn layout(&self, problem: &JointProblem<'_>) -> Layout {
+        Layout { form: problem.free.form().count(&self.intrinsics), joints: self.joints_rad.len() }
+    }
+
     /// The chain of one view.
     pub fn chain(&self, problem: &JointProblem<'_>, view: &View, correction: &Vector6<f64>) -> Chain {
-        Chain::new(problem.mode, &view.base_from_tip, correction, &self.mount_from_camera, &self.anchor_from_target)
+        Chain::with_joints(
+            problem.mode,
+            view,
+            &self.joints_rad,
+            correction,
+            &self.mount_from_camera,
+            &self.anchor_from_target,
+        )
     }
 
     fn stepped(&self, problem: &JointProblem<'_>, shared: &DVector<f64>, own: &[Vector6<f64>]) -> Self {
         let mut next = self.clone();
         next.mount_from_camera = self.mount_from_camera.perturbed(&shared.fixed_rows::<6>(0).into_owned());
         next.anchor_from_target = self.anchor_from_target.perturbed(&shared.fixed_rows::<6>(6).into_owned());
-        if problem.free_intrinsics {
+        let form = problem.free.form();
+        let at = |column: usize| shared[Layout::FORM_AT + column];
+        if form.lens {
             let parameters: Vec<f64> =
-                self.intrinsics.parameters().iter().zip(shared.iter().skip(12)).map(|(p, d)| p + d).collect();
+                self.intrinsics.parameters().iter().enumerate().map(|(i, p)| p + at(i)).collect();
             next.intrinsics = self.intrinsics.with_parameters(&parameters);
+        }
+        if form.warp {
+            let first = form.warp_at(&self.intrinsics);
+            for (k, warp) in next.shape.warp_m.iter_mut().enumerate() {
+                *warp += at(first + k);
+            }
+        }
+        if form.scale {
+            next.shape.scale += at(form.scale_at(&self.intrinsics));
+        }
+        let joints_at = self.layout(problem).joints_at();
+        for (j, offset) in next.joints_rad.iter_mut().enumerate() {
+            *offset += shared[joints_at + j];
         }
         for (correction, step) in next.corrections.iter_mut().zip(own) {
             *correction += step;
@@ -71,8 +106,9 @@ impl State {
 
     /// Mean over the views of the target's middle in camera coordinates.
     pub fn mean_target_centre(&self, problem: &JointProblem<'_>) -> Point3<f64> {
-        let points = problem.points.len().max(1) as f64;
-        let centre = Point3::from(problem.points.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / points);
+        let points = problem.board.points(&self.shape);
+        let centre =
+            Point3::from(points.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / points.len().max(1) as f64);
         let sum: nalgebra::Vector3<f64> = problem
             .views
             .iter()
@@ -86,13 +122,14 @@ impl State {
     }
 }
 
-/// Minimises the cost from `state`, which holds the best point found afterwards. Returns the number of steps.
+/// Minimises the cost from `state`, which holds the best point found afterwards. Returns the system at that point and the
+/// number of steps.
 pub fn minimise(
     problem: &JointProblem<'_>,
     state: &mut State,
     noise: &Noise,
     cancel: &CancelToken,
-) -> Result<usize, HandEyeError> {
+) -> Result<(System, usize), HandEyeError> {
     let mut system = System::new(problem, state, cancel)?;
     let mut cost = system.cost(noise);
     let mut damping = FIRST_DAMPING;
@@ -113,7 +150,7 @@ pub fn minimise(
                 }
             };
             if promised <= COST_TOLERANCE * cost.max(f64::MIN_POSITIVE) {
-                return Ok(step);
+                return Ok((system, step));
             }
             // A step that puts the target behind the camera is as bad as one that raises the cost.
             let next_system = match System::new(problem, &next, cancel) {
@@ -128,9 +165,9 @@ pub fn minimise(
             }
             damping *= 10.0;
             if damping > LARGEST_DAMPING {
-                return Ok(step);
+                return Ok((system, step));
             }
         }
     }
-    Ok(MAX_STEPS)
+    Ok((system, MAX_STEPS))
 }

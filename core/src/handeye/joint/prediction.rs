@@ -1,10 +1,11 @@
 //! What the data promise before more are taken: the expected error by number of views, and the residual that a view
 //! outside the fit should have.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{DMatrix, Matrix6, Vector6};
 
-use super::normal::{SharedMatrix, System, covariance_of, prior_weight};
+use super::normal::{System, covariance_of};
 use super::optimise::State;
+use super::view_block::prior_weight;
 use super::{JointProblem, JointSolution, NEED};
 use crate::handeye::{HandEyeError, quality};
 use crate::progress::{Stage, Work};
@@ -73,7 +74,9 @@ pub fn error_by_views<'a>(
     let system = System::new(problem, &state_of(problem, solution)?, work.cancel)?;
     let wanted = spaced(NEED, count);
     let mut wanted = wanted.iter().peekable();
-    let mut information = SharedMatrix::zeros();
+    let n = system.layout.count();
+    let mut information = DMatrix::zeros(n, n);
+    let known = system.prior_information();
     let mut gathered = Vec::new();
     for (index, block) in system.blocks.iter().enumerate() {
         if work.is_cancelled() {
@@ -81,11 +84,11 @@ pub fn error_by_views<'a>(
         }
         let views = index + 1;
         work.report(Stage::Prediction, index, count);
-        if let Some(of_view) = block.information(&solution.noise) {
+        if let Some((of_view, _)) = block.information(system.layout, &solution.noise, &Vector6::zeros()) {
             information += of_view;
         }
         if wanted.next_if_eq(&&views).is_some() {
-            let covariance = covariance_of(&information, system.shared_count);
+            let covariance = covariance_of(&(&information + &known));
             let error_m = covariance.map(|c| {
                 let hand_eye: Matrix6<f64> = c.fixed_view::<6, 6>(0, 0).into_owned();
                 quality::radius_95(&quality::point_covariance(&hand_eye, &solution.reference_point))
@@ -95,6 +98,12 @@ pub fn error_by_views<'a>(
             let tip_error_95_m = error_m.filter(|e| *e <= solution.reference_point.coords.norm());
             gathered.push(ErrorPoint { views, tip_error_95_m });
         }
+    }
+    // What estimated noise levels add to the whole they add to every part of it alike.
+    let plain = gathered.last().and_then(|p: &ErrorPoint| p.tip_error_95_m).filter(|e| *e > 0.0);
+    let added = plain.map_or(1.0, |e| quality::tip_error_95_m(solution) / e);
+    for point in &mut gathered {
+        point.tip_error_95_m = point.tip_error_95_m.map(|e| e * added);
     }
     let last = gathered.last().and_then(|p| p.tip_error_95_m);
     let further = spaced(count + 1, 2 * count)
@@ -150,14 +159,14 @@ pub fn expected_residuals<'a>(
     let state = State { corrections: vec![Vector6::zeros(); problem.views.len()], ..state_of(problem, solution)? };
     let system = System::new(problem, &state, work.cancel)?;
     let robot_variance = prior_weight(&solution.noise).map(f64::recip);
-    let n = system.shared_count;
     let (mut robot, mut shared, mut corners) = (0.0, 0.0, 0usize);
     for block in &system.blocks {
         robot += block.own.diagonal().dot(&robot_variance);
-        shared += block.shared.view((0, 0), (n, n)).component_mul(&solution.covariance).sum();
+        shared += block.shared_trace(system.layout, &solution.covariance);
         corners += block.corner_count();
     }
-    let corner_squares = 2.0 * corners as f64 * solution.noise.corner_px.powi(2);
+    let corner_squares = 2.0 * corners as f64 * solution.noise.corner_px.powi(2)
+        + 6.0 * system.blocks.len() as f64 * solution.noise.view_px.powi(2);
     let rms = |squares: f64| (squares / corners.max(1) as f64).sqrt();
     Ok(ExpectedResiduals { robot_px: rms(robot), prediction_px: rms(robot + shared + corner_squares) })
 }

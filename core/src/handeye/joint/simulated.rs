@@ -6,7 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::chain::correction_transform;
-use super::{JointProblem, JointSolution, JointStart, Noise};
+use super::{Free, JointProblem, JointSolution, JointStart, Noise};
+use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::Intrinsics;
 use crate::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use crate::handeye::Mode;
@@ -20,10 +21,12 @@ pub(crate) const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, 
 pub(crate) struct Trial {
     pub mode: Mode,
     pub points: Vec<Point3<f64>>,
+    pub board: BoardPoints,
     pub views: Vec<View>,
     pub intrinsics: Intrinsics,
     pub mount_from_camera: Pose<Mount, Camera>,
     pub anchor_from_target: Pose<Anchor, Target>,
+    pub true_camera_from_target: Vec<Pose<Camera, Target>>,
 }
 
 fn normal(rng: &mut impl Rng) -> f64 {
@@ -43,6 +46,7 @@ pub(crate) fn trial(mode: Mode, views: usize, noise: &Noise, intrinsics: Intrins
     let anchor_from_target: Pose<Anchor, Target> =
         Pose::from_isometry(se3::exp(&Vector6::new(0.5, 0.1, 0.2, 0.4, 0.2, -0.3)));
     let mut out = Vec::new();
+    let mut true_camera_from_target = Vec::new();
     while out.len() < views {
         let tilt = 35f64.to_radians() * rng.random::<f64>().sqrt();
         let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
@@ -68,19 +72,31 @@ pub(crate) fn trial(mode: Mode, views: usize, noise: &Noise, intrinsics: Intrins
                 let px = intrinsics.project(&(camera_from_target.isometry() * p)).ok()?;
                 let seen =
                     Vector2::new(px.x + normal(&mut rng) * noise.corner_px, px.y + normal(&mut rng) * noise.corner_px);
-                intrinsics.contains(&seen).then_some(Corner { index, px: seen })
+                intrinsics.contains(&seen).then_some(Corner::new(index, seen))
             })
             .collect();
         if let Some(corners) = corners {
-            out.push(View { name: format!("{}", out.len()), base_from_tip, corners });
+            true_camera_from_target.push(camera_from_target);
+            out.push(View::new(format!("{}", out.len()), base_from_tip, corners));
         }
     }
-    Trial { mode, points, views: out, intrinsics, mount_from_camera, anchor_from_target }
+    let board = BoardPoints::new(&points);
+    Trial {
+        mode,
+        points,
+        board,
+        views: out,
+        intrinsics,
+        mount_from_camera,
+        anchor_from_target,
+        true_camera_from_target,
+    }
 }
 
 impl Trial {
     pub fn problem(&self, free_intrinsics: bool, noise: Option<Noise>) -> JointProblem<'_> {
-        JointProblem { mode: self.mode, points: &self.points, views: &self.views, free_intrinsics, noise }
+        let free = Free { intrinsics: free_intrinsics, ..Free::default() };
+        JointProblem { free, noise, ..JointProblem::new(self.mode, &self.board, &self.views) }
     }
 
     /// A start as far off as a poor closed form: millimetres and tenths of a degree.
@@ -90,6 +106,8 @@ impl Trial {
             mount_from_camera: self.mount_from_camera.perturbed(&off),
             anchor_from_target: self.anchor_from_target.perturbed(&(-off)),
             intrinsics: self.intrinsics,
+            shape: BoardShape::default(),
+            noise: None,
         }
     }
 
@@ -105,4 +123,4 @@ pub(crate) fn camera() -> Intrinsics {
 
 /// Noise of a good robot and a good camera.
 pub(crate) const REALISTIC: Noise =
-    Noise { corner_px: 0.1, robot_m: 1e-4, robot_rad: 0.02 * std::f64::consts::PI / 180.0 };
+    Noise { corner_px: 0.1, view_px: 0.0, robot_m: 1e-4, robot_rad: 0.02 * std::f64::consts::PI / 180.0 };

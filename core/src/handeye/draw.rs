@@ -1,0 +1,37 @@
+//! Numbers that look random and are the same every time.
+
+/// SplitMix64 (Steele, Lea, Flood 2014, "Fast splittable pseudorandom number generators"): small, and good enough to shuffle
+/// and to draw from a few thousand views.
+pub struct Draw(u64);
+
+impl Draw {
+    /// Begins at a number; any does.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number below `bound`; the bias of the remainder is beneath one in 2⁵⁰ for any number of views.
+    pub fn below(&mut self, bound: usize) -> usize {
+        (self.next() % bound.max(1) as u64) as usize
+    }
+
+    /// `most` different numbers below `count`, or all there are.
+    pub fn distinct(&mut self, count: usize, most: usize) -> Vec<usize> {
+        let mut drawn: Vec<usize> = Vec::with_capacity(most);
+        while drawn.len() < most.min(count) {
+            let index = self.below(count);
+            if !drawn.contains(&index) {
+                drawn.push(index);
+            }
+        }
+        drawn
+    }
+}
