@@ -2,7 +2,7 @@
 //!
 //! Reference: OpenCV documentation of `calib3d` (pinhole, `fisheye`), Brown 1966, Kannala & Brandt 2006.
 
-use nalgebra::{Matrix2, Matrix2x3, RowVector3, SMatrix, Unit, Vector2, Vector3};
+use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::CameraError;
@@ -26,11 +26,15 @@ pub enum Distortion {
     Fisheye([f64; 4]),
 }
 
+/// Two numbers that belong to x and y of the image.
+type Pair = [f64; 2];
+
 /// Normalised image coordinates with derivatives.
 pub(super) struct Distorted {
-    pub value: Vector2<f64>,
-    pub by_point: Matrix2x3<f64>,
-    pub by_coefficients: SMatrix<f64, 2, 8>,
+    pub value: Pair,
+    pub by_point: [Pair; 3],
+    /// Zero beyond those of the model.
+    pub by_coefficients: [Pair; 8],
 }
 
 impl Distortion {
@@ -90,23 +94,15 @@ impl Distortion {
         }
     }
 
-    pub(super) fn distort_with_jacobians(&self, point: &Vector3<f64>) -> Result<Distorted, CameraError> {
-        let mut by_coefficients = SMatrix::<f64, 2, 8>::zeros();
-        let (value, by_point) = match self {
-            Self::None => (normalise(point)?, normalise_jacobian(point)),
-            Self::BrownConrady(k) => {
-                let x = normalise(point)?;
-                let (value, by_x) = polynomial_with_jacobians(&x, &widen(k), &mut by_coefficients);
-                (value, by_x * normalise_jacobian(point))
-            }
-            Self::Rational(k) => {
-                let x = normalise(point)?;
-                let (value, by_x) = polynomial_with_jacobians(&x, k, &mut by_coefficients);
-                (value, by_x * normalise_jacobian(point))
-            }
-            Self::Fisheye(k) => fisheye_with_jacobians(point, k, &mut by_coefficients)?,
-        };
-        Ok(Distorted { value, by_point, by_coefficients })
+    /// [`Self::distort`] with its derivatives.
+    #[inline]
+    pub(super) fn linearise(&self, point: &Vector3<f64>) -> Result<Distorted, CameraError> {
+        match self {
+            Self::None => on_plane(point, Lens::none),
+            Self::BrownConrady(k) => on_plane(point, |x| polynomial_linearised::<false>(x, &widen(k))),
+            Self::Rational(k) => on_plane(point, |x| polynomial_linearised::<true>(x, k)),
+            Self::Fisheye(k) => fisheye_linearised(point, k),
+        }
     }
 
     /// The ray that distorts to `distorted`; `None` where the model has none.
@@ -136,9 +132,33 @@ fn normalise(p: &Vector3<f64>) -> Result<Vector2<f64>, CameraError> {
     if p.z > 0.0 { Ok(Vector2::new(p.x / p.z, p.y / p.z)) } else { Err(CameraError::BehindCamera { z_m: p.z }) }
 }
 
-fn normalise_jacobian(p: &Vector3<f64>) -> Matrix2x3<f64> {
+/// A distortion of the plane z = 1 with its derivatives.
+struct Lens {
+    value: Pair,
+    /// By x and by y of the plane.
+    by_x: [Pair; 2],
+    by_coefficients: [Pair; 8],
+}
+
+impl Lens {
+    /// No distortion.
+    fn none(x: Pair) -> Self {
+        Self { value: x, by_x: [[1.0, 0.0], [0.0, 1.0]], by_coefficients: [[0.0; 2]; 8] }
+    }
+}
+
+/// Puts the perspective division in front of a distortion of the plane z = 1.
+#[inline]
+fn on_plane(p: &Vector3<f64>, lens: impl Fn(Pair) -> Lens) -> Result<Distorted, CameraError> {
+    if p.z.is_nan() || p.z <= 0.0 {
+        return Err(CameraError::BehindCamera { z_m: p.z });
+    }
     let w = 1.0 / p.z;
-    Matrix2x3::new(w, 0.0, -p.x * w * w, 0.0, w, -p.y * w * w)
+    let x = [p.x * w, p.y * w];
+    let Lens { value, by_x, by_coefficients } = lens(x);
+    let [across, down] = by_x.map(|column| column.map(|d| d * w));
+    let by_depth = [0, 1].map(|row| -(x[0] * across[row] + x[1] * down[row]));
+    Ok(Distorted { value, by_point: [across, down, by_depth], by_coefficients })
 }
 
 fn polynomial(x: &Vector2<f64>, k: &[f64; 8]) -> Vector2<f64> {
@@ -152,45 +172,50 @@ fn polynomial(x: &Vector2<f64>, k: &[f64; 8]) -> Vector2<f64> {
     )
 }
 
-fn polynomial_with_jacobians(
-    x: &Vector2<f64>,
-    k: &[f64; 8],
-    by_coefficients: &mut SMatrix<f64, 2, 8>,
-) -> (Vector2<f64>, Matrix2<f64>) {
+/// [`polynomial`] with its derivatives; `RATIONAL` says whether its denominator is free.
+#[inline]
+fn polynomial_linearised<const RATIONAL: bool>([a, b]: Pair, k: &[f64; 8]) -> Lens {
     let [k1, k2, p1, p2, k3, k4, k5, k6] = *k;
-    let (a, b) = (x.x, x.y);
-    let r2 = a * a + b * b;
-    let (r4, r6) = (r2 * r2, r2 * r2 * r2);
-    let numerator = 1.0 + k1 * r2 + k2 * r4 + k3 * r6;
-    let denominator = 1.0 + k4 * r2 + k5 * r4 + k6 * r6;
-    let radial = numerator / denominator;
-    let radial_by_r2 =
-        ((k1 + 2.0 * k2 * r2 + 3.0 * k3 * r4) - radial * (k4 + 2.0 * k5 * r2 + 3.0 * k6 * r4)) / denominator;
-    let value = Vector2::new(
-        a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a),
-        b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b,
-    );
-    let cross = 2.0 * a * b * radial_by_r2 + 2.0 * p1 * a + 2.0 * p2 * b;
-    let by_x = Matrix2::new(
-        radial + 2.0 * a * a * radial_by_r2 + 2.0 * p1 * b + 6.0 * p2 * a,
-        cross,
-        cross,
-        radial + 2.0 * b * b * radial_by_r2 + 6.0 * p1 * b + 2.0 * p2 * a,
-    );
-    for (row, c) in [a, b].into_iter().enumerate() {
-        let up = c / denominator;
-        let down = -c * radial / denominator;
-        for (column, value) in
-            [(0, up * r2), (1, up * r4), (4, up * r6), (5, down * r2), (6, down * r4), (7, down * r6)]
-        {
-            by_coefficients[(row, column)] = value;
-        }
+    let (aa, bb, ab2) = (a * a, b * b, 2.0 * a * b);
+    let r2 = aa + bb;
+    let r4 = r2 * r2;
+    let r6 = r4 * r2;
+    let numerator = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    let slope = k1 + r2 * (2.0 * k2 + r2 * (3.0 * k3));
+    let (radial, radial_by_r2, up) = if RATIONAL {
+        let up = 1.0 / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+        let radial = numerator * up;
+        (radial, (slope - radial * (k4 + r2 * (2.0 * k5 + r2 * (3.0 * k6)))) * up, up)
+    } else {
+        (numerator, slope, 1.0)
+    };
+    let cross = ab2 * radial_by_r2 + 2.0 * (p1 * a + p2 * b);
+    let (across, down) = ([a * up, b * up], [-a * up * radial, -b * up * radial]);
+    let times = |v: Pair, s: f64| v.map(|c| c * s);
+    let of_denominator = |s: f64| if RATIONAL { times(down, s) } else { [0.0; 2] };
+    Lens {
+        value: [a * radial + p1 * ab2 + p2 * (r2 + 2.0 * aa), b * radial + p1 * (r2 + 2.0 * bb) + p2 * ab2],
+        by_x: [
+            [radial + 2.0 * aa * radial_by_r2 + 2.0 * p1 * b + 6.0 * p2 * a, cross],
+            [cross, radial + 2.0 * bb * radial_by_r2 + 6.0 * p1 * b + 2.0 * p2 * a],
+        ],
+        by_coefficients: [
+            times(across, r2),
+            times(across, r4),
+            [ab2, r2 + 2.0 * bb],
+            [r2 + 2.0 * aa, ab2],
+            times(across, r6),
+            of_denominator(r2),
+            of_denominator(r4),
+            of_denominator(r6),
+        ],
     }
-    by_coefficients[(0, 2)] = 2.0 * a * b;
-    by_coefficients[(1, 2)] = r2 + 2.0 * b * b;
-    by_coefficients[(0, 3)] = r2 + 2.0 * a * a;
-    by_coefficients[(1, 3)] = 2.0 * a * b;
-    (value, by_x)
+}
+
+/// [`polynomial`] and its derivative by the plane.
+fn polynomial_with_slope(x: &Vector2<f64>, k: &[f64; 8]) -> (Vector2<f64>, Matrix2<f64>) {
+    let lens = polynomial_linearised::<true>([x.x, x.y], k);
+    (lens.value.into(), lens.by_x.into())
 }
 
 /// Newton from the distorted point, damped so that the residual falls at every step.
@@ -198,13 +223,12 @@ fn polynomial_with_jacobians(
 /// A solution counts only where the map still has positive determinant on the whole way there from the centre,
 /// checked at the solution: past the fold a second, false pre-image exists.
 fn undistort_polynomial(distorted: &Vector2<f64>, k: &[f64; 8]) -> Option<Vector2<f64>> {
-    let mut scratch = SMatrix::<f64, 2, 8>::zeros();
     let mut x = *distorted;
-    let (mut value, mut by_x) = polynomial_with_jacobians(&x, k, &mut scratch);
+    let (mut value, mut by_x) = polynomial_with_slope(&x, k);
     if by_x.determinant() <= 0.0 {
         // The start is past the fold; the centre never is.
         x = Vector2::zeros();
-        (value, by_x) = polynomial_with_jacobians(&x, k, &mut scratch);
+        (value, by_x) = polynomial_with_slope(&x, k);
     }
     let mut residual = value - distorted;
     for _ in 0..INVERSE_STEPS {
@@ -215,7 +239,7 @@ fn undistort_polynomial(distorted: &Vector2<f64>, k: &[f64; 8]) -> Option<Vector
         let mut scale = 1.0;
         loop {
             let candidate = x - step * scale;
-            let (new_value, new_by_x) = polynomial_with_jacobians(&candidate, k, &mut scratch);
+            let (new_value, new_by_x) = polynomial_with_slope(&candidate, k);
             let new_residual = new_value - distorted;
             if new_by_x.determinant() > 0.0 && new_residual.norm() < residual.norm() {
                 (x, by_x, residual) = (candidate, new_by_x, new_residual);
@@ -245,7 +269,7 @@ fn fisheye_angle(theta: f64, k: &[f64; 4]) -> (f64, f64) {
 const FISHEYE_AXIS: f64 = 1e-9;
 
 fn fisheye(p: &Vector3<f64>, k: &[f64; 4]) -> Result<Vector2<f64>, CameraError> {
-    let r = p.x.hypot(p.y);
+    let r = (p.x * p.x + p.y * p.y).sqrt();
     if r <= FISHEYE_AXIS * p.z.abs() {
         return normalise(p);
     }
@@ -253,30 +277,38 @@ fn fisheye(p: &Vector3<f64>, k: &[f64; 4]) -> Result<Vector2<f64>, CameraError> 
     Ok(Vector2::new(p.x, p.y) * (theta_d / r))
 }
 
-fn fisheye_with_jacobians(
-    p: &Vector3<f64>,
-    k: &[f64; 4],
-    by_coefficients: &mut SMatrix<f64, 2, 8>,
-) -> Result<(Vector2<f64>, Matrix2x3<f64>), CameraError> {
-    let r = p.x.hypot(p.y);
+#[inline]
+fn fisheye_linearised(p: &Vector3<f64>, k: &[f64; 4]) -> Result<Distorted, CameraError> {
+    let r2 = p.x * p.x + p.y * p.y;
+    let r = r2.sqrt();
     if r <= FISHEYE_AXIS * p.z.abs() {
-        return Ok((normalise(p)?, normalise_jacobian(p)));
+        return on_plane(p, Lens::none);
     }
     let theta = r.atan2(p.z);
     let (theta_d, slope) = fisheye_angle(theta, k);
-    let direction = Vector2::new(p.x, p.y) / r;
-    let d2 = r * r + p.z * p.z;
-    let theta_by_point = RowVector3::new(direction.x * p.z / d2, direction.y * p.z / d2, -r / d2);
-    let (a, b) = (direction.x, direction.y);
-    let direction_by_point = Matrix2x3::new(b * b, -a * b, 0.0, -a * b, a * a, 0.0) / r;
+    let over_r = 1.0 / r;
+    let (a, b) = (p.x * over_r, p.y * over_r);
+    // The angle turns with the radius and with the depth; the direction only with what is across the radius.
+    let over_d2 = 1.0 / (r2 + p.z * p.z);
+    let (by_radius, by_depth) = (slope * p.z * over_d2, -slope * r * over_d2);
+    let turn = theta_d * over_r;
+    let cross = a * b * (by_radius - turn);
     let t2 = theta * theta;
+    let mut by_coefficients = [[0.0; 2]; 8];
     let mut power = theta;
-    for column in 0..4 {
+    for column in &mut by_coefficients[..4] {
         power *= t2;
-        by_coefficients[(0, column)] = a * power;
-        by_coefficients[(1, column)] = b * power;
+        *column = [a * power, b * power];
     }
-    Ok((direction * theta_d, direction * (slope * theta_by_point) + direction_by_point * theta_d))
+    Ok(Distorted {
+        value: [a * theta_d, b * theta_d],
+        by_point: [
+            [a * a * by_radius + b * b * turn, cross],
+            [cross, b * b * by_radius + a * a * turn],
+            [a * by_depth, b * by_depth],
+        ],
+        by_coefficients,
+    })
 }
 
 fn undistort_fisheye(distorted: &Vector2<f64>, k: &[f64; 4]) -> Option<Unit<Vector3<f64>>> {

@@ -74,6 +74,14 @@ pub struct Projection {
     pub px_by_parameters: PixelByParameters,
 }
 
+/// [`Projection`] in plain numbers; every derivative is a pair of x and y.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LinearPixel {
+    pub px: [f64; 2],
+    pub by_point: [[f64; 2]; 3],
+    pub by_parameters: [[f64; 2]; MAX_PARAMETERS],
+}
+
 impl Intrinsics {
     /// A camera without distortion whose principal point is the image centre.
     pub fn pinhole(width: u32, height: u32, focal_px: f64) -> Self {
@@ -158,23 +166,30 @@ impl Intrinsics {
     /// # Errors
     /// As [`Self::project`].
     pub fn project_with_jacobians(&self, point: &Point3<f64>) -> Result<Projection, CameraError> {
-        let d = self.distortion.distort_with_jacobians(&point.coords)?;
-        let mut px_by_point = d.by_point;
-        px_by_point.row_mut(0).scale_mut(self.fx);
-        px_by_point.row_mut(1).scale_mut(self.fy);
-        let mut px_by_parameters = PixelByParameters::zeros();
-        px_by_parameters[(0, 0)] = d.value.x;
-        px_by_parameters[(1, 1)] = d.value.y;
-        px_by_parameters[(0, 2)] = 1.0;
-        px_by_parameters[(1, 3)] = 1.0;
-        for column in 0..self.distortion.coefficients().len() {
-            px_by_parameters[(0, 4 + column)] = self.fx * d.by_coefficients[(0, column)];
-            px_by_parameters[(1, 4 + column)] = self.fy * d.by_coefficients[(1, column)];
-        }
+        let linear = self.linearise(&point.coords)?;
         Ok(Projection {
-            px: Vector2::new(self.fx * d.value.x + self.cx, self.fy * d.value.y + self.cy),
-            px_by_point,
-            px_by_parameters,
+            px: linear.px.into(),
+            px_by_point: linear.by_point.into(),
+            px_by_parameters: linear.by_parameters.into(),
+        })
+    }
+
+    /// [`Self::project_with_jacobians`] in plain numbers, for inner loops.
+    #[inline]
+    pub(crate) fn linearise(&self, point: &Vector3<f64>) -> Result<LinearPixel, CameraError> {
+        let d = self.distortion.linearise(point)?;
+        let focal = |[x, y]: [f64; 2]| [self.fx * x, self.fy * y];
+        let [x, y] = d.value;
+        let mut by_parameters = [[0.0; 2]; MAX_PARAMETERS];
+        (by_parameters[0], by_parameters[1]) = ([x, 0.0], [0.0, y]);
+        (by_parameters[2], by_parameters[3]) = ([1.0, 0.0], [0.0, 1.0]);
+        for (column, by_coefficient) in by_parameters[4..].iter_mut().zip(d.by_coefficients) {
+            *column = focal(by_coefficient);
+        }
+        Ok(LinearPixel {
+            px: [self.fx * x + self.cx, self.fy * y + self.cy],
+            by_point: d.by_point.map(focal),
+            by_parameters,
         })
     }
 

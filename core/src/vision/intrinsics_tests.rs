@@ -31,7 +31,7 @@ fn views(camera: &Intrinsics, count: usize, tilt: (f64, f64), noise_px: f64, see
             (0..GRID.len())
                 .map(|index| {
                     let px = camera.project(&(pose * GRID.point(index))).expect("in front");
-                    Corner { index, px: px + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)) }
+                    Corner::new(index, px + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)))
                 })
                 .collect()
         })
@@ -55,9 +55,9 @@ fn exact_corners_give_the_camera_back() {
             let found = solved(&truth, 0.0, guess, 2);
             // Single precision corners: 3e-5 px of noise, which moves fx by about as much.
             for (got, want) in found.intrinsics.parameters().iter().zip(truth.parameters()).take(4) {
-                assert!((got - want).abs() < 2e-2, "{distortion:?} {guess:?}: {:?}", found.intrinsics);
+                assert!((got - want).abs() < 1e-6, "{distortion:?} {guess:?}: {:?}", found.intrinsics);
             }
-            assert!(found.rms_px < 1e-3, "{distortion:?}: {}", found.rms_px);
+            assert!(found.rms_px < 1e-8, "{distortion:?}: {}", found.rms_px);
         }
     }
 }
@@ -133,7 +133,7 @@ fn a_faint_tilt_is_not_sold_as_a_calibration() {
     // 2.5° of tilt passes for different orientations, but says next to nothing about the focal length.
     let nearly = views(&camera(Distortion::None), 6, (0.04, 0.045), 0.1, 1);
     match calibrate(&nearly, &TARGET, SIZE, Distortion::BrownConrady([0.0; 5]), None) {
-        Err(VisionError::Undetermined { .. } | VisionError::NotACamera { .. } | VisionError::OpenCv { .. }) => {}
+        Err(VisionError::Undetermined { .. } | VisionError::NotACamera { .. }) => {}
         other => panic!("{other:?}"),
     }
 }
