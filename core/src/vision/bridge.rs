@@ -3,10 +3,13 @@
 use image::GrayImage;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use opencv::boxed_ref::BoxedRef;
-use opencv::core::{Mat, Point2d, Point2f, Point3d, Point3f, Scalar, Vec3d, Vector};
+use opencv::core::{Mat, Point2d, Point2f, Point3d, Scalar, Vector};
+#[cfg(test)]
+use opencv::core::{Point3f, Vec3d};
 use opencv::prelude::*;
 
 use super::VisionError;
+#[cfg(test)]
 use crate::camera::Intrinsics;
 
 /// Says which operation failed; OpenCV's text is kept without its file and line.
@@ -48,11 +51,13 @@ pub(super) fn to_points3d(points: &[Point3<f64>]) -> Vector<Point3d> {
     points.iter().map(|p| Point3d::new(p.x, p.y, p.z)).collect()
 }
 
+#[cfg(test)]
 pub(super) fn to_points3f(points: &[Point3<f64>]) -> Vector<Point3f> {
     points.iter().map(|p| Point3f::new(p.x as f32, p.y as f32, p.z as f32)).collect()
 }
 
 /// The 3×3 matrix K.
+#[cfg(test)]
 pub(super) fn camera_matrix(camera: &Intrinsics) -> Result<Mat, VisionError> {
     mat_from_matrix3(&camera.matrix())
 }
@@ -70,6 +75,7 @@ pub(super) fn mat_from_matrix3(m: &Matrix3<f64>) -> Result<Mat, VisionError> {
 }
 
 /// The distortion coefficients as a vector, in OpenCV's order; empty for none.
+#[cfg(test)]
 pub(super) fn coefficients(camera: &Intrinsics) -> Vector<f64> {
     camera.distortion.coefficients().iter().copied().collect()
 }
@@ -90,6 +96,7 @@ pub(super) fn isometry(rotation_vector: &[f64; 3], translation: &[f64; 3]) -> Is
 }
 
 /// Pairs of rotation vector and translation as OpenCV returns them for several views.
+#[cfg(test)]
 pub(super) fn isometries(rotations: &Vector<Vec3d>, translations: &Vector<Vec3d>) -> Vec<Isometry3<f64>> {
     rotations.iter().zip(translations.iter()).map(|(r, t)| isometry(&r.0, &t.0)).collect()
 }

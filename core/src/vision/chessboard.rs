@@ -1,18 +1,18 @@
-//! Chessboards: found by OpenCV, brought into one order, refined by our own corner model.
+//! Chessboards: found by our own detector, or with all effort by OpenCV's; brought into one order.
 
 use image::GrayImage;
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 use opencv::boxed_ref::BoxedRef;
 use opencv::calib3d;
 use opencv::core::{Mat, Point2f, Size, ToInputArray, Vector};
 use opencv::imgproc;
 use opencv::prelude::*;
 
-use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray};
 use super::detect::Effort;
 use super::order::{Ordered, canonical};
 use super::subpixel;
+use super::{VisionError, checker};
 use crate::target::Grid;
 
 /// Least share of neighbouring squares that must differ in the direction the pattern asks for.
@@ -23,11 +23,39 @@ const PIXELS_TO_REDUCE: u32 = 1_000_000;
 /// Images up to this many pixels are worth enlarging in search of a small board.
 const PIXELS_TO_ENLARGE: u32 = 500_000;
 
+/// Standard deviation per axis [px] stated for a corner that the model of a corner does not fit and `cornerSubPix`
+/// refined: dirt, a reflection or a cut square is on it.
+const UNSURE_PX: f64 = 0.15;
+
+/// The board's corners with their covariances, in the order of [`super::detect_with`].
+///
+/// A live search is by [`checker`] alone; with all effort OpenCV looks where that finds nothing.
 pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
-    let Some(found) = search(image, grid, effort)? else { return Ok(None) };
+    let native = checker::find(image, grid).filter(|order| alternation(image, order) >= MIN_ALTERNATION);
+    let found = match (native, effort) {
+        (Some(found), _) => Some(found),
+        (None, Effort::Live) => None,
+        (None, Effort::Thorough) => search(image, grid)?.map(|found| checker::refine(image, &found)),
+    };
+    let Some(found) = found else { return Ok(None) };
+    let found = with_all_stated(image, found)?;
     let ordered = canonical(&found, grid, |order| contrast_of_first_square(image, order) < 0.0);
-    let refined = subpixel::refine(image, &ordered)?;
-    Ok(refined.is_regular().then_some(refined))
+    Ok(ordered.is_regular().then_some(ordered))
+}
+
+/// Corners without a fit are refined by OpenCV and stated with [`UNSURE_PX`].
+fn with_all_stated(image: &GrayImage, mut found: Ordered) -> Result<Ordered, VisionError> {
+    if found.covariances_px2.iter().all(Option::is_some) {
+        return Ok(found);
+    }
+    let sub_pix = subpixel::corner_sub_pix(image, &found)?;
+    for (index, covariance_px2) in found.covariances_px2.iter_mut().enumerate() {
+        if covariance_px2.is_none() {
+            found.points[index] = sub_pix.points[index];
+            *covariance_px2 = Some(Matrix2::identity() * UNSURE_PX * UNSURE_PX);
+        }
+    }
+    Ok(found)
 }
 
 /// A way to look.
@@ -44,31 +72,30 @@ enum Strategy {
     SectorBased { robust: bool },
 }
 
-fn strategies(image: &GrayImage, effort: Effort) -> Vec<Strategy> {
+fn strategies(image: &GrayImage) -> Vec<Strategy> {
     let pixels = image.width().saturating_mul(image.height());
     let divisor = (f64::from(pixels) / f64::from(PIXELS_TO_REDUCE)).sqrt().ceil().max(1.0);
     let scale = 1.0 / divisor;
     let mut all = vec![Strategy::Plain { scale }, Strategy::Flattened { scale }];
-    if effort == Effort::Thorough {
-        if scale < 1.0 {
-            all.extend([Strategy::Plain { scale: 1.0 }, Strategy::Flattened { scale: 1.0 }]);
-        }
-        all.push(Strategy::Adaptive { scale });
-        if pixels <= PIXELS_TO_ENLARGE {
-            all.push(Strategy::Plain { scale: 2.0 });
-        }
-        all.extend([Strategy::SectorBased { robust: false }, Strategy::SectorBased { robust: true }]);
+    if scale < 1.0 {
+        all.extend([Strategy::Plain { scale: 1.0 }, Strategy::Flattened { scale: 1.0 }]);
     }
+    all.push(Strategy::Adaptive { scale });
+    if pixels <= PIXELS_TO_ENLARGE {
+        all.push(Strategy::Plain { scale: 2.0 });
+    }
+    all.extend([Strategy::SectorBased { robust: false }, Strategy::SectorBased { robust: true }]);
     all
 }
 
-fn search(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
+/// What OpenCV finds, to a pixel or so.
+fn search(image: &GrayImage, grid: &Grid) -> Result<Option<Ordered>, VisionError> {
     let mat = mat_from_gray(image)?;
-    for strategy in strategies(image, effort) {
+    for strategy in strategies(image) {
         let Some(points) = attempt(&mat, grid, strategy)? else { continue };
         let order = Ordered::new(points, grid);
         if order.is_regular() && alternation(image, &order) >= MIN_ALTERNATION {
-            tracing::trace!(?strategy, "chessboard found");
+            tracing::debug!(?strategy, "chessboard found by OpenCV after our own search missed it");
             return Ok(Some(order));
         }
     }

@@ -3,9 +3,9 @@
 use image::GrayImage;
 
 use super::order::Ordered;
-use super::{VisionError, chessboard, circles};
+use super::{VisionError, april, asymmetric, charuco, chessboard, circles};
 use crate::observation::Corner;
-use crate::target::TargetSpec;
+use crate::target::{Grid, TargetSpec};
 
 /// An image with fewer pixels than this per point cannot show the target: squares of less than 3 px are not separated.
 const MIN_SQUARE_PX: u32 = 3;
@@ -48,14 +48,17 @@ pub fn detect(image: &GrayImage, target: &TargetSpec) -> Result<Option<Vec<Corne
     detect_with(image, target, DetectOptions::default())
 }
 
-/// Finds all points of the target, to a few hundredths of a pixel; `None` when it is not (wholly) in the image.
+/// Finds the points of the target, to a few hundredths of a pixel; `None` when it is not in the image.
 ///
-/// Corner `i` of the result is point `i` of [`TargetSpec::points`]: index `row * columns + column`, pixel (0, 0) at
-/// the centre of the top-left pixel. The order is right-handed in the image, that is, the target's x × y points into
+/// `Corner::index` is the number of the point in [`TargetSpec::points`], ascending; pixel (0, 0) is the centre of the
+/// top-left pixel. All points of chessboards and grids of dots are found, or none. Of `ChArUco` boards and boards of tags
+/// those in sight are, when they are at least four and not on a line, and the markers that tell them apart are two or
+/// more that lie as the target has them. The order is right-handed in the image, that is, the target's x × y points into
 /// the board, away from the camera, and is the same in every view:
 ///
 /// - a chessboard begins at the end where the square between its first four corners is dark;
-/// - a grid of dots begins at the larger dot, where one of its corners has one.
+/// - a grid of dots begins at the larger dot, where one of its corners has one;
+/// - markers and shifted rows of dots say by themselves where a target begins.
 ///
 /// # Symmetric targets
 /// Where that leaves a choice ([`TargetSpec::is_symmetric`]: boards of even sum, plain grids of dots), the end is
@@ -65,33 +68,56 @@ pub fn detect(image: &GrayImage, target: &TargetSpec) -> Result<Option<Vec<Corne
 /// at all ends is accepted and follows the same rule.
 ///
 /// # Errors
-/// [`VisionError::TargetTooSmall`] below 3 points a side, [`VisionError::BadImage`], [`VisionError::OpenCv`].
+/// [`VisionError::TargetTooSmall`] for a chessboard or a grid of dots below 3 points a side, [`VisionError::BadTarget`]
+/// for markers that cannot be, [`VisionError::OtherLayout`] for a `ChArUco` board of the other layout than stated,
+/// [`VisionError::BadImage`], [`VisionError::OpenCv`].
 pub fn detect_with(
     image: &GrayImage,
     target: &TargetSpec,
     options: DetectOptions,
 ) -> Result<Option<Vec<Corner>>, VisionError> {
-    let grid = target.grid();
-    let (columns, rows) = (grid.columns, grid.rows);
-    if columns < 3 || rows < 3 {
-        return Err(VisionError::TargetTooSmall { columns, rows });
+    check(image, target)?;
+    let effort = options.effort;
+    match target {
+        TargetSpec::Chessboard(grid) if fits(image, grid) => {
+            Ok(chessboard::find(image, grid, effort)?.as_ref().map(corners))
+        }
+        TargetSpec::Circles(grid) if fits(image, grid) => Ok(circles::find(image, grid, effort)?.as_ref().map(corners)),
+        TargetSpec::AsymmetricCircles(grid) if fits(image, grid) => asymmetric::find(image, grid, effort),
+        TargetSpec::Chessboard(_) | TargetSpec::Circles(_) | TargetSpec::AsymmetricCircles(_) => Ok(None),
+        TargetSpec::Charuco(board) => charuco::find(image, board, effort),
+        TargetSpec::AprilGrid(board) => april::find(image, board, effort),
+        TargetSpec::AprilTag(tag) => april::find(image, &tag.alone(), effort),
+    }
+}
+
+/// Whether there is something to search, and something to search for.
+pub(super) fn check(image: &GrayImage, target: &TargetSpec) -> Result<(), VisionError> {
+    match target {
+        TargetSpec::Chessboard(grid) | TargetSpec::Circles(grid) | TargetSpec::AsymmetricCircles(grid) => {
+            let Grid { columns, rows, .. } = *grid;
+            if columns < 3 || rows < 3 {
+                return Err(VisionError::TargetTooSmall { columns, rows });
+            }
+        }
+        TargetSpec::Charuco(_) | TargetSpec::AprilGrid(_) | TargetSpec::AprilTag(_) => target.check()?,
     }
     let (width, height) = image.dimensions();
     if width == 0 || height == 0 {
         return Err(VisionError::BadImage { width, height });
     }
-    if columns.min(rows) >= (width.min(height) / MIN_SQUARE_PX) as usize
-        || columns.max(rows) >= (width.max(height) / MIN_SQUARE_PX * 2) as usize
-    {
-        return Ok(None);
-    }
-    let found = match target {
-        TargetSpec::Chessboard(_) => chessboard::find(image, grid, options.effort)?,
-        TargetSpec::Circles(_) => circles::find(image, grid, options.effort)?,
-    };
-    Ok(found.map(|order| corners(&order)))
+    Ok(())
+}
+
+/// Whether the image has room for all points.
+fn fits(image: &GrayImage, grid: &Grid) -> bool {
+    let (width, height) = image.dimensions();
+    let (columns, rows) = (grid.columns, grid.rows);
+    columns.min(rows) < (width.min(height) / MIN_SQUARE_PX) as usize
+        && columns.max(rows) < (width.max(height) / MIN_SQUARE_PX * 2) as usize
 }
 
 fn corners(order: &Ordered) -> Vec<Corner> {
-    order.points.iter().enumerate().map(|(index, &px)| Corner { index, px }).collect()
+    let all = order.points.iter().zip(&order.covariances_px2).enumerate();
+    all.map(|(index, (&px, &covariance_px2))| Corner { index, px, covariance_px2 }).collect()
 }

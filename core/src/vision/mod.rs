@@ -4,17 +4,28 @@
 //!
 //! OpenCV's own errors never leave this module as types: [`VisionError::OpenCv`] carries the operation and the text.
 
+mod april;
+mod asymmetric;
 mod bridge;
+mod charuco;
+pub(crate) mod checker;
 mod chessboard;
 mod circles;
+mod crossing;
 mod detect;
+mod dots;
+mod edges;
+mod homography;
+pub(crate) mod markers;
 mod order;
 pub(crate) mod saddle;
+mod spread;
 pub(crate) mod subpixel;
 
 pub mod intrinsics;
 pub mod pnp;
 
+pub use charuco::charuco_layout;
 pub use detect::{DetectOptions, Effort, detect, detect_with};
 
 use crate::camera::CameraError;
@@ -32,6 +43,24 @@ pub enum VisionError {
         columns: usize,
         /// Points along y.
         rows: usize,
+    },
+    /// A number of the target is out of range.
+    #[error("the target cannot be detected: {source}")]
+    BadTarget {
+        /// Which, and what it may be.
+        #[from]
+        source: crate::target::BadTarget,
+    },
+    /// The board in the picture has its markers in the other squares.
+    #[error(
+        "the target is said to have the {stated} layout, the ChArUco board in the picture has the {seen} one: write \
+         layout = \"{seen}\", or leave it out"
+    )]
+    OtherLayout {
+        /// What is said.
+        stated: &'static str,
+        /// What is seen.
+        seen: &'static str,
     },
     /// The distance between points is not a length.
     #[error("the target's point distance of {square_m} m is not usable: it must be finite and positive")]
@@ -128,6 +157,9 @@ pub enum VisionError {
         /// What is wrong with them.
         reason: String,
     },
+    /// The work was cancelled.
+    #[error("the calibration of the camera was cancelled")]
+    Cancelled,
     /// OpenCV refused or failed.
     #[error("OpenCV could not {operation}: {message}")]
     OpenCv {
@@ -145,8 +177,12 @@ mod detect_tests;
 #[cfg(test)]
 mod gray_tests;
 #[cfg(test)]
+mod intrinsics_opencv_tests;
+#[cfg(test)]
 mod intrinsics_tests;
 #[cfg(test)]
 mod pnp_tests;
 #[cfg(test)]
 pub(crate) mod rendered;
+#[cfg(test)]
+mod targets_tests;

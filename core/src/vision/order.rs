@@ -4,7 +4,7 @@
 //! points into the board. Of the orders left (two, or four for a square grid) the caller's preference decides, and
 //! where that does not, the one whose x axis points most to the right in the image.
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 
 use crate::target::Grid;
 
@@ -12,12 +12,23 @@ use crate::target::Grid;
 #[derive(Debug, Clone)]
 pub(super) struct Ordered {
     pub points: Vec<Vector2<f64>>,
+    /// How well each point is known, squared pixels; `None` where that is not known.
+    pub covariances_px2: Vec<Option<Matrix2<f64>>>,
     pub columns: usize,
 }
 
 impl Ordered {
     pub fn new(points: Vec<Vector2<f64>>, grid: &Grid) -> Self {
-        Self { points, columns: grid.columns }
+        Self { covariances_px2: vec![None; points.len()], points, columns: grid.columns }
+    }
+
+    /// The points in another order: `place` says where each is taken from.
+    fn rearranged(&self, columns: usize, place: impl Iterator<Item = usize> + Clone) -> Self {
+        Self {
+            points: place.clone().map(|i| self.points[i]).collect(),
+            covariances_px2: place.map(|i| self.covariances_px2[i]).collect(),
+            columns,
+        }
     }
 
     pub fn rows(&self) -> usize {
@@ -101,18 +112,18 @@ impl Ordered {
     }
 
     fn mirrored(&self) -> Self {
-        let points = self.points.chunks(self.columns).flat_map(|row| row.iter().rev().copied()).collect();
-        Self { points, columns: self.columns }
+        let columns = self.columns;
+        let place = (0..self.points.len()).map(|i| i / columns * columns + columns - 1 - i % columns);
+        self.rearranged(columns, place)
     }
 
     fn half_turn(&self) -> Self {
-        Self { points: self.points.iter().rev().copied().collect(), columns: self.columns }
+        self.rearranged(self.columns, (0..self.points.len()).rev())
     }
 
     fn transposed(&self) -> Self {
-        let points =
-            (0..self.columns).flat_map(|column| (0..self.rows()).map(move |row| self.at(column, row))).collect();
-        Self { points, columns: self.rows() }
+        let (columns, rows) = (self.columns, self.rows());
+        self.rearranged(rows, (0..self.points.len()).map(|i| i % rows * columns + i / rows))
     }
 
     /// Twice the area that the cells span, positive for a right-handed order.

@@ -83,7 +83,7 @@ pub fn solve(corners: &[Corner], target: &TargetSpec, intrinsics: &Intrinsics) -
     intrinsics.validate()?;
     check_corners(corners, target, 0)?;
     let seen: Vec<(Point3<f64>, Vector2<f64>)> =
-        corners.iter().map(|corner| (target.grid().point(corner.index), corner.px)).collect();
+        corners.iter().map(|corner| (target.point(corner.index), corner.px)).collect();
     let mut solutions: Vec<Solution> = initial_poses(&seen, intrinsics)?
         .iter()
         .filter_map(|start| refine(&seen, intrinsics, start))
@@ -122,7 +122,7 @@ pub(super) fn check_corners(corners: &[Corner], target: &TargetSpec, view: usize
             Some(slot) => *slot = true,
         }
     }
-    let on_target: Vec<Vector2<f64>> = corners.iter().map(|c| grid.point(c.index).coords.xy()).collect();
+    let on_target: Vec<Vector2<f64>> = corners.iter().map(|c| target.point(c.index).coords.xy()).collect();
     let in_image: Vec<Vector2<f64>> = corners.iter().map(|c| c.px).collect();
     if is_collinear(&on_target) || is_collinear(&in_image) {
         return Err(VisionError::CollinearCorners { view });

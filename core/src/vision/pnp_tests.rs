@@ -33,7 +33,7 @@ fn project(camera: &Intrinsics, pose: &Isometry3<f64>, noise_px: f64, rng: &mut 
     (0..GRID.len())
         .map(|index| {
             let px = camera.project(&(pose * GRID.point(index))).expect("in front");
-            Corner { index, px: px + Vector2::new(noise.sample(rng), noise.sample(rng)) }
+            Corner::new(index, px + Vector2::new(noise.sample(rng), noise.sample(rng)))
         })
         .collect()
 }

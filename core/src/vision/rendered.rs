@@ -127,7 +127,7 @@ fn area(polygon: &[Vector2<f64>]) -> f64 {
     0.5 * (0..n).map(|i| polygon[i].perp(&polygon[(i + 1) % n])).sum::<f64>().abs()
 }
 
-fn blur(levels: &mut [f64], width: usize, height: usize, sigma: f64) {
+pub(crate) fn blur(levels: &mut [f64], width: usize, height: usize, sigma: f64) {
     if sigma <= 0.0 {
         return;
     }

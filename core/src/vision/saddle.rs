@@ -28,10 +28,15 @@ const FURTHEST: f64 = 0.12;
 /// The saddle point near `start`, for a corner whose nearest neighbour is `spacing` pixels away; `None` where there is
 /// no saddle.
 pub(crate) fn refine(image: &GrayImage, start: &Vector2<f64>, spacing: f64) -> Option<Vector2<f64>> {
+    refine_in(image.as_raw(), image.dimensions(), start, spacing)
+}
+
+/// [`refine`] for the pixels of an image of the given width and height.
+pub(crate) fn refine_in(pixels: &[u8], size: (u32, u32), start: &Vector2<f64>, spacing: f64) -> Option<Vector2<f64>> {
     let sigma = (SIGMA_PER_SPACING * spacing).clamp(SIGMA_PX.0, SIGMA_PX.1);
     let mut at = *start;
     for _ in 0..FITS {
-        let step = saddle_of(image, &at, sigma)?;
+        let step = saddle_of(pixels, size, &at, sigma)?;
         at += step;
         if (at - start).norm() > (FURTHEST * spacing).max(0.5) {
             return None;
@@ -44,19 +49,20 @@ pub(crate) fn refine(image: &GrayImage, start: &Vector2<f64>, spacing: f64) -> O
 }
 
 /// Offset from `at` to the saddle of `f = a x² + b xy + c y² + d x + e y + g`, fitted by weighted least squares.
-fn saddle_of(image: &GrayImage, at: &Vector2<f64>, sigma: f64) -> Option<Vector2<f64>> {
+fn saddle_of(pixels: &[u8], (width, height): (u32, u32), at: &Vector2<f64>, sigma: f64) -> Option<Vector2<f64>> {
     let reach = REACH * sigma;
     let (left, top) = ((at.x - reach).ceil(), (at.y - reach).ceil());
     let (right, bottom) = ((at.x + reach).floor(), (at.y + reach).floor());
-    let inside = left >= 0.0 && top >= 0.0 && right < f64::from(image.width()) && bottom < f64::from(image.height());
+    let inside = left >= 0.0 && top >= 0.0 && right < f64::from(width) && bottom < f64::from(height);
     if !inside {
         return None;
     }
     let mut normal = SMatrix::<f64, 6, 6>::zeros();
     let mut rhs = SVector::<f64, 6>::zeros();
-    for v in top as u32..=bottom as u32 {
-        for u in left as u32..=right as u32 {
-            let (x, y) = (f64::from(u) - at.x, f64::from(v) - at.y);
+    for v in top as usize..=bottom as usize {
+        let line = pixels.get(v * width as usize..(v + 1) * width as usize)?;
+        for (u, level) in line.iter().enumerate().take(right as usize + 1).skip(left as usize) {
+            let (x, y) = (u as f64 - at.x, v as f64 - at.y);
             let r2 = x * x + y * y;
             if r2 > reach * reach {
                 continue;
@@ -64,7 +70,7 @@ fn saddle_of(image: &GrayImage, at: &Vector2<f64>, sigma: f64) -> Option<Vector2
             let weight = (-0.5 * r2 / (sigma * sigma)).exp();
             let row = SVector::<f64, 6>::new(x * x, x * y, y * y, x, y, 1.0);
             normal.ger(weight, &row, &row, 1.0);
-            rhs.axpy(weight * f64::from(image.get_pixel(u, v).0[0]), &row, 1.0);
+            rhs.axpy(weight * f64::from(*level), &row, 1.0);
         }
     }
     let f = normal.cholesky()?.solve(&rhs);

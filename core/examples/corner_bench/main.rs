@@ -1,0 +1,118 @@
+//! Chessboard detection on rendered boards and on the reference sets, beside OpenCV.
+//!
+//! `cargo run --release -p handeye_core --example corner_bench -- [VIEWS]`: VIEWS rendered boards per case, 24 unless
+//! told. The sets are looked for in `$HANDEYE_DATA`, then in `../shared/data`.
+
+mod opencv_detectors;
+mod real;
+mod render;
+
+use std::time::Instant;
+
+use handeye_core::image::GrayImage;
+use handeye_core::observation::Corner;
+use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::vision::{DetectOptions, detect_with};
+use nalgebra::{Matrix2, Vector2};
+use render::{Look, Picture, view};
+
+/// A detector by name: the corners in any order, `None` when the board is not found.
+pub struct Detector {
+    /// Its name.
+    pub name: &'static str,
+    /// Its search.
+    pub find: fn(&GrayImage, &Grid) -> Option<Vec<Corner>>,
+}
+
+/// The detectors that are compared.
+pub const DETECTORS: [Detector; 3] = [
+    Detector { name: "native", find: native },
+    Detector { name: "findChessboardCorners + cornerSubPix", find: opencv_detectors::classic },
+    Detector { name: "findChessboardCornersSB", find: opencv_detectors::sectors },
+];
+
+fn native(image: &GrayImage, grid: &Grid) -> Option<Vec<Corner>> {
+    detect_with(image, &TargetSpec::Chessboard(*grid), DetectOptions::live()).expect("the image can be searched")
+}
+
+fn main() {
+    let views = std::env::args().nth(1).map_or(24, |n| n.parse().expect("a number of views"));
+    let at = Look::published;
+    let mut cases: Vec<(String, Look)> =
+        [(0.0, 0.0), (0.5, 0.0), (0.7, 2.0), (1.0, 2.0), (0.7, 5.0), (1.5, 2.0), (2.5, 2.0), (0.7, 10.0)]
+            .into_iter()
+            .map(|(blur, noise)| (format!("blur {blur} px, noise {noise}"), at(blur, noise)))
+            .collect();
+    let usual = at(0.7, 2.0);
+    cases.extend([
+        ("squares of 8 px".to_owned(), Look { square_px: 8.0, ..usual }),
+        ("squares of 30 px".to_owned(), Look { square_px: 30.0, ..usual }),
+        ("tilt up to 65°".to_owned(), Look { max_tilt: 1.13, ..usual }),
+        ("wide lens".to_owned(), Look { focal_px: 400.0, radial: -0.1, ..usual }),
+        ("light falls to a third".to_owned(), Look { fall: 1.0, ..usual }),
+        ("saturated".to_owned(), Look { light: 300.0, dark: -20.0, ..usual }),
+        ("contrast 20".to_owned(), Look { light: 70.0, dark: 50.0, ..usual }),
+    ]);
+    for (name, look) in cases {
+        println!("{name}");
+        let pictures: Vec<Picture> = (0..views).map(|seed| view(&look, seed)).collect();
+        for detector in &DETECTORS {
+            rendered(detector, &look, &pictures);
+        }
+    }
+    real::all();
+}
+
+fn rendered(detector: &Detector, look: &Look, pictures: &[Picture]) {
+    let grid = Grid { columns: look.columns, rows: look.rows, square_m: 1.0 };
+    // Of an odd size it does not have, the board is not there: as much texture, but nothing to find.
+    let other = Grid { columns: look.columns + 1, ..grid };
+    let (mut found, mut hit_ms, mut miss_ms) = (0, Vec::new(), Vec::new());
+    let (mut errors, mut normalised): (Vec<Vector2<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
+    for picture in pictures {
+        miss_ms.push(timed(detector, &picture.image, &other).1);
+        let (corners, ms) = timed(detector, &picture.image, &grid);
+        let Some(corners) = corners else { continue };
+        found += 1;
+        hit_ms.push(ms);
+        for corner in corners {
+            let nearest = picture.truth.iter().map(|t| corner.px - t).min_by(|a, b| a.norm().total_cmp(&b.norm()));
+            let Some(error) = nearest else { continue };
+            errors.push(error);
+            if let Some(inverse) = corner.covariance_px2.and_then(Matrix2::try_inverse) {
+                normalised.push(error.dot(&(inverse * error)) / 2.0);
+            }
+        }
+    }
+    let mean = |all: &mut dyn Iterator<Item = f64>, count: usize| all.sum::<f64>() / count.max(1) as f64;
+    let rms = (mean(&mut errors.iter().map(nalgebra::Matrix::norm_squared), errors.len()) / 2.0).sqrt();
+    let worst = errors.iter().map(nalgebra::Matrix::norm).fold(0.0, f64::max);
+    let unit = mean(&mut normalised.iter().copied(), normalised.len()).sqrt();
+    let megapixels = f64::from(look.size.0) * f64::from(look.size.1) / 1e6;
+    println!(
+        "  {:37} found {found}/{}, RMS per axis {rms:.4} px, worst {worst:.3} px, normalised {unit:.2}, \
+         {:.2} ms/MP found, {:.2} ms/MP not found",
+        detector.name,
+        pictures.len(),
+        median(&mut hit_ms) / megapixels,
+        median(&mut miss_ms) / megapixels
+    );
+}
+
+/// What is found, and the shortest of three times in milliseconds: the machine may do something else besides.
+pub fn timed(detector: &Detector, image: &GrayImage, grid: &Grid) -> (Option<Vec<Corner>>, f64) {
+    let mut shortest = f64::INFINITY;
+    let mut corners = None;
+    for _ in 0..3 {
+        let start = Instant::now();
+        corners = (detector.find)(image, grid);
+        shortest = shortest.min(start.elapsed().as_secs_f64() * 1e3);
+    }
+    (corners, shortest)
+}
+
+/// The middle of them; sorts them.
+pub fn median(all: &mut [f64]) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+}

@@ -1,0 +1,75 @@
+//! Boards found in the reference sets, and how well a detector repeats itself on a robot that returns to one pose.
+
+use std::path::{Path, PathBuf};
+
+use handeye_core::image::GrayImage;
+use handeye_core::observation::Corner;
+use handeye_core::target::Grid;
+use nalgebra::Vector2;
+
+use crate::{DETECTORS, Detector, median, timed};
+
+/// Folder, columns and rows.
+const SETS: [(&str, usize, usize); 8] = [
+    ("visp_franka_eye_in_hand", 9, 6),
+    ("rwhe_kuka_1_eye_in_hand/images", 28, 17),
+    ("rwhe_cs_synthetic_3/images", 9, 6),
+    ("caliban_no_curv/images", 14, 9),
+    ("opencv_stereo_9x6", 9, 6),
+    ("alim_repeatability_intrinsics/cam1_intrinsics", 9, 7),
+    ("alim_repeatability_intrinsics/repeatability", 9, 7),
+    // No board of this size is in these: the time of a miss.
+    ("rct_circles_eye_in_hand/images", 9, 6),
+];
+
+pub fn all() {
+    let data = std::env::var_os("HANDEYE_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
+    if !data.is_dir() {
+        println!("skipped: no data sets at {}", data.display());
+        return;
+    }
+    for (folder, columns, rows) in SETS {
+        println!("{folder}");
+        let images: Vec<GrayImage> = images(&data.join(folder));
+        for detector in &DETECTORS {
+            one(detector, &images, &Grid { columns, rows, square_m: 1.0 }, folder.ends_with("/repeatability"));
+        }
+    }
+}
+
+fn images(folder: &Path) -> Vec<GrayImage> {
+    let entries = std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == "png" || e == "jpg"));
+    paths.sort();
+    let load = |path: &PathBuf| handeye_core::image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    paths.iter().map(|path| load(path).to_luma8()).collect()
+}
+
+fn one(detector: &Detector, images: &[GrayImage], grid: &Grid, repeats: bool) {
+    let (mut times, mut views) = (Vec::new(), Vec::new());
+    for image in images {
+        let (corners, ms) = timed(detector, image, grid);
+        times.push(ms / (f64::from(image.width()) * f64::from(image.height()) / 1e6));
+        views.extend(corners);
+    }
+    println!("  {:37} found {}/{}, {:.2} ms/MP", detector.name, views.len(), images.len(), median(&mut times));
+    if repeats && views.len() > 1 {
+        println!("  {:37} repeats to {:.4} px per axis", "", repeatability(&views));
+    }
+}
+
+/// Standard deviation per axis of the corners over the views, without the common shift of each view.
+fn repeatability(views: &[Vec<Corner>]) -> f64 {
+    let (count, corners) = (views.len() as f64, views[0].len());
+    let mean: Vec<Vector2<f64>> =
+        (0..corners).map(|i| views.iter().map(|v| v[i].px).sum::<Vector2<f64>>() / count).collect();
+    let mut sum = 0.0;
+    for view in views {
+        let off: Vec<Vector2<f64>> = view.iter().zip(&mean).map(|(c, m)| c.px - m).collect();
+        let shift = off.iter().sum::<Vector2<f64>>() / corners as f64;
+        sum += off.iter().map(|o| (o - shift).norm_squared()).sum::<f64>();
+    }
+    (sum / (2.0 * (count - 1.0) * (corners as f64 - 1.0))).sqrt()
+}
