@@ -6,46 +6,22 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::{DatasetError, DatasetProblem};
+use super::joints::{JointColumns, RawArm, joint_columns};
+use super::target_table::RawTarget;
 use super::text::line_of;
 use crate::camera::{Distortion, Intrinsics};
 use crate::handeye::Mode;
 use crate::image_file::one_line;
-use crate::target::{Grid, TargetSpec};
-
-/// Most points along a side of a target; ten times the largest printed boards, and small enough to allocate.
-const MOST_POINTS: i64 = 1000;
-/// A line of points determines no pose, two lines leave nothing to check; no detector takes less than three.
-const FEWEST_POINTS: i64 = 3;
+use crate::target::TargetSpec;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawConfig {
     mode: Option<Mode>,
     target: RawTarget,
-    robot: Option<RawRobot>,
+    robot: Option<Spanned<RawRobot>>,
     camera: Option<Spanned<RawCamera>>,
 }
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawTarget {
-    kind: RawKind,
-    columns: Spanned<i64>,
-    rows: Spanned<i64>,
-    square_m: Spanned<f64>,
-    corners: Option<String>,
-    poses: Option<String>,
-}
-
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum RawKind {
-    Chessboard,
-    Circles,
-}
-
-/// Kinds that the file format knows and this version does not.
-const UNSUPPORTED_KINDS: [&str; 4] = ["charuco", "aprilgrid", "apriltag", "asymmetric_circles"];
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -56,6 +32,9 @@ struct RawRobot {
     /// Needed for the conventions with angles; elsewhere it may stand and says nothing.
     angle_unit: Option<AngleUnit>,
     pose: PoseDirection,
+    joints: Option<Spanned<i64>>,
+    joint_unit: Option<AngleUnit>,
+    arm: Option<Spanned<RawArm>>,
 }
 
 /// The table `[robot]`.
@@ -65,6 +44,8 @@ pub(super) struct RobotConfig {
     pub length_unit: LengthUnit,
     pub rotation: RotationConvention,
     pub pose: PoseDirection,
+    /// Columns of joint angles after those of the rotation, if there are any.
+    pub joints: Option<JointColumns>,
 }
 
 /// How a row of a pose table writes its rotation.
@@ -188,12 +169,8 @@ impl Config {
             let why = "describe the target, the robot and the camera";
             return Err(DatasetError::new(file, None, DatasetProblem::Empty(why)));
         }
-        // Before the keys are checked: other kinds have other keys, and the kind is the news.
-        if let Some((kind, span)) = unsupported_kind(text).map_err(|e| toml_error(&e))? {
-            return Err(at(span, DatasetProblem::UnsupportedTarget { kind }));
-        }
         let raw: RawConfig = toml::from_str(text).map_err(|e| toml_error(&e))?;
-        let target = target_spec(&raw.target).map_err(|(span, problem)| at(span, problem))?;
+        let target = raw.target.spec().map_err(|(span, problem)| at(span, problem))?;
         let camera = raw
             .camera
             .as_ref()
@@ -201,7 +178,7 @@ impl Config {
             .transpose()
             .map_err(|(span, problem)| at(span, problem))?;
         let whole_file = |problem| DatasetError::new(file, None, problem);
-        let robot = raw.robot.map(robot_config).transpose().map_err(whole_file)?;
+        let robot = raw.robot.as_ref().map(robot_config).transpose().map_err(|(span, problem)| at(span, problem))?;
         let config =
             Self { mode: raw.mode, target, corners: raw.target.corners, target_poses: raw.target.poses, robot, camera };
         config.check_together().map_err(whole_file)?;
@@ -226,24 +203,15 @@ impl Config {
     }
 }
 
-type Spanning = (std::ops::Range<usize>, DatasetProblem);
+pub(super) type Spanning = (std::ops::Range<usize>, DatasetProblem);
 
-fn unsupported_kind(text: &str) -> Result<Option<(String, std::ops::Range<usize>)>, toml::de::Error> {
-    let document = toml::de::DeTable::parse(text)?;
-    let kind = document.get_ref().get("target").and_then(|t| t.get_ref().as_table()).and_then(|t| t.get("kind"));
-    Ok(kind.and_then(|kind| {
-        let name = kind.get_ref().as_str()?;
-        UNSUPPORTED_KINDS.contains(&name).then(|| (name.to_owned(), kind.span()))
-    }))
-}
-
-fn robot_config(raw: RawRobot) -> Result<RobotConfig, DatasetProblem> {
+fn robot_config(raw: &Spanned<RawRobot>) -> Result<RobotConfig, Spanning> {
+    let whole = raw.span();
+    let raw = raw.get_ref();
     let angle_unit = || {
-        raw.angle_unit.ok_or(DatasetProblem::MissingKey {
-            table: "robot",
-            key: "angle_unit",
-            why: "rotation_vector and rpy are angles, \"rad\" or \"deg\"",
-        })
+        let why = "rotation_vector and rpy are angles, \"rad\" or \"deg\"";
+        let missing = DatasetProblem::MissingKey { table: "robot", key: "angle_unit", why };
+        raw.angle_unit.ok_or_else(|| (whole.clone(), missing))
     };
     let rotation = match raw.rotation {
         RawRotation::QuaternionXyzw => RotationConvention::QuaternionXyzw,
@@ -252,28 +220,8 @@ fn robot_config(raw: RawRobot) -> Result<RobotConfig, DatasetProblem> {
         RawRotation::Rpy => RotationConvention::Rpy(angle_unit()?),
         RawRotation::Matrix => RotationConvention::Matrix,
     };
-    Ok(RobotConfig { poses: raw.poses, length_unit: raw.length_unit, rotation, pose: raw.pose })
-}
-
-fn target_spec(raw: &RawTarget) -> Result<TargetSpec, Spanning> {
-    let points = |key, value: &Spanned<i64>| {
-        let n = *value.get_ref();
-        if (FEWEST_POINTS..=MOST_POINTS).contains(&n) {
-            return Ok(n as usize);
-        }
-        Err(bad(value, key, "a whole number of points from 3 to 1000 (a chessboard counts inner corners)"))
-    };
-    let columns = points("columns", &raw.columns)?;
-    let rows = points("rows", &raw.rows)?;
-    let square_m = *raw.square_m.get_ref();
-    if !(square_m.is_finite() && square_m > 0.0) {
-        return Err(bad(&raw.square_m, "square_m", "a positive length in metres"));
-    }
-    let grid = Grid { columns, rows, square_m };
-    Ok(match raw.kind {
-        RawKind::Chessboard => TargetSpec::Chessboard(grid),
-        RawKind::Circles => TargetSpec::Circles(grid),
-    })
+    let joints = joint_columns(raw.joints.as_ref(), raw.joint_unit, raw.arm.as_ref(), whole.clone())?;
+    Ok(RobotConfig { poses: raw.poses.clone(), length_unit: raw.length_unit, rotation, pose: raw.pose, joints })
 }
 
 fn camera_config(raw: &Spanned<RawCamera>, row: usize) -> Result<CameraConfig, Spanning> {
@@ -362,6 +310,6 @@ fn pixels(key: &'static str, value: &Spanned<i64>) -> Result<u32, Spanning> {
     }
 }
 
-fn bad<T: std::fmt::Display>(value: &Spanned<T>, key: &'static str, want: &'static str) -> Spanning {
+pub(super) fn bad<T: std::fmt::Display>(value: &Spanned<T>, key: &'static str, want: &'static str) -> Spanning {
     (value.span(), DatasetProblem::BadValue { key, value: value.get_ref().to_string(), want })
 }

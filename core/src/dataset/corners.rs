@@ -66,7 +66,7 @@ pub(super) fn read_corners(file: &TextFile, target: &TargetSpec) -> Result<Corne
             let what = format!("column {at_column}, row {at_row} of image {:?}", shown(name));
             return Err(table.fail(row, DatasetProblem::Duplicate { what, first_row }));
         }
-        let corner = Corner { index, px: Vector2::from(table.numbers::<2>(row, 3)?) };
+        let corner = Corner::new(index, Vector2::from(table.numbers::<2>(row, 3)?));
         let image = images.entry(path).or_insert_with(|| ImageCorners { name: name.to_owned(), points: Vec::new() });
         image.points.push((row.line, corner));
     }

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::arm::ArmError;
 use crate::image_file::ImageFileError;
 
 /// What is wrong, in which file, and in which of its rows. One line of text: `FILE, row N: what, and what to do`.
@@ -94,14 +95,24 @@ pub enum DatasetProblem {
     /// Two keys that exclude each other.
     #[error("{0}")]
     Conflict(&'static str),
-    /// A target of the file format that this version does not know how to find.
-    #[error(
-        "target kind {kind:?} is not supported by this version, which finds chessboard and circles: use one of these \
-         boards, or for poses measured elsewhere (poses = …) describe any grid, since its points are not used"
-    )]
-    UnsupportedTarget {
-        /// The kind.
-        kind: String,
+    /// Joint angles for another arm.
+    #[error("joints = {got}, but the arm of [robot.arm] has {need}")]
+    JointCount {
+        /// What `joints` says.
+        got: usize,
+        /// Joints of the arm.
+        need: usize,
+    },
+    /// An arm that is none.
+    #[error("[robot.arm]: {0}")]
+    Arm(ArmError),
+    /// A key of another kind of target.
+    #[error("{key} does not belong to a target of kind {kind:?}: remove it, or check the kind")]
+    ForeignKey {
+        /// The key.
+        key: &'static str,
+        /// The kind that is stated.
+        kind: &'static str,
     },
     /// The coefficients do not fit the model.
     #[error("distortion has {got} numbers, model {model} takes {need}")]
@@ -174,7 +185,7 @@ pub enum DatasetProblem {
     #[error("r11…r33 is not a rotation matrix: {0}")]
     NotARotation(String),
     /// An angle that nobody writes in radians, or a typing error.
-    #[error("{column} = {value} {unit} is more than two turns: check angle_unit")]
+    #[error("{column} = {value} {unit} is more than two turns: check {key}")]
     AngleTooLarge {
         /// The column.
         column: &'static str,
@@ -182,6 +193,8 @@ pub enum DatasetProblem {
         value: f64,
         /// The unit as declared.
         unit: &'static str,
+        /// The key that declares it.
+        key: &'static str,
     },
     /// The same image, or the same point of it, twice.
     #[error("{what} is already in row {first_row}: remove one of the two")]

@@ -13,14 +13,19 @@
 //! | `rpy` | `roll,pitch,yaw` (or `rx,ry,rz`): URDF, R = Rz(yaw)·Ry(pitch)·Rx(roll) |
 //! | `matrix` | `r11,r12,r13,r21,…,r33`, row by row |
 //!
+//! Joint angles follow in columns `q1,q2,…` where `[robot]` says how many there are. With the arm they belong to they tell
+//! how the tip moves with each joint, see [`DatasetArm`].
+//!
 //! A quaternion may be 10⁻³ off unit length, a matrix 2·10⁻³ off orthonormal; both are then made exact.
 
 mod config;
 mod corners;
 mod error;
 mod images;
+mod joints;
 mod natural_order;
 mod poses;
+mod target_table;
 mod text;
 pub mod write;
 
@@ -29,7 +34,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, RgbImage};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector6};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
@@ -43,6 +48,7 @@ use crate::target::TargetSpec;
 use config::{Config, PoseDirection};
 use corners::CornerTable;
 pub use error::{DatasetError, DatasetProblem};
+pub use joints::DatasetArm;
 use poses::PoseRow;
 use text::TextFile;
 
@@ -64,6 +70,8 @@ pub struct Dataset {
     pub entries: Vec<Entry>,
     /// Width and height in pixels of every image; `None` only for pose pairs without images.
     pub image_size: Option<(u32, u32)>,
+    /// The arm that the joint angles belong to, and whether they fit the poses; `None` when `[robot.arm]` is absent.
+    pub arm: Option<DatasetArm>,
     pose_table: Option<PathBuf>,
     /// Name in the data set and SHA-256 of every text file.
     sources: Vec<(String, [u8; 32])>,
@@ -90,6 +98,11 @@ pub struct Entry {
     pub image_path: Option<PathBuf>,
     /// Tip pose as the controller reported it; `None` when there is no robot.
     pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// Joint angles as the controller reported them, radians; `None` when the pose table has none.
+    pub joints_rad: Option<Vec<f64>>,
+    /// How the tip moves with each joint, see [`crate::arm::Arm::tip_by_joint_at`]; empty without joint angles, without
+    /// the arm, or where the two do not fit the poses, see [`Dataset::arm`].
+    pub tip_by_joint: Vec<Vector6<f64>>,
     /// Corners detected elsewhere, sorted by index, empty when the target was not found in this image; `None` when
     /// the data set has no corner table.
     pub corners: Option<Vec<Corner>>,
@@ -121,7 +134,7 @@ impl Dataset {
             entries.take_corner_images(file, corners)?;
         }
         let mut target_poses = match (&target_poses_file, &config.robot) {
-            (Some(file), Some(robot)) => entries.target_poses(file, poses::read_poses(file, robot)?)?,
+            (Some(file), Some(robot)) => entries.target_poses(file, poses::read_poses(file, robot, None)?)?,
             _ => BTreeMap::new(),
         };
 
@@ -144,11 +157,15 @@ impl Dataset {
                 name: view.name.clone(),
                 image_path: size.map(|_| folder.join(&view.path)),
                 base_from_tip: view.pose.zip(direction).map(|(pose, direction)| base_from_tip(pose, direction)),
+                joints_rad: view.joints_rad.clone(),
+                tip_by_joint: Vec::new(),
                 corners,
                 camera_from_target: target_poses.remove(&view.path).map(Pose::from_isometry),
                 row: view.row,
             });
         }
+        let joints = config.robot.as_ref().and_then(|robot| robot.joints.as_ref());
+        let arm = joints.and_then(|joints| joints.arm.clone()).map(|model| DatasetArm::of(model, &mut out));
         let files = [Some(&description), poses_file.as_ref(), corners_file.as_ref(), target_poses_file.as_ref()];
         let sources = files.into_iter().flatten().map(|f| (f.name.display().to_string(), f.sha256)).collect();
         Ok(Self {
@@ -158,6 +175,7 @@ impl Dataset {
             camera,
             entries: out,
             image_size,
+            arm,
             pose_table: poses_file.map(|f| f.path),
             sources,
         })
@@ -235,6 +253,13 @@ struct View {
     path: PathBuf,
     row: Option<usize>,
     pose: Option<Isometry3<f64>>,
+    joints_rad: Option<Vec<f64>>,
+}
+
+impl View {
+    fn of_image(name: String, path: PathBuf) -> Self {
+        Self { name, path, row: None, pose: None, joints_rad: None }
+    }
 }
 
 /// The views, and where messages about them point.
@@ -266,9 +291,7 @@ impl EntryList<'_> {
                 .min_by_key(|(_, image)| image.line())
                 .map_or(Ok(()), |(_, image)| Err(no_pose(file, image.line(), &image.name, poses)));
         }
-        let added: Vec<View> = unknown
-            .map(|(path, image)| View { name: image.name.clone(), path: path.clone(), row: None, pose: None })
-            .collect();
+        let added: Vec<View> = unknown.map(|(path, image)| View::of_image(image.name.clone(), path.clone())).collect();
         self.views.extend(added);
         self.views.sort_by(|a, b| natural_order::compare(&a.path.to_string_lossy(), &b.path.to_string_lossy()));
         Ok(())
@@ -315,9 +338,14 @@ fn read_table(folder: &Path, name: &str, description: &Path) -> Result<TextFile,
 
 fn views(folder: &Path, config: &Config, poses_file: Option<&TextFile>) -> Result<Vec<View>, DatasetError> {
     if let (Some(file), Some(robot)) = (poses_file, &config.robot) {
-        let rows = poses::read_poses(file, robot)?;
-        let view =
-            |row: PoseRow| View { name: row.name, path: row.path, row: Some(row.line), pose: Some(row.isometry) };
+        let rows = poses::read_poses(file, robot, robot.joints.as_ref())?;
+        let view = |PoseRow { name, path, line, isometry, joints_rad }| View {
+            name,
+            path,
+            row: Some(line),
+            pose: Some(isometry),
+            joints_rad,
+        };
         return Ok(rows.into_iter().map(view).collect());
     }
     let paths = images::list(folder)?;
@@ -325,10 +353,7 @@ fn views(folder: &Path, config: &Config, poses_file: Option<&TextFile>) -> Resul
         let why = "no images (png, jpg, bmp or tif) in this folder or in its images folder";
         return Err(DatasetError::new(folder, None, DatasetProblem::Empty(why)));
     }
-    Ok(paths
-        .into_iter()
-        .map(|path| View { name: path.to_string_lossy().into_owned(), path, row: None, pose: None })
-        .collect())
+    Ok(paths.into_iter().map(|path| View::of_image(path.to_string_lossy().into_owned(), path)).collect())
 }
 
 fn base_from_tip(pose: Isometry3<f64>, direction: PoseDirection) -> Pose<Base, Tip> {

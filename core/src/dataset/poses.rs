@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vec
 
 use super::config::{AngleUnit, LengthUnit, RobotConfig, RotationConvention};
 use super::error::{DatasetError, DatasetProblem, shown};
+use super::joints::{self, JointColumns};
 use super::text::{Row, Table, TextFile};
 use crate::se3;
 
@@ -30,11 +31,20 @@ pub(super) struct PoseRow {
     pub line: usize,
     /// The transform as the table gives it.
     pub isometry: Isometry3<f64>,
+    /// Joint angles in radians, where the table has them.
+    pub joints_rad: Option<Vec<f64>>,
 }
 
-/// Reads the poses of a table in the conventions of `[robot]`. No image is there twice.
-pub(super) fn read_poses(file: &TextFile, conventions: &RobotConfig) -> Result<Vec<PoseRow>, DatasetError> {
-    let table = Table::parse(file, &headers(conventions.rotation), "one row per view is needed")?;
+/// Reads the poses of a table in the conventions of `[robot]`, and the joint angles if it has them. No image is there
+/// twice.
+pub(super) fn read_poses(
+    file: &TextFile,
+    conventions: &RobotConfig,
+    joints: Option<&JointColumns>,
+) -> Result<Vec<PoseRow>, DatasetError> {
+    let joint_names = joints.map_or(&[][..], |joints| &joints::COLUMNS[..joints.count]);
+    let headers: Vec<_> = headers(conventions.rotation).iter().map(|header| [header, joint_names].concat()).collect();
+    let table = Table::parse(file, &headers, "one row per view is needed")?;
     let mut first_rows = BTreeMap::new();
     let mut poses = Vec::with_capacity(table.rows.len());
     for row in &table.rows {
@@ -46,7 +56,8 @@ pub(super) fn read_poses(file: &TextFile, conventions: &RobotConfig) -> Result<V
         }
         first_rows.insert(path.clone(), row.line);
         let isometry = read_pose(&table, row, conventions)?;
-        poses.push(PoseRow { name: name.to_owned(), path, line: row.line, isometry });
+        let joints_rad = joints.map(|joints| read_joints(&table, row, joints)).transpose()?;
+        poses.push(PoseRow { name: name.to_owned(), path, line: row.line, isometry, joints_rad });
     }
     Ok(poses)
 }
@@ -80,11 +91,11 @@ fn read_pose(table: &Table<'_>, row: &Row, conventions: &RobotConfig) -> Result<
             unit_quaternion(Quaternion::new(w, x, y, z)).map_err(|p| table.fail(row, p))?
         }
         RotationConvention::RotationVector(unit) => {
-            let vector = angles(table, row, FIRST_OF_ROTATION, unit)?;
+            let vector = rotation_angles(table, row, FIRST_OF_ROTATION, unit)?;
             UnitQuaternion::from_scaled_axis(Vector3::from(vector))
         }
         RotationConvention::Rpy(unit) => {
-            let [roll, pitch, yaw] = angles(table, row, FIRST_OF_ROTATION, unit)?;
+            let [roll, pitch, yaw] = rotation_angles(table, row, FIRST_OF_ROTATION, unit)?;
             // URDF: about the fixed axes x, then y, then z. nalgebra builds the same product Rz·Ry·Rx.
             UnitQuaternion::from_euler_angles(roll, pitch, yaw)
         }
@@ -96,21 +107,30 @@ fn read_pose(table: &Table<'_>, row: &Row, conventions: &RobotConfig) -> Result<
     Ok(Isometry3::from_parts(Translation3::from(translation), rotation))
 }
 
-fn angles(table: &Table<'_>, row: &Row, first: usize, unit: AngleUnit) -> Result<[f64; 3], DatasetError> {
+/// The last columns of a row.
+fn read_joints(table: &Table<'_>, row: &Row, joints: &JointColumns) -> Result<Vec<f64>, DatasetError> {
+    let first = table.column_count() - joints.count;
+    (0..joints.count).map(|i| angle(table, row, first + i, joints.unit, "joint_unit")).collect()
+}
+
+fn rotation_angles(table: &Table<'_>, row: &Row, first: usize, unit: AngleUnit) -> Result<[f64; 3], DatasetError> {
+    let at = |i| angle(table, row, first + i, unit, "angle_unit");
+    Ok([at(0)?, at(1)?, at(2)?])
+}
+
+/// An angle in radians; `key` declares its unit.
+fn angle(table: &Table<'_>, row: &Row, column: usize, unit: AngleUnit, key: &'static str) -> Result<f64, DatasetError> {
     let (radians_per_unit, unit) = match unit {
         AngleUnit::Degree => (std::f64::consts::PI / 180.0, "deg"),
         AngleUnit::Radian => (1.0, "rad"),
     };
-    let mut angles = table.numbers::<3>(row, first)?;
-    for (i, angle) in angles.iter_mut().enumerate() {
-        let value = *angle;
-        *angle *= radians_per_unit;
-        if angle.abs() > LARGEST_ANGLE_RAD {
-            let column = table.column_name(first + i);
-            return Err(table.fail(row, DatasetProblem::AngleTooLarge { column, value, unit }));
-        }
+    let value = table.number(row, column)?;
+    let angle = value * radians_per_unit;
+    if angle.abs() > LARGEST_ANGLE_RAD {
+        let column = table.column_name(column);
+        return Err(table.fail(row, DatasetProblem::AngleTooLarge { column, value, unit, key }));
     }
-    Ok(angles)
+    Ok(angle)
 }
 
 fn unit_quaternion(q: Quaternion<f64>) -> Result<UnitQuaternion<f64>, DatasetProblem> {

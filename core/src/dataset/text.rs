@@ -160,6 +160,10 @@ impl<'a> Table<'a> {
         })
     }
 
+    pub fn column_count(&self) -> usize {
+        self.columns.len()
+    }
+
     pub fn column_name(&self, column: usize) -> &'static str {
         self.columns[column]
     }

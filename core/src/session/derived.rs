@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::document::Document;
 use super::error::{SessionError, SessionProblem};
 use super::history::History;
 use super::{DOCUMENT, session_file};
@@ -32,9 +31,8 @@ impl Derived {
         let document = history.document();
         let json = session_file::to_json(document, sequence, history.last_capture())
             .map_err(|problem| SessionError::new(&folder.join(DOCUMENT), problem))?;
-        for ((name, text), written) in
-            NAMES.into_iter().zip([description(document), pose_table(document), json]).zip(&mut self.written)
-        {
+        let (description, pose_table) = document.as_dataset();
+        for ((name, text), written) in NAMES.into_iter().zip([description, pose_table, json]).zip(&mut self.written) {
             if written.as_ref() == Some(&text) {
                 continue;
             }
@@ -47,14 +45,4 @@ impl Derived {
         }
         Ok(())
     }
-}
-
-fn description(document: &Document) -> String {
-    let meta = &document.meta;
-    dataset::write::description(meta.mode, &meta.target, meta.camera.as_ref())
-}
-
-/// The captures in use and no others, so that the command line solves what the window solves.
-fn pose_table(document: &Document) -> String {
-    dataset::write::pose_table(document.in_use().map(|c| (c.image.as_str(), &c.base_from_tip)))
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::edit::EditError;
 use super::pose_record;
+use crate::arm::ArmModel;
 use crate::camera::Intrinsics;
 use crate::dataset::CameraInput;
 use crate::frames::{Base, Pose, Tip};
@@ -50,6 +51,9 @@ pub struct SessionMeta {
     pub seeds: BTreeMap<String, u64>,
     /// The truth that a simulated cell publishes; for reports, never for a solver.
     pub ground_truth: Option<GroundTruth>,
+    /// The arm, where it is known: what the joint angles of the captures belong to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arm: Option<ArmModel>,
 }
 
 /// What a simulated cell knows.
@@ -189,9 +193,9 @@ impl Document {
 impl SessionMeta {
     /// Checks what the types do not say.
     pub(super) fn check(&self) -> Result<(), EditError> {
-        let grid = self.target.grid();
-        if grid.columns < 3 || grid.rows < 3 || !(grid.square_m.is_finite() && grid.square_m > 0.0) {
-            return Err(bad("target", "needs at least 3 columns and rows and a positive square_m"));
+        self.target.check().map_err(|why| bad("target", &format!("cannot be: {why}")))?;
+        if let Some(Err(e)) = self.arm.as_ref().map(ArmModel::arm) {
+            return Err(bad("arm", &format!("is of no use: {}", one_line(&e))));
         }
         let Some(camera) = &self.camera else { return Ok(()) };
         if camera.fixed && camera.intrinsics.is_none() {

@@ -18,6 +18,7 @@
 //! [`Document`] is what a session says, [`Edit`] what may be done to it, [`History`] both with undo, [`Store`] all
 //! three on a disk. The layout is described in `docs/session.md`.
 
+mod arm_use;
 mod capture;
 mod depth;
 mod derived;

@@ -14,8 +14,8 @@ pub const FORMAT: &str = "handeye-session";
 /// The layout: a reader refuses another one.
 pub const MAJOR_VERSION: u32 = 1;
 /// Additions that an older reader may ignore. 1: `sequence`, `last_capture`, `taught`, `export_names`, and what a
-/// capture has from `id` on.
-pub const MINOR_VERSION: u32 = 1;
+/// capture has from `id` on. 2: `arm`.
+pub const MINOR_VERSION: u32 = 2;
 
 /// The folder of images in a session.
 pub(super) const IMAGES: &str = "images";

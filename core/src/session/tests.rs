@@ -27,6 +27,7 @@ pub(super) fn meta() -> SessionMeta {
         camera: Some(CameraInput { fixed: false, intrinsics: Some(intrinsics), model: intrinsics.distortion }),
         seeds: [("scene".to_owned(), u64::MAX)].into(),
         ground_truth: Some(GroundTruth::new(&links, Some(intrinsics))),
+        arm: None,
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod kinematics;
 pub mod motion;
 pub mod planning;
+pub mod recorded;
 pub mod render;
 pub mod scene;
 pub mod server;

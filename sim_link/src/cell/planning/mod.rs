@@ -159,39 +159,81 @@ pub fn poses_looking_at(setup: &ViewSetup, options: &ViewOptions) -> Result<Vec<
     if !setup.arm.is_free(&setup.start_joints, &setup.obstacles, options.clearance_m) {
         return Err(PlanError::StartBlocked);
     }
-    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-    let (mut not_in_view, mut unreachable, mut in_the_way) = (0, 0, 0);
-    let mut views = Vec::new();
-    for _ in 0..options.candidates {
-        let target_from_camera = draw(setup, options, &mut rng);
+    let mut draws = Draws::new(setup, options);
+    let views = draws.by_ref().flatten().collect();
+    let (chosen, no_path) = choose(setup, options, views);
+    draws.result(chosen, no_path)
+}
+
+/// The first random views that show the whole board, that the arm reaches and that touch nothing: as a person without
+/// a plan would choose them. Whether the arm can be driven from one to the next is not asked.
+///
+/// # Errors
+/// [`PlanError`] says what the candidates failed at.
+pub fn random_poses_looking_at(setup: &ViewSetup, options: &ViewOptions) -> Result<Vec<PlannedView>, PlanError> {
+    let mut draws = Draws::new(setup, options);
+    let views = draws.by_ref().flatten().take(options.count).collect();
+    draws.result(views, 0)
+}
+
+/// Random views, each `None` when something is wrong with it, and what that was.
+struct Draws<'a> {
+    setup: &'a ViewSetup,
+    options: &'a ViewOptions,
+    rng: ChaCha8Rng,
+    drawn: usize,
+    not_in_view: usize,
+    unreachable: usize,
+    in_the_way: usize,
+}
+
+impl<'a> Draws<'a> {
+    fn new(setup: &'a ViewSetup, options: &'a ViewOptions) -> Self {
+        let rng = ChaCha8Rng::seed_from_u64(options.seed);
+        Self { setup, options, rng, drawn: 0, not_in_view: 0, unreachable: 0, in_the_way: 0 }
+    }
+
+    fn result(&self, chosen: Vec<PlannedView>, no_path: usize) -> Result<Vec<PlannedView>, PlanError> {
+        if chosen.len() >= self.options.count {
+            return Ok(chosen);
+        }
+        Err(PlanError::TooFewViews {
+            found: chosen.len(),
+            wanted: self.options.count,
+            candidates: self.options.candidates,
+            not_in_view: self.not_in_view,
+            unreachable: self.unreachable,
+            in_the_way: self.in_the_way,
+            no_path,
+        })
+    }
+}
+
+impl Iterator for Draws<'_> {
+    type Item = Option<PlannedView>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (setup, options) = (self.setup, self.options);
+        if self.drawn == options.candidates {
+            return None;
+        }
+        self.drawn += 1;
+        let target_from_camera = draw(setup, options, &mut self.rng);
         if !shows_whole_board(setup, options, &target_from_camera) {
-            not_in_view += 1;
-            continue;
+            self.not_in_view += 1;
+            return Some(None);
         }
         let base_from_tip = setup.base_from_target * target_from_camera * setup.tip_from_camera.inverse();
         let Some(joints) = setup.reach(&base_from_tip) else {
-            unreachable += 1;
-            continue;
+            self.unreachable += 1;
+            return Some(None);
         };
         if !setup.arm.is_free(&joints, &setup.obstacles, options.clearance_m) {
-            in_the_way += 1;
-            continue;
+            self.in_the_way += 1;
+            return Some(None);
         }
-        views.push(PlannedView { joints, base_from_tip });
+        Some(Some(PlannedView { joints, base_from_tip }))
     }
-    let (chosen, no_path) = choose(setup, options, views);
-    if chosen.len() < options.count {
-        return Err(PlanError::TooFewViews {
-            found: chosen.len(),
-            wanted: options.count,
-            candidates: options.candidates,
-            not_in_view,
-            unreachable,
-            in_the_way,
-            no_path,
-        });
-    }
-    Ok(chosen)
 }
 
 /// Orders views so that each is near the one before: less time on the way, but less spread in the first few.

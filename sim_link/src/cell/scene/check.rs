@@ -7,7 +7,7 @@ use super::Scene;
 use super::error::Violation;
 use super::resolved::intrinsics;
 use super::spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, RobotSpec, SimulationSpec, SolidSpec,
+    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, RobotSpec, SimulationSpec, SlipSpec, SolidSpec,
 };
 
 type Check = Result<(), Violation>;
@@ -174,7 +174,8 @@ fn check_lens(intrinsics: &Intrinsics) -> Check {
 }
 
 fn check_board(board: &BoardSpec) -> Check {
-    let BoardSpec { columns, rows, square_m, paper_m, plane, random_offset_mm, random_offset_deg, motion } = board;
+    let BoardSpec { columns, rows, square_m, paper_m, plane, random_offset_mm, random_offset_deg, motion, slip } =
+        board;
     for (field, value) in [("board.columns", *columns), ("board.rows", *rows)] {
         if !(2..=MAX_CORNERS).contains(&value) {
             return violation(field, &value, format!("from 2 to {MAX_CORNERS} inner corners"));
@@ -193,7 +194,16 @@ fn check_board(board: &BoardSpec) -> Check {
     pose("board.plane", plane)?;
     in_range("board.random_offset_mm", *random_offset_mm, 0.0, 1000.0)?;
     in_range("board.random_offset_deg", *random_offset_deg, 0.0, 45.0)?;
-    motion.check("board.motion.")
+    motion.check("board.motion.")?;
+    slip.as_ref().map_or(Ok(()), check_slip)
+}
+
+fn check_slip(slip: &SlipSpec) -> Check {
+    let SlipSpec { at_stop, by_mm } = slip;
+    if *at_stop == 0 {
+        return violation("board.slip.at_stop", at_stop, "a whole number from 1");
+    }
+    by_mm.iter().enumerate().try_for_each(|(axis, mm)| in_range(&format!("board.slip.by_mm[{axis}]"), *mm, -1e3, 1e3))
 }
 
 fn check_image(image: &ImageSpec) -> Check {

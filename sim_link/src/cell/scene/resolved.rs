@@ -11,7 +11,7 @@ use super::board_motion::BoardMotionSpec;
 use super::errors_of_robot::{RobotErrors, gaussian};
 use super::spec::{
     BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo, SimulationSpec,
-    SolidSpec,
+    SlipSpec, SolidSpec,
 };
 use crate::cell::kinematics::{JointAngles, JointLimits, forward};
 
@@ -47,6 +47,8 @@ pub struct ResolvedScene {
     pub world_from_plane: Isometry3<f64>,
     /// How it moves from the start of the simulation on.
     pub board_motion: BoardMotionSpec,
+    /// That it slips once.
+    pub board_slip: Option<SlipSpec>,
     /// What is printed on it.
     pub target: TargetSpec,
     /// Size of the sheet along x and y of the plane, metres.
@@ -124,6 +126,7 @@ pub(super) fn resolve(scene: &Scene, seed: u64) -> ResolvedScene {
         base_from_target: Pose::from_isometry(world_from_plane * plane_from_target(board)),
         world_from_plane,
         board_motion: board.motion,
+        board_slip: board.slip,
         target,
         paper_m: board.paper_m,
         start_joints: robot.start_joints_deg.map(f64::to_radians),

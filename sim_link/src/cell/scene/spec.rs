@@ -179,6 +179,20 @@ pub struct BoardSpec {
     pub random_offset_deg: f64,
     /// How it moves from the start of the simulation on.
     pub motion: BoardMotionSpec,
+    /// That it slips once; it does not by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip: Option<SlipSpec>,
+}
+
+/// A board that is knocked or sags: it moves once, while nobody looks.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SlipSpec {
+    /// It has moved when the arm comes to rest for this time, counted from 1; where the arm stands at the start does
+    /// not count.
+    pub at_stop: u64,
+    /// How far, along x, y and z of the sheet, millimetres.
+    pub by_mm: [f64; 3],
 }
 
 impl Default for BoardSpec {
@@ -192,6 +206,7 @@ impl Default for BoardSpec {
             random_offset_mm: 0.0,
             random_offset_deg: 0.0,
             motion: BoardMotionSpec::default(),
+            slip: None,
         }
     }
 }

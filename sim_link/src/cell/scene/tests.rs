@@ -267,13 +267,15 @@ fn a_solid_on_the_board_goes_where_the_board_goes() {
 
 #[test]
 fn mistakes_in_a_file_are_found_at_their_line() {
-    let cases: [(&str, usize, &str); 12] = [
+    let cases: [(&str, usize, &str); 14] = [
         ("[camera]\nnear = 0.1\n", 2, "camera.near"),
         ("[camera]\nwidth = 640\nheight = \"tall\"\n", 3, "camera.height"),
         ("[robot\n", 1, ""),
         ("[board.motion]\npath = \"spiral\"\n", 2, "board.motion.path"),
         ("[board.motion]\npath = \"step\"\ntilt_deg = 31.0\n", 3, "board.motion.tilt_deg"),
         ("[board.motion]\npath = \"circle\"\nsize_m = 0.01\nspeed_m_s = 0.21\n", 4, "board.motion.speed_m_s"),
+        ("[board.slip]\nat_stop = 0\nby_mm = [5, 0, 0]\n", 2, "board.slip.at_stop"),
+        ("[board.slip]\nat_stop = 1\nby_mm = [5, 0, nan]\n", 3, "board.slip.by_mm[2]"),
         // Not written down: the line of its table.
         ("\n[camera]\n\nnear_m = 5.0\n", 2, "camera.far_m"),
         ("\n[camera]\nfx = 500.0\n", 2, "camera.fy"),

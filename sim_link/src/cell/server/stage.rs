@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use crate::cell::kinematics::{JOINTS, JointAngles, forward};
 use crate::cell::motion::Course;
 use crate::cell::render::{Finish, Shape, Solid, props};
-use crate::cell::scene::{RelativeTo, ResolvedScene, RobotErrors, Scene};
-use crate::cell::world::{Carrier, Faults, Handle, Joint, Kind, Tree, VisionSensor, World, WorldError, turn_z};
+use crate::cell::scene::{RelativeTo, ResolvedScene, RobotErrors, Scene, SlipSpec};
+use crate::cell::world::{Carrier, Chain, Faults, Handle, Joint, Kind, Tree, VisionSensor, World, WorldError, turn_z};
 
 /// Handles of the objects that the cell itself has to find again.
 #[derive(Debug, Clone)]
@@ -41,7 +41,7 @@ pub fn build(scene: &Scene, resolved: &ResolvedScene) -> Result<(World, Stage), 
     let tree = &mut builder.tree;
     let dummy = || Kind::Dummy { size_m: 0.01 };
     let tip = tree.add("Tip", dummy(), Some(connection), resolved.connection_from_tip)?;
-    let world_from_tip = tree.world_pose(tip, crate::cell::world::Chain::Reported)?;
+    let world_from_tip = tree.world_pose(tip, Chain::Reported)?;
     tree.add("Target", dummy(), Some(arm), resolved.world_from_arm.inv_mul(&world_from_tip))?;
     let mut colour = VisionSensor::new(resolved.intrinsics, resolved.near_m, resolved.far_m);
     let mut depth = colour.clone();
@@ -57,7 +57,7 @@ pub fn build(scene: &Scene, resolved: &ResolvedScene) -> Result<(World, Stage), 
     builder.surroundings(scene, resolved, plane)?;
     let mut world = World::default();
     world.tree = builder.tree;
-    world.set_faults(Box::new(ArmFaults::new(joints, tip, resolved.robot_errors)));
+    world.set_faults(Box::new(CellFaults::new(joints, tip, resolved.robot_errors, plane, resolved.board_slip)));
     world.set_robot(joints.to_vec(), tip);
     world.carrier = Some(Carrier::new(plane, Course::new(&resolved.board_motion, resolved.seed)));
     world.set_time_step(resolved.simulation.time_step_s)?;
@@ -153,25 +153,40 @@ fn alias(name: &str) -> String {
         .collect()
 }
 
-/// The errors of the arm as the tree takes them: constant joint offsets, and a displacement of the tip that is another
-/// one every time the arm has come to rest.
+/// The faults of a cell as the tree takes them: of the arm constant joint offsets, and a displacement of the tip that is
+/// another one every time the arm has come to rest; of the board that it slips.
 #[derive(Debug)]
-struct ArmFaults {
+struct CellFaults {
     joints: [Handle; JOINTS],
     tip: Handle,
     errors: RobotErrors,
+    plane: Handle,
+    /// `None` when it has happened.
+    slip: Option<SlipSpec>,
     reported: Option<JointAngles>,
     moving: bool,
     settled: u64,
 }
 
-impl ArmFaults {
-    fn new(joints: [Handle; JOINTS], tip: Handle, errors: RobotErrors) -> Self {
-        Self { joints, tip, errors, reported: None, moving: false, settled: 0 }
+impl CellFaults {
+    fn new(joints: [Handle; JOINTS], tip: Handle, errors: RobotErrors, plane: Handle, slip: Option<SlipSpec>) -> Self {
+        Self { joints, tip, errors, plane, slip, reported: None, moving: false, settled: 0 }
+    }
+
+    /// Moves the board as if somebody had put it there: what is forgotten at the end of the simulation goes back.
+    fn let_slip(&mut self, tree: &mut Tree) {
+        let Some(slip) = self.slip.filter(|slip| self.settled >= slip.at_stop) else { return };
+        self.slip = None;
+        let [x, y, z] = slip.by_mm.map(|mm| mm * 1e-3);
+        // A board that a client has removed slips no more.
+        if let Ok(world_from_plane) = tree.world_pose(self.plane, Chain::Reported) {
+            let slipped = world_from_plane * Translation3::new(x, y, z);
+            let _gone = tree.set_world_pose(self.plane, &slipped).is_err();
+        }
     }
 }
 
-impl Faults for ArmFaults {
+impl Faults for CellFaults {
     fn apply(&mut self, tree: &mut Tree) {
         let reported = self.joints.map(|joint| tree.joint(joint).map_or(0.0, Joint::position_rad));
         let moved = self.reported.is_some_and(|before| before != reported);
@@ -188,6 +203,7 @@ impl Faults for ArmFaults {
         if let Ok(tip) = tree.get_mut(self.tip) {
             tip.displacement = handeye_core::se3::exp(&self.errors.settled(self.settled));
         }
+        self.let_slip(tree);
     }
 }
 

@@ -79,6 +79,28 @@ fn a_faulty_arm_stands_still_differently_after_every_move_and_not_while_it_stand
 }
 
 #[test]
+fn a_board_slips_once_when_the_arm_comes_to_rest_for_the_time_that_the_scene_names() {
+    let mut scene = Scene::default();
+    scene.board.slip = Some(SlipSpec { at_stop: 2, by_mm: [3.0, -4.0, 0.0] });
+    let (mut world, stage, resolved) = cell(&scene);
+    world.start_simulation();
+    let from_start = |world: &World| {
+        let plane = world.tree.world_pose(stage.plane, Chain::Actual).expect("exists");
+        resolved.world_from_plane.inv_mul(&plane).translation.vector
+    };
+    for visit in 1..=4 {
+        for position in [0.1, 0.2, 0.1 * f64::from(visit)] {
+            assert_eq!(from_start(&world).norm() > 1e-9, visit > 2, "on the way to visit {visit}");
+            world.tree.joint_mut(stage.joints[0]).expect("joint").set_position(position).expect("finite");
+            world.run_pass();
+        }
+        world.run_pass();
+        let expected = if visit < 2 { Vector3::zeros() } else { Vector3::new(3e-3, -4e-3, 0.0) };
+        assert!((from_start(&world) - expected).norm() < 1e-12, "visit {visit}: {}", from_start(&world));
+    }
+}
+
+#[test]
 fn names_of_a_scene_become_names_of_a_path() {
     assert_eq!(alias("mounting plate"), "MountingPlate");
     assert_eq!(alias("board/stand [2]"), "BoardStand2");
