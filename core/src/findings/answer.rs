@@ -12,6 +12,8 @@ const MIN_FOR_OUTLIERS: usize = 5;
 const ROBUST_SIGMAS: f64 = 5.0;
 /// And at least so many times the median, because the deviation of a handful of views is itself uncertain.
 const TIMES_MEDIAN: f64 = 3.0;
+/// Length of the six numbers of a correction over the noise levels: passed by chance by one view in 400 000.
+const CORRECTION_SIGMAS: f64 = 6.0;
 /// An influence above this part of the expected error counts: leaving the view out would change what is stated.
 const INFLUENCE: f64 = 0.5;
 /// Prediction error over what the noise levels explain; they are themselves known to a fifth or so.
@@ -28,7 +30,7 @@ pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Find
     let mut found = Vec::new();
     found.extend(influence(calibration, &used));
     found.extend(residuals(&used));
-    found.extend(corrections(&used));
+    found.extend(corrections(calibration, &used));
     found.extend(prediction(calibration));
     found.extend(robot_noise(calibration));
     found.extend(closed_forms(calibration));
@@ -73,7 +75,8 @@ fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding>
         largest_m * 1e3,
         median_m * 1e3
     );
-    let finding = Finding::new(FindingCode::InfluentialView, Severity::Warning, text).of_view(&view.name);
+    // Where a view stands alone is geometry; one that is wrong is told by what it contradicts.
+    let finding = Finding::new(FindingCode::InfluentialView, Severity::Advice, text).of_view(&view.name);
     let finding = finding.with("influence", largest_m * 1e3, "mm").with("median_influence", median_m * 1e3, "mm");
     Some(finding.with("expected_error_95", error_m * 1e3, "mm"))
 }
@@ -89,12 +92,19 @@ fn residuals(used: &[&ViewResult]) -> Option<Finding> {
     Some(finding.with("rms", largest, "px").with("median_rms", middle, "px"))
 }
 
-fn corrections(used: &[&ViewResult]) -> Option<Finding> {
+fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding> {
     let by_distance = stands_out(used, |v| v.correction_m);
     let by_angle = stands_out(used, |v| v.correction_rad);
     // One view is named: that which is out by more of its median.
     let (view, ..) =
         [by_distance, by_angle].into_iter().flatten().max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
+    // Views tell their corrections unequally well, so the median alone is no measure: the noise level must be left too.
+    // One view that makes up all of the noise has at most the root of six times the views.
+    let noise = calibration.noise?;
+    let over_noise = (view.correction_m? / noise.robot_m).hypot(view.correction_rad? / noise.robot_rad);
+    if over_noise < CORRECTION_SIGMAS.min(0.75 * (6.0 * used.len() as f64).sqrt()) {
+        return None;
+    }
     let middle = |value: fn(&ViewResult) -> Option<f64>| median(used.iter().filter_map(|v| value(v)).collect());
     let (mm, deg) = (view.correction_m? * 1e3, view.correction_rad?.to_degrees());
     let (median_mm, median_deg) = (middle(|v| v.correction_m)? * 1e3, middle(|v| v.correction_rad)?.to_degrees());

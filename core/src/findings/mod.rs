@@ -7,6 +7,8 @@
 //! Before a calibration only the views themselves are judged; with one, also the answer.
 
 mod answer;
+mod direction;
+mod set_aside;
 mod views;
 
 use std::fmt;
@@ -14,6 +16,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::calibrate::{Calibration, Observations};
+use crate::findings_record::{EvidenceRecord, FindingRecord};
 
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -22,6 +25,8 @@ use crate::calibrate::{Calibration, Observations};
 pub enum FindingCode {
     /// Fewer views than a calibration takes, or than a good one does.
     TooFewViews,
+    /// A pose or a corner is not a number.
+    NotFinite,
     /// The target was not found in some views.
     TargetNotFound,
     /// The robot hardly turned between the views.
@@ -34,6 +39,42 @@ pub enum FindingCode {
     LittleTilt,
     /// Part of the image was never covered.
     PoorCoverage,
+    /// The robot poses are inverted: tip from base where base from tip was stated, or the other way round.
+    InvertedPoses,
+    /// The camera sits on the other side: eye-in-hand where eye-to-hand was stated, or the other way round.
+    WrongMode,
+    /// Numbers of quaternions are in another order than stated.
+    WrongQuaternionOrder,
+    /// Robot poses are in millimetres where metres were stated, or the other way round.
+    WrongLengthUnit,
+    /// Pictures and robot poses are out of step by one row.
+    ShiftedPoses,
+    /// The target is not of the stated size.
+    WrongScale,
+    /// The intrinsics given do not fit the pictures.
+    WrongIntrinsics,
+    /// The target moved during the session.
+    BoardMoved,
+    /// The camera moved on its mount during the session.
+    CameraMoved,
+    /// The zero of a joint is off.
+    JointOffset,
+    /// The target is bent.
+    BoardBent,
+    /// Views that contradict the others.
+    OutlierView,
+    /// Corners that are not where the rest of their view puts them.
+    OutlierCorners,
+    /// The target looks the same from both ends and was counted from the other one in some views.
+    Renumbered,
+    /// The data scatter more than independent noise explains, and the stated uncertainty was widened.
+    UncertaintyWidened,
+    /// Robot and corner noise cannot be told apart.
+    NoiseUnclear,
+    /// The robot poses contradict the pictures by more than any arm errs.
+    InconsistentPoses,
+    /// One direction of the answer is known much worse than the others.
+    WeakDirection,
     /// One view moves the answer a lot.
     InfluentialView,
     /// One view fits much worse than the others.
@@ -99,18 +140,37 @@ impl fmt::Display for Finding {
 }
 
 impl Finding {
-    fn new(code: FindingCode, severity: Severity, text: String) -> Self {
+    pub(crate) fn new(code: FindingCode, severity: Severity, text: String) -> Self {
         Self { code, severity, evidence: Vec::new(), views: Vec::new(), text }
     }
 
-    fn with(mut self, name: &'static str, value: f64, unit: &'static str) -> Self {
+    pub(crate) fn with(mut self, name: &'static str, value: f64, unit: &'static str) -> Self {
         self.evidence.push(Evidence { name, value, unit });
         self
     }
 
-    fn of_view(mut self, name: &str) -> Self {
+    pub(crate) fn of_view(mut self, name: &str) -> Self {
         self.views.push(name.to_owned());
         self
+    }
+
+    /// As it stands in a document.
+    pub fn to_record(&self) -> FindingRecord {
+        // Both are plain names in snake case.
+        let name =
+            |value: Option<serde_json::Value>| value.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
+        let evidence = |e: &Evidence| EvidenceRecord {
+            name: e.name.to_owned(),
+            value: Some(e.value).filter(|v| v.is_finite()),
+            unit: e.unit.to_owned(),
+        };
+        FindingRecord {
+            code: name(serde_json::to_value(self.code).ok()),
+            severity: name(serde_json::to_value(self.severity).ok()),
+            text: self.text.clone(),
+            views: self.views.clone(),
+            evidence: self.evidence.iter().map(evidence).collect(),
+        }
     }
 
     /// The value of the evidence of that name.
@@ -138,13 +198,20 @@ pub fn findings(
     let mut found = views::findings(observations, calibration);
     if let Some(calibration) = calibration {
         found.extend(answer::findings(calibration, options));
+        found.extend(direction::finding(calibration));
+        found.extend(set_aside::findings(calibration));
     }
-    found.sort_by(|a, b| b.severity.cmp(&a.severity).then(a.code.cmp(&b.code)));
+    sort(&mut found);
     found
 }
 
+/// The most severe first, in the order of the codes within a severity.
+pub(crate) fn sort(found: &mut [Finding]) {
+    found.sort_by(|a, b| b.severity.cmp(&a.severity).then(a.code.cmp(&b.code)));
+}
+
 /// The names of views for a sentence: all of a few, else the first and how many more.
-fn listed(names: &[String]) -> String {
+pub(crate) fn listed(names: &[String]) -> String {
     const SHOWN: usize = 4;
     if names.len() <= SHOWN {
         return names.join(", ");
@@ -153,7 +220,7 @@ fn listed(names: &[String]) -> String {
 }
 
 /// `s` unless there is one.
-fn plural(count: usize) -> &'static str {
+pub(crate) fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 

@@ -1,6 +1,6 @@
 //! What the types of a result do not say: finite, unit length, the frames of the mode.
 
-use super::{CalibrationResult, FORMAT, IntrinsicsEstimate, MethodStatus, TransformEstimate, VERSION};
+use super::{CalibrationResult, EstimateDetails, FORMAT, IntrinsicsEstimate, MethodStatus, TransformEstimate, VERSION};
 use crate::handeye::Mode;
 
 /// How far from 1 the length of a quaternion may be: far above rounding, far below the nine digits that other
@@ -57,8 +57,9 @@ impl CalibrationResult {
         for (i, view) in self.views.iter().enumerate() {
             not_negative(view.rms_px, &format!("views[{i}].rms_px"))?;
             not_negative(view.influence_mm, &format!("views[{i}].influence_mm"))?;
+            not_negative(view.distance, &format!("views[{i}].distance"))?;
         }
-        Ok(())
+        self.estimate.as_ref().map_or(Ok(()), check_estimate)
     }
 
     fn check_links(&self) -> Checked {
@@ -109,6 +110,24 @@ impl CalibrationResult {
         }
         Ok(())
     }
+}
+
+fn check_estimate(estimate: &EstimateDetails) -> Checked {
+    not_negative(estimate.degrees_of_freedom, "estimate.degrees_of_freedom")?;
+    not_negative(estimate.region_scale, "estimate.region_scale")?;
+    not_negative(estimate.view_sigma_px, "estimate.view_sigma_px")?;
+    estimate.reference_point_m.map_or(Ok(()), |p| all_finite(&p, "estimate.reference_point_m"))?;
+    if let Some(widening) = &estimate.widening {
+        require(widening.factor >= 1.0, "estimate.widening.factor", "must be at least 1")?;
+    }
+    if let Some(board) = &estimate.board {
+        all_finite(&board.warp_mm, "estimate.board.warp_mm")?;
+        require(board.scale > 0.0, "estimate.board.scale", "must be positive")?;
+        not_negative(board.scale_sigma, "estimate.board.scale_sigma")?;
+    }
+    let Some(joints) = &estimate.joint_offsets else { return Ok(()) };
+    all_finite(&joints.offsets_deg, "estimate.joint_offsets.offsets_deg")?;
+    all_finite(&joints.sigma_deg, "estimate.joint_offsets.sigma_deg")
 }
 
 impl TransformEstimate {

@@ -5,6 +5,7 @@
 //! `[tx ty tz rx ry rz]` in `T * exp(delta)`.
 
 mod check;
+mod estimate;
 mod file;
 
 use std::fmt;
@@ -17,6 +18,7 @@ use crate::frames::{Camera, Frame, Mount, Pose};
 use crate::handeye::{HandEye, Mode};
 
 pub use check::BadResult;
+pub use estimate::{BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, WideningRecord};
 pub use file::{ResultError, ResultProblem};
 
 /// What `format` says.
@@ -45,6 +47,12 @@ pub struct CalibrationResult {
     pub methods: Vec<MethodResult>,
     /// What became of every view.
     pub views: Vec<ViewResult>,
+    /// Details of a joint estimate; `None` for a closed form and a camera alone.
+    #[serde(default)]
+    pub estimate: Option<EstimateDetails>,
+    /// What is weak or wrong, the most severe first.
+    #[serde(default)]
+    pub findings: Findings,
     /// Comparison with the truth, where a simulated cell publishes it.
     pub truth: Option<TruthComparison>,
     /// What made this result.
@@ -265,6 +273,15 @@ pub struct ViewResult {
     pub rms_px: Option<f64>,
     /// How far the hand-eye translation moves without this view, millimetres.
     pub influence_mm: Option<f64>,
+    /// How far it is from what the other views expect, over the limit from which it is set aside.
+    #[serde(default)]
+    pub distance: Option<f64>,
+    /// Corners of it that were set aside, by their index.
+    #[serde(default)]
+    pub corners_aside: Vec<usize>,
+    /// Whether its target was numbered from the other end than detected.
+    #[serde(default)]
+    pub renumbered: bool,
 }
 
 /// What became of a view.
@@ -316,6 +333,8 @@ impl Default for CalibrationResult {
             quality: Quality::default(),
             methods: Vec::new(),
             views: Vec::new(),
+            estimate: None,
+            findings: Vec::new(),
             truth: None,
             provenance: Provenance::default(),
         }

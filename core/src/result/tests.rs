@@ -39,8 +39,42 @@ pub(crate) fn golden() -> CalibrationResult {
             status,
             rms_px: Some(0.3),
             influence_mm: None,
+            distance: (status == ViewStatus::Outlier).then_some(3.5),
+            corners_aside: vec![4, 17],
+            renumbered: status == ViewStatus::Excluded,
         })
         .collect();
+    result.estimate = Some(EstimateDetails {
+        reference_point_m: Some([0.01, -0.02, 0.45]),
+        degrees_of_freedom: Some(31.5),
+        region_scale: Some(0.97),
+        view_sigma_px: Some(0.0),
+        widening: Some(WideningRecord { factor: 1.4, by: "split_halves".to_owned() }),
+        board: Some(BoardEstimate {
+            warp_mm: [0.16, -0.03],
+            warp_sigma_mm: Some([0.01, 0.02]),
+            scale: 1.0,
+            scale_sigma: None,
+        }),
+        joint_offsets: Some(JointOffsetsEstimate {
+            offsets_deg: vec![0.0, 0.2],
+            sigma_deg: vec![1.0, 0.02],
+            heldout_before_px: 2.0,
+            heldout_after_px: 1.0,
+            accepted: true,
+        }),
+    });
+    result.findings = vec![crate::findings_record::FindingRecord {
+        code: "large_residual".to_owned(),
+        severity: "warning".to_owned(),
+        text: "The corners of view images/0001.png fit badly.".to_owned(),
+        views: vec!["images/0001.png".to_owned()],
+        evidence: vec![crate::findings_record::EvidenceRecord {
+            name: "rms".to_owned(),
+            value: Some(1.5),
+            unit: "px".to_owned(),
+        }],
+    }];
     result.truth = Some(TruthComparison { translation_error_mm: Some(0.2), ..TruthComparison::default() });
     result.provenance.tool_version = "0.1.0".to_owned();
     result.provenance.input_sha256 = Some("00ff".repeat(16));

@@ -1,0 +1,116 @@
+//! The six faults that have to be ranked first, and healthy sessions.
+
+use handeye_core::calibrate::{Method, Observations, calibrate};
+use handeye_core::doctor::{Diagnosis, diagnose};
+use handeye_core::findings::{FindingCode, FindingOptions};
+use handeye_core::handeye::Mode;
+use handeye_core::progress::CancelToken;
+use nalgebra::{Isometry3, Vector3, Vector6};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use crate::sim::{Fault, Setup, changed, session};
+
+/// The diagnosis with the calibration beside it, as the command line makes it.
+pub fn examined(observations: &Observations) -> Diagnosis {
+    let cancel = CancelToken::default();
+    let calibration = calibrate(observations, Method::Joint, &cancel).ok();
+    diagnose(observations, calibration.as_ref(), &FindingOptions::default(), &cancel)
+}
+
+/// The diagnosis of the data alone, which takes a third of the time.
+pub fn examined_alone(observations: &Observations) -> Diagnosis {
+    diagnose(observations, None, &FindingOptions::default(), &CancelToken::default())
+}
+
+fn direction(rng: &mut ChaCha8Rng) -> Vector3<f64> {
+    loop {
+        let v = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        if v.norm() > 0.1 && v.norm() < 1.0 {
+            return v.normalize();
+        }
+    }
+}
+
+fn twist(translation: Vector3<f64>, rotation: Vector3<f64>) -> Vector6<f64> {
+    let mut twist = Vector6::zeros();
+    twist.fixed_rows_mut::<3>(0).copy_from(&translation);
+    twist.fixed_rows_mut::<3>(3).copy_from(&rotation);
+    twist
+}
+
+/// Names of the faults.
+pub const FAULTS: [&str; 6] = [
+    "board slipped 5 mm at view 12",
+    "square 2 % wrong",
+    "joint 4 offset 0.2°",
+    "one view captured in motion",
+    "poses inverted",
+    "millimetres",
+];
+
+/// A session with a fault and the code that has to come first. Both set-ups, with the lens given and estimated, take turns.
+pub fn faulty(fault: usize, seed: u64) -> (Observations, FindingCode) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
+    let mode = if seed.is_multiple_of(2) { Mode::EyeInHand } else { Mode::EyeToHand };
+    let estimated = seed % 4 > 1;
+    // What the arm's repeatability and a small error of its geometry make together.
+    let setup = Setup { estimated, joints: true, ..Setup::new(mode, 20, seed) };
+    match fault {
+        0 => {
+            // A board slips in its plane and turns a little.
+            let angle = rng.random_range(0.0..std::f64::consts::TAU);
+            let slip = Vector3::new(angle.cos(), angle.sin(), 0.0) * 5e-3;
+            let turn = Vector3::z() * rng.random_range(-0.01..0.01);
+            let fault = Fault { board_moved: Some((12, twist(slip, turn))), ..Fault::default() };
+            (session(&setup.with(fault)), FindingCode::BoardMoved)
+        }
+        1 => {
+            let scale = if rng.random::<bool>() { 0.02 } else { -0.02 };
+            (session(&setup.with(Fault { scale, ..Fault::default() })), FindingCode::WrongScale)
+        }
+        2 => {
+            let offset = 0.2f64.to_radians() * if rng.random::<bool>() { 1.0 } else { -1.0 };
+            (session(&setup.with(Fault { joint: Some((3, offset)), ..Fault::default() })), FindingCode::JointOffset)
+        }
+        3 => {
+            // A picture one frame of 30 Hz late, of an arm at 0.1 m/s and 10°/s.
+            let motion = twist(direction(&mut rng) * 3.3e-3, direction(&mut rng) * 0.33f64.to_radians());
+            let moving = vec![(rng.random_range(0..20), motion)];
+            (session(&setup.with(Fault { moving, ..Fault::default() })), FindingCode::OutlierView)
+        }
+        4 => (changed(session(&setup), |p| p.inverse()), FindingCode::InvertedPoses),
+        _ => {
+            let in_millimetres = |mut p: Isometry3<f64>| {
+                p.translation.vector *= 1e3;
+                p
+            };
+            (changed(session(&setup), in_millimetres), FindingCode::WrongLengthUnit)
+        }
+    }
+}
+
+/// A healthy session: set-up, number of views, noise, geometry and what is known are drawn at random.
+pub fn healthy(seed: u64) -> Observations {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x4ea1);
+    let mode = if rng.random::<bool>() { Mode::EyeInHand } else { Mode::EyeToHand };
+    let robot = [(1e-6, 1e-5), (1e-4, 0.02), (5e-4, 0.1)][rng.random_range(0..3usize)];
+    session(&Setup {
+        tilt_deg: rng.random_range(25.0..50.0),
+        roll_deg: rng.random_range(20.0..120.0),
+        corner_px: [0.03, 0.1, 0.3][rng.random_range(0..3usize)],
+        robot_m: robot.0,
+        robot_rad: f64::to_radians(robot.1),
+        estimated: rng.random(),
+        joints: rng.random(),
+        ..Setup::new(mode, rng.random_range(10..=40), seed)
+    })
+}
+
+/// Error of the size found for a target that is 2 % too large, over its uncertainty, squared.
+pub fn scale_error(estimated: bool, seed: u64) -> Option<f64> {
+    let setup = Setup { estimated, ..Setup::new(Mode::EyeInHand, 20, seed) };
+    let diagnosis = examined_alone(&session(&setup.with(Fault { scale: 0.02, ..Fault::default() })));
+    let scale = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale)?.estimate?;
+    Some(((scale.value - 1.02) / scale.sigma?).powi(2))
+}

@@ -1,0 +1,214 @@
+//! Sessions of a simulated cell with known faults: poses and corners, no pictures.
+
+use handeye_core::calibrate::{CameraKnowledge, Observations, ObservedView};
+use handeye_core::camera::{Distortion, Intrinsics};
+use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::handeye::Mode;
+use handeye_core::observation::Corner;
+use handeye_core::se3;
+use handeye_core::target::{Grid, TargetSpec};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
+
+use crate::arm;
+
+/// How views are taken.
+#[derive(Clone)]
+pub struct Setup {
+    pub mode: Mode,
+    pub views: usize,
+    pub tilt_deg: f64,
+    pub roll_deg: f64,
+    /// Noise of a corner in pixels, of the robot in metres and radians, per axis.
+    pub corner_px: f64,
+    pub robot_m: f64,
+    pub robot_rad: f64,
+    /// Whether intrinsics are estimated.
+    pub estimated: bool,
+    pub joints: bool,
+    pub seed: u64,
+    pub fault: Fault,
+}
+
+/// What is wrong.
+#[derive(Clone, Default)]
+pub struct Fault {
+    /// The target moves before this view by a twist in its frame.
+    pub board_moved: Option<(usize, Vector6<f64>)>,
+    /// The camera moves on its mount before this view.
+    pub camera_moved: Option<(usize, Vector6<f64>)>,
+    /// Offset of a joint's zero, radians.
+    pub joint: Option<(usize, f64)>,
+    /// True size of the target over the stated one, minus one.
+    pub scale: f64,
+    /// Deflection of the target's middle, metres.
+    pub warp_m: f64,
+    /// Views taken in motion: the tip was elsewhere by a twist, and the corners are blurred.
+    pub moving: Vec<(usize, Vector6<f64>)>,
+    /// Error of the focal length given, minus one.
+    pub focal: f64,
+}
+
+impl Setup {
+    pub fn new(mode: Mode, views: usize, seed: u64) -> Self {
+        Self {
+            mode,
+            views,
+            tilt_deg: 35.0,
+            roll_deg: 60.0,
+            corner_px: 0.1,
+            robot_m: 1e-4,
+            robot_rad: 0.02f64.to_radians(),
+            estimated: false,
+            joints: false,
+            seed,
+            fault: Fault::default(),
+        }
+    }
+
+    pub fn with(self, fault: Fault) -> Self {
+        Self { fault, ..self }
+    }
+}
+
+pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
+
+fn pose(x: f64, y: f64, z: f64, rotation: Vector3<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_scaled_axis(rotation))
+}
+
+/// The camera on its mount and the target on its anchor.
+pub fn links(mode: Mode) -> (Isometry3<f64>, Isometry3<f64>) {
+    let pi = std::f64::consts::PI;
+    match mode {
+        // Board on the table, face up; camera beside the flange, looking along it.
+        Mode::EyeInHand => (
+            pose(0.05, 0.01, 0.06, Vector3::new(0.1, -0.05, 1.4)),
+            pose(0.42, 0.06, 0.02, Vector3::new(pi - 0.04, 0.03, 0.05)),
+        ),
+        // Camera above the arm, looking down; board held by the flange, face up.
+        Mode::EyeToHand => (
+            pose(0.45, 0.05, 0.95, Vector3::new(pi - 0.1, 0.05, 0.1)),
+            pose(-0.06, -0.04, 0.03, Vector3::new(0.05, -0.1, 0.3)),
+        ),
+    }
+}
+
+pub fn camera() -> Intrinsics {
+    Intrinsics::pinhole(640, 480, 581.0)
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// A random view of the board at 0.4 to 0.6 m.
+fn random_view(rng: &mut ChaCha8Rng, setup: &Setup) -> Isometry3<f64> {
+    let centre = TargetSpec::Chessboard(GRID).centre();
+    let tilt = setup.tilt_deg.to_radians() * rng.random::<f64>().sqrt();
+    let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
+    let roll = setup.roll_deg.to_radians() * rng.random_range(-1.0..=1.0);
+    let jitter = Vector3::new(rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), rng.random_range(0.4..0.6));
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)
+        * UnitQuaternion::from_scaled_axis(Vector3::z() * roll);
+    Isometry3::from_parts(jitter.into(), turn) * Isometry3::translation(-centre.x, -centre.y, -centre.z)
+}
+
+/// Random views of the setup's geometry.
+pub fn session(setup: &Setup) -> Observations {
+    let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+    let mut views = Vec::with_capacity(setup.views);
+    let mut tries = 0;
+    while views.len() < setup.views {
+        tries += 1;
+        assert!(tries < 100 * setup.views + 1000, "no such view is in reach");
+        let planned = random_view(&mut rng, setup);
+        if let Some(view) = observed(setup, &mut rng, views.len(), &planned) {
+            views.push(view);
+        }
+    }
+    observations(setup, views)
+}
+
+/// Views with the given poses of the target in the camera; those out of sight are left out.
+pub fn session_of(setup: &Setup, planned: &[Isometry3<f64>]) -> Observations {
+    let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+    let views = planned.iter().enumerate().filter_map(|(i, p)| observed(setup, &mut rng, i, p)).collect();
+    observations(setup, views)
+}
+
+fn observations(setup: &Setup, views: Vec<ObservedView>) -> Observations {
+    let camera = if setup.estimated {
+        CameraKnowledge::Estimate { model: Distortion::None, start: None }
+    } else {
+        let mut given = camera();
+        given.fx *= 1.0 + setup.fault.focal;
+        given.fy *= 1.0 + setup.fault.focal;
+        CameraKnowledge::Fixed(given)
+    };
+    Observations { mode: Some(setup.mode), target: TargetSpec::Chessboard(GRID), image_size: (640, 480), camera, views }
+}
+
+/// One view: the robot reports the pose planned, and is somewhere else by its noise and the faults.
+fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometry3<f64>) -> Option<ObservedView> {
+    let (mount_from_camera, anchor_from_target) = links(setup.mode);
+    let anchor_from_mount = anchor_from_target * planned.inverse() * mount_from_camera.inverse();
+    let reported = if setup.mode == Mode::EyeInHand { anchor_from_mount } else { anchor_from_mount.inverse() };
+    let fault = &setup.fault;
+    let mut twists = Vec::new();
+    let mut off = Isometry3::identity();
+    if setup.joints || fault.joint.is_some() {
+        let joints = arm::joints_at(&reported)?;
+        twists = arm::tip_by_joint(&joints).to_vec();
+        if let Some((joint, offset)) = fault.joint {
+            let mut really = joints;
+            really[joint] += offset;
+            off = reported.inverse() * arm::base_from_tip(&really);
+        }
+    }
+    let noise = Vector6::from_fn(|i, _| normal(rng) * if i < 3 { setup.robot_m } else { setup.robot_rad });
+    let mut tip = reported * off * se3::exp(&noise);
+    let moving = fault.moving.iter().find(|(view, _)| *view == index).map(|(_, twist)| twist);
+    if let Some(twist) = moving {
+        tip *= se3::exp(twist);
+    }
+    let after = |step: &Option<(usize, Vector6<f64>)>| match step {
+        Some((from, twist)) if index >= *from => se3::exp(twist),
+        _ => Isometry3::identity(),
+    };
+    let mount_from_camera = mount_from_camera * after(&fault.camera_moved);
+    let anchor_from_target = anchor_from_target * after(&fault.board_moved);
+    let mount_from_anchor = if setup.mode == Mode::EyeInHand { tip.inverse() } else { tip };
+    let camera_from_target = mount_from_camera.inverse() * mount_from_anchor * anchor_from_target;
+    let noise_px = if moving.is_some() { 3.0 * setup.corner_px } else { setup.corner_px };
+    let lens = camera();
+    let corners: Vec<Corner> = (0..GRID.len())
+        .map(|i| {
+            let mut point = GRID.point(i);
+            let (u, v) = (2.0 * point.x / (9.0 * GRID.square_m) - 1.0, 2.0 * point.y / (6.0 * GRID.square_m) - 1.0);
+            point.z += fault.warp_m * (2.0 - u * u - v * v);
+            point.coords *= 1.0 + fault.scale;
+            let px = lens.project(&(camera_from_target * point)).ok()?;
+            let seen = Vector2::new(px.x + noise_px * normal(rng), px.y + noise_px * normal(rng));
+            lens.contains(&seen).then_some(Corner::new(i, seen))
+        })
+        .collect::<Option<_>>()?;
+    Some(ObservedView {
+        name: format!("{index:03}"),
+        base_from_tip: Some(Pose::from_isometry(reported)),
+        corners: Some(corners),
+        tip_by_joint: if setup.joints { twists } else { Vec::new() },
+        camera_from_target: None,
+        in_fit: true,
+    })
+}
+
+/// Changes every robot pose.
+pub fn changed(mut observations: Observations, change: impl Fn(Isometry3<f64>) -> Isometry3<f64>) -> Observations {
+    for view in &mut observations.views {
+        view.base_from_tip = view.base_from_tip.map(|p: Pose<Base, Tip>| Pose::from_isometry(change(*p.isometry())));
+    }
+    observations
+}
