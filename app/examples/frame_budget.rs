@@ -246,7 +246,7 @@ fn thousand_views(app: &mut App) {
             .filter_map(|(index, point)| {
                 let px = camera.project(&(camera_from_target.isometry() * point)).ok()?;
                 let off = |phase: f64| 0.07 * (s * 12.9 + index as f64 * 78.2 + phase).sin();
-                Some(Corner { index, px: px + Vector2::new(off(0.0), off(1.0)) })
+                Some(Corner::new(index, px + Vector2::new(off(0.0), off(1.0))))
             })
             .collect();
         document.captures.push(CaptureRecord {

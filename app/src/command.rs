@@ -20,7 +20,7 @@ use crate::model::{
     Dialog, FolderListing, FollowStatus, FollowWish, FrameImages, FrameInfo, ImagePoint, JobId, Jog, JogSettings, Link,
     LinkState, LiveDetection, MotionGoal, MotionId, MotionOutcome, Observed, Overlays, Pane, Preview, RecentSession,
     RerunState, RobotState, RotationFormat, SceneView, SessionState, Severity, Solved, Step, ThemeChoice, Tracked,
-    Viewport, Written,
+    Viewport, WorkBox, Written,
 };
 use crate::text::{Language, Text};
 
@@ -154,6 +154,10 @@ pub enum Command {
     CancelSolve,
     /// Which answer is asked for, by its name.
     SetMethod(String),
+    /// Whether views and corners that do not fit the others stay in the answer.
+    SetKeepOutliers(bool),
+    /// The box of the workspace over which the error is stated; `None` is that about the target.
+    SetTipBox(Option<WorkBox>),
     /// The error that is good enough [m].
     SetGoal(f64),
     /// Where the line between good and bad residuals is [px]; `None` takes it away.

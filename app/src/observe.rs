@@ -44,6 +44,9 @@ pub fn observe(
     progress: &(dyn Fn(usize, usize) + Sync),
     cancel: &CancelToken,
 ) -> Result<Observations, ObserveError> {
+    if let Some(Err(why)) = dataset.arm.as_ref().map(|arm| &arm.placement) {
+        tracing::warn!("the joint angles are not used: {why}");
+    }
     let count = dataset.entries.len();
     let done = AtomicUsize::new(0);
     let corners = map_in_order(count, |index| {
@@ -60,6 +63,7 @@ pub fn observe(
                 name: entry.name.clone(),
                 base_from_tip: entry.base_from_tip,
                 corners: corners.unwrap_or(Err(ObserveError::Cancelled))?,
+                tip_by_joint: entry.tip_by_joint.clone(),
                 camera_from_target: entry.camera_from_target,
                 in_fit: true,
             })

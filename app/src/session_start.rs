@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use handeye_core::calibrate::Method;
+use handeye_core::arm::{ArmKind, ArmModel};
+use handeye_core::calibrate::{Method, Options};
 use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::session::{GroundTruth, SessionMeta};
 use handeye_core::target::{Grid, TargetSpec};
@@ -12,6 +13,9 @@ use crate::model::Truth;
 /// The board of the reference scene.
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
+/// The arm whose kinematics is built in, of which a cell tells whether it is its own.
+pub const BUILT_IN_ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
+
 /// The ten reference poses, so that they are there wherever the binary is.
 pub const REFERENCE_POSES: &str = include_str!("../../assets/poses/seed10.toml");
 
@@ -19,9 +23,15 @@ pub const REFERENCE_POSES: &str = include_str!("../../assets/poses/seed10.toml")
 pub const TARGET_OPTION: &str = "target";
 
 /// What a result depends on besides its data.
-pub fn solve_options(method: Method, target: &TargetSpec) -> BTreeMap<String, serde_json::Value> {
+pub fn solve_options(method: Method, options: Options, target: &TargetSpec) -> BTreeMap<String, serde_json::Value> {
     let target = serde_json::to_value(target).unwrap_or_default();
-    BTreeMap::from([("method".to_owned(), method.name().into()), (TARGET_OPTION.to_owned(), target)])
+    BTreeMap::from([
+        ("method".to_owned(), method.name().into()),
+        ("keep_outliers".to_owned(), options.keep_outliers.into()),
+        ("free_scale".to_owned(), options.free_scale.into()),
+        ("joint_offsets".to_owned(), options.joint_offsets.into()),
+        (TARGET_OPTION.to_owned(), target),
+    ])
 }
 
 /// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.
@@ -39,5 +49,6 @@ pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
         camera: None,
         seeds: BTreeMap::new(),
         ground_truth,
+        arm: None,
     }
 }

@@ -195,6 +195,8 @@ impl App {
             Command::Solve => self.solve_again(),
             Command::CancelSolve => self.cancel_solve(),
             Command::SetMethod(name) => self.set_method(&name),
+            Command::SetKeepOutliers(keep) => self.set_keep_outliers(keep),
+            Command::SetTipBox(chosen) => self.set_tip_box(chosen),
             Command::SetGoal(goal) => self.set_goal(goal),
             Command::SetOutlierLine(line_px) => self.model.outlier_line_px = line_px,
 

@@ -20,8 +20,9 @@ use crate::worker::{ArchiveTask, Beginning, FileTask, ObserveJob, VisionTask, ti
 impl App {
     /// What a new session begins with, by what is known of the cell.
     fn beginning(&self) -> Box<Beginning> {
-        let truth = self.model.cell.as_ref().and_then(|cell| cell.truth.as_ref());
-        let meta = session_start::meta(truth, timestamp_rfc3339());
+        let cell = self.model.cell.as_ref();
+        let mut meta = session_start::meta(cell.and_then(|cell| cell.truth.as_ref()), timestamp_rfc3339());
+        meta.arm = cell.filter(|cell| cell.kinematics_known).map(|_known| session_start::BUILT_IN_ARM);
         Box::new(Beginning { meta, taught: reference_poses() })
     }
 

@@ -1,15 +1,18 @@
 //! Solving by itself whenever the set of captures is another.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use handeye_core::calibrate::{Method, Observations, ObservedView};
+use handeye_core::arm::ArmError;
+use handeye_core::calibrate::{Method, Observations, ObservedView, Options};
 use handeye_core::observation::{Corner, View};
 use handeye_core::progress::Stage;
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
+use nalgebra::Vector6;
 
 use super::App;
 use crate::command::SolveOutcome;
-use crate::model::{Goal, JobId, Severity, SolveState, SolveStatus};
+use crate::model::{BoxState, Goal, JobId, Severity, SolveState, SolveStatus, WorkBox, judge_box};
 use crate::observe::camera_knowledge;
 use crate::text;
 use crate::text::Text;
@@ -25,6 +28,7 @@ pub(super) struct Question {
     captures: Vec<(CaptureId, Role, bool, bool)>,
     folder: Option<std::path::PathBuf>,
     method: String,
+    keep_outliers: bool,
     goal: Goal,
 }
 
@@ -40,6 +44,7 @@ impl App {
                 .collect(),
             folder: self.model.session.folder.clone(),
             method: self.model.method.clone(),
+            keep_outliers: self.model.keep_outliers,
             goal: self.model.view.goal,
         }
     }
@@ -97,17 +102,21 @@ impl App {
 
     fn job(&self, id: JobId, document: &Document) -> SolveJob {
         let fitted: Vec<&CaptureRecord> = document.captures.iter().filter(|it| it.role == Role::Calibration).collect();
+        let tip_by_joint = tip_by_joint(document);
+        let of_capture = |id: CaptureId| tip_by_joint.get(&id).cloned().unwrap_or_default();
         let views = fitted.iter().map(|it| ObservedView {
             name: it.image.clone(),
             base_from_tip: Some(it.base_from_tip),
             corners: self.corners(it.id).cloned(),
+            tip_by_joint: of_capture(it.id),
             camera_from_target: None,
             in_fit: it.is_in_use(),
         });
         let verification =
             document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).filter_map(|it| {
                 let corners = self.corners(it.id)?.clone();
-                Some((it.id, View { name: it.image.clone(), base_from_tip: it.base_from_tip, corners }))
+                let view = View::new(it.image.clone(), it.base_from_tip, corners);
+                Some((it.id, View { tip_by_joint: of_capture(it.id), ..view }))
             });
         SolveJob {
             id,
@@ -121,6 +130,7 @@ impl App {
             captures: fitted.iter().map(|it| it.id).collect(),
             verification: verification.collect(),
             method: Method::by_name(&self.model.method).unwrap_or_default(),
+            options: Options { keep_outliers: self.model.keep_outliers, ..Options::default() },
             goal_m: self.model.view.goal.0,
             truth: self.model.cell.as_ref().and_then(|cell| cell.truth.clone()),
         }
@@ -137,6 +147,7 @@ impl App {
         self.numbers.job = JobId(self.numbers.job.0 + 1);
         self.asked = None;
         self.model.solve = SolveState::default();
+        self.model.tip_box = BoxState::default();
         self.set_tracking(false);
     }
 
@@ -149,6 +160,26 @@ impl App {
             name.clone_into(&mut self.model.method);
             self.solve_if_changed();
         }
+    }
+
+    pub(super) fn set_keep_outliers(&mut self, keep: bool) {
+        self.model.keep_outliers = keep;
+        self.solve_if_changed();
+    }
+
+    pub(super) fn set_tip_box(&mut self, chosen: Option<WorkBox>) {
+        let is_finite = |work_box: &WorkBox| work_box.from_m.iter().chain(&work_box.to_m).all(|m| m.is_finite());
+        if chosen.as_ref().is_none_or(is_finite) {
+            self.model.tip_box.chosen = chosen;
+            self.judge_tip_box();
+        }
+    }
+
+    /// Some milliseconds, so only when box or answer are others.
+    fn judge_tip_box(&mut self) {
+        let model = &self.model;
+        let judged = model.solve.solved.as_deref().and_then(|it| judge_box(model.tip_box.chosen, it, model.document()));
+        self.model.tip_box.judged = judged;
     }
 
     pub(super) fn set_goal(&mut self, goal_m: f64) {
@@ -177,6 +208,7 @@ impl App {
                 self.model.solve.fresh = true;
                 let result = Box::new(solved.result.clone());
                 self.model.solve.solved = Some(solved);
+                self.judge_tip_box();
                 self.send_intrinsics();
                 self.send_tracking();
                 self.preview_exports();
@@ -196,4 +228,15 @@ impl App {
     fn no_answer(&mut self, why: Text) {
         self.model.solve.status = SolveStatus::Failed { why };
     }
+}
+
+/// How the tip moves with each joint, by capture; empty where the joint angles are of no use.
+fn tip_by_joint(document: &Document) -> BTreeMap<CaptureId, Vec<Vector6<f64>>> {
+    document.tip_by_joint().unwrap_or_else(|why| {
+        // Too few poses to tell where the arm stands are too few for an answer, which says so itself.
+        if !matches!(why, ArmError::NotPlaced(_)) {
+            tracing::warn!("the joint angles are not used: {why}");
+        }
+        BTreeMap::new()
+    })
 }

@@ -128,6 +128,18 @@ fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_tour() {
 }
 
 #[test]
+fn keeping_all_views_is_another_question_and_is_solved_at_once() {
+    let mut bench = bench(&FakeCell::new(0));
+    bench.app.apply(Command::SetKeepOutliers(true));
+    assert!(bench.app.model().keep_outliers);
+    let asked = bench.app.numbers.job;
+    bench.app.apply(Command::SetKeepOutliers(true));
+    assert_eq!(bench.app.numbers.job, asked, "the same question is not asked twice");
+    bench.app.apply(Command::SetKeepOutliers(false));
+    assert_ne!(bench.app.numbers.job, asked);
+}
+
+#[test]
 fn an_answer_to_an_earlier_question_is_not_shown() {
     let mut bench = bench(&FakeCell::new(0));
     bench.app.numbers.job = JobId(7);

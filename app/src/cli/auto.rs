@@ -5,7 +5,8 @@ mod poses;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use handeye_core::calibrate::Method;
+use handeye_core::arm::ArmModel;
+use handeye_core::calibrate::{Method, Options};
 use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::poses_file::Goal;
 use handeye_core::progress::CancelToken;
@@ -21,7 +22,7 @@ use super::cell::SceneArg;
 use super::{Failure, RerunArg, record, report, rerun_arg, solve};
 use crate::model::Step;
 use crate::rerun_log::{Entry, Pace, Recorder, RerunChoice};
-use crate::session_start::BOARD;
+use crate::session_start::{BOARD, BUILT_IN_ARM};
 use poses::Plan;
 
 /// Options of `handeye auto`.
@@ -84,7 +85,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let truth = cell.ground_truth().map_err(Failure::failed)?;
 
     keep_earlier_session(&folder)?;
-    let mut session = Store::create(&folder, meta(&truth, args.seed)?).map_err(Failure::failed)?;
+    // That it is another arm is no fault: its joint angles are then kept and not used.
+    let arm = cell.arm().kinematics().map_err(Failure::failed)?.ok().map(|_ur5| BUILT_IN_ARM);
+    let mut session = Store::create(&folder, meta(&truth, args.seed, arm)?).map_err(Failure::failed)?;
     recorder.note(Entry::Step(Step::Capture));
     record::document(&recorder, &session);
     record::cell(&recorder, cell.arm(), &truth).map_err(Failure::failed)?;
@@ -106,7 +109,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     drop(cell);
     drop(server);
 
-    let solution = solve::folder(&folder, Method::Joint, Some(record::known(&truth)), &cancel)?;
+    let solution = solve::folder(&folder, Method::Joint, Options::default(), Some(record::known(&truth)), &cancel)?;
     finish(&session, args.json.as_deref(), solution.result())?;
     solution.note(&recorder);
     rerun_arg::finish(recorder, &cancel)
@@ -151,7 +154,11 @@ fn new_session_folder() -> Result<PathBuf, Failure> {
     Ok(Path::new("sessions").join(name))
 }
 
-fn meta(truth: &handeye_sim_link::client::cell::GroundTruth, seed: Option<u64>) -> Result<SessionMeta, Failure> {
+fn meta(
+    truth: &handeye_sim_link::client::cell::GroundTruth,
+    seed: Option<u64>,
+    arm: Option<ArmModel>,
+) -> Result<SessionMeta, Failure> {
     let created =
         OffsetDateTime::now_utc().format(&time::format_description::well_known::Rfc3339).map_err(Failure::failed)?;
     Ok(SessionMeta {
@@ -165,6 +172,7 @@ fn meta(truth: &handeye_sim_link::client::cell::GroundTruth, seed: Option<u64>) 
             let links = HandEye::EyeInHand { tip_from_camera: truth.tip_from_camera, base_from_target };
             GroundTruth::new(&links, Some(truth.intrinsics))
         }),
+        arm,
     })
 }
 

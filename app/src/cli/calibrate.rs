@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::calibrate::Method;
+use handeye_core::calibrate::{Method, Options};
 
+use super::gate::Gate;
 use super::{Failure, RerunArg, report, rerun_arg, solve};
 use crate::rerun_log::{Pace, RerunChoice};
 
@@ -22,8 +23,26 @@ pub struct CalibrateArgs {
     /// Write the result and its exports into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Keep views and corners that do not fit the others; without it they are set aside and named.
+    #[arg(long)]
+    keep_outliers: bool,
+    /// Estimate the true size of the target, which the robot's translations tell.
+    #[arg(long)]
+    free_scale: bool,
+    /// Try constant offsets of the robot's joints, and take them when views held out say so. Needs joint angles.
+    #[arg(long)]
+    joint_offsets: bool,
+    /// End with exit code 1 unless a number of the result is below a limit, such as `tip_error_95_mm<0.5`.
+    #[arg(long, value_name = "NAME<LIMIT")]
+    gate: Vec<Gate>,
     #[command(flatten)]
     rerun: RerunArg,
+}
+
+impl CalibrateArgs {
+    fn options(&self) -> Options {
+        Options { keep_outliers: self.keep_outliers, free_scale: self.free_scale, joint_offsets: self.joint_offsets }
+    }
 }
 
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
@@ -31,7 +50,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
         .ok_or_else(|| Failure::unusable(anyhow::anyhow!("no method {:?}", args.method)))?;
     let cancel = solve::cancel_on_ctrl_c();
     let recorder = args.rerun.start(RerunChoice::Off, Pace::Everything, false)?;
-    let solution = solve::folder(&args.path, method, None, &cancel)?;
+    let solution = solve::folder(&args.path, method, args.options(), None, &cancel)?;
     let result = solution.result();
     if let Some(folder) = &args.out {
         solve::write_exports(folder, result)?;
@@ -47,5 +66,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
         None => print!("{}", report::text(result)),
     }
     solution.note(&recorder);
-    rerun_arg::finish(recorder, &cancel)
+    rerun_arg::finish(recorder, &cancel)?;
+    let failures: Vec<String> = args.gate.iter().filter_map(|gate| gate.failure(&result.quality)).collect();
+    if failures.is_empty() { Ok(()) } else { Err(Failure::failed(anyhow::anyhow!("{}", failures.join("; ")))) }
 }

@@ -6,12 +6,15 @@
 mod auto;
 mod calibrate;
 mod cell;
+mod doctor;
 mod export;
 mod failure;
+mod gate;
 mod record;
 pub(crate) mod report;
 pub mod rerun_arg;
 mod solve;
+mod target;
 mod track;
 
 use std::io::IsTerminal as _;
@@ -48,12 +51,18 @@ enum Command {
     /// Solve a session or a dataset folder.
     #[command(after_help = "Example:\n  handeye calibrate my_robot_images --json result.json")]
     Calibrate(calibrate::CalibrateArgs),
+    /// Say what is wrong with a session or a dataset folder, and what to do about it.
+    #[command(after_help = "Example:\n  handeye doctor my_robot_images --json diagnosis.json")]
+    Doctor(doctor::DoctorArgs),
     /// Track the board live with a calibration, and have the arm follow it.
     #[command(after_help = "Example:\n  handeye track --calibration session/result.json --follow --frames 600")]
     Track(track::TrackArgs),
     /// Write calibration files from a solved session or a result JSON.
     #[command(after_help = "Example:\n  handeye export session --format ros_camera_info easy_handeye2 --out files")]
     Export(export::ExportArgs),
+    /// Print a target as a PDF at exact physical scale, with rulers to check the print.
+    #[command(after_help = target::EXAMPLES)]
+    Target(target::TargetArgs),
 }
 
 /// Options of the workbench.
@@ -89,8 +98,10 @@ pub fn main() -> ExitCode {
         Command::Cell(args) => cell::run(&args),
         Command::Auto(args) => auto::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Track(args) => track::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Target(args) => target::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -17,6 +17,8 @@ pub fn text(result: &CalibrationResult) -> String {
     }
     camera(&mut out, result);
     fit(&mut out, result);
+    details(&mut out, result);
+    findings(&mut out, result);
     truth(&mut out, result);
     methods(&mut out, result);
     views(&mut out, result);
@@ -120,6 +122,43 @@ fn fit(out: &mut String, result: &CalibrationResult) {
     }
     if !parts.is_empty() {
         line!(out, "fit: {}", parts.join(", "));
+    }
+}
+
+/// What the joint estimate says of itself: only what there is to say.
+fn details(out: &mut String, result: &CalibrationResult) {
+    let Some(estimate) = &result.estimate else { return };
+    if let Some(sigma) = estimate.view_sigma_px.filter(|sigma| *sigma > 0.0) {
+        line!(out, "  the corners of a view share errors of {sigma:.4} px");
+    }
+    match estimate.degrees_of_freedom {
+        Some(n) if n < 1e5 => line!(out, "  noise levels on {n:.0} degrees of freedom"),
+        _ => {}
+    }
+    if let Some(widening) = estimate.widening.as_ref().filter(|w| w.factor > 1.0) {
+        line!(out, "  stated uncertainty widened {:.2} times, by {}", widening.factor, widening.by.replace('_', " "));
+    }
+    if let Some(board) = &estimate.board {
+        if let Some([x, y]) = board.warp_sigma_mm {
+            let [wx, wy] = board.warp_mm;
+            line!(out, "  target bent by {wx:.3} ± {x:.3} mm along x, {wy:.3} ± {y:.3} mm along y");
+        }
+        if let Some(sigma) = board.scale_sigma {
+            line!(out, "  target {:.5} ± {sigma:.5} times its stated size", board.scale);
+        }
+    }
+    if let Some(joints) = &estimate.joint_offsets {
+        let each: Vec<String> =
+            joints.offsets_deg.iter().zip(&joints.sigma_deg).map(|(o, s)| format!("{o:.4} ± {s:.4}°")).collect();
+        let verdict = if joints.accepted { "taken" } else { "not taken" };
+        let (before, after) = (joints.heldout_before_px, joints.heldout_after_px);
+        line!(out, "  joint offsets {}: {verdict}, held-out error {before:.4} → {after:.4} px", each.join(", "));
+    }
+}
+
+fn findings(out: &mut String, result: &CalibrationResult) {
+    for finding in &result.findings {
+        line!(out, "{} [{}]: {}", finding.severity, finding.code, finding.text);
     }
 }
 

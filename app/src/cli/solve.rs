@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{Method, Observations, ObservedView};
+use handeye_core::calibrate::{Method, Observations, ObservedView, Options};
 use handeye_core::dataset::Dataset;
 use handeye_core::export::{self, ExportInput, ExportNames};
 use handeye_core::handeye::Mode;
@@ -57,7 +57,13 @@ impl Solution {
 }
 
 /// Reads a folder, finds the target in its images and calibrates. The truth is only compared with.
-pub fn folder(path: &Path, method: Method, truth: Option<Truth>, cancel: &CancelToken) -> Result<Solution, Failure> {
+pub fn folder(
+    path: &Path,
+    method: Method,
+    options: Options,
+    truth: Option<Truth>,
+    cancel: &CancelToken,
+) -> Result<Solution, Failure> {
     let dataset = Dataset::read(path).map_err(Failure::unusable)?;
     let mut observations = observations(&dataset, cancel)?;
     let document = if Session::is_session(path) {
@@ -78,6 +84,7 @@ pub fn folder(path: &Path, method: Method, truth: Option<Truth>, cancel: &Cancel
         observations,
         verification: Vec::new(),
         method,
+        options,
         goal_m: Goal::default().0,
         truth,
     };
@@ -97,6 +104,7 @@ fn as_document(dataset: &Dataset) -> Document {
         camera: dataset.camera,
         seeds: BTreeMap::new(),
         ground_truth: None,
+        arm: None,
     });
     for (entry, number) in dataset.entries.iter().zip(1..) {
         let Some(base_from_tip) = entry.base_from_tip else { continue };
@@ -119,7 +127,7 @@ fn as_document(dataset: &Dataset) -> Document {
 }
 
 /// Captures that were taken out of the fit stand in the result as such, and in their place, as when the window solves.
-fn add_excluded(document: &Document, observations: &mut Observations) {
+pub fn add_excluded(document: &Document, observations: &mut Observations) {
     let fitted = document.captures.iter().filter(|capture| capture.role == Role::Calibration);
     for (index, capture) in fitted.enumerate() {
         if capture.excluded && index <= observations.views.len() {
@@ -127,6 +135,7 @@ fn add_excluded(document: &Document, observations: &mut Observations) {
                 name: capture.image.clone(),
                 base_from_tip: Some(capture.base_from_tip),
                 corners: None,
+                tip_by_joint: Vec::new(),
                 camera_from_target: None,
                 in_fit: false,
             };

@@ -98,10 +98,10 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
     };
     let address = args.connect.clone().or_else(|| server.as_ref().map(CellServer::endpoint)).unwrap_or_default();
     let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
-    if let Some(index) = args.corner.or(args.reach).filter(|&index| index >= target.grid().len()) {
+    if let Some(index) = args.corner.or(args.reach).filter(|&index| index >= target.len()) {
         return Err(Failure::unusable(anyhow::anyhow!(
             "there is no corner {index}: a {target} has corners 0 to {}",
-            target.grid().len() - 1
+            target.len() - 1
         )));
     }
     let stand_off_m = args.stand_off * 1e-3;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use egui::{Context, Id};
-use handeye_core::calibrate::CornerResidual;
+use handeye_core::calibrate::{CornerResidual, ViewResult, ViewStatus};
 use handeye_core::coverage::{Coverage, CoveredView};
 use handeye_core::findings::{Finding, FindingCode};
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
@@ -25,6 +25,14 @@ pub enum Seen {
     NoBoard,
     /// The picture cannot be read.
     Unreadable,
+}
+
+/// A capture that the estimate set aside, because it does not fit the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aside {
+    /// How far its board is from where the others put it [mm] and by how much it is turned [deg]; `None` where its corners
+    /// are no picture of the board.
+    pub board_off: Option<(f64, f64)>,
 }
 
 /// One capture with all that is known of it.
@@ -50,6 +58,10 @@ pub struct CaptureRow {
     pub influence_mm: Option<f64>,
     /// Noise of a corner of its picture [px].
     pub corner_noise_px: Option<f64>,
+    /// How far it is from the others, where the estimate set it aside.
+    pub aside: Option<Aside>,
+    /// How many of its corners the estimate set aside.
+    pub corners_aside: usize,
     /// What the calibration finds remarkable about it.
     pub found: Vec<FindingCode>,
 }
@@ -58,6 +70,11 @@ impl CaptureRow {
     /// Whether it verifies the fit.
     pub fn verifies(&self) -> bool {
         self.role == Role::Verification
+    }
+
+    /// Whether the answer is without it although it is meant to be in the fit.
+    pub fn is_aside(&self) -> bool {
+        self.aside.is_some() && !self.excluded && !self.verifies()
     }
 
     /// Its name for people: `7 · above left`.
@@ -193,6 +210,8 @@ fn plain_row(model: &Model, record: &CaptureRecord) -> CaptureRow {
         correction_deg: None,
         influence_mm: None,
         corner_noise_px: record.corner_noise_px,
+        aside: None,
+        corners_aside: 0,
         found: Vec::new(),
     }
 }
@@ -214,6 +233,8 @@ fn add_solution(rows: &mut [CaptureRow], solved: &Solved) {
         row.correction_mm = finite(view.correction_m.map(|metres| metres * 1e3));
         row.correction_deg = finite(view.correction_rad.map(f64::to_degrees));
         row.influence_mm = finite(view.influence_m.map(|metres| metres * 1e3));
+        row.aside = aside(view);
+        row.corners_aside = view.corners_aside.len();
     }
     let Some(Ok(verification)) = &solved.verification else { return };
     for (id, check) in solved.verified_captures.iter().zip(&verification.captures) {
@@ -221,6 +242,12 @@ fn add_solution(rows: &mut [CaptureRow], solved: &Solved) {
             row.rms_px = finite(Some(check.rms_px));
         }
     }
+}
+
+fn aside(view: &ViewResult) -> Option<Aside> {
+    let board_off = view.distance.map(|distance| (distance.metres * 1e3, distance.radians.to_degrees()));
+    (view.status == ViewStatus::Outlier)
+        .then(|| Aside { board_off: board_off.filter(|(mm, deg)| mm.is_finite() && deg.is_finite()) })
 }
 
 fn add_findings(rows: &mut [CaptureRow], document: &Document, findings: &[Finding]) {
@@ -279,5 +306,18 @@ mod tests {
         assert!(checked.verifies() && checked.influence_mm.is_none());
         assert_eq!(checked.rms_px, Some(verification.captures[0].rms_px));
         assert_eq!(table.outlined.len(), table.rows.len());
+    }
+
+    #[test]
+    fn a_capture_that_was_set_aside_has_its_distance_and_no_influence() {
+        let model = sample::with_an_outlier();
+        let table = table(&Context::default(), &model);
+        let row = table.row(sample::OUTLIER).expect("a row");
+        assert!(row.is_aside() && row.influence_mm.is_none());
+        let (mm, deg) = row.aside.and_then(|aside| aside.board_off).expect("a distance");
+        assert!((mm - 12.3).abs() < 1e-9 && (deg - 1.5).abs() < 1e-9, "{mm} mm, {deg}°");
+        assert_eq!(table.rows.iter().filter(|row| row.is_aside()).count(), 1);
+        let excluded = CaptureRow { excluded: true, ..row.clone() };
+        assert!(!excluded.is_aside(), "who took it out by hand knows");
     }
 }

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, CameraKnowledge, Method, Observations, ObservedView};
+use handeye_core::calibrate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
 use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{ColourMap, DepthImage};
 use handeye_core::export::{self, ExportInput};
 use handeye_core::findings::{self, FindingOptions};
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::handeye::joint::outliers::Distance;
 use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::observation::{Corner, View};
@@ -74,7 +75,7 @@ fn corners(n: u32) -> Vec<Corner> {
         .enumerate()
         .map(|(index, point)| {
             let px = intrinsics().project(&(chain.isometry() * point)).expect("the board is in front of the camera");
-            Corner { index, px: px + Vector2::new(wiggle(index, 0.0), wiggle(index, 1.0)) }
+            Corner::new(index, px + Vector2::new(wiggle(index, 0.0), wiggle(index, 1.0)))
         })
         .collect()
 }
@@ -170,39 +171,47 @@ pub fn captured() -> Model {
     model
 }
 
-/// The same, solved and verified.
-pub fn solved() -> Model {
-    let mut model = captured();
+/// What is to be reached.
+const FINDINGS: FindingOptions = FindingOptions { goal_mm: Some(0.5) };
+
+/// What was seen in the captures of the fit.
+fn observations() -> Observations {
     let views = (1..=FITTED).map(|n| ObservedView {
         name: record(n).image,
         base_from_tip: Some(base_from_tip(n)),
         corners: Some(corners(n)),
+        tip_by_joint: Vec::new(),
         camera_from_target: None,
         in_fit: true,
     });
-    let observations = Observations {
+    Observations {
         mode: Some(Mode::EyeInHand),
         target: BOARD,
         image_size: (640, 480),
         camera: CameraKnowledge::Estimate { model: observe::DEFAULT_MODEL, start: None },
         views: views.collect(),
-    };
+    }
+}
+
+/// The same, solved and verified.
+pub fn solved() -> Model {
+    let mut model = captured();
+    let observations = observations();
     let cancel = CancelToken::default();
     let calibration = calibrate::calibrate(&observations, Method::Joint, &cancel).expect("a calibration");
     assert!(matches!(calibration.hand_eye, Some(HandEye::EyeInHand { .. })));
     let mut result = calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
     result.truth = truth::comparison(&result, &tip_from_camera(), &intrinsics());
     let calibrated = Calibrated::new(&calibration).expect("a hand-eye");
-    let checks: Vec<View> = (FITTED + 1..=FITTED + VERIFYING)
-        .map(|n| View { name: record(n).image, base_from_tip: base_from_tip(n), corners: corners(n) })
-        .collect();
+    let checks: Vec<View> =
+        (FITTED + 1..=FITTED + VERIFYING).map(|n| View::new(record(n).image, base_from_tip(n), corners(n))).collect();
     let captures: Vec<CheckCapture<'_>> =
         checks.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
     let verification = verify::verify(&calibrated, &BOARD, &captures, &cancel);
     model.solve.solved = Some(Arc::new(Solved {
         job: JobId(1),
         captures: (1..=FITTED).map(CaptureId).collect(),
-        findings: findings::findings(&observations, Some(&calibration), &FindingOptions { goal_mm: Some(0.5) }),
+        findings: findings::findings(&observations, Some(&calibration), &FINDINGS),
         result,
         calibrated: Some(calibrated),
         verification: Some(verification),
@@ -211,6 +220,27 @@ pub fn solved() -> Model {
         took_s: 0.2,
     }));
     model.solve.fresh = true;
+    model
+}
+
+/// The capture that does not fit the others in [`with_an_outlier`].
+pub const OUTLIER: CaptureId = CaptureId(3);
+
+/// The same, with a capture that the estimate set aside: its board is 12.3 mm and 1.5° from where the others put it.
+pub fn with_an_outlier() -> Model {
+    let mut model = solved();
+    let mut solved = Solved::clone(model.solve.current().expect("solved"));
+    let at = solved.captures.iter().position(|id| *id == OUTLIER).expect("in the fit");
+    let view = &mut solved.calibration.views[at];
+    view.status = ViewStatus::Outlier;
+    view.distance = Some(Distance { of_limit: 9.0, metres: 12.3e-3, radians: 1.5_f64.to_radians() });
+    view.rms_px = Some(18.0);
+    (view.influence_m, view.correction_m, view.correction_rad) = (None, None, None);
+    let truth = solved.result.truth.take();
+    solved.result = solved.calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
+    solved.result.truth = truth;
+    solved.findings = findings::findings(&observations(), Some(&solved.calibration), &FINDINGS);
+    model.solve.solved = Some(Arc::new(solved));
     model
 }
 

@@ -4,12 +4,14 @@
 //! on the clock that the application was started with.
 
 mod capture;
+mod estimated;
 mod export;
 mod messages;
 mod motion;
 mod rerun;
 mod session;
 mod solve;
+mod tip_box;
 mod track;
 mod trail;
 mod view;
@@ -33,6 +35,7 @@ use serde::{Deserialize, Serialize};
 pub use capture::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
+pub use estimated::{Estimated, estimated};
 pub use export::{ExportState, Preview, PreviewFile, Written};
 pub use handeye_sim_link::client::cell::BoardPath;
 pub use messages::{Message, Messages};
@@ -45,6 +48,7 @@ pub use session::{
     FolderEntry, FolderKind, FolderListing, Observed, RecentSession, Review, SessionState, StopOutcome, Tour,
 };
 pub use solve::{JobId, SolveState, SolveStatus, Solved};
+pub use tip_box::{BoxState, WorkBox, judge_box};
 pub use track::{BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked};
 pub use trail::{MAX_TRAIL_POINTS, Trail};
 pub use view::{Overlays, PickedPoint, SceneView, Viewport, exports_of};
@@ -321,6 +325,7 @@ pub enum Severity {
 }
 
 /// Everything that the window shows.
+#[expect(clippy::struct_excessive_bools, reason = "each is a state of its own")]
 #[derive(Debug, Clone)]
 pub struct Model {
     /// Which cell.
@@ -377,6 +382,10 @@ pub struct Model {
     pub solve: SolveState,
     /// Which answer is asked for.
     pub method: String,
+    /// Whether it uses every view and corner, also those that do not fit the others.
+    pub keep_outliers: bool,
+    /// The box of the workspace over which the error is stated.
+    pub tip_box: BoxState,
     /// The line between good and bad residuals [px].
     pub outlier_line_px: Option<f64>,
     /// The point that was picked.
@@ -440,6 +449,8 @@ impl Model {
             review: None,
             solve: SolveState::default(),
             method: Method::default().name().to_owned(),
+            keep_outliers: false,
+            tip_box: BoxState::default(),
             outlier_line_px: None,
             picked: None,
             export: ExportState::default(),

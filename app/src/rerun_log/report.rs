@@ -6,7 +6,8 @@ use handeye_core::findings::Severity;
 use handeye_core::result::{CalibrationResult, MethodStatus, Quality, TransformEstimate};
 
 use crate::cli::report;
-use crate::model::Solved;
+use crate::model::{self, Solved};
+use crate::text::{Language, Text};
 
 /// Writing into a `String` cannot fail.
 macro_rules! line {
@@ -28,6 +29,7 @@ pub(super) fn markdown(solved: &Solved) -> String {
     for transform in [&result.hand_eye, &result.target].into_iter().flatten() {
         pose(&mut out, transform);
     }
+    estimate(&mut out, solved);
     camera(&mut out, result);
     quality(&mut out, &result.quality);
     verification(&mut out, solved);
@@ -72,6 +74,23 @@ fn pose(out: &mut String, transform: &TransformEstimate) {
     if let Some(c) = transform.covariance {
         let [a, b, c] = [3, 4, 5].map(|i| c[i][i].max(0.0).sqrt().to_degrees());
         line!(out, "| standard deviation [°] | {a:.4} | {b:.4} | {c:.4} | |");
+    }
+    line!(out);
+}
+
+/// What the result pane says below the answer.
+fn estimate(out: &mut String, solved: &Solved) {
+    let lines = model::estimated(&solved.calibration);
+    if lines.is_empty() {
+        return;
+    }
+    let said = |text: &Text| text.say(Language::English);
+    line!(out, "## What the estimate found out\n");
+    line!(out, "| | |");
+    line!(out, "| --- | --- |");
+    for it in &lines {
+        let why = it.why.as_ref().map_or_else(String::new, |why| format!(": {}", said(why)));
+        line!(out, "| {} | {}{} |", cell(&said(&it.what)), cell(&said(&it.value)), cell(&why));
     }
     line!(out);
 }
@@ -202,6 +221,16 @@ mod tests {
         }
         assert!(text.contains("## tip_from_camera") && text.contains("## base_from_target"), "{text}");
         assert!(text.contains("2 captures that took no part"), "{text}");
+    }
+
+    #[test]
+    fn the_report_says_what_was_set_aside_and_what_the_estimate_found_out() {
+        let model = sample::with_an_outlier();
+        let text = markdown(model.solve.current().expect("solved"));
+        assert!(text.contains("| Views set aside | 1 of 10 |"), "{text}");
+        assert!(text.contains("| Noise levels | "), "{text}");
+        assert!(text.contains("- *Warning:* 1 view set aside"), "{text}");
+        assert!(text.contains("| images/0003.png | outlier | 18.0000 |"), "{text}");
     }
 
     #[test]

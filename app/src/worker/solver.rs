@@ -4,8 +4,9 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, CalibrateError, Method, Observations};
-use handeye_core::findings::{self, FindingOptions};
+use handeye_core::calibrate::{self, CalibrateError, Method, Observations, Options};
+use handeye_core::doctor;
+use handeye_core::findings::{Finding, FindingOptions};
 use handeye_core::handeye::HandEyeError;
 use handeye_core::observation::View;
 use handeye_core::progress::{CancelToken, Progress, Work};
@@ -35,6 +36,8 @@ pub struct SolveJob {
     pub verification: Vec<(CaptureId, View)>,
     /// Which answer is asked for.
     pub method: Method,
+    /// What is changed about it.
+    pub options: Options,
     /// The error [m] that is good enough.
     pub goal_m: f64,
     /// For comparison with the answer, when that is there.
@@ -74,14 +77,15 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
 /// # Errors
 /// [`CalibrateError`].
 pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> {
-    let calibration = calibrate::calibrate(&job.observations, job.method, work)?;
-    let options = session_start::solve_options(job.method, &job.observations.target);
+    let calibration = calibrate::calibrate_with(&job.observations, job.method, job.options, work)?;
+    let options = session_start::solve_options(job.method, job.options, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
     }
     let options = FindingOptions { goal_mm: Some(job.goal_m * 1e3) };
-    let findings = findings::findings(&job.observations, Some(&calibration), &options);
+    let findings = doctor::diagnose(&job.observations, Some(&calibration), &options, work.cancel).findings;
+    result.findings = findings.iter().map(Finding::to_record).collect();
     let calibrated = Calibrated::new(&calibration).ok();
     let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
         let captures: Vec<CheckCapture<'_>> =

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use handeye_core::board_shape::BoardShape;
 use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::result::CalibrationResult;
 use handeye_core::session::{RESULT, Session};
@@ -35,7 +36,12 @@ pub fn read(path: &Path) -> Result<(Calibrated, Option<TargetSpec>), Failure> {
         let said = result.provenance.options.get(TARGET_OPTION).cloned();
         said.and_then(|value| serde_json::from_value(value).ok())
     };
-    Ok((Calibrated { hand_eye, intrinsics, hand_eye_covariance: covariance, uncertainty: None }, target))
+    let board = result.estimate.as_ref().and_then(|estimate| estimate.board.as_ref());
+    let shape = board.map_or_else(BoardShape::default, |board| BoardShape {
+        warp_m: board.warp_mm.map(|mm| mm * 1e-3),
+        scale: board.scale,
+    });
+    Ok((Calibrated { hand_eye, intrinsics, shape, hand_eye_covariance: covariance, uncertainty: None }, target))
 }
 
 fn links(result: &CalibrationResult) -> Option<(HandEye, Option<nalgebra::Matrix6<f64>>)> {

@@ -156,7 +156,18 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
             .filter(|row| !row.excluded)
             .fold((0, 0), |(fit, verify), row| if row.verifies() { (fit, verify + 1) } else { (fit + 1, verify) });
         let out = table.rows.len() - fit - verify;
-        let words = text!("{fit} in the fit · {verify} verify · {out} excluded", fit = fit, verify = verify, out = out);
+        let aside = table.rows.iter().filter(|row| row.is_aside()).count();
+        let words = if aside == 0 {
+            text!("{fit} in the fit · {verify} verify · {out} excluded", fit = fit, verify = verify, out = out)
+        } else {
+            text!(
+                "{fit} in the fit · {aside} set aside · {verify} verify · {out} excluded",
+                fit = fit - aside,
+                aside = aside,
+                verify = verify,
+                out = out
+            )
+        };
         if !table.rows.is_empty() {
             // As a whole on the next line when there is no room.
             ui.add(egui::Label::new(RichText::new(words.say(language)).color(Palette::of(ui).weak)).extend());

@@ -1,6 +1,7 @@
 //! The answer: how far off it may be, where the camera is, and why it should be believed or not.
 
 mod answer;
+mod estimate;
 mod evidence;
 mod figures;
 mod findings;
@@ -9,6 +10,7 @@ mod methods;
 mod quality;
 mod status;
 mod words;
+mod workspace;
 
 use egui::Ui;
 
@@ -23,7 +25,9 @@ pub fn result_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let Some(solved) = &model.solve.solved else { return };
         headline::headline_ui(ui, model, solved, outbox);
         answer::answer_ui(ui, model, solved);
+        estimate::estimate_ui(ui, model, solved);
         answer::truth_ui(ui, model, solved);
+        workspace::workspace_ui(ui, model, outbox);
         findings::findings_ui(ui, model, solved);
         quality::camera_ui(ui, model, solved);
         quality::noise_ui(ui, model, solved);

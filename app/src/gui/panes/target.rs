@@ -25,6 +25,8 @@ const BESIDE: f32 = 470.0;
 enum Kind {
     Chessboard,
     Circles,
+    /// One that is not set up here.
+    Other,
 }
 
 /// The pane.
@@ -63,7 +65,12 @@ fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             across = grid.columns + 1,
             down = grid.rows + 1
         ),
-        TargetSpec::Circles(_) => text!("Count the dots along each side; the distance is from centre to centre."),
+        TargetSpec::Circles(_) | TargetSpec::AsymmetricCircles(_) => {
+            text!("Count the dots along each side; the distance is from centre to centre.")
+        }
+        TargetSpec::Charuco(_) | TargetSpec::AprilGrid(_) | TargetSpec::AprilTag(_) => {
+            text!("{board}. Its numbers are those of the file that it was opened from.", board = target)
+        }
     };
     form::hint_ui(ui, &hint.say(language));
     if target.is_symmetric() {
@@ -75,7 +82,7 @@ fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                     "Its ends cannot be told apart. Take one with an odd number of rows plus columns, as 10 × 7."
                 )
             }
-            TargetSpec::Circles(_) => tr!(language, "Its ends cannot be told apart. A chessboard is safer."),
+            _ => tr!(language, "Its ends cannot be told apart. A chessboard is safer."),
         };
         form::note_ui(ui, Tone::Warning, title, detail);
     }
@@ -83,18 +90,26 @@ fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 
 fn numbers_ui(ui: &mut Ui, target: &TargetSpec, language: Language, outbox: &mut Outbox) {
     ui.spacing_mut().item_spacing.y = 6.0;
+    // Targets of other kinds come from files; here they can be exchanged for one of these.
     let kind = match target {
         TargetSpec::Chessboard(_) => Kind::Chessboard,
         TargetSpec::Circles(_) => Kind::Circles,
+        _ => Kind::Other,
     };
-    let mut grid = *target.grid();
+    let mut grid = target.grid();
     let choices = [(Kind::Chessboard, tr!(language, "Chessboard"), ""), (Kind::Circles, tr!(language, "Dots"), "")];
     let chosen = form::choice_ui(ui, kind, &choices);
+    if kind == Kind::Other {
+        if chosen.is_none() {
+            return;
+        }
+        (grid.columns, grid.rows) = (grid.columns.max(3), grid.rows.max(3));
+    }
     let (columns, rows, size) = match kind {
         Kind::Chessboard => {
             (tr!(language, "Inner corners, x"), tr!(language, "Inner corners, y"), tr!(language, "Square"))
         }
-        Kind::Circles => (tr!(language, "Dots, x"), tr!(language, "Dots, y"), tr!(language, "Distance")),
+        Kind::Circles | Kind::Other => (tr!(language, "Dots, x"), tr!(language, "Dots, y"), tr!(language, "Distance")),
     };
     for (name, count) in [(columns, &mut grid.columns), (rows, &mut grid.rows)] {
         form::row_ui(ui, name, |ui| number_ui(ui, name, DragValue::new(count).range(POINTS).speed(0.05)));
@@ -114,6 +129,7 @@ fn numbers_ui(ui: &mut Ui, target: &TargetSpec, language: Language, outbox: &mut
     let wanted = match chosen.unwrap_or(kind) {
         Kind::Chessboard => TargetSpec::Chessboard(grid),
         Kind::Circles => TargetSpec::Circles(grid),
+        Kind::Other => *target,
     };
     if wanted != *target {
         outbox.send(Command::SetTarget(wanted));
@@ -137,7 +153,7 @@ fn preview_ui(ui: &mut Ui, target: &TargetSpec, room: Vec2, language: Language) 
             text!("Drawing of the board: {board}", board = target).say(language),
         )
     });
-    let Grid { columns, rows, .. } = *target.grid();
+    let Grid { columns, rows, .. } = target.grid();
     let (across, down) = (columns as f32 + 1.0, rows as f32 + 1.0);
     // Room for the letters of the axes.
     let inner = area.shrink2(Vec2::new(12.0, 10.0));
@@ -166,7 +182,8 @@ fn preview_ui(ui: &mut Ui, target: &TargetSpec, room: Vec2, language: Language) 
                 }
             }
         }
-        TargetSpec::Circles(_) => {
+        // Points by their place in the lattice: enough to see how many there are and which is the first.
+        _ => {
             for row in 0..rows {
                 for column in 0..columns {
                     ui.painter().circle_filled(at(column, row), square * 0.3, ink);

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::calibrate::CornerResidual;
+use handeye_core::calibrate::{CornerResidual, ViewStatus};
 use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
 use handeye_core::frames::{Camera, Pose, Target};
 use handeye_core::image::RgbImage;
 use handeye_core::observation::Corner;
-use handeye_core::session::{CaptureId, CaptureRecord, Document, Session, SessionError};
+use handeye_core::session::{CaptureId, CaptureRecord, Document, Role, Session, SessionError};
 use handeye_core::target::TargetSpec;
 use handeye_core::vision::pnp;
 use rerun::{Arrows2D, AsComponents, Color, EncodedImage, Points3D, Radius};
@@ -58,6 +58,8 @@ struct Outcome<'a> {
     residuals: &'a [CornerResidual],
     /// 0 for a perfect fit, 1 for [`style::RED_AT_MEDIANS`] times the median and beyond.
     redness: Option<f64>,
+    /// Whether the estimate set it aside.
+    is_aside: bool,
     camera_from_target: Option<Pose<Camera, Target>>,
 }
 
@@ -168,7 +170,7 @@ impl Captures {
         let colour = self.colour(known, record);
         let path = paths::capture(record.id);
         let name = Points3D::new([[0.0_f32; 3]])
-            .with_labels([record.id.to_string()])
+            .with_labels([label(known, record)])
             .with_colors([colour])
             .with_radii([Radius::new_ui_points(style::CORNER_UI_POINTS)]);
         pen.write(&path, &[&transform(&base_from_camera) as &dyn AsComponents, &name])?;
@@ -182,6 +184,9 @@ impl Captures {
         }
         if record.excluded {
             return style::EXCLUDED;
+        }
+        if is_aside(known, record) {
+            return style::SET_ASIDE;
         }
         let outcome = known.solved.as_deref().and_then(|solved| outcome(solved, record.id));
         outcome.and_then(|outcome| outcome.redness).map_or(style::NEUTRAL, style::residual_colour)
@@ -247,6 +252,17 @@ fn seen(known: &Known, corners: Option<&[Corner]>) -> Option<Pose<Camera, Target
     pnp::camera_from_target(corners?, &target, &intrinsics).ok()
 }
 
+/// Whether the answer is without a capture that is meant to be in the fit.
+fn is_aside(known: &Known, record: &CaptureRecord) -> bool {
+    let outcome = known.solved.as_deref().and_then(|solved| outcome(solved, record.id));
+    !record.excluded && record.role == Role::Calibration && outcome.is_some_and(|outcome| outcome.is_aside)
+}
+
+/// Its number, and that it was set aside where it was.
+fn label(known: &Known, record: &CaptureRecord) -> String {
+    if is_aside(known, record) { format!("{} (set aside)", record.id) } else { record.id.to_string() }
+}
+
 /// What a calibration says of a capture: of its fit, or of its verification.
 fn outcome(solved: &Solved, id: CaptureId) -> Option<Outcome<'_>> {
     if let Some(index) = solved.captures.iter().position(|capture| *capture == id) {
@@ -255,6 +271,7 @@ fn outcome(solved: &Solved, id: CaptureId) -> Option<Outcome<'_>> {
         return Some(Outcome {
             residuals: &view.residuals,
             redness: view.rms_px.and_then(|rms| redness(rms, all)),
+            is_aside: view.status == ViewStatus::Outlier,
             camera_from_target: view.camera_from_target,
         });
     }
@@ -264,6 +281,7 @@ fn outcome(solved: &Solved, id: CaptureId) -> Option<Outcome<'_>> {
     Some(Outcome {
         residuals: &check.residuals,
         redness: redness(check.rms_px, verification.captures.iter().map(|check| check.rms_px)),
+        is_aside: false,
         camera_from_target: Some(check.predicted_camera_from_target),
     })
 }
@@ -273,4 +291,26 @@ fn redness(rms_px: f64, all: impl Iterator<Item = f64>) -> Option<f64> {
     all.sort_by(f64::total_cmp);
     let median = *all.get(all.len() / 2)?;
     (median > 0.0).then(|| rms_px / (style::RED_AT_MEDIANS * median))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::sample;
+
+    #[test]
+    fn a_capture_that_was_set_aside_is_named_so_and_has_the_colour_of_a_warning() {
+        let model = sample::with_an_outlier();
+        let known = Known { solved: model.solve.solved.clone(), ..Known::default() };
+        let mut captures = Captures::default();
+        let record = |id: CaptureId| model.document().capture(id).expect("a capture").clone();
+        assert_eq!(label(&known, &record(sample::OUTLIER)), format!("{} (set aside)", sample::OUTLIER));
+        assert_eq!(captures.colour(&known, &record(sample::OUTLIER)), style::SET_ASIDE);
+        assert_eq!(label(&known, &record(CaptureId(1))), CaptureId(1).to_string());
+        assert_ne!(captures.colour(&known, &record(CaptureId(1))), style::SET_ASIDE);
+        let excluded = CaptureRecord { excluded: true, ..record(sample::OUTLIER) };
+        assert_eq!(captures.colour(&known, &excluded), style::EXCLUDED, "who took it out by hand knows");
+        captures.select(&[sample::OUTLIER]);
+        assert_eq!(captures.colour(&known, &record(sample::OUTLIER)), style::SELECTED);
+    }
 }

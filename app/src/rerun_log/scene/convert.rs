@@ -85,9 +85,9 @@ pub(super) fn corner_marks(corners: &[Corner], colour: Color) -> Points2D {
 
 /// The outer edge of a board, with the row of squares around the inner corners of a chessboard.
 pub(super) fn outline(target: &TargetSpec, colour: Color) -> LineStrips3D {
-    let grid = target.grid();
-    let side = grid.square_m;
-    let (right, bottom) = (grid.columns as f64 * side, grid.rows as f64 * side);
+    let side = target.grid().square_m;
+    let far = target.extent().add_scalar(side);
+    let (right, bottom) = (far.x, far.y);
     let edge = [[-side, -side], [right, -side], [right, bottom], [-side, bottom], [-side, -side]];
     LineStrips3D::new([edge.map(|[x, y]| [x as f32, y as f32, 0.0])])
         .with_colors([colour])

@@ -43,6 +43,8 @@ pub const RESIDUAL: Color = colour(255, 230, 80);
 pub const NEUTRAL: Color = colour(130, 160, 200);
 /// A capture that is out of the fit.
 pub const EXCLUDED: Color = colour(110, 110, 110);
+/// A capture that the estimate set aside: beside the green, yellow and red of residuals it must not be mistaken.
+pub const SET_ASIDE: Color = colour(255, 120, 0);
 /// A capture that is selected.
 pub const SELECTED: Color = colour(255, 255, 255);
 /// The tracked board.

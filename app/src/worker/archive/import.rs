@@ -49,6 +49,7 @@ impl Archive {
         let mut meta = session_start::meta(None, timestamp_rfc3339());
         meta.target = dataset.target;
         meta.camera = dataset.camera;
+        meta.arm = dataset.arm.as_ref().map(|arm| arm.model.clone());
         if let Some(mode) = dataset.mode {
             meta.mode = mode;
         }
@@ -69,7 +70,7 @@ impl Archive {
                 image: &image,
                 depth_m: None,
                 base_from_tip,
-                joints_rad: None,
+                joints_rad: entry.joints_rad.as_deref(),
                 sim_time_s: None,
                 role: Role::Calibration,
                 frames: 1,

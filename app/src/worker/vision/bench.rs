@@ -245,7 +245,7 @@ impl CellBench {
         let camera_from_target = (*base_from_tip * self.truth.tip_from_camera).inverse() * base_from_target;
         let project = |(index, point)| {
             let px = camera.project(&(camera_from_target.isometry() * point)).expect("in front of the camera");
-            Corner { index, px }
+            Corner::new(index, px)
         };
         BOARD.points().into_iter().enumerate().map(project).collect()
     }

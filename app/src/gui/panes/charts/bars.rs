@@ -157,7 +157,7 @@ impl Bars {
     fn colour(&self, ui: &Ui, model: &Model, row: &CaptureRow, value: f64, is_pointed: bool) -> Color32 {
         let palette = Palette::of(ui);
         let is_above = self.unit == "px" && model.outlier_line_px.is_some_and(|line_px| value > line_px);
-        let colour = if is_above && !row.excluded && !row.verifies() {
+        let colour = if row.is_aside() || (is_above && !row.excluded && !row.verifies()) {
             palette.warning
         } else {
             marks::of_capture(Marks::of(ui), row.excluded, row.verifies())
@@ -171,6 +171,7 @@ impl Bars {
         let what = match (row.excluded, row.verifies()) {
             (true, _) => tr!(language, "excluded"),
             (false, true) => tr!(language, "verifies the fit: error of the prediction"),
+            (false, false) if row.is_aside() => tr!(language, "set aside"),
             (false, false) => tr!(language, "in the fit"),
         };
         format!("{}\n{} {value}\n{what}", text!("Capture {name}", name = row.title()).say(language), self.name)

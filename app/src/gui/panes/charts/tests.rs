@@ -80,6 +80,17 @@ fn a_click_on_a_bar_selects_its_capture() {
 }
 
 #[test]
+fn the_bar_of_a_capture_that_was_set_aside_says_so() {
+    let mut pane = pane(sample::with_an_outlier());
+    let plot = pane.rect("RMS residual [px]");
+    let pitch = (plot.width() / 12.0).min(46.0);
+    pane.harness.hover_at(plot.left_bottom() + vec2(pitch * 2.5, -4.0));
+    // Words at the pointer take half a second.
+    pane.harness.run_steps(60);
+    assert!(pane.sees("Capture 3 · pose 3") && pane.sees("set aside"));
+}
+
+#[test]
 fn the_expected_error_says_what_the_goal_takes() {
     let point = |views, mm: f64| ErrorPoint { views, tip_error_95_m: Some(mm * 1e-3) };
     let curve = ErrorCurve { gathered: vec![point(3, 2.0), point(10, 1.0)], further: vec![point(20, 0.7)] };

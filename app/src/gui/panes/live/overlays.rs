@@ -221,12 +221,12 @@ fn live_residuals(
     model: &Model,
     arrow: impl Fn(&Vector2<f64>, &Vector2<f64>),
 ) {
-    let grid = model.document().meta.target.grid();
-    if grid.columns == 0 {
+    let target = &model.document().meta.target;
+    if target.is_empty() {
         return;
     }
     for corner in corners {
-        let point = camera_from_target.isometry() * grid.point(corner.index);
+        let point = camera_from_target.isometry() * target.point(corner.index);
         if let Ok(predicted_px) = intrinsics.project(&point) {
             arrow(&corner.px, &(corner.px - predicted_px));
         }

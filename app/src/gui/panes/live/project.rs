@@ -65,13 +65,13 @@ pub struct BoardLines {
 pub fn board_lines(target: &TargetSpec) -> BoardLines {
     let grid = target.grid();
     let side = grid.square_m;
-    let point = |column: f64, row: f64| Point3::new(column * side, row * side, 0.0);
-    let (right, bottom) = (grid.columns as f64 - 1.0, grid.rows as f64 - 1.0);
+    let point = |column: usize, row: usize| target.point(row * grid.columns + column);
+    let (last_column, last_row) = (grid.columns.saturating_sub(1), grid.rows.saturating_sub(1));
     // A chessboard has one more row of squares around its inner corners.
-    let corners =
-        [point(-1.0, -1.0), point(right + 1.0, -1.0), point(right + 1.0, bottom + 1.0), point(-1.0, bottom + 1.0)];
+    let far = target.extent().add_scalar(side);
+    let corners = [[-side, -side], [far.x, -side], [far.x, far.y], [-side, far.y]].map(|[x, y]| Point3::new(x, y, 0.0));
     let around = (0..4).map(|i| [corners[i], corners[(i + 1) % 4]]).collect();
-    let rows = (0..grid.rows).map(|row| [point(0.0, row as f64), point(right, row as f64)]);
-    let columns = (0..grid.columns).map(|column| [point(column as f64, 0.0), point(column as f64, bottom)]);
+    let rows = (0..grid.rows).map(|row| [point(0, row), point(last_column, row)]);
+    let columns = (0..grid.columns).map(|column| [point(column, 0), point(column, last_row)]);
     BoardLines { around, inside: rows.chain(columns).collect() }
 }

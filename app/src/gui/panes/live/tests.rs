@@ -300,7 +300,7 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
     };
     let target = model.document().meta.target;
     for corner in model.detection.as_ref().and_then(|seen| seen.corners.as_ref()).expect("seen") {
-        let at = projector.point(&target.grid().point(corner.index)).expect("in the picture");
+        let at = projector.point(&target.point(corner.index)).expect("in the picture");
         // The sample has no robot noise and corner noise of 0.05 px.
         let seen = place.screen(vec2(corner.px.x as f32, corner.px.y as f32));
         assert!(at.distance(seen) < 1.0, "{at:?} {seen:?}");

@@ -34,11 +34,45 @@ pub fn weight(row: &CaptureRow) -> u8 {
         Seen::NoBoard => return 8,
         Seen::Board | Seen::NotYet => {}
     }
+    if row.is_aside() {
+        return 8;
+    }
     let has = |code, weight| if row.found.contains(&code) { weight } else { 0 };
     has(FindingCode::LargeResidual, 4)
         + has(FindingCode::LargeCorrection, 2)
         + has(FindingCode::InfluentialView, 1)
         + u8::from(row.excluded)
+}
+
+/// Why the estimate set a capture aside, and what to do; `None` when it did not.
+fn why_aside(row: &CaptureRow, language: Language) -> Option<String> {
+    let aside = row.aside.filter(|_| row.is_aside())?;
+    let why = match aside.board_off {
+        Some((mm, deg)) => text!(
+            "It does not fit the other captures, so the answer is without it: its board is {mm} mm and {deg}° from where \
+             they put it. The arm may still have moved, the board may have been touched, or the pose is of another \
+             picture. Look at its picture and capture this pose again, or keep all views in the result to see the \
+             difference.",
+            mm = format!("{mm:.2}"),
+            deg = format!("{deg:.3}")
+        ),
+        None => text!(
+            "Its corners are no image of the board, so the answer is without it. Look at its picture: reflections, a \
+             covered board, wrong columns and rows. Capture this pose again, or keep all views in the result to see the \
+             difference."
+        ),
+    };
+    Some(why.say(language))
+}
+
+/// The same of single corners.
+fn why_corners_aside(row: &CaptureRow, language: Language) -> Option<String> {
+    let why = text!(
+        "Corners of this picture that are far from where the rest of it puts them, and which the answer is without: \
+         {count}. Look there for reflections and things in front of the board.",
+        count = row.corners_aside
+    );
+    (row.corners_aside > 0 && !row.excluded && !row.verifies() && !row.is_aside()).then(|| why.say(language))
 }
 
 /// The remarks on a capture, the worst first.
@@ -76,10 +110,14 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         }
         Seen::Board => {}
     }
+    if let Some(why) = why_aside(row, language) {
+        flag(Some(Tone::Warning), tr!(language, "Set aside"), why);
+    }
     if let (Some(rms_px), Some(line_px)) = (row.rms_px, circumstances.outlier_line_px)
         && rms_px > line_px
         && !row.verifies()
         && !row.excluded
+        && !row.is_aside()
     {
         let (rms, line) = (format!("{rms_px:.3}"), format!("{line_px:.3}"));
         let why = text!(
@@ -112,6 +150,9 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
              safer."
         );
         flag(Some(Tone::Busy), tr!(language, "Influential"), why.to_owned());
+    }
+    if let Some(why) = why_corners_aside(row, language) {
+        flag(Some(Tone::Busy), tr!(language, "Corners aside"), why);
     }
     if row.excluded {
         let why = tr!(language, "It was taken out by hand and touches no number. Tick it to use it again.");

@@ -12,8 +12,9 @@ use crate::gui::captures::CaptureRow;
 use crate::gui::marks::{self, Marks};
 use crate::gui::numbers;
 use crate::gui::textures::Thumbnails;
-use crate::gui::theme::{CAPTION, Palette};
+use crate::gui::theme::{CAPTION, Palette, Tone};
 use crate::model::Model;
+use crate::text::Language;
 use crate::{text, tr};
 
 /// Height of a row.
@@ -35,11 +36,21 @@ pub fn row_ui(
     let name = text!("Capture {name}", name = row.title()).say(language);
     // Rows are reached by the arrow keys, not by Tab: there may be a thousand of them.
     let response = ui.interact(place, ui.id().with(("capture", row.id)), Sense::CLICK);
-    response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, selected, spoken(row, &name)));
+    response.widget_info(|| {
+        WidgetInfo::selected(WidgetType::SelectableLabel, true, selected, spoken(row, &name, language))
+    });
     if selected {
         ui.painter().rect_filled(place, CornerRadius::ZERO, ui.visuals().selection.bg_fill);
-    } else if response.hovered() {
-        ui.painter().rect_filled(place, CornerRadius::ZERO, palette.card.lerp_to_gamma(palette.text, 0.05));
+    } else {
+        let plain = row.is_aside().then(|| palette.tinted(Tone::Warning));
+        let fill = if response.hovered() {
+            Some(plain.unwrap_or(palette.card).lerp_to_gamma(palette.text, 0.05))
+        } else {
+            plain
+        };
+        if let Some(fill) = fill {
+            ui.painter().rect_filled(place, CornerRadius::ZERO, fill);
+        }
     }
     if model.review.as_ref().is_some_and(|review| review.id == row.id) {
         let bar = Rect::from_min_size(place.min, Vec2::new(3.0, place.height()));
@@ -55,8 +66,12 @@ pub fn row_ui(
             Column::Name => title(ui, row, cell),
             Column::Use => use_ui(ui, row, cell, language, outbox),
             Column::Purpose => {
-                let words = if row.verifies() { tr!(language, "verify") } else { tr!(language, "fit") };
-                let colour = marks::of_capture(Marks::of(ui), row.excluded, row.verifies());
+                let (words, colour) = if row.is_aside() {
+                    (tr!(language, "aside"), palette.warning)
+                } else {
+                    let words = if row.verifies() { tr!(language, "verify") } else { tr!(language, "fit") };
+                    (words, marks::of_capture(Marks::of(ui), row.excluded, row.verifies()))
+                };
                 let at = Pos2::new(cell.left() + 6.0, cell.center().y);
                 ui.painter().text(at, Align2::LEFT_CENTER, words, FontId::proportional(13.0), colour);
             }
@@ -74,10 +89,11 @@ pub fn row_ui(
     response
 }
 
-fn spoken(row: &CaptureRow, name: &str) -> String {
+fn spoken(row: &CaptureRow, name: &str, language: Language) -> String {
+    let aside = if row.is_aside() { format!(", {}", tr!(language, "set aside")) } else { String::new() };
     match row.rms_px {
-        Some(rms_px) => format!("{name}, {rms_px:.3} px"),
-        None => name.to_owned(),
+        Some(rms_px) => format!("{name}{aside}, {rms_px:.3} px"),
+        None => format!("{name}{aside}"),
     }
 }
 
@@ -121,7 +137,7 @@ fn title(ui: &Ui, row: &CaptureRow, cell: Rect) {
     }
 }
 
-fn use_ui(ui: &mut Ui, row: &CaptureRow, cell: Rect, language: crate::text::Language, outbox: &mut Outbox) {
+fn use_ui(ui: &mut Ui, row: &CaptureRow, cell: Rect, language: Language, outbox: &mut Outbox) {
     let mut used = !row.excluded;
     let place = Rect::from_center_size(cell.center(), Vec2::splat(20.0));
     let response = ui.put(place, Checkbox::without_text(&mut used));

@@ -9,7 +9,7 @@ use super::*;
 use crate::gui::pane_harness::{PaneHarness, PaneState};
 use crate::gui::sample;
 use crate::model::{CaptureRefused, RefusalKind};
-use crate::text::Text;
+use crate::text::{Language, Text};
 
 fn pane(model: Model) -> PaneHarness {
     PaneHarness::new(model, vec2(760.0, 420.0), |ui, state| {
@@ -136,6 +136,36 @@ fn remarks_say_what_is_wrong_with_a_capture() {
     assert!(pane.sees("No capture: too similar"));
     assert!(pane.sees("1: Robot is here, Excluded"));
     assert!(!pane.sees("2: Robot is here"));
+}
+
+#[test]
+fn a_capture_that_was_set_aside_says_so_with_how_far_it_is_off_and_what_to_do() {
+    let model = sample::with_an_outlier();
+    let table = captures::table(&egui::Context::default(), &model);
+    let aside = table.row(sample::OUTLIER).expect("a row");
+    let flags = flags::flags(aside, flags::Circumstances::default(), Language::English);
+    let why = &flags.first().expect("a remark").why;
+    assert!(why.contains("12.30 mm and 1.500°") && why.contains("keep all views"), "{why}");
+    let first = sorted(&table.rows, Sort { column: Column::Flags, descending: false })[0];
+    assert_eq!(table.rows[first].id, sample::OUTLIER, "it is worth looking at before all others");
+    let mut pane = pane(model);
+    assert!(pane.sees("3: Set aside") && !pane.sees("4: Set aside"));
+    assert!(pane.sees("9 in the fit · 1 set aside · 2 verify · 0 excluded"));
+    assert!(pane.sees("Capture 3 · pose 3, set aside, 18.000 px"));
+    change(pane.model(), |captures| captures[2].excluded = true);
+    pane.steps();
+    assert!(pane.sees("3: Excluded") && !pane.sees("set aside"), "who took it out by hand knows");
+}
+
+#[test]
+fn corners_that_were_set_aside_are_counted() {
+    let mut model = sample::solved();
+    let mut solved = crate::model::Solved::clone(model.solve.current().expect("solved"));
+    solved.calibration.views[1].corners_aside = vec![4, 5, 6];
+    model.solve.solved = Some(Arc::new(solved));
+    let table = captures::table(&egui::Context::default(), &model);
+    let flags = flags::flags(&table.rows[1], flags::Circumstances::default(), Language::English);
+    assert!(flags.iter().any(|flag| flag.name == "Corners aside" && flag.why.contains("without: 3.")), "{flags:?}");
 }
 
 #[test]

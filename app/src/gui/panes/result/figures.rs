@@ -2,13 +2,13 @@
 
 use handeye_core::frames::{Camera, Mount, Pose};
 use handeye_core::handeye::Mode;
+use handeye_core::handeye::joint::SmallSample;
+use handeye_core::handeye::quality;
 use handeye_core::se3;
-use nalgebra::{Cholesky, Matrix6};
+use nalgebra::{Cholesky, Matrix3, Matrix6, Vector3};
 
 use crate::model::{Model, Solved};
 
-/// 97.5 % quantile of the normal distribution: 95 % lie within as many standard deviations.
-const Z_95: f64 = 1.96;
 /// 95 % quantile of chi-square with six degrees of freedom.
 const CHI_SQUARE_6_95: f64 = 12.592;
 
@@ -22,11 +22,15 @@ pub struct Within95 {
 }
 
 impl Within95 {
-    /// From the covariance of `[t; r]` in `T * exp(delta)`, whose translation is along the axes of the child.
-    pub fn new(mount_from_camera: &Pose<Mount, Camera>, covariance: &Matrix6<f64>) -> Self {
+    /// From the covariance of `[t; r]` in `T * exp(delta)`, whose translation is along the axes of the child, and the
+    /// distribution of the error, as the headline has it: few views know their noise levels badly.
+    pub fn new(mount_from_camera: &Pose<Mount, Camera>, covariance: &Matrix6<f64>, law: SmallSample) -> Self {
         let rotation = mount_from_camera.rotation().to_rotation_matrix().into_inner();
         let translation = rotation * covariance.fixed_view::<3, 3>(0, 0) * rotation.transpose();
-        let within = |variance: f64| Z_95 * variance.max(0.0).sqrt();
+        // 1.96 standard deviations when the levels are known, and more the fewer degrees of freedom they have.
+        let one_axis = Matrix3::from_diagonal(&Vector3::new(1.0 / law.scale, 0.0, 0.0));
+        let sigmas = quality::radius_95_t(&one_axis, law.degrees_of_freedom);
+        let within = |variance: f64| sigmas * variance.max(0.0).sqrt();
         Self {
             translation_m: std::array::from_fn(|i| within(translation[(i, i)])),
             rotation_rad: std::array::from_fn(|i| within(covariance[(3 + i, 3 + i)])),
@@ -83,10 +87,13 @@ mod tests {
         let mut covariance = Matrix6::zeros();
         covariance[(0, 0)] = 4e-6;
         covariance[(5, 5)] = 1e-6;
-        let within = Within95::new(&pose, &covariance);
+        let within = Within95::new(&pose, &covariance, SmallSample::KNOWN);
         let expected = [0.0, 1.96 * 2e-3, 0.0];
-        assert!((0..3).all(|i| (within.translation_m[i] - expected[i]).abs() < 1e-12), "{within:?}");
-        assert!((within.rotation_rad[2] - 1.96e-3).abs() < 1e-12 && within.rotation_rad[0] == 0.0);
+        assert!((0..3).all(|i| (within.translation_m[i] - expected[i]).abs() < 1e-6), "{within:?}");
+        assert!((within.rotation_rad[2] - 1.96e-3).abs() < 1e-6 && within.rotation_rad[0] == 0.0);
+        // Student's t with ten degrees of freedom.
+        let few = Within95::new(&pose, &covariance, SmallSample { degrees_of_freedom: 10.0, ..SmallSample::KNOWN });
+        assert!((few.translation_m[1] - 2.228 * 2e-3).abs() < 5e-6, "{few:?}");
     }
 
     #[test]

@@ -19,6 +19,7 @@ pub fn methods_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outb
         ui,
         tr!(language, "Closed forms weigh no noise: they start the joint estimate and show how firm the views are."),
     );
+    keep_ui(ui, model, outbox);
     let answer = solved.calibration.hand_eye.map(|hand_eye| hand_eye.mount_from_camera());
     Grid::new("methods").num_columns(4).spacing([12.0, 4.0]).striped(true).show(ui, |ui| {
         let weak = Palette::of(ui).weak;
@@ -34,6 +35,20 @@ pub fn methods_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outb
             ui.end_row();
         }
     });
+}
+
+/// Whether views that do not fit the others stay in the answer.
+fn keep_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let mut keep = model.keep_outliers;
+    let what = tr!(
+        language,
+        "Views and corners that do not fit the others are set aside and named. With this they stay in the answer, so \
+         that you see the difference; it may then be much worse than it says"
+    );
+    if ui.checkbox(&mut keep, tr!(language, "Keep all views")).on_hover_text(what).changed() {
+        outbox.send(Command::SetKeepOutliers(keep));
+    }
 }
 
 fn row_ui(ui: &mut Ui, name: &str, answer: Option<&Pose<Mount, Camera>>, solved: &Solved, language: Language) {

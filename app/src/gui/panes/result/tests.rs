@@ -1,8 +1,12 @@
-use handeye_core::calibrate::{CameraKnowledge, Observations, ObservedView, ViewStatus};
+use handeye_core::board_shape::BoardShape;
+use handeye_core::calibrate::{CameraKnowledge, Observations, ObservedView, ShapeEstimate, ViewStatus};
+use handeye_core::doctor;
 use handeye_core::findings::{self, FindingCode, FindingOptions};
 use handeye_core::frames::Pose;
+use handeye_core::handeye::joint::outliers::Distance;
+use handeye_core::handeye::widening::{Evidence, Widening};
 use handeye_core::handeye::{HandEyeError, Mode};
-use handeye_core::progress::Stage;
+use handeye_core::progress::{CancelToken, Stage};
 use handeye_core::result::TruthComparison;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -130,6 +134,67 @@ fn another_method_is_chosen_from_the_comparison() {
 }
 
 #[test]
+fn keeping_all_views_is_one_click() {
+    let mut pane = driven(sample::with_an_outlier());
+    assert!(pane.sees("Views set aside: 1 of 10"));
+    assert_eq!(pane.click("Keep all views"), [Command::SetKeepOutliers(true)]);
+    pane.model().keep_outliers = true;
+    pane.steps();
+    assert_eq!(pane.click("Keep all views"), [Command::SetKeepOutliers(false)]);
+}
+
+/// What the estimate found out, all of it.
+fn with_everything_found(calibration: &mut handeye_core::calibrate::Calibration) {
+    for view in calibration.views.iter_mut().take(2) {
+        view.status = ViewStatus::Outlier;
+        view.distance = Some(Distance { of_limit: 4.0, metres: 8e-3, radians: 0.02 });
+    }
+    calibration.views[3].corners_aside = vec![1, 2];
+    calibration.views[4].renumbered = true;
+    calibration.shape = Some(ShapeEstimate {
+        shape: BoardShape { warp_m: [4e-4, -1e-4], scale: 1.0 },
+        warp_sigma_m: Some([3e-5, 2e-5]),
+        scale_sigma: None,
+    });
+    calibration.widening = Some(Widening { factor: 4.0, by: Some(Evidence::Neighbours), checks: Vec::new() });
+    if let Some(sample) = &mut calibration.small_sample {
+        sample.level_sigma = [0.1, 0.8, 0.9];
+    }
+    if let Some(noise) = &mut calibration.noise {
+        noise.view_px = 0.12;
+    }
+    calibration.robot_effect_px = Some(10.0);
+    // The camera's place along its own x axis is known worst.
+    let mut covariance = nalgebra::Matrix6::identity() * 1e-12;
+    covariance[(0, 0)] = 1e-6;
+    calibration.hand_eye_covariance = Some(covariance);
+}
+
+#[test]
+fn what_the_estimate_found_out_is_stated_with_units() {
+    let pane = driven(changed(|solved| with_everything_found(&mut solved.calibration)));
+    for line in [
+        "Views set aside: 2 of 10",
+        "Corners set aside: 2, in 1 of 10 views",
+        "Bend of the board: x 0.400 ± 0.030 mm, y -0.100 ± 0.020 mm",
+        "Noise of views: 0.120 px",
+        "Uncertainty widened: 2.0 times",
+        "the robot is off in the same direction in neighbouring poses",
+        "degrees of freedom",
+    ] {
+        assert!(pane.sees(line), "{line}");
+    }
+    assert!(pane.nothing_is_cut_off());
+    let plain = driven(changed(|solved| {
+        solved.calibration.shape = None;
+        solved.calibration.widening = None;
+        solved.calibration.small_sample = None;
+        solved.calibration.noise = None;
+    }));
+    assert!(!plain.sees("What the estimate found out"), "there is nothing to say");
+}
+
+#[test]
 fn a_camera_beside_the_robot_is_shown_in_the_base() {
     let model = changed(|solved| {
         let hand_eye = solved.calibration.hand_eye.expect("a hand-eye");
@@ -148,6 +213,7 @@ fn observations(model: &Model) -> Observations {
         name: record.image.clone(),
         base_from_tip: Some(record.base_from_tip),
         corners: model.observed(record.id).and_then(|observed| observed.corners.clone()),
+        tip_by_joint: Vec::new(),
         camera_from_target: None,
         in_fit: true,
     });
@@ -228,6 +294,7 @@ fn every_finding() -> Vec<findings::Finding> {
         },
         1000.0,
     );
+    judge(&good, &with_everything_found, 1000.0);
     judge(
         &good,
         &|c| {
@@ -247,7 +314,7 @@ fn every_finding() -> Vec<findings::Finding> {
 fn every_finding_is_said_in_both_languages_with_its_numbers() {
     let found = every_finding();
     let codes: BTreeSet<FindingCode> = found.iter().map(|finding| finding.code).collect();
-    assert_eq!(codes.len(), 15, "{codes:?}");
+    assert_eq!(codes.len(), 22, "{codes:?}");
     for finding in &found {
         let words = words::of(finding);
         assert_eq!(words.say(Language::English), finding.text);
@@ -276,10 +343,40 @@ fn every_finding_is_said_in_both_languages_with_its_numbers() {
             "daniilidis",
             "shah",
             "li",
+            "ChArUco",
             "",
         ];
         let left: Vec<&String> = latin.iter().filter(|word| !kept.contains(&word.as_str())).collect();
         assert!(left.is_empty(), "{left:?} in {chinese}");
+    }
+}
+
+#[test]
+fn what_the_doctor_says_of_a_session_is_said_in_both_languages() {
+    let good = observations(&sample::solved());
+    let mut found = Vec::new();
+    let mut examine = |change: &dyn Fn(usize, &mut nalgebra::Isometry3<f64>)| {
+        let mut observations = good.clone();
+        for (n, view) in observations.views.iter_mut().enumerate() {
+            let mut pose = *view.base_from_tip.expect("a robot pose").isometry();
+            change(n, &mut pose);
+            view.base_from_tip = Some(Pose::from_isometry(pose));
+        }
+        let diagnosis = doctor::diagnose(&observations, None, &FindingOptions::default(), &CancelToken::default());
+        found.extend(diagnosis.findings);
+    };
+    examine(&|_, pose| *pose = pose.inverse());
+    examine(&|_, pose| pose.translation.vector *= 1e3);
+    examine(&|n, pose| pose.translation.vector.x += if n < 5 { 0.0 } else { 0.02 });
+    examine(&|n, pose| pose.translation.vector.y += if n == 3 { 0.03 } else { 0.0 });
+    examine(&|n, pose| pose.translation.vector.z += if n == 3 { f64::NAN } else { 0.0 });
+    let codes: BTreeSet<FindingCode> = found.iter().map(|finding| finding.code).collect();
+    assert!(codes.contains(&FindingCode::InvertedPoses) || codes.contains(&FindingCode::WrongMode), "{codes:?}");
+    assert!(codes.contains(&FindingCode::WrongLengthUnit) && codes.contains(&FindingCode::NotFinite), "{codes:?}");
+    for finding in &found {
+        let words = words::of(finding);
+        assert_eq!(words.say(Language::English), finding.text);
+        assert_ne!(words.say(Language::Chinese), finding.text, "not translated");
     }
 }
 

@@ -4,6 +4,9 @@
 //! the translation; a sentence that no catalogue has is shown as the core says it. So a finding is never said with
 //! other numbers or with less than the core says.
 
+mod decided;
+mod diagnosed;
+
 use handeye_core::findings::{Finding, FindingCode};
 
 use crate::text::{Language, Text, Value};
@@ -12,7 +15,17 @@ use crate::tr;
 /// A finding that can be said in every language.
 pub fn of(finding: &Finding) -> Text {
     let said = finding.text.as_str();
-    templates(finding.code).iter().find_map(|template| matched(template, said)).unwrap_or_else(|| Text::verbatim(said))
+    let templates = templates(finding.code);
+    let whole = |said: &str| templates.iter().find_map(|template| matched(template, said));
+    whole(said).or_else(|| beside(said, whole)).unwrap_or_else(|| Text::verbatim(said))
+}
+
+/// A finding that ends with saying that another one explains as much.
+fn beside(said: &str, whole: impl Fn(&str) -> Option<Text>) -> Option<Text> {
+    const FINDING: &str = "{finding}";
+    let template = tr!(Language::English, "{finding} What else was found explains much the same: check both.");
+    let finding = whole(said.strip_suffix(template.strip_prefix(FINDING)?)?)?;
+    Some(Text::new(template, vec![("finding", Value::Text(finding))]))
 }
 
 fn templates(code: FindingCode) -> Vec<&'static str> {
@@ -93,12 +106,16 @@ fn templates(code: FindingCode) -> Vec<&'static str> {
         FindingCode::GoalNotReached => {
             vec![tr!(en, "The expected error of {error} mm (95 %) is above the goal of {goal} mm. {advice}")]
         }
-        _ => Vec::new(),
+        other => [decided::templates(other), diagnosed::templates(other)].concat(),
     }
 }
 
 /// Parts of sentences that are translated as well; whole ones first.
-fn parts() -> [&'static str; 21] {
+fn parts() -> impl Iterator<Item = &'static str> {
+    decided::parts().into_iter().chain(diagnosed::parts()).chain(common_parts())
+}
+
+fn common_parts() -> [&'static str; 21] {
     let en = Language::English;
     [
         tr!(en, "it is seen in patches"),
@@ -143,5 +160,5 @@ fn matched(template: &'static str, said: &str) -> Option<Text> {
 }
 
 fn part(said: &str) -> Value {
-    parts().iter().find_map(|template| matched(template, said)).map_or_else(|| Value::from(said), Value::Text)
+    parts().find_map(|template| matched(template, said)).map_or_else(|| Value::from(said), Value::Text)
 }

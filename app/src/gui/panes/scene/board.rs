@@ -2,8 +2,8 @@
 
 use egui::{Color32, Stroke};
 use handeye_core::frames::{Base, Pose, Target};
-use handeye_core::target::TargetSpec;
-use nalgebra::{Point3, Vector3};
+use handeye_core::target::{AprilGrid, Layout, TargetSpec};
+use nalgebra::{Point3, Vector2, Vector3};
 
 use super::canvas::Canvas;
 use crate::gui::theme::Palette;
@@ -23,32 +23,40 @@ fn size_m(target: &TargetSpec) -> f64 {
 
 /// The corners of the pattern, wider by a part of a square.
 fn outline(target: &TargetSpec, margin: f64) -> [Point3<f64>; 4] {
-    let grid = target.grid();
-    let (before, beyond) = (1.0 + margin, margin);
-    let at = |column: f64, row: f64| Point3::new(column * grid.square_m, row * grid.square_m, 0.0);
-    let (right, bottom) = (grid.columns as f64 + beyond, grid.rows as f64 + beyond);
-    [at(-before, -before), at(right, -before), at(right, bottom), at(-before, bottom)]
+    let before = (1.0 + margin) * target.grid().square_m;
+    let far = target.extent().add_scalar(before);
+    let at = |x: f64, y: f64| Point3::new(x, y, 0.0);
+    [at(-before, -before), at(far.x, -before), at(far.x, far.y), at(-before, far.y)]
 }
 
-/// The dark parts of the pattern.
+/// The dark parts of the pattern; markers without their codes, which nobody reads at this size.
 fn dark(target: &TargetSpec) -> Vec<Vec<Point3<f64>>> {
     let grid = target.grid();
     let side = grid.square_m;
+    // One more square on each side than there are inner corners; the one between the first corners is dark.
+    let squares = |is_dark: &dyn Fn(usize, usize) -> bool| -> Vec<Vec<Point3<f64>>> {
+        let all = (0..=grid.rows).flat_map(|row| (0..=grid.columns).map(move |column| (column, row)));
+        all.filter(|(column, row)| is_dark(*column, *row))
+            .map(|(column, row)| {
+                let corner = |x: usize, y: usize| {
+                    Point3::new((column + x) as f64 * side - side, (row + y) as f64 * side - side, 0.0)
+                };
+                vec![corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)]
+            })
+            .collect()
+    };
+    let flat = |corners: [Vector2<f64>; 4]| corners.map(|c| Point3::new(c.x, c.y, 0.0)).to_vec();
     match target {
-        TargetSpec::Chessboard(_) => {
-            // One more square on each side than there are inner corners; the one between the first corners is dark.
-            let squares = (0..=grid.rows).flat_map(|row| (0..=grid.columns).map(move |column| (column, row)));
-            squares
-                .filter(|(column, row)| (column + row) % 2 == 0)
-                .map(|(column, row)| {
-                    let corner = |x: usize, y: usize| {
-                        Point3::new((column + x) as f64 * side - side, (row + y) as f64 * side - side, 0.0)
-                    };
-                    vec![corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)]
-                })
-                .collect()
+        TargetSpec::Chessboard(_) => squares(&|column, row| (column + row) % 2 == 0),
+        TargetSpec::Charuco(board) => {
+            let layout = board.layout.unwrap_or(Layout::New);
+            let mut all = squares(&|column, row| board.is_dark(layout, column, row));
+            all.extend(board.marker_squares(layout).into_iter().map(|square| flat(board.marker_corners(square))));
+            all
         }
-        TargetSpec::Circles(_) => {
+        TargetSpec::AprilGrid(board) => tags(board).into_iter().map(flat).collect(),
+        TargetSpec::AprilTag(tag) => tags(&tag.alone()).into_iter().map(flat).collect(),
+        TargetSpec::Circles(_) | TargetSpec::AsymmetricCircles(_) => {
             let around = |centre: Point3<f64>| {
                 let corner = |i: usize| {
                     let (sin, cos) = (i as f64 / DOT_CORNERS as f64 * std::f64::consts::TAU).sin_cos();
@@ -59,6 +67,11 @@ fn dark(target: &TargetSpec) -> Vec<Vec<Point3<f64>>> {
             target.points().into_iter().map(around).collect()
         }
     }
+}
+
+fn tags(board: &AprilGrid) -> Vec<[Vector2<f64>; 4]> {
+    let places = (0..board.rows).flat_map(|row| (0..board.columns).map(move |column| (column, row)));
+    places.map(|place| board.tag_corners(place)).collect()
 }
 
 /// The board with its pattern; from behind, a plain sheet.

@@ -39,7 +39,7 @@ fn median_px(table: &CaptureTable) -> Option<f64> {
 }
 
 /// The colour of a capture: by what it is for, and the nearer to that of a warning the larger its residual is against
-/// the median; in it above the line between good and bad residuals, as in the charts.
+/// the median; in it above the line between good and bad residuals, and when the estimate set it aside, as in the charts.
 pub fn colour(
     row: &CaptureRow,
     median_px: Option<f64>,
@@ -47,6 +47,9 @@ pub fn colour(
     marks: &Marks,
     warning: Color32,
 ) -> Color32 {
+    if row.is_aside() {
+        return warning;
+    }
     let plain = marks::of_capture(marks, row.excluded, row.verifies());
     let Some(rms_px) = row.rms_px.filter(|_| !row.excluded && !row.verifies()) else { return plain };
     if line_px.is_some_and(|line_px| rms_px > line_px) {
@@ -144,6 +147,9 @@ mod tests {
         assert_eq!(of(1.1 * median, Some(median)), warning, "the line of the charts counts here as well");
         let verifying = &table.rows[sample::FITTED as usize];
         assert_eq!(colour(verifying, Some(median), None, marks, warning), marks.verify);
+        let aside = captures::Aside { board_off: None };
+        let aside = CaptureRow { aside: Some(aside), rms_px: None, ..table.rows[0].clone() };
+        assert_eq!(colour(&aside, Some(median), None, marks, warning), warning);
         let excluded = CaptureRow { excluded: true, rms_px: Some(1e3), ..table.rows[0].clone() };
         assert_eq!(colour(&excluded, Some(median), None, marks, warning), marks.excluded);
     }

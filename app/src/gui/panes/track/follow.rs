@@ -90,7 +90,7 @@ fn choice_ui(ui: &mut Ui, model: &Model, choice: &mut Choice) {
     if !choice.to_corner {
         return;
     }
-    let grid = *model.document().meta.target.grid();
+    let grid = model.document().meta.target.grid();
     choice.corner = choice.corner.clamp(1, grid.len().max(1));
     ui.horizontal_wrapped(|ui| {
         let columns = grid.columns.max(1);

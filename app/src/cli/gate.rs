@@ -1,0 +1,117 @@
+//! `--gate`: conditions on a result that decide over the exit code.
+
+use std::fmt;
+use std::str::FromStr;
+
+use handeye_core::result::Quality;
+
+/// A condition such as `tip_error_95_mm<0.5`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gate {
+    number: Number,
+    or_equal: bool,
+    limit: f64,
+}
+
+/// The numbers that a condition may be on, by their keys in the result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Number {
+    Rms,
+    Sigma,
+    HeldOut,
+    TipError,
+    RobotPosition,
+    RobotOrientation,
+}
+
+impl Number {
+    const ALL: [Self; 6] =
+        [Self::Rms, Self::Sigma, Self::HeldOut, Self::TipError, Self::RobotPosition, Self::RobotOrientation];
+
+    fn key(self) -> &'static str {
+        match self {
+            Self::Rms => "rms_px",
+            Self::Sigma => "sigma_px",
+            Self::HeldOut => "heldout_rms_px",
+            Self::TipError => "tip_error_95_mm",
+            Self::RobotPosition => "robot_sigma_mm",
+            Self::RobotOrientation => "robot_sigma_deg",
+        }
+    }
+
+    fn of(self, quality: &Quality) -> Option<f64> {
+        match self {
+            Self::Rms => quality.rms_px,
+            Self::Sigma => quality.sigma_px,
+            Self::HeldOut => quality.heldout_rms_px,
+            Self::TipError => quality.tip_error_95_mm,
+            Self::RobotPosition => quality.robot_sigma_mm,
+            Self::RobotOrientation => quality.robot_sigma_deg,
+        }
+    }
+}
+
+impl Gate {
+    /// Why a result does not pass; `None` when it does. A number that is not known does not pass.
+    pub fn failure(&self, quality: &Quality) -> Option<String> {
+        let key = self.number.key();
+        match self.number.of(quality) {
+            None => Some(format!("gate {self}: {key} is not known for this result")),
+            Some(value) if value < self.limit || (self.or_equal && value == self.limit) => None,
+            Some(value) => Some(format!("gate {self}: {key} is {value:.4}")),
+        }
+    }
+}
+
+impl fmt::Display for Gate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}{}", self.number.key(), if self.or_equal { "<=" } else { "<" }, self.limit)
+    }
+}
+
+impl FromStr for Gate {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (key, rest) = text.split_once('<').ok_or_else(|| format!("{text:?} has no <: write NAME<LIMIT"))?;
+        let (or_equal, limit) = match rest.strip_prefix('=') {
+            Some(limit) => (true, limit),
+            None => (false, rest),
+        };
+        let number = Number::ALL.into_iter().find(|number| number.key() == key.trim()).ok_or_else(|| {
+            let keys: Vec<&str> = Number::ALL.iter().map(|number| number.key()).collect();
+            format!("{:?} is no number of a result: take one of {}", key.trim(), keys.join(", "))
+        })?;
+        let limit: f64 = limit.trim().parse().map_err(|_not_a_number| format!("{limit:?} is no number"))?;
+        if !limit.is_finite() {
+            return Err(format!("{limit} is no limit"));
+        }
+        Ok(Self { number, or_equal, limit })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_result_passes_below_its_limit_and_not_when_the_number_is_unknown() {
+        let gate: Gate = "tip_error_95_mm<0.5".parse().expect("a gate");
+        let with = |error: Option<f64>| Quality { tip_error_95_mm: error, ..Quality::default() };
+        assert_eq!(gate.failure(&with(Some(0.49))), None);
+        assert_eq!(
+            gate.failure(&with(Some(0.5))).as_deref(),
+            Some("gate tip_error_95_mm<0.5: tip_error_95_mm is 0.5000")
+        );
+        assert!(gate.failure(&with(None)).is_some());
+        let or_equal: Gate = "tip_error_95_mm <= 0.5".parse().expect("a gate");
+        assert_eq!(or_equal.failure(&with(Some(0.5))), None);
+    }
+
+    #[test]
+    fn what_is_no_gate_says_why() {
+        for bad in ["tip_error_95_mm>0.5", "tip_error<1", "rms_px<one", "rms_px<inf"] {
+            assert!(bad.parse::<Gate>().is_err(), "{bad}");
+        }
+    }
+}

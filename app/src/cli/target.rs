@@ -1,0 +1,188 @@
+//! `handeye target`: a target on paper.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, anyhow};
+use clap::{Args, ValueEnum};
+use handeye_core::atomic_file;
+use handeye_core::dataset::write::target_table;
+use handeye_core::print::{Page, PrintError, Sheet, pdf};
+use handeye_core::target::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
+
+use super::Failure;
+
+pub const EXAMPLES: &str = "Example:
+  handeye target --kind charuco --columns 6 --rows 8 --square 22 --marker 16 --dictionary 5x5_100 --pdf board.pdf
+  handeye target --kind aprilgrid --columns 4 --rows 6 --tag 30 --spacing 9 --family apriltag_36h11 --pdf grid.pdf
+  handeye target --kind chessboard --columns 10 --rows 7 --square 40 --page fit --pdf board.pdf";
+
+/// Options of `handeye target`.
+#[derive(Debug, Args)]
+pub struct TargetArgs {
+    /// What to print.
+    #[arg(long, value_enum)]
+    kind: Kind,
+    /// File to write.
+    #[arg(long, value_name = "FILE")]
+    pdf: PathBuf,
+    /// Page: a4, a3, letter, or fit for one as large as the target needs.
+    #[arg(long, value_name = "PAGE", default_value = "a4")]
+    page: Page,
+    /// Inner corners, dots or tags along x.
+    #[arg(long, value_name = "N")]
+    columns: Option<usize>,
+    /// Inner corners, dots or tags along y.
+    #[arg(long, value_name = "N")]
+    rows: Option<usize>,
+    /// Side of a square, distance of dots, or distance of the rows of asymmetric dots.
+    #[arg(long, value_name = "MM")]
+    square: Option<f64>,
+    /// Side of a marker of a ChArUco board, with its black border.
+    #[arg(long, value_name = "MM")]
+    marker: Option<f64>,
+    /// Family of the markers of a ChArUco board, such as 5x5_100.
+    #[arg(long, value_name = "NAME")]
+    dictionary: Option<Dictionary>,
+    /// Which squares of a ChArUco board have markers.
+    #[arg(long, value_enum)]
+    layout: Option<LayoutName>,
+    /// Side of a tag, with its black border.
+    #[arg(long, value_name = "MM")]
+    tag: Option<f64>,
+    /// Gap between tags.
+    #[arg(long, value_name = "MM")]
+    spacing: Option<f64>,
+    /// Number of the first tag of a board of tags [default: 0].
+    #[arg(long, value_name = "N")]
+    first_id: Option<usize>,
+    /// Number of a single tag [default: 0].
+    #[arg(long, value_name = "N")]
+    id: Option<usize>,
+    /// Family of tags [default: apriltag_36h11].
+    #[arg(long, value_name = "NAME")]
+    family: Option<Dictionary>,
+    /// Width of the black border of tags in bits [default: 2 on boards, as Kalibr has it, 1 for a single tag].
+    #[arg(long, value_name = "N")]
+    border_bits: Option<usize>,
+}
+
+/// Kinds of targets, as data sets call them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+enum Kind {
+    Chessboard,
+    Charuco,
+    #[value(name = "aprilgrid")]
+    AprilGrid,
+    #[value(name = "apriltag")]
+    AprilTag,
+    Circles,
+    AsymmetricCircles,
+}
+
+/// Layouts of ChArUco boards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LayoutName {
+    /// OpenCV from 4.6 on.
+    New,
+    /// OpenCV before 4.6.
+    Legacy,
+}
+
+pub fn run(args: &TargetArgs) -> Result<(), Failure> {
+    let target = target(args).map_err(Failure::unusable)?;
+    let sheet = Sheet::new(&target, args.page).map_err(|error| match error {
+        PrintError::Markers { .. } => Failure::failed(error),
+        _ => Failure::unusable(error),
+    })?;
+    atomic_file::write(&args.pdf, &pdf(&sheet))
+        .with_context(|| format!("{} cannot be written", args.pdf.display()))
+        .map_err(Failure::failed)?;
+    let [width, height] = sheet.size_mm;
+    eprintln!("{target}, on a page of {width} × {height} mm");
+    eprintln!("print at 100 % (actual size); both rulers must then be 100 mm long");
+    eprintln!("wrote {}", args.pdf.display());
+    // What a data set says of it, to be copied.
+    print!("{}", target_table(&target));
+    Ok(())
+}
+
+fn target(args: &TargetArgs) -> anyhow::Result<TargetSpec> {
+    use Kind as K;
+    let of = |kinds: &[Kind]| kinds.contains(&args.kind);
+    let tags = [K::AprilGrid, K::AprilTag];
+    let lattices = [K::Chessboard, K::Charuco, K::Circles, K::AsymmetricCircles];
+    let grids = [K::Chessboard, K::Charuco, K::Circles, K::AsymmetricCircles, K::AprilGrid];
+    for (name, given, belongs) in [
+        ("--columns", args.columns.is_some(), of(&grids)),
+        ("--rows", args.rows.is_some(), of(&grids)),
+        ("--square", args.square.is_some(), of(&lattices)),
+        ("--marker", args.marker.is_some(), of(&[K::Charuco])),
+        ("--dictionary", args.dictionary.is_some(), of(&[K::Charuco])),
+        ("--layout", args.layout.is_some(), of(&[K::Charuco])),
+        ("--tag", args.tag.is_some(), of(&tags)),
+        ("--spacing", args.spacing.is_some(), of(&[K::AprilGrid])),
+        ("--first-id", args.first_id.is_some(), of(&[K::AprilGrid])),
+        ("--id", args.id.is_some(), of(&[K::AprilTag])),
+        ("--family", args.family.is_some(), of(&tags)),
+        ("--border-bits", args.border_bits.is_some(), of(&tags)),
+    ] {
+        if given && !belongs {
+            return Err(anyhow!("{name} does not belong to a target of that kind: leave it out"));
+        }
+    }
+    let columns = || needed("--columns", args.columns);
+    let rows = || needed("--rows", args.rows);
+    let grid = || anyhow::Ok(Grid { columns: columns()?, rows: rows()?, square_m: metres("--square", args.square)? });
+    let family = args.family.unwrap_or(Dictionary::APRILTAG_36H11);
+    let target = match args.kind {
+        K::Chessboard => TargetSpec::Chessboard(grid()?),
+        K::Circles => TargetSpec::Circles(grid()?),
+        K::AsymmetricCircles => TargetSpec::AsymmetricCircles(grid()?),
+        K::Charuco => {
+            let Grid { columns, rows, square_m } = grid()?;
+            TargetSpec::Charuco(Charuco {
+                columns,
+                rows,
+                square_m,
+                marker_m: metres("--marker", args.marker)?,
+                dictionary: needed("--dictionary", args.dictionary)?,
+                layout: Some(match args.layout.unwrap_or(LayoutName::New) {
+                    LayoutName::New => Layout::New,
+                    LayoutName::Legacy => Layout::Legacy,
+                }),
+            })
+        }
+        K::AprilGrid => TargetSpec::AprilGrid(AprilGrid {
+            columns: columns()?,
+            rows: rows()?,
+            tag_m: metres("--tag", args.tag)?,
+            spacing_m: metres("--spacing", args.spacing)?,
+            first_id: args.first_id.unwrap_or(0),
+            family,
+            border_bits: Some(args.border_bits.unwrap_or(2)),
+            ids: IdOrder::BottomUp,
+        }),
+        K::AprilTag => TargetSpec::AprilTag(AprilTag {
+            tag_m: metres("--tag", args.tag)?,
+            id: args.id.unwrap_or(0),
+            family,
+            border_bits: Some(args.border_bits.unwrap_or(1)),
+        }),
+    };
+    target.check()?;
+    Ok(target)
+}
+
+fn needed<T>(option: &str, value: Option<T>) -> anyhow::Result<T> {
+    value.ok_or_else(|| anyhow!("{option} is needed for a target of that kind"))
+}
+
+fn metres(option: &str, value: Option<f64>) -> anyhow::Result<f64> {
+    let mm = needed(option, value)?;
+    if mm.is_finite() && mm > 0.0 {
+        Ok(mm * 1e-3)
+    } else {
+        Err(anyhow!("{option} {mm} is not usable: it must be a length in mm"))
+    }
+}
