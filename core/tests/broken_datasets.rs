@@ -130,7 +130,7 @@ const DEFECTS: &[(&str, Mutation, &[&str])] = &[
     (
         "angles without a unit",
         |f| f.edit("dataset.toml", "quaternion_xyzw", "rpy"),
-        &["dataset.toml:", "angle_unit", "deg"],
+        &["dataset.toml, row 7:", "angle_unit", "deg"],
     ),
     (
         "an unknown target",
@@ -138,9 +138,30 @@ const DEFECTS: &[(&str, Mutation, &[&str])] = &[
         &["dataset.toml, row 3:", "checkers", "chessboard", "circles"],
     ),
     (
-        "a target that is not supported yet",
+        "a target without one of its keys",
         |f| f.edit("dataset.toml", "kind = \"chessboard\"", "kind = \"charuco\"\nmarker_m = 0.01"),
-        &["dataset.toml, row 3:", "charuco", "chessboard"],
+        &["dataset.toml, row 3:", "dictionary", "5x5_100"],
+    ),
+    (
+        "a key of another kind of target",
+        |f| f.edit("dataset.toml", "kind = \"chessboard\"", "kind = \"chessboard\"\nmarker_m = 0.01"),
+        &["dataset.toml, row 4:", "marker_m", "chessboard"],
+    ),
+    (
+        "a marker as large as its square",
+        |f| {
+            let charuco = "kind = \"charuco\"\ndictionary = \"5x5_100\"\nmarker_m = 0.02";
+            f.edit("dataset.toml", "kind = \"chessboard\"", charuco);
+        },
+        &["dataset.toml, row 5:", "marker_m = 0.02", "square_m"],
+    ),
+    (
+        "an unknown family of markers",
+        |f| {
+            let charuco = "kind = \"charuco\"\ndictionary = \"8x8_10\"\nmarker_m = 0.01";
+            f.edit("dataset.toml", "kind = \"chessboard\"", charuco);
+        },
+        &["dataset.toml, row 4:", "8x8_10", "apriltag_36h11"],
     ),
     (
         "a square of no size",

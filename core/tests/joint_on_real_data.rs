@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use handeye_core::board_shape::{BoardPoints, BoardShape};
 use handeye_core::camera::{Distortion, Intrinsics};
 use handeye_core::frames::{Anchor, Base, Mount, Pose, Target, Tip};
 use handeye_core::handeye::Mode;
@@ -59,7 +60,7 @@ fn corners(folder: &Path, json: &Value) -> (Vec<Point3<f64>>, BTreeMap<String, V
                 points.push(point);
                 points.len() - 1
             });
-            by_image.entry(cells[1].to_owned()).or_default().push(Corner { index, px: Vector2::new(at(5), at(6)) });
+            by_image.entry(cells[1].to_owned()).or_default().push(Corner::new(index, Vector2::new(at(5), at(6))));
         }
         return (points, by_image);
     }
@@ -77,7 +78,7 @@ fn corners(folder: &Path, json: &Value) -> (Vec<Point3<f64>>, BTreeMap<String, V
         if cells[0] == detector {
             let px = Vector2::new(cells[4].parse().expect("u"), cells[5].parse().expect("v"));
             let index = cells[3].parse().expect("corner");
-            by_image.entry(cells[2].to_owned()).or_default().push(Corner { index, px });
+            by_image.entry(cells[2].to_owned()).or_default().push(Corner::new(index, px));
         }
     }
     (points, by_image)
@@ -101,7 +102,7 @@ fn load(folder: &Path) -> Set {
         let camera_from_target: Pose<handeye_core::frames::Camera, Target> = pose(&view["cam_T_target"]);
         first.get_or_insert((base_from_tip, camera_from_target));
         let found = by_image.remove(&name).expect("corners of every view");
-        views.push(View { name, base_from_tip, corners: found });
+        views.push(View::new(name, base_from_tip, found));
     }
     // Start from the closed form of the reference, as a user's solve would.
     let mount_from_camera = pose(&json["reference"]["Park"]);
@@ -113,15 +114,21 @@ fn load(folder: &Path) -> Set {
         mode,
         points,
         views,
-        start: JointStart { mount_from_camera, anchor_from_target, intrinsics },
+        start: JointStart {
+            mount_from_camera,
+            anchor_from_target,
+            intrinsics,
+            shape: BoardShape::default(),
+            noise: None,
+        },
         reference: pose(&nonlinear["X"]),
         reference_sigma_mm: numbers(&nonlinear["sd_t_mm"]),
     }
 }
 
 fn solve(set: &Set) -> JointSolution {
-    let problem =
-        JointProblem { mode: set.mode, points: &set.points, views: &set.views, free_intrinsics: false, noise: None };
+    let board = BoardPoints::new(&set.points);
+    let problem = JointProblem::new(set.mode, &board, &set.views);
     estimate(&problem, &set.start, &CancelToken::default()).expect("solves")
 }
 

@@ -35,6 +35,7 @@ fn meta() -> SessionMeta {
         camera: None,
         seeds: [].into(),
         ground_truth: None,
+        arm: None,
     }
 }
 

@@ -60,12 +60,31 @@ distortion = []
 
 #[test]
 fn every_subcommand_has_help_with_an_example() {
-    for command in ["gui", "cell", "auto", "calibrate", "export"] {
+    for command in ["gui", "cell", "auto", "calibrate", "export", "target"] {
         let output = handeye(&[command, "--help"]);
         assert_eq!(output.status.code(), Some(0));
         assert!(text(&output.stdout).contains("Example:\n  handeye "), "{command}");
         assert!(text(&output.stdout).contains("--quiet"), "{command}");
     }
+}
+
+#[test]
+fn a_target_is_printed_and_described_for_a_data_set() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("board.pdf");
+    let path = file.to_str().expect("UTF-8");
+    let board = ["target", "--kind", "charuco", "--columns", "6", "--rows", "8", "--square", "22", "--pdf", path];
+    let refused = handeye(&board);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("--marker"), "{}", text(&refused.stderr));
+    let output = handeye(&[&board[..], &["--marker", "16", "--dictionary", "5x5_100"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).starts_with("[target]\nkind = \"charuco\"\ncolumns = 6\n"));
+    assert!(std::fs::read(&file).expect("written").starts_with(b"%PDF-"));
+    let large =
+        handeye(&["target", "--kind", "circles", "--columns", "9", "--rows", "9", "--square", "90", "--pdf", path]);
+    assert_eq!(large.status.code(), Some(2));
+    assert!(text(&large.stderr).contains("fit"), "{}", text(&large.stderr));
 }
 
 #[test]

@@ -1,0 +1,146 @@
+//! The methods, each from a choice of views to both links.
+
+use handeye_core::board_shape::BoardShape;
+use handeye_core::camera::Intrinsics;
+use handeye_core::frames::{Anchor, Camera, Mount, Pose, Target};
+use handeye_core::handeye::closed_form::{self, ClosedFormSolution};
+use handeye_core::handeye::joint::outliers::estimate_screened;
+use handeye_core::handeye::joint::{Free, JointProblem, JointSolution, JointStart, Noise, estimate};
+use handeye_core::handeye::{PosePair, pose_graph};
+use handeye_core::observation::View;
+use handeye_core::progress::CancelToken;
+
+use crate::sets::Set;
+
+/// What a method found.
+pub struct Answer {
+    pub mount_from_camera: Pose<Mount, Camera>,
+    pub anchor_from_target: Pose<Anchor, Target>,
+    pub intrinsics: Intrinsics,
+    pub shape: BoardShape,
+}
+
+/// Name of our estimator in tables: wrong views set aside, camera as given, target flat and of the stated size.
+pub const OURS: &str = "joint";
+
+/// Variants of it that free more.
+const VARIANTS: [(&str, Free); 4] = [
+    ("joint, scale free", Free { scale: true, ..FIXED }),
+    ("joint, camera free", Free { intrinsics: true, ..FIXED }),
+    ("joint, camera and warp free", Free { intrinsics: true, warp: true, ..FIXED }),
+    ("joint, all three free", Free { intrinsics: true, warp: true, scale: true, ..FIXED }),
+];
+const FIXED: Free = Free { intrinsics: false, warp: false, scale: false, joints: false };
+
+/// Fewest views from which camera and warp are freed.
+const MANY: usize = 12;
+
+/// What may be freed for a set: the scale always, the camera where there are views enough.
+pub fn variants(set: &Set) -> impl Iterator<Item = (&'static str, Free)> {
+    let many = set.views.len() >= MANY;
+    VARIANTS.into_iter().filter(move |(_, free)| many || !(free.intrinsics || free.warp))
+}
+
+/// Names of all methods for a set, closed forms first, ours last.
+pub fn names(set: &Set) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = closed_form::all().iter().map(|m| m.name()).collect();
+    if set.has_corners() {
+        names.push("reprojection, exact robot");
+        names.extend(variants(set).map(|(name, _)| name));
+        names.push("joint, all views kept");
+    }
+    names.push(OURS);
+    names
+}
+
+/// The corners and poses of a choice of views.
+pub struct Choice {
+    views: Vec<View>,
+    pairs: Vec<PosePair>,
+}
+
+/// The joint estimate and the views that it kept.
+pub struct Kept {
+    pub views: Vec<View>,
+    pub solution: JointSolution,
+}
+
+impl Kept {
+    /// The problem it solves.
+    pub fn problem<'a>(&'a self, set: &'a Set) -> JointProblem<'a> {
+        JointProblem { free: self.solution.free, ..JointProblem::new(set.mode, &set.board, &self.views) }
+    }
+}
+
+impl Choice {
+    pub fn new(set: &Set, indices: &[usize]) -> Self {
+        let pairs = indices.iter().map(|&i| set.pairs[i]).collect();
+        let views =
+            if set.has_corners() { indices.iter().map(|&i| set.views[i].clone()).collect() } else { Vec::new() };
+        Self { views, pairs }
+    }
+
+    /// The joint estimate from the first closed form that has an answer, wrong views set aside.
+    pub fn joint(&self, set: &Set, free: Free) -> Option<Kept> {
+        let problem = JointProblem { free, ..JointProblem::new(set.mode, &set.board, &self.views) };
+        let own: Vec<_> = self.pairs.iter().map(|pair| pair.camera_from_target).collect();
+        let screened = estimate_screened(&problem, &self.start(set)?, &own, &CancelToken::default()).ok()?;
+        Some(Kept { views: screened.kept_views(), solution: screened.solution })
+    }
+
+    /// The same with all views kept.
+    fn joint_of_all(&self, set: &Set, noise: Option<Noise>) -> Option<JointSolution> {
+        let problem = JointProblem { noise, ..JointProblem::new(set.mode, &set.board, &self.views) };
+        estimate(&problem, &self.start(set)?, &CancelToken::default()).ok()
+    }
+
+    fn closed_form(&self) -> Option<ClosedFormSolution> {
+        ["park_martin", "daniilidis", "shah"]
+            .into_iter()
+            .find_map(|name| closed_form::by_name(name)?.solve(&self.pairs).ok())
+    }
+
+    fn start(&self, set: &Set) -> Option<JointStart> {
+        let start = self.closed_form()?;
+        Some(JointStart {
+            mount_from_camera: start.mount_from_camera,
+            anchor_from_target: start.anchor_from_target,
+            intrinsics: set.intrinsics,
+            shape: BoardShape::default(),
+            noise: None,
+        })
+    }
+
+    /// The answer of a method, where it has one.
+    pub fn solve(&self, set: &Set, name: &str) -> Option<Answer> {
+        let of = |s: ClosedFormSolution| Answer {
+            mount_from_camera: s.mount_from_camera,
+            anchor_from_target: s.anchor_from_target,
+            intrinsics: set.intrinsics,
+            shape: BoardShape::default(),
+        };
+        if let Some(method) = closed_form::by_name(name) {
+            return method.solve(&self.pairs).ok().map(of);
+        }
+        if !set.has_corners() {
+            let found = pose_graph::refine(&self.pairs, &self.closed_form()?).ok()?;
+            return Some(of(ClosedFormSolution {
+                mount_from_camera: found.mount_from_camera,
+                anchor_from_target: found.anchor_from_target,
+            }));
+        }
+        let exact = Noise { corner_px: 1.0, view_px: 0.0, robot_m: 1e-9, robot_rad: 1e-9 };
+        let solution = match name {
+            OURS => self.joint(set, FIXED)?.solution,
+            "joint, all views kept" => self.joint_of_all(set, None)?,
+            "reprojection, exact robot" => self.joint_of_all(set, Some(exact))?,
+            _ => self.joint(set, VARIANTS.iter().find(|(variant, _)| *variant == name)?.1)?.solution,
+        };
+        Some(Answer {
+            mount_from_camera: solution.hand_eye.mount_from_camera(),
+            anchor_from_target: solution.hand_eye.anchor_from_target(),
+            intrinsics: solution.intrinsics,
+            shape: solution.shape,
+        })
+    }
+}
