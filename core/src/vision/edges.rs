@@ -9,12 +9,14 @@
 //! its corners, as Kalibr prints them, lie beyond the ends of the edges and are not touched.
 
 use image::GrayImage;
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-use super::subpixel::erf_and_slope;
+use super::edge_profile::Profile;
 
-/// Part of the dark border and of the light gap beside an edge that is looked at.
-const REACH_PART: f64 = 0.75;
+/// What lies beyond the dark border and beyond the light gap reaches so far into them [px]: twice the usual blur.
+const BLUR_BEYOND_PX: f64 = 1.5;
+/// Narrowest border or gap [px].
+const NARROWEST_PX: f64 = 1.9;
 /// Pixels on either side of an edge: fewer hold no blurred edge, more gain nothing but noise.
 const REACH_PX: (f64, f64) = (1.4, 4.5);
 /// The blur of the next edge reaches this far along an edge [px].
@@ -40,27 +42,24 @@ const USUAL_BEND: (f64, f64) = (0.1, 2.0);
 const LEAST_BEND: f64 = 0.01;
 /// Below this blur [px] the profile of an edge is that of the pixels' area, not Gaussian.
 const SHARP_PX: f64 = 0.5;
-/// Largest RMS misfit of the Gaussian profile as a part of half the contrast.
-const MAX_MISFIT: f64 = 0.2;
-/// A step of the fit below this ends it [px].
-const CONVERGED_PX: f64 = 5e-4;
-const MAX_STEPS: usize = 15;
-/// Variance of rounding to whole grey levels: no picture is known better.
-const ROUNDING: f64 = 1.0 / 12.0;
+/// An edge with less than this part of the usual contrast has something else beside it.
+const MIN_CONTRAST_PART: f64 = 0.6;
 /// Crossings are no better than this [px]: the grey levels of a pixel are not perfectly linear in its area.
 const FLOOR_PX: f64 = 0.01;
 
 /// A curve `across = c₀ + c₁ s + c₂ s²` with `s = (along − middle) / half`.
 #[derive(Debug, Clone, Copy)]
-struct Edge {
+pub(super) struct Edge {
     /// The coordinate that runs along it: 0 for u, 1 for v.
-    axis: usize,
+    pub axis: usize,
     middle: f64,
     half: f64,
-    curve: Vector3<f64>,
-    covariance: Matrix3<f64>,
+    pub curve: Vector3<f64>,
+    pub covariance: Matrix3<f64>,
     /// Cosine of the angle to its axis.
     cos: f64,
+    /// Usual difference between both sides [grey levels].
+    contrast: f64,
 }
 
 impl Edge {
@@ -69,12 +68,12 @@ impl Edge {
         2.0 * self.cos.powi(3) / (self.half * self.half)
     }
 
-    fn terms(&self, along: f64) -> Vector3<f64> {
+    pub fn terms(&self, along: f64) -> Vector3<f64> {
         let s = (along - self.middle) / self.half;
         Vector3::new(1.0, s, s * s)
     }
 
-    fn across(&self, along: f64) -> f64 {
+    pub fn across(&self, along: f64) -> f64 {
         self.curve.dot(&self.terms(along))
     }
 
@@ -110,7 +109,9 @@ pub(super) fn refine(
     gap: f64,
 ) -> Vec<[Option<Refined>; 4]> {
     let sides = |squares: &[[Vector2<f64>; 4]], bend: f64| -> Vec<[Option<Edge>; 4]> {
-        squares.iter().map(|corners| edges_of(image, corners, border.min(gap), bend)).collect()
+        let mut sides: Vec<_> = squares.iter().map(|corners| edges_of(image, corners, border.min(gap), bend)).collect();
+        keep_clear(&mut sides);
+        sides
     };
     let width = f64::from(image.width().max(image.height()));
     let free = sides(squares, ANY_BEND / width);
@@ -131,10 +132,21 @@ pub(super) fn refine(
 /// Where the edges of a square meet, not too far from where its corners were thought to be.
 fn crossings(corners: &[Vector2<f64>; 4], edges: &[Option<Edge>; 4]) -> [Option<Refined>; 4] {
     std::array::from_fn(|i| {
-        let refined = crossing(edges[(i + 3) % 4].as_ref()?, edges[i].as_ref()?, corners[i])?;
+        let (before, after) = (edges[(i + 3) % 4].as_ref()?, edges[i].as_ref()?);
+        let refined = crossing(before, after, corners[i])?;
         let side = (corners[(i + 1) % 4] - corners[i]).norm();
         ((refined.0 - corners[i]).norm() <= 2.5 + 0.05 * side).then_some(refined)
     })
+}
+
+/// Leaves out edges of little contrast.
+fn keep_clear(squares: &mut [[Option<Edge>; 4]]) {
+    let mut contrasts: Vec<f64> = squares.iter().flatten().flatten().map(|edge| edge.contrast).collect();
+    contrasts.sort_by(f64::total_cmp);
+    let Some(usual) = contrasts.get(contrasts.len() / 2) else { return };
+    for edge in squares.iter_mut().flatten() {
+        *edge = edge.filter(|edge| edge.contrast >= MIN_CONTRAST_PART * usual);
+    }
 }
 
 /// The deviation of the curvature of edges, times the width of the picture: their scatter less what noise makes of it
@@ -161,8 +173,9 @@ fn edges_of(image: &GrayImage, corners: &[Vector2<f64>; 4], beside: f64, curvatu
         let (a, b) = (corners[i], corners[(i + 1) % 4]);
         let along = (b - a).normalize();
         let opposite = (corners[(i + 2) % 4] + corners[(i + 3) % 4]) / 2.0;
-        let reach = REACH_PART * beside * along.perp(&(opposite - a));
-        (reach.is_finite() && reach >= REACH_PX.0).then(|| find(image, a, b, reach.min(REACH_PX.1), curvature))?
+        let even = beside * along.perp(&(opposite - a));
+        let reach = (even - BLUR_BEYOND_PX).clamp(REACH_PX.0, REACH_PX.1);
+        (even.is_finite() && even >= NARROWEST_PX).then(|| find(image, a, b, reach, curvature))?
     })
 }
 
@@ -181,7 +194,7 @@ fn find(image: &GrayImage, a: Vector2<f64>, b: Vector2<f64>, reach: f64, curvatu
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let slope = (b[1 - axis] - a[1 - axis]) / (b[axis] - a[axis]);
     let curve = Vector3::new(a[1 - axis] + slope * (middle - a[axis]), slope * half, 0.0);
-    let mut edge = Edge { axis, middle, half, curve, covariance: Matrix3::zeros(), cos };
+    let mut edge = Edge { axis, middle, half, curve, covariance: Matrix3::zeros(), cos, contrast: 0.0 };
     // The dark side is at (−d.y, d.x) from the edge.
     let dark_beyond = if axis == 0 { direction.x > 0.0 } else { direction.y < 0.0 };
     let scan = Scan { image, first: first as i64, last: last as i64, reach: reach / cos, dark_beyond };
@@ -190,6 +203,7 @@ fn find(image: &GrayImage, a: Vector2<f64>, b: Vector2<f64>, reach: f64, curvatu
     for _ in 0..PASSES {
         (edge, kept) = fitted(edge, &scan.steps(&edge)?, bend)?;
     }
+    edge.contrast = scan.contrast(&edge)?;
     let profile = Profile { scan: &scan, along: kept, bend, least_blur: SHARP_PX / cos };
     if let Some(smooth) = profile.fit(&edge) {
         // Once more in a window around what was found.
@@ -201,18 +215,18 @@ fn find(image: &GrayImage, a: Vector2<f64>, b: Vector2<f64>, reach: f64, curvatu
 }
 
 /// The pixels on both sides of an edge.
-struct Scan<'a> {
+pub(super) struct Scan<'a> {
     image: &'a GrayImage,
     first: i64,
     last: i64,
     /// Pixels across, on either side.
-    reach: f64,
+    pub reach: f64,
     /// Whether the dark side is the one of the larger coordinate.
     dark_beyond: bool,
 }
 
 impl Scan<'_> {
-    fn grey(&self, axis: usize, along: i64, across: i64) -> Option<f64> {
+    pub fn grey(&self, axis: usize, along: i64, across: i64) -> Option<f64> {
         let (u, v) = if axis == 0 { (along, across) } else { (across, along) };
         let (u, v) = (u32::try_from(u).ok()?, u32::try_from(v).ok()?);
         self.image.get_pixel_checked(u, v).map(|p| f64::from(p.0[0]))
@@ -227,6 +241,15 @@ impl Scan<'_> {
             levels.map(|levels| (along as f64, start as f64, levels))
         };
         (self.first..=self.last).map(line).collect()
+    }
+
+    /// The median difference between both sides.
+    fn contrast(&self, edge: &Edge) -> Option<f64> {
+        let lines = self.lines(edge)?;
+        let difference = |levels: &[f64]| Some((levels.last()? - levels.first()?).abs());
+        let mut all: Vec<f64> = lines.iter().filter_map(|(_, _, levels)| difference(levels)).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied()
     }
 
     /// Where every line of pixels has its steepest steps of the right sign: along and across.
@@ -328,113 +351,6 @@ fn fitted(edge: Edge, crossings: &[Vector2<f64>], bend: f64) -> Option<(Edge, Ve
         }
     }
     Some((out, kept.iter().map(|p| p.x as i64).collect()))
-}
-
-/// Curve (3), blur across the edge, mean level (2), half the step (2).
-type Parameters = SVector<f64, 8>;
-
-/// The pixels near an edge with a Gaussian profile.
-struct Profile<'a> {
-    scan: &'a Scan<'a>,
-    /// Lines of pixels that count.
-    along: Vec<i64>,
-    bend: f64,
-    least_blur: f64,
-}
-
-struct Sums {
-    cost: f64,
-    hessian: SMatrix<f64, 8, 8>,
-    gradient: Parameters,
-}
-
-impl Profile<'_> {
-    /// The edge by least squares; `None` where the profile is another.
-    fn fit(&self, start: &Edge) -> Option<Edge> {
-        let pixels = self.pixels(start)?;
-        let level = |beyond: bool| {
-            let side = pixels.iter().filter(|p| (p.y > start.curve.dot(&Vector3::new(1.0, p.x, p.x * p.x))) == beyond);
-            side.clone().map(|p| p.z).sum::<f64>() / side.count().max(1) as f64
-        };
-        let (before, after) = (level(false), level(true));
-        let mut x = Parameters::zeros();
-        x.fixed_rows_mut::<3>(0).copy_from(&start.curve);
-        x[3] = 0.8;
-        x[4] = f64::midpoint(before, after);
-        // Blur lowers the step seen.
-        x[6] = 0.6 * (after - before);
-        let mut now = self.sums(&pixels, &x);
-        let mut damping = 1e-3;
-        for _ in 0..MAX_STEPS {
-            let mut damped = now.hessian;
-            for i in 0..8 {
-                damped[(i, i)] *= 1.0 + damping;
-            }
-            let step = damped.cholesky()?.solve(&now.gradient);
-            let mut candidate = x - step;
-            candidate[3] = candidate[3].clamp(0.1, 6.0);
-            let next = self.sums(&pixels, &candidate);
-            if next.cost <= now.cost {
-                (x, now) = (candidate, next);
-                damping *= 0.1;
-                if step.fixed_rows::<3>(0).amax() < CONVERGED_PX {
-                    break;
-                }
-            } else {
-                damping = f64::max(damping * 10.0, 1e-3);
-                if damping > 1e3 {
-                    break;
-                }
-            }
-        }
-        let variance = now.cost / (pixels.len() as f64 - 8.0);
-        let curve = x.fixed_rows::<3>(0).into_owned();
-        let near = (curve - start.curve).amax() < 0.5;
-        if !(near && x[3] >= self.least_blur && variance.sqrt() <= MAX_MISFIT * x[6].abs()) {
-            return None;
-        }
-        let covariance = now.hessian.cholesky()?.inverse().fixed_view::<3, 3>(0, 0) * variance.max(ROUNDING);
-        Some(Edge { curve, covariance, ..*start })
-    }
-
-    /// Place along (as s) and across, and grey level.
-    fn pixels(&self, edge: &Edge) -> Option<Vec<Vector3<f64>>> {
-        let steps = self.scan.reach.round() as i64;
-        let mut pixels = Vec::with_capacity(self.along.len() * (2 * steps as usize + 1));
-        for &along in &self.along {
-            let middle = edge.across(along as f64).round() as i64;
-            for across in middle - steps..=middle + steps {
-                let grey = self.scan.grey(edge.axis, along, across)?;
-                pixels.push(Vector3::new(edge.terms(along as f64).y, across as f64, grey));
-            }
-        }
-        (pixels.len() > 16).then_some(pixels)
-    }
-
-    fn sums(&self, pixels: &[Vector3<f64>], x: &Parameters) -> Sums {
-        let scale = std::f64::consts::FRAC_1_SQRT_2 / x[3];
-        let mut out = Sums { cost: 0.0, hessian: SMatrix::zeros(), gradient: Parameters::zeros() };
-        for p in pixels {
-            let s = p.x;
-            let half = x[6] + x[7] * s;
-            let q = (p.y - (x[0] + x[1] * s + x[2] * s * s)) * scale;
-            let (e, slope) = erf_and_slope(q);
-            let by_curve = -half * slope * scale;
-            let by_blur = -half * slope * q / x[3];
-            let row =
-                Parameters::from_column_slice(&[by_curve, by_curve * s, by_curve * s * s, by_blur, 1.0, s, e, e * s]);
-            let residual = x[4] + x[5] * s + half * e - p.z;
-            out.cost += residual * residual;
-            out.gradient += row * residual;
-            out.hessian.ger(1.0, &row, &row, 1.0);
-        }
-        // The curvature a priori, for noise of two grey levels.
-        let weight = 4.0 / (self.bend * self.bend);
-        out.cost += weight * x[2] * x[2];
-        out.gradient[2] += weight * x[2];
-        out.hessian[(2, 2)] += weight;
-        out
-    }
 }
 
 /// Where two edges meet, by Newton's method from `start`.

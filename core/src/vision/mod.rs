@@ -14,6 +14,7 @@ mod circles;
 mod crossing;
 mod detect;
 mod dots;
+mod edge_profile;
 mod edges;
 mod homography;
 pub(crate) mod markers;
