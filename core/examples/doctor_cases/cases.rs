@@ -8,7 +8,7 @@ use handeye_core::frames::Pose;
 use handeye_core::handeye::Mode;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
-use crate::sim::{Fault, GRID, Setup, changed, session, session_of};
+use super::sim::{Fault, GRID, Setup, changed, session, session_of};
 
 pub struct Case {
     pub name: &'static str,

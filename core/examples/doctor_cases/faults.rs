@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use crate::sim::{Fault, Setup, changed, session};
+use super::sim::{Fault, Setup, changed, session};
 
 /// The diagnosis with the calibration beside it, as the command line makes it.
 pub fn examined(observations: &Observations) -> Diagnosis {

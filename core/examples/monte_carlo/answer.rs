@@ -11,7 +11,7 @@ use handeye_core::progress::CancelToken;
 use handeye_core::vision::{intrinsics, pnp};
 use nalgebra::{Matrix6, Point3};
 
-use crate::scene::{BOARD, Trial};
+use super::scene::{BOARD, Trial};
 
 /// Noise levels of an exact robot, as an estimator that weighs by their inverse can be given them: a nanometre and a
 /// nanoradian.

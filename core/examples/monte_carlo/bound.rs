@@ -7,7 +7,7 @@ use handeye_core::handeye::Mode;
 use handeye_core::handeye::joint::Noise;
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
-use crate::scene::Trial;
+use super::scene::Trial;
 
 /// Step of the differences in metres, radians and lens coefficients: far above rounding (1e-13 of 500 px) and far below
 /// where the second-order term shows.

@@ -7,7 +7,7 @@ use handeye_core::handeye::joint::Noise;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, SMatrix, SymmetricEigen, Vector3, Vector6};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use crate::bound::{Blocks, Normals, scaled_inverse};
+use super::bound::{Blocks, Normals, scaled_inverse};
 
 /// Components of a hand-eye transform.
 const L: f64 = 6.0;

@@ -4,10 +4,10 @@ use handeye_core::handeye::closed_form;
 use nalgebra::{Isometry3, Matrix6, Vector6};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
-use crate::answer::{self, Answer};
-use crate::bound::{self, Normals};
-use crate::scene::{Cell, Trial};
-use crate::small_sample::{self, Correction};
+use super::answer::{self, Answer};
+use super::bound::{self, Normals};
+use super::scene::{Cell, Trial};
+use super::small_sample::{self, Correction};
 
 /// Components of a hand-eye transform.
 const COMPONENTS: f64 = 6.0;
@@ -152,7 +152,7 @@ pub struct Outcome {
 /// Draws a trial, solves it and judges the answers. `product` asks for the whole path of `calibrate` in place of the
 /// estimator alone, where noise levels are estimated.
 pub fn run(cell: &Cell, seed: u64, number: u64, product: bool) -> Result<Outcome, String> {
-    let trial = crate::scene::trial(cell, seed, number);
+    let trial = super::scene::trial(cell, seed, number);
     let normals = Normals::new(&trial);
     let bound = bound::hand_eye(&normals, &cell.noise).ok_or("the bound is singular")?;
     let judged = |answer: Result<Answer, String>, given: bool| {

@@ -22,6 +22,9 @@ use rand_chacha::ChaCha8Rng;
 const VICTIM: &str = "HANDEYE_TEST_SESSION_VICTIM";
 const SEED: &str = "HANDEYE_TEST_SESSION_SEED";
 
+/// The name by which the test runner knows the test below.
+const THIS_TEST: &str = "slow::session_kill::a_kill_at_any_moment_loses_nothing_that_was_acknowledged";
+
 const SESSIONS: u64 = 50;
 /// How often the program that works on one session is killed. Each time it goes on where the one before ended.
 const KILLS_PER_SESSION: u64 = 4;
@@ -195,7 +198,7 @@ fn run_and_kill(folder: &Path, seed: u64) -> usize {
     let wait_for = rng.random_range(0..10);
     let longer = Duration::from_micros(rng.random_range(0..8_000));
     let mut victim = Command::new(std::env::current_exe().expect("this program"))
-        .args(["--exact", "a_kill_at_any_moment_loses_nothing_that_was_acknowledged", "--nocapture"])
+        .args(["--exact", THIS_TEST, "--nocapture"])
         .env(VICTIM, folder)
         .env(SEED, seed.to_string())
         .stdout(Stdio::piped())

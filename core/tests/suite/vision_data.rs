@@ -1,5 +1,4 @@
 //! Detection and intrinsics on recorded images with published or reference results.
-#![cfg(feature = "opencv")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,4 @@
 //! Markers and tags in recorded pictures with published or reference corners.
-#![cfg(feature = "opencv")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

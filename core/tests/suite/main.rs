@@ -1,0 +1,21 @@
+//! All integration tests of the core in one program, which is linked once.
+//!
+//! `slow` is what the fast tier (`./test fast`) leaves out.
+
+mod broken_datasets;
+#[cfg(feature = "opencv")]
+mod doctor;
+#[cfg(feature = "opencv")]
+mod doctor_on_real_data;
+mod joint_on_real_data;
+mod reference_datasets;
+#[cfg(feature = "opencv")]
+mod target_data;
+#[cfg(feature = "opencv")]
+mod vision_data;
+
+mod slow {
+    #[cfg(feature = "opencv")]
+    mod monte_carlo;
+    mod session_kill;
+}

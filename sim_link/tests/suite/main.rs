@@ -1,0 +1,12 @@
+//! All integration tests of the client and the cell in one program, which is linked once.
+//!
+//! `slow` is what the fast tier (`./test fast`) leaves out.
+
+mod arm;
+mod board;
+mod client_faults;
+mod joint_offsets;
+
+mod slow {
+    mod follow;
+}
