@@ -1,7 +1,8 @@
 //! Chessboard detection on rendered boards and on the reference sets, beside OpenCV.
 //!
-//! `cargo run --release -p handeye_core --example corner_bench -- [VIEWS]`: VIEWS rendered boards per case, 24 unless
-//! told. The sets are looked for in `$HANDEYE_DATA`, then in `../shared/data`.
+//! `cargo run --release -p handeye_core --example corner_bench -- [VIEWS] [native]`: VIEWS rendered boards per case, 24
+//! unless told; with `native` without the detectors of OpenCV, which take most of the time. The sets are looked for in
+//! `$HANDEYE_DATA`, then in `../shared/data`.
 
 mod opencv_detectors;
 mod real;
@@ -31,6 +32,11 @@ pub const DETECTORS: [Detector; 3] = [
     Detector { name: "findChessboardCornersSB", find: opencv_detectors::sectors },
 ];
 
+/// Those that were asked for.
+pub fn detectors() -> &'static [Detector] {
+    if std::env::args().any(|argument| argument == "native") { &DETECTORS[..1] } else { &DETECTORS }
+}
+
 fn native(image: &GrayImage, grid: &Grid) -> Option<Vec<Corner>> {
     detect_with(image, &TargetSpec::Chessboard(*grid), DetectOptions::live()).expect("the image can be searched")
 }
@@ -56,7 +62,7 @@ fn main() {
     for (name, look) in cases {
         println!("{name}");
         let pictures: Vec<Picture> = (0..views).map(|seed| view(&look, seed)).collect();
-        for detector in &DETECTORS {
+        for detector in detectors() {
             rendered(detector, &look, &pictures);
         }
     }

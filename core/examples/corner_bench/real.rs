@@ -7,7 +7,7 @@ use handeye_core::observation::Corner;
 use handeye_core::target::Grid;
 use nalgebra::Vector2;
 
-use crate::{DETECTORS, Detector, median, timed};
+use crate::{Detector, detectors, median, timed};
 
 /// Folder, columns and rows.
 const SETS: [(&str, usize, usize); 8] = [
@@ -23,16 +23,11 @@ const SETS: [(&str, usize, usize); 8] = [
 ];
 
 pub fn all() {
-    let data = std::env::var_os("HANDEYE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    if !data.is_dir() {
-        println!("skipped: no data sets at {}", data.display());
-        return;
-    }
+    let Some(data) = handeye_core::testing::data_folder() else { return };
     for (folder, columns, rows) in SETS {
         println!("{folder}");
         let images: Vec<GrayImage> = images(&data.join(folder));
-        for detector in &DETECTORS {
+        for detector in detectors() {
             one(detector, &images, &Grid { columns, rows, square_m: 1.0 }, folder.ends_with("/repeatability"));
         }
     }

@@ -12,6 +12,7 @@ use crate::camera::{Distortion, Intrinsics};
 use crate::depth::DepthImage;
 use crate::frames::{Base, Camera, Pose, Target, Tip};
 use crate::handeye::HandEye;
+use crate::handeye::joint::SmallSample;
 use crate::target::{Grid, TargetSpec};
 use crate::verify::Calibrated;
 
@@ -156,7 +157,9 @@ pub fn calibrated() -> Calibrated {
         shape: BoardShape::default(),
         hand_eye: HandEye::EyeInHand { tip_from_camera: tip_from_camera(), base_from_target: Pose::identity() },
         intrinsics: lens(),
+        joint_offsets_rad: Vec::new(),
         hand_eye_covariance: None,
+        small_sample: SmallSample::KNOWN,
         uncertainty: None,
     }
 }

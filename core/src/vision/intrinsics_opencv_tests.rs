@@ -4,7 +4,7 @@
 //! optimum to the last digits. The unit of length is 1/32 of the real one for the same reason.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Vector2};
 use opencv::calib3d;
@@ -21,6 +21,7 @@ use crate::intrinsics::{Found, Options};
 use crate::observation::Corner;
 use crate::progress::CancelToken;
 use crate::target::{Grid, TargetSpec};
+use crate::testing::data_folder;
 
 const SQUARE_M: f64 = 1.0 / 32.0;
 
@@ -188,19 +189,9 @@ fn the_rational_model_fits_at_least_as_well_as_with_opencv() {
     assert!(gain > -1e-9, "{gain:e}");
 }
 
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("HANDEYE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: no data sets at {}", folder.display());
-    None
-}
-
 #[test]
 fn the_optimum_is_that_of_opencv_on_recorded_corners() {
-    let Some(data) = data() else { return };
+    let Some(data) = data_folder() else { return };
     for (name, inner, size) in [
         ("caliban_no_curv", (14, 9), (1920, 1080)),
         ("rwhe_cs_synthetic_3", (9, 6), (1920, 1080)),

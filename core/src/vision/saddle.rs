@@ -28,15 +28,10 @@ const FURTHEST: f64 = 0.12;
 /// The saddle point near `start`, for a corner whose nearest neighbour is `spacing` pixels away; `None` where there is
 /// no saddle.
 pub(crate) fn refine(image: &GrayImage, start: &Vector2<f64>, spacing: f64) -> Option<Vector2<f64>> {
-    refine_in(image.as_raw(), image.dimensions(), start, spacing)
-}
-
-/// [`refine`] for the pixels of an image of the given width and height.
-pub(crate) fn refine_in(pixels: &[u8], size: (u32, u32), start: &Vector2<f64>, spacing: f64) -> Option<Vector2<f64>> {
     let sigma = (SIGMA_PER_SPACING * spacing).clamp(SIGMA_PX.0, SIGMA_PX.1);
     let mut at = *start;
     for _ in 0..FITS {
-        let step = saddle_of(pixels, size, &at, sigma)?;
+        let step = saddle_of(image.as_raw(), image.dimensions(), &at, sigma)?;
         at += step;
         if (at - start).norm() > (FURTHEST * spacing).max(0.5) {
             return None;

@@ -4,12 +4,13 @@
 //! bend (lens), and all corners how the light falls off, which a single window of a blurred corner cannot tell from a
 //! shift; with that every corner is fitted in the image itself, in a larger window.
 
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::fit::{Fit, Light, Patch, Window, fit};
+use super::edge::{PIXEL_AREA, Profile};
+use super::fit::{Fit, Light, fit};
+use super::patch::{BLUR, Patch, Window};
 use super::pyramid::Level;
 use crate::vision::order::Ordered;
-use crate::vision::saddle;
 
 /// Part of a grid step up to which a pixel counts for the first fit, and the part tried when that fails: the outermost
 /// squares of some boards are cut narrow, and dirt or a shadow may lie on a square.
@@ -34,18 +35,13 @@ const OFF_MIDDLE_PX: f64 = 0.35;
 /// the corner may be: a wide edge is felt from further away.
 const START_BLUR_PX: f64 = 1.0;
 const BLUR_PER_PX: f64 = 0.3;
-/// Blur of the area of a pixel, squared [px²].
-const PIXEL_AREA: f64 = 1.0 / 12.0;
 /// Least blur that a second fit starts from [px].
 const SHARPEST_PX: f64 = 0.4;
-/// Below this blur an edge has the profile of a pixel's area (0.29 px of its own), not of the Gaussian in the model.
-const SHARP_PX: f64 = 0.5;
-/// An edge closer than this [tangent] to a row or column of pixels crosses hardly more than one of them within the
-/// window, so that the wrong profile of a sharp edge does not average out: up to a tenth of a pixel, the same for all
-/// corners.
-const ALIGNED: f64 = 0.1;
-/// The saddle uses fewer pixels of the edges than the fit: its variance in units of the fit's.
-const SADDLE_VARIANCE: f64 = 2.0;
+/// Below this blur an edge is integrated over the pixels: beyond, a Gaussian is off by `2 · 0.55 / (24 · 120 σ⁴)` of the
+/// contrast at the most ([`super::edge`]), in full contrast less than the deviation of rounding to whole grey levels.
+const SHARP_PX: f64 = 0.64;
+/// Pixels within so many blurs of both edges see both, and how far off the corner may be besides [px].
+const MEETING: (f64, f64) = (2.5, 0.2);
 /// Furthest usual move of the second fit, in pixels of the level and on top of what the first fit states.
 const USUAL_MOVE: f64 = 0.2;
 /// Largest move from the start that is believed: a part of the spacing, at least that many pixels.
@@ -89,24 +85,10 @@ pub(super) fn refine(levels: &[Level], depth: usize, found: &Ordered) -> Ordered
         let second = second.filter(|fit| (fit.px - start.px).norm() <= usual);
         // On a coarse level the first fit is not good enough to stand.
         let Some(fit) = second.or((depth == 0).then_some(*start)) else { continue };
-        let (px, covariance_px2) = without_profile(image, &fit, [along_x, along_y], spacing);
-        out.points[index] = px;
-        out.covariances_px2[index] = Some(covariance_px2);
+        out.points[index] = fit.px;
+        out.covariances_px2[index] = Some(fit.covariance_px2);
     }
     out
-}
-
-/// In a picture sharper than [`SHARP_PX`] a corner with an edge along the pixels is finished by [`saddle::refine`],
-/// which assumes no profile.
-fn without_profile(image: &Level, fit: &Fit, along: [Vector2<f64>; 2], spacing: f64) -> (Vector2<f64>, Matrix2<f64>) {
-    let aligned = along.iter().any(|edge| edge.abs().min() < ALIGNED * edge.abs().max());
-    if fit.blur_px < SHARP_PX && aligned {
-        let (width, height) = (image.width as u32, image.height as u32);
-        if let Some(px) = saddle::refine_in(&image.pixels, (width, height), &fit.px, spacing) {
-            return (px, fit.covariance_px2 * SADDLE_VARIANCE);
-        }
-    }
-    (fit.px, fit.covariance_px2)
 }
 
 /// A coordinate u covers u − ½ … u + ½, so it is u + ½ that scales.
@@ -153,6 +135,7 @@ fn plain(centre: Vector2<f64>, along: [Vector2<f64>; 2]) -> Window {
         part: FIRST_PARTS[0],
         reach_px: FIRST_REACH_PX,
         band_px: f64::INFINITY,
+        meeting_px: 0.0,
         clear_part: 1.0,
         dark: true,
     }
@@ -164,7 +147,7 @@ fn first_fit(level: &Level, window: &Window, spacing: f64, blur_px: f64) -> Opti
         let part = (LEAST_REACH_PX / spacing).clamp(part, LARGEST_PART.max(part));
         let window = Window { part, ..*window };
         let patch = Patch::of(level, &window)?;
-        fit(&patch, &window, None, patch.start(&window, blur_px), CONVERGED_PX[0])
+        fit(&patch, &window, Profile::Blurred, None, patch.start(&window, blur_px), CONVERGED_PX[0])
     })
 }
 
@@ -181,10 +164,13 @@ fn second_fit(
         part: clear.clamp(0.25, SECOND_PART).max(least),
         reach_px: SECOND_REACH_PX,
         band_px: BAND.0 * first.blur_px + BAND.1,
+        meeting_px: MEETING.0 * first.blur_px + MEETING.1,
         ..*window
     };
+    let profile = if first.blur_px < SHARP_PX { Profile::Pixels } else { Profile::Blurred };
     let light = gradient.map(|gradient| Light { gradient, sd: LIGHT_SD, noise: first.noise });
     let mut at = *first;
+    at.parameters[BLUR] = at.parameters[BLUR].max(SHARPEST_PX);
     for _ in 0..2 {
         window.centre = at.px;
         let patch = Patch::of(image, &window).or_else(|| {
@@ -192,7 +178,7 @@ fn second_fit(
             window.part = FIRST_PARTS[1].max(least);
             Patch::of(image, &window)
         })?;
-        let next = fit(&patch, &window, light.as_ref(), at.parameters, CONVERGED_PX[1])?;
+        let next = fit(&patch, &window, profile, light.as_ref(), at.parameters, CONVERGED_PX[1])?;
         let moved = (next.px - at.px).norm();
         at = next;
         if moved <= OFF_MIDDLE_PX {

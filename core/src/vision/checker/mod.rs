@@ -7,8 +7,11 @@
 //!    the edges and the fall of the light.
 
 mod board;
+mod edge;
 mod fit;
 mod lattice;
+mod meeting;
+mod patch;
 mod pyramid;
 mod saddles;
 
