@@ -5,8 +5,8 @@ use nalgebra::Point3;
 use super::lens::Lens;
 use super::refine::{self, Refined};
 use super::{
-    CalibrateError, Calibration, CornerResidual, Method, Observations, Options, ShapeEstimate, ViewResult, ViewStatus,
-    check_motion, chosen, closed_forms,
+    CalibrateError, Calibration, CornerResidual, Method, Observations, Options, ShapeEstimate, SharedCovariance,
+    ViewResult, ViewStatus, check_motion, chosen, closed_forms,
 };
 use crate::board_shape::BoardPoints;
 use crate::camera::Intrinsics;
@@ -141,7 +141,7 @@ fn without_hand_eye(observations: &Observations, seen: &[Seen<'_>], lens: &Lens)
         hand_eye: None,
         hand_eye_covariance: None,
         target_covariance: None,
-        shared_covariance: None,
+        shared: None,
         intrinsics: Some(lens.intrinsics),
         intrinsics_fixed: !lens.free,
         intrinsics_sigma: lens.sigma,
@@ -185,7 +185,7 @@ fn with_robot(mode: Mode, seen: &[Seen<'_>], lens: &Lens) -> Result<(Vec<View>, 
 fn take_joint(calibration: &mut Calibration, problem: &JointProblem<'_>, refined: &Refined, seen: &[Seen<'_>]) {
     let screened = &refined.screened;
     let solution = &screened.solution;
-    calibration.shared_covariance = Some(solution.links_and_lens_covariance());
+    calibration.shared = Some(SharedCovariance { free: solution.free, covariance: solution.covariance.clone() });
     calibration.hand_eye_covariance = Some(solution.hand_eye_covariance());
     calibration.target_covariance = Some(solution.target_covariance());
     calibration.small_sample = Some(solution.small_sample);

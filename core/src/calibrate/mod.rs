@@ -13,11 +13,12 @@ use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
 
 use crate::board_shape::BoardShape;
 use crate::camera::{Distortion, Intrinsics};
+use crate::dataset::CameraInput;
 use crate::frames::{Base, Camera, Pose, Target, Tip};
 use crate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::handeye::joint::outliers::Distance;
 use crate::handeye::joint::prediction::ErrorCurve;
-use crate::handeye::joint::{Noise, SmallSample};
+use crate::handeye::joint::{Free, Noise, SmallSample};
 use crate::handeye::widening::Widening;
 use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, subset};
 use crate::observation::Corner;
@@ -70,6 +71,25 @@ pub enum CameraKnowledge {
         start: Option<Intrinsics>,
     },
 }
+
+impl CameraKnowledge {
+    /// What is known when nothing is stated: intrinsics are estimated with [`DEFAULT_MODEL`].
+    pub const NOTHING: Self = Self::Estimate { model: DEFAULT_MODEL, start: None };
+
+    /// What a data set or a session says of its camera.
+    pub fn of(camera: Option<&CameraInput>) -> Self {
+        match camera {
+            None => Self::NOTHING,
+            Some(input) => match input.intrinsics {
+                Some(intrinsics) if input.fixed => Self::Fixed(intrinsics),
+                start => Self::Estimate { model: input.model, start },
+            },
+        }
+    }
+}
+
+/// Lens model that is estimated when none is named: what OpenCV estimates by default.
+pub const DEFAULT_MODEL: Distortion = Distortion::BrownConrady([0.0; 5]);
 
 /// Which answer is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -202,9 +222,8 @@ pub struct Calibration {
     pub hand_eye_covariance: Option<Matrix6<f64>>,
     /// Covariance of the target's place.
     pub target_covariance: Option<Matrix6<f64>>,
-    /// Covariance of everything that predicts a view, `[mount_from_camera (6), anchor_from_target (6), free
-    /// intrinsics…]`, as in [`crate::handeye::joint::JointSolution::covariance`]; of the joint estimate only.
-    pub shared_covariance: Option<DMatrix<f64>>,
+    /// How well everything is known that the views share; of the joint estimate only.
+    pub shared: Option<SharedCovariance>,
     /// Intrinsics; `None` when only pose pairs were given.
     pub intrinsics: Option<Intrinsics>,
     /// Whether they were given and kept.
@@ -240,6 +259,15 @@ pub struct Calibration {
     pub methods: Vec<MethodResult>,
     /// One entry per view, in the order of the observations.
     pub views: Vec<ViewResult>,
+}
+
+/// How well everything is known that predicts a view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SharedCovariance {
+    /// What was estimated besides the links.
+    pub free: Free,
+    /// As in [`crate::handeye::joint::JointSolution::covariance`].
+    pub covariance: DMatrix<f64>,
 }
 
 /// What one closed form said.

@@ -28,7 +28,7 @@ pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -
         hand_eye: None,
         hand_eye_covariance: None,
         target_covariance: None,
-        shared_covariance: None,
+        shared: None,
         intrinsics: match observations.camera {
             CameraKnowledge::Fixed(intrinsics) => Some(intrinsics),
             CameraKnowledge::Estimate { .. } => None,

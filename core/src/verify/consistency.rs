@@ -1,25 +1,28 @@
 //! Whether errors of prediction are of the size that a calibration states.
 //!
 //! The pose error of a capture, `e_i = log(predicted⁻¹ * seen)`, is to first order
-//! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and the free
-//! intrinsics, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP. With
+//! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and whatever of lens,
+//! target and joints is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP. With
 //! `B_i = D_i Σ_robot D_iᵀ + (corner_px² + view_px²) (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
 //! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
 //! `√(12 n)`. The inverse is by the matrix inversion lemma, so the cost is linear in the number of captures.
 //!
 //! The noise levels are taken as known. From a dozen views they are known to a fifth, and the ratio as badly.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Point3, SMatrix, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
 use super::{Calibrated, CaptureCheck, Uncertainty};
-use crate::board_shape::{BoardPoints, BoardShape};
+use crate::board_shape::BoardPoints;
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::equations::{FreeForm, MAX_FORM, PoseEquations, Seen};
+use crate::handeye::joint::equations::{FreeForm, PoseEquations, Seen};
 use crate::observation::View;
 use crate::se3;
 
 /// Quantile of the normal distribution at 99 %.
 const Z_99: f64 = 2.326;
+
+/// Unknowns of the two links.
+const LINKS: usize = 12;
 
 /// Errors of prediction against the stated uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,6 +53,7 @@ pub struct Sums {
     /// `L` with `C = L Lᵀ`: in `s = L u` the prior of `u` is the identity, whatever the units.
     root: DMatrix<f64>,
     covariance: DMatrix<f64>,
+    form: FreeForm,
     robot_variance: Vector6<f64>,
     corner_variance: f64,
     captures: usize,
@@ -59,16 +63,18 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// `None` when the covariance is not one.
-    pub fn new(uncertainty: &Uncertainty) -> Option<Self> {
-        let n = uncertainty.covariance.nrows();
-        if !(12..=12 + MAX_FORM).contains(&n) || uncertainty.covariance.ncols() != n {
+    /// `None` when the covariance is not one, or not of what this calibration is of.
+    pub fn new(calibrated: &Calibrated, uncertainty: &Uncertainty) -> Option<Self> {
+        let form = uncertainty.free.form();
+        let n = LINKS + form.count(&calibrated.intrinsics) + calibrated.joint_offsets_rad.len();
+        if uncertainty.covariance.shape() != (n, n) {
             return None;
         }
         let (m, rad) = (uncertainty.noise.robot_m.powi(2), uncertainty.noise.robot_rad.powi(2));
         Some(Self {
             root: Cholesky::new(uncertainty.covariance.clone())?.l(),
             covariance: uncertainty.covariance.clone(),
+            form,
             robot_variance: Vector6::new(m, m, m, rad, rad, rad),
             corner_variance: uncertainty.noise.corner_px.powi(2) + uncertainty.noise.view_px.powi(2),
             captures: 0,
@@ -82,34 +88,35 @@ impl Sums {
     pub fn add(
         &mut self,
         calibrated: &Calibrated,
-        points: &[Point3<f64>],
+        board: &BoardPoints,
         view: &View,
         check: &CaptureCheck,
     ) -> Option<f64> {
-        let chain = Chain::new(
+        let chain = Chain::with_joints(
             calibrated.hand_eye.mode(),
-            &view.base_from_tip,
+            view,
+            &calibrated.joint_offsets_rad,
             &Vector6::zeros(),
             &calibrated.hand_eye.mount_from_camera(),
             &calibrated.hand_eye.anchor_from_target(),
         );
-        let n = self.covariance.nrows();
         let seen = check.seen_camera_from_target.isometry();
         let seen_through = Seen {
             intrinsics: &calibrated.intrinsics,
-            board: &BoardPoints::new(points),
-            shape: &BoardShape::default(),
+            board,
+            shape: &calibrated.shape,
             corners: &view.corners,
             whiteners: &[],
         };
-        let equations = PoseEquations::new(&seen_through, seen, FreeForm::only_lens(n > 12)).ok()?;
+        let equations = PoseEquations::new(&seen_through, seen, self.form).ok()?;
         let pose_covariance = Cholesky::new(equations.pose)?.inverse();
-        let lens = pose_covariance * equations.pose_by_form;
-        let mut by_shared = SMatrix::<f64, 6, { 12 + MAX_FORM }>::zeros();
+        let by_form = pose_covariance * equations.pose_by_form;
+        let (form, joints) = (self.form.count(&calibrated.intrinsics), calibrated.joint_offsets_rad.len());
+        let mut by_shared = DMatrix::zeros(6, self.covariance.nrows());
         by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
-        by_shared.fixed_view_mut::<6, MAX_FORM>(0, 12).copy_from(&lens);
-        let by_shared = by_shared.columns(0, n).into_owned();
+        by_shared.columns_mut(LINKS, form).copy_from(&by_form.columns(0, form));
+        by_shared.columns_mut(LINKS + form, joints).copy_from(&chain.by_joints.columns(0, joints));
         let own = chain.by_correction * Matrix6::from_diagonal(&self.robot_variance) * chain.by_correction.transpose()
             + pose_covariance * self.corner_variance;
         let error = se3::log((check.predicted_camera_from_target.inverse() * check.seen_camera_from_target).isometry());

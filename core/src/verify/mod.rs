@@ -1,54 +1,30 @@
 //! A calibration against captures that were never in its fit.
 //!
 //! The bare chain — reported robot pose and calibration, nothing fitted — predicts where the board is; the corners say
-//! where it was seen. What lies between is the error that a user of the calibration gets: of the calibration, of the
-//! robot and of the picture together. It is an error of prediction, measured on the board; it is not the residual of any
-//! fit.
+//! where it was seen. Both are of the board and the joints as the calibration found them. What lies between is the error
+//! that a user of the calibration gets: of the calibration, of the robot and of the picture together. It is an error of
+//! prediction, measured on the board; it is not the residual of any fit.
 
+mod calibrated;
 mod consistency;
 mod points;
 
-use nalgebra::{DMatrix, Isometry3, Matrix6, Point3, Vector3};
+use nalgebra::{Point3, Translation3, Vector3};
 
-use crate::board_shape::{BoardPoints, BoardShape};
-use crate::calibrate::{Calibration, CornerResidual};
-use crate::camera::{CameraError, Intrinsics};
+use crate::board_shape::BoardPoints;
+use crate::calibrate::CornerResidual;
+use crate::camera::CameraError;
 use crate::depth::{DepthImage, DepthSample};
 use crate::frames::{Anchor, Base, Camera, Pose, Target, Tip};
-use crate::handeye::HandEye;
-use crate::handeye::joint::{Noise, camera_from_target};
-use crate::observation::View;
+use crate::observation::{Corner, View};
 use crate::progress::{Stage, Work};
 use crate::se3;
 use crate::target::TargetSpec;
 use crate::vision::{VisionError, pnp};
 
+pub use calibrated::{Calibrated, Uncertainty};
 pub use consistency::Consistency;
 pub use points::MeasuredPoint;
-
-/// What of a calibration is needed to predict.
-#[derive(Debug, Clone)]
-pub struct Calibrated {
-    /// Both rigid links.
-    pub hand_eye: HandEye,
-    /// The camera.
-    pub intrinsics: Intrinsics,
-    /// The shape of the target.
-    pub shape: BoardShape,
-    /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
-    pub hand_eye_covariance: Option<Matrix6<f64>>,
-    /// What says how large errors may be; of a joint estimate.
-    pub uncertainty: Option<Uncertainty>,
-}
-
-/// How uncertain a prediction is.
-#[derive(Debug, Clone)]
-pub struct Uncertainty {
-    /// Noise levels of robot and corners.
-    pub noise: Noise,
-    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…]`.
-    pub covariance: DMatrix<f64>,
-}
 
 /// Why there is nothing to verify with.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -74,6 +50,15 @@ pub enum VerifyError {
     /// A capture whose robot pose is not finite.
     #[error("the robot pose of capture {name:?} is not finite: capture it again")]
     NotFinite {
+        /// Which capture.
+        name: String,
+    },
+    /// The calibration counts on offsets of the joints, and nothing says how this capture's tip moves with them.
+    #[error(
+        "the calibration corrects the robot's joints, and capture {name:?} does not say how they stood: capture it with \
+         its joint angles, or calibrate without joint offsets"
+    )]
+    NoJoints {
         /// Which capture.
         name: String,
     },
@@ -134,7 +119,7 @@ pub struct CaptureCheck {
     pub residuals: Vec<CornerResidual>,
     /// The board as predicted.
     pub predicted_camera_from_target: Pose<Camera, Target>,
-    /// The board as seen, by PnP.
+    /// The board as seen: its pose from the corners alone, of the shape that the calibration found.
     pub seen_camera_from_target: Pose<Camera, Target>,
     /// Middle of the board as seen minus as predicted, in camera axes, metres.
     pub centre_error_m: Vector3<f64>,
@@ -170,41 +155,6 @@ pub struct Verification {
     pub consistency: Option<Consistency>,
 }
 
-impl Calibrated {
-    /// Takes what it needs from a calibration.
-    ///
-    /// # Errors
-    /// [`VerifyError::NoHandEye`], [`VerifyError::NoIntrinsics`].
-    pub fn new(calibration: &Calibration) -> Result<Self, VerifyError> {
-        let hand_eye = calibration.hand_eye.ok_or(VerifyError::NoHandEye)?;
-        let intrinsics = calibration.intrinsics.ok_or(VerifyError::NoIntrinsics)?;
-        let uncertainty = calibration
-            .noise
-            .zip(calibration.shared_covariance.clone())
-            .map(|(noise, covariance)| Uncertainty { noise, covariance });
-        let shape = calibration.shape.map_or_else(BoardShape::default, |estimate| estimate.shape);
-        Ok(Self { hand_eye, intrinsics, shape, hand_eye_covariance: calibration.hand_eye_covariance, uncertainty })
-    }
-
-    /// Where the camera is when the robot reports this pose.
-    pub fn base_from_camera(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Base, Camera> {
-        match self.hand_eye {
-            HandEye::EyeInHand { tip_from_camera, .. } => *base_from_tip * tip_from_camera,
-            HandEye::EyeToHand { base_from_camera, .. } => base_from_camera,
-        }
-    }
-
-    /// Where the camera sees the board when the robot reports this pose: the bare chain.
-    pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
-        camera_from_target(
-            self.hand_eye.mode(),
-            base_from_tip,
-            &self.hand_eye.mount_from_camera(),
-            &self.hand_eye.anchor_from_target(),
-        )
-    }
-}
-
 /// Checks a calibration with captures that were never in its fit. `work` is a `&CancelToken`, or a [`Work`] to follow the
 /// progress.
 ///
@@ -223,65 +173,73 @@ pub fn verify<'a>(
     if captures.is_empty() {
         return Err(VerifyError::NoCaptures);
     }
-    let points = BoardPoints::new(&target.points()).points(&calibrated.shape);
-    let mut consistency = calibrated.uncertainty.as_ref().and_then(consistency::Sums::new);
+    let board = BoardPoints::new(&target.points());
+    let mut consistency = calibrated.uncertainty.as_ref().and_then(|it| consistency::Sums::new(calibrated, it));
     let mut checks = Vec::with_capacity(captures.len());
+    let mut tips = Vec::with_capacity(captures.len());
     for (done, capture) in captures.iter().enumerate() {
         if work.is_cancelled() {
             return Err(VerifyError::Cancelled);
         }
         work.report(Stage::Verification, done, captures.len());
-        let mut check = check(calibrated, target, &points, capture)?;
-        check.ratio = consistency.as_mut().and_then(|sums| sums.add(calibrated, &points, capture.view, &check));
+        let base_from_tip = calibrated.base_from_tip(capture.view)?;
+        let mut check = check(calibrated, target, &board, capture, &base_from_tip)?;
+        check.ratio = consistency.as_mut().and_then(|sums| sums.add(calibrated, &board, capture.view, &check));
         checks.push(check);
+        tips.push(base_from_tip);
     }
-    Ok(summary(calibrated, captures, checks, consistency.and_then(consistency::Sums::finish)))
+    Ok(summary(calibrated, &tips, checks, consistency.and_then(consistency::Sums::finish)))
 }
 
 fn check(
     calibrated: &Calibrated,
     target: &TargetSpec,
-    points: &[Point3<f64>],
+    board: &BoardPoints,
     capture: &CheckCapture<'_>,
+    base_from_tip: &Pose<Base, Tip>,
 ) -> Result<CaptureCheck, VerifyError> {
     let view = capture.view;
     let name = || view.name.clone();
-    if !view.base_from_tip.is_finite() {
-        return Err(VerifyError::NotFinite { name: name() });
-    }
+    let no_pose = |source| VerifyError::Vision { name: name(), source };
     // PnP checks the corners, so every index below is a point of the target.
-    let seen = pnp::solve(&view.corners, target, &calibrated.intrinsics)
-        .map_err(|source| VerifyError::Vision { name: name(), source })?
-        .best;
-    let predicted = calibrated.camera_from_target(&view.base_from_tip);
-    let mut residuals = Vec::with_capacity(view.corners.len());
-    for corner in &view.corners {
-        let px = calibrated
-            .intrinsics
-            .project(&(predicted.isometry() * points[corner.index]))
-            .map_err(|_behind| VerifyError::PredictedBehind { name: name() })?;
-        residuals.push(CornerResidual { index: corner.index, px: corner.px, residual_px: corner.px - px });
-    }
-    let centre = target.centre();
-    let seen_pose = seen.camera_from_target;
-    let origin_error = seen_pose.translation() - predicted.translation();
+    let flat = pnp::camera_from_target(&view.corners, target, &calibrated.intrinsics).map_err(no_pose)?;
+    let seen = calibrated
+        .seen(board, &view.corners, &flat)
+        .ok_or_else(|| no_pose(VisionError::NoPose { corners: view.corners.len() }))?;
+    let predicted = calibrated.camera_from_target(base_from_tip);
+    let points = board.points(&calibrated.shape);
+    let residuals_at = |camera_from_target: &Pose<Camera, Target>| -> Result<Vec<CornerResidual>, CameraError> {
+        let residual = |corner: &Corner| {
+            let px = calibrated.intrinsics.project(&(camera_from_target.isometry() * points[corner.index]))?;
+            Ok(CornerResidual { index: corner.index, px: corner.px, residual_px: corner.px - px })
+        };
+        view.corners.iter().map(residual).collect()
+    };
+    let residuals = residuals_at(&predicted).map_err(|_behind| VerifyError::PredictedBehind { name: name() })?;
+    let centre = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64);
+    let origin_error = seen.translation() - predicted.translation();
     Ok(CaptureCheck {
         name: name(),
         rms_px: rms(residuals.iter().map(|r| r.residual_px.norm_squared())),
-        pnp_rms_px: seen.rms_px,
-        centre_error_m: seen_pose.isometry() * centre - predicted.isometry() * centre,
-        orientation_error_rad: se3::rotation_vector(&(predicted.inverse() * seen_pose).rotation()).norm(),
-        origin_error_in_base_m: calibrated.base_from_camera(&view.base_from_tip).rotation() * origin_error,
-        depth_error_m: depth_error_m(calibrated, capture, predicted.isometry()),
+        pnp_rms_px: rms(residuals_at(&seen)?.iter().map(|r| r.residual_px.norm_squared())),
+        centre_error_m: seen.isometry() * centre - predicted.isometry() * centre,
+        orientation_error_rad: se3::rotation_vector(&(predicted.inverse() * seen).rotation()).norm(),
+        origin_error_in_base_m: calibrated.base_from_camera(base_from_tip).rotation() * origin_error,
+        depth_error_m: depth_error_m(calibrated, capture, &predicted, &points),
         residuals,
         predicted_camera_from_target: predicted,
-        seen_camera_from_target: seen_pose,
+        seen_camera_from_target: seen,
         ratio: None,
     })
 }
 
 /// Median over the corners, so that a corner at an edge of the surface does not decide.
-fn depth_error_m(calibrated: &Calibrated, capture: &CheckCapture<'_>, board: &Isometry3<f64>) -> Option<f64> {
+fn depth_error_m(
+    calibrated: &Calibrated,
+    capture: &CheckCapture<'_>,
+    predicted: &Pose<Camera, Target>,
+    points: &[Point3<f64>],
+) -> Option<f64> {
     let image = capture.depth?;
     let mut errors: Vec<f64> = Vec::new();
     for corner in &capture.view.corners {
@@ -292,7 +250,9 @@ fn depth_error_m(calibrated: &Calibrated, capture: &CheckCapture<'_>, board: &Is
         let DepthSample::Metres(depth) = image.sample(column as u32, row as u32, capture.far_m) else { continue };
         // The depth is that of the pixel's middle, not of the corner.
         let pixel = nalgebra::Vector2::new(column, row);
-        if let Ok(on_board) = points::on_plane(&calibrated.intrinsics, &pixel, board) {
+        // Around a corner a bent board is a plane as deep in it as the corner.
+        let surface = predicted.isometry() * Translation3::new(0.0, 0.0, points[corner.index].z);
+        if let Ok(on_board) = points::on_plane(&calibrated.intrinsics, &pixel, &surface) {
             errors.push(f64::from(depth) - on_board.z);
         }
     }
@@ -307,18 +267,18 @@ fn rms(squares: impl ExactSizeIterator<Item = f64>) -> f64 {
 
 fn summary(
     calibrated: &Calibrated,
-    captures: &[CheckCapture<'_>],
+    tips: &[Pose<Base, Tip>],
     checks: Vec<CaptureCheck>,
     consistency: Option<Consistency>,
 ) -> Verification {
     let mode = calibrated.hand_eye.mode();
     let mount_from_camera = calibrated.hand_eye.mount_from_camera();
-    let origins: Vec<Vector3<f64>> = captures
+    let origins: Vec<Vector3<f64>> = tips
         .iter()
         .zip(&checks)
-        .map(|(capture, check)| {
+        .map(|(base_from_tip, check)| {
             let anchor_from_target: Pose<Anchor, Target> =
-                mode.anchor_from_mount(&capture.view.base_from_tip) * mount_from_camera * check.seen_camera_from_target;
+                mode.anchor_from_mount(base_from_tip) * mount_from_camera * check.seen_camera_from_target;
             anchor_from_target.translation()
         })
         .collect();
@@ -335,5 +295,7 @@ fn summary(
     }
 }
 
+#[cfg(test)]
+mod found_tests;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
 use super::{Calibrated, VerifyError};
 use crate::camera::Intrinsics;
 use crate::frames::{Base, Camera, PointIn, Pose, Target, Tip};
+use crate::handeye::joint::SmallSample;
 use crate::handeye::quality;
 
 /// A point that the camera measured.
@@ -17,6 +18,8 @@ pub struct MeasuredPoint {
     /// Covariance in base axes, square metres, as far as the hand-eye transform causes it: the noise of this robot
     /// pose, of the depth or the corners, and of the lens come on top. `None` when the calibration states none.
     pub covariance_in_base: Option<Matrix3<f64>>,
+    /// How the error is distributed in units of that covariance.
+    pub small_sample: SmallSample,
 }
 
 impl MeasuredPoint {
@@ -25,9 +28,10 @@ impl MeasuredPoint {
         self.covariance_in_base.map(|c| c.diagonal().map(|v| v.max(0.0).sqrt()))
     }
 
-    /// The length that its error stays under with a probability of 95 %, metres; of the same part of the error.
+    /// The length that its error stays under with a probability of 95 %, metres; of the same part of the error, and by
+    /// the same law as the expected error of the calibration.
     pub fn error_95_m(&self) -> Option<f64> {
-        self.covariance_in_base.as_ref().map(quality::radius_95)
+        self.covariance_in_base.as_ref().map(|covariance| quality::point_error_95(covariance, self.small_sample))
     }
 }
 
@@ -50,7 +54,8 @@ impl Calibrated {
         Ok(self.measured(base_from_tip, Point3::from(ray.into_inner() * (depth_m / ray.z))))
     }
 
-    /// The point of the board's plane that a pixel sees, with the board's pose in this picture from PnP.
+    /// The point of the board's plane that a pixel sees, with the board's pose in this picture by
+    /// [`seen`](Self::seen).
     ///
     /// # Errors
     /// [`VerifyError::MissesBoard`] when the ray does not meet the plane in front of the camera,
@@ -73,7 +78,8 @@ impl Calibrated {
             .as_ref()
             .map(|c| rotation * quality::point_covariance(c, &in_camera) * rotation.transpose());
         let in_camera = PointIn::new(in_camera);
-        MeasuredPoint { in_camera, in_base: base_from_camera * in_camera, covariance_in_base }
+        let in_base = base_from_camera * in_camera;
+        MeasuredPoint { in_camera, in_base, covariance_in_base, small_sample: self.small_sample }
     }
 }
 

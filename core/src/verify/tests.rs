@@ -1,9 +1,11 @@
-use nalgebra::{Vector2, Vector6};
+use nalgebra::{Isometry3, Vector2, Vector6};
 
 use super::*;
+use crate::board_shape::BoardShape;
 use crate::calibrate::{Method, calibrate};
-use crate::handeye::Mode;
 use crate::handeye::joint::simulated::{BOARD, REALISTIC, Trial, camera, trial};
+use crate::handeye::joint::{Noise, SmallSample};
+use crate::handeye::{HandEye, Mode};
 use crate::progress::CancelToken;
 
 /// A calibration from the first views of a trial; the others are there to check it.
@@ -28,7 +30,9 @@ fn truth(t: &Trial) -> Calibrated {
         shape: BoardShape::default(),
         hand_eye: HandEye::new(t.mode, t.mount_from_camera, t.anchor_from_target),
         intrinsics: t.intrinsics,
+        joint_offsets_rad: Vec::new(),
         hand_eye_covariance: None,
+        small_sample: SmallSample::KNOWN,
         uncertainty: None,
     }
 }

@@ -23,10 +23,6 @@ pub(crate) struct FreeForm {
 }
 
 impl FreeForm {
-    pub fn only_lens(free: bool) -> Self {
-        Self { lens: free, ..Self::default() }
-    }
-
     fn lens_count(self, intrinsics: &Intrinsics) -> usize {
         if self.lens { intrinsics.parameter_count() } else { 0 }
     }

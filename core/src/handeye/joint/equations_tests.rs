@@ -125,5 +125,5 @@ fn a_target_behind_the_camera_has_no_equations() {
     let View { intrinsics, board, shape, corners, whiteners, .. } = &view;
     let seen = Seen { intrinsics, board, shape, corners, whiteners };
     let behind = Isometry3::translation(0.0, 0.0, -1.0);
-    assert!(PoseEquations::new(&seen, &behind, FreeForm::only_lens(true)).is_err());
+    assert!(PoseEquations::new(&seen, &behind, FreeForm { lens: true, ..FreeForm::default() }).is_err());
 }

@@ -82,7 +82,7 @@ pub struct Free {
 }
 
 impl Free {
-    fn form(self) -> equations::FreeForm {
+    pub(crate) fn form(self) -> equations::FreeForm {
         equations::FreeForm { lens: self.intrinsics, warp: self.warp, scale: self.scale }
     }
 }
@@ -197,12 +197,6 @@ impl JointSolution {
     /// Covariance of the target's place `[t; r]`, right perturbation.
     pub fn target_covariance(&self) -> Matrix6<f64> {
         self.covariance.fixed_view::<6, 6>(6, 6).into_owned()
-    }
-
-    /// Covariance of the links and the free intrinsics alone.
-    pub fn links_and_lens_covariance(&self) -> DMatrix<f64> {
-        let n = 12 + self.free.form().warp_at(&self.intrinsics);
-        self.covariance.view((0, 0), (n, n)).into_owned()
     }
 
     /// Standard deviations of the free intrinsics in the order of [`Intrinsics::parameters`]; empty when fixed.

@@ -32,7 +32,13 @@ pub fn tip_error_95_m(solution: &JointSolution) -> f64 {
 /// The same at any `point` (camera coordinates, metres), from the covariance `[t; r]` of the hand-eye transform (right
 /// perturbation) and the distribution of its error.
 pub fn tip_error_95_at(hand_eye: &Matrix6<f64>, law: SmallSample, point: &Point3<f64>) -> f64 {
-    radius_95_t(&(point_covariance(hand_eye, point) / law.scale), law.degrees_of_freedom)
+    point_error_95(&point_covariance(hand_eye, point), law)
+}
+
+/// The length that the error of a point stays under with a probability of 95 %, metres, from the covariance of the point
+/// and the distribution of the hand-eye's error that causes it.
+pub fn point_error_95(covariance: &Matrix3<f64>, law: SmallSample) -> f64 {
+    radius_95_t(&(covariance / law.scale), law.degrees_of_freedom)
 }
 
 #[cfg(test)]

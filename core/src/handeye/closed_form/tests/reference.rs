@@ -1,7 +1,6 @@
 //! Agreement with OpenCV 4.14 (`calibrateHandEye`, `calibrateRobotWorldHandEye`) on real and rendered sessions.
 
 use std::fs;
-use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::Deserialize;
@@ -61,10 +60,9 @@ impl Session {
     }
 }
 
-/// The recorded sessions with their names; says so on standard output when there are none.
+/// The recorded sessions with their names; none without the data sets.
 fn sessions() -> Vec<(String, Session)> {
-    let folder = std::env::var_os("HANDEYE_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
+    let Some(folder) = crate::testing::data_folder() else { return Vec::new() };
     let mut found: Vec<_> = fs::read_dir(&folder)
         .into_iter()
         .flatten()
@@ -76,9 +74,7 @@ fn sessions() -> Vec<(String, Session)> {
         })
         .collect();
     found.sort_by(|(a, _), (b, _)| a.cmp(b));
-    if found.is_empty() {
-        println!("skipped: no data sets at {}", folder.display());
-    }
+    assert!(!found.is_empty(), "no session with views.json in {}", folder.display());
     found
 }
 

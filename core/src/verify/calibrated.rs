@@ -1,0 +1,123 @@
+//! What of a calibration is needed to predict what the camera sees.
+
+use nalgebra::{DMatrix, Matrix6};
+
+use super::VerifyError;
+use crate::board_shape::{BoardPoints, BoardShape};
+use crate::calibrate::Calibration;
+use crate::camera::Intrinsics;
+use crate::frames::{Base, Camera, Pose, Target, Tip};
+use crate::handeye::HandEye;
+use crate::handeye::joint::{Free, Noise, SmallSample, base_from_tip_by_joints, camera_from_target};
+use crate::handeye::quality;
+use crate::observation::{Corner, View};
+
+/// What of a calibration is needed to predict.
+#[derive(Debug, Clone)]
+pub struct Calibrated {
+    /// Both rigid links.
+    pub hand_eye: HandEye,
+    /// The camera.
+    pub intrinsics: Intrinsics,
+    /// The shape of the target.
+    pub shape: BoardShape,
+    /// Offsets of the joints that the calibration counts on, to be added to the reported angles, radians; empty where it
+    /// counts on none.
+    pub joint_offsets_rad: Vec<f64>,
+    /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
+    pub hand_eye_covariance: Option<Matrix6<f64>>,
+    /// How the error of the hand-eye transform is distributed in units of that covariance.
+    pub small_sample: SmallSample,
+    /// What says how large errors may be; of a joint estimate.
+    pub uncertainty: Option<Uncertainty>,
+}
+
+/// How uncertain a prediction is.
+#[derive(Debug, Clone)]
+pub struct Uncertainty {
+    /// Noise levels of robot and corners.
+    pub noise: Noise,
+    /// What was estimated besides the links.
+    pub free: Free,
+    /// Covariance of everything that predictions share, as in
+    /// [`JointSolution::covariance`](crate::handeye::joint::JointSolution::covariance).
+    pub covariance: DMatrix<f64>,
+}
+
+impl Calibrated {
+    /// Takes what it needs from a calibration.
+    ///
+    /// # Errors
+    /// [`VerifyError::NoHandEye`], [`VerifyError::NoIntrinsics`].
+    pub fn new(calibration: &Calibration) -> Result<Self, VerifyError> {
+        let hand_eye = calibration.hand_eye.ok_or(VerifyError::NoHandEye)?;
+        let intrinsics = calibration.intrinsics.ok_or(VerifyError::NoIntrinsics)?;
+        let shared = calibration.shared.clone();
+        let uncertainty = calibration.noise.zip(shared).map(|(noise, shared)| Uncertainty {
+            noise,
+            free: shared.free,
+            covariance: shared.covariance,
+        });
+        let accepted = calibration.joint_offsets.as_ref().filter(|joints| joints.accepted);
+        Ok(Self {
+            hand_eye,
+            intrinsics,
+            shape: calibration.shape.map_or_else(BoardShape::default, |estimate| estimate.shape),
+            joint_offsets_rad: accepted.map_or_else(Vec::new, |joints| joints.offsets_rad.clone()),
+            hand_eye_covariance: calibration.hand_eye_covariance,
+            small_sample: calibration.small_sample.unwrap_or(SmallSample::KNOWN),
+            uncertainty,
+        })
+    }
+
+    /// Where the tip is when the robot reports what it does in this view: with the offsets of the joints taken out.
+    ///
+    /// # Errors
+    /// [`VerifyError::NotFinite`]; [`VerifyError::NoJoints`] when there are offsets and the view does not say how its tip
+    /// moves with the joints.
+    pub fn base_from_tip(&self, view: &View) -> Result<Pose<Base, Tip>, VerifyError> {
+        if !view.base_from_tip.is_finite() {
+            return Err(VerifyError::NotFinite { name: view.name.clone() });
+        }
+        if view.tip_by_joint.len() < self.joint_offsets_rad.len() {
+            return Err(VerifyError::NoJoints { name: view.name.clone() });
+        }
+        Ok(base_from_tip_by_joints(view, &self.joint_offsets_rad))
+    }
+
+    /// Where the camera is when the tip is there.
+    pub fn base_from_camera(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Base, Camera> {
+        match self.hand_eye {
+            HandEye::EyeInHand { tip_from_camera, .. } => *base_from_tip * tip_from_camera,
+            HandEye::EyeToHand { base_from_camera, .. } => base_from_camera,
+        }
+    }
+
+    /// Where the camera sees the board when the tip is there: the bare chain.
+    pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
+        camera_from_target(
+            self.hand_eye.mode(),
+            base_from_tip,
+            &self.hand_eye.mount_from_camera(),
+            &self.hand_eye.anchor_from_target(),
+        )
+    }
+
+    /// The board's pose in one picture, by its corners and the shape that the calibration found, from its pose as a flat
+    /// board of the stated size. That a board is 2 % larger than stated puts it 2 % farther away.
+    ///
+    /// `None` when that puts a corner behind the camera, or a corner is no point of this board.
+    pub fn seen(
+        &self,
+        board: &BoardPoints,
+        corners: &[Corner],
+        flat: &Pose<Camera, Target>,
+    ) -> Option<Pose<Camera, Target>> {
+        if corners.iter().any(|corner| corner.index >= board.len()) {
+            return None;
+        }
+        let mut start = *flat.isometry();
+        start.translation.vector *= self.shape.scale;
+        quality::pose_of_view(&self.intrinsics, board, &self.shape, corners, &Pose::from_isometry(start))
+    }
+}
