@@ -1,27 +1,48 @@
-//! Files that are there completely or not at all, also after a power cut.
+//! Files that are there completely or not at all, also after a power cut, and that are where their name says: a link in
+//! their place is replaced and never followed.
 
-use std::fs::{self, File};
+use std::ffi::OsString;
+use std::fs::File;
 use std::io::{self, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use tempfile::NamedTempFile;
+
+use crate::own_folder;
+
+/// How the hidden name of a file ends that is not whole yet.
+const ENDING: &str = "partial";
 
 /// Replaces `path` by `bytes` so that a reader, or a machine that stops at any moment, sees the old content or the
-/// new and never a part: written beside it under a hidden name, flushed to the disk, renamed, the folder flushed.
+/// new and never a part: written beside it under a new hidden name, flushed to the disk, renamed, the folder flushed.
 ///
-/// The folder must exist. A left-over hidden file of an interrupted write is overwritten by the next.
+/// The folder must exist. What an interrupted write leaves is known by [`is_partial`].
 ///
 /// # Errors
-/// Whatever the file system reports; the old content is then still in place.
+/// Whatever the file system reports, and a folder that is reached through a link inside of a session or a data set; the
+/// old content is then still in place.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let partial = partial_path(path)?;
-    let mut file = File::create(&partial)?;
-    let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    drop(file);
-    if let Err(error) = written.and_then(|()| fs::rename(&partial, path)) {
-        // Best effort: the error that matters is the first.
-        drop(fs::remove_file(&partial));
-        return Err(error);
-    }
+    let mut file = partial(path)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|e| e.error)?;
     sync_folder(parent(path))
+}
+
+/// An empty file in the place of `path`, for what is written bit by bit and read as far as it came.
+///
+/// # Errors
+/// As [`write`].
+pub fn create(path: &Path) -> io::Result<File> {
+    partial(path)?.persist(path).map_err(|e| e.error)
+}
+
+/// Whether a file of this name is what an interrupted write of the file `of` in the same folder has left.
+pub fn is_partial(name: &str, of: &str) -> bool {
+    name.strip_prefix('.').and_then(|rest| rest.strip_prefix(of)).is_some_and(|rest| {
+        // Earlier programs had no random part.
+        rest.starts_with('.') && rest.ends_with(&format!(".{ENDING}"))
+    })
 }
 
 /// Flushes the names in a folder to the disk, so that a rename in it survives a power cut.
@@ -40,40 +61,27 @@ fn parent(path: &Path) -> &Path {
     }
 }
 
-fn partial_path(path: &Path) -> io::Result<PathBuf> {
+/// A new file beside `path` under a name that nobody can have foreseen; it is gone when it is dropped.
+fn partial(path: &Path) -> io::Result<NamedTempFile> {
     let name = path
         .file_name()
         .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, format!("{} is not a file name", path.display())))?;
-    let mut hidden = std::ffi::OsString::from(".");
+    own_folder::check_folder(parent(path))?;
+    let mut hidden = OsString::from(".");
     hidden.push(name);
-    hidden.push(".partial");
-    Ok(parent(path).join(hidden))
+    hidden.push(".");
+    let ending = format!(".{ENDING}");
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&hidden).suffix(&ending);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        // As any other new file: what the umask leaves.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(parent(path))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_failed_write_keeps_the_old_content_and_leaves_nothing_behind() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("result.json");
-        write(&path, b"old").expect("first write");
-        // A folder cannot be replaced by a file, so this rename fails after the bytes are written.
-        let taken = folder.path().join("taken");
-        fs::create_dir_all(taken.join("inside")).expect("a folder in the way");
-        assert!(write(&taken, b"new").is_err());
-        assert_eq!(fs::read(&path).expect("still there"), b"old");
-        let names: Vec<_> = fs::read_dir(folder.path()).expect("list").map(|e| e.expect("entry").file_name()).collect();
-        assert_eq!(names.len(), 2, "{names:?}");
-    }
-
-    #[test]
-    fn a_new_write_replaces_the_whole_content() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("result.json");
-        write(&path, b"a long old content").expect("first write");
-        write(&path, b"new").expect("second write");
-        assert_eq!(fs::read(&path).expect("read"), b"new");
-    }
-}
+#[path = "atomic_file_tests.rs"]
+mod tests;

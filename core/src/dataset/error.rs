@@ -66,9 +66,15 @@ pub enum DatasetProblem {
         /// What is read.
         limit: u64,
     },
-    /// No rows, or nothing at all.
+    /// Not a letter of text.
     #[error("is empty: {0}")]
     Empty(&'static str),
+    /// A header and nothing below it.
+    #[error("has a header and no rows: {0}")]
+    NoRows(&'static str),
+    /// Neither images nor anything that stands in for them.
+    #[error("has no images (png, jpg, bmp or tif), nor has its images folder{0}")]
+    NoImages(&'static str),
     /// Not TOML, an unknown key, or a word that is not one of the choices.
     #[error("{0}")]
     Toml(String),
@@ -207,6 +213,11 @@ pub enum DatasetProblem {
     /// An image name that cannot be one.
     #[error("image {0:?} is not a path relative to this file")]
     BadImageName(String),
+    /// The table of a session names an image outside of it.
+    #[error(
+        "{0:?} is not inside of the session: a session is complete in its folder, so another program has changed this file"
+    )]
+    OutsideSession(String),
     /// The table names an image that is not there.
     #[error("image {0:?} does not exist: names are relative to this file")]
     MissingImage(String),

@@ -24,21 +24,22 @@ mod error;
 mod images;
 mod joints;
 mod natural_order;
+mod outside;
 mod poses;
 mod target_table;
+pub mod template;
 mod text;
 pub mod write;
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, RgbImage};
 use nalgebra::{Isometry3, Vector6};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 
 use crate::camera::{Distortion, Intrinsics};
+use crate::digest::Listing;
 use crate::frames::{Base, Camera, Pose, Target, Tip};
 use crate::handeye::Mode;
 use crate::image_file::{self, ImageFileError};
@@ -49,6 +50,7 @@ use config::{Config, PoseDirection};
 use corners::CornerTable;
 pub use error::{DatasetError, DatasetProblem};
 pub use joints::DatasetArm;
+use outside::Outside;
 use poses::PoseRow;
 use text::TextFile;
 
@@ -72,6 +74,8 @@ pub struct Dataset {
     pub image_size: Option<(u32, u32)>,
     /// The arm that the joint angles belong to, and whether they fit the poses; `None` when `[robot.arm]` is absent.
     pub arm: Option<DatasetArm>,
+    /// What the tables name outside of the folder, through `../`.
+    pub outside: Vec<String>,
     pose_table: Option<PathBuf>,
     /// Name in the data set and SHA-256 of every text file.
     sources: Vec<(String, [u8; 32])>,
@@ -127,11 +131,19 @@ impl Dataset {
         let corners_file = table(&config.corners)?;
         let target_poses_file = table(&config.target_poses)?;
 
+        let mut outside = Outside::of(folder);
+        for file in [&poses_file, &corners_file, &target_poses_file].into_iter().flatten() {
+            outside.look_at(&description.path, None, &file.name.to_string_lossy(), &file.name)?;
+        }
         let views = views(folder, &config, poses_file.as_ref())?;
         let mut corners = corners_file.as_ref().map(|file| corners::read_corners(file, &config.target)).transpose()?;
         let mut entries = EntryList { folder, poses_file: poses_file.as_ref(), views };
         if let (Some(file), Some(corners)) = (&corners_file, &corners) {
             entries.take_corner_images(file, corners)?;
+        }
+        for view in &entries.views {
+            let table = poses_file.as_ref().or(corners_file.as_ref()).unwrap_or(&description);
+            outside.look_at(&table.path, view.row, &view.name, &view.path)?;
         }
         let mut target_poses = match (&target_poses_file, &config.robot) {
             (Some(file), Some(robot)) => entries.target_poses(file, poses::read_poses(file, robot, None)?)?,
@@ -176,6 +188,7 @@ impl Dataset {
             entries: out,
             image_size,
             arm,
+            outside: outside.said(poses_file.as_ref(), folder),
             pose_table: poses_file.map(|f| f.path),
             sources,
         })
@@ -197,7 +210,11 @@ impl Dataset {
         self.load(entry, image_file::load_gray)
     }
 
-    fn load<T>(&self, entry: &Entry, loader: impl Fn(&Path) -> Result<T, ImageFileError>) -> Result<T, DatasetError> {
+    fn load<T>(
+        &self,
+        entry: &Entry,
+        loader: impl FnOnce(&Path) -> Result<T, ImageFileError>,
+    ) -> Result<T, DatasetError> {
         let file = self.pose_table.as_ref().unwrap_or(&self.folder);
         let fail = |problem| DatasetError::new(file, entry.row, problem);
         let name = || error::shown(&entry.name);
@@ -212,38 +229,18 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError`] when an image can no longer be read.
     pub fn input_sha256(&self) -> Result<String, DatasetError> {
-        let mut listing = String::new();
-        let mut add = |digest: &[u8], name: &str| {
-            // Writing to a string cannot fail.
-            let _ok = writeln!(listing, "{}  {name}", hex(digest)).is_ok();
-        };
+        let mut listing = Listing::default();
         for (name, digest) in &self.sources {
-            add(digest, name);
+            listing.add_digest(name, digest);
         }
         for entry in &self.entries {
             let Some(path) = &entry.image_path else { continue };
-            let digest = self.load(entry, |path| {
-                hash_file(path).map_err(|e| ImageFileError::Unreadable(image_file::one_line(&e)))
-            })?;
-            add(&digest, &path.strip_prefix(&self.folder).unwrap_or(path).display().to_string());
+            let name = path.strip_prefix(&self.folder).unwrap_or(path).display().to_string();
+            let unreadable = |e| ImageFileError::Unreadable(image_file::one_line(&e));
+            self.load(entry, |path| listing.add_file(&name, path).map_err(unreadable))?;
         }
-        Ok(hex(&Sha256::digest(listing.as_bytes())))
+        Ok(listing.digest())
     }
-}
-
-fn hash_file(path: &Path) -> std::io::Result<[u8; 32]> {
-    let mut hasher = Sha256::new();
-    std::io::copy(&mut std::fs::File::open(path)?, &mut hasher)?;
-    Ok(hasher.finalize().into())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
-        let digit = |nibble: u8| char::from_digit(u32::from(nibble), 16).unwrap_or('0');
-        text.push(digit(byte >> 4));
-        text.push(digit(byte & 15));
-        text
-    })
 }
 
 /// A view before its image was looked at.
@@ -350,8 +347,10 @@ fn views(folder: &Path, config: &Config, poses_file: Option<&TextFile>) -> Resul
     }
     let paths = images::list(folder)?;
     if paths.is_empty() && config.corners.is_none() {
-        let why = "no images (png, jpg, bmp or tif) in this folder or in its images folder";
-        return Err(DatasetError::new(folder, None, DatasetProblem::Empty(why)));
+        // Without [robot] a table in the folder is not read, and says nothing of where the images are.
+        let has_table = template::tables(folder).next().is_some();
+        let hint = if has_table { "; for images that a pose table names, dataset.toml needs [robot]" } else { "" };
+        return Err(DatasetError::new(folder, None, DatasetProblem::NoImages(hint)));
     }
     Ok(paths.into_iter().map(|path| View::of_image(path.to_string_lossy().into_owned(), path)).collect())
 }

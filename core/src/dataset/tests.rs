@@ -2,8 +2,10 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use sha2::{Digest as _, Sha256};
 
 use super::*;
+use crate::digest::hex;
 use crate::target::Grid;
 
 const TARGET: &str =

@@ -73,7 +73,7 @@ pub(super) fn resolve(folder: &Path, name: &str) -> Option<PathBuf> {
 pub(super) struct Row {
     /// Line of its first cell, from 1.
     pub line: usize,
-    cells: Vec<String>,
+    pub cells: Vec<String>,
 }
 
 impl Row {
@@ -109,7 +109,7 @@ impl<'a> Table<'a> {
             }
         }
         if records.is_empty() {
-            return Err(DatasetError::new(path, None, DatasetProblem::Empty(why)));
+            return Err(DatasetError::new(path, Some(header.line), DatasetProblem::NoRows(why)));
         }
         let folder = file.name.parent().unwrap_or(Path::new(""));
         Ok(Self { path, folder, columns, rows: records })
@@ -169,7 +169,7 @@ impl<'a> Table<'a> {
     }
 }
 
-fn records(file: &TextFile) -> Result<Vec<Row>, DatasetError> {
+pub(super) fn records(file: &TextFile) -> Result<Vec<Row>, DatasetError> {
     let bytes = file.text.as_bytes();
     let mut reader =
         csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);

@@ -34,9 +34,9 @@ mod zivid;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::atomic_file;
 use crate::image_file::one_line;
 use crate::result::ResultProblem;
+use crate::{atomic_file, own_folder};
 
 pub use error::ExportError;
 pub use input::{ExportInput, ExportView};
@@ -130,7 +130,8 @@ pub fn preview(format: &dyn Format, input: &ExportInput<'_>) -> Result<Vec<Expor
 }
 
 /// Writes the files of all `formats` into a folder, which is made where there is none, reads every file back and
-/// compares it with the result. Gives the paths written, in order. Files that were there are replaced, each as a whole.
+/// compares it with the result. Gives the paths written, in order. Files and links that were there are replaced, each as a
+/// whole.
 ///
 /// # Errors
 /// [`ExportError`] for the first format that cannot be written; everything is rendered before anything is written.
@@ -142,7 +143,7 @@ pub fn write_all(folder: &Path, formats: &[&dyn Format], input: &ExportInput<'_>
         }
     }
     let io = |file: &Path, e: std::io::Error| ExportError::Io { file: file.to_path_buf(), problem: one_line(&e) };
-    fs::create_dir_all(folder).map_err(|e| io(folder, e))?;
+    own_folder::check_folder(folder).and_then(|()| fs::create_dir_all(folder)).map_err(|e| io(folder, e))?;
     let mut written = Vec::with_capacity(rendered.len());
     for (format, file) in rendered {
         let path = folder.join(&file.name);

@@ -86,6 +86,11 @@ impl CalibrationResult {
             ("quality.robot_sigma_mm", q.robot_sigma_mm),
             ("quality.robot_sigma_deg", q.robot_sigma_deg),
         ];
+        if let Some(verification) = &self.verification {
+            numbers.push(("verification.rms_px", Some(verification.rms_px)));
+            numbers.push(("verification.centre_rms_mm", Some(verification.centre_rms_mm)));
+            numbers.push(("verification.orientation_rms_deg", Some(verification.orientation_rms_deg)));
+        }
         if let Some(truth) = &self.truth {
             numbers.push(("truth.translation_error_mm", truth.translation_error_mm));
             numbers.push(("truth.rotation_error_deg", truth.rotation_error_deg));

@@ -53,6 +53,9 @@ pub struct CalibrationResult {
     /// What is weak or wrong, the most severe first.
     #[serde(default)]
     pub findings: Findings,
+    /// Errors on captures that never entered the fit; `None` when there are none.
+    #[serde(default)]
+    pub verification: Option<VerificationSummary>,
     /// Comparison with the truth, where a simulated cell publishes it.
     pub truth: Option<TruthComparison>,
     /// What made this result.
@@ -298,6 +301,19 @@ pub enum ViewStatus {
     NoTarget,
 }
 
+/// How well the result predicts captures that never entered the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct VerificationSummary {
+    /// How many there are.
+    pub captures: usize,
+    /// Root mean square distance of their corners from where they are predicted, pixels.
+    pub rms_px: f64,
+    /// Root mean square distance of the middle of the target from where it is predicted, millimetres.
+    pub centre_rms_mm: f64,
+    /// Root mean square angle of the target from how it is predicted, degrees.
+    pub orientation_rms_deg: f64,
+}
+
 /// How far the result is from the truth of a simulated cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct TruthComparison {
@@ -335,6 +351,7 @@ impl Default for CalibrationResult {
             views: Vec::new(),
             estimate: None,
             findings: Vec::new(),
+            verification: None,
             truth: None,
             provenance: Provenance::default(),
         }

@@ -75,6 +75,8 @@ pub(crate) fn golden() -> CalibrationResult {
             unit: "px".to_owned(),
         }],
     }];
+    result.verification =
+        Some(VerificationSummary { captures: 3, rms_px: 0.25, centre_rms_mm: 0.125, orientation_rms_deg: 0.01 });
     result.truth = Some(TruthComparison { translation_error_mm: Some(0.2), ..TruthComparison::default() });
     result.provenance.tool_version = "0.1.0".to_owned();
     result.provenance.input_sha256 = Some("00ff".repeat(16));

@@ -6,9 +6,9 @@ use super::error::{SessionError, SessionProblem};
 use super::history::History;
 use super::{DOCUMENT, session_file};
 use crate::image_file::one_line;
-use crate::{atomic_file, dataset};
+use crate::{atomic_file, dataset, own_folder};
 
-const NAMES: [&str; 3] = [dataset::DESCRIPTION, dataset::write::POSE_TABLE, DOCUMENT];
+pub(super) const NAMES: [&str; 3] = [dataset::DESCRIPTION, dataset::write::POSE_TABLE, DOCUMENT];
 
 /// What is known to be in the files.
 #[derive(Debug, Default)]
@@ -20,7 +20,8 @@ impl Derived {
     /// Looks at what is in a folder.
     pub fn look_at(folder: &Path) -> Self {
         // A file that cannot be read lags behind.
-        Self { written: NAMES.map(|name| std::fs::read_to_string(folder.join(name)).ok()) }
+        let text = |name| String::from_utf8(own_folder::read(&folder.join(name)).ok()?).ok();
+        Self { written: NAMES.map(text) }
     }
 
     /// Brings the files up to date with entry `sequence` of the journal, the document last.

@@ -50,7 +50,10 @@ pub enum SessionProblem {
     #[error("holds a session already, which is never replaced: open it, or name another folder")]
     Exists,
     /// There is neither `session.json` nor a journal.
-    #[error("has no session.json and no journal.jsonl: it is not a session folder")]
+    #[error(
+        "has no session.json and no journal.jsonl: it is not a session folder; for images and a pose table \
+         `handeye calibrate` prints a dataset.toml to fill in"
+    )]
     NotASession,
     /// Another program has the session open.
     #[error("is open in another program: close it there first")]

@@ -20,8 +20,8 @@ use super::document::{CaptureId, Document};
 use super::edit::Edit;
 use super::error::{SessionError, SessionProblem};
 use super::history::History;
-use crate::atomic_file;
 use crate::image_file::one_line;
+use crate::{atomic_file, own_folder};
 
 /// Name of the journal in a session folder.
 pub const JOURNAL: &str = "journal.jsonl";
@@ -259,7 +259,7 @@ impl Journal {
     /// it and cut off.
     pub fn open(folder: &Path, length: u64, sequence: u64) -> Result<Self, SessionError> {
         let path = folder.join(JOURNAL);
-        let bytes = std::fs::read(&path).map_err(|e| SessionError::unreadable(&path, &e))?;
+        let bytes = own_folder::read(&path).map_err(|e| SessionError::unreadable(&path, &e))?;
         let torn = usize::try_from(length).ok().and_then(|length| bytes.get(length..)).unwrap_or_default();
         let journal = Self::at_end(path, length, sequence)?;
         if !torn.is_empty() {
@@ -270,7 +270,8 @@ impl Journal {
     }
 
     fn at_end(path: PathBuf, length: u64, sequence: u64) -> Result<Self, SessionError> {
-        let file = File::options().append(true).open(&path).map_err(|e| SessionError::unwritable(&path, &e))?;
+        let opened = own_folder::check_file(&path).and_then(|()| File::options().append(true).open(&path));
+        let file = opened.map_err(|e| SessionError::unwritable(&path, &e))?;
         Ok(Self { path, file, length, sequence, is_broken: false })
     }
 

@@ -1,6 +1,5 @@
 //! Reading a session: the journal, or a document from before there were journals.
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -13,7 +12,8 @@ use super::journal::{self, JOURNAL, Replayed};
 use super::session_file::{self, SessionFile};
 use super::{DOCUMENT, depth};
 use crate::depth::DepthImage;
-use crate::image_file;
+use crate::digest::Listing;
+use crate::{dataset, image_file, own_folder};
 
 /// The committed state of a session.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ pub(super) fn load(folder: &Path) -> Result<Loaded, SessionError> {
     // First the document: a program that writes meanwhile then only lets the journal be further.
     let file = read_file(folder);
     let path = folder.join(JOURNAL);
-    let bytes = match fs::read(&path) {
+    let bytes = match own_folder::read(&path) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == ErrorKind::NotFound => return file.map(without_journal),
         Err(e) => return Err(SessionError::unreadable(&path, &e)),
@@ -72,14 +72,20 @@ fn without_journal(file: SessionFile) -> Loaded {
 
 fn read_file(folder: &Path) -> Result<SessionFile, SessionError> {
     let path = folder.join(DOCUMENT);
-    let text = match fs::read_to_string(&path) {
-        Ok(text) => text,
+    let bytes = match own_folder::read(&path) {
+        Ok(bytes) => bytes,
         Err(e) if e.kind() == ErrorKind::NotFound && folder.is_dir() => {
             return Err(SessionError::new(folder, SessionProblem::NotASession));
         }
         Err(e) => return Err(SessionError::unreadable(&path, &e)),
     };
+    let text = String::from_utf8(bytes).map_err(|e| SessionError::unreadable(&path, &e))?;
     session_file::from_json(&text).map_err(|problem| SessionError::new(&path, problem))
+}
+
+/// Whether the image of every capture is there; it is not decoded.
+pub(super) fn check_images(folder: &Path, document: &Document) -> Result<(), SessionError> {
+    document.captures.iter().try_for_each(|capture| check_file_of(folder, capture, &capture.image))
 }
 
 /// Whether the files of every capture are there; they are not decoded.
@@ -88,11 +94,29 @@ pub(super) fn check_files(folder: &Path, document: &Document) -> Result<(), Sess
 }
 
 pub(super) fn check_files_of(folder: &Path, capture: &CaptureRecord) -> Result<(), SessionError> {
-    let missing = capture.files().map(|name| folder.join(name)).find(|path| !path.is_file());
-    missing.map_or(Ok(()), |path| {
-        let what = format!("it is not there and capture {} needs it: bring it back from a copy", capture.id);
-        Err(SessionError::new(&path, SessionProblem::Unreadable(what)))
-    })
+    capture.files().try_for_each(|name| check_file_of(folder, capture, name))
+}
+
+fn check_file_of(folder: &Path, capture: &CaptureRecord, name: &str) -> Result<(), SessionError> {
+    let path = folder.join(name);
+    if path.is_file() {
+        return Ok(());
+    }
+    let what = format!("it is not there and capture {} needs it: bring it back from a copy", capture.id);
+    Err(SessionError::new(&path, SessionProblem::Unreadable(what)))
+}
+
+/// The digest of the session's data set.
+pub(super) fn input_sha256(folder: &Path, document: &Document) -> Result<String, SessionError> {
+    let (description, pose_table) = document.as_dataset();
+    let mut listing = Listing::default();
+    listing.add(dataset::DESCRIPTION, description.as_bytes());
+    listing.add(dataset::write::POSE_TABLE, pose_table.as_bytes());
+    for capture in document.in_use() {
+        let path = folder.join(&capture.image);
+        listing.add_file(&capture.image, &path).map_err(|e| SessionError::unreadable(&path, &e))?;
+    }
+    Ok(listing.digest())
 }
 
 pub(super) fn rgb(folder: &Path, capture: &CaptureRecord) -> Result<RgbImage, SessionError> {

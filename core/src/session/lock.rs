@@ -4,6 +4,7 @@ use std::fs::{File, TryLockError};
 use std::path::Path;
 
 use super::error::{SessionError, SessionProblem};
+use crate::own_folder;
 
 /// The file that is locked. It stays when the session is closed: removing it would let two programs lock two files of
 /// the same name.
@@ -23,6 +24,7 @@ impl FolderLock {
     pub fn take(folder: &Path) -> Result<Self, SessionError> {
         let path = folder.join(LOCK);
         let unwritable = |e| SessionError::unwritable(&path, &e);
+        own_folder::check_file(&path).map_err(unwritable)?;
         let file = File::options().create(true).truncate(false).write(true).open(&path).map_err(unwritable)?;
         match file.try_lock() {
             Ok(()) => Ok(Self { _file: file }),

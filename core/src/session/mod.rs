@@ -29,6 +29,8 @@ mod history;
 mod journal;
 mod load;
 mod lock;
+#[cfg(feature = "opencv")]
+mod observations;
 pub(crate) mod pose_record;
 mod save_as;
 mod session_file;
@@ -46,10 +48,13 @@ pub use error::{SessionError, SessionProblem};
 pub use history::{History, UNDO_STEPS};
 pub use journal::JOURNAL;
 pub use lock::FolderLock;
+#[cfg(feature = "opencv")]
+pub use observations::SessionObservations;
 pub use session_file::{FORMAT, MAJOR_VERSION, MINOR_VERSION};
 pub use store::Store;
 
 use crate::depth::DepthImage;
+use crate::image_file;
 
 /// Name of the document in a session folder.
 pub const DOCUMENT: &str = "session.json";
@@ -71,16 +76,44 @@ impl Session {
         [DOCUMENT, JOURNAL].iter().any(|name| folder.join(name).is_file())
     }
 
-    /// Reads a session, also while another program writes it; nothing in the folder is changed. The files of every
-    /// capture must be there; they are not decoded.
+    /// Reads a session, also while another program writes it; nothing in the folder is changed. The image of every
+    /// capture must be there; it is not decoded. Depth images are not needed for a calibration.
     ///
     /// # Errors
     /// [`SessionError`]: no session, an unknown major version, a damaged journal, a file that is gone.
     pub fn open(folder: &Path) -> Result<Self, SessionError> {
         let loaded = load::load(folder)?;
         let document = loaded.history.document().clone();
-        load::check_files(folder, &document)?;
+        load::check_images(folder, &document)?;
         Ok(Self { folder: folder.to_path_buf(), document })
+    }
+
+    /// Width and height in pixels, by the headers of the images; `None` when there are no captures.
+    ///
+    /// # Errors
+    /// [`SessionError`] when one cannot be read, or is not of the size of the first.
+    pub fn image_size(&self) -> Result<Option<(u32, u32)>, SessionError> {
+        let mut size = None;
+        for capture in &self.document.captures {
+            let path = self.folder.join(&capture.image);
+            let (width, height) = image_file::image_size(&path).map_err(|e| SessionError::unreadable(&path, &e))?;
+            let need = *size.get_or_insert((width, height));
+            if (width, height) != need {
+                let (need_width, need_height) = need;
+                let what = format!("it is {width}×{height} px, and the first image {need_width}×{need_height} px");
+                return Err(SessionError::unreadable(&path, &what));
+            }
+        }
+        Ok(size)
+    }
+
+    /// SHA-256 of the captures in use, as [`crate::dataset::Dataset::input_sha256`] has it of the session's data set, whose
+    /// files need not be there.
+    ///
+    /// # Errors
+    /// [`SessionError`] when an image can no longer be read.
+    pub fn input_sha256(&self) -> Result<String, SessionError> {
+        load::input_sha256(&self.folder, &self.document)
     }
 
     /// The image of a capture.
@@ -100,5 +133,7 @@ impl Session {
     }
 }
 
+#[cfg(all(test, unix))]
+mod foreign_tests;
 #[cfg(test)]
 mod tests;

@@ -26,6 +26,10 @@ impl Store {
     pub fn save_as(&self, new_folder: &Path) -> Result<Self, SessionError> {
         check_is_empty(new_folder)?;
         let partial = partial_path(new_folder)?;
+        if partial.is_symlink() {
+            // Clearing what is behind it would destroy what is not ours.
+            return Err(SessionError::new(&partial, SessionProblem::NotEmpty));
+        }
         if !partial.join(LOCK).exists() {
             // Whatever has our name for unfinished copies and not our lock is not ours to clear.
             check_is_empty(&partial)?;
@@ -114,7 +118,7 @@ fn clear(partial: &Path) -> Result<(), SessionError> {
 
 fn copy_file(from: &Path, to: &Path) -> Result<(), SessionError> {
     let mut source = File::open(from).map_err(|e| SessionError::unreadable(from, &e))?;
-    let mut copy = File::create(to).map_err(|e| SessionError::unwritable(to, &e))?;
+    let mut copy = File::create_new(to).map_err(|e| SessionError::unwritable(to, &e))?;
     let copied = io::copy(&mut source, &mut copy).and_then(|_length| copy.sync_all());
     copied.map_err(|e| SessionError::unwritable(to, &e))
 }

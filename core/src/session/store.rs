@@ -9,7 +9,7 @@ use std::sync::Arc;
 use image::RgbImage;
 
 use super::capture::{Capture, DEPTH};
-use super::derived::Derived;
+use super::derived::{self, Derived};
 use super::document::{CaptureId, CaptureRecord, Document, SessionMeta};
 use super::edit::Edit;
 use super::error::{SessionError, SessionProblem};
@@ -19,9 +19,10 @@ use super::load::{self, Loaded};
 use super::lock::{FolderLock, LOCK};
 use super::session_file::IMAGES;
 use super::{DOCUMENT, RESULT, Session};
+use crate::atomic_file::is_partial;
 use crate::depth::DepthImage;
 use crate::result::{CalibrationResult, ResultError};
-use crate::{atomic_file, image_file};
+use crate::{atomic_file, image_file, own_folder};
 
 /// A session folder and the right to change it. What a method was told is on the disk when it returns, and survives a
 /// kill or a power cut.
@@ -82,6 +83,7 @@ impl Store {
             // Past the number in the document, so that the document does not seem to be ahead of its journal.
             None => Journal::create(folder, &history, sequence + 1)?,
         };
+        remove_partial_files(folder);
         let derived = Derived::look_at(folder);
         Self { folder: folder.to_path_buf(), journal, history, derived, _lock: lock }.ready()
     }
@@ -187,6 +189,14 @@ impl Store {
         result.write(&self.folder.join(RESULT))
     }
 
+    /// As [`Session::input_sha256`].
+    ///
+    /// # Errors
+    /// As [`Session::input_sha256`].
+    pub fn input_sha256(&self) -> Result<String, SessionError> {
+        load::input_sha256(&self.folder, self.document())
+    }
+
     /// The image of a capture.
     ///
     /// # Errors
@@ -235,17 +245,39 @@ fn check_free(folder: &Path) -> Result<(), SessionError> {
         let name = entry.map_err(|e| SessionError::unwritable(folder, &e))?.file_name();
         // A session that was killed before its journal was there has left these and nothing else; the third is from
         // programs that wrote no journal.
-        let ours = [LOCK.to_owned(), format!(".{JOURNAL}.partial"), format!(".{DOCUMENT}.partial")];
-        if !name.to_str().is_some_and(|name| ours.iter().any(|our| our == name)) {
+        let is_ours = |name: &str| name == LOCK || [JOURNAL, DOCUMENT].iter().any(|of| is_partial(name, of));
+        if !name.to_str().is_some_and(is_ours) {
             return Err(SessionError::new(folder, SessionProblem::NotEmpty));
         }
     }
     Ok(())
 }
 
+/// Removes what writes have left that a kill or a power cut interrupted. The lock says that nobody is at one.
+fn remove_partial_files(folder: &Path) {
+    let of_capture = |name: &str| {
+        let number: String = name.chars().skip(1).take_while(char::is_ascii_digit).collect();
+        ["png", "tiff"].iter().any(|ending| is_partial(name, &format!("{number}.{ending}")))
+    };
+    let of_session = |name: &str| derived::NAMES.iter().chain(&[JOURNAL]).any(|of| is_partial(name, of));
+    for sub in ["", IMAGES, DEPTH] {
+        let folder = folder.join(sub);
+        // What lies behind a link is not the session's.
+        let Ok(entries) = own_folder::check_folder(&folder).and_then(|()| fs::read_dir(&folder)) else { continue };
+        for entry in entries.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let is_left = if sub.is_empty() { of_session(&name) } else { of_capture(&name) };
+            if is_left {
+                // Best effort: it is in nobody's way.
+                drop(fs::remove_file(entry.path()));
+            }
+        }
+    }
+}
+
 /// Makes a folder and those above it, so that their names survive a power cut.
 pub(super) fn make_folder(folder: &Path) -> Result<(), SessionError> {
-    make(folder).map_err(|e| SessionError::unwritable(folder, &e))
+    own_folder::check_folder(folder).and_then(|()| make(folder)).map_err(|e| SessionError::unwritable(folder, &e))
 }
 
 fn make(folder: &Path) -> io::Result<()> {

@@ -198,7 +198,16 @@ const DEFECTS: &[(&str, Mutation, &[&str])] = &[
     ),
     ("no pose table", |f| fs::remove_file(f.path("poses.csv")).expect("remove"), &["poses.csv:", "cannot be read"]),
     ("an empty pose table", |f| f.write("poses.csv", ""), &["poses.csv:", "is empty"]),
-    ("a header alone", |f| f.write("poses.csv", "image,x,y,z,qx,qy,qz,qw\n"), &["poses.csv:", "is empty"]),
+    (
+        "a header alone",
+        |f| f.write("poses.csv", "image,x,y,z,qx,qy,qz,qw\n"),
+        &["poses.csv, row 1:", "a header and no rows"],
+    ),
+    (
+        "another header alone",
+        |f| f.write("poses.csv", "image,x,y,z,rx,ry,rz\n"),
+        &["poses.csv, row 1:", "\"rx\"", "qx,qy,qz,qw"],
+    ),
     ("a folder for a table", |f| f.edit("dataset.toml", "poses.csv", "images"), &["images:", "not a file"]),
     ("a table that is not UTF-8", |f| f.write("poses.csv", b"image,x\nb\xe9\n"), &["poses.csv, row 2:", "UTF-8"]),
     (
@@ -327,7 +336,7 @@ const DEFECTS: &[(&str, Mutation, &[&str])] = &[
             fs::remove_dir_all(f.path("images")).expect("remove");
             f.write("dataset.toml", &DESCRIPTION[..DESCRIPTION.find("[robot]").expect("a robot")]);
         },
-        &["no images"],
+        &["has no images", "dataset.toml needs [robot]"],
     ),
 ];
 
