@@ -58,7 +58,7 @@ install_system_packages() {
   [ ${#missing[@]} -eq 0 ] && return 0
   say "The packages above are missing and are installed now with apt-get."
   as_root env DEBIAN_FRONTEND=noninteractive apt-get update -qq || say "apt-get update failed; trying with the lists at hand."
-  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2 || {
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" >&2 || {
     say "apt-get could not install: ${missing[*]}"
     return 1
   }

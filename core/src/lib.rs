@@ -13,6 +13,7 @@ pub mod capture;
 pub mod coverage;
 pub mod dataset;
 pub mod depth;
+mod digest;
 #[cfg(feature = "opencv")]
 pub mod doctor;
 pub mod export;
@@ -25,6 +26,7 @@ pub mod image_file;
 pub mod intrinsics;
 mod json_text;
 pub mod observation;
+pub mod own_folder;
 pub mod poses_file;
 #[cfg(feature = "opencv")]
 pub mod print;
@@ -33,6 +35,8 @@ pub mod result;
 pub mod se3;
 pub mod session;
 pub mod target;
+#[cfg(feature = "testing")]
+pub mod testing;
 #[cfg(feature = "opencv")]
 pub mod track;
 #[cfg(feature = "opencv")]

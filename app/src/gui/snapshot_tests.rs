@@ -10,6 +10,7 @@ use egui::{Vec2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::wgpu::WgpuTestRenderer;
 use egui_wgpu::{RenderState, RendererOptions, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew, wgpu};
+use handeye_core::testing::{Need, skip};
 
 use super::sample;
 use super::testing::Silent;
@@ -66,7 +67,10 @@ fn looks_like(name: &str, theme: ThemeChoice, language: Language, state: State) 
     let renderer = match renderer() {
         Ok(renderer) => renderer,
         Err(error) => {
-            eprintln!("skipped, {name} was not drawn: {error}. On Debian: apt-get install mesa-vulkan-drivers");
+            skip(
+                Need::Vulkan,
+                &format!("{name} is not drawn: {error}. On Debian: apt-get install mesa-vulkan-drivers"),
+            );
             return;
         }
     };
@@ -75,6 +79,8 @@ fn looks_like(name: &str, theme: ThemeChoice, language: Language, state: State) 
     let State { mut model, step, panes } = state;
     model.view.theme = theme;
     model.view.language = language;
+    // The harness keeps its sessions in another folder each time.
+    model.sessions = "/home/me/handeye-sessions".into();
     silent.show_model(model);
     if let Some(step) = step {
         silent.command(crate::command::Command::GoToStep(step));

@@ -20,10 +20,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Some(data) = sets::folder() else {
-        println!("skipped: no data sets in $HANDEYE_DATA or ../shared/data");
-        return ExitCode::SUCCESS;
-    };
+    let Some(data) = handeye_core::testing::data_folder() else { return ExitCode::SUCCESS };
     let what = arguments.first().map_or("checks", String::as_str);
     let divisions = arguments.get(1).and_then(|n| n.parse::<usize>().ok());
     let chosen = &arguments[arguments.len().min(if divisions.is_some() { 2 } else { 1 })..];

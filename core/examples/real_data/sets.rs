@@ -1,7 +1,7 @@
 //! The recorded sets: poses, corners and target poses as their `views.json` and corner tables have them.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use handeye_core::board_shape::BoardPoints;
 use handeye_core::camera::{Distortion, Intrinsics};
@@ -28,13 +28,6 @@ impl Set {
     pub fn has_corners(&self) -> bool {
         !self.views.is_empty()
     }
-}
-
-/// Where the data sets are.
-pub fn folder() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let folder = std::env::var_os("HANDEYE_DATA").map_or_else(beside, PathBuf::from);
-    folder.is_dir().then_some(folder)
 }
 
 const NAMES: [&str; 7] = [

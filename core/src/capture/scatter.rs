@@ -6,9 +6,6 @@ use nalgebra::Vector2;
 
 use crate::observation::Corner;
 
-/// Pictures below which a scatter says nothing.
-const MIN_PICTURES: u32 = 3;
-
 /// Collects the corners of several pictures of a scene at rest.
 #[derive(Debug, Clone, Default)]
 pub struct Scatter {
@@ -19,6 +16,9 @@ pub struct Scatter {
 }
 
 impl Scatter {
+    /// Pictures below which a scatter says nothing.
+    pub const LEAST_PICTURES: u32 = 3;
+
     /// Adds the corners of a picture.
     pub fn add(&mut self, corners: &[Corner]) {
         self.pictures += 1;
@@ -42,6 +42,6 @@ impl Scatter {
     pub fn sigma_px(&self) -> Option<f64> {
         let freedom: u32 = self.corners.values().map(|(count, ..)| 2 * (count - 1)).sum();
         let squares: f64 = self.corners.values().map(|(.., squares)| squares.sum()).sum();
-        (self.pictures >= MIN_PICTURES && freedom > 0).then(|| (squares / f64::from(freedom)).sqrt())
+        (self.pictures >= Self::LEAST_PICTURES && freedom > 0).then(|| (squares / f64::from(freedom)).sqrt())
     }
 }

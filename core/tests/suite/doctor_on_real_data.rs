@@ -1,7 +1,7 @@
 //! What the doctor says of recorded data: the faults that are known of them, and nothing else.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use handeye_core::calibrate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
 use handeye_core::camera::Distortion;
@@ -11,17 +11,8 @@ use handeye_core::findings::{FindingCode, FindingOptions, Severity};
 use handeye_core::observation::Corner;
 use handeye_core::progress::CancelToken;
 use handeye_core::target::TargetSpec;
+use handeye_core::testing::data_folder;
 use nalgebra::{Point3, Vector2};
-
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("HANDEYE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("skipped: no data sets at {}", folder.display());
-    None
-}
 
 /// Recorded corners by image: of a table of points, or of one detector.
 fn corners(folder: &Path, target: &TargetSpec, detector: &str) -> BTreeMap<String, Vec<Corner>> {
@@ -88,7 +79,7 @@ fn grave(diagnosis: &Diagnosis) -> Vec<FindingCode> {
 
 #[test]
 fn the_square_of_the_visp_set_is_said_to_be_wrong_by_what_the_motion_implies() {
-    let Some(data) = data() else { return };
+    let Some(data) = data_folder() else { return };
     let diagnosis = diagnosis(&data, "visp_franka_eye_in_hand", "classic_subpix");
     let best = diagnosis.hypotheses.first().expect("tested");
     assert_eq!((best.code, best.accepted), (FindingCode::WrongScale, true));
@@ -100,7 +91,7 @@ fn the_square_of_the_visp_set_is_said_to_be_wrong_by_what_the_motion_implies() {
 
 #[test]
 fn the_poor_circles_are_said_to_have_inconsistent_poses_and_another_dot_distance() {
-    let Some(data) = data() else { return };
+    let Some(data) = data_folder() else { return };
     let diagnosis = diagnosis(&data, "rct_circles_eye_in_hand", "");
     let grave = grave(&diagnosis);
     assert!(grave.contains(&FindingCode::InconsistentPoses), "{grave:?}");
@@ -109,7 +100,7 @@ fn the_poor_circles_are_said_to_have_inconsistent_poses_and_another_dot_distance
 
 #[test]
 fn good_sets_raise_no_false_alarm() {
-    let Some(data) = data() else { return };
+    let Some(data) = data_folder() else { return };
     for (name, detector) in [
         ("rwhe_kuka_1_eye_in_hand", "sb_accuracy"),
         ("caliban_no_curv", "classic_subpix"),

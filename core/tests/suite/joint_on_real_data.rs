@@ -2,7 +2,7 @@
 //! data set: same corners, same camera, robot noise by an EM iteration) on real and rendered data.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use handeye_core::board_shape::{BoardPoints, BoardShape};
 use handeye_core::camera::{Distortion, Intrinsics};
@@ -11,18 +11,9 @@ use handeye_core::handeye::Mode;
 use handeye_core::handeye::joint::{JointProblem, JointSolution, JointStart, estimate};
 use handeye_core::observation::{Corner, View};
 use handeye_core::progress::CancelToken;
+use handeye_core::testing::data_folder;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2};
 use serde_json::Value;
-
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("HANDEYE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("skipped: no data sets at {}", folder.display());
-    None
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     match value {
@@ -134,7 +125,7 @@ fn solve(set: &Set) -> JointSolution {
 
 #[test]
 fn agrees_with_an_independent_estimator_within_its_uncertainty() {
-    let Some(data) = data() else { return };
+    let Some(data) = data_folder() else { return };
     for name in [
         "caliban_no_curv",
         "rwhe_cs_synthetic_3",

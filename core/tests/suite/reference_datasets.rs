@@ -1,19 +1,7 @@
 //! The reader on recorded data sets, where they are at hand.
 
-use std::path::PathBuf;
-
 use handeye_core::dataset::Dataset;
-
-/// The folder of the data sets; `None`, with a line that says so, when there is none.
-fn data_folder() -> Option<PathBuf> {
-    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let folder = std::env::var_os("HANDEYE_DATA").map_or_else(beside, PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: no data sets at {}", folder.display());
-    None
-}
+use handeye_core::testing::data_folder;
 
 #[test]
 fn recorded_data_sets_are_read_whole() {

@@ -1,24 +1,15 @@
 //! Markers and tags in recorded pictures with published or reference corners.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use handeye_core::dataset::Dataset;
 use handeye_core::image::GrayImage;
 use handeye_core::observation::Corner;
 use handeye_core::target::{AprilGrid, AprilTag, Charuco, IdOrder, Layout, TargetSpec};
+use handeye_core::testing::data_folder;
 use handeye_core::vision::{charuco_layout, detect, pnp};
 use nalgebra::Vector2;
-
-fn data_dir() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let dir = std::env::var_os("HANDEYE_DATA").map_or_else(beside, PathBuf::from);
-    if dir.is_dir() {
-        return Some(dir);
-    }
-    println!("skipped: no data sets at {}", dir.display());
-    None
-}
 
 fn load(path: &Path) -> GrayImage {
     handeye_core::image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_luma8()
@@ -74,7 +65,7 @@ fn reference(set: &Path) -> Vec<[Vector2<f64>; 4]> {
 
 #[test]
 fn the_tag_of_the_eye_to_hand_set_is_found_in_all_views() {
-    let Some(data) = data_dir() else { return };
+    let Some(data) = data_folder() else { return };
     let set = data.join("visp_franka_eye_to_hand");
     let folder = tempfile::tempdir().expect("a folder");
     described(&set, folder.path());
@@ -107,7 +98,7 @@ fn the_tag_of_the_eye_to_hand_set_is_found_in_all_views() {
 
 #[test]
 fn tags_of_three_families_have_the_corners_of_the_apriltag_library() {
-    let Some(data) = data_dir() else { return };
+    let Some(data) = data_folder() else { return };
     let folder = data.join("detection_images/visp_apriltag_gt_640x480");
     for (name, family) in [("16_05", "16h5"), ("25_09", "25h9"), ("36_11", "36h11")] {
         let image = load(&folder.join(format!("tag{name}_640x480.png")));
@@ -138,7 +129,7 @@ fn tags_of_three_families_have_the_corners_of_the_apriltag_library() {
 
 #[test]
 fn charuco_boards_of_others_are_found_whole() {
-    let Some(data) = data_dir() else { return };
+    let Some(data) = data_folder() else { return };
     let board = |columns, rows, dictionary: &str, marker: f64| Charuco {
         columns,
         rows,
@@ -167,7 +158,7 @@ fn charuco_boards_of_others_are_found_whole() {
 
 #[test]
 fn a_board_of_aruco_markers_is_a_board_of_tags() {
-    let Some(data) = data_dir() else { return };
+    let Some(data) = data_folder() else { return };
     let image = load(&data.join("moveit_pose_samples/test_aruco_marker_detection.png"));
     let board = AprilGrid {
         columns: 3,

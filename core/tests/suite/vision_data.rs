@@ -8,19 +8,10 @@ use handeye_core::camera::Distortion;
 use handeye_core::image::GrayImage;
 use handeye_core::observation::Corner;
 use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::testing::data_folder;
 use handeye_core::vision::intrinsics::calibrate;
 use handeye_core::vision::{DetectOptions, detect_with};
 use nalgebra::Vector2;
-
-fn data_dir() -> Option<PathBuf> {
-    let dir = std::env::var_os("HANDEYE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    if dir.is_dir() {
-        return Some(dir);
-    }
-    println!("skipped: no data sets at {}", dir.display());
-    None
-}
 
 fn load(path: &Path) -> GrayImage {
     handeye_core::image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_luma8()
@@ -109,7 +100,7 @@ struct Expected {
 }
 
 fn check(expected: &Expected) {
-    let Some(data) = data_dir() else { return };
+    let Some(data) = data_folder() else { return };
     let folder = data.join(expected.folder);
     let mut paths = images(&folder.join(expected.images));
     paths.retain(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(expected.prefix)));
@@ -267,7 +258,7 @@ fn dots() -> TargetSpec {
 
 #[test]
 fn grids_of_dots_begin_at_the_larger_dot_in_every_view() {
-    let Some(data) = data_dir() else { return };
+    let Some(data) = data_folder() else { return };
     let folder = data.join("rct_circles_eye_in_hand");
     let text = std::fs::read_to_string(folder.join("points.csv")).expect("points.csv");
     let mut reference: BTreeMap<String, Vec<Vector2<f64>>> = BTreeMap::new();
@@ -290,7 +281,7 @@ fn grids_of_dots_begin_at_the_larger_dot_in_every_view() {
 
 #[test]
 fn a_live_search_finds_all_boards_too() {
-    let Some(data) = data_dir() else { return };
+    let Some(data) = data_folder() else { return };
     for (folder, target) in [
         ("opencv_stereo_9x6", chessboard(9, 6, 0.025)),
         ("caliban_no_curv/images", chessboard(14, 9, 0.0121)),

@@ -81,18 +81,66 @@ fn core_is_below_sim_link_is_below_app() {
     assert!(!app.contains("handeye_tests"));
 }
 
+/// What names the truth that a simulated cell publishes for reports and tests.
+const TRUTH: [&str; 3] = ["GroundTruth", "ground_truth", "TruthComparison"];
+
+/// The files of core that keep or report it, and compute nothing from it.
+const MAY_NAME_THE_TRUTH: [&str; 3] = ["session/document.rs", "session/mod.rs", "result/mod.rs"];
+
+/// Lines of a source that name the truth; none where the source may.
+fn lines_that_see_the_truth(path: &str, text: &str) -> Vec<String> {
+    let name = path.rsplit('/').next().unwrap_or(path);
+    let is_test = name.ends_with("tests.rs") || path.contains("/tests/");
+    if is_test || MAY_NAME_THE_TRUTH.contains(&path) {
+        return Vec::new();
+    }
+    let names_it = |line: &&str| TRUTH.iter().any(|word| line.contains(word));
+    text.lines().filter(names_it).map(|line| format!("core/src/{path}: {}", line.trim())).collect()
+}
+
+/// All sources of core with their paths below `core/src`, in folders of any depth.
+fn sources_of_core() -> Vec<(String, String)> {
+    let root = handeye_tests::workspace_root().join("core/src");
+    let mut folders = vec![root.clone()];
+    let mut sources = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("folder").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let below = path.strip_prefix(&root).expect("below it").to_string_lossy().replace('\\', "/");
+                sources.push((below, std::fs::read_to_string(&path).expect("source")));
+            }
+        }
+    }
+    sources
+}
+
 #[test]
 fn solvers_never_see_the_ground_truth() {
-    // The cell publishes its truth for reports and tests. No module that estimates may name it.
-    let core = handeye_tests::workspace_root().join("core/src");
-    for folder in ["handeye", "vision", "calibrate"] {
-        for entry in std::fs::read_dir(core.join(folder)).expect("folder").flatten() {
-            let path = entry.path();
-            if path.is_dir() || path.file_name().is_some_and(|n| n.to_string_lossy().contains("tests")) {
-                continue;
-            }
-            let text = std::fs::read_to_string(&path).expect("source");
-            assert!(!text.contains("GroundTruth"), "{} names the ground truth", path.display());
-        }
+    let sources = sources_of_core();
+    let seen: Vec<String> = sources.iter().flat_map(|(path, text)| lines_that_see_the_truth(path, text)).collect();
+    assert!(seen.is_empty(), "{}", seen.join("\n"));
+    for path in MAY_NAME_THE_TRUTH {
+        let text = sources.iter().find(|(p, _)| p == path).map(|(_, text)| text.as_str());
+        let names_it = text.is_some_and(|text| TRUTH.iter().any(|word| text.contains(word)));
+        assert!(names_it, "core/src/{path} need no longer be allowed to name the truth");
+    }
+}
+
+#[test]
+fn one_line_anywhere_in_core_that_names_the_truth_is_found() {
+    let sources = sources_of_core();
+    for folder in ["handeye", "handeye/joint", "intrinsics", "doctor", "findings", "track", "verify", "vision/checker"]
+    {
+        let (path, text) = sources
+            .iter()
+            .find(|(path, _)| {
+                path.strip_prefix(folder).is_some_and(|rest| rest.starts_with('/')) && !path.contains("tests")
+            })
+            .unwrap_or_else(|| panic!("core/src/{folder} is not searched"));
+        let broken = format!("{text}\nuse crate::session::GroundTruth;\n");
+        assert_eq!(lines_that_see_the_truth(path, &broken).len(), 1, "{path}");
     }
 }

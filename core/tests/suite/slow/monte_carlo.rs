@@ -1,6 +1,5 @@
 //! A small version of the study in `examples/monte_carlo`: the bound is right, the estimate reaches it, its regions hold.
 
-
 #[path = "../../../examples/monte_carlo/answer.rs"]
 mod answer;
 #[path = "../../../examples/monte_carlo/bound.rs"]
