@@ -156,13 +156,32 @@ pub enum PlanError {
 /// # Errors
 /// [`PlanError`] says what the candidates failed at.
 pub fn poses_looking_at(setup: &ViewSetup, options: &ViewOptions) -> Result<Vec<PlannedView>, PlanError> {
-    if !setup.arm.is_free(&setup.start_joints, &setup.obstacles, options.clearance_m) {
+    poses_unlike(setup, options, &[])
+}
+
+/// As [`poses_looking_at`], but also as different as possible from views that there are already: the first is the one
+/// whose rotation is farthest from all of `taken`, and none is nearer to one of these than to those chosen before it.
+///
+/// # Errors
+/// [`PlanError`] says what the candidates failed at.
+pub fn poses_unlike(
+    setup: &ViewSetup,
+    options: &ViewOptions,
+    taken: &[Pose<Base, Tip>],
+) -> Result<Vec<PlannedView>, PlanError> {
+    if !setup.is_free(&setup.start_joints, options.clearance_m) {
         return Err(PlanError::StartBlocked);
     }
     let mut draws = Draws::new(setup, options);
     let views = draws.by_ref().flatten().collect();
-    let (chosen, no_path) = choose(setup, options, views);
+    let (chosen, no_path) = choose(setup, options, views, taken);
     draws.result(chosen, no_path)
+}
+
+/// All random views that show the whole board, that the arm reaches and that touch nothing, in the order in which they
+/// were drawn: for who chooses among them by something else.
+pub fn views_of_board(setup: &ViewSetup, options: &ViewOptions) -> Vec<PlannedView> {
+    Draws::new(setup, options).flatten().collect()
 }
 
 /// The first random views that show the whole board, that the arm reaches and that touch nothing: as a person without
@@ -228,7 +247,7 @@ impl Iterator for Draws<'_> {
             self.unreachable += 1;
             return Some(None);
         };
-        if !setup.arm.is_free(&joints, &setup.obstacles, options.clearance_m) {
+        if !setup.is_free(&joints, options.clearance_m) {
             self.in_the_way += 1;
             return Some(None);
         }
@@ -255,18 +274,23 @@ impl ViewSetup {
         inverse_nearest(&arm_from_connection, &self.start_joints, &self.joint_limits).ok()
     }
 
-    fn path_is_free(&self, from: &JointAngles, to: &JointAngles, clearance_m: f64) -> bool {
+    fn is_free(&self, joints: &JointAngles, clearance_m: f64) -> bool {
+        self.arm.is_free(joints, &self.obstacles, clearance_m)
+    }
+
+    /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
+    pub fn path_is_free(&self, from: &JointAngles, to: &JointAngles, clearance_m: f64) -> bool {
         let steps = (travel(from, to) / PATH_STEP_RAD).ceil().max(1.0) as usize;
         (1..steps).all(|step| {
             let part = step as f64 / steps as f64;
             let joints: JointAngles = std::array::from_fn(|i| from[i] + part * (to[i] - from[i]));
-            self.arm.is_free(&joints, &self.obstacles, clearance_m)
+            self.is_free(&joints, clearance_m)
         })
     }
 }
 
 /// Largest joint movement, radians.
-fn travel(from: &JointAngles, to: &JointAngles) -> f64 {
+pub fn travel(from: &JointAngles, to: &JointAngles) -> f64 {
     from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
@@ -311,11 +335,22 @@ fn shows_whole_board(setup: &ViewSetup, options: &ViewOptions, target_from_camer
 }
 
 /// Greedy farthest-point selection; also counts the candidates that were given up for want of a path.
-fn choose(setup: &ViewSetup, options: &ViewOptions, mut rest: Vec<PlannedView>) -> (Vec<PlannedView>, usize) {
+fn choose(
+    setup: &ViewSetup,
+    options: &ViewOptions,
+    mut rest: Vec<PlannedView>,
+    taken: &[Pose<Base, Tip>],
+) -> (Vec<PlannedView>, usize) {
     let mut chosen: Vec<PlannedView> = Vec::with_capacity(options.count);
     let mut no_path = 0;
-    // Angle from each remaining candidate to the nearest one chosen; before the first, closeness to the start.
-    let mut scores: Vec<f64> = rest.iter().map(|view| -travel(&setup.start_joints, &view.joints)).collect();
+    // Angle from each remaining candidate to the nearest one taken or chosen; while there is none, closeness to the start.
+    let angle_to =
+        |view: &PlannedView, other: &Pose<Base, Tip>| view.base_from_tip.rotation().angle_to(&other.rotation());
+    let first_score = |view: &PlannedView| match taken {
+        [] => -travel(&setup.start_joints, &view.joints),
+        taken => taken.iter().map(|other| angle_to(view, other)).fold(f64::INFINITY, f64::min),
+    };
+    let mut scores: Vec<f64> = rest.iter().map(first_score).collect();
     while chosen.len() < options.count {
         let Some(best) = (0..rest.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])) else { break };
         let view = rest.swap_remove(best);
@@ -325,9 +360,9 @@ fn choose(setup: &ViewSetup, options: &ViewOptions, mut rest: Vec<PlannedView>) 
             no_path += 1;
             continue;
         }
-        let first = chosen.is_empty();
+        let first = chosen.is_empty() && taken.is_empty();
         for (score, other) in scores.iter_mut().zip(&rest) {
-            let angle = view.base_from_tip.rotation().angle_to(&other.base_from_tip.rotation());
+            let angle = angle_to(other, &view.base_from_tip);
             *score = if first { angle } else { score.min(angle) };
         }
         chosen.push(view);

@@ -9,6 +9,10 @@ use super::task::Task;
 /// Clients with different ids that are remembered at a time.
 pub const MAX_CLIENTS: usize = 64;
 
+/// Those of them that one connection may bring: a client has one id, and a new one after a call that it gave up. More
+/// would let a single program take all places.
+pub const MAX_CLIENTS_PER_CONNECTION: usize = 4;
+
 /// Calls of one connection that may be under way: a blocking one, and those that its callbacks make.
 pub const MAX_CALLS: usize = 16;
 
@@ -19,9 +23,25 @@ const GRACE: Duration = Duration::from_secs(2);
 /// Name that the socket gives a connection.
 pub type Peer = Vec<u8>;
 
+/// Why a client is not served.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Crowded {
+    /// All places are taken by clients that hold something.
+    #[error("the built-in cell serves {MAX_CLIENTS} clients at a time: close one and try again.")]
+    Cell,
+    /// All places of its connection are.
+    #[error(
+        "a connection may have {MAX_CLIENTS_PER_CONNECTION} clients with locks, stepping or calls under way: end one \
+         and try again, or connect again."
+    )]
+    Connection,
+}
+
 /// A client, by the id that it sends with every request.
 #[derive(Debug)]
 pub struct Client {
+    /// The connection over which it was last heard of.
+    pub peer: Peer,
     /// Above zero, passes wait until it has asked for one.
     pub stepping_level: u32,
     /// Number of the pass that it wants to see begin.
@@ -39,8 +59,9 @@ pub struct Client {
 }
 
 impl Client {
-    fn new(idle_limit: Duration, now: Duration) -> Self {
+    fn new(peer: &Peer, idle_limit: Duration, now: Duration) -> Self {
         Self {
+            peer: peer.clone(),
             stepping_level: 0,
             desired_step: 0,
             locks: 0,
@@ -111,18 +132,27 @@ pub struct Clients {
 }
 
 impl Clients {
-    /// The record of a client, made if it is new; `None` when there are too many that must not be forgotten.
-    pub fn meet(&mut self, uuid: &str, idle_limit: Duration, now: Duration) -> Option<&mut Client> {
-        if !self.records.contains_key(uuid) {
-            if self.records.len() >= MAX_CLIENTS && !self.forget_idlest() {
-                return None;
+    /// Notes that a client was heard of over a connection, and makes a record of it if it is new.
+    ///
+    /// # Errors
+    /// [`Crowded`], when there are too many that must not be forgotten.
+    pub fn meet(&mut self, peer: &Peer, uuid: &str, idle_limit: Duration, now: Duration) -> Result<(), Crowded> {
+        if self.records.get(uuid).is_none_or(|client| client.peer != *peer) {
+            let beside = self.records.values().filter(|client| client.peer == *peer).count();
+            if beside >= MAX_CLIENTS_PER_CONNECTION && !self.forget_idlest(|client| client.peer == *peer) {
+                return Err(Crowded::Connection);
             }
-            self.records.insert(uuid.to_owned(), Client::new(idle_limit, now));
         }
-        let client = self.records.get_mut(uuid)?;
+        if !self.records.contains_key(uuid) && self.records.len() >= MAX_CLIENTS && !self.forget_idlest(|_| true) {
+            return Err(Crowded::Cell);
+        }
+        let client = self.records.entry(uuid.to_owned()).or_insert_with(|| Client::new(peer, idle_limit, now));
+        if client.peer != *peer {
+            client.peer.clone_from(peer);
+        }
         client.last_seen = now;
         client.gone_since = None;
-        Some(client)
+        Ok(())
     }
 
     /// The record of a client that has one.
@@ -177,10 +207,12 @@ impl Clients {
     /// Forgets a connection and gives back its calls.
     pub fn disconnect(&mut self, peer: &Peer, now: Duration) -> Vec<Running> {
         let Some(connection) = self.connections.remove(peer) else { return Vec::new() };
-        if !self.is_connected(&connection.uuid)
-            && let Some(client) = self.records.get_mut(&connection.uuid)
-        {
-            client.gone_since = Some(now);
+        let connections = &self.connections;
+        let is_elsewhere = |uuid: &str| connections.values().any(|connection| connection.uuid == uuid);
+        for (uuid, client) in &mut self.records {
+            if client.peer == *peer && !is_elsewhere(uuid) {
+                client.gone_since = Some(now);
+            }
         }
         connection.calls
     }
@@ -222,17 +254,13 @@ impl Clients {
         calls.any(|call| call.uuid == uuid && call.waiting != Waiting::Callback)
     }
 
-    fn is_connected(&self, uuid: &str) -> bool {
-        self.connections.values().any(|connection| connection.uuid == uuid)
-    }
-
-    fn forget_idlest(&mut self) -> bool {
+    fn forget_idlest(&mut self, among: impl Fn(&Client) -> bool) -> bool {
         let idlest = self
             .records
             .iter()
             .filter(|(uuid, client)| {
                 let has_calls = self.connections.values().any(|c| c.calls.iter().any(|call| call.uuid == **uuid));
-                !client.holds_anything() && !has_calls
+                among(client) && !client.holds_anything() && !has_calls
             })
             .min_by_key(|(_, client)| client.last_seen)
             .map(|(uuid, _)| uuid.clone());

@@ -5,8 +5,8 @@ use std::time::Duration;
 use super::api::{Call, Effect, Registry};
 use super::args::{ApiError, Args};
 use super::cell::Cell;
-use super::clients::{Client, Clients, MAX_CALLS, MAX_CLIENTS, Peer, Running, Waiting};
-use super::message::{self, Request};
+use super::clients::{Client, Clients, MAX_CALLS, Peer, Running, Waiting};
+use super::message::{self, BadRequest, Request};
 use super::task::{Answer, Next, Task, Wake};
 use crate::cell::world::State;
 
@@ -69,7 +69,7 @@ impl Engine {
     pub fn receive(&mut self, peer: &Peer, bytes: &[u8], now: Duration) {
         self.cell.now = now;
         match message::parse(bytes) {
-            Err(error) => self.send(peer, message::failed(&error.to_string())),
+            Err(error) => self.refuse(peer, &error),
             Ok(Request::WithoutId) => self.send(peer, message::version_mismatch()),
             Ok(Request::Nothing) => self.send(peer, message::empty()),
             Ok(Request::Eval) => {
@@ -82,15 +82,17 @@ impl Engine {
             }
             Ok(Request::Executed { uuid, values }) => self.executed(peer, &uuid, values),
             Ok(Request::Call { uuid, func, args, idle_limit }) => {
-                if self.clients.meet(&uuid, idle_limit, now).is_some() {
-                    self.call(peer, uuid, func, &Args::new(args));
-                } else {
-                    let text =
-                        format!("the built-in cell serves {MAX_CLIENTS} clients at a time: close one and try again.");
-                    self.send(peer, message::failed(&text));
+                match self.clients.meet(peer, &uuid, idle_limit, now) {
+                    Ok(()) => self.call(peer, uuid, func, &Args::new(args)),
+                    Err(crowded) => self.send(peer, message::failed(&crowded.to_string())),
                 }
             }
         }
+    }
+
+    /// Answers a request that cannot be understood.
+    pub fn refuse(&mut self, peer: &Peer, error: &BadRequest) {
+        self.send(peer, message::failed(&error.to_string()));
     }
 
     /// A connection is gone.

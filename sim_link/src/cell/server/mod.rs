@@ -23,7 +23,9 @@ mod socket;
 mod stage;
 mod task;
 
+use std::net::SocketAddr;
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use crate::cell::scene::Scene;
 pub use cell::BuildError;
@@ -38,18 +40,22 @@ pub struct CellConfig {
     pub scene: Scene,
     /// Seed of everything random in it; the scene's own if absent.
     pub seed: Option<u64>,
-    /// Address of the network interface.
+    /// Address of the network interface, or a host name; `*` for all interfaces.
     pub bind: String,
     /// Port; 0 for any that is free.
     pub port: u16,
     /// Whether simulated time runs like real time; as the scene says if absent.
     pub real_time: Option<bool>,
+    /// A connection that answers nothing for so long is gone although nobody closed it: a pulled plug, a computer that
+    /// sleeps. Two seconds later its client is forgotten, with its stepping and its motions.
+    pub silence: Duration,
 }
 
 impl CellConfig {
     /// A scene on any free port of this machine.
     pub fn new(scene: Scene) -> Self {
-        Self { scene, seed: None, bind: "127.0.0.1".to_owned(), port: 0, real_time: None }
+        let silence = Duration::from_secs(15);
+        Self { scene, seed: None, bind: "127.0.0.1".to_owned(), port: 0, real_time: None, silence }
     }
 }
 
@@ -93,7 +99,7 @@ pub enum CellError {
 /// A cell that is being served. Dropping it ends the service.
 #[derive(Debug)]
 pub struct CellServer {
-    endpoint: String,
+    address: SocketAddr,
     stopper: Stopper,
     thread: Option<JoinHandle<()>>,
 }
@@ -104,21 +110,26 @@ impl CellServer {
     /// # Errors
     /// [`CellError`]: a scene out of range, a port in use, an address that is not this machine's.
     pub fn start(config: CellConfig) -> Result<Self, CellError> {
-        let CellConfig { scene, seed, bind, port, real_time } = config;
+        let CellConfig { scene, seed, bind, port, real_time, silence } = config;
         let engine = Engine::new(Cell::new(&scene, seed, real_time)?);
-        let (serving, stopper) = Loop::bind(engine, &bind, port)?;
-        let endpoint = serving.endpoint().to_owned();
+        let (serving, stopper) = Loop::bind(engine, &bind, port, silence)?;
+        let address = serving.address();
         let thread = std::thread::Builder::new()
             .name("cell".to_owned())
             .spawn(move || serving.run())
             .map_err(|error| CellError::System { operation: "starting its thread", reason: error.to_string() })?;
-        tracing::info!(endpoint, "the built-in cell is being served");
-        Ok(Self { endpoint, stopper, thread: Some(thread) })
+        tracing::info!(%address, "the built-in cell is being served");
+        Ok(Self { address, stopper, thread: Some(thread) })
     }
 
     /// Where it listens: `tcp://127.0.0.1:23000`.
     pub fn endpoint(&self) -> String {
-        self.endpoint.clone()
+        format!("tcp://{}", self.address)
+    }
+
+    /// Whether only programs of this machine can connect. There is no password: who can connect can move the arm.
+    pub fn is_local(&self) -> bool {
+        self.address.ip().to_canonical().is_loopback()
     }
 
     /// Ends the service and waits until the socket is closed.

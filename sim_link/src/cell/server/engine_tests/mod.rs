@@ -5,6 +5,7 @@ mod motions;
 
 use ciborium::Value;
 
+use super::super::clients::{MAX_CLIENTS, MAX_CLIENTS_PER_CONNECTION};
 use super::*;
 use crate::cell::scene::Scene;
 use crate::wire::{self, Reader};
@@ -325,4 +326,39 @@ fn clients_and_their_calls_are_limited_and_idle_ones_make_room() {
     assert_eq!(bench.reply(A), None);
     bench.send(A, "sim.step", vec![]);
     assert!(bench.reply(A).expect("refused").get("err").is_some());
+}
+
+#[test]
+fn the_ids_of_one_connection_take_only_their_share_and_go_with_it() {
+    let mut bench = Bench::new();
+    let crowd = peer("crowd");
+    let mut refused = 0;
+    for index in 0..2 * MAX_CLIENTS {
+        let stepping = request(&format!("id {index}"), "sim.setStepping", vec![Value::from(true)]);
+        bench.engine.receive(&crowd, &stepping, bench.now);
+        let reply = wire::decode(&bench.engine.take_outgoing().remove(0).1).expect("a reply");
+        refused += usize::from(reply.get("err").is_some());
+    }
+    assert_eq!(bench.engine.clients.records.len(), MAX_CLIENTS_PER_CONNECTION);
+    assert_eq!(refused, 2 * MAX_CLIENTS - MAX_CLIENTS_PER_CONNECTION);
+    bench.call(A, "sim.startSimulation", vec![]);
+    // All of them are gone with their connection, not only the last that spoke: nobody holds the passes any more.
+    bench.engine.disconnected(&crowd, bench.now);
+    bench.now += Duration::from_secs(3);
+    bench.engine.turn(bench.now);
+    bench.engine.turn(bench.now);
+    assert_eq!(bench.engine.clients.records.len(), 1);
+    assert!(bench.time_s() > 0.0);
+}
+
+#[test]
+fn a_connection_may_change_its_id_as_often_as_it_likes() {
+    let mut bench = Bench::new();
+    for index in 0..2 * MAX_CLIENTS {
+        bench.now += Duration::from_millis(1);
+        let state = request(&format!("id {index}"), "sim.getSimulationState", vec![]);
+        bench.engine.receive(&peer("one"), &state, bench.now);
+        let reply = wire::decode(&bench.engine.take_outgoing().remove(0).1).expect("a reply");
+        assert!(reply.get("ret").is_some(), "{reply:?}");
+    }
 }
