@@ -16,6 +16,7 @@ use super::protocol::{
 };
 use super::returned::Returned;
 use super::transport::{Transport, TransportFault, ZmqTransport};
+use crate::wire::WireError;
 use handeye_core::progress::CancelToken;
 
 /// Longest stretch of waiting without a look at the cancel token.
@@ -158,6 +159,10 @@ impl Connection {
         };
         if self.depth == 0 {
             self.broken = None;
+            // Between two calls it went without a word: the server may have forgotten this client since.
+            if self.transport.ended() {
+                self.drop_exchange();
+            }
         }
         self.converse(&mut exchange, args).map(|values| Returned::new(func, values))
     }
@@ -295,6 +300,9 @@ impl Connection {
         let call = || exchange.func.to_owned();
         let error = match protocol::parse(bytes) {
             Ok(message) => return Ok(message),
+            Err(ReplyError::Wire(WireError::TooLarge { bytes })) => {
+                LinkError::ReplyTooLarge { call: call(), bytes: Some(bytes) }
+            }
             Err(ReplyError::Wire(source)) => LinkError::Malformed { call: call(), source },
             Err(ReplyError::Shape { expected, got }) => {
                 LinkError::UnexpectedReply { call: call(), expected: expected.to_owned(), got }
@@ -359,6 +367,7 @@ impl Connection {
         let call = exchange.func.to_owned();
         let error = match fault {
             TransportFault::Disconnected => LinkError::Disconnected { call },
+            TransportFault::TooLong => LinkError::ReplyTooLarge { call, bytes: None },
             TransportFault::ManyParts(parts) => LinkError::UnexpectedReply {
                 call,
                 expected: "a message of one part".to_owned(),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::convert::ConvertError;
 use super::endpoint::Endpoint;
-use crate::wire::WireError;
+use crate::wire::{MAX_MESSAGE_BYTES, WireError};
 
 /// Why a call, or a task made of calls, has no result. Each message says what to do next.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -89,6 +89,18 @@ pub enum LinkError {
         /// What is wrong with it.
         source: WireError,
     },
+    /// The reply is longer than anything that is read.
+    #[error(
+        "{call}: the reply {}, over the limit of {} MiB; ask for less, for images by a lower resolution of the sensor",
+        length(.bytes.as_ref()),
+        MAX_MESSAGE_BYTES >> 20
+    )]
+    ReplyTooLarge {
+        /// Which call.
+        call: String,
+        /// Its length; `None` when it was so long that it was not read to its end.
+        bytes: Option<usize>,
+    },
     /// The reply is a message, but not one that the call can have.
     #[error("{call}: expected {expected}, got {got}; check that the simulator's version is 4.2 to 4.10")]
     UnexpectedReply {
@@ -122,6 +134,19 @@ pub enum LinkError {
         path: String,
         /// What it is for.
         what: &'static str,
+    },
+    /// The server answers, but what a task waits for does not come.
+    #[error(
+        "{task}: waited {after:.1?} for {awaited}, in vain; look at the simulator, and start the simulation again if its \
+         time does not go on"
+    )]
+    WaitedTooLong {
+        /// What was asked for.
+        task: &'static str,
+        /// What was waited for.
+        awaited: String,
+        /// How long, in real time.
+        after: Duration,
     },
     /// The simulation does not run, so nothing would move and no image would be new.
     #[error("{task}: the simulation is {state}; start it first")]
@@ -162,6 +187,15 @@ pub enum LinkError {
         call: String,
         /// Result of the motion generator.
         code: i64,
+    },
+    /// The server has no record of a motion that this client was taking step by step.
+    #[error(
+        "{call}: the server has forgotten the motion, as it does with a client that was silent for too long, for example \
+         because its computer slept; the arm stands where it was: move again"
+    )]
+    MotionForgotten {
+        /// Which call.
+        call: String,
     },
     /// Somebody else stopped the motion, and the arm stands.
     #[error("{task}: the motion was stopped on its way, perhaps by another client; move again when it is clear")]
@@ -222,8 +256,33 @@ impl LinkError {
         )
     }
 
+    /// Whether the server said that the scene has no such object.
+    pub fn is_missing_object(&self) -> bool {
+        matches!(self, Self::Remote { message, .. } if message.to_lowercase().contains(super::protocol::NO_SUCH_OBJECT))
+    }
+
+    /// The same error, or [`Self::MotionForgotten`] when it is a server's answer to a step of a motion that it does not
+    /// know.
+    pub(super) fn of_motion_step(self) -> Self {
+        match self {
+            // Servers name the object that they keep a motion in.
+            Self::Remote { call, message } if message.to_ascii_lowercase().contains("ruckig") => {
+                tracing::debug!(call, message, "a motion was forgotten");
+                Self::MotionForgotten { call }
+            }
+            other => other,
+        }
+    }
+
     /// Whether the server said that it has no such function.
     pub fn is_unknown_function(&self) -> bool {
         matches!(self, Self::Remote { message, .. } if message.contains(super::protocol::UNKNOWN_FUNCTION))
+    }
+}
+
+fn length(bytes: Option<&usize>) -> String {
+    match bytes {
+        Some(bytes) => format!("has {bytes} bytes"),
+        None => format!("has more than {} MiB, or breaks the rules of ZeroMQ", super::transport::MAX_REPLY_BYTES >> 20),
     }
 }

@@ -16,6 +16,9 @@ pub(super) const WAIT: &str = "_*wait*_";
 pub(super) const REPEAT: &str = "_*repeat*_";
 /// Start of the error text for a name that the server does not know.
 pub(super) const UNKNOWN_FUNCTION: &str = "No such function";
+/// Part of the error text for a path that leads to no object: "object does not exist, or alias/path is ill formatted" in
+/// newer versions, "Object does not exist" in older ones; in lower case.
+pub(super) const NO_SUCH_OBJECT: &str = "object does not exist";
 /// Part of the error text of a version 2 server for a request of version 1.
 const OTHER_VERSION: &str = "version does not match";
 /// Ending that makes a text argument a callback.

@@ -110,6 +110,10 @@ impl Transport for Fake {
     fn connected(&mut self) -> bool {
         true
     }
+
+    fn ended(&mut self) -> bool {
+        false
+    }
 }
 
 /// A connection to a closure.

@@ -1,6 +1,6 @@
 //! The seam between the protocol and the socket, and the socket.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::endpoint::Endpoint;
 use super::error::LinkError;
@@ -9,6 +9,14 @@ use crate::wire::MAX_MESSAGE_BYTES;
 /// How long a last message may keep a closing socket alive. A server on this machine takes it in under a millisecond,
 /// on a busy one in a tenth of a second; one that has gone must not hold up the end of the program.
 const FAREWELL: Duration = Duration::from_millis(500);
+
+/// Longest reply that is read. A little over the limit of a message is still read, and refused with its length; far over
+/// it is not worth the memory.
+pub(super) const MAX_REPLY_BYTES: usize = 2 * MAX_MESSAGE_BYTES;
+
+/// When a connection breaks, the library says at once that it tries again, unless it has ended the connection itself,
+/// over a message that is too long. Nothing but its thread has to run for that.
+const RETRY_NEWS: Duration = Duration::from_millis(250);
 
 /// Pause before a refused connection is tried again: short, because a person waits for the server to come up.
 const RECONNECT_MS: i32 = 50;
@@ -21,6 +29,8 @@ const MONITOR: &str = "inproc://monitor";
 pub enum TransportFault {
     /// The peer has gone since the request was sent; its reply will never come.
     Disconnected,
+    /// The reply is longer than [`MAX_REPLY_BYTES`], or not what a ZeroMQ socket sends.
+    TooLong,
     /// The reply has more than one part, which the remote API never sends.
     ManyParts(usize),
     /// The socket library refused.
@@ -49,6 +59,9 @@ pub trait Transport: Send {
 
     /// Whether a server is on the other side, as far as is known since the last reset.
     fn connected(&mut self) -> bool;
+
+    /// Whether a connection that was made since the last reset has ended. The next request then goes out over another one.
+    fn ended(&mut self) -> bool;
 }
 
 /// A REQ socket over TCP that notices when its server dies.
@@ -71,7 +84,8 @@ struct Channel {
     serial: u64,
     awaiting_reply: bool,
     shaken_hands: bool,
-    lost: bool,
+    lost_since: Option<Instant>,
+    retries: bool,
 }
 
 impl ZmqTransport {
@@ -99,7 +113,7 @@ impl ZmqTransport {
     fn ready(&mut self) -> Result<&mut Channel, TransportFault> {
         let usable = self.channel.as_mut().is_some_and(|channel| {
             channel.listen_to_monitor();
-            !channel.lost && !channel.awaiting_reply
+            channel.lost_since.is_none() && !channel.awaiting_reply
         });
         if !usable {
             self.channel = None;
@@ -121,8 +135,7 @@ impl Channel {
         let request = context.socket(zmq::REQ)?;
         request.set_linger(0)?;
         request.set_reconnect_ivl(RECONNECT_MS)?;
-        // A little over the limit is still read, and refused with its size; far over it is not worth the memory.
-        request.set_maxmsgsize(2 * MAX_MESSAGE_BYTES as i64)?;
+        request.set_maxmsgsize(MAX_REPLY_BYTES as i64)?;
         request.set_ipv6(endpoint.is_ipv6())?;
         if let Some(silence) = heartbeat {
             let third = i32::try_from(silence.as_millis() / 3).unwrap_or(i32::MAX).max(1);
@@ -130,15 +143,24 @@ impl Channel {
             request.set_heartbeat_timeout(third.saturating_mul(2))?;
         }
         let name = format!("{MONITOR}-{serial}");
-        let events = zmq::SocketEvent::HANDSHAKE_SUCCEEDED as i32 | zmq::SocketEvent::DISCONNECTED as i32;
-        request.monitor(&name, events)?;
+        let events =
+            [zmq::SocketEvent::HANDSHAKE_SUCCEEDED, zmq::SocketEvent::DISCONNECTED, zmq::SocketEvent::CONNECT_RETRIED];
+        request.monitor(&name, events.into_iter().fold(0, |all, event| all | event as i32))?;
         let monitor = context.socket(zmq::PAIR)?;
         monitor.set_linger(0)?;
         // The library's I/O thread blocks on a monitor that is full, and with it every socket of this context.
         monitor.set_rcvhwm(0)?;
         monitor.connect(&name)?;
         request.connect(&endpoint.to_string())?;
-        Ok(Self { request, monitor, serial, awaiting_reply: false, shaken_hands: false, lost: false })
+        Ok(Self {
+            request,
+            monitor,
+            serial,
+            awaiting_reply: false,
+            shaken_hands: false,
+            lost_since: None,
+            retries: false,
+        })
     }
 
     /// Takes the pending events of the monitor.
@@ -150,8 +172,19 @@ impl Channel {
                 self.shaken_hands = true;
             } else if event == zmq::SocketEvent::DISCONNECTED as u16 && self.shaken_hands {
                 // Before the handshake it is only an attempt that failed: the library tries again by itself.
-                self.lost = true;
+                self.lost_since = self.lost_since.or_else(|| Some(Instant::now()));
+            } else if event == zmq::SocketEvent::CONNECT_RETRIED as u16 && self.lost_since.is_some() {
+                self.retries = true;
             }
+        }
+    }
+
+    /// Why there will be no reply, as soon as that is certain.
+    fn fault(&self) -> Option<TransportFault> {
+        match self.lost_since {
+            Some(_) if self.retries => Some(TransportFault::Disconnected),
+            Some(since) if since.elapsed() > RETRY_NEWS => Some(TransportFault::TooLong),
+            _ => None,
         }
     }
 
@@ -200,10 +233,10 @@ impl Transport for ZmqTransport {
         channel.listen_to_monitor();
         // A reply that arrived before the connection broke is still a reply.
         let reply = channel.take_reply()?;
-        if reply.is_none() && channel.lost {
-            return Err(TransportFault::Disconnected);
+        match channel.fault() {
+            Some(fault) if reply.is_none() => Err(fault),
+            _ => Ok(reply),
         }
-        Ok(reply)
     }
 
     fn reset(&mut self) {
@@ -227,7 +260,14 @@ impl Transport for ZmqTransport {
     fn connected(&mut self) -> bool {
         self.channel.as_mut().is_some_and(|channel| {
             channel.listen_to_monitor();
-            channel.shaken_hands && !channel.lost
+            channel.shaken_hands && channel.lost_since.is_none()
+        })
+    }
+
+    fn ended(&mut self) -> bool {
+        self.channel.as_mut().is_some_and(|channel| {
+            channel.listen_to_monitor();
+            channel.lost_since.is_some()
         })
     }
 }

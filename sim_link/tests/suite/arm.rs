@@ -1,14 +1,18 @@
 //! Motions, jogs and stops of the arm against the real cell over a socket.
 
+use ciborium::Value;
 use handeye_core::frames::{Base, Camera, Pose, Tip};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{
-    Arm, ArmJog, ArmKinematics, CameraFeed, CellPaths, JogAxes, JogEnd, JogObstacle, JointAngles, UnknownKinematics,
+    Arm, ArmJog, ArmKinematics, CameraFeed, CellClient, CellPaths, JogAxes, JogEnd, JogObstacle, JointAngles,
+    UnknownKinematics,
 };
 use handeye_sim_link::client::{
-    CallOptions, CancelToken, ConnectionOptions, Endpoint, JointMotion, LinkError, MotionLimits, ObjectHandle, Sim,
+    CallOptions, CancelToken, Connection, ConnectionOptions, Endpoint, JointMotion, LinkError, MotionLimits,
+    ObjectHandle, Sim, Transport, TransportFault, ZmqTransport,
 };
+use handeye_sim_link::wire::{self, Reader as _};
 use nalgebra::Vector3;
 use std::sync::mpsc::channel;
 use std::time::Duration;
@@ -62,6 +66,39 @@ fn connect(server: &CellServer) -> Arm {
 
 fn slow() -> MotionLimits {
     MotionLimits::uniform(6, 0.2, 1.0, 10.0)
+}
+
+/// Has a server forget a client, as it does by itself with one that was silent for too long.
+fn forget(address: &str, uuid: &str) {
+    let request =
+        wire::map([("func", Value::from("_*end*_")), ("args", Value::Array(Vec::new())), ("uuid", Value::from(uuid))]);
+    let socket = zmq::Context::new().socket(zmq::REQ).expect("a socket");
+    socket.set_rcvtimeo(PATIENCE.as_millis() as i32).expect("an option");
+    socket.connect(address).expect("an address");
+    socket.send(wire::encode(&request), 0).expect("sent");
+    socket.recv_bytes(0).expect("an answer in time");
+}
+
+#[test]
+fn a_motion_that_the_server_has_forgotten_is_named_and_can_be_made_again() {
+    let Bench { server, arm: mut witness } = Bench::running();
+    let goal = witness.joint_angles().expect("a call").map(|angle| angle + 0.5);
+    let (uuids, uuid) = channel::<String>();
+    let (mut passes, address) = (0, server.endpoint());
+    let mut cell = watched(&server, move || {
+        passes += 1;
+        if passes == 5 {
+            forget(&address, &uuid.recv_timeout(PATIENCE).expect("its id"));
+        }
+    });
+    uuids.send(cell.arm().sim().connection().uuid().to_owned()).expect("the transport listens");
+    cell.arm().sim().set_stepping(true).expect("a call");
+    let error = cell.move_to_joints(&goal, &slow(), &CancelToken::default()).expect_err("nobody knows the motion");
+    assert!(matches!(error, LinkError::MotionForgotten { .. }), "{error}");
+    assert!(error.to_string().contains("slept"), "{error}");
+    assert!(cell.joint_angles().expect("a call") != goal);
+    let limits = MotionLimits::uniform(6, 3.0, 9.0, 90.0);
+    cell.move_to_joints(&goal, &limits, &CancelToken::default()).expect("there");
 }
 
 /// Held for a number of passes.
@@ -264,49 +301,85 @@ fn a_jog_ends_when_the_simulation_does() {
     );
 }
 
+/// A transport that has a look after every pass that its client has made, before the client goes on.
+struct Watched<F> {
+    transport: ZmqTransport,
+    is_step: bool,
+    look: F,
+}
+
+impl<F: FnMut() + Send> Transport for Watched<F> {
+    fn send(&mut self, message: &[u8]) -> Result<(), TransportFault> {
+        let request = wire::decode(message).expect("requests are valid");
+        self.is_step = request.get("func").and_then(|func| func.text()) == Some("sim.step");
+        self.transport.send(message)
+    }
+
+    fn receive(&mut self, wait: Duration) -> Result<Option<Vec<u8>>, TransportFault> {
+        let reply = self.transport.receive(wait)?;
+        if reply.is_some() && std::mem::take(&mut self.is_step) {
+            (self.look)();
+        }
+        Ok(reply)
+    }
+
+    fn reset(&mut self) {
+        self.transport.reset();
+    }
+
+    fn send_last(&mut self, message: &[u8]) {
+        self.transport.send_last(message);
+    }
+
+    fn connected(&mut self) -> bool {
+        self.transport.connected()
+    }
+
+    fn ended(&mut self) -> bool {
+        self.transport.ended()
+    }
+}
+
+/// A client that has a look after every pass that it has made.
+fn watched(server: &CellServer, look: impl FnMut() + Send + 'static) -> CellClient {
+    let (address, options) = (endpoint(server), ConnectionOptions::default());
+    let transport = Watched { transport: ZmqTransport::new(&address, options.heartbeat), is_step: false, look };
+    let control = Sim::new(Connection::over(Box::new(transport), &address, options.clone()));
+    let camera = Sim::connect(&address, options).expect("a socket");
+    CellClient::over(control, camera, &CellPaths::default()).expect("the scene is whole")
+}
+
 #[test]
 fn a_cancelled_motion_is_braked_within_its_limits() {
-    let mut bench = Bench::stepped();
+    const CANCELLED_AT_RAD: f64 = 0.8;
+    let Bench { server, arm: mut watch } = Bench::running();
     let goal = [2.0, 0.8, -1.0, 0.0, 1.5, 0.0];
-    // So slow that the thread that watches has many passes to notice where the arm is, however busy the machine.
     let limits = MotionLimits::uniform(6, 0.4, 2.0, 20.0);
     let cancel = CancelToken::default();
-    let (stepped, steps) = channel();
-    let (mut watch, token) = (connect(&bench.server), cancel.clone());
-    let watching = std::thread::spawn(move || {
-        let mut seen: Vec<(f64, f64)> = Vec::new();
-        loop {
-            watch.sim().acquire_lock().expect("a call");
-            let now = (watch.sim().get_simulation_time().expect("a call"), watch.joint_angles().expect("a call")[0]);
-            watch.sim().release_lock().expect("a call");
-            if seen.last().is_none_or(|last| last.0 != now.0) {
-                seen.push(now);
-            }
-            if now.1 > 0.8 && !token.is_cancelled() {
-                token.cancel();
-                seen = vec![now];
-            }
-            if steps.try_recv().is_ok() {
-                return seen;
-            }
+    let (token, (seen, passes)) = (cancel.clone(), channel());
+    let look = move || {
+        let angle_rad = watch.joint_angles().expect("a call")[0];
+        if angle_rad > CANCELLED_AT_RAD {
+            token.cancel();
         }
-    });
-    let outcome = bench.arm.move_to_joints(&goal, &limits, &cancel);
-    stepped.send(()).expect("it watches");
+        seen.send(angle_rad).expect("the test listens");
+    };
+    let mut cell = watched(&server, look);
+    // Passes come only when this client steps: every one of them is seen.
+    cell.arm().sim().set_stepping(true).expect("a call");
+    let outcome = cell.move_to_joints(&goal, &limits, &cancel);
     assert!(matches!(outcome, Err(LinkError::Cancelled { .. })), "{outcome:?}");
-    let rest = bench.joints()[0];
-    assert!(rest > 0.8 && rest < 1.6, "it stopped on its way, at {rest}");
-    let seen = watching.join().expect("no panic");
+    let rest = cell.joint_angles().expect("a call")[0];
+    let seen: Vec<f64> = passes.try_iter().collect();
+    let cancelled_at = *seen.iter().find(|angle| **angle > CANCELLED_AT_RAD).expect("it was cancelled");
+    assert!(rest < 1.6, "it stopped on its way, at {rest}");
     // From 0.4 rad/s at 2 rad/s² it takes 0.04 rad to stop; an arm that stops dead takes none.
-    let braked = rest - seen[0].1;
-    assert!(braked > 0.03, "it stopped dead, within {braked} rad");
-    // While this thread holds the simulation the arm may pause for a pass and catch up in the next; then it brakes alone.
-    for triple in seen[3.min(seen.len())..].windows(3) {
-        let speed = |i: usize| (triple[i + 1].1 - triple[i].1) / (triple[i + 1].0 - triple[i].0);
-        // Mean speeds are those of some moment, and the middles of their times are half of all the time apart.
-        let acceleration = (speed(1) - speed(0)) / ((triple[2].0 - triple[0].0) / 2.0);
+    assert!(rest - cancelled_at > 0.03, "it stopped dead, within {} rad", rest - cancelled_at);
+    for triple in seen.windows(3) {
+        let acceleration = (triple[2] - 2.0 * triple[1] + triple[0]) / (TIME_STEP_S * TIME_STEP_S);
         assert!(acceleration.abs() <= 2.0 + 1e-6, "{acceleration} rad/s² over {triple:?}");
     }
+    assert_eq!(seen.last(), Some(&rest), "and it stands");
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! The client against servers that misbehave, over real sockets on this machine.
 
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -229,13 +231,38 @@ fn a_server_that_dies_in_a_long_silent_call_is_noticed_at_once_and_found_again()
 }
 
 #[test]
-fn a_host_that_vanishes_without_a_word_is_noticed_within_two_seconds() {
-    // A plain TCP peer that completes ZeroMQ's handshake and then says nothing, not even to heartbeats.
+fn a_connection_that_ends_between_two_calls_is_known_to_have_lost_what_the_server_kept() {
+    let (answered, is_answered) = pair();
+    let (endpoint, server) = serve(move |peer| {
+        let (to, _) = peer.next();
+        peer.say(&to, &ret(Vec::new()));
+        done(&is_answered);
+    });
+    let mut connection = connect(&endpoint, options());
+    connection.call("sim.setStepping", vec![]).expect("an answer");
+    answered.send(()).expect("the server listens");
+    join(server);
+    let deadline = Instant::now() + PATIENCE;
+    while connection.is_connected() {
+        assert!(Instant::now() < deadline, "nobody notices that the server has gone");
+    }
+    let peer = Peer::bind(Some(endpoint.port()));
+    let server = std::thread::spawn(move || {
+        let (to, request) = peer.next();
+        assert!(request.get("ver").is_some(), "a new server has to be introduced to the client");
+        peer.say(&to, &ret(Vec::new()));
+        peer
+    });
+    connection.call("sim.x", vec![]).expect("an answer");
+    assert_eq!(connection.epoch(), 1, "whoever relied on state of the server has to set it again");
+    drop(server.join().expect("no panic"));
+}
+
+/// A plain TCP peer that completes ZeroMQ's handshake by hand and does then what a library would not.
+fn by_hand(then: impl FnOnce(TcpStream) + Send + 'static) -> (Endpoint, JoinHandle<()>) {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let endpoint = Endpoint::local(listener.local_addr().expect("bound").port());
-    let (finished, is_finished) = pair();
     let server = std::thread::spawn(move || {
-        use std::io::{Read as _, Write as _};
         let (mut stream, _) = listener.accept().expect("a client");
         let mut greeting = [0u8; 64];
         greeting[0] = 0xff;
@@ -246,9 +273,16 @@ fn a_host_that_vanishes_without_a_word_is_noticed_within_two_seconds() {
         let mut theirs = [0u8; 64];
         stream.read_exact(&mut theirs).expect("a greeting");
         stream.write_all(b"\x04\x19\x05READY\x0bSocket-Type\x00\x00\x00\x03REP").expect("sent");
-        // The frozen host: its connection stays open until the client has given up.
-        done(&is_finished);
+        then(stream);
     });
+    (endpoint, server)
+}
+
+#[test]
+fn a_host_that_vanishes_without_a_word_is_noticed_within_two_seconds() {
+    let (finished, is_finished) = pair();
+    // The frozen host does not even answer heartbeats: its connection stays open until the client has given up.
+    let (endpoint, server) = by_hand(move |_stream| done(&is_finished));
     let mut connection = connect(&endpoint, options());
     let started = Instant::now();
     let cancel = CancelToken::default();
@@ -257,6 +291,27 @@ fn a_host_that_vanishes_without_a_word_is_noticed_within_two_seconds() {
         .expect_err("vanished");
     assert_eq!(error, LinkError::Disconnected { call: "sim.moveToConfig".to_owned() });
     assert!(started.elapsed() < Duration::from_secs(2), "{:?}", started.elapsed());
+    finished.send(()).expect("the server listens");
+    join(server);
+}
+
+#[test]
+fn a_reply_far_over_the_limit_is_named_and_not_taken_for_the_end_of_the_server() {
+    let (finished, is_finished) = pair();
+    let (endpoint, server) = by_hand(move |mut stream| {
+        let (mut seen, mut piece) = (Vec::new(), [0; 1000]);
+        while !seen.windows(5).any(|window| window == b"sim.x") {
+            let count = stream.read(&mut piece).expect("a request");
+            seen.extend_from_slice(&piece[..count]);
+        }
+        // The head of a frame of 3 GB; the client has no need to see more of it.
+        stream.write_all(b"\x01\x00\x02\x00\x00\x00\x00\xb0\x00\x00\x00").expect("sent");
+        done(&is_finished);
+    });
+    let mut connection = connect(&endpoint, options());
+    let error = connection.call("sim.x", vec![]).expect_err("too large");
+    assert_eq!(error, LinkError::ReplyTooLarge { call: "sim.x".to_owned(), bytes: None });
+    assert!(error.to_string().contains("over the limit of 64 MiB"), "{error}");
     finished.send(()).expect("the server listens");
     join(server);
 }
@@ -467,7 +522,11 @@ fn a_big_image_arrives_and_a_message_over_the_limit_is_refused() {
     let image = connection.call("sim.getVisionSensorImg", vec![]).expect("done");
     assert_eq!(image.blob(0).map(<[u8]>::len), Ok(BIG));
     let error = connection.call("sim.x", vec![]).expect_err("too large");
-    assert!(error.to_string().contains("over the limit"), "{error}");
+    assert!(
+        matches!(error, LinkError::ReplyTooLarge { bytes: Some(bytes), .. } if bytes == MAX_MESSAGE_BYTES + 1),
+        "{error}"
+    );
+    assert!(error.to_string().contains("over the limit of 64 MiB"), "{error}");
     assert_eq!(connection.call("sim.x", vec![]).expect("answered").integer(0), Ok(1));
     drop(connection);
     join(server);

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use handeye_core::frames::{Base, Pose, Tip};
 
 use super::hold::Hold;
+use super::stream::clock_past;
 use super::truth::{self, GroundTruth};
 use super::{CellInfo, CellObjects, CellPaths, JOINTS, JointAngles, discover, read_joint_angles, require_running};
 use crate::client::endpoint::Endpoint;
@@ -53,12 +54,15 @@ pub struct SettleOptions {
     pub rate_rad_s: f64,
     /// Longest wait, in simulated time (s).
     pub limit_s: f64,
+    /// Longest wait in real time, for a simulation whose time stands, runs backwards or hardly goes on.
+    pub longest: Duration,
 }
 
 impl Default for SettleOptions {
     /// At 0.001 rad/s an arm of 1 m reach moves by 0.05 mm in a pass: less than a tenth of a pixel at working distance.
+    /// Five seconds of a simulation at a twentieth of real time take less than two minutes.
     fn default() -> Self {
-        Self { rate_rad_s: 1e-3, limit_s: 5.0 }
+        Self { rate_rad_s: 1e-3, limit_s: 5.0, longest: Duration::from_mins(2) }
     }
 }
 
@@ -238,20 +242,31 @@ impl Arm {
     /// time that it took (s).
     ///
     /// # Errors
-    /// [`LinkError::NotSettled`] after `options.limit_s` of simulated time; [`LinkError::NotRunning`];
-    /// [`LinkError::Cancelled`].
+    /// [`LinkError::NotSettled`] after `options.limit_s` of simulated time; [`LinkError::WaitedTooLong`] after
+    /// `options.longest` of real time; [`LinkError::NotRunning`]; [`LinkError::Cancelled`].
     pub fn settle(&mut self, options: &SettleOptions, cancel: &CancelToken) -> Result<f64, LinkError> {
         let task = "waiting for the arm to stand still";
         require_running(&mut self.sim, task)?;
         let call = CallOptions::cancelled_by(cancel);
-        let start_s = self.sim.get_simulation_time()?;
+        let started = Instant::now();
+        let mut start_s = self.sim.get_simulation_time()?;
         let (mut before_s, mut before) = (start_s, self.joint_angles()?);
         let mut resting = 0;
         loop {
             self.sim.step(&call)?;
             let (now_s, now) = (self.sim.get_simulation_time()?, self.joint_angles()?);
-            if now_s <= before_s {
+            let has_advanced = now_s > before_s;
+            let after = started.elapsed();
+            if after > options.longest {
+                let awaited = if has_advanced { "the joints to be at rest".to_owned() } else { clock_past(now_s) };
+                return Err(LinkError::WaitedTooLong { task, awaited, after });
+            }
+            if !has_advanced {
                 require_running(&mut self.sim, task)?;
+                if now_s < before_s {
+                    // The simulation was ended and started again.
+                    (start_s, before_s, before, resting) = (now_s, now_s, now, 0);
+                }
                 continue;
             }
             let travel_rad = before.iter().zip(&now).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
@@ -330,9 +345,13 @@ impl Arm {
                     Err(error) => break Err(error),
                 }
             }
-            let is_too_long = started.elapsed() > LONGEST_MOTION;
-            if is_too_long || braking_since.is_some_and(|since| since.elapsed() > LONGEST_BRAKING) {
-                break Err(LinkError::Timeout { call: task.to_owned(), after: started.elapsed() });
+            if let Some(since) = braking_since.filter(|since| since.elapsed() > LONGEST_BRAKING) {
+                let (awaited, after) = ("the arm to brake".to_owned(), since.elapsed());
+                break Err(LinkError::WaitedTooLong { task, awaited, after });
+            }
+            if started.elapsed() > LONGEST_MOTION {
+                let (awaited, after) = ("the arm to arrive".to_owned(), started.elapsed());
+                break Err(LinkError::WaitedTooLong { task, awaited, after });
             }
             let call = if braking_since.is_some() { CallOptions::default() } else { patient.clone() };
             let stepped = motion.step(&mut self.sim, &mut state);

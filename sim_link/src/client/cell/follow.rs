@@ -216,7 +216,7 @@ impl Arm {
         }
         match FollowPlan::new(kinematics, limits, start, self.info.time_step_s) {
             Ok(plan) => {
-                let mut stream = Stream::begin(self, start)?;
+                let mut stream = Stream::begin(self, start, TASK)?;
                 let outcome = self.send_follow(plan, &mut stream, wish);
                 let outcome = outcome.and_then(|end| self.put_target_to_tip().map(|()| end));
                 stream.end(self, outcome)
@@ -236,7 +236,7 @@ impl Arm {
         let mut ending = None;
         loop {
             let now_s = self.sim.get_simulation_time()?;
-            if stream.has_sent_at(now_s) {
+            if stream.has_sent_at(self, now_s)? {
                 self.sim.step(&CallOptions::default())?;
                 require_running(&mut self.sim, TASK)?;
                 continue;

@@ -55,8 +55,9 @@ impl Held {
                 }
             }
         }
-        // The conversation broke: a server that is still there must not stay held.
+        // The conversation broke: a server that is still there must not stay held, and what was read, also by calls that
+        // went well, may be of more than one instant.
         sim.connection().renew();
-        outcome
+        outcome.and(Err(LinkError::Disconnected { call: "sim.releaseLock".to_owned() }))
     }
 }

@@ -104,7 +104,7 @@ impl Arm {
         let path = self.path(jog, &start)?;
         match JogPlan::new(path, start, self.info.time_step_s, length) {
             Ok(plan) => {
-                let mut stream = Stream::begin(self, start)?;
+                let mut stream = Stream::begin(self, start, TASK)?;
                 let outcome = self.send_jog(plan, &mut stream, held);
                 stream.end(self, outcome)
             }

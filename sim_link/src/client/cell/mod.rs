@@ -24,9 +24,11 @@ mod hold;
 mod jog;
 mod jog_plan;
 mod reach;
+mod room;
 mod sentinel;
 mod stream;
 mod truth;
+mod views;
 
 use std::sync::Arc;
 
@@ -43,7 +45,9 @@ pub use jog_plan::{
     TURN_SPEED as JOG_TURN_SPEED_RAD_S,
 };
 pub use reach::{ArmKinematics, UnknownKinematics};
+pub use room::{BoardReach, FollowPlace, NoPlace};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
+pub use views::BoardInView;
 
 use super::endpoint::Endpoint;
 use super::error::LinkError;
@@ -314,15 +318,13 @@ fn discover(
     Ok((sim, Arc::new(objects), Arc::new(info)))
 }
 
-/// The server's refusal of a path means that the object is not there.
+/// An object that the scene has to have. Only when the server says that there is none it is so; another refusal is the
+/// server's to explain.
 fn named(found: Result<ObjectHandle, LinkError>, path: &str, what: &'static str) -> Result<ObjectHandle, LinkError> {
     match found {
         Ok(handle) if handle.0 >= 0 => Ok(handle),
         Ok(_) => Err(LinkError::NoSuchObject { path: path.to_owned(), what }),
-        Err(error @ LinkError::Remote { .. }) if !error.is_unknown_function() => {
-            tracing::debug!(path, %error, "an object of the cell was not found");
-            Err(LinkError::NoSuchObject { path: path.to_owned(), what })
-        }
+        Err(error) if error.is_missing_object() => Err(LinkError::NoSuchObject { path: path.to_owned(), what }),
         Err(error) => Err(error),
     }
 }

@@ -79,6 +79,16 @@ impl ArmKinematics {
         &self.limits
     }
 
+    /// Where the arm stands.
+    pub(super) fn base_from_arm(&self) -> &Isometry3<f64> {
+        &self.base_from_arm
+    }
+
+    /// How it carries its tip.
+    pub(super) fn connection_from_tip(&self) -> &Isometry3<f64> {
+        &self.connection_from_tip
+    }
+
     /// Where the tip is with the joints at `joints` (rad).
     pub fn tip(&self, joints: &JointAngles) -> Pose<Base, Tip> {
         let arm_from_connection = kinematics::forward(joints).arm_from_connection;

@@ -41,7 +41,8 @@ impl Sentinel {
     /// Whether somebody has stopped everything since; to be asked once per pass.
     pub fn is_stopped(&mut self, sim: &mut Sim) -> Result<bool, LinkError> {
         let Some(state) = &mut self.0 else { return Ok(false) };
-        let reply = sim.connection().call("sim.moveToConfig_step", vec![state.clone()])?;
+        let reply =
+            sim.connection().call("sim.moveToConfig_step", vec![state.clone()]).map_err(LinkError::of_motion_step)?;
         let code = reply.integer(0)?;
         *state = reply.into_map(1)?;
         Ok(code == MOTION_STOPPED)

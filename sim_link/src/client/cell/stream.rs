@@ -7,6 +7,8 @@
 //! A client that is too slow for the simulation misses passes, and the arm stands in them. It still gets the next point
 //! of its plan, one step of one pass: to make up for the passes it would have to move faster than it may.
 
+use std::time::Instant;
+
 use handeye_core::frames::{Base, Pose, Tip};
 
 use super::sentinel::Sentinel;
@@ -27,7 +29,10 @@ pub(super) struct Stream {
     dynamic: [bool; JOINTS],
     sent: JointAngles,
     seen_s: Option<f64>,
+    /// When simulated time went on for the last time.
+    advanced: Instant,
     is_stopped: bool,
+    task: &'static str,
 }
 
 /// The pass for which a point is wanted.
@@ -62,14 +67,15 @@ pub(super) enum Pass {
 }
 
 impl Stream {
-    /// For an arm that stands at `start`.
-    pub fn begin(arm: &mut Arm, start: JointAngles) -> Result<Self, LinkError> {
+    /// For an arm that stands at `start`; `task` says what for, in messages.
+    pub fn begin(arm: &mut Arm, start: JointAngles, task: &'static str) -> Result<Self, LinkError> {
         let mut dynamic = [false; JOINTS];
         for (dynamic, &joint) in dynamic.iter_mut().zip(&arm.objects.joints) {
             *dynamic = arm.sim.is_joint_dynamic(joint)?;
         }
         let sentinel = Sentinel::begin(&mut arm.sim, &arm.info)?;
-        Ok(Self { sentinel, dynamic, sent: start, seen_s: None, is_stopped: false })
+        let advanced = Instant::now();
+        Ok(Self { sentinel, dynamic, sent: start, seen_s: None, advanced, is_stopped: false, task })
     }
 
     /// Tidies up behind the last point, unless the connection is gone.
@@ -85,9 +91,19 @@ impl Stream {
         self.is_stopped
     }
 
-    /// Whether a point was sent at this simulated time already.
-    pub fn has_sent_at(&self, now_s: f64) -> bool {
-        self.seen_s == Some(now_s)
+    /// Whether a point was sent at this simulated time already, so that the next pass has to be waited for.
+    ///
+    /// # Errors
+    /// [`LinkError::WaitedTooLong`] when simulated time has stood for as long as a call may take.
+    pub fn has_sent_at(&self, arm: &mut Arm, now_s: f64) -> Result<bool, LinkError> {
+        if self.seen_s != Some(now_s) {
+            return Ok(false);
+        }
+        let after = self.advanced.elapsed();
+        if after > arm.sim.connection().total_timeout() {
+            return Err(LinkError::WaitedTooLong { task: self.task, awaited: clock_past(now_s), after });
+        }
+        Ok(true)
     }
 
     /// Sends the next point, if a pass has gone by since the last one and the joints are where they were sent, and waits
@@ -110,11 +126,11 @@ impl Stream {
 
     fn send(&mut self, arm: &mut Arm, next: impl FnOnce(&Slot) -> Point) -> Result<Pass, LinkError> {
         let now_s = arm.sim.get_simulation_time()?;
-        if self.has_sent_at(now_s) {
+        if self.has_sent_at(arm, now_s)? {
             return Ok(Pass::None);
         }
         let since_last_s = self.seen_s.map(|seen_s| now_s - seen_s);
-        self.seen_s = Some(now_s);
+        (self.seen_s, self.advanced) = (Some(now_s), Instant::now());
         let joints = read_joint_angles(&mut arm.sim, &arm.objects.joints)?;
         let tolerance = |joint: usize| if self.dynamic[joint] { DRIVEN_OFF_RAD } else { PLACED_OFF_RAD };
         if let Some(joint) = (0..JOINTS).find(|&i| difference_rad(joints[i], self.sent[i]) > tolerance(i)) {
@@ -135,6 +151,11 @@ impl Stream {
         }
         Ok(Pass::Sent)
     }
+}
+
+/// What is waited for when simulated time stands.
+pub(super) fn clock_past(now_s: f64) -> String {
+    format!("simulated time to go on from {now_s:.3} s")
 }
 
 /// Between two angles, the short way round: a joint that turns without end comes back from the other side.

@@ -30,6 +30,10 @@ struct World {
     die_in: Option<&'static str>,
     steps: u32,
     held: i32,
+    /// Simulated time after a pass.
+    clock: fn(f64) -> f64,
+    /// What is wrong with every path.
+    no_path: Option<&'static str>,
 }
 
 type Shared = Arc<Mutex<World>>;
@@ -56,12 +60,14 @@ fn world() -> Shared {
         die_in: None,
         steps: 0,
         held: 0,
+        clock: |time_s| time_s + 0.05,
+        no_path: None,
     }))
 }
 
 impl World {
     fn pass(&mut self) {
-        self.time_s += 0.05;
+        self.time_s = (self.clock)(self.time_s);
         for (joint, target) in self.joints.iter_mut().zip(self.targets) {
             *joint += self.follow * (target - *joint);
         }
@@ -84,6 +90,13 @@ impl World {
                 self.targets[id as usize] = args[1].number().expect("a number");
                 ret([Value::from(1)])
             }
+            "sim.getJointMode" => ret([Value::from(0)]),
+            "sim.setJointPosition" => {
+                self.joints[id as usize] = args[1].number().expect("a number");
+                self.targets[id as usize] = self.joints[id as usize];
+                ret([])
+            }
+            "sim.setObjectPose" => ret([]),
             "sim.getInt32Param" => ret([Value::from(41000)]),
             "sim.getVisionSensorRes" => ret([wire::integers([4, 2])]),
             "sim.getObjectInt32Param" => ret([Value::from(1)]),
@@ -134,6 +147,9 @@ impl World {
     fn object(&self, args: &[Value]) -> Answer {
         let index = args.get(1).and_then(|options| options.get("index")).and_then(Reader::integer);
         let quiet = args.get(1).is_some_and(|options| options.get("noError").is_some());
+        if let Some(text) = self.no_path {
+            return err(text);
+        }
         let path = args[0].text().expect("a path");
         let handle = match (path, index) {
             ("/UR5/joint", Some(index)) => Some(index),
@@ -259,6 +275,24 @@ fn a_scene_without_its_tip_is_named_with_the_path() {
 }
 
 #[test]
+fn only_a_server_that_says_that_an_object_is_not_there_is_taken_to_say_so() {
+    let fails_with = |text| {
+        let world = world();
+        edit(&world, |w| w.no_path = Some(text));
+        try_cell(&world).0.err().expect("refused")
+    };
+    for text in
+        ["354: in sim._getObject: object does not exist, or alias/path is ill formatted.", "Object does not exist"]
+    {
+        assert!(matches!(fails_with(text), LinkError::NoSuchObject { .. }), "{text}");
+    }
+    for text in ["the built-in cell serves 64 clients at a time: close one and try again.", "354: a script error"] {
+        let error = fails_with(text);
+        assert!(error.to_string().contains(text), "{error}");
+    }
+}
+
+#[test]
 fn a_scene_without_a_target_can_do_everything_but_motions_to_a_pose() {
     let world = world();
     edit(&world, |w| w.missing.push("/UR5/Target"));
@@ -371,7 +405,7 @@ fn settling_waits_for_the_joints_and_tells_how_long() {
         w.follow = 0.5;
     });
     let mut cell = cell(world);
-    let options = SettleOptions { rate_rad_s: 1e-3, limit_s: 5.0 };
+    let options = SettleOptions { rate_rad_s: 1e-3, limit_s: 5.0, ..SettleOptions::default() };
     let after_s = cell.client.arm().settle(&options, &CancelToken::default()).expect("settles");
     // The travel of pass n is 0.1 / 2ⁿ rad, which is under 5e-5 rad from pass 11 on; two more passes confirm it.
     assert_relative_eq!(after_s, 13.0 * 0.05, epsilon = 1e-9);
@@ -487,3 +521,5 @@ fn what_the_cell_publishes_goes_before_what_the_scene_shows() {
 
 #[path = "moment_tests.rs"]
 mod moment;
+#[path = "wait_tests.rs"]
+mod wait;

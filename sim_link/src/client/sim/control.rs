@@ -75,9 +75,16 @@ impl Sim {
     /// Simulated time (s).
     ///
     /// # Errors
-    /// Any [`LinkError`] of a call.
+    /// Any [`LinkError`] of a call; [`LinkError::UnexpectedReply`] when it is no finite number.
     pub fn get_simulation_time(&mut self) -> Result<f64, LinkError> {
-        self.call("sim.getSimulationTime", Vec::new())?.number(0)
+        let call = "sim.getSimulationTime";
+        let time_s = self.call(call, Vec::new())?.number(0)?;
+        // Whoever waits for a time to pass would wait for ever.
+        time_s.is_finite().then_some(time_s).ok_or_else(|| LinkError::UnexpectedReply {
+            call: call.to_owned(),
+            expected: "a finite time".to_owned(),
+            got: time_s.to_string(),
+        })
     }
 
     /// Simulated time that one pass takes (s).

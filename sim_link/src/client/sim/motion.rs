@@ -154,7 +154,8 @@ impl Sim {
     /// Commands the next point of the motion; it takes effect with the next pass, see [`Sim::step`].
     ///
     /// # Errors
-    /// [`LinkError::MotionFailed`] when the motion generator gives up.
+    /// [`LinkError::MotionFailed`] when the motion generator gives up, [`LinkError::MotionForgotten`] when the server has
+    /// forgotten it.
     pub fn move_to_config_step(&mut self, state: &mut MotionState) -> Result<MotionStatus, LinkError> {
         self.motion_step(Kind::Config, state)
     }
@@ -209,7 +210,7 @@ impl Sim {
 
     fn motion_step(&mut self, kind: Kind, state: &mut MotionState) -> Result<MotionStatus, LinkError> {
         let call = kind.name("_step");
-        let reply = self.call(&call, vec![state.0.clone()])?;
+        let reply = self.call(&call, vec![state.0.clone()]).map_err(LinkError::of_motion_step)?;
         let code = reply.integer(0)?;
         state.0 = reply.into_map(1)?;
         match code {

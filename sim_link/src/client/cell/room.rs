@@ -1,0 +1,230 @@
+//! Room to follow: whether an arm that keeps its view of a board can go along with it, and from where it can.
+//!
+//! A camera that keeps its view goes wherever the board goes, and about it when the board turns. Where the arm is close to
+//! its column, nearly stretched, or has two axes in line, some direction needs joints faster than they are, and following
+//! ends there. So a place is judged by the worst of all poses of the board within a reach: by the share of its limits that
+//! the tip can have there in every direction at once.
+
+use handeye_core::frames::{Base, Pose, Tip};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use super::JointAngles;
+use super::follow::FollowLimits;
+use super::jog_plan::nearest;
+use super::reach::ArmKinematics;
+use super::views::BoardInView;
+use crate::cell::kinematics::jacobian_at;
+use crate::cell::planning::{self, PlannedView, ViewOptions};
+
+/// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
+/// and still comes closer to it.
+const ENOUGH: f64 = 0.25;
+/// With less it is slowed down wherever the board goes, and a little further it stands.
+const LEAST: f64 = 0.12;
+
+/// Steps to each end of the reach: on the way there the arm must not get into a singular position either.
+const STEPS: u32 = 2;
+
+/// A place for several paths of a board, one after the other, has room for so much more than one for a single path.
+const WIDER: f64 = 1.5;
+
+/// Other distances between camera and board that are tried, relative to that of now.
+const DISTANCES: [f64; 2] = [0.8, 1.3];
+/// Free pixels about the board: an arm that starts after it lags behind for a moment.
+const MARGIN_PX: f64 = 30.0;
+/// Random places that are tried: enough for one within a few degrees of any.
+const CANDIDATES: usize = 3000;
+
+/// How far a board may go from where it is now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoardReach {
+    /// In its plane, either way along both sides [m].
+    pub in_plane_m: f64,
+    /// Along its normal, either way [m].
+    pub out_of_plane_m: f64,
+    /// About any axis through its middle [rad].
+    pub turn_rad: f64,
+}
+
+impl Default for BoardReach {
+    /// Twice what the built-in cell moves its board by from the middle of its path (40 mm in its plane, 20 mm along its
+    /// normal, 3°): whoever begins amid the path has all of it on one side.
+    fn default() -> Self {
+        Self { in_plane_m: 0.08, out_of_plane_m: 0.04, turn_rad: 6.0_f64.to_radians() }
+    }
+}
+
+impl BoardReach {
+    /// Half as far again: where one path ends the next begins, up to 40 mm away.
+    fn wider(&self) -> Self {
+        let Self { in_plane_m, out_of_plane_m, turn_rad } = *self;
+        Self { in_plane_m: in_plane_m * WIDER, out_of_plane_m: out_of_plane_m * WIDER, turn_rad }
+    }
+
+    /// Shift in the axes of the board and turn about its middle, at every corner of the box, unturned and turned about
+    /// each axis.
+    fn ends(&self) -> impl Iterator<Item = (Vector3<f64>, Vector3<f64>)> {
+        let Self { in_plane_m, out_of_plane_m, turn_rad } = *self;
+        let signs = [-1.0, 1.0];
+        let corners = signs.into_iter().flat_map(move |x| {
+            signs
+                .into_iter()
+                .flat_map(move |y| signs.map(|z| Vector3::new(x * in_plane_m, y * in_plane_m, z * out_of_plane_m)))
+        });
+        let turns = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| axis * turn_rad);
+        let turns: Vec<Vector3<f64>> =
+            std::iter::once(Vector3::zeros()).chain(turns).chain(turns.map(|turn| -turn)).collect();
+        corners
+            .chain([Vector3::zeros()])
+            .flat_map(move |shift| turns.clone().into_iter().map(move |turn| (shift, turn)))
+    }
+}
+
+/// A place to follow a board from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FollowPlace {
+    /// The joints there [rad].
+    pub joints: JointAngles,
+    /// The tip there.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// The least share of its limits that the tip can have in every direction, wherever the board goes within its reach.
+    pub room: f64,
+}
+
+/// There is no place to follow from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "of {tried} places that show the whole board none has room for the arm to go along with it: move the board away from \
+     the column of the arm, and not to the end of its reach"
+)]
+pub struct NoPlace {
+    /// Places that were looked at.
+    pub tried: usize,
+}
+
+impl ArmKinematics {
+    /// The least share of its limits that the tip can have in every direction from these joints, wherever the board goes
+    /// within `reach` while its view is kept. 0 where some of it cannot be followed at all.
+    pub fn room_to_follow(
+        &self,
+        limits: &FollowLimits,
+        board: &BoardInView,
+        reach: &BoardReach,
+        joints: &JointAngles,
+    ) -> f64 {
+        self.room_over(limits, board, reach, joints, 0.0)
+    }
+
+    /// Whether [`Self::room_to_follow`] is enough for a board at a usual speed.
+    pub fn has_room_to_follow(
+        &self,
+        limits: &FollowLimits,
+        board: &BoardInView,
+        reach: &BoardReach,
+        joints: &JointAngles,
+    ) -> bool {
+        self.room_over(limits, board, reach, joints, ENOUGH) >= ENOUGH
+    }
+
+    /// The nearest place from which the whole board is seen and the arm has room to go along with it over half as much again
+    /// as `reach`; where there is none, over `reach`, and where none has enough the one with most. The way there, straight
+    /// for the joints, touches neither arm, board nor table.
+    ///
+    /// # Errors
+    /// [`NoPlace`].
+    pub fn place_to_follow(
+        &self,
+        limits: &FollowLimits,
+        board: &BoardInView,
+        reach: &BoardReach,
+        from: &JointAngles,
+    ) -> Result<FollowPlace, NoPlace> {
+        let setup = self.view_setup(board, from);
+        let distance_m = board.distance_m(&self.tip(from));
+        let options = ViewOptions {
+            distance_m: DISTANCES.map(|times| distance_m * times),
+            margin_px: MARGIN_PX,
+            candidates: CANDIDATES,
+            ..ViewOptions::default()
+        };
+        let mut views = planning::views_of_board(&setup, &options);
+        let travel = |view: &PlannedView| planning::travel(from, &view.joints);
+        views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
+        let is_free = |joints: &JointAngles| setup.path_is_free(from, joints, options.clearance_m);
+        let place =
+            |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
+        for reach in [&reach.wider(), reach] {
+            for view in &views {
+                let room = self.room_over(limits, board, reach, &view.joints, ENOUGH);
+                if room >= ENOUGH && is_free(&view.joints) {
+                    return Ok(place(view, room));
+                }
+            }
+        }
+        let mut best: Option<FollowPlace> = None;
+        for view in &views {
+            let wanted = best.map_or(LEAST, |best| best.room);
+            let room = self.room_over(limits, board, reach, &view.joints, wanted);
+            if room > wanted && is_free(&view.joints) {
+                best = Some(place(view, room));
+            }
+        }
+        best.ok_or(NoPlace { tried: views.len() })
+    }
+
+    /// As [`Self::room_to_follow`], but given up with any smaller value as soon as it is below `wanted`.
+    fn room_over(
+        &self,
+        limits: &FollowLimits,
+        board: &BoardInView,
+        reach: &BoardReach,
+        joints: &JointAngles,
+        wanted: f64,
+    ) -> f64 {
+        let base_from_target = board.base_from_target.isometry();
+        let centre = board.target.centre();
+        let target_from_tip = base_from_target.inverse() * self.tip(joints).isometry();
+        let mut room = self.share_of_limits(limits, joints);
+        for (shift, turn) in reach.ends() {
+            let mut before = *joints;
+            for step in 1..=STEPS {
+                if room < wanted {
+                    return room;
+                }
+                let part = f64::from(step) / f64::from(STEPS);
+                let tip = base_from_target * moved_about(&centre, &(shift * part), &(turn * part)) * target_from_tip;
+                if !limits.workspace.contains(&tip.translation.vector) {
+                    return 0.0;
+                }
+                let Ok(next) = nearest(self, &Pose::from_isometry(tip), &before) else { return 0.0 };
+                room = room.min(self.share_of_limits(limits, &next));
+                before = next;
+            }
+        }
+        room
+    }
+
+    /// The share of its limits of speed that the tip can have in every direction at once, so that no joint is too fast.
+    fn share_of_limits(&self, limits: &FollowLimits, joints: &JointAngles) -> f64 {
+        let Some(per_twist) = jacobian_at(joints, self.connection_from_tip()).try_inverse() else { return 0.0 };
+        let fastest = per_twist
+            .row_iter()
+            .map(|row| {
+                let (linear, angular) = (row.fixed_columns::<3>(0).norm(), row.fixed_columns::<3>(3).norm());
+                linear * limits.speed_m_s + angular * limits.turn_rad_s
+            })
+            .fold(0.0, f64::max);
+        if fastest.is_finite() { limits.joint_speed_rad_s / fastest } else { 0.0 }
+    }
+}
+
+/// A board shifted along its axes and turned about its middle, in its own axes before.
+fn moved_about(centre: &Point3<f64>, shift: &Vector3<f64>, turn: &Vector3<f64>) -> Isometry3<f64> {
+    Translation3::from(centre.coords + shift)
+        * UnitQuaternion::from_scaled_axis(*turn)
+        * Translation3::from(-centre.coords)
+}
+
+#[cfg(test)]
+#[path = "room_tests.rs"]
+mod tests;

@@ -1,0 +1,179 @@
+use std::path::Path;
+
+use handeye_core::frames::Target;
+use handeye_core::poses_file::{Goal, TaughtPoses};
+
+use super::super::follow::FollowGoal;
+use super::super::follow_plan::FollowPlan;
+use super::*;
+use crate::cell::motion::Course;
+use crate::cell::scene::{BoardMotionSpec, BoardPath, ResolvedScene, Scene};
+
+const DT_S: f64 = 0.05;
+
+/// The reference scene, its arm, and the joints at each of the ten reference poses, one after the other.
+fn after_the_tour() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointAngles>) {
+    let scene = Scene::reference().expect("the scene").resolve(1).expect("valid");
+    let arm = ArmKinematics::new(scene.world_from_arm, scene.connection_from_tip, scene.joint_limits);
+    let board = BoardInView {
+        base_from_target: scene.base_from_target,
+        target: scene.target,
+        intrinsics: scene.intrinsics,
+        tip_from_camera: scene.tip_from_camera,
+    };
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/poses/seed10.toml");
+    let poses = TaughtPoses::read(&file).expect("the poses").poses;
+    let mut at = scene.start_joints;
+    let joints = poses.iter().map(|pose| {
+        let Goal::Tip(goal) = &pose.goal else { panic!("{} is a pose of the tip", pose.name) };
+        at = arm.reach(goal, &at).expect("the tour visits it");
+        at
+    });
+    let joints = joints.collect();
+    (scene, arm, board, joints)
+}
+
+/// The board of the cell after some time on a path.
+fn board_at(scene: &ResolvedScene, course: &Course, seconds: f64) -> Pose<Base, Target> {
+    let plane_from_target = scene.world_from_plane.inverse() * scene.base_from_target.isometry();
+    Pose::from_isometry(scene.world_from_plane * course.offset(seconds) * plane_from_target)
+}
+
+/// Follows the board on its way from some time on with the view kept: the worst distance of the tip from where the view
+/// wants it after the first seconds [m]; or after how many seconds it ended.
+fn followed(
+    (scene, arm): (&ResolvedScene, &ArmKinematics),
+    joints: JointAngles,
+    motion: &BoardMotionSpec,
+    from_s: f64,
+    seconds: f64,
+) -> Result<f64, f64> {
+    let course = Course::new(motion, scene.seed);
+    let limits = FollowLimits::default();
+    let mut plan = FollowPlan::new(arm, &limits, joints, DT_S).expect("nothing forbids to move");
+    let kept = board_at(scene, &course, from_s).inverse() * arm.tip(&joints);
+    let mut worst_m: f64 = 0.0;
+    for pass in 1..=(seconds / DT_S) as u32 {
+        let after_s = f64::from(pass) * DT_S;
+        let at_s = from_s + after_s;
+        let (now, next) = (board_at(scene, &course, at_s) * kept, board_at(scene, &course, at_s + 1e-4) * kept);
+        // A board that jumps has no speed, as who tracks it soon finds out.
+        let per_s = if motion.path == BoardPath::Step { 0.0 } else { 1e4 };
+        let goal = FollowGoal {
+            base_from_tip: now,
+            velocity_m_s: (next.translation() - now.translation()) * per_s,
+            angular_velocity_rad_s: (next.rotation() * now.rotation().inverse()).scaled_axis() * per_s,
+        };
+        let tip = arm.tip(&plan.advance(Some(&goal)));
+        if plan.obstacle().is_some() {
+            return Err(after_s);
+        }
+        if after_s > 3.0 {
+            worst_m = worst_m.max((tip.translation() - now.translation()).norm());
+        }
+    }
+    Ok(worst_m)
+}
+
+fn moving(path: BoardPath, speed_m_s: f64) -> BoardMotionSpec {
+    BoardMotionSpec { path, speed_m_s, ..BoardMotionSpec::default() }
+}
+
+fn paths() -> impl Iterator<Item = BoardPath> {
+    BoardPath::ALL.into_iter().filter(|path| *path != BoardPath::Still)
+}
+
+#[test]
+fn from_where_the_reference_tour_ends_a_board_on_a_circle_cannot_be_followed_and_that_is_known_beforehand() {
+    let (scene, arm, board, tour) = after_the_tour();
+    let last = *tour.last().expect("ten poses");
+    let limits = FollowLimits::default();
+    assert!(!arm.has_room_to_follow(&limits, &board, &BoardReach::default(), &last));
+    let ended = followed((&scene, &arm), last, &moving(BoardPath::Circle, 0.05), 0.0, 60.0);
+    println!("the circle from the tenth pose: {ended:?}");
+    assert!(ended.is_err_and(|after_s| after_s < 30.0), "{ended:?}");
+}
+
+#[test]
+fn from_the_place_that_is_found_every_path_of_the_board_is_followed_for_minutes() {
+    let (scene, arm, board, tour) = after_the_tour();
+    let (limits, reach) = (FollowLimits::default(), BoardReach::default());
+    for (index, from) in tour.iter().enumerate() {
+        let place = arm.place_to_follow(&limits, &board, &reach, from).expect("there is room");
+        assert!(place.room >= ENOUGH, "{}", place.room);
+        let travel_deg = planning::travel(from, &place.joints).to_degrees();
+        println!("pose {}: room {:.3}, after {travel_deg:.0}° for the joint that turns most", index + 1, place.room);
+        // Minutes after the last, where a person is after the tour; enough to go round after the others.
+        let seconds = if index + 1 == tour.len() { 300.0 } else { 20.0 };
+        for path in paths() {
+            for speed_m_s in [0.05, 0.1] {
+                let worst = followed((&scene, &arm), place.joints, &moving(path, speed_m_s), 0.0, seconds);
+                let what = format!("{path} at {speed_m_s} m/s after pose {}", index + 1);
+                let worst_m = worst.unwrap_or_else(|after_s| panic!("{what} ended after {after_s} s"));
+                // A board that jumps by up to 80 mm is caught up with at 0.25 m/s. At twice the speed that there has to be
+                // room for the arm may lag for a moment, by what the board goes in a fifth of a second.
+                let most_m = match path {
+                    BoardPath::Step => 0.1,
+                    _ if speed_m_s > 0.05 => 0.02,
+                    _ => 2e-3,
+                };
+                assert!(worst_m < most_m, "{what}: {worst_m} m");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_place_that_is_found_amid_the_path_of_the_board_has_room_for_all_of_the_path() {
+    let (scene, arm, board, tour) = after_the_tour();
+    let limits = FollowLimits::default();
+    let from = *tour.last().expect("ten poses");
+    for path in paths() {
+        let motion = moving(path, 0.05);
+        let course = Course::new(&motion, scene.seed);
+        for from_s in [5.0, 11.0, 17.5, 33.0] {
+            let board = BoardInView { base_from_target: board_at(&scene, &course, from_s), ..board };
+            let place = arm.place_to_follow(&limits, &board, &BoardReach::default(), &from).expect("there is room");
+            let worst = followed((&scene, &arm), place.joints, &motion, from_s, 60.0);
+            assert!(worst.is_ok(), "{path} from {from_s} s on ended after {worst:?} s");
+        }
+    }
+}
+
+#[test]
+fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
+    let (scene, arm, board, tour) = after_the_tour();
+    let place = arm
+        .place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), tour.last().expect("ten poses"))
+        .expect("there is room");
+    let camera_from_target = (place.base_from_tip * board.tip_from_camera).inverse() * board.base_from_target;
+    for point in board.target.points() {
+        let px = board.intrinsics.project(&(camera_from_target.isometry() * point)).expect("in front");
+        let inside = |at: f64, size: u32| at > MARGIN_PX && at < f64::from(size) - MARGIN_PX;
+        assert!(inside(px.x, board.intrinsics.width) && inside(px.y, board.intrinsics.height), "{px}");
+    }
+    // By the planner's own knowledge of the scene, which has a floor and a plate as well.
+    let setup = planning::ViewSetup::of(&scene);
+    assert!(setup.path_is_free(tour.last().expect("ten poses"), &place.joints, 0.01));
+}
+
+#[test]
+fn where_there_is_room_the_nearest_place_is_near() {
+    let (_, arm, board, tour) = after_the_tour();
+    let (limits, reach) = (FollowLimits::default(), BoardReach::default());
+    let first = arm.place_to_follow(&limits, &board, &reach, tour.last().expect("ten poses")).expect("there is room");
+    assert!(arm.has_room_to_follow(&limits, &board, &reach, &first.joints), "following begins there without a move");
+    let again = arm.place_to_follow(&limits, &board, &reach, &first.joints).expect("there is room");
+    let travel_deg = planning::travel(&first.joints, &again.joints).to_degrees();
+    assert!(travel_deg < 20.0, "{travel_deg}°");
+}
+
+#[test]
+fn a_board_out_of_reach_has_no_place() {
+    let (_, arm, board, tour) = after_the_tour();
+    let far = Pose::from_isometry(Translation3::new(0.0, -2.0, 0.0) * board.base_from_target.isometry());
+    let board = BoardInView { base_from_target: far, ..board };
+    let from = tour.last().expect("ten poses");
+    let none = arm.place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), from);
+    assert!(matches!(none, Err(NoPlace { .. })), "{none:?}");
+}

@@ -1,0 +1,111 @@
+//! Views of a board for the arm of a scene: what the planner of views has to know, from what a client knows.
+
+use handeye_core::camera::Intrinsics;
+use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::target::TargetSpec;
+use nalgebra::{Isometry3, Translation3};
+
+use super::JointAngles;
+use super::reach::ArmKinematics;
+use crate::cell::planning::{self, Obstacle, PlanError, ViewOptions, ViewSetup};
+
+/// How far below its frame the arm is mounted [m]. What it stands on is taken for a table.
+const TABLE_BELOW_ARM_M: f64 = 0.0147;
+/// Edges of that table [m]: more than the arm reaches.
+const TABLE_M: [f64; 3] = [4.0, 4.0, 0.1];
+/// What is printed on has an edge about the pattern; this much of it on each side, in squares.
+const SHEET_EDGE_SQUARES: f64 = 2.0;
+/// Thickness of what is printed on [m].
+const SHEET_M: f64 = 0.002;
+/// Views are planned from so much nearer and farther than those that there are.
+const OTHER_DISTANCES: [f64; 2] = [0.9, 1.1];
+/// With fewer views nothing can be said about their scatter.
+const LEAST_VIEWS: usize = 2;
+
+/// A board that a camera on the tip looks at, as far as it is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoardInView {
+    /// Where it is.
+    pub base_from_target: Pose<Base, Target>,
+    /// What it is.
+    pub target: TargetSpec,
+    /// The lens.
+    pub intrinsics: Intrinsics,
+    /// Where the camera is.
+    pub tip_from_camera: Pose<Tip, Camera>,
+}
+
+impl BoardInView {
+    /// From the camera to the middle of the board when the tip is there [m].
+    pub fn distance_m(&self, base_from_tip: &Pose<Base, Tip>) -> f64 {
+        let camera_from_target = (*base_from_tip * self.tip_from_camera).inverse() * self.base_from_target;
+        (camera_from_target.isometry() * self.target.centre()).coords.norm()
+    }
+}
+
+impl ArmKinematics {
+    /// Joints [rad] from which the whole board is seen, as different as possible from the views at `taken` and from each
+    /// other: up to `count` of them, at least two, in an order with short ways. Nothing that is known is touched on the
+    /// way from `start` to the first and from each to the next.
+    ///
+    /// What is known is the arm itself, the board, and the plane that the arm stands on.
+    ///
+    /// # Errors
+    /// [`PlanError`] says what was in the way.
+    pub fn views_unlike(
+        &self,
+        board: &BoardInView,
+        taken: &[Pose<Base, Tip>],
+        start: &JointAngles,
+        count: usize,
+    ) -> Result<Vec<JointAngles>, PlanError> {
+        let setup = self.view_setup(board, start);
+        let mut options = ViewOptions { count, ..ViewOptions::default() };
+        let distances = taken.iter().map(|pose| board.distance_m(pose));
+        if let Some([nearest, farthest]) = distances.fold(None, |range: Option<[f64; 2]>, distance_m| {
+            let [nearest, farthest] = range.unwrap_or([distance_m; 2]);
+            Some([nearest.min(distance_m), farthest.max(distance_m)])
+        }) {
+            options.distance_m = [nearest * OTHER_DISTANCES[0], farthest * OTHER_DISTANCES[1]];
+        }
+        let mut views = match planning::poses_unlike(&setup, &options, taken) {
+            Err(PlanError::TooFewViews { found, .. }) if found >= LEAST_VIEWS => {
+                planning::poses_unlike(&setup, &ViewOptions { count: found, ..options }, taken)?
+            }
+            planned => planned?,
+        };
+        planning::order_by_travel(start, &mut views);
+        Ok(views.into_iter().map(|view| view.joints).collect())
+    }
+
+    /// What the planner knows of this arm.
+    pub(super) fn view_setup(&self, board: &BoardInView, start: &JointAngles) -> ViewSetup {
+        let grid = board.target.grid();
+        let edge_m = |points: usize| (points.saturating_sub(1) as f64 + 2.0 * SHEET_EDGE_SQUARES) * grid.square_m;
+        let centre = board.target.centre();
+        let sheet = Obstacle {
+            world_from_centre: board.base_from_target.isometry() * Translation3::new(centre.x, centre.y, SHEET_M / 2.0),
+            size_m: [edge_m(grid.columns), edge_m(grid.rows), SHEET_M],
+        };
+        let below = Isometry3::translation(0.0, 0.0, -TABLE_BELOW_ARM_M - TABLE_M[2] / 2.0);
+        let table = Obstacle { world_from_centre: self.base_from_arm() * below, size_m: TABLE_M };
+        ViewSetup {
+            base_from_target: board.base_from_target,
+            target: board.target,
+            intrinsics: board.intrinsics,
+            tip_from_camera: board.tip_from_camera,
+            arm: planning::Arm {
+                world_from_arm: *self.base_from_arm(),
+                connection_from_tip: *self.connection_from_tip(),
+                tip_from_camera: *board.tip_from_camera.isometry(),
+            },
+            joint_limits: *self.limits(),
+            start_joints: *start,
+            obstacles: vec![sheet, table],
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "views_tests.rs"]
+mod tests;
