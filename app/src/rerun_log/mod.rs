@@ -13,12 +13,12 @@
 //! `docs/rerun_viewers.md` has the bounds.
 
 pub mod blueprint;
+mod browser;
 mod choice;
 mod entry;
 mod file;
 mod lasting;
 mod native;
-mod page;
 mod pump;
 mod queue;
 mod recorder;

@@ -1,4 +1,4 @@
-//! What a thread that writes has yet to write. Whoever puts something in never waits.
+//! What a thread that writes has yet to write. Whoever puts something in waits only where nothing may be left out.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -9,6 +9,9 @@ use super::lasting::{Item, Lasting};
 
 /// A writer that is later than this has left something out because it was slow, and not because so much was not wanted.
 const SLOW: Duration = Duration::from_millis(500);
+
+/// A writer that takes nothing for so long hangs, and is waited for no longer.
+const STUCK: Duration = Duration::from_secs(10);
 
 /// How much of one kind of live entries is written.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +45,8 @@ pub struct Rates {
     pub detection: Rate,
     /// The board as it is tracked.
     pub tracked: Rate,
+    /// Whether whoever puts something in waits for the writer, so that everything is written, in its order.
+    pub waits: bool,
 }
 
 /// What is next for the thread that writes.
@@ -62,6 +67,9 @@ pub enum Next {
 pub struct Queue {
     state: Mutex<State>,
     bell: Condvar,
+    /// Rung when the writer has taken something, for those who wait with more.
+    taken: Condvar,
+    waits: bool,
 }
 
 #[derive(Debug)]
@@ -85,10 +93,10 @@ impl Queue {
     /// With nothing to do yet.
     pub fn new(rates: &Rates) -> Self {
         let now = Instant::now();
-        let Rates { robot, picture, detection, tracked } = *rates;
+        let Rates { robot, picture, detection, tracked, waits } = *rates;
         let lanes = [robot, picture, detection, tracked].map(|rate| Lane { rate, waiting: VecDeque::new(), due: now });
         let state = State { lasting: Lasting::default(), lanes, arrivals: 0, left_out: 0, ended: false };
-        Self { state: Mutex::new(state), bell: Condvar::new() }
+        Self { state: Mutex::new(state), bell: Condvar::new(), taken: Condvar::new(), waits }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -98,6 +106,11 @@ impl Queue {
     /// Puts an entry in.
     pub fn put(&self, entry: Entry) {
         let mut state = self.state();
+        if self.waits {
+            let is_full = |state: &mut State| !state.is_empty() && !state.ended;
+            let waited = self.taken.wait_timeout_while(state, STUCK, is_full);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
         let left_out = match lane_of(&entry) {
             None => {
                 state.lasting.put(entry);
@@ -133,6 +146,7 @@ impl Queue {
     pub fn end(&self) {
         self.state().ended = true;
         self.bell.notify_all();
+        self.taken.notify_all();
     }
 
     /// Waits for what is next, or for so long.
@@ -141,10 +155,12 @@ impl Queue {
         let mut state = self.state();
         loop {
             if let Some(item) = state.lasting.pop() {
+                self.taken.notify_all();
                 return Next::Lasting(item);
             }
             let now = Instant::now();
             if let Some(entry) = state.pop_live(now) {
+                self.taken.notify_all();
                 return Next::Live(entry);
             }
             if state.ended {
@@ -161,6 +177,10 @@ impl Queue {
 }
 
 impl State {
+    fn is_empty(&self) -> bool {
+        self.lasting.iter().next().is_none() && self.lanes.iter().all(|lane| lane.waiting.is_empty())
+    }
+
     /// What had to make room.
     fn put_live(&mut self, lane: usize, entry: Entry) -> Option<(u64, Entry)> {
         self.arrivals += 1;

@@ -11,7 +11,7 @@ const SOON: Duration = Duration::from_secs(20);
 const AT_ONCE: Duration = Duration::from_millis(1);
 
 fn rates(rate: Rate) -> Rates {
-    Rates { robot: rate, picture: rate, detection: rate, tracked: rate }
+    Rates { robot: rate, picture: rate, detection: rate, tracked: rate, waits: false }
 }
 
 fn robot(sim_time_s: f64) -> Entry {
@@ -110,4 +110,33 @@ fn what_lasts_goes_before_what_is_live_and_a_waiting_writer_is_woken() {
     let writer = std::thread::spawn(move || matches!(waiting.next(SOON), Next::Lasting(_)));
     queue.put(said("again"));
     assert!(writer.join().expect("no panic"));
+}
+
+#[test]
+fn where_nothing_may_be_left_out_a_slow_writer_gets_every_entry_in_its_order() {
+    let queue = Arc::new(Queue::new(&Rates { waits: true, ..rates(Rate::all(1)) }));
+    let writer = std::thread::spawn({
+        let queue = Arc::clone(&queue);
+        move || {
+            let mut taken = Vec::new();
+            loop {
+                match queue.next(Duration::from_mins(1)) {
+                    Next::Live(Entry::Robot { sim_time_s, .. }) => taken.push(sim_time_s),
+                    Next::Lasting(Item::Entry(Entry::Said { words, .. })) => {
+                        taken.push(words.parse().expect("a number"));
+                    }
+                    Next::End => return taken,
+                    other => panic!("{other:?}"),
+                }
+                std::thread::yield_now();
+            }
+        }
+    });
+    for number in 0..200 {
+        queue.put(if number % 2 == 0 { robot(f64::from(number)) } else { said(&number.to_string()) });
+    }
+    queue.end();
+    let taken: Vec<f64> = writer.join().expect("no panic");
+    assert_eq!(taken, (0..200).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(queue.left_out(), 0);
 }

@@ -37,22 +37,31 @@ impl Pace {
     fn for_file(self) -> Rates {
         let every = |millis| Rate::newest_every(Duration::from_millis(millis));
         match self {
-            Self::Live => Rates { robot: every(200), picture: every(1000), detection: every(1000), tracked: every(50) },
-            Self::Everything => Self::everything(),
+            Self::Live => Rates {
+                robot: every(200),
+                picture: every(1000),
+                detection: every(1000),
+                tracked: every(50),
+                waits: false,
+            },
+            Self::Everything => Rates { waits: true, ..Self::everything() },
         }
     }
 
     fn for_viewer(self) -> Rates {
         let every = |millis| Rate::newest_every(Duration::from_millis(millis));
         match self {
-            Self::Live => Rates { robot: every(50), picture: every(100), detection: every(100), tracked: every(33) },
+            Self::Live => {
+                Rates { robot: every(50), picture: every(100), detection: every(100), tracked: every(33), waits: false }
+            }
             Self::Everything => Self::everything(),
         }
     }
 
     /// Pictures are megabytes, so that few may wait.
     fn everything() -> Rates {
-        Rates { robot: Rate::all(4096), picture: Rate::all(8), detection: Rate::all(64), tracked: Rate::all(4096) }
+        let (small, images) = (Rate::all(4096), Rate::all(8));
+        Rates { robot: small, picture: images, detection: Rate::all(64), tracked: small, waits: false }
     }
 }
 
@@ -189,6 +198,9 @@ impl Recorder {
         }
         if shared.reports.is_news(&now) {
             absorb(Event::Rerun(now));
+        }
+        if shared.reports.take_no_browser() {
+            absorb(Event::NoBrowser);
         }
     }
 

@@ -20,6 +20,7 @@ pub struct Reports {
 struct Inner {
     state: RerunState,
     notices: Vec<(Severity, Text)>,
+    no_browser: bool,
     told: RerunState,
 }
 
@@ -69,6 +70,17 @@ impl Reports {
         }
         drop(inner);
         (self.waker)();
+    }
+
+    /// The web viewer is served and no browser shows it.
+    pub fn no_browser(&self) {
+        self.inner().no_browser = true;
+        (self.waker)();
+    }
+
+    /// Whether that is so, once.
+    pub fn take_no_browser(&self) -> bool {
+        std::mem::take(&mut self.inner().no_browser)
     }
 
     /// The state with so many entries left out.

@@ -1,17 +1,16 @@
 //! Opening viewers, each on a thread of its own: programs are started and looked after, which takes its time.
 
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::sync::{Arc, MutexGuard, PoisonError};
 use std::thread::Builder;
 use std::time::Duration;
 
 use rerun::sink::{GrpcSink, GrpcSinkConnectionState};
 
-use super::native;
-use super::page::Page;
 use super::recorder::Shared;
-use super::serving::Servers;
+use super::serving::{Page, Servers};
 use super::stream::{SharedSink, Target};
+use super::{browser, native};
 use crate::model::{Severity, ViewerState};
 use crate::text;
 use crate::text::Text;
@@ -99,6 +98,18 @@ impl Shared {
         Ok(urls)
     }
 
+    /// The address of the page with the web viewer.
+    fn page(&self) -> Result<String, Text> {
+        let no_viewer = |error: std::io::Error| text!("No viewer was opened: {error}", error = error);
+        let mut viewers = self.viewers();
+        let Viewers { servers, page } = &mut *viewers;
+        if let Some(page) = page {
+            return Ok(page.url().to_owned());
+        }
+        let served = servers.as_ref().ok_or_else(|| no_viewer(std::io::Error::other("the servers have ended")))?;
+        Ok(page.insert(served.page().map_err(no_viewer)?).url().to_owned())
+    }
+
     fn native(&self) -> Result<(), Text> {
         let program = native::find()?;
         let urls = self.serve()?;
@@ -144,23 +155,20 @@ impl Shared {
     }
 
     fn web(&self) -> Result<(), Text> {
-        let urls = self.serve()?;
-        let mut viewers = self.viewers();
-        let url = if let Some(page) = &viewers.page {
-            page.url().to_owned()
-        } else {
-            let page = Page::start(&urls).map_err(|error| text!("No viewer was opened: {error}", error = error))?;
-            viewers.page.insert(page).url().to_owned()
-        };
-        drop(viewers);
+        self.serve()?;
+        let url = self.page()?;
         self.reports.set_viewer(ViewerState::Web { url: url.clone() });
         if self.open_browser {
-            let text = if browse(&url) {
+            let opened = browser::open(&url);
+            let text = if opened {
                 text!("The recording is shown in the browser: {url}", url = url)
             } else {
                 text!("The recording is shown at {url}: open it in a browser", url = url)
             };
             self.reports.notice(Severity::Info, text);
+            if !opened {
+                self.reports.no_browser();
+            }
         }
         Ok(())
     }
@@ -195,23 +203,5 @@ impl Shared {
             std::thread::sleep(LOOK);
         }
         Ok(())
-    }
-}
-
-/// Has the system show a page; whether it was asked.
-fn browse(url: &str) -> bool {
-    if std::env::var_os("DISPLAY").is_none() && std::env::var_os("WAYLAND_DISPLAY").is_none() {
-        // Some systems would start a browser in the terminal.
-        return false;
-    }
-    let asked =
-        Command::new("xdg-open").arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-    match asked {
-        Ok(mut child) => {
-            let waited = Builder::new().name("xdg-open".to_owned()).spawn(move || child.wait());
-            tracing::debug!(?waited, "xdg-open");
-            true
-        }
-        Err(_not_there) => false,
     }
 }

@@ -1,0 +1,299 @@
+//! A port of this machine behind which something is served.
+//!
+//! Whoever runs a program on this machine can connect, and so can every page that its browser shows. The door lets
+//! requests in that use a name of this machine ([`names`]), holds a bounded number of connections, and gives up those on
+//! which nothing is asked or nothing is taken.
+
+use std::convert::Infallible;
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use http_body_util::{BodyExt as _, Full};
+use hyper::body::{Bytes, Incoming};
+use hyper::header::{CONTENT_TYPE, HeaderValue};
+use hyper::service::service_fn;
+use hyper::{Request, Response, StatusCode};
+use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
+use hyper_util::server::conn::auto;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::runtime::Handle;
+use tokio::sync::watch;
+use tokio::task::{AbortHandle, JoinSet};
+use tonic::body::Body;
+
+use super::names;
+
+/// What the head of a request, and what is to be sent before more of it is made, may take [bytes].
+const BUFFER: usize = 64 * 1024;
+
+/// Requests at a time on one connection.
+const STREAMS: u32 = 16;
+
+/// How often somebody who reads is asked whether he is still there, where the protocol has a way to ask.
+const PING: Duration = Duration::from_secs(10);
+
+/// After the system has refused a connection, most likely for want of file descriptors.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// What is held for whom.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Connections at a time. A viewer has one, a browser up to six.
+    pub connections: usize,
+    /// How long a connection may be without a complete request.
+    pub idle: Duration,
+    /// How long nothing may be taken of an answer.
+    pub stalled: Duration,
+    /// How long the beginning of an answer may take, the rest of the request included.
+    pub answer: Duration,
+}
+
+impl Limits {
+    /// For people and their viewers.
+    pub const USUAL: Self = Self {
+        connections: 32,
+        idle: Duration::from_secs(10),
+        stalled: Duration::from_secs(30),
+        answer: Duration::from_secs(10),
+    };
+}
+
+/// A port that is listened at; closed, with all its connections, when this is dropped.
+#[derive(Debug)]
+pub struct Door {
+    address: SocketAddr,
+    listening: AbortHandle,
+}
+
+impl Door {
+    /// Listens on a free port of 127.0.0.1 and gives to `answer` what is asked with a name of this machine.
+    ///
+    /// # Errors
+    /// When there is no port.
+    pub fn open<A, F>(runtime: &Handle, limits: Limits, answer: A) -> io::Result<Self>
+    where
+        A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
+        F: Future<Output = Response<Body>> + Send + 'static,
+    {
+        let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let _inside = runtime.enter();
+        let listener = TcpListener::from_std(listener)?;
+        let listening = runtime.spawn(listen(listener, limits, answer)).abort_handle();
+        Ok(Self { address, listening })
+    }
+
+    /// Where it is.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl Drop for Door {
+    fn drop(&mut self) {
+        self.listening.abort();
+    }
+}
+
+/// What happens on a connection.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Activity {
+    /// Requests that are being answered.
+    requests: usize,
+    /// Whether the other side does not take what is sent.
+    blocked: bool,
+}
+
+impl Activity {
+    fn is_idle(self) -> bool {
+        self.requests == 0 && !self.blocked
+    }
+}
+
+/// A connection, as long as it lasts.
+struct Guest {
+    task: AbortHandle,
+    activity: watch::Receiver<Activity>,
+}
+
+async fn listen<A, F>(listener: TcpListener, limits: Limits, answer: A)
+where
+    A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
+    F: Future<Output = Response<Body>> + Send + 'static,
+{
+    // Oldest first.
+    let mut guests: Vec<Guest> = Vec::new();
+    let mut tasks = JoinSet::new();
+    loop {
+        let client = match listener.accept().await {
+            Ok((client, _)) => client,
+            Err(error) => {
+                tracing::debug!(%error, "a viewer was not let in");
+                tokio::time::sleep(PAUSE).await;
+                continue;
+            }
+        };
+        while tasks.try_join_next().is_some() {}
+        guests.retain(|guest| !guest.task.is_finished());
+        if guests.len() >= limits.connections {
+            // Whoever waits longest without asking anything goes first, so that nobody is locked out by them.
+            let Some(idle) = guests.iter().position(|guest| guest.activity.borrow().is_idle()) else {
+                tracing::debug!("a viewer was not let in: {} are served already", guests.len());
+                continue;
+            };
+            guests.remove(idle).task.abort();
+        }
+        let (sender, activity) = watch::channel(Activity::default());
+        let task = tasks.spawn(attend(client, limits, Arc::new(sender), answer.clone()));
+        guests.push(Guest { task, activity });
+    }
+}
+
+/// Serves a connection until it ends or is given up.
+async fn attend<A, F>(client: TcpStream, limits: Limits, activity: Arc<watch::Sender<Activity>>, answer: A)
+where
+    A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
+    F: Future<Output = Response<Body>> + Send + 'static,
+{
+    // What is small and live should not wait for more.
+    let _set = client.set_nodelay(true).is_ok();
+    let given_up = is_given_up(limits, activity.subscribe());
+    let watched = Watched { client, activity: Arc::clone(&activity) };
+    let service = service_fn(move |request: Request<Incoming>| {
+        let busy = Busy::new(&activity);
+        let answered =
+            names::are_of_this_machine(&request).then(|| tokio::time::timeout(limits.answer, answer(request)));
+        async move {
+            let response = match answered {
+                None => plain(StatusCode::FORBIDDEN, names::REFUSAL),
+                Some(answered) => match answered.await {
+                    Ok(response) => response,
+                    Err(_late) => plain(StatusCode::REQUEST_TIMEOUT, "The request took too long.\n"),
+                },
+            };
+            // A request is being answered until the last of the answer was made.
+            Ok::<_, Infallible>(response.map(|body| {
+                Body::new(body.map_frame(move |frame| {
+                    let _until_then = &busy;
+                    frame
+                }))
+            }))
+        }
+    });
+    let mut http = auto::Builder::new(TokioExecutor::new());
+    http.http1().timer(TokioTimer::new()).max_buf_size(BUFFER);
+    http.http2()
+        .timer(TokioTimer::new())
+        .keep_alive_interval(PING)
+        .keep_alive_timeout(limits.stalled.saturating_sub(PING).max(PING))
+        .max_concurrent_streams(STREAMS);
+    tokio::select! {
+        ended = http.serve_connection(TokioIo::new(watched), service) => {
+            if let Err(error) = ended {
+                tracing::debug!(%error, "a connection of a viewer has ended");
+            }
+        }
+        () = given_up => tracing::debug!("a connection on which nothing happened was given up"),
+    }
+}
+
+/// Ends when a connection is worth waiting for no longer.
+async fn is_given_up(limits: Limits, mut activity: watch::Receiver<Activity>) {
+    loop {
+        let now = *activity.borrow_and_update();
+        let changed = activity.changed();
+        let patience = match now {
+            Activity { blocked: true, .. } => limits.stalled,
+            Activity { requests: 0, .. } => limits.idle,
+            // Something that is live is watched for as long as one likes.
+            _ => Duration::MAX,
+        };
+        match tokio::time::timeout(patience, changed).await {
+            Ok(Ok(())) => {}
+            // Too late, or the connection is gone already.
+            Ok(Err(_)) | Err(_) => return,
+        }
+    }
+}
+
+/// A short answer.
+pub fn plain(status: StatusCode, words: &'static str) -> Response<Body> {
+    let mut response = Response::new(Body::new(Full::new(Bytes::from_static(words.as_bytes()))));
+    *response.status_mut() = status;
+    response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("text/plain; charset=utf-8"));
+    response
+}
+
+/// Counts a request as long as it is held.
+struct Busy(Arc<watch::Sender<Activity>>);
+
+impl Busy {
+    fn new(activity: &Arc<watch::Sender<Activity>>) -> Self {
+        activity.send_modify(|now| now.requests += 1);
+        Self(Arc::clone(activity))
+    }
+}
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        self.0.send_modify(|now| now.requests -= 1);
+    }
+}
+
+/// A connection that notes when the other side does not take what is sent.
+struct Watched {
+    client: TcpStream,
+    activity: Arc<watch::Sender<Activity>>,
+}
+
+impl Watched {
+    fn noted<T>(&self, written: Poll<T>) -> Poll<T> {
+        let blocked = written.is_pending();
+        self.activity.send_if_modified(|now| std::mem::replace(&mut now.blocked, blocked) != blocked);
+        written
+    }
+}
+
+impl AsyncRead for Watched {
+    fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.client).poll_read(cx, buffer)
+    }
+}
+
+impl AsyncWrite for Watched {
+    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        let written = Pin::new(&mut self.client).poll_write(cx, bytes);
+        self.noted(written)
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        pieces: &[io::IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        let written = Pin::new(&mut self.client).poll_write_vectored(cx, pieces);
+        self.noted(written)
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.client.is_write_vectored()
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.client).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.client).poll_shutdown(cx)
+    }
+}
+
+#[cfg(test)]
+#[path = "door_tests.rs"]
+mod tests;

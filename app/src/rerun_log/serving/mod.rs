@@ -1,0 +1,105 @@
+//! The servers from which viewers read, and the page with the web viewer.
+//!
+//! Why two servers: a server keeps what it has sent for viewers that come later, up to a limit, and forgets the oldest
+//! first. Pictures would push the captures out within a minute. So what lasts and what is live are served side by side, and
+//! a viewer reads both as one recording.
+//!
+//! Rerun's own server listens by itself and answers whoever asks. What it serves is taken out of it here and put behind a
+//! [`Door`], in this process: there is no port behind the door that somebody else could find.
+
+mod door;
+mod names;
+mod page;
+mod proxy;
+
+use std::io;
+use std::sync::Arc;
+
+use tokio::runtime::{Builder, Handle, Runtime};
+
+use super::stream::{SharedSink, Target};
+use door::Door;
+use proxy::ProxySink;
+
+pub use page::Page;
+
+/// What is kept of what lasts, for viewers that come later [bytes].
+pub const LASTING_BYTES: u64 = 128 * 1024 * 1024;
+
+/// What is kept of what is live, for viewers that come later [bytes].
+pub const LIVE_BYTES: u64 = 32 * 1024 * 1024;
+
+/// Threads of all servers and the page together, however many connections there are.
+const THREADS: usize = 2;
+
+/// The servers.
+pub struct Servers {
+    engine: Arc<Engine>,
+    lasting: Served,
+    live: Served,
+}
+
+/// One of them.
+struct Served {
+    sink: Arc<ProxySink>,
+    door: Door,
+}
+
+/// The threads that do the work of the servers; they end when this is dropped, without being waited for.
+struct Engine(Option<Runtime>);
+
+impl Servers {
+    /// Starts them on free ports of 127.0.0.1.
+    ///
+    /// # Errors
+    /// When there is no port or no thread.
+    pub fn start() -> io::Result<Self> {
+        let engine = Arc::new(Engine::start()?);
+        let served = |limit_bytes| -> io::Result<Served> {
+            let (sink, door) = proxy::serve(&engine, limit_bytes)?;
+            Ok(Served { sink: Arc::new(sink), door })
+        };
+        Ok(Self { lasting: served(LASTING_BYTES)?, live: served(LIVE_BYTES)?, engine })
+    }
+
+    /// Where a stream for them writes to.
+    pub fn target(&self) -> Target {
+        let sink = |served: &Served| SharedSink(Arc::clone(&served.sink) as Arc<dyn rerun::sink::LogSink>);
+        Target::Viewers { lasting: sink(&self.lasting), live: sink(&self.live) }
+    }
+
+    /// What viewers read.
+    pub fn urls(&self) -> [String; 2] {
+        [&self.lasting, &self.live].map(|served| format!("rerun+http://{}/proxy", served.door.address()))
+    }
+
+    /// Serves the page with the web viewer.
+    ///
+    /// # Errors
+    /// When there is no port.
+    pub fn page(&self) -> io::Result<Page> {
+        Page::start(&self.engine, &self.urls())
+    }
+}
+
+impl Engine {
+    fn start() -> io::Result<Self> {
+        let mut builder = Builder::new_multi_thread();
+        Ok(Self(Some(builder.worker_threads(THREADS).thread_name("rerun-server").enable_all().build()?)))
+    }
+
+    fn handle(&self) -> io::Result<&Handle> {
+        self.0.as_ref().map(Runtime::handle).ok_or_else(|| io::Error::other("the servers have ended"))
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        if let Some(runtime) = self.0.take() {
+            runtime.shutdown_background();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

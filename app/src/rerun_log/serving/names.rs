@@ -1,0 +1,85 @@
+//! Who is asked, and by whom: names of this machine and nothing else.
+//!
+//! A page from elsewhere can have its own name lead to 127.0.0.1 (DNS rebinding). The browser then lets it read what it
+//! gets from here, because it takes both for one site; only the name in the request tells. An address in numbers cannot be
+//! given another meaning.
+
+use std::net::IpAddr;
+
+use hyper::header::{HOST, HeaderValue, ORIGIN};
+use hyper::http::uri::Authority;
+use hyper::{Request, Uri};
+
+/// What somebody who uses another name is told.
+pub const REFUSAL: &str = "This is served for this machine only: ask for it as 127.0.0.1 or localhost, and from a page of \
+                           this machine.\n";
+
+/// Whether a request asks for this machine by one of its own names and comes from no page of another one.
+pub fn are_of_this_machine<B>(request: &Request<B>) -> bool {
+    let headers = request.headers();
+    // HTTP/2 and proxies say the name in the address, HTTP/1 in a header; whoever says both has to be right in both.
+    let address = request.uri().authority().map(|authority| is_here(authority.host()));
+    let asked: Vec<bool> = address.into_iter().chain(headers.get_all(HOST).iter().map(is_host_here)).collect();
+    !asked.is_empty() && asked.into_iter().all(|here| here) && headers.get_all(ORIGIN).iter().all(is_origin_here)
+}
+
+fn is_host_here(host: &HeaderValue) -> bool {
+    let authority = host.to_str().ok().and_then(|host| host.parse::<Authority>().ok());
+    authority.is_some_and(|authority| !authority.as_str().contains('@') && is_here(authority.host()))
+}
+
+/// A page says where it is from; one that will not say (`null`) may be from anywhere.
+fn is_origin_here(origin: &HeaderValue) -> bool {
+    let uri = origin.to_str().ok().and_then(|origin| origin.parse::<Uri>().ok());
+    uri.is_some_and(|uri| matches!(uri.scheme_str(), Some("http" | "https")) && uri.host().is_some_and(is_here))
+}
+
+fn is_here(host: &str) -> bool {
+    let plain = host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host);
+    plain.eq_ignore_ascii_case("localhost") || plain.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(uri: &str, headers: &[(&str, &str)]) -> bool {
+        let mut request = Request::builder().uri(uri);
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        are_of_this_machine(&request.body(()).expect("a request"))
+    }
+
+    #[test]
+    fn names_of_this_machine_are_served() {
+        for host in ["127.0.0.1:9876", "127.0.0.1", "localhost:1", "LocalHost", "[::1]:80", "[::1]", "127.8.9.1:5"] {
+            assert!(asked("/", &[("host", host)]), "{host}");
+            assert!(asked(&format!("http://{host}/a"), &[]), "HTTP/2: {host}");
+        }
+        for origin in ["http://127.0.0.1:3000", "http://localhost", "https://[::1]:1"] {
+            assert!(asked("/", &[("host", "127.0.0.1:1"), ("origin", origin)]), "{origin}");
+        }
+    }
+
+    #[test]
+    fn other_names_are_not() {
+        let hosts =
+            ["evil.example", "evil.example:9876", "127.0.0.1.evil.example", "localhost.evil.example", "", "0.0.0.0"];
+        for host in
+            hosts.into_iter().chain(["10.0.0.1", "evil@127.0.0.1", "127.0.0.1@evil.example", "[::2]", "2130706433"])
+        {
+            assert!(!asked("/", &[("host", host)]), "{host:?}");
+        }
+        assert!(!asked("/", &[]), "no name at all");
+        assert!(!asked("http://evil.example/", &[]), "HTTP/2");
+        assert!(!asked("http://evil.example/", &[("host", "127.0.0.1")]), "one of two names");
+        assert!(!asked("http://127.0.0.1/", &[("host", "evil.example")]), "the other of two names");
+        assert!(!asked("/", &[("host", "127.0.0.1"), ("host", "evil.example")]), "one of two headers");
+        for origin in
+            ["http://evil.example", "null", "http://127.0.0.1.evil.example", "https://rerun.io", "file://", ""]
+        {
+            assert!(!asked("/", &[("host", "127.0.0.1:1"), ("origin", origin)]), "{origin:?}");
+        }
+    }
+}
