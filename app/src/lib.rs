@@ -1,6 +1,8 @@
 //! The Handeye Workbench: a window and a command line over [`handeye_core`] and [`handeye_sim_link`].
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod app;
+pub mod capture;
 pub mod cli;
 pub mod command;
 pub mod depth_view;

@@ -1,23 +1,30 @@
-//! From a dataset folder to observations: loading every image and finding the target in it.
+//! From a dataset folder or a session to observations: loading every image and finding the target in it.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use handeye_core::calibrate::{CameraKnowledge, Observations, ObservedView};
-use handeye_core::camera::Distortion;
-use handeye_core::dataset::{CameraInput, Dataset, DatasetError, Entry};
+use handeye_core::dataset::{Dataset, DatasetError, Entry};
+use handeye_core::image::GrayImage;
+use handeye_core::image_file::gray_from_rgb;
 use handeye_core::observation::Corner;
 use handeye_core::progress::CancelToken;
+use handeye_core::session::{CaptureId, Session, SessionError, SessionObservations};
+use handeye_core::target::TargetSpec;
 use handeye_core::vision::{self, VisionError};
 
 use crate::parallel::map_in_order;
 
-/// Why a dataset could not be observed.
+/// Why a data set or a session could not be observed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObserveError {
-    /// An image could not be read.
+    /// An image of a data set could not be read.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// An image of a session could not be read.
+    #[error(transparent)]
+    Session(#[from] SessionError),
     /// The detector itself failed; a target that is not there is no failure.
     #[error("image {name:?}: {source}")]
     Vision {
@@ -31,75 +38,91 @@ pub enum ObserveError {
     Cancelled,
 }
 
-/// Lens model estimated when a data set names none: what OpenCV estimates by default.
-pub const DEFAULT_MODEL: Distortion = Distortion::BrownConrady([0.0; 5]);
+/// Called with how many images of how many are done, from the threads that do the work.
+pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
-/// Loads every image of a data set and finds the target in it, on all cores. `progress` is called with how many of how
-/// many are done, from the threads that do the work.
+/// Loads every image of a data set and finds the target in it, on all cores.
 ///
 /// # Errors
 /// [`ObserveError`]; the first in the order of the pose table.
-pub fn observe(
-    dataset: &Dataset,
-    progress: &(dyn Fn(usize, usize) + Sync),
-    cancel: &CancelToken,
-) -> Result<Observations, ObserveError> {
+pub fn observe(dataset: &Dataset, progress: Progress<'_>, cancel: &CancelToken) -> Result<Observations, ObserveError> {
     if let Some(Err(why)) = dataset.arm.as_ref().map(|arm| &arm.placement) {
         tracing::warn!("the joint angles are not used: {why}");
     }
-    let count = dataset.entries.len();
-    let done = AtomicUsize::new(0);
-    let corners = map_in_order(count, |index| {
-        let found = corners_of(dataset, &dataset.entries[index], cancel);
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
-        found
-    });
+    let corners =
+        of_each(dataset.entries.len(), progress, cancel, |index| corners_of(dataset, &dataset.entries[index]))?;
     let views = dataset
         .entries
         .iter()
         .zip(corners)
-        .map(|(entry, corners)| {
-            Ok(ObservedView {
-                name: entry.name.clone(),
-                base_from_tip: entry.base_from_tip,
-                corners: corners.unwrap_or(Err(ObserveError::Cancelled))?,
-                tip_by_joint: entry.tip_by_joint.clone(),
-                camera_from_target: entry.camera_from_target,
-                in_fit: true,
-            })
+        .map(|(entry, corners)| ObservedView {
+            name: entry.name.clone(),
+            base_from_tip: entry.base_from_tip,
+            corners,
+            tip_by_joint: entry.tip_by_joint.clone(),
+            camera_from_target: entry.camera_from_target,
+            in_fit: true,
         })
-        .collect::<Result<Vec<_>, ObserveError>>()?;
+        .collect();
     Ok(Observations {
         mode: dataset.mode,
         target: dataset.target,
         // Only pose pairs come without a size, and they need none.
         image_size: dataset.image_size.unwrap_or_default(),
-        camera: camera_knowledge(dataset.camera.as_ref()),
+        camera: CameraKnowledge::of(dataset.camera.as_ref()),
         views,
     })
 }
 
-/// What a data set or a session says of its camera, for the solver.
-pub fn camera_knowledge(camera: Option<&CameraInput>) -> CameraKnowledge {
-    match camera {
-        None => CameraKnowledge::Estimate { model: DEFAULT_MODEL, start: None },
-        Some(input) => match input.intrinsics {
-            Some(intrinsics) if input.fixed => CameraKnowledge::Fixed(intrinsics),
-            start => CameraKnowledge::Estimate { model: input.model, start },
-        },
-    }
+/// Loads the image of every capture of a session and finds the target in it, on all cores. Also of those that are not in the
+/// fit, as when the window opens the session.
+///
+/// # Errors
+/// [`ObserveError`]; the first in the order of the captures.
+pub fn observe_session(
+    session: &Session,
+    progress: Progress<'_>,
+    cancel: &CancelToken,
+) -> Result<SessionObservations, ObserveError> {
+    let image_size = session.image_size()?.unwrap_or_default();
+    let (captures, target) = (&session.document.captures, &session.document.meta.target);
+    let corners = of_each(captures.len(), progress, cancel, |index| {
+        let capture = &captures[index];
+        detect(&gray_from_rgb(&session.load_rgb(capture)?), target, &capture.image)
+    })?;
+    let corners: BTreeMap<CaptureId, Vec<Corner>> =
+        captures.iter().zip(corners).filter_map(|(capture, corners)| Some((capture.id, corners?))).collect();
+    Ok(session.document.observations(image_size, |id| corners.get(&id).cloned()))
 }
 
-fn corners_of(dataset: &Dataset, entry: &Entry, cancel: &CancelToken) -> Result<Option<Vec<Corner>>, ObserveError> {
-    if cancel.is_cancelled() {
-        return Err(ObserveError::Cancelled);
-    }
+fn of_each<T: Send>(
+    count: usize,
+    progress: Progress<'_>,
+    cancel: &CancelToken,
+    work: impl Fn(usize) -> Result<T, ObserveError> + Sync,
+) -> Result<Vec<T>, ObserveError> {
+    let done = AtomicUsize::new(0);
+    let each = map_in_order(count, |index| {
+        if cancel.is_cancelled() {
+            return Err(ObserveError::Cancelled);
+        }
+        let result = work(index);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
+        result
+    });
+    each.into_iter().map(|result| result.unwrap_or(Err(ObserveError::Cancelled))).collect()
+}
+
+fn corners_of(dataset: &Dataset, entry: &Entry) -> Result<Option<Vec<Corner>>, ObserveError> {
     if let Some(corners) = &entry.corners {
         return Ok((!corners.is_empty()).then(|| corners.clone()));
     }
     if entry.image_path.is_none() {
         return Ok(None);
     }
-    let image = dataset.load_gray(entry)?;
-    vision::detect(&image, &dataset.target).map_err(|source| ObserveError::Vision { name: entry.name.clone(), source })
+    detect(&dataset.load_gray(entry)?, &dataset.target, &entry.name)
+}
+
+fn detect(image: &GrayImage, target: &TargetSpec, name: &str) -> Result<Option<Vec<Corner>>, ObserveError> {
+    vision::detect(image, target).map_err(|source| ObserveError::Vision { name: name.to_owned(), source })
 }

@@ -3,9 +3,10 @@
 use handeye_core::session::CaptureId;
 
 use super::App;
-use crate::model::{CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, Severity};
+use crate::capture::CaptureRequest;
+use crate::model::{CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, Pane, Severity};
 use crate::text;
-use crate::worker::{CaptureRequest, VisionTask};
+use crate::worker::VisionTask;
 
 impl App {
     /// Takes a capture as soon as robot and picture have settled.
@@ -16,13 +17,8 @@ impl App {
         }
         self.numbers.capture += 1;
         let number = self.numbers.capture;
-        let others = self.model.document().captures.iter().map(|it| (it.id.0, it.base_from_tip)).collect();
-        let mut options = self.model.view.capture;
-        if pose_name.is_some() {
-            // Whoever taught two poses close to each other wants both; the reference poses have one twice.
-            (options.least_distance_m, options.least_angle_rad) = (0.0, 0.0);
-        }
-        let request = CaptureRequest { number, purpose, options, pose_name, others };
+        let options = self.model.view.capture;
+        let request = CaptureRequest::new(number, purpose, options, pose_name, self.model.document());
         let asked = self.workers.ask_vision(VisionTask::Capture(request));
         if asked.is_ok() {
             let since_s = self.model.now_s;
@@ -50,7 +46,8 @@ impl App {
             return;
         }
         self.model.capture = None;
-        self.say(Severity::Warning, text!("No capture: {why}", why = refused.why.clone()));
+        let said = text!("No capture: {why}", why = refused.why.clone());
+        self.say_in(Pane::Colour, Severity::Warning, said);
         self.tour_refused(&refused);
         self.model.refused = Some(refused);
     }

@@ -14,6 +14,7 @@ impl App {
     pub(super) fn stop(&mut self) {
         self.workers.press_stop();
         self.model.touring = false;
+        self.model.planning = false;
         self.cancel_capture();
         self.model.stop_pending = true;
         if self.model.control.is_connected() {
@@ -58,6 +59,7 @@ impl App {
         self.model.cell = None;
         self.model.detection = None;
         self.model.touring = false;
+        self.model.planning = false;
         self.model.motion = Motion::Idle;
         let first = LinkState::first(&source);
         self.model.control = first.clone();
@@ -117,12 +119,16 @@ impl App {
                 let text = match link {
                     Link::Control => text!("Robot connection lost: {why}", why = why),
                     Link::Camera => text!("Camera connection lost: {why}", why = why),
-                    Link::Motion => text!("Connection for motions lost: {why}", why = why),
+                    // Pictures and joints go on, so no strip tells of it.
+                    Link::Motion => {
+                        let said = text!("Connection for motions lost: {why}", why = why);
+                        return self.say(Severity::Warning, said);
+                    }
                 };
-                self.say(Severity::Warning, text);
+                self.say_of_connection(Severity::Warning, text);
             }
             (LinkState::Failed { why }, _) if link != Link::Motion => {
-                self.say(Severity::Error, text::Text::verbatim(why));
+                self.say_of_connection(Severity::Error, text::Text::verbatim(why));
             }
             _ => {}
         }

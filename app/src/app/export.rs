@@ -3,7 +3,7 @@
 use handeye_core::export::ExportView;
 
 use super::App;
-use crate::model::{Severity, Written, exports_of};
+use crate::model::{Pane, Severity, Written, exports_of};
 use crate::text;
 use crate::worker::{ExportJob, FileTask};
 
@@ -52,9 +52,13 @@ impl App {
         match &written.files {
             Ok(files) => {
                 let count = files.len();
-                self.say(Severity::Info, text!("{count} files written, read back and compared", count = count));
+                let said = text!("{count} files written, read back and compared", count = count);
+                self.say_in(Pane::Export, Severity::Info, said);
             }
-            Err(why) => self.say(Severity::Error, text!("Nothing was exported: {why}", why = why)),
+            Err(why) => {
+                let said = text!("Nothing was exported: {why}", why = why);
+                self.say_in(Pane::Export, Severity::Error, said);
+            }
         }
         self.model.export.written = Some(written);
     }

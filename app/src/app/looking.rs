@@ -1,5 +1,6 @@
 //! How the pictures are looked at, and points that are measured in them.
 
+use handeye_core::board_shape::BoardPoints;
 use handeye_core::depth::{ColourMap, DepthSample};
 use handeye_core::verify::VerifyError;
 use nalgebra::Vector2;
@@ -61,8 +62,13 @@ impl App {
             }
             DepthSample::Far | DepthSample::Invalid => Err(text!("there is no depth at this pixel")),
         };
-        // The board and the tip of the same picture: the newest frame may be a later one.
-        let seen = self.model.detection.as_ref().and_then(|it| Some((it.camera_from_target?, it.base_from_tip)));
+        // The board and the tip of the same picture: the newest frame may be a later one. The board is as large and as
+        // bent as the calibration found it.
+        let seen = self.model.detection.as_ref().and_then(|it| {
+            let board = BoardPoints::new(&self.model.document().meta.target.points());
+            let seen = calibrated.seen(&board, it.corners.as_ref()?, &it.camera_from_target?)?;
+            Some((seen, it.base_from_tip))
+        });
         let from_board = match seen {
             Some((camera_from_target, base_from_tip)) => {
                 calibrated.point_on_board(&base_from_tip, &px, &camera_from_target).map_err(words)

@@ -6,6 +6,7 @@
 mod capture;
 mod connection;
 mod export;
+mod leave;
 mod looking;
 mod messages;
 mod motion;
@@ -19,6 +20,7 @@ mod track;
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
@@ -60,6 +62,8 @@ pub struct App {
     asked: Option<solve::Question>,
     recorder: Recorder,
     recorded: recording::Recorded,
+    /// Until when everything has to be over, once the application ends.
+    leave_by: Option<Instant>,
 }
 
 /// The last numbers that were given to requests.
@@ -70,6 +74,8 @@ struct Numbers {
     motion: MotionId,
     /// The motion that follows the board.
     follow: Option<MotionId>,
+    /// The request for poses to verify at that is not answered yet.
+    plan: Option<MotionId>,
 }
 
 impl App {
@@ -88,10 +94,22 @@ impl App {
         })?;
         let desk = Desk::start(sessions, &clock, &waker)?;
         let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
-        let model = Model { addresses, ..Model::new(source, view) };
+        let model = Model { addresses, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
         let numbers = Numbers::default();
         let recorded = recording::Recorded::default();
-        let mut app = Self { model, workers, desk, connect, clock, waker, numbers, asked: None, recorder, recorded };
+        let mut app = Self {
+            model,
+            workers,
+            desk,
+            connect,
+            clock,
+            waker,
+            numbers,
+            asked: None,
+            recorder,
+            recorded,
+            leave_by: None,
+        };
         app.prepare_session();
         app.send_target();
         if let Some(folder) = open {
@@ -171,6 +189,7 @@ impl App {
             Command::GoToTaught(name) => self.go_to_taught(&name),
             Command::GoToCapture(id) => self.go_to_capture(id),
             Command::RunTour { purpose } => self.run_tour(purpose),
+            Command::VerifyAtPlanned => self.plan_verification(),
             Command::StopTour => self.stop_tour(),
 
             Command::Capture(purpose) => self.capture(purpose, None),
@@ -191,6 +210,7 @@ impl App {
             Command::Open(folder) => self.open(folder),
             Command::SaveAs(folder) => self.save_as(folder),
             Command::ListFolder(folder) => self.list_folder(folder),
+            Command::OpenFolder(folder) => self.open_folder(folder),
 
             Command::Solve => self.solve_again(),
             Command::CancelSolve => self.cancel_solve(),
@@ -235,6 +255,7 @@ impl App {
             }
             Event::Detection(detection) => self.model.detection = Some(*detection),
             Event::Moved { id, outcome } => self.moved(id, outcome),
+            Event::Planned { id, views } => self.planned(id, views),
             Event::JogEnded { why } => self.jog_ended(why),
             Event::CaptureWaits { number, wait } => self.capture_waits(number, wait),
             Event::CaptureRefused { number, refused } => self.capture_refused(number, refused),
@@ -255,6 +276,7 @@ impl App {
             Event::TrackFailed { why } => self.track_failed(why),
             Event::Follow(status) => self.follow_goes(status),
             Event::Rerun(state) => self.model.rerun = state,
+            Event::NoBrowser => self.show_rerun_address(),
             Event::Notice { severity, text } => self.say(severity, text),
         }
     }

@@ -4,7 +4,7 @@ use handeye_core::frames::{Camera, Pose, Tip};
 use handeye_core::session::CaptureId;
 
 use super::App;
-use crate::model::{Jog, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Severity};
+use crate::model::{Jog, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};
 use crate::text;
 use crate::text::Text;
 
@@ -14,6 +14,7 @@ impl App {
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         let id = self.numbers.motion;
         let request = MotionRequest { id, goal, speed: self.model.view.jog.speed };
+        self.model.messages.is_over_in(Pane::Jog);
         match self.workers.move_to(request) {
             Ok(()) => {
                 self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
@@ -46,23 +47,31 @@ impl App {
         if self.model.touring && id == self.numbers.motion {
             self.tour_moved(&outcome);
         }
+        if self.model.planning && self.numbers.plan == Some(id) {
+            return self.plan_refused(&outcome);
+        }
         if self.numbers.follow == Some(id) {
             return self.follow_ended(outcome);
         }
         match outcome {
             MotionOutcome::Arrived => {}
-            MotionOutcome::Stopped => self.say(Severity::Warning, text!("Stopped on the way to {what}", what = what)),
+            MotionOutcome::Stopped => {
+                self.say_in(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
+            }
             MotionOutcome::Refused(why) => {
-                self.say(Severity::Warning, text!("The arm does not move to {what}: {why}", what = what, why = why));
+                let said = text!("The arm does not move to {what}: {why}", what = what, why = why);
+                self.say_in(Pane::Jog, Severity::Warning, said);
             }
             MotionOutcome::Failed(why) => {
-                self.say(Severity::Error, text!("The arm did not get to {what}: {why}", what = what, why = why));
+                let said = text!("The arm did not get to {what}: {why}", what = what, why = why);
+                self.say_in(Pane::Jog, Severity::Error, said);
             }
         }
     }
 
     /// A press of a jog button: one step, or the beginning of holding it.
     pub(super) fn jog(&mut self, jog: Jog) {
+        self.model.messages.is_over_in(Pane::Jog);
         match self.model.view.jog.step {
             JogStep::Hold => {
                 self.hold_jog(jog);
@@ -77,7 +86,7 @@ impl App {
                         let (what, since_s) = (text!("the next step"), self.model.now_s);
                         self.model.motion = Motion::Moving { id, what, since_s };
                     }
-                    Err(busy) => self.say(Severity::Warning, Text::verbatim(busy.to_string())),
+                    Err(busy) => self.say_in(Pane::Jog, Severity::Warning, Text::verbatim(busy.to_string())),
                 }
             }
         }
@@ -100,7 +109,7 @@ impl App {
             self.model.motion = Motion::Idle;
         }
         if let Some(why) = why {
-            self.say(Severity::Warning, text!("Jogging has ended: {why}", why = why));
+            self.say_in(Pane::Jog, Severity::Warning, text!("Jogging has ended: {why}", why = why));
         }
     }
 

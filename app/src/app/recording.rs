@@ -6,7 +6,7 @@ use handeye_core::session::CaptureId;
 
 use super::App;
 use crate::command::{Event, SolveOutcome};
-use crate::model::Step;
+use crate::model::{Dialog, Step};
 use crate::rerun_log::{Entry, ViewerWish};
 use crate::text::Language;
 
@@ -22,6 +22,13 @@ pub(super) struct Recorded {
 impl App {
     pub(super) fn open_rerun(&mut self) {
         self.recorder.open(ViewerWish::Best);
+    }
+
+    /// Shows where the web viewer is, to copy it. A dialog that somebody uses stays: the address is also behind the button.
+    pub(super) fn show_rerun_address(&mut self) {
+        if self.model.dialog.is_none() {
+            self.set_dialog(Some(Dialog::RerunAddress));
+        }
     }
 
     /// Notes what was reported. Without a recording this is a single comparison.

@@ -123,6 +123,12 @@ impl App {
         self.expect(text!("The folder was not read"), asked);
     }
 
+    /// Shows a folder in the program of the system for that.
+    pub(super) fn open_folder(&mut self, folder: PathBuf) {
+        let asked = self.desk.files(FileTask::OpenFolder(folder));
+        self.expect(text!("The folder was not opened"), asked);
+    }
+
     /// The document is now like this, on the disk.
     pub(super) fn document_changed(&mut self, state: SessionState) {
         let before = std::mem::replace(&mut self.model.session, state);

@@ -1,19 +1,15 @@
 //! Solving by itself whenever the set of captures is another.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use handeye_core::arm::ArmError;
-use handeye_core::calibrate::{Method, Observations, ObservedView, Options};
-use handeye_core::observation::{Corner, View};
+use handeye_core::calibrate::{Method, Options};
+use handeye_core::observation::Corner;
 use handeye_core::progress::Stage;
-use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
-use nalgebra::Vector6;
+use handeye_core::session::{CaptureId, Document, Role, SessionObservations};
 
 use super::App;
 use crate::command::SolveOutcome;
 use crate::model::{BoxState, Goal, JobId, Severity, SolveState, SolveStatus, WorkBox, judge_box};
-use crate::observe::camera_knowledge;
 use crate::text;
 use crate::text::Text;
 use crate::worker::{ArchiveTask, SolveJob};
@@ -101,34 +97,13 @@ impl App {
     }
 
     fn job(&self, id: JobId, document: &Document) -> SolveJob {
-        let fitted: Vec<&CaptureRecord> = document.captures.iter().filter(|it| it.role == Role::Calibration).collect();
-        let tip_by_joint = tip_by_joint(document);
-        let of_capture = |id: CaptureId| tip_by_joint.get(&id).cloned().unwrap_or_default();
-        let views = fitted.iter().map(|it| ObservedView {
-            name: it.image.clone(),
-            base_from_tip: Some(it.base_from_tip),
-            corners: self.corners(it.id).cloned(),
-            tip_by_joint: of_capture(it.id),
-            camera_from_target: None,
-            in_fit: it.is_in_use(),
-        });
-        let verification =
-            document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).filter_map(|it| {
-                let corners = self.corners(it.id)?.clone();
-                let view = View::new(it.image.clone(), it.base_from_tip, corners);
-                Some((it.id, View { tip_by_joint: of_capture(it.id), ..view }))
-            });
+        let SessionObservations { observations, captures, verification } =
+            document.observations(self.image_size(), |id| self.corners(id).cloned());
         SolveJob {
             id,
-            observations: Observations {
-                mode: Some(document.meta.mode),
-                target: document.meta.target,
-                image_size: self.image_size(),
-                camera: camera_knowledge(document.meta.camera.as_ref()),
-                views: views.collect(),
-            },
-            captures: fitted.iter().map(|it| it.id).collect(),
-            verification: verification.collect(),
+            observations,
+            captures,
+            verification,
             method: Method::by_name(&self.model.method).unwrap_or_default(),
             options: Options { keep_outliers: self.model.keep_outliers, ..Options::default() },
             goal_m: self.model.view.goal.0,
@@ -228,15 +203,4 @@ impl App {
     fn no_answer(&mut self, why: Text) {
         self.model.solve.status = SolveStatus::Failed { why };
     }
-}
-
-/// How the tip moves with each joint, by capture; empty where the joint angles are of no use.
-fn tip_by_joint(document: &Document) -> BTreeMap<CaptureId, Vec<Vector6<f64>>> {
-    document.tip_by_joint().unwrap_or_else(|why| {
-        // Too few poses to tell where the arm stands are too few for an answer, which says so itself.
-        if !matches!(why, ArmError::NotPlaced(_)) {
-            tracing::warn!("the joint angles are not used: {why}");
-        }
-        BTreeMap::new()
-    })
 }

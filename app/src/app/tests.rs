@@ -5,11 +5,11 @@ use handeye_core::session::CaptureId;
 use super::*;
 use crate::gui::sample;
 use crate::model::{
-    CapturePurpose, DepthScale, Jog, Link, LinkState, Motion, MotionOutcome, SolveStatus, StopOutcome, ThemeChoice,
-    Tour,
+    CapturePurpose, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState, Motion, MotionGoal,
+    MotionOutcome, Pane, SolveStatus, StopOutcome, ThemeChoice, Tour,
 };
 use crate::text::{Language, Text};
-use crate::worker::fake::FakeCell;
+use crate::worker::fake::{FakeCell, FakeMotions};
 
 struct Bench {
     app: App,
@@ -91,6 +91,56 @@ fn a_stop_without_connection_points_to_the_emergency_stop() {
 }
 
 #[test]
+fn leaving_brakes_an_arm_that_it_moves_and_leaves_the_arm_of_others_alone() {
+    for moves in [true, false] {
+        let cell = FakeCell::new(0);
+        cell.script().motions = FakeMotions::Hang;
+        let mut bench = bench(&cell);
+        let deadline = Instant::now() + Duration::from_mins(1);
+        let until = |app: &mut App, is_so: &dyn Fn(&Model) -> bool| {
+            while !is_so(app.model()) {
+                assert!(Instant::now() < deadline, "{}", said(app));
+                app.collect();
+                std::thread::yield_now();
+            }
+        };
+        until(&mut bench.app, &|model| model.control.is_connected() && model.mover.is_connected());
+        if moves {
+            let goal = MotionGoal::Joints([0.5; 6]);
+            bench.app.apply(Command::Move { goal, what: Text::verbatim("there") });
+            until(&mut bench.app, &|_| !cell.script().moved.is_empty());
+        }
+        let began = Instant::now();
+        drop(bench);
+        assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
+        assert_eq!(cell.script().stops, u32::from(moves));
+        assert_eq!(cell.owners(), 1, "no thread is left alone with the arm");
+    }
+}
+
+#[test]
+fn leaving_ends_in_time_while_the_cell_never_answers() {
+    let (cell, release) = FakeCell::that_never_answers();
+    let mut bench = bench(&cell);
+    bench.app.apply(Command::Stop);
+    bench.app.collect();
+    let began = Instant::now();
+    drop(bench);
+    assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
+    drop(release);
+}
+
+#[test]
+fn where_no_browser_opens_the_address_is_shown_but_never_in_place_of_what_is_in_use() {
+    let mut bench = bench(&FakeCell::new(0));
+    bench.app.absorb(Event::NoBrowser);
+    assert_eq!(bench.app.model().dialog, Some(Dialog::RerunAddress));
+    bench.app.apply(Command::SetDialog(Some(Dialog::SaveAs)));
+    bench.app.absorb(Event::NoBrowser);
+    assert_eq!(bench.app.model().dialog, Some(Dialog::SaveAs));
+}
+
+#[test]
 fn commands_and_events_survive_being_written_down() {
     let commands = [
         Command::Stop,
@@ -98,6 +148,8 @@ fn commands_and_events_survive_being_written_down() {
         Command::SetTheme(ThemeChoice::Light),
         Command::Delete(vec![CaptureId(3)]),
         Command::RunTour { purpose: Some(CapturePurpose::Verify) },
+        Command::SetFollow(Some(FollowWish::KeepViewWithRoom)),
+        Command::VerifyAtPlanned,
     ];
     for command in commands {
         let text = serde_json::to_string(&command).expect("it can be written");
@@ -114,7 +166,7 @@ fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_tour() {
     let mut bench = bench(&FakeCell::new(0));
     bench.app.model.touring = true;
     let names = vec!["a".to_owned(), "b".to_owned()];
-    bench.app.model.tour = Some(Tour { names, purpose: None, outcomes: Vec::new(), began_s: 0.0 });
+    bench.app.model.tour = Some(Tour { names, planned: None, purpose: None, outcomes: Vec::new(), began_s: 0.0 });
     let id = bench.app.numbers.motion;
     bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Refused(Text::verbatim("too far")) });
     let tour = bench.app.model().tour.clone().expect("the tour");
@@ -163,4 +215,63 @@ fn an_answer_of_the_session_before_does_not_get_into_another_one() {
     let outcome = crate::command::SolveOutcome::Failed(Text::verbatim("of the first session"));
     bench.app.absorb(Event::SolveEnded { job, outcome });
     assert_eq!(bench.app.model().solve.status, SolveStatus::Idle);
+}
+
+#[test]
+fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_leaves_nothing_that_begins() {
+    let mut bench = bench(&FakeCell::new(0));
+    bench.app.apply(Command::VerifyAtPlanned);
+    assert!(!bench.app.model().planning, "there is no calibration");
+    assert_eq!(bench.app.model().messages.newest().map(|it| it.home), Some(Home::Pane(Pane::Verify)));
+
+    bench.app.replace_model(sample::solved());
+    bench.app.apply(Command::VerifyAtPlanned);
+    assert!(bench.app.model().planning);
+    let id = bench.app.numbers.motion;
+    bench.app.apply(Command::Stop);
+    assert!(!bench.app.model().planning);
+    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
+    assert!(!bench.app.model().touring, "it was stopped");
+
+    bench.app.apply(Command::VerifyAtPlanned);
+    let id = bench.app.numbers.motion;
+    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
+    let tour = bench.app.model().tour.clone().expect("a tour");
+    assert!(bench.app.model().touring && !bench.app.model().planning);
+    assert_eq!(tour.names, ["check 1", "check 2", "check 3"]);
+    assert_eq!(tour.purpose, Some(CapturePurpose::Verify));
+    assert!(matches!(bench.app.model().motion, Motion::Moving { .. }), "it is on its way to the first");
+    bench.app.apply(Command::StopTour);
+    assert!(!bench.app.model().touring);
+
+    bench.app.apply(Command::VerifyAtPlanned);
+    let id = bench.app.numbers.motion;
+    // A motion that is asked for meanwhile is refused, and the poses still come.
+    bench.app.apply(Command::GoToCapture(CaptureId(1)));
+    let other = bench.app.numbers.motion;
+    bench.app.absorb(Event::Moved { id: other, outcome: MotionOutcome::Refused(Text::verbatim("busy")) });
+    assert!(bench.app.model().planning);
+    bench.app.absorb(Event::Planned { id, views: Err(Text::verbatim("the board is too far")) });
+    assert!(!bench.app.model().planning && !bench.app.model().touring);
+    assert_eq!(said(&bench.app), "There are no poses to verify at: the board is too far");
+}
+
+#[test]
+fn why_following_ended_stands_in_its_pane_and_what_was_asked_for_is_no_warning() {
+    let mut bench = bench(&FakeCell::new(0));
+    let mut model = sample::tracking();
+    model.track.follow = FollowStatus::Off;
+    bench.app.replace_model(model);
+    bench.app.apply(Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
+    let id = bench.app.numbers.follow.expect("it follows");
+    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Failed(Text::verbatim("joint 3 is at its limit")) });
+    let newest = bench.app.model().messages.newest().expect("said").clone();
+    assert_eq!((newest.home, newest.severity), (Home::Pane(Pane::Track), crate::model::Severity::Warning));
+    assert!(matches!(bench.app.model().track.follow, FollowStatus::Ended(_)));
+
+    bench.app.apply(Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
+    assert_eq!(bench.app.model().track.follow, FollowStatus::Off, "the reason before is no longer so");
+    let id = bench.app.numbers.follow.expect("it follows");
+    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Stopped });
+    assert_eq!(bench.app.model().messages.newest().map(|it| it.home), Some(Home::StatusLine));
 }

@@ -1,9 +1,18 @@
-//! Visiting all taught poses, with a capture at each.
+//! Visiting all taught poses, or poses that are planned to verify at, with a capture at each.
+
+use handeye_core::handeye::HandEye;
+use handeye_sim_link::client::cell::{BoardInView, JointAngles};
 
 use super::App;
-use crate::model::{CapturePurpose, CaptureRefused, MotionOutcome, RefusalKind, Severity, StopOutcome, Tour};
+use crate::model::{
+    CapturePurpose, CaptureRefused, MotionGoal, MotionId, MotionOutcome, Pane, Severity, StopOutcome, Tour,
+};
 use crate::text;
 use crate::text::Text;
+use crate::worker::ViewsRequest;
+
+/// Poses that are planned to verify at: enough for an average and a scatter, and over within a minute or two.
+const VERIFYING: usize = 5;
 
 impl App {
     pub(super) fn run_tour(&mut self, purpose: Option<CapturePurpose>) {
@@ -12,9 +21,73 @@ impl App {
             self.say(Severity::Warning, text!("There are no taught poses: teach some, or take the reference poses"));
             return;
         }
-        self.model.tour = Some(Tour { names, purpose, outcomes: Vec::new(), began_s: self.model.now_s });
+        self.begin_tour(Tour { names, planned: None, purpose, outcomes: Vec::new(), began_s: self.model.now_s });
+    }
+
+    fn begin_tour(&mut self, tour: Tour) {
+        self.model.tour = Some(tour);
         self.model.touring = true;
         self.next_stop();
+    }
+
+    /// Has poses planned that differ from all captures, to verify at.
+    pub(super) fn plan_verification(&mut self) {
+        if self.model.touring || self.model.planning {
+            return;
+        }
+        let board = self.model.calibrated().and_then(|calibrated| match calibrated.hand_eye {
+            HandEye::EyeInHand { tip_from_camera, base_from_target } => Some(BoardInView {
+                base_from_target,
+                target: self.model.document().meta.target,
+                intrinsics: calibrated.intrinsics,
+                tip_from_camera,
+            }),
+            HandEye::EyeToHand { .. } => None,
+        });
+        let Some(board) = board else {
+            let why = text!("Poses to verify at are planned with a calibration of a camera on the tip only");
+            return self.say_in(Pane::Verify, Severity::Warning, why);
+        };
+        let taken =
+            self.model.document().captures.iter().filter(|it| !it.excluded).map(|it| it.base_from_tip).collect();
+        self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
+        self.model.messages.is_over_in(Pane::Verify);
+        let request = ViewsRequest { board, taken, count: VERIFYING };
+        let asked = self.workers.plan_views(self.numbers.motion, request);
+        self.model.planning = asked.is_ok();
+        self.numbers.plan = asked.is_ok().then_some(self.numbers.motion);
+        self.expect(text!("No poses are planned"), asked);
+    }
+
+    /// The poses are planned, or cannot be.
+    pub(super) fn planned(&mut self, id: MotionId, views: Result<Vec<JointAngles>, Text>) {
+        // After a stop nothing begins by itself any more.
+        if self.numbers.plan != Some(id) || !self.model.planning {
+            return;
+        }
+        self.model.planning = false;
+        match views {
+            Ok(joints) => self.begin_tour(Tour {
+                names: (1..=joints.len()).map(|number| format!("check {number}")).collect(),
+                planned: Some(joints),
+                purpose: Some(CapturePurpose::Verify),
+                outcomes: Vec::new(),
+                began_s: self.model.now_s,
+            }),
+            Err(why) => {
+                let said = text!("There are no poses to verify at: {why}", why = why);
+                self.say_in(Pane::Verify, Severity::Warning, said);
+            }
+        }
+    }
+
+    /// Nothing is planned after all: the arm does something else, or was stopped.
+    pub(super) fn plan_refused(&mut self, outcome: &MotionOutcome) {
+        self.model.planning = false;
+        if let MotionOutcome::Refused(why) | MotionOutcome::Failed(why) = outcome {
+            let said = text!("There are no poses to verify at: {why}", why = why.clone());
+            self.say_in(Pane::Verify, Severity::Warning, said);
+        }
     }
 
     pub(super) fn stop_tour(&mut self) {
@@ -28,16 +101,25 @@ impl App {
         let Some(tour) = self.model.tour.as_ref().filter(|_| self.model.touring) else { return };
         if let Some(name) = tour.current() {
             let name = name.to_owned();
-            self.go_to_taught(&name);
+            let planned = tour.planned.as_ref().and_then(|joints| joints.get(tour.outcomes.len()));
+            match planned.copied() {
+                Some(joints) => self.start_motion(MotionGoal::Joints(joints), text!("pose {name}", name = name)),
+                None => self.go_to_taught(&name),
+            }
             return;
         }
+        let pane = pane_of(tour);
         let of = tour.names.len();
         let done = tour.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
         let took_s = self.model.now_s - tour.began_s;
         self.model.touring = false;
         let severity = if done == of { Severity::Info } else { Severity::Warning };
         let took = format!("{took_s:.0}");
-        self.say(severity, text!("Tour ended: {done} of {of} poses in {took} s", done = done, of = of, took = took));
+        let said = text!("Tour ended: {done} of {of} poses in {took} s", done = done, of = of, took = took);
+        match severity {
+            Severity::Info => self.say(severity, said),
+            _ => self.say_in(pane, severity, said),
+        }
     }
 
     fn end_stop(&mut self, outcome: StopOutcome) {
@@ -71,22 +153,26 @@ impl App {
         }
     }
 
-    /// There is no capture at this pose. What concerns this pose alone does not end the tour.
+    /// There is no capture at this pose.
     pub(super) fn tour_refused(&mut self, refused: &CaptureRefused) {
         if !self.model.touring {
             return;
         }
-        match refused.kind {
-            RefusalKind::NoBoard | RefusalKind::Blurred | RefusalKind::TooSimilar | RefusalKind::NotSettled => {
-                self.end_stop(StopOutcome::Skipped(refused.why.clone()));
-            }
-            RefusalKind::NoPictures | RefusalKind::Cancelled | RefusalKind::NotSaved => self.break_off(),
+        if refused.kind.concerns_the_pose() {
+            self.end_stop(StopOutcome::Skipped(refused.why.clone()));
+        } else {
+            self.break_off();
         }
     }
 
     fn break_off(&mut self) {
         self.model.touring = false;
-        let text: Text = text!("The tour was broken off; what was captured is kept");
-        self.say(Severity::Warning, text);
+        let pane = self.model.tour.as_ref().map_or(Pane::Taught, pane_of);
+        self.say_in(pane, Severity::Warning, text!("The tour was broken off; what was captured is kept"));
     }
+}
+
+/// Where it says how it went.
+fn pane_of(tour: &Tour) -> Pane {
+    if tour.is_planned() { Pane::Verify } else { Pane::Taught }
 }

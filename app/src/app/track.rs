@@ -6,8 +6,8 @@ use handeye_core::track::{MotionModel, Setup};
 
 use super::App;
 use crate::model::{
-    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, Motion, MotionId, MotionOutcome, Severity, TrackPoint,
-    Tracked,
+    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, Motion, MotionId, MotionOutcome, Pane, Severity,
+    TrackPoint, Tracked,
 };
 use crate::text;
 use crate::text::Text;
@@ -89,9 +89,10 @@ impl App {
         }
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         let id = self.numbers.motion;
-        match self.workers.follow(id, wish) {
+        match self.workers.follow(id, wish, self.model.view.jog.speed) {
             Ok(()) => {
                 self.numbers.follow = Some(id);
+                self.model.track.follow = FollowStatus::Off;
                 let what = text!("the board");
                 self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
                 self.say(Severity::Info, text!("The arm follows the board"));
@@ -110,11 +111,15 @@ impl App {
     pub(super) fn follow_ended(&mut self, outcome: MotionOutcome) {
         self.numbers.follow = None;
         self.model.track.wish = None;
-        let why = match outcome {
-            MotionOutcome::Arrived | MotionOutcome::Stopped => text!("it was stopped"),
-            MotionOutcome::Refused(why) | MotionOutcome::Failed(why) => why,
+        let (severity, why) = match outcome {
+            MotionOutcome::Arrived | MotionOutcome::Stopped => (Severity::Info, text!("it was stopped")),
+            MotionOutcome::Refused(why) | MotionOutcome::Failed(why) => (Severity::Warning, why),
         };
-        self.say(Severity::Warning, text!("The arm does not follow the board: {why}", why = why.clone()));
+        let said = text!("The arm does not follow the board: {why}", why = why.clone());
+        match severity {
+            Severity::Info => self.say(severity, said),
+            _ => self.say_in(Pane::Track, severity, said),
+        }
         self.model.track.follow = FollowStatus::Ended(why);
     }
 

@@ -1,6 +1,7 @@
 //! `handeye auto`: poses, captures, result and exports from one command.
 
 mod poses;
+mod tour;
 
 use std::path::{Path, PathBuf};
 
@@ -8,22 +9,22 @@ use clap::Args;
 use handeye_core::arm::ArmModel;
 use handeye_core::calibrate::{Method, Options};
 use handeye_core::handeye::{HandEye, Mode};
-use handeye_core::poses_file::Goal;
-use handeye_core::progress::CancelToken;
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::{Capture, FolderLock, GroundTruth, Session, SessionMeta, Store};
+use handeye_core::session::{FolderLock, GroundTruth, Session, SessionMeta, Store};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{CellClient, CellPaths, Frame, MotionTolerance, SettleOptions};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError};
+use handeye_sim_link::client::cell::{CellClient, CellPaths};
+use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use time::OffsetDateTime;
 use time::macros::format_description;
 
 use super::cell::SceneArg;
-use super::{Failure, RerunArg, record, report, rerun_arg, solve};
-use crate::model::Step;
-use crate::rerun_log::{Entry, Pace, Recorder, RerunChoice};
+use super::output::Output;
+use super::{Failure, RerunArg, out, record, rerun_arg, solve};
+use crate::model::{CaptureOptions, Step};
+use crate::rerun_log::{Entry, Pace, RerunChoice};
 use crate::session_start::{BOARD, BUILT_IN_ARM};
 use poses::Plan;
+use solve::Solution;
+use tour::Tour;
 
 /// Options of `handeye auto`.
 #[derive(Debug, Args)]
@@ -37,9 +38,9 @@ pub struct AutoArgs {
     /// Folder of the session; a new one under `sessions` if not given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write the result as JSON to this file too.
+    /// Write the result as JSON to this file too; `-` for standard output instead of the report.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     #[command(flatten)]
     scene: SceneArg,
     /// Seed of everything random in the built-in cell, and of planned poses.
@@ -48,6 +49,9 @@ pub struct AutoArgs {
     /// Run the built-in cell like real time instead of as fast as it can.
     #[arg(long)]
     real_time: bool,
+    /// Images that are averaged for each capture.
+    #[arg(long, value_name = "N", default_value_t = CaptureOptions::default().frames, value_parser = clap::value_parser!(u32).range(1..=64))]
+    frames: u32,
     #[command(flatten)]
     rerun: RerunArg,
 }
@@ -91,7 +95,16 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     recorder.note(Entry::Step(Step::Capture));
     record::document(&recorder, &session);
     record::cell(&recorder, cell.arm(), &truth).map_err(Failure::failed)?;
-    let captured = capture_all(&mut cell, &plan, args.real_time, &mut session, &recorder, &cancel);
+    let captured = Tour {
+        cell: &mut cell,
+        plan: &plan,
+        options: CaptureOptions { frames: args.frames, ..CaptureOptions::default() },
+        real_time: args.real_time,
+        session: &mut session,
+        recorder: &recorder,
+        cancel: &cancel,
+    }
+    .run();
     // Whatever happened on the way, the arm is not left moving and the simulation not running or waiting for steps.
     let ended = cell.stop().and_then(|()| {
         let sim = cell.arm().sim();
@@ -110,21 +123,20 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     drop(server);
 
     let solution = solve::folder(&folder, Method::Joint, Options::default(), Some(record::known(&truth)), &cancel)?;
-    finish(&session, args.json.as_deref(), solution.result())?;
+    finish(&session, args.json.as_ref(), &solution)?;
     solution.note(&recorder);
     rerun_arg::finish(recorder, &cancel)
 }
 
-fn finish(session: &Store, json: Option<&Path>, result: &CalibrationResult) -> Result<(), Failure> {
-    let folder = session.folder();
+fn finish(session: &Store, json: Option<&Output>, solution: &Solution) -> Result<(), Failure> {
+    let (folder, result) = (session.folder(), solution.result());
     session.write_result(result).map_err(Failure::failed)?;
     solve::write_exports(&folder.join("exports"), result)?;
-    if let Some(file) = json {
-        result.write(file).map_err(Failure::failed)?;
+    solution.publish(json)?;
+    if json.is_some_and(Output::is_standard) {
+        return Ok(());
     }
-    print!("{}", report::text(result));
-    println!("session: {}", folder.display());
-    Ok(())
+    out::line(format_args!("session: {}", folder.display()))
 }
 
 /// Moves a session that is already there out of the way: nothing captured is ever overwritten. A session that another
@@ -174,61 +186,4 @@ fn meta(
         }),
         arm,
     })
-}
-
-/// Visits every pose and captures there. A pose that the arm cannot reach is named and left out; anything else ends it.
-fn capture_all(
-    cell: &mut CellClient,
-    plan: &Plan,
-    real_time: bool,
-    session: &mut Store,
-    recorder: &Recorder,
-    cancel: &CancelToken,
-) -> Result<(), Failure> {
-    let info = cell.info().clone();
-    // Stepped, a pass takes as long as it takes, and the same command gives the same pictures on every machine.
-    let sim = cell.arm().sim();
-    sim.set_stepping(!real_time).and_then(|()| sim.start_simulation()).map_err(Failure::failed)?;
-    if let Some(start) = &plan.start_joints {
-        cell.move_to_joints(start, &plan.joint_limits, cancel).map_err(Failure::failed)?;
-    }
-    for (index, (name, goal)) in plan.goals.iter().enumerate() {
-        let moved = match goal {
-            Goal::Tip(pose) => cell.move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), cancel),
-            Goal::Joints(joints) => joints.as_slice().try_into().map_or_else(
-                |_wrong_length| {
-                    Err(LinkError::BadMotion { what: "the goal", expected: "six joints", value: joints.len() as f64 })
-                },
-                |joints| cell.move_to_joints(joints, &plan.joint_limits, cancel),
-            ),
-        };
-        match moved {
-            Ok(()) => {}
-            Err(error @ LinkError::Unreached { .. }) => {
-                tracing::warn!("pose {name:?} is left out: {error}");
-                continue;
-            }
-            Err(error) => return Err(Failure::failed(error)),
-        }
-        // An arm that still swings, or a picture from before it stood, would be a capture in motion.
-        cell.arm().settle(&SettleOptions::default(), cancel).map_err(Failure::failed)?;
-        let frame = cell.grab().map_err(Failure::failed)?;
-        store(session, &frame, name)?;
-        record::capture(recorder, &info, index as u64 + 1, frame, session);
-        tracing::info!("pose {} of {} captured ({name})", index + 1, plan.goals.len());
-    }
-    Ok(())
-}
-
-fn store(session: &mut Store, frame: &Frame, pose_name: &str) -> Result<(), Failure> {
-    session
-        .add_capture(&Capture {
-            depth_m: Some(&frame.depth),
-            joints_rad: Some(&frame.joints),
-            sim_time_s: Some(frame.sim_time_s),
-            pose_name: Some(pose_name),
-            ..Capture::new(&frame.rgb, frame.base_from_tip)
-        })
-        .map_err(Failure::failed)?;
-    Ok(())
 }

@@ -6,7 +6,8 @@ use clap::Args;
 use handeye_core::calibrate::{Method, Options};
 
 use super::gate::Gate;
-use super::{Failure, RerunArg, report, rerun_arg, solve};
+use super::output::Output;
+use super::{Failure, RerunArg, rerun_arg, solve};
 use crate::rerun_log::{Pace, RerunChoice};
 
 /// Options of `handeye calibrate`.
@@ -16,7 +17,7 @@ pub struct CalibrateArgs {
     path: PathBuf,
     /// Write the result as JSON to this file; `-` for standard output instead of the report.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Which answer: the joint estimate, or one closed form.
     #[arg(long, value_name = "NAME", default_value = "joint", value_parser = Method::names())]
     method: String,
@@ -55,16 +56,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     if let Some(folder) = &args.out {
         solve::write_exports(folder, result)?;
     }
-    match &args.json {
-        Some(file) if file.as_os_str() == "-" => {
-            println!("{}", result.to_json().map_err(Failure::failed)?);
-        }
-        Some(file) => {
-            result.write(file).map_err(Failure::failed)?;
-            print!("{}", report::text(result));
-        }
-        None => print!("{}", report::text(result)),
-    }
+    solution.publish(args.json.as_ref())?;
     solution.note(&recorder);
     rerun_arg::finish(recorder, &cancel)?;
     let failures: Vec<String> = args.gate.iter().filter_map(|gate| gate.failure(&result.quality)).collect();

@@ -7,12 +7,12 @@ use clap::Args;
 use handeye_sim_link::cell::scene::{BoardPath, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 
-use super::{Failure, solve};
+use super::{Failure, out, solve};
 
 /// Options of `handeye cell`.
 #[derive(Debug, Args)]
 pub struct CellArgs {
-    /// Address of the network interface to serve on.
+    /// Address of the network interface to serve on. Whoever can connect can move the arm: there is no password.
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1")]
     bind: String,
     /// Port; 0 picks one that is free.
@@ -87,14 +87,22 @@ const POLL: Duration = Duration::from_millis(100);
 
 pub fn run(args: &CellArgs) -> Result<(), Failure> {
     let server = CellServer::start(CellConfig {
-        scene: args.scene()?,
         seed: args.seed,
         bind: args.bind.clone(),
         port: args.port,
         real_time: args.fast.then_some(false),
+        ..CellConfig::new(args.scene()?)
     })
     .map_err(Failure::failed)?;
-    println!("listening on {}", server.endpoint());
+    if !server.is_local() {
+        // Even when quiet: nobody should learn of it from somebody else.
+        out::note(format_args!(
+            "warning: everybody on the network who reaches {} can move the arm and see its images, and there is no \
+             password; --bind 127.0.0.1 serves this machine alone",
+            server.endpoint()
+        ));
+    }
+    out::line(format_args!("listening on {}", server.endpoint()))?;
     let cancel = solve::cancel_on_ctrl_c();
     while !cancel.is_cancelled() {
         std::thread::sleep(POLL);

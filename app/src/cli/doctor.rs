@@ -1,17 +1,15 @@
 //! `handeye doctor`: what is wrong with a session or a dataset folder.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::atomic_file;
 use handeye_core::calibrate::{CalibrateError, Method, calibrate};
-use handeye_core::dataset::Dataset;
-use handeye_core::doctor::{Diagnosis, diagnose};
+use handeye_core::doctor::diagnose;
 use handeye_core::findings::FindingOptions;
 use handeye_core::handeye::HandEyeError;
-use handeye_core::session::Session;
 
-use super::{Failure, solve};
+use super::output::Output;
+use super::{Failure, out, solve};
 
 /// Options of `handeye doctor`.
 #[derive(Debug, Args)]
@@ -20,7 +18,7 @@ pub struct DoctorArgs {
     path: PathBuf,
     /// Write the diagnosis as JSON to this file; `-` for standard output instead of the report.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// The expected error to reach, millimetres (95 %).
     #[arg(long, value_name = "MM")]
     goal: Option<f64>,
@@ -29,12 +27,7 @@ pub struct DoctorArgs {
 /// Prints the diagnosis. A session that is ill is an answer, not a failure: the exit code is 0.
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
-    let dataset = Dataset::read(&args.path).map_err(Failure::unusable)?;
-    let mut observations = solve::observations(&dataset, &cancel)?;
-    if Session::is_session(&args.path) {
-        let session = Session::open(&args.path).map_err(Failure::unusable)?;
-        solve::add_excluded(&session.document, &mut observations);
-    }
+    let observations = solve::read(&args.path, &cancel)?.seen.observations;
     let calibration = match calibrate(&observations, Method::Joint, &cancel) {
         Ok(calibration) => Some(calibration),
         Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => {
@@ -51,22 +44,9 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     if cancel.is_cancelled() {
         return Err(Failure::failed(HandEyeError::Cancelled));
     }
-    match &args.json {
-        Some(file) if file.as_os_str() == "-" => println!("{}", json(&diagnosis)?),
-        Some(file) => {
-            write(file, &json(&diagnosis)?)?;
-            print!("{}", diagnosis.report());
-        }
-        None => print!("{}", diagnosis.report()),
+    if let Some(output) = &args.json {
+        let text = serde_json::to_string_pretty(&diagnosis).map_err(Failure::failed)?;
+        output.write(format!("{text}\n").as_bytes())?;
     }
-    Ok(())
-}
-
-fn json(diagnosis: &Diagnosis) -> Result<String, Failure> {
-    serde_json::to_string_pretty(diagnosis).map_err(Failure::failed)
-}
-
-fn write(file: &Path, text: &str) -> Result<(), Failure> {
-    atomic_file::write(file, format!("{text}\n").as_bytes())
-        .map_err(|error| Failure::failed(anyhow::anyhow!("cannot write {}: {error}", file.display())))
+    if args.json.as_ref().is_some_and(Output::is_standard) { Ok(()) } else { out::print(&diagnosis.report()) }
 }

@@ -7,8 +7,9 @@ use clap::Args;
 use handeye_core::dataset::{self, Dataset};
 use handeye_core::export::{self, CameraLink, ExportError, ExportInput, ExportNames, ExportView, Format};
 use handeye_core::result::CalibrationResult;
+use handeye_core::session::{CaptureRecord, Session};
 
-use super::{Failure, solve};
+use super::{Failure, out, solve};
 
 /// What `calibrate --out` and `export --format json` call the result.
 const EXPORTED_RESULT: &str = "calibration.json";
@@ -85,7 +86,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Failure> {
     let written = export::write_all(&args.out, &formats, &input)
         .map_err(|error| if error.is_bad_input() { Failure::unusable(error) } else { Failure::failed(error) })?;
     for path in written {
-        println!("{}", path.display());
+        out::line(path.display())?;
     }
     Ok(())
 }
@@ -113,9 +114,15 @@ fn needs_views(format: &dyn Format, input: &ExportInput<'_>) -> bool {
     matches!(export::preview(format, input), Err(ExportError::NeedsViews { .. }))
 }
 
-/// Images with robot poses of the dataset that a result lies in; empty where there is no dataset.
+/// Images with robot poses of the session or data set that a result lies in; empty where there is none.
 fn read_views(path: &Path) -> Result<Vec<ExportView>, Failure> {
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(path) };
+    if Session::is_session(folder) {
+        let session = Session::open(folder).map_err(Failure::unusable)?;
+        let view =
+            |capture: &CaptureRecord| ExportView { name: capture.image.clone(), base_from_tip: capture.base_from_tip };
+        return Ok(session.document.in_use().map(view).collect());
+    }
     if !folder.join(dataset::DESCRIPTION).is_file() {
         return Ok(Vec::new());
     }

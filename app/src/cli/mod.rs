@@ -10,6 +10,8 @@ mod doctor;
 mod export;
 mod failure;
 mod gate;
+mod out;
+mod output;
 mod record;
 pub(crate) mod report;
 pub mod rerun_arg;
@@ -17,7 +19,7 @@ mod solve;
 mod target;
 mod track;
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
@@ -85,11 +87,11 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // `--help` and `--version` are answers, not errors; clap prints each to its proper stream.
-            let code = if error.use_stderr() { 2 } else { 0 };
-            if error.print().is_err() {
-                return ExitCode::from(1);
+            let printed = error.print().and_then(|()| std::io::stdout().flush());
+            if error.use_stderr() {
+                return ExitCode::from(2);
             }
-            return ExitCode::from(code);
+            return ended(out::finished(printed, "standard output"));
         }
     };
     start_logging(cli.quiet);
@@ -103,10 +105,14 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Target(args) => target::run(&args),
     };
+    ended(result)
+}
+
+fn ended(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("error: {failure}");
+            out::note(format_args!("error: {failure}"));
             ExitCode::from(failure.exit_code())
         }
     }
@@ -120,7 +126,7 @@ fn start_logging(quiet: bool) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr)
+        .with_writer(|| out::Log)
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
         .without_time()

@@ -7,7 +7,7 @@ use handeye_core::session::Store;
 use handeye_sim_link::client::LinkError;
 use handeye_sim_link::client::cell::{Arm, CellInfo, Frame, GroundTruth};
 
-use crate::model::{CellFacts, FrameImages, FrameInfo, Truth};
+use crate::model::{CellFacts, FrameImages, FrameInfo, LiveFrame, Truth};
 use crate::rerun_log::{Entry, Recorder};
 
 /// The cell and what it publishes of itself.
@@ -35,24 +35,35 @@ pub fn known(truth: &GroundTruth) -> Truth {
     Truth { tip_from_camera, base_from_target, intrinsics }
 }
 
-/// A capture: the robot, the picture, and the session with it.
-pub fn capture(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame, session: &Store) {
+/// A capture: the robot, the last of its pictures, and the session with it.
+pub fn capture(recorder: &Recorder, last: LiveFrame, session: &Store) {
     if recorder.is_on() {
-        picture(recorder, info, number, frame);
+        note(recorder, last);
         document(recorder, session);
     }
 }
 
 /// The robot and the picture.
 pub fn picture(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame) {
+    // There is no clock of a window here.
+    let received_s = frame.sim_time_s;
+    note(recorder, live_frame(info, number, received_s, frame));
+}
+
+fn note(recorder: &Recorder, LiveFrame { info, images }: LiveFrame) {
+    let FrameInfo { sim_time_s, base_from_tip, joints_rad, .. } = info;
+    recorder.note(Entry::Robot { sim_time_s, base_from_tip, joints_rad });
+    recorder.note(Entry::Picture { info, images });
+}
+
+/// Pictures as the window has them, without colours of depths: those are the window's, and a viewer has its own.
+pub fn live_frame(info: &CellInfo, number: u64, received_s: f64, frame: Frame) -> LiveFrame {
     let Frame { rgb, depth, sim_time_s, base_from_tip, joints, base_from_target_true } = frame;
-    recorder.note(Entry::Robot { sim_time_s, base_from_tip, joints_rad: joints });
     let depth_range_m = [info.depth_optics.near_m as f32, info.depth_optics.far_m as f32];
     let info = FrameInfo {
         number,
         sim_time_s,
-        // There is no clock of a window here.
-        received_s: sim_time_s,
+        received_s,
         rate_hz: 0.0,
         depth_range_m,
         far_plane_m: depth_range_m[1],
@@ -60,9 +71,7 @@ pub fn picture(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame) 
         joints_rad: joints,
         base_from_target_true,
     };
-    // The colours of depths are the window's; a viewer has its own.
-    let depth_coloured = RgbImage::default();
-    recorder.note(Entry::Picture { info, images: Arc::new(FrameImages { rgb, depth, depth_coloured }) });
+    LiveFrame { info, images: Arc::new(FrameImages { rgb, depth, depth_coloured: RgbImage::default() }) }
 }
 
 /// The session as it is now.

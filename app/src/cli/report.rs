@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use handeye_core::handeye::Mode;
 use handeye_core::result::{CalibrationResult, MethodStatus, TransformEstimate, ViewStatus};
 
+use crate::model::Solved;
+
 /// The report. It ends with a newline.
 pub fn text(result: &CalibrationResult) -> String {
     let mut out = String::new();
@@ -172,6 +174,33 @@ fn truth(out: &mut String, result: &CalibrationResult) {
         show(truth.rotation_error_deg, "°"),
         show(truth.focal_error_percent, " %")
     );
+}
+
+/// How the answer does on captures that never entered the fit; nothing when there are none.
+pub fn verification(solved: &Solved) -> String {
+    let mut out = String::new();
+    match &solved.verification {
+        None => {}
+        Some(Err(error)) => line!(out, "verification: {error}"),
+        Some(Ok(verification)) => {
+            let captures = match verification.captures.len() {
+                1 => "1 capture that was".to_owned(),
+                count => format!("{count} captures that were"),
+            };
+            line!(
+                out,
+                "verification on {captures} not in the fit: {:.4} px RMS, middle of the board {:.3} mm and {:.4}° RMS",
+                verification.rms_px,
+                verification.centre_rms_m * 1e3,
+                verification.orientation_rms_rad.to_degrees()
+            );
+            for check in &verification.captures {
+                let mm = check.centre_error_m.norm() * 1e3;
+                line!(out, "  {:<24} {:.4} px  {mm:.3} mm", check.name, check.rms_px);
+            }
+        }
+    }
+    out
 }
 
 fn methods(out: &mut String, result: &CalibrationResult) {

@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use clap::Args;
 use handeye_core::progress::CancelToken;
 
-use super::Failure;
+use super::{Failure, out};
 use crate::model::ViewerState;
 use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice};
 use crate::text::Language;
@@ -105,7 +105,7 @@ impl RerunArg {
         if self.rerun == Some(RerunChoice::Web)
             && let ViewerState::Web { url } = opened(&recorder, &CancelToken::default())
         {
-            eprintln!("the recording is shown at {url}");
+            out::note(format_args!("the recording is shown at {url}"));
         }
         Ok(recorder)
     }
@@ -131,13 +131,13 @@ pub fn finish(mut recorder: Recorder, cancel: &CancelToken) -> Result<(), Failur
     let mut failed = None;
     match opened(&recorder, cancel) {
         ViewerState::Web { url } => {
-            eprintln!("the recording is shown at {url} until Ctrl-C");
+            out::note(format_args!("the recording is shown at {url} until Ctrl-C"));
             while !cancel.is_cancelled() {
                 std::thread::sleep(LOOK);
             }
         }
         ViewerState::Native => {
-            eprintln!("the recording is shown until the viewer is closed, or Ctrl-C");
+            out::note("the recording is shown until the viewer is closed, or Ctrl-C");
             while recorder.state().viewer == ViewerState::Native && !cancel.is_cancelled() {
                 std::thread::sleep(LOOK);
             }

@@ -4,28 +4,108 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{Method, Observations, ObservedView, Options};
-use handeye_core::dataset::Dataset;
+use anyhow::anyhow;
+use handeye_core::calibrate::{Method, ObservedView, Options};
+use handeye_core::dataset::template::{CHOICE, template};
+use handeye_core::dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
 use handeye_core::export::{self, ExportInput, ExportNames};
 use handeye_core::handeye::Mode;
 use handeye_core::progress::CancelToken;
 use handeye_core::result::CalibrationResult;
-use handeye_core::session::{self, CaptureId, CaptureRecord, Document, Role, Session, SessionMeta};
+use handeye_core::session::{
+    self, CaptureId, CaptureRecord, Document, Role, Session, SessionMeta, SessionObservations,
+};
 
-use super::Failure;
+use super::output::Output;
+use super::{Failure, out, report};
 use crate::model::{Goal, JobId, Observed, Solved, Step, Truth};
-use crate::observe::{ObserveError, observe};
+use crate::observe::{ObserveError, observe, observe_session};
 use crate::rerun_log::{Entry, Recorder};
 use crate::worker::{self, SolveJob};
 
 /// Name of the result in a session.
 pub const RESULT_FILE: &str = session::RESULT;
 
+/// What a folder holds: a session by its document, whatever else lies in it, or a data set.
+pub struct Input {
+    /// The captures; of a data set as a session would have them.
+    pub document: Arc<Document>,
+    /// What was observed in them.
+    pub seen: SessionObservations,
+    /// Digest of what the fit is made from.
+    pub sha256: String,
+}
+
+/// Reads a folder and finds the target in its images.
+pub fn read(folder: &Path, cancel: &CancelToken) -> Result<Input, Failure> {
+    let progress = |done: usize, of: usize| tracing::debug!(done, of, "image");
+    let input = if Session::is_session(folder) {
+        let session = Session::open(folder).map_err(Failure::unusable)?;
+        if session.document.captures.is_empty() {
+            let folder = folder.display();
+            return Err(Failure::unusable(anyhow!(
+                "{folder} has no captures: capture the board in the window or by auto"
+            )));
+        }
+        let seen = observe_session(&session, &progress, cancel).map_err(not_observed)?;
+        let sha256 = session.input_sha256().map_err(Failure::unusable)?;
+        Input { document: session.document, seen, sha256 }
+    } else {
+        let dataset = Dataset::read(folder).map_err(|error| not_a_data_set(folder, error))?;
+        let observations = observe(&dataset, &progress, cancel).map_err(not_observed)?;
+        let document = as_document(&dataset);
+        let id_of = |view: &ObservedView| {
+            let capture = document.captures.iter().find(|capture| capture.image == view.name);
+            capture.map_or(CaptureId(0), |capture| capture.id)
+        };
+        let captures = observations.views.iter().map(id_of).collect();
+        let sha256 = dataset.input_sha256().map_err(Failure::unusable)?;
+        let seen = SessionObservations { observations, captures, verification: Vec::new() };
+        Input { document: Arc::new(document), seen, sha256 }
+    };
+    let views = &input.seen.observations.views;
+    let found = views.iter().filter(|view| view.corners.is_some()).count();
+    tracing::info!("target found in {found} of {} images", views.len());
+    if !input.seen.verification.is_empty() {
+        tracing::info!("{} captures verify the answer and are not in the fit", input.seen.verification.len());
+    }
+    Ok(input)
+}
+
+fn not_observed(error: ObserveError) -> Failure {
+    match error {
+        ObserveError::Dataset(_) | ObserveError::Session(_) => Failure::unusable(error),
+        ObserveError::Vision { .. } | ObserveError::Cancelled => Failure::failed(error),
+    }
+}
+
+/// A folder that nobody has described yet is answered with a description to fill in.
+fn not_a_data_set(folder: &Path, error: DatasetError) -> Failure {
+    // Empty is what a shell makes of it before the template is written into it.
+    let is_undescribed = match error.problem {
+        DatasetProblem::NotADataset => folder.is_dir(),
+        DatasetProblem::Empty(_) => error.file == folder.join(DESCRIPTION),
+        _ => false,
+    };
+    if !is_undescribed {
+        return Failure::unusable(error);
+    }
+    let Some(template) = template(folder) else { return Failure::unusable(error) };
+    if let Err(unprinted) = out::print(&template) {
+        return unprinted;
+    }
+    Failure::unusable(anyhow!(
+        "{} has no dataset.toml, or an empty one: the text on standard output is one with what was found; save it in the \
+         folder under this name and take in what is true of the lines that begin with {:?}",
+        folder.display(),
+        CHOICE.trim_end()
+    ))
+}
+
 /// The answer for a folder, with all that led to it.
 pub struct Solution {
     folder: PathBuf,
-    document: Arc<Document>,
-    observations: Observations,
+    input: Input,
     solved: Arc<Solved>,
 }
 
@@ -35,18 +115,35 @@ impl Solution {
         &self.solved.result
     }
 
+    /// All of it for a person. It ends with a newline.
+    fn report(&self) -> String {
+        report::text(self.result()) + &report::verification(&self.solved)
+    }
+
+    /// Writes the JSON where it is wanted and prints the report, unless the JSON is printed in its place.
+    pub fn publish(&self, json: Option<&Output>) -> Result<(), Failure> {
+        if let Some(output) = json {
+            let text = self.result().to_json().map_err(Failure::failed)?;
+            output.write(text.as_bytes())?;
+        }
+        if json.is_some_and(Output::is_standard) { Ok(()) } else { out::print(&self.report()) }
+    }
+
     /// Records captures, corners and answer.
     pub fn note(&self, recorder: &Recorder) {
         if !recorder.is_on() {
             return;
         }
         recorder.note(Entry::Step(Step::Solve));
-        let (folder, document) = (Some(self.folder.clone()), Arc::clone(&self.document));
+        let (folder, document) = (Some(self.folder.clone()), Arc::clone(&self.input.document));
         recorder.note(Entry::Document { folder, document });
-        for (view, id) in self.observations.views.iter().zip(&self.solved.captures) {
+        let SessionObservations { observations, captures, verification } = &self.input.seen;
+        let fitted = captures.iter().zip(&observations.views).map(|(id, view)| (id, view.corners.clone()));
+        let verifying = verification.iter().map(|(id, view)| (id, Some(view.corners.clone())));
+        for (id, corners) in fitted.chain(verifying) {
             let observed = Observed {
-                corners: view.corners.clone(),
-                image_size: self.observations.image_size,
+                corners,
+                image_size: observations.image_size,
                 // Nobody looks at small copies here.
                 thumbnail: Arc::default(),
             };
@@ -56,7 +153,8 @@ impl Solution {
     }
 }
 
-/// Reads a folder, finds the target in its images and calibrates. The truth is only compared with.
+/// Reads a folder, finds the target in its images, calibrates, and checks the answer on the captures that are kept for it.
+/// The truth is only compared with.
 pub fn folder(
     path: &Path,
     method: Method,
@@ -64,34 +162,21 @@ pub fn folder(
     truth: Option<Truth>,
     cancel: &CancelToken,
 ) -> Result<Solution, Failure> {
-    let dataset = Dataset::read(path).map_err(Failure::unusable)?;
-    let mut observations = observations(&dataset, cancel)?;
-    let document = if Session::is_session(path) {
-        let session = Session::open(path).map_err(Failure::unusable)?;
-        add_excluded(&session.document, &mut observations);
-        session.document
-    } else {
-        Arc::new(as_document(&dataset))
-    };
-    let digest = dataset.input_sha256().map_err(Failure::unusable)?;
-    let id_of = |view: &ObservedView| {
-        let capture = document.captures.iter().find(|capture| capture.image == view.name);
-        capture.map_or(CaptureId(0), |capture| capture.id)
-    };
+    let input = read(path, cancel)?;
+    let SessionObservations { observations, captures, verification } = input.seen.clone();
     let job = SolveJob {
         id: JobId(0),
-        captures: observations.views.iter().map(id_of).collect(),
         observations,
-        verification: Vec::new(),
+        captures,
+        verification,
         method,
         options,
         goal_m: Goal::default().0,
         truth,
     };
     let mut solved = worker::answer(&job, cancel.into()).map_err(Failure::failed)?;
-    solved.result.provenance.input_sha256 = Some(digest);
-    let SolveJob { observations, .. } = job;
-    Ok(Solution { folder: path.to_path_buf(), document, observations, solved: Arc::new(solved) })
+    solved.result.provenance.input_sha256 = Some(input.sha256.clone());
+    Ok(Solution { folder: path.to_path_buf(), input, solved: Arc::new(solved) })
 }
 
 /// A data set as a session would have it.
@@ -124,36 +209,6 @@ fn as_document(dataset: &Dataset) -> Document {
         });
     }
     document
-}
-
-/// Captures that were taken out of the fit stand in the result as such, and in their place, as when the window solves.
-pub fn add_excluded(document: &Document, observations: &mut Observations) {
-    let fitted = document.captures.iter().filter(|capture| capture.role == Role::Calibration);
-    for (index, capture) in fitted.enumerate() {
-        if capture.excluded && index <= observations.views.len() {
-            let view = ObservedView {
-                name: capture.image.clone(),
-                base_from_tip: Some(capture.base_from_tip),
-                corners: None,
-                tip_by_joint: Vec::new(),
-                camera_from_target: None,
-                in_fit: false,
-            };
-            observations.views.insert(index, view);
-        }
-    }
-}
-
-/// Finds the target in every image, with a line of progress.
-pub fn observations(dataset: &Dataset, cancel: &CancelToken) -> Result<Observations, Failure> {
-    let progress = |done: usize, of: usize| tracing::debug!(done, of, "image");
-    let observations = observe(dataset, &progress, cancel).map_err(|error| match error {
-        ObserveError::Dataset(error) => Failure::unusable(error),
-        other => Failure::failed(other),
-    })?;
-    let found = observations.views.iter().filter(|v| v.corners.is_some()).count();
-    tracing::info!("target found in {found} of {} images", observations.views.len());
-    Ok(observations)
 }
 
 /// Every format that the result has the data for, into a folder. Poses of images are left to `export`: their files have

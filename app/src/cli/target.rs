@@ -1,15 +1,13 @@
 //! `handeye target`: a target on paper.
 
-use std::path::PathBuf;
-
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use clap::{Args, ValueEnum};
-use handeye_core::atomic_file;
 use handeye_core::dataset::write::target_table;
 use handeye_core::print::{Page, PrintError, Sheet, pdf};
 use handeye_core::target::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
 
-use super::Failure;
+use super::output::Output;
+use super::{Failure, out};
 
 pub const EXAMPLES: &str = "Example:
   handeye target --kind charuco --columns 6 --rows 8 --square 22 --marker 16 --dictionary 5x5_100 --pdf board.pdf
@@ -22,9 +20,9 @@ pub struct TargetArgs {
     /// What to print.
     #[arg(long, value_enum)]
     kind: Kind,
-    /// File to write.
+    /// File to write; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    pdf: PathBuf,
+    pdf: Output,
     /// Page: a4, a3, letter, or fit for one as large as the target needs.
     #[arg(long, value_name = "PAGE", default_value = "a4")]
     page: Page,
@@ -95,16 +93,18 @@ pub fn run(args: &TargetArgs) -> Result<(), Failure> {
         PrintError::Markers { .. } => Failure::failed(error),
         _ => Failure::unusable(error),
     })?;
-    atomic_file::write(&args.pdf, &pdf(&sheet))
-        .with_context(|| format!("{} cannot be written", args.pdf.display()))
-        .map_err(Failure::failed)?;
+    args.pdf.write(&pdf(&sheet))?;
     let [width, height] = sheet.size_mm;
-    eprintln!("{target}, on a page of {width} × {height} mm");
-    eprintln!("print at 100 % (actual size); both rulers must then be 100 mm long");
-    eprintln!("wrote {}", args.pdf.display());
+    out::note(format_args!("{target}, on a page of {width} × {height} mm"));
+    out::note("print at 100 % (actual size); both rulers must then be 100 mm long");
+    out::note(format_args!("wrote {}", args.pdf));
     // What a data set says of it, to be copied.
-    print!("{}", target_table(&target));
-    Ok(())
+    let table = target_table(&target);
+    if args.pdf.is_standard() {
+        out::note(table.trim_end());
+        return Ok(());
+    }
+    out::print(&table)
 }
 
 fn target(args: &TargetArgs) -> anyhow::Result<TargetSpec> {

@@ -13,8 +13,9 @@ use handeye_sim_link::client::Endpoint;
 use handeye_sim_link::client::cell::{BoardMotion, BoardPath};
 
 use super::cell::SceneArg;
-use super::{Failure, RerunArg, rerun_arg, solve};
-use crate::model::FollowWish;
+use super::output::Output;
+use super::{Failure, RerunArg, out, rerun_arg, solve};
+use crate::model::{FollowWish, Tracked};
 use crate::rerun_log::{Pace, RerunChoice};
 use live::{Job, Live, Task};
 
@@ -42,9 +43,9 @@ pub struct TrackArgs {
     /// End after so many pictures; without it, at Ctrl-C.
     #[arg(long, value_name = "N")]
     frames: Option<u64>,
-    /// Write every pose and a summary as JSON to this file.
+    /// Write every pose and a summary as JSON to this file; `-` for standard output instead of the summary.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// The chessboard, if the calibration does not say it: inner corners along x and y, and the square.
     #[arg(long, value_name = "COLUMNSxROWSxMM")]
     target: Option<String>,
@@ -123,9 +124,18 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         // The board of somebody else's cell is not ours to move, nor is the arm before it follows.
         own_cell: server.is_some().then_some(board),
     };
-    let mut document = document::Document::begin(args.json.as_deref(), &args.calibration)?;
-    let summary = Live::connect(&endpoint)?.run(&job, &cancel, &mut |tracked| document.add(tracked))?;
+    let mut document = document::Document::begin(args.json.as_ref(), &args.calibration)?;
+    let mut add = |tracked: &Tracked| {
+        document.add(tracked)?;
+        if document.is_closed() {
+            cancel.cancel();
+        }
+        Ok(())
+    };
+    let summary = Live::connect(&endpoint)?.run(&job, &cancel, &mut add)?;
     document.finish(&summary)?;
-    print!("{}", summary.text());
+    if !args.json.as_ref().is_some_and(Output::is_standard) {
+        out::print(&summary.text())?;
+    }
     rerun_arg::finish(recorder, &cancel)
 }

@@ -7,18 +7,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crossbeam_channel::{Receiver, select};
-use handeye_core::dataset::Dataset;
 use handeye_core::poses_file::TaughtPose;
 use handeye_core::result::CalibrationResult;
-use handeye_core::session::{Capture, Document, Edit, Role, SessionError, SessionMeta, Store};
+use handeye_core::session::{Document, Edit, SessionError, SessionMeta, Store};
 
 use super::files::kind_of;
 use super::link::Outlet;
-use super::vision::Measured;
+use crate::capture::Measured;
 use crate::command::Event;
-use crate::model::{
-    CapturePurpose, CaptureRefused, CaptureWait, FolderKind, Observed, RefusalKind, SessionState, Severity,
-};
+use crate::model::{CaptureRefused, CaptureWait, FolderKind, Observed, RefusalKind, SessionState, Severity};
 use crate::text;
 use crate::text::Text;
 
@@ -208,23 +205,7 @@ impl Archive {
 
     fn keep(&mut self, measured: &Measured) {
         self.outlet.report(Event::CaptureWaits { number: measured.number, wait: CaptureWait::Saving });
-        let kept = self.store().and_then(|store| {
-            store.add_capture(&Capture {
-                image: &measured.rgb,
-                depth_m: Some(&measured.depth),
-                base_from_tip: measured.base_from_tip,
-                joints_rad: Some(&measured.joints_rad),
-                sim_time_s: Some(measured.sim_time_s),
-                role: match measured.purpose {
-                    CapturePurpose::Calibrate => Role::Calibration,
-                    CapturePurpose::Verify => Role::Verification,
-                },
-                frames: measured.frames,
-                corner_noise_px: measured.corner_noise_px,
-                settled_s: Some(measured.settled_s),
-                pose_name: measured.pose_name.as_deref(),
-            })
-        });
+        let kept = self.store().and_then(|store| measured.record(store));
         match kept {
             Ok(id) => {
                 let observed = Observed {
@@ -248,8 +229,7 @@ impl Archive {
     /// The digest of the input is that of the files, so that the command line and the window write the same result.
     fn keep_result(&mut self, folder: &Path, mut result: CalibrationResult) {
         let Some(store) = self.store.as_mut().filter(|store| store.folder() == folder) else { return };
-        let digest = Dataset::read(store.folder()).and_then(|dataset| dataset.input_sha256());
-        match digest {
+        match store.input_sha256() {
             Ok(digest) => result.provenance.input_sha256 = Some(digest),
             Err(error) => tracing::warn!(%error, "the digest of the session is not known"),
         }

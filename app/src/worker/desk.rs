@@ -15,8 +15,8 @@ use super::link::Outlet;
 use super::newest::{NewestWins, Started};
 use super::observer::{self, ObserveJob};
 use super::solver::{self, SolveJob};
-use super::vision::Measured;
-use super::{Busy, Clock, JOIN_DEADLINE, MAX_EVENTS, MAX_REQUESTS, Waker};
+use super::{Busy, Clock, JOIN_DEADLINE, MAX_EVENTS, MAX_REQUESTS, POLL, Waker};
+use crate::capture::Measured;
 use crate::command::Event;
 
 /// Captures that may wait for the disk. The vision thread waits when there are more, and the next capture with it.
@@ -117,16 +117,20 @@ impl Desk {
     pub fn cancel_solve(&self) {
         self.solver.cancel();
     }
-}
 
-impl Drop for Desk {
-    /// What was handed to the archive is still written; everything else is cancelled.
-    fn drop(&mut self) {
+    /// Cancels what only computes.
+    pub fn cancel_all(&self) {
+        self.observer.cancel();
+        self.solver.cancel();
+    }
+
+    /// Ends the threads, and waits for them no longer than until `end`. What was handed to the archive is still written;
+    /// everything else is cancelled. Called again it does nothing.
+    pub fn end(&mut self, end: Instant) {
         self.observer.end();
         self.solver.end();
         self.archive = None;
         self.files = None;
-        let end = Instant::now() + JOIN_DEADLINE;
         for Started { handle, done } in self.threads.drain(..) {
             // A thread whose report nobody takes would wait for ever.
             while matches!(done.try_recv(), Err(crossbeam_channel::TryRecvError::Empty)) && Instant::now() < end {
@@ -142,8 +146,11 @@ impl Drop for Desk {
     }
 }
 
-/// How long the end of the program waits for one report of a worker before it looks again whether it is done.
-const POLL: std::time::Duration = std::time::Duration::from_millis(5);
+impl Drop for Desk {
+    fn drop(&mut self) {
+        self.end(Instant::now() + JOIN_DEADLINE);
+    }
+}
 
 fn hand_in<Task>(worker: Option<&Sender<Task>>, task: Task) -> Result<(), Busy> {
     worker.map_or(Err(Busy), |worker| worker.try_send(task).map_err(|_full| Busy))

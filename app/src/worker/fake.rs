@@ -8,9 +8,11 @@ use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{FollowMoment, FollowWish};
+use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish, JointAngles};
 
-use super::port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
+use super::port::{
+    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
+};
 use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, RobotState, Simulation};
 use crate::text::Text;
 
@@ -47,6 +49,10 @@ pub struct Script {
     pub refuse_tasks: Option<PortError>,
     /// What becomes of motions.
     pub motions: FakeMotions,
+    /// Whether there is room to follow.
+    pub room: Room,
+    /// The poses that are planned, or why there are none.
+    pub views: Result<Vec<JointAngles>, Text>,
     /// Motions that were begun.
     pub moved: Vec<MotionGoal>,
     /// Jogs and steps that were begun.
@@ -76,6 +82,8 @@ impl FakeCell {
             stops: 0,
             refuse_tasks: None,
             motions: FakeMotions::Arrive,
+            room: Room::Enough,
+            views: Ok(Vec::new()),
             moved: Vec::new(),
             jogged: Vec::new(),
             board: BoardMotion::default(),
@@ -249,6 +257,14 @@ impl MotionPort for FakeCell {
             std::thread::yield_now();
         }
         Ok(None)
+    }
+
+    fn room(&mut self, _board: &BoardInView) -> Result<Room, PortError> {
+        Ok(self.answer()?.room.clone())
+    }
+
+    fn views(&mut self, _request: &ViewsRequest) -> Result<Result<Vec<JointAngles>, Text>, PortError> {
+        Ok(self.answer()?.views.clone())
     }
 
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {

@@ -1,7 +1,9 @@
 //! Reading and writing that has to do with one click: pictures of a capture, folders, exports, pose files.
 
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::thread::Builder;
 
 use handeye_core::dataset;
 use handeye_core::depth::{ColourMap, DepthImage};
@@ -30,6 +32,8 @@ pub enum FileTask {
     },
     /// The folders in a folder.
     List(PathBuf),
+    /// A folder in the file manager of the system.
+    OpenFolder(PathBuf),
     /// The text of every format.
     Preview(Box<ExportJob>),
     /// Write the chosen formats.
@@ -76,6 +80,7 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
     match task {
         FileTask::Review { folder, capture, colours } => review(&folder, &capture, colours, outlet),
         FileTask::List(folder) => outlet.report(Event::Folder(list(folder))),
+        FileTask::OpenFolder(folder) => open_folder(&folder, FILE_MANAGER, outlet),
         FileTask::Preview(job) => outlet.report(Event::Previews(preview(&job))),
         FileTask::Export { job, formats, folder } => {
             let files = write(&job, &formats, &folder);
@@ -124,6 +129,43 @@ fn pictures(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Resul
     let [near_m, far_m] = depth_view::range_of(&depth, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
     let depth_coloured = depth.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
     Ok(FrameImages { rgb, depth, depth_coloured })
+}
+
+/// What shows a folder.
+const FILE_MANAGER: &str = if cfg!(target_os = "macos") {
+    "open"
+} else if cfg!(windows) {
+    "explorer"
+} else {
+    "xdg-open"
+};
+
+/// Has a program show a folder; says where it is when there is none.
+fn open_folder(folder: &Path, program: &str, outlet: &Outlet) {
+    if !folder.is_dir() {
+        let said = text!("{folder} is not there yet: it is made with the first capture", folder = folder.display());
+        return outlet.notice(Severity::Warning, said);
+    }
+    let begun =
+        Command::new(program).arg(folder).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    match begun {
+        // It may stay as long as its window.
+        Ok(mut child) => {
+            let (folder, outlet) = (folder.to_path_buf(), outlet.clone());
+            let waited = Builder::new().name("file manager".to_owned()).spawn(move || match child.wait() {
+                Ok(status) if status.success() => {}
+                Ok(status) => not_shown(&folder, &status, &outlet),
+                Err(error) => not_shown(&folder, &error, &outlet),
+            });
+            tracing::debug!(?waited, program, "a folder is shown");
+        }
+        Err(error) => not_shown(folder, &error, outlet),
+    }
+}
+
+fn not_shown(folder: &Path, why: &dyn std::fmt::Display, outlet: &Outlet) {
+    let said = text!("No program shows the folder {folder}: {why}", folder = folder.display(), why = why);
+    outlet.notice(Severity::Warning, said);
 }
 
 /// Folders with what they are, sessions first, and files of poses.
@@ -177,4 +219,35 @@ fn write(job: &ExportJob, formats: &[String], folder: &Path) -> Result<Vec<PathB
         .collect::<Result<_, _>>()
         .map_err(|error| error.to_string())?;
     export::write_all(folder, &formats, &job.input()).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::text::Language;
+
+    /// What is said until nobody is left who could say something.
+    fn said(folder: &Path, program: &str) -> Vec<String> {
+        let (events, reported) = crossbeam_channel::bounded(4);
+        let outlet = Outlet { events, waker: Arc::new(|| {}), clock: Arc::new(|| 0.0) };
+        open_folder(folder, program, &outlet);
+        drop(outlet);
+        let notices = reported.iter().map(|event| match event {
+            Event::Notice { text, .. } => text.say(Language::English),
+            other => panic!("{other:?}"),
+        });
+        notices.collect()
+    }
+
+    #[test]
+    fn a_folder_that_nothing_can_show_is_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().display().to_string();
+        let words = said(folder.path(), "no-such-file-manager");
+        assert!(words[0].starts_with(&format!("No program shows the folder {path}: ")), "{words:?}");
+        assert_eq!(said(folder.path(), "false").len(), 1, "a program that fails is told of");
+        let words = said(&folder.path().join("later"), "no-such-file-manager");
+        assert_eq!(words, [format!("{path}/later is not there yet: it is made with the first capture")]);
+        assert!(said(folder.path(), "true").is_empty());
+    }
 }

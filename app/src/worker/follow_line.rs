@@ -4,8 +4,9 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::handeye::HandEye;
 use handeye_core::track::{Estimate, Keep, Setup, State, TipGoal, Update};
-use handeye_sim_link::client::cell::{FollowGoal, FollowMoment, FollowWish as ArmWish};
+use handeye_sim_link::client::cell::{BoardInView, FollowGoal, FollowMoment, FollowWish as ArmWish};
 
 use crate::model::{FollowStatus, FollowWish};
 use crate::text;
@@ -14,6 +15,10 @@ use crate::text::Text;
 /// How far [s] the motion of the board is thought on from the newest picture: a few pictures, so that one that comes late
 /// does not end everything, and less than what an arm at its speed limit makes of a wrong guess.
 const LONGEST_GUESS_S: f64 = 0.4;
+
+/// How long [s] an arm that was moved to another place waits there for the board to be seen again: the whole picture is
+/// searched within a few pictures.
+const PATIENCE_S: f64 = 3.0;
 
 /// What the arm is to do about the board.
 #[derive(Default)]
@@ -26,6 +31,10 @@ struct Inner {
     setup: Option<Setup>,
     newest: Option<Update>,
     aim: Option<Aim>,
+    /// For so long the board may be out of sight before the first goal [s].
+    patience_s: f64,
+    /// Until then, once there was a pass.
+    waits_until_s: Option<f64>,
     ended: Option<Text>,
     status: Option<FollowStatus>,
 }
@@ -58,11 +67,31 @@ impl FollowLine {
         self.inner().newest.as_ref().is_some_and(|newest| matches!(newest.state, State::Tracking { .. }))
     }
 
+    /// The board as it is tracked now, for a camera on the tip; `None` while it is not known where it is.
+    pub fn board_in_view(&self) -> Option<BoardInView> {
+        let inner = self.inner();
+        let setup = inner.setup.as_ref()?;
+        let HandEye::EyeInHand { tip_from_camera, .. } = setup.calibrated.hand_eye else { return None };
+        Some(BoardInView {
+            base_from_target: inner.newest.as_ref()?.estimate.as_ref()?.base_from_target,
+            target: setup.target,
+            intrinsics: setup.calibrated.intrinsics,
+            tip_from_camera,
+        })
+    }
+
     /// What the arm is to do from its next pass on.
     pub fn begin(&self, wish: FollowWish) {
         let mut inner = self.inner();
         inner.aim = Some(Aim::Wished(wish));
+        (inner.patience_s, inner.waits_until_s) = (0.0, None);
         inner.ended = None;
+    }
+
+    /// The same after the arm was moved, when the board may have to be found again.
+    pub fn begin_elsewhere(&self, wish: FollowWish) {
+        self.begin(wish);
+        self.inner().patience_s = PATIENCE_S;
     }
 
     /// Why following has ended by itself since it began.
@@ -78,6 +107,9 @@ impl FollowLine {
     /// What the arm is to do in a pass.
     pub fn wish(&self, moment: &FollowMoment) -> ArmWish {
         let mut inner = self.inner();
+        if inner.waits(moment) {
+            return ArmWish::Rest;
+        }
         match inner.goal(moment) {
             Ok(goal) => {
                 inner.status = Some(distance(&goal.base_from_tip, &moment.base_from_tip));
@@ -96,6 +128,15 @@ impl FollowLine {
 }
 
 impl Inner {
+    /// Whether the arm stands until the board is seen.
+    fn waits(&mut self, moment: &FollowMoment) -> bool {
+        let until_s = *self.waits_until_s.get_or_insert(moment.sim_time_s + self.patience_s);
+        let is_fresh = self.newest.as_ref().is_some_and(|newest| {
+            matches!(newest.state, State::Tracking { .. }) && moment.sim_time_s - newest.time_s <= LONGEST_GUESS_S
+        });
+        matches!(self.aim, Some(Aim::Wished(_))) && !is_fresh && moment.sim_time_s < until_s
+    }
+
     fn goal(&mut self, moment: &FollowMoment) -> Result<TipGoal, Text> {
         let setup = self.setup.as_ref().ok_or_else(|| text!("The board is not tracked: start tracking first"))?;
         let newest = self.newest.as_ref().ok_or_else(|| text!("The board has not been seen yet"))?;
@@ -124,7 +165,7 @@ impl Inner {
 
 fn fixed(wish: FollowWish, now: &Estimate, setup: &Setup, base_from_tip: &Pose<Base, Tip>) -> Keep {
     match wish {
-        FollowWish::KeepView => {
+        FollowWish::KeepView | FollowWish::KeepViewWithRoom => {
             let base_from_camera = setup.calibrated.base_from_camera(base_from_tip);
             Keep::View(base_from_camera.inverse() * now.base_from_target)
         }
@@ -139,3 +180,7 @@ fn distance(goal: &Pose<Base, Tip>, tip: &Pose<Base, Tip>) -> FollowStatus {
     let apart = tip.inverse() * *goal;
     FollowStatus::Following { distance_m: apart.translation().norm(), angle_rad: apart.rotation().angle() }
 }
+
+#[cfg(test)]
+#[path = "follow_line_tests.rs"]
+mod tests;

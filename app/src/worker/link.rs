@@ -22,6 +22,7 @@ pub enum Request<Task> {
 }
 
 /// Where a worker reports to.
+#[derive(Clone)]
 pub struct Outlet {
     /// Changes of state, in order. A window that does not look (it may be hidden) makes the worker wait here once the
     /// channel is full, which harms nobody; the channel closes when the application ends.

@@ -1,14 +1,15 @@
 //! The arm of a cell over the remote API, as the motion worker drives it.
 
+use handeye_sim_link::cell::planning::PlanError;
 use handeye_sim_link::client::cell::{
-    Arm, ArmJog, ArmKinematics, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes, JogEnd, JogObstacle,
-    MotionTolerance, SettleOptions, UnknownKinematics,
+    Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes,
+    JogEnd, JogObstacle, JointAngles, MotionTolerance, SettleOptions, UnknownKinematics,
 };
 use handeye_sim_link::client::{CancelToken, LinkError};
 use nalgebra::Vector3;
 
 use super::live::{check_arm, port_error};
-use super::port::{JogRequest, MotionPort, PortError};
+use super::port::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
 use crate::limits;
 use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
 use crate::text;
@@ -116,6 +117,36 @@ impl MotionPort for LiveMotion {
         }
     }
 
+    fn room(&mut self, board: &BoardInView) -> Result<Room, PortError> {
+        // Following says what is wrong with an arm of unknown kinematics.
+        let Ok(kinematics) = &self.kinematics else { return Ok(Room::Enough) };
+        let joints = self.arm.joint_angles().map_err(port_error)?;
+        let (limits, reach) = (FollowLimits::default(), BoardReach::default());
+        if kinematics.has_room_to_follow(&limits, board, &reach, &joints) {
+            return Ok(Room::Enough);
+        }
+        Ok(match kinematics.place_to_follow(&limits, board, &reach, &joints) {
+            Ok(place) => Room::At(place.joints),
+            Err(none) => Room::Nowhere(text!(
+                "Of {tried} places that show the whole board none has room for the arm to go along with it: move the board \
+                 away from the column of the arm, and not to the end of its reach",
+                tried = none.tried
+            )),
+        })
+    }
+
+    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointAngles>, Text>, PortError> {
+        let ViewsRequest { board, taken, count } = request;
+        let kinematics = match &self.kinematics {
+            Ok(kinematics) => kinematics,
+            Err(why) => {
+                return Ok(Err(text!("The kinematics of the arm is not known: {why}", why = why)));
+            }
+        };
+        let start = self.arm.joint_angles().map_err(port_error)?;
+        Ok(kinematics.views_unlike(board, taken, &start, *count).map_err(|why| no_views(&why)))
+    }
+
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
         let kinematics = match &self.kinematics {
             Ok(kinematics) => kinematics,
@@ -130,6 +161,26 @@ impl MotionPort for LiveMotion {
             Ok(end) => Ok(outcome_of_following(end)),
             Err(error) => outcome_of(error, &CancelToken::default()),
         }
+    }
+}
+
+/// Why no poses can be planned.
+fn no_views(why: &PlanError) -> Text {
+    match why {
+        PlanError::StartBlocked => {
+            text!("Where the arm is now it touches the board, its table or itself: move it into free space first")
+        }
+        PlanError::TooFewViews { candidates, not_in_view, unreachable, in_the_way, no_path, .. } => text!(
+            "Of {tried} views that were tried, {not_in_view} would not show the whole board, {unreachable} are out of \
+             reach, {in_the_way} would touch something, and {no_path} cannot be driven to safely: move the board towards \
+             the middle of the workspace",
+            tried = candidates,
+            not_in_view = not_in_view,
+            unreachable = unreachable,
+            in_the_way = in_the_way,
+            no_path = no_path
+        ),
+        other => Text::verbatim(other.to_string()),
     }
 }
 

@@ -57,12 +57,15 @@ pub use live_motion::end_of_following;
 pub use motion::MotionLook;
 pub use motion_desk::{MotionDesk, MotionTask};
 pub use observer::ObserveJob;
-pub use port::{CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame};
+pub use port::{
+    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
+};
 pub use slot::LatestSlot;
 pub use solver::{SolveJob, answer};
 pub use tracking::{Sight, Tracking};
-pub use vision::{CaptureRequest, Measured, VisionTask};
+pub use vision::VisionTask;
 
+use crate::capture::Measured;
 use crate::command::Event;
 use crate::model::{
     CellSource, FollowWish, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, Tracked, ViewSettings,
@@ -89,6 +92,9 @@ const MAX_EVENTS: usize = 256;
 
 /// How long the end of the program waits for the workers. Calls under way return within a fraction of it.
 pub const JOIN_DEADLINE: Duration = Duration::from_secs(2);
+
+/// How long the end of the program waits for one report of a worker before it looks again.
+const POLL: Duration = Duration::from_millis(5);
 
 /// A worker cannot take the request now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -266,13 +272,23 @@ impl Workers {
         self.begin(MotionTask::JogStep { id, request: JogRequest { jog, tip_from_camera, speed }, length })
     }
 
-    /// Has the arm follow the board that is tracked, until [`Self::cancel_motion`], a stop, or the board is lost. Reported
+    /// Has the arm follow the board that is tracked, from a place where it has room if that is wished, to which it moves at
+    /// a share of the fastest speed; until [`Self::cancel_motion`], a stop, or the board is lost. Reported
     /// as [`Self::move_to`]; why it ended by itself is the reason of a motion that failed.
     ///
     /// # Errors
     /// As [`Self::move_to`].
-    pub fn follow(&self, id: MotionId, wish: FollowWish) -> Result<(), Busy> {
-        self.begin(MotionTask::Follow { id, wish })
+    pub fn follow(&self, id: MotionId, wish: FollowWish, speed: f64) -> Result<(), Busy> {
+        self.begin(MotionTask::Follow { id, wish, speed })
+    }
+
+    /// Asks for poses to look at the board from. [`Event::Planned`] tells them; [`Event::Moved`], with the same number, why
+    /// they are not looked for.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn plan_views(&self, id: MotionId, request: ViewsRequest) -> Result<(), Busy> {
+        self.begin(MotionTask::Plan { id, request: Box::new(request) })
     }
 
     /// Ends the motion that is under way, without a stop of everything else.
@@ -345,6 +361,25 @@ impl Workers {
     /// [`Busy`] when it does not take requests.
     pub fn ask_vision(&self, task: VisionTask) -> Result<(), Busy> {
         ask(self.vision.as_ref(), task)
+    }
+
+    /// Whether this program moves the arm, or is about to.
+    pub fn is_moving(&self) -> bool {
+        self.desk.is_busy(self.now_s())
+    }
+
+    /// Waits until this program does not move the arm and a stop that was asked for is done, but no longer than until
+    /// `end`; whether it is so. What is reported meanwhile is lost: for the end of the program.
+    pub fn come_to_rest(&self, end: Instant) -> bool {
+        loop {
+            // A worker whose reports nobody takes would wait, and the arm go on.
+            self.drain(|_lost| {});
+            if !self.is_moving() && !self.stop.is_pressed() {
+                return true;
+            }
+            let Some(events) = self.events.as_ref().filter(|_| Instant::now() < end) else { return false };
+            let _lost = events.recv_timeout(POLL).is_ok();
+        }
     }
 
     /// Ends the threads: calls under way are cancelled, channels closed, threads joined. A thread that does not end

@@ -10,9 +10,9 @@ use super::follow_line::FollowLine;
 use super::jog_line::Held;
 use super::link::{Duty, Outlet};
 use super::motion_desk::{MotionDesk, MotionTask, Work};
-use super::port::{Connected, Connector, JogRequest, MotionPort, PortError};
+use super::port::{Connected, Connector, JogRequest, MotionPort, PortError, Room, ViewsRequest};
 use crate::command::Event;
-use crate::model::{FollowWish, Link, MotionOutcome};
+use crate::model::{FollowStatus, FollowWish, Link, MotionGoal, MotionId, MotionOutcome, Severity};
 use crate::text;
 
 /// Rest between two looks at the connection. Work does not wait for it: the worker is woken.
@@ -44,7 +44,8 @@ impl Motions {
         let outcome = match task {
             MotionTask::Move(request) => port.move_to(&request.goal, request.speed, cancel),
             MotionTask::JogStep { request, length, .. } => port.jog_step(request, *length, cancel),
-            MotionTask::Follow { wish, .. } => self.follow(port, *wish, cancel),
+            MotionTask::Follow { wish, speed, .. } => self.follow(port, *wish, *speed, cancel, outlet),
+            MotionTask::Plan { id, request } => return self.plan(port, *id, request, outlet),
         };
         // First, so that what the window asks for next is not refused.
         self.desk.done();
@@ -58,13 +59,50 @@ impl Motions {
         ended
     }
 
+    fn plan(
+        &self,
+        port: &mut dyn MotionPort,
+        id: MotionId,
+        request: &ViewsRequest,
+        outlet: &Outlet,
+    ) -> Result<(), PortError> {
+        let planned = port.views(request);
+        self.desk.done();
+        let (views, ended) = match planned {
+            Ok(views) => (views, Ok(())),
+            Err(error) => (Err(text!("The connection broke: {error}", error = &error)), Err(error)),
+        };
+        outlet.report(Event::Planned { id, views });
+        ended
+    }
+
     fn follow(
         &self,
         port: &mut dyn MotionPort,
         wish: FollowWish,
+        speed: f64,
         cancel: &CancelToken,
+        outlet: &Outlet,
     ) -> Result<MotionOutcome, PortError> {
-        self.line.begin(wish);
+        let board = self.line.board_in_view().filter(|_| wish == FollowWish::KeepViewWithRoom);
+        match board.map(|board| port.room(&board)).transpose()? {
+            None | Some(Room::Enough) => self.line.begin(wish),
+            Some(Room::Nowhere(why)) => return Ok(MotionOutcome::Refused(why)),
+            Some(Room::At(joints)) => {
+                outlet.report(Event::Follow(FollowStatus::MakingRoom));
+                outlet.notice(
+                    Severity::Info,
+                    text!(
+                        "Here the arm has no room to go along with the board: it moves to the nearest place where it has, \
+                         and keeps the view from there"
+                    ),
+                );
+                match port.move_to(&MotionGoal::Joints(joints), speed, cancel)? {
+                    MotionOutcome::Arrived => self.line.begin_elsewhere(wish),
+                    outcome => return Ok(outcome),
+                }
+            }
+        }
         let mut wanted = |moment: &FollowMoment| {
             if cancel.is_cancelled() { ArmWish::End } else { self.line.wish(moment) }
         };

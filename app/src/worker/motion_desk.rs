@@ -7,7 +7,7 @@ use handeye_sim_link::client::CancelToken;
 
 use super::Waker;
 use super::jog_line::{HELD_S, Held, JogLine};
-use super::port::JogRequest;
+use super::port::{JogRequest, ViewsRequest};
 use crate::command::Event;
 use crate::model::{FollowWish, MotionGoal, MotionId, MotionOutcome, MotionRequest};
 use crate::text;
@@ -33,6 +33,15 @@ pub enum MotionTask {
         id: MotionId,
         /// What is wanted.
         wish: FollowWish,
+        /// Share of the fastest speed at which it moves to where it has room.
+        speed: f64,
+    },
+    /// Nothing that moves: where the board can be looked at from, of which only the arm's kinematics tells.
+    Plan {
+        /// Its number.
+        id: MotionId,
+        /// What is wanted.
+        request: Box<ViewsRequest>,
     },
 }
 
@@ -41,7 +50,7 @@ impl MotionTask {
     pub fn id(&self) -> MotionId {
         match self {
             Self::Move(request) => request.id,
-            Self::JogStep { id, .. } | Self::Follow { id, .. } => *id,
+            Self::JogStep { id, .. } | Self::Follow { id, .. } | Self::Plan { id, .. } => *id,
         }
     }
 
@@ -51,6 +60,7 @@ impl MotionTask {
             Self::Move(MotionRequest { goal: MotionGoal::Tip(_), .. }) => text!("a motion of the tip"),
             Self::JogStep { .. } => text!("a step"),
             Self::Follow { .. } => text!("following the board"),
+            Self::Plan { .. } => text!("planning of poses"),
         }
     }
 }
@@ -160,6 +170,12 @@ impl MotionDesk {
             Doing::Nothing if is_held => inner.say(Event::JogEnded { why: Some(stopped()) }, &self.waker),
             Doing::Nothing => {}
         }
+    }
+
+    /// Whether the arm is moved from here, or about to be.
+    pub fn is_busy(&self, now_s: f64) -> bool {
+        let mut inner = self.inner();
+        !matches!(inner.doing, Doing::Nothing) || inner.connected && inner.line.request(now_s).is_some()
     }
 
     /// Hands over what the window has not heard.

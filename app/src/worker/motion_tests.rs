@@ -7,7 +7,8 @@ use crossbeam_channel::Receiver;
 
 use super::fake::{FakeCell, FakeMotions};
 use super::*;
-use crate::model::{CellFacts, Link, LinkState, MotionGoal, MotionOutcome};
+use crate::gui::sample;
+use crate::model::{CellFacts, FollowStatus, FollowWish, Link, LinkState, MotionGoal, MotionOutcome};
 use crate::text::{Language, Text};
 
 /// A healthy worker answers within milliseconds; this is for a machine that does something else.
@@ -279,4 +280,75 @@ fn a_connection_that_breaks_ends_the_motion_and_the_jog() {
     begun(&cell, 2);
     cell.script().broken = true;
     assert!(bench.jog_ended().is_some());
+}
+
+/// The board of the sample is tracked.
+fn tracked(bench: &Bench) {
+    let model = sample::tracking();
+    bench.workers.follow.set_up(Some(handeye_core::track::Setup {
+        target: model.document().meta.target,
+        calibrated: model.calibrated().expect("calibrated").clone(),
+        motion: handeye_core::track::MotionModel::default(),
+    }));
+    bench.workers.follow.see(&model.track.newest.as_ref().expect("tracked").update);
+}
+
+#[test]
+fn following_moves_to_where_there_is_room_first_when_that_is_wished_and_needed() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    tracked(&bench);
+    let joints = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+    let follow = |bench: &Bench, id, wish| bench.workers.follow(MotionId(id), wish, 0.25).expect("the worker is there");
+    follow(&bench, 1, FollowWish::KeepViewWithRoom);
+    bench.moved(1);
+    assert!(cell.script().moved.is_empty(), "there is room");
+    cell.script().room = Room::At(joints);
+    follow(&bench, 2, FollowWish::KeepView);
+    bench.moved(2);
+    assert!(cell.script().moved.is_empty(), "it was not wished");
+    follow(&bench, 3, FollowWish::KeepViewWithRoom);
+    bench.until("word of the move", |event| matches!(event, Event::Follow(FollowStatus::MakingRoom)).then_some(()));
+    let said = bench.until("what it does", |event| match event {
+        Event::Notice { text, .. } => Some(text.say(Language::English)),
+        _ => None,
+    });
+    assert!(said.contains("no room to go along with the board"), "{said}");
+    bench.moved(3);
+    assert_eq!(cell.script().moved, [MotionGoal::Joints(joints)]);
+    let why = Text::verbatim("the board is at the column");
+    cell.script().room = Room::Nowhere(why.clone());
+    follow(&bench, 4, FollowWish::KeepViewWithRoom);
+    assert_eq!(bench.moved(4), MotionOutcome::Refused(why));
+}
+
+#[test]
+fn a_stop_on_the_way_to_where_there_is_room_ends_the_following() {
+    let (cell, mut bench) = fake(FakeMotions::Hang);
+    tracked(&bench);
+    cell.script().room = Room::At([0.0; 6]);
+    bench.workers.follow(MotionId(1), FollowWish::KeepViewWithRoom, 0.25).expect("the worker is there");
+    begun(&cell, 1);
+    bench.workers.press_stop();
+    assert_eq!(bench.moved(1), MotionOutcome::Stopped);
+    bench.next = 0;
+    bench.stopped();
+}
+
+#[test]
+fn poses_are_planned_without_a_motion_and_the_arm_is_free_afterwards() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    tracked(&bench);
+    let board = bench.workers.follow.board_in_view().expect("tracked");
+    let request = ViewsRequest { board, taken: Vec::new(), count: 2 };
+    let views = vec![[0.1; 6], [0.2; 6]];
+    cell.script().views = Ok(views.clone());
+    bench.workers.plan_views(MotionId(1), request).expect("the worker is there");
+    let planned = bench.until("the poses", |event| match event {
+        Event::Planned { id: MotionId(1), views } => Some(views.clone()),
+        _ => None,
+    });
+    assert_eq!(planned, Ok(views));
+    bench.move_to(2, HOME, 1.0);
+    assert_eq!(bench.moved(2), MotionOutcome::Arrived);
+    assert_eq!(cell.script().moved, [HOME]);
 }

@@ -9,7 +9,7 @@ use handeye_core::session::{CaptureId, CaptureRecord};
 use handeye_core::target::TargetSpec;
 
 use super::link::Outlet;
-use super::vision;
+use crate::capture::thumbnail;
 use crate::command::Event;
 use crate::model::{Observed, Severity};
 use crate::text;
@@ -50,6 +50,6 @@ fn look(job: &ObserveJob, capture: &CaptureRecord) -> Result<Observed, String> {
     Ok(Observed {
         corners: seen.map(|seen| seen.corners),
         image_size: rgb.dimensions(),
-        thumbnail: Arc::new(vision::thumbnail(&rgb)),
+        thumbnail: Arc::new(thumbnail(&rgb)),
     })
 }

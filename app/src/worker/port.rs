@@ -4,7 +4,7 @@ use handeye_core::depth::DepthImage;
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{FollowMoment, FollowWish, JointAngles};
+use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish, JointAngles};
 
 use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
 use crate::text::Text;
@@ -105,6 +105,28 @@ pub struct JogRequest {
     pub speed: f64,
 }
 
+/// Poses that are asked for to look at the board from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewsRequest {
+    /// What is looked at, and with what.
+    pub board: BoardInView,
+    /// Where it was looked at from already: the poses are to be others.
+    pub taken: Vec<Pose<Base, Tip>>,
+    /// How many are wanted; there may be fewer.
+    pub count: usize,
+}
+
+/// Whether an arm can go along with a board from where it is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Room {
+    /// It can.
+    Enough,
+    /// It can from these joints [rad].
+    At(JointAngles),
+    /// It can from nowhere, and this is why.
+    Nowhere(Text),
+}
+
 /// What moves the arm.
 pub trait MotionPort: Send {
     /// Looks whether the cell is there, without asking it for anything.
@@ -133,6 +155,18 @@ pub trait MotionPort: Send {
     /// # Errors
     /// As [`Self::move_to`].
     fn jog(&mut self, request: &JogRequest, held: &mut dyn FnMut() -> Option<f64>) -> Result<Option<Text>, PortError>;
+
+    /// Whether the arm has room to keep its view of a board that moves, and where it has. Nothing moves.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    fn room(&mut self, board: &BoardInView) -> Result<Room, PortError>;
+
+    /// Joints from which the whole board is seen; or why there are none. Nothing moves.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointAngles>, Text>, PortError>;
 
     /// Leads the tip where `wish` wants it, pass by pass, and returns when the arm stands: [`MotionOutcome::Stopped`] when
     /// that was wished or a stop came, and why otherwise.

@@ -10,8 +10,9 @@ use handeye_core::findings::{Finding, FindingOptions};
 use handeye_core::handeye::HandEyeError;
 use handeye_core::observation::View;
 use handeye_core::progress::{CancelToken, Progress, Work};
+use handeye_core::result::VerificationSummary;
 use handeye_core::session::CaptureId;
-use handeye_core::verify::{self, Calibrated, CheckCapture, VerifyError};
+use handeye_core::verify::{self, Calibrated, CheckCapture, Verification, VerifyError};
 
 use super::link::Outlet;
 use crate::command::{Event, SolveOutcome};
@@ -95,6 +96,7 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
     if let Some(Err(VerifyError::Cancelled)) = verification {
         return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
     }
+    result.verification = verification.as_ref().and_then(|outcome| outcome.as_ref().ok()).map(summary);
     Ok(Solved {
         job: job.id,
         captures: job.captures.clone(),
@@ -106,4 +108,13 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
         calibration,
         took_s: 0.0,
     })
+}
+
+fn summary(verification: &Verification) -> VerificationSummary {
+    VerificationSummary {
+        captures: verification.captures.len(),
+        rms_px: verification.rms_px,
+        centre_rms_mm: verification.centre_rms_m * 1e3,
+        orientation_rms_deg: verification.orientation_rms_rad.to_degrees(),
+    }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use handeye_core::board_shape::BoardShape;
+use handeye_core::handeye::joint::SmallSample;
 use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::result::CalibrationResult;
 use handeye_core::session::{RESULT, Session};
@@ -41,7 +42,35 @@ pub fn read(path: &Path) -> Result<(Calibrated, Option<TargetSpec>), Failure> {
         warp_m: board.warp_mm.map(|mm| mm * 1e-3),
         scale: board.scale,
     });
-    Ok((Calibrated { hand_eye, intrinsics, shape, hand_eye_covariance: covariance, uncertainty: None }, target))
+    let calibrated = Calibrated {
+        hand_eye,
+        intrinsics,
+        shape,
+        joint_offsets_rad: joint_offsets_rad(&result),
+        hand_eye_covariance: covariance,
+        small_sample: small_sample(&result),
+        uncertainty: None,
+    };
+    Ok((calibrated, target))
+}
+
+/// How the error of the hand-eye transform is distributed; one without degrees of freedom is Gaussian.
+fn small_sample(result: &CalibrationResult) -> SmallSample {
+    let estimate = result.estimate.as_ref();
+    let degrees_of_freedom = estimate.and_then(|estimate| estimate.degrees_of_freedom);
+    let scale = estimate.and_then(|estimate| estimate.region_scale);
+    SmallSample {
+        degrees_of_freedom: degrees_of_freedom.unwrap_or(SmallSample::KNOWN.degrees_of_freedom),
+        scale: scale.unwrap_or(SmallSample::KNOWN.scale),
+        ..SmallSample::KNOWN
+    }
+}
+
+/// The offsets of the joints that the answer uses.
+fn joint_offsets_rad(result: &CalibrationResult) -> Vec<f64> {
+    let joints = result.estimate.as_ref().and_then(|estimate| estimate.joint_offsets.as_ref());
+    let accepted = joints.filter(|joints| joints.accepted);
+    accepted.map_or_else(Vec::new, |joints| joints.offsets_deg.iter().map(|deg| deg.to_radians()).collect())
 }
 
 fn links(result: &CalibrationResult) -> Option<(HandEye, Option<nalgebra::Matrix6<f64>>)> {

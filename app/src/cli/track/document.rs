@@ -1,30 +1,33 @@
 //! The JSON of a track: written picture by picture, so that hours of it need no memory, and readable whenever it ends.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::Path;
 
+use anyhow::anyhow;
 use handeye_core::frames::{Base, Pose, Target};
 use handeye_core::track::State;
 use serde_json::{Value, json};
 
 use super::live::Summary;
-use crate::cli::Failure;
+use crate::cli::output::Output;
+use crate::cli::{Failure, out};
 use crate::model::Tracked;
 
-/// The file, or nothing where none is wanted.
+/// The document, or nothing where none is wanted.
 pub struct Document {
-    open: Option<(PathBuf, BufWriter<File>)>,
+    open: Option<(Output, BufWriter<Box<dyn Write>>)>,
     written: u64,
+    is_closed: bool,
 }
 
 impl Document {
-    /// Begins a file.
-    pub fn begin(file: Option<&Path>, calibration: &Path) -> Result<Self, Failure> {
-        let Some(path) = file else { return Ok(Self { open: None, written: 0 }) };
-        let made = File::create(path)
-            .map_err(|error| Failure::unusable(anyhow::anyhow!("{} cannot be written: {error}", path.display())))?;
-        let mut document = Self { open: Some((path.to_path_buf(), BufWriter::new(made))), written: 0 };
+    /// Begins a document.
+    pub fn begin(output: Option<&Output>, calibration: &Path) -> Result<Self, Failure> {
+        let mut document = Self { open: None, written: 0, is_closed: false };
+        let Some(output) = output else { return Ok(document) };
+        let opened =
+            output.open().map_err(|error| Failure::unusable(anyhow!("{output} cannot be written: {error}")))?;
+        document.open = Some((output.clone(), BufWriter::new(opened)));
         let calibration = json!(calibration.display().to_string());
         document.write(&format!(
             "{{ \"format\": \"handeye-track\", \"version\": 1,\n  \"calibration\": {calibration},\n  \"frames\": ["
@@ -42,26 +45,27 @@ impl Document {
         self.write(&format!("{comma}\n    {}", frame(tracked)))
     }
 
-    /// Ends the file.
+    /// Whether nobody reads it any longer.
+    pub fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// Ends the document.
     pub fn finish(mut self, summary: &Summary) -> Result<(), Failure> {
-        if self.open.is_none() {
-            return Ok(());
-        }
-        self.write(&format!("\n  ],\n  \"summary\": {} }}\n", summary.json()))?;
-        match &mut self.open {
-            Some((path, file)) => file.flush().map_err(|error| cannot_write(path, &error)),
-            None => Ok(()),
-        }
+        let end = format!("\n  ],\n  \"summary\": {} }}\n", summary.json());
+        self.with(|file| file.write_all(end.as_bytes()).and_then(|()| file.flush()))
     }
 
     fn write(&mut self, text: &str) -> Result<(), Failure> {
-        let Some((path, file)) = &mut self.open else { return Ok(()) };
-        file.write_all(text.as_bytes()).map_err(|error| cannot_write(path, &error))
+        self.with(|file| file.write_all(text.as_bytes()))
     }
-}
 
-fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::failed(anyhow::anyhow!("{} cannot be written: {error}", path.display()))
+    fn with(&mut self, work: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
+        let Some((output, file)) = self.open.as_mut().filter(|_| !self.is_closed) else { return Ok(()) };
+        let written = work(file);
+        self.is_closed = written.as_ref().is_err_and(|error| error.kind() == ErrorKind::BrokenPipe);
+        out::finished(written, output)
+    }
 }
 
 fn pose(pose: &Pose<Base, Target>) -> Value {

@@ -30,19 +30,24 @@ impl Archive {
             why
         });
         match imported {
-            Ok(store) => {
+            Ok((store, outside)) => {
                 let folder = store.folder().display().to_string();
                 self.store = Some(store);
                 self.report_document();
                 self.outlet.report(Event::SessionOpened);
                 let text = text!("The data set was copied to the session {folder}", folder = folder);
                 self.outlet.notice(Severity::Info, text);
+                if outside > 0 {
+                    let text = text!("{count} files of the data set lie outside of its folder", count = outside);
+                    self.outlet.notice(Severity::Warning, text);
+                }
             }
             Err(why) => self.outlet.report(Event::SessionFailed { why }),
         }
     }
 
-    fn copy(&self, folder: &Path) -> Result<Store, ImportError> {
+    /// The session, and how many files of the data set lie outside of its folder.
+    fn copy(&self, folder: &Path) -> Result<(Store, usize), ImportError> {
         let dataset = Dataset::read(folder)?;
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let target_folder = free_folder(&self.sessions, &name);
@@ -79,6 +84,6 @@ impl Archive {
                 pose_name: Some(&entry.name),
             })?;
         }
-        Ok(store)
+        Ok((store, dataset.outside.len()))
     }
 }

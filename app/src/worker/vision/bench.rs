@@ -16,7 +16,8 @@ use handeye_sim_link::client::cell::{CellClient, CellPaths, GroundTruth};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions};
 
 use super::super::{Clock, Connector, LiveConnector, Waker, Workers};
-use super::{CaptureRequest, LatestSlot, Measured, Outlet, Sights, Tap, Vision, VisionTask};
+use super::{LatestSlot, Outlet, Sights, Tap, Vision, VisionTask};
+use crate::capture::{CaptureRequest, Measured};
 use crate::command::Event;
 use crate::model::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellSource, DepthScale, FrameImages, FrameInfo,

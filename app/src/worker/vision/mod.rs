@@ -5,8 +5,6 @@
 //! be compared, then the live search. So whatever is asked for is taken up within one search, and a capture that waits
 //! goes on within one search, however long a search takes.
 
-mod capture;
-mod refusal;
 mod search;
 
 use std::sync::Arc;
@@ -20,14 +18,13 @@ use handeye_core::target::TargetSpec;
 use handeye_core::track::{Picture, Setup};
 use handeye_sim_link::client::CancelToken;
 
-pub use capture::{CaptureRequest, Measured, thumbnail};
-use capture::{Look, UnderWay};
 use search::Search;
 
 use super::follow_line::FollowLine;
 use super::link::Outlet;
 use super::slot::{LatestSlot, Tap};
 use super::tracking::{Sight, Tracking};
+use crate::capture::{CaptureRequest, Measured, Sequence, refusal};
 use crate::command::Event;
 use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
 use crate::text::Text;
@@ -63,6 +60,13 @@ pub struct Sights {
 
 /// The application ends.
 struct Ended;
+
+/// The capture that is under way.
+struct UnderWay {
+    sequence: Sequence,
+    /// What was reported last.
+    told: Option<CaptureWait>,
+}
 
 /// The vision thread.
 pub struct Vision {
@@ -105,7 +109,7 @@ impl Vision {
             self.look_at(&frame, dropped)?;
         }
         if let Some(capture) = &mut self.capture {
-            capture.machine.pass_time(self.outlet.now_s(), self.tap.heard_s());
+            capture.sequence.pass_time(self.outlet.now_s(), self.tap.heard_s());
             self.tell_progress();
         }
         Ok(())
@@ -146,11 +150,14 @@ impl Vision {
             VisionTask::SetIntrinsics(intrinsics) => self.search.intrinsics = Some(intrinsics),
             VisionTask::Capture(request) => {
                 self.refuse(refusal::another_capture());
-                self.capture = Some(UnderWay::new(request, self.outlet.now_s()));
-                if self.search.target.is_none() {
-                    self.refuse(refusal::no_target());
+                match self.search.target {
+                    Some(target) => {
+                        let sequence = Sequence::new(request, target, self.outlet.now_s());
+                        self.capture = Some(UnderWay { sequence, told: None });
+                        self.tell_progress();
+                    }
+                    None => self.report_refusal(request.number, refusal::no_target()),
                 }
-                self.tell_progress();
             }
             VisionTask::CancelCapture => self.refuse(refusal::cancelled()),
             VisionTask::Track(setup) => self.track(setup),
@@ -160,7 +167,7 @@ impl Vision {
 
     fn look_at(&mut self, frame: &LiveFrame, dropped: u64) -> Result<(), Ended> {
         let grey = gray_from_rgb(&frame.images.rgb);
-        let complete = self.capture.as_mut().is_some_and(|capture| capture.see(frame, &grey));
+        let complete = self.capture.as_mut().is_some_and(|capture| capture.sequence.see(frame, &grey));
         self.tell_progress();
         if self.capture.is_none() && self.tracking.is_some() {
             self.track_in(frame, &grey, dropped);
@@ -168,13 +175,13 @@ impl Vision {
         }
         let Some(detection) = self.search.live(frame, &grey, dropped) else { return Ok(()) };
         if let (Some(capture), Some(corners)) = (&mut self.capture, &detection.corners) {
-            capture.machine.saw_board(frame.info.number, corners);
+            capture.sequence.saw_board(frame.info.number, corners);
         }
         self.sights.detections.put(detection);
         (self.outlet.waker)();
         if complete {
             self.take_up_tasks()?;
-            self.measure(frame)?;
+            self.measure()?;
         }
         Ok(())
     }
@@ -227,29 +234,29 @@ impl Vision {
         }
     }
 
-    /// Measures the average of a capture, whose last picture is `frame`, unless it was given up meanwhile.
-    fn measure(&mut self, frame: &LiveFrame) -> Result<(), Ended> {
-        let Some(target) = self.search.target else { return Ok(()) };
-        let Some(capture) = &mut self.capture else { return Ok(()) };
-        let Some(taken) = capture.machine.finish() else { return Ok(()) };
-        let number = capture.request.number;
+    /// Measures the average of a capture, unless it was given up meanwhile.
+    fn measure(&mut self) -> Result<(), Ended> {
+        let complete = self.capture.as_ref().filter(|capture| capture.sequence.is_complete());
+        let Some(number) = complete.map(|capture| capture.sequence.number()) else { return Ok(()) };
         self.tell(CaptureWait::Measuring);
-        let look = capture::measure(taken, &target);
+        let measured = self.capture.as_ref().and_then(|capture| capture.sequence.measure());
         // The search may have taken seconds: what was asked for meanwhile comes first.
         self.take_up_tasks()?;
-        if self.capture.as_ref().is_none_or(|capture| capture.request.number != number) {
+        if self.capture.as_ref().is_none_or(|capture| capture.sequence.number() != number) {
             return Ok(());
         }
-        match look {
-            Look::Refused(kind, why) => self.refuse((kind, why)),
-            Look::Good(picture) => {
+        match measured {
+            None => Ok(()),
+            Some(Err(why)) => {
+                self.refuse(why);
+                Ok(())
+            }
+            Some(Ok(measured)) => {
                 self.tell(CaptureWait::Saving);
-                if let Some(capture) = self.capture.take() {
-                    self.hand_over(picture.into_measured(capture.request, &frame.info))?;
-                }
+                self.capture = None;
+                self.hand_over(measured)
             }
         }
-        Ok(())
     }
 
     /// Waits for the one who writes captures when that one is behind.
@@ -269,7 +276,7 @@ impl Vision {
 
     /// Reports what the capture waits for, or that there is none, when it is news.
     fn tell_progress(&mut self) {
-        match self.capture.as_ref().map(UnderWay::state) {
+        match self.capture.as_ref().map(|capture| capture.sequence.state()) {
             Some(Ok(wait)) => self.tell(wait),
             Some(Err(why)) => self.refuse(why),
             None => {}
@@ -279,17 +286,21 @@ impl Vision {
     fn tell(&mut self, wait: CaptureWait) {
         if let Some(capture) = self.capture.as_mut().filter(|capture| capture.told != Some(wait)) {
             capture.told = Some(wait);
-            let number = capture.request.number;
+            let number = capture.sequence.number();
             self.outlet.report(Event::CaptureWaits { number, wait });
         }
     }
 
     /// Ends the capture that is under way, if there is one.
-    fn refuse(&mut self, (kind, why): refusal::Why) {
+    fn refuse(&mut self, why: refusal::Why) {
         if let Some(capture) = self.capture.take() {
-            let refused = CaptureRefused { kind, why, at_s: self.outlet.now_s() };
-            self.outlet.report(Event::CaptureRefused { number: capture.request.number, refused });
+            self.report_refusal(capture.sequence.number(), why);
         }
+    }
+
+    fn report_refusal(&self, number: u64, (kind, why): refusal::Why) {
+        let refused = CaptureRefused { kind, why, at_s: self.outlet.now_s() };
+        self.outlet.report(Event::CaptureRefused { number, refused });
     }
 }
 

@@ -4,8 +4,9 @@ use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::target::{Grid, TargetSpec};
 use handeye_core::vision::VisionError;
 
+use super::VisionTask;
 use super::bench::{BOARD, Table, board_picture, request};
-use super::{CaptureRequest, VisionTask};
+use crate::capture::CaptureRequest;
 use crate::model::{CaptureOptions, CaptureWait, RefusalKind};
 use crate::text::Language;
 

@@ -1,0 +1,39 @@
+//! What is asked for.
+
+use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::session::Document;
+
+use crate::model::{CaptureOptions, CapturePurpose};
+
+/// A capture that is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CaptureRequest {
+    /// Its number, which everything that is reported of it carries.
+    pub number: u64,
+    /// What it is for.
+    pub purpose: CapturePurpose,
+    /// How it is taken.
+    pub options: CaptureOptions,
+    /// Name of the pose that it is taken at, where it has one.
+    pub pose_name: Option<String>,
+    /// The captures that there are, by number, against which it must be different.
+    pub others: Vec<(u32, Pose<Base, Tip>)>,
+}
+
+impl CaptureRequest {
+    /// For a session. At a pose that has a name a capture may be as similar to others as it likes: whoever taught two
+    /// poses close to each other wants both, and the reference poses have one twice.
+    pub fn new(
+        number: u64,
+        purpose: CapturePurpose,
+        mut options: CaptureOptions,
+        pose_name: Option<String>,
+        session: &Document,
+    ) -> Self {
+        if pose_name.is_some() {
+            (options.least_distance_m, options.least_angle_rad) = (0.0, 0.0);
+        }
+        let others = session.captures.iter().map(|it| (it.id.0, it.base_from_tip)).collect();
+        Self { number, purpose, options, pose_name, others }
+    }
+}

@@ -1,0 +1,124 @@
+//! The capture that is under way, and what comes out of it.
+
+use std::sync::Arc;
+
+use handeye_core::capture::{self, Machine, Plan, Progress, Shot, Sighting, Taken, Wait};
+use handeye_core::image::GrayImage;
+use handeye_core::observation::Corner;
+use handeye_core::target::TargetSpec;
+
+use super::refusal::{self, Why};
+use super::{CaptureRequest, Measured, thumbnail};
+use crate::model::{CaptureOptions, CaptureWait, FrameInfo, LiveFrame};
+
+/// The capture that is under way: takes in pictures one by one, from the request on, and says what it waits for. Never
+/// waits itself.
+#[derive(Debug)]
+pub struct Sequence {
+    request: CaptureRequest,
+    target: TargetSpec,
+    machine: Machine,
+    /// What belongs to the last picture that was taken in.
+    last: Option<FrameInfo>,
+}
+
+impl Sequence {
+    /// A request at a time on the clock that pictures arrive by, for the board that is looked for.
+    pub fn new(request: CaptureRequest, target: TargetSpec, now_s: f64) -> Self {
+        let CaptureOptions { frames, least_distance_m, least_angle_rad, settle_limit_s } = request.options;
+        let others = request.others.clone();
+        let plan = Plan { frames, settle_limit_s, least_distance_m, least_angle_rad, others };
+        Self { request, target, machine: Machine::new(plan, now_s), last: None }
+    }
+
+    /// The number of the request.
+    pub fn number(&self) -> u64 {
+        self.request.number
+    }
+
+    /// Takes in a picture; whether it was the last that is needed.
+    pub fn see(&mut self, frame: &LiveFrame, grey: &GrayImage) -> bool {
+        let LiveFrame { info, images } = frame;
+        let shot = Shot {
+            number: info.number,
+            sim_time_s: info.sim_time_s,
+            received_s: info.received_s,
+            joints_rad: &info.joints_rad,
+            rgb: &images.rgb,
+            grey,
+            depth: &images.depth,
+            far_plane_m: info.far_plane_m,
+        };
+        if !self.is_complete() {
+            self.last = Some(info.clone());
+        }
+        self.machine.see(&info.base_from_tip, &shot);
+        self.is_complete()
+    }
+
+    /// Whether all pictures are there.
+    pub fn is_complete(&self) -> bool {
+        self.machine.progress() == Progress::Complete
+    }
+
+    /// Whether [`Self::saw_board`] of the last picture is of use: where corners are to be compared from picture to
+    /// picture, and the picture is part of the average.
+    pub fn compares_corners(&self) -> bool {
+        let averages = matches!(self.machine.progress(), Progress::Waits(Wait::Averaging { .. }) | Progress::Complete);
+        averages && self.request.options.frames >= capture::Scatter::LEAST_PICTURES
+    }
+
+    /// Tells where the board was in the last picture that was taken in.
+    pub fn saw_board(&mut self, number: u64, corners: &[Corner]) {
+        self.machine.saw_board(number, corners);
+    }
+
+    /// See [`Machine::pass_time`].
+    pub fn pass_time(&mut self, now_s: f64, camera_heard_s: Option<f64>) {
+        self.machine.pass_time(now_s, camera_heard_s);
+    }
+
+    /// What it waits for, or why it has ended.
+    pub fn state(&self) -> Result<CaptureWait, Why> {
+        match self.machine.progress() {
+            Progress::Waits(Wait::ForPicture) => Ok(CaptureWait::ForPicture),
+            Progress::Waits(Wait::RobotMoves) => Ok(CaptureWait::RobotMoves),
+            Progress::Waits(Wait::PictureChanges) => Ok(CaptureWait::PictureChanges),
+            Progress::Waits(Wait::Averaging { done, of }) => Ok(CaptureWait::Averaging { done, of }),
+            Progress::Complete => Ok(CaptureWait::Measuring),
+            Progress::Refused(why) => Err(refusal::of_machine(&why)),
+        }
+    }
+
+    /// Looks for the board in the average with all effort, which may take seconds when it is not there. `None` before
+    /// all pictures are there.
+    pub fn measure(&self) -> Option<Result<Measured, Why>> {
+        let (taken, last) = (self.machine.finish()?, self.last.as_ref()?);
+        Some(match capture::observe_image(&taken.rgb, &self.target) {
+            Err(error) => Err(refusal::not_searched(&error)),
+            Ok(None) => Err(refusal::no_board(&self.target)),
+            Ok(Some(Sighting { blur: Some(blur), .. })) if blur.is_too_blurred() => Err(refusal::blurred(&blur)),
+            Ok(Some(Sighting { corners, .. })) => Ok(self.measured(taken, corners, last)),
+        })
+    }
+
+    fn measured(&self, taken: Taken, corners: Vec<Corner>, last: &FrameInfo) -> Measured {
+        let Taken { rgb, depth, frames, settled_s, corner_noise_px } = taken;
+        Measured {
+            number: self.request.number,
+            purpose: self.request.purpose,
+            target: self.target,
+            thumbnail: thumbnail(&rgb),
+            rgb: Arc::new(rgb),
+            depth,
+            base_from_tip: last.base_from_tip,
+            joints_rad: last.joints_rad,
+            sim_time_s: last.sim_time_s,
+            frames,
+            settled_s,
+            corner_noise_px,
+            corners,
+            pose_name: self.request.pose_name.clone(),
+        }
+    }
+}

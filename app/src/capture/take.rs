@@ -1,0 +1,70 @@
+//! A capture from the request to its end, for a thread that can wait.
+
+use handeye_core::image_file::gray_from_rgb;
+use handeye_core::target::TargetSpec;
+use handeye_core::vision::{DetectOptions, detect_with};
+
+use super::{CaptureRequest, Measured, Sequence};
+use crate::model::{CaptureRefused, LiveFrame};
+
+/// Where the pictures of a capture come from.
+pub trait Pictures {
+    /// Why there are none.
+    type Error;
+
+    /// The clock that pictures arrive by [s].
+    fn now_s(&self) -> f64;
+
+    /// Waits for the pictures of a later instant than those before. Gives those of the same instant again where simulated
+    /// time stands still, so that it is noticed.
+    ///
+    /// # Errors
+    /// Whatever comes back ends the capture.
+    fn next(&mut self) -> Result<LiveFrame, Self::Error>;
+}
+
+/// What came of a capture.
+#[derive(Debug)]
+pub enum CaptureEnd {
+    /// It is good; with the last of its pictures.
+    Good(Box<Measured>, LiveFrame),
+    /// There is none.
+    Refused(CaptureRefused),
+}
+
+/// Takes a capture. Ends, whatever the pictures are: see [`handeye_core::capture::Machine`].
+///
+/// # Errors
+/// Those of the pictures.
+pub fn take<P: Pictures>(
+    request: CaptureRequest,
+    target: &TargetSpec,
+    pictures: &mut P,
+) -> Result<CaptureEnd, P::Error> {
+    let mut sequence = Sequence::new(request, *target, pictures.now_s());
+    loop {
+        let frame = pictures.next()?;
+        let (number, received_s) = (frame.info.number, frame.info.received_s);
+        let grey = gray_from_rgb(&frame.images.rgb);
+        sequence.see(&frame, &grey);
+        // A picture in which the quick search does not find the board tells nothing of its corners; whether it is there is
+        // decided in the average.
+        if sequence.compares_corners()
+            && let Ok(Some(corners)) = detect_with(&grey, target, DetectOptions::live())
+        {
+            sequence.saw_board(number, &corners);
+        }
+        sequence.pass_time(received_s, Some(received_s));
+        let ended = match sequence.state() {
+            Err(why) => Err(why),
+            Ok(_waits) => match sequence.measure() {
+                None => continue,
+                Some(measured) => measured,
+            },
+        };
+        return Ok(match ended {
+            Ok(measured) => CaptureEnd::Good(Box::new(measured), frame),
+            Err((kind, why)) => CaptureEnd::Refused(CaptureRefused { kind, why, at_s: received_s }),
+        });
+    }
+}

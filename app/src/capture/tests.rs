@@ -1,0 +1,147 @@
+//! The blocking way through a capture, with pictures that a test makes up.
+
+use std::cell::Cell;
+use std::sync::Arc;
+
+use handeye_core::depth::DepthImage;
+use handeye_core::frames::Pose;
+use handeye_core::image::{Rgb, RgbImage};
+use handeye_core::target::{Grid, TargetSpec};
+
+use super::{CaptureEnd, CaptureRequest, Pictures, take};
+use crate::model::{CaptureOptions, CapturePurpose, FrameImages, FrameInfo, LiveFrame, RefusalKind};
+use crate::text::Language;
+
+const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
+
+/// One picture after the other, a pass apart.
+struct Reel<F> {
+    rgb: F,
+    number: u64,
+    pass_s: f64,
+    now_s: Cell<f64>,
+}
+
+impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Reel<F> {
+    fn new(rgb: F) -> Self {
+        Self { rgb, number: 0, pass_s: 0.05, now_s: Cell::new(100.0) }
+    }
+}
+
+impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Pictures for Reel<F> {
+    type Error = &'static str;
+
+    fn now_s(&self) -> f64 {
+        self.now_s.get()
+    }
+
+    fn next(&mut self) -> Result<LiveFrame, Self::Error> {
+        self.number += 1;
+        self.now_s.set(self.now_s.get() + 0.1);
+        let info = FrameInfo {
+            number: self.number,
+            sim_time_s: self.number as f64 * self.pass_s,
+            received_s: self.now_s.get(),
+            rate_hz: 0.0,
+            depth_range_m: [0.1, 3.5],
+            far_plane_m: 3.5,
+            base_from_tip: Pose::identity(),
+            joints_rad: [0.0; 6],
+            base_from_target_true: None,
+        };
+        let depth = DepthImage { width: 1, height: 1, metres: vec![0.5] };
+        let rgb = (self.rgb)(self.number)?;
+        let images = FrameImages { rgb, depth, depth_coloured: RgbImage::default() };
+        Ok(LiveFrame { info, images: Arc::new(images) })
+    }
+}
+
+fn request(frames: u32) -> CaptureRequest {
+    CaptureRequest {
+        number: 7,
+        purpose: CapturePurpose::Calibrate,
+        options: CaptureOptions { frames, ..CaptureOptions::default() },
+        pose_name: Some("view".to_owned()),
+        others: Vec::new(),
+    }
+}
+
+/// The board straight on, squares of 24 px, box blur of a radius, brighter by some grey levels.
+fn board(blur_px: i32, brighter: f64) -> RgbImage {
+    let level = |u: i32, v: i32| {
+        let (x, y) = ((u - 100).div_euclid(24), (v - 100).div_euclid(24));
+        let on_board = (-1..10).contains(&x) && (-1..7).contains(&y);
+        if on_board && (x + y).rem_euclid(2) == 0 { 40.0 } else { 210.0 }
+    };
+    RgbImage::from_fn(480, 360, |u, v| {
+        let around = -blur_px..=blur_px;
+        let sum: f64 = around
+            .clone()
+            .flat_map(|du| around.clone().map(move |dv| (du, dv)))
+            .map(|(du, dv)| level(u as i32 + du, v as i32 + dv))
+            .sum();
+        let count = f64::from((2 * blur_px + 1).pow(2));
+        Rgb([(sum / count + brighter).round() as u8; 3])
+    })
+}
+
+fn refused(end: Result<CaptureEnd, &'static str>) -> (RefusalKind, String) {
+    match end.expect("pictures came") {
+        CaptureEnd::Refused(refused) => (refused.kind, refused.why.say(Language::English)),
+        CaptureEnd::Good(measured, _) => panic!("{measured:?}"),
+    }
+}
+
+#[test]
+fn four_pictures_show_that_everything_is_at_rest_and_the_next_ones_are_averaged() {
+    let mut reel = Reel::new(|number| Ok(board(1, number as f64)));
+    let CaptureEnd::Good(measured, last) = take(request(3), &BOARD, &mut reel).expect("pictures") else {
+        panic!("a capture")
+    };
+    assert_eq!((measured.frames, reel.number, last.info.number), (3, 6, 6), "pictures 4, 5 and 6");
+    assert_eq!(*measured.rgb, board(1, 5.0), "their mean");
+    assert_eq!(measured.sim_time_s, last.info.sim_time_s);
+    // Three intervals, whose sum is rounded.
+    assert!((measured.settled_s - 3.0 * 0.05).abs() < 1e-12, "{} s", measured.settled_s);
+    assert_eq!(measured.corners.len(), 70);
+    assert!(measured.corner_noise_px.is_some_and(|noise_px| noise_px < 0.01), "compared in all three");
+    assert_eq!((measured.number, measured.pose_name.as_deref()), (7, Some("view")));
+}
+
+#[test]
+fn what_is_no_good_is_refused_with_the_reason() {
+    let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(RgbImage::new(320, 240)))));
+    assert_eq!(kind, RefusalKind::NoBoard, "{why}");
+    let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(board(6, 0.0)))));
+    assert_eq!(kind, RefusalKind::Blurred, "{why}");
+    let near = CaptureRequest { others: vec![(12, Pose::identity())], ..request(1) };
+    let (kind, why) = refused(take(near, &BOARD, &mut Reel::new(|_| Ok(board(0, 0.0)))));
+    assert_eq!(kind, RefusalKind::TooSimilar, "{why}");
+    // Only a part of the image: that of a lamp would be no change.
+    let waving = |number: u64| {
+        let mut rgb = board(0, 0.0);
+        (0..480).for_each(|u| (300..360).for_each(|v| rgb.put_pixel(u, v, Rgb([90 * (number % 2) as u8; 3]))));
+        Ok(rgb)
+    };
+    let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(waving)));
+    assert_eq!(kind, RefusalKind::NotSettled);
+    assert!(why.contains("still changes after 10 s"), "{why}");
+}
+
+#[test]
+fn a_simulation_without_time_ends_the_capture() {
+    for pass_s in [0.0, f64::NAN] {
+        let mut reel = Reel { pass_s, ..Reel::new(|_| Ok(board(0, 0.0))) };
+        let (kind, why) = refused(take(request(1), &BOARD, &mut reel));
+        assert_eq!(kind, RefusalKind::NotSettled);
+        assert!(why.contains("paused"), "{why}");
+        assert!(reel.number < 40, "{} pictures in {} s", reel.number, reel.now_s.get() - 100.0);
+    }
+}
+
+#[test]
+fn the_error_of_a_camera_ends_the_capture() {
+    let end =
+        take(request(1), &BOARD, &mut Reel::new(|number| if number < 3 { Ok(board(0, 0.0)) } else { Err("gone") }));
+    assert_eq!(end.expect_err("no third picture"), "gone");
+}

@@ -1,0 +1,193 @@
+//! Visiting the poses, with a capture at each.
+
+use std::time::Instant;
+
+use handeye_core::poses_file::Goal;
+use handeye_core::progress::CancelToken;
+use handeye_core::session::Store;
+use handeye_sim_link::client::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
+use handeye_sim_link::client::{CallOptions, LinkError};
+
+use super::super::{Failure, record};
+use super::poses::Plan;
+use crate::capture::{self, CaptureEnd, CaptureRequest, Pictures};
+use crate::model::{CaptureOptions, CapturePurpose, LiveFrame};
+use crate::rerun_log::Recorder;
+use crate::text::Language;
+
+/// How often a conversation that broke on the way to one pose is taken up again. A try waits for as long as a server may
+/// be silent, so that a network has some time to come back when the computer wakes up.
+const TRIES: u32 = 3;
+
+/// A tour of the poses of a plan.
+pub struct Tour<'a> {
+    pub cell: &'a mut CellClient,
+    pub plan: &'a Plan,
+    pub options: CaptureOptions,
+    /// Whether the simulation keeps its own pace.
+    pub real_time: bool,
+    pub session: &'a mut Store,
+    pub recorder: &'a Recorder,
+    pub cancel: &'a CancelToken,
+}
+
+/// What came of a pose.
+enum Visit {
+    Ended(CaptureEnd),
+    Unreached(LinkError),
+}
+
+impl Tour<'_> {
+    /// Visits every pose and captures there. A pose that the arm cannot reach, or that gives no capture, is named and
+    /// left out; anything else ends the tour.
+    pub fn run(&mut self) -> Result<(), Failure> {
+        let plan = self.plan;
+        let began = Instant::now();
+        let mut pictures = 0;
+        self.set_going().map_err(Failure::failed)?;
+        if let Some(start) = &plan.start_joints {
+            self.persisting("the start", |tour| tour.cell.move_to_joints(start, &plan.joint_limits, tour.cancel))?;
+        }
+        for (index, (name, goal)) in plan.goals.iter().enumerate() {
+            let number = index as u64 + 1;
+            let visit = self.persisting(&format!("pose {name:?}"), |tour| {
+                match tour.go_to(goal) {
+                    Err(error @ LinkError::Unreached { .. }) => return Ok(Visit::Unreached(error)),
+                    arrived => arrived?,
+                }
+                let request = CaptureRequest::new(
+                    number,
+                    CapturePurpose::Calibrate,
+                    tour.options,
+                    Some(name.clone()),
+                    tour.session.document(),
+                );
+                let target = tour.session.document().meta.target;
+                let info = tour.cell.info().clone();
+                let mut eye = Passes {
+                    cell: &mut *tour.cell,
+                    info,
+                    cancel: tour.cancel,
+                    began,
+                    pictures: &mut pictures,
+                    first: true,
+                };
+                capture::take(request, &target, &mut eye).map(Visit::Ended)
+            })?;
+            match visit {
+                Visit::Ended(CaptureEnd::Good(measured, last)) => {
+                    measured.record(self.session).map_err(Failure::failed)?;
+                    record::capture(self.recorder, last, self.session);
+                    tracing::info!("pose {number} of {} captured ({name})", plan.goals.len());
+                }
+                Visit::Ended(CaptureEnd::Refused(refused)) if refused.kind.concerns_the_pose() => {
+                    tracing::warn!("pose {name:?} is left out: {}", refused.why.say(Language::English));
+                }
+                Visit::Ended(CaptureEnd::Refused(refused)) => {
+                    return Err(Failure::failed(anyhow::anyhow!("{}", refused.why.say(Language::English))));
+                }
+                Visit::Unreached(error) => tracing::warn!("pose {name:?} is left out: {error}"),
+            }
+        }
+        if self.session.document().captures.is_empty() {
+            let count = plan.goals.len();
+            return Err(Failure::failed(anyhow::anyhow!(
+                "none of the {count} poses gave a capture: see above why each was left out"
+            )));
+        }
+        Ok(())
+    }
+
+    fn go_to(&mut self, goal: &Goal) -> Result<(), LinkError> {
+        let Self { cell, plan, cancel, .. } = self;
+        match goal {
+            Goal::Tip(pose) => cell.move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), cancel),
+            Goal::Joints(joints) => {
+                let joints = joints.as_slice().try_into().map_err(|_wrong_length| LinkError::BadMotion {
+                    what: "the goal",
+                    expected: "six joints",
+                    value: joints.len() as f64,
+                })?;
+                cell.move_to_joints(joints, &plan.joint_limits, cancel)?;
+                // Waiting for the joints costs no pictures.
+                cell.arm().settle(&SettleOptions::default(), cancel).map(drop)
+            }
+        }
+    }
+
+    /// Stepped, a pass takes as long as it takes, and the same command gives the same pictures on every machine.
+    fn set_going(&mut self) -> Result<(), LinkError> {
+        let sim = self.cell.arm().sim();
+        sim.set_stepping(!self.real_time)?;
+        sim.start_simulation()
+    }
+
+    /// Does something that can be done again: a computer that slept is forgotten by the server, and with it its stepping
+    /// and the motion that was under way; the arm stands where it was.
+    fn persisting<T>(
+        &mut self,
+        what: &str,
+        mut work: impl FnMut(&mut Self) -> Result<T, LinkError>,
+    ) -> Result<T, Failure> {
+        let mut outcome = work(self);
+        for this in 1..=TRIES {
+            match outcome {
+                Err(error) if is_forgotten(&error) && !self.cancel.is_cancelled() => {
+                    tracing::warn!(
+                        "on the way to {what}: {error}. If this computer was asleep, that is why; going on, try {this} of \
+                         {TRIES}"
+                    );
+                    outcome = self.take_up_again().and_then(|()| work(self));
+                }
+                outcome => return outcome.map_err(Failure::failed),
+            }
+        }
+        outcome.map_err(Failure::failed)
+    }
+
+    /// As new clients: what the server may still keep for these would only be in the way.
+    fn take_up_again(&mut self) -> Result<(), LinkError> {
+        self.cell.arm().sim().connection().renew();
+        self.cell.camera().sim().connection().renew();
+        self.set_going()
+    }
+}
+
+/// Whether the server may no longer know this client, and everything else may be as it was.
+fn is_forgotten(error: &LinkError) -> bool {
+    matches!(
+        error,
+        LinkError::MotionForgotten { .. }
+            | LinkError::Disconnected { .. }
+            | LinkError::Timeout { .. }
+            | LinkError::Unreachable { .. }
+    )
+}
+
+/// The pictures of one pass after the other.
+struct Passes<'a> {
+    cell: &'a mut CellClient,
+    info: CellInfo,
+    cancel: &'a CancelToken,
+    began: Instant,
+    pictures: &'a mut u64,
+    /// The arm has just come to rest, and the pictures of that pass are there.
+    first: bool,
+}
+
+impl Pictures for Passes<'_> {
+    type Error = LinkError;
+
+    fn now_s(&self) -> f64 {
+        self.began.elapsed().as_secs_f64()
+    }
+
+    fn next(&mut self) -> Result<LiveFrame, LinkError> {
+        if !std::mem::take(&mut self.first) {
+            self.cell.arm().sim().step(&CallOptions::cancelled_by(self.cancel))?;
+        }
+        let frame = self.cell.grab()?;
+        *self.pictures += 1;
+        Ok(record::live_frame(&self.info, *self.pictures, self.now_s(), frame))
+    }
+}
