@@ -13,6 +13,7 @@ use handeye_core::poses_file::TaughtPose;
 use handeye_core::progress::Stage;
 use handeye_core::session::CaptureId;
 use handeye_core::target::TargetSpec;
+use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{
@@ -116,6 +117,8 @@ pub enum Command {
         /// What is captured at each; `None` only moves.
         purpose: Option<CapturePurpose>,
     },
+    /// Have poses planned that are not in the fit, visit them, and capture for verification at each.
+    VerifyAtPlanned,
     /// No more poses.
     StopTour,
     /// Which captures are selected; the last one's picture is shown.
@@ -182,6 +185,8 @@ pub enum Command {
     SaveAs(PathBuf),
     /// Read the folders in a folder.
     ListFolder(PathBuf),
+    /// Show a folder in the file manager of the system.
+    OpenFolder(PathBuf),
     /// Track the board in every picture, or no more.
     SetTracking(bool),
     /// Have the arm follow the board; `None` has it come to rest.
@@ -235,6 +240,13 @@ pub enum Event {
         id: MotionId,
         /// How.
         outcome: MotionOutcome,
+    },
+    /// Poses to look at the board from were planned, or cannot be.
+    Planned {
+        /// The number of the request.
+        id: MotionId,
+        /// The joints at each [rad]; or why there are none.
+        views: Result<Vec<JointAngles>, Text>,
     },
     /// A held jog button can do no more, or may not: the arm stands.
     JogEnded {
@@ -335,6 +347,8 @@ pub enum Event {
     Follow(FollowStatus),
     /// The recording is in another state.
     Rerun(RerunState),
+    /// The web viewer is served, and the system has no browser to show it.
+    NoBrowser,
     /// Something to tell the user.
     Notice {
         /// How much it matters.

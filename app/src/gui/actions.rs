@@ -110,6 +110,12 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
             keys: DELETE,
             command: (!model.selection.is_empty()).then(|| Command::Delete(model.selection.clone())),
         },
+        Action {
+            name: tr!(language, "Verify at planned poses"),
+            group: Group::Work,
+            keys: &[],
+            command: (connected && model.calibrated().is_some()).then_some(Command::VerifyAtPlanned),
+        },
         action(tr!(language, "Solve"), Group::Work, &[], Command::Solve),
         action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation),
         action(tr!(language, "Try to connect now"), Group::Work, &[], Command::Reconnect),

@@ -153,6 +153,19 @@ impl Layout {
         }
     }
 
+    /// Brings the most important pane of a step to the front, and no other.
+    pub fn arrive_at(&mut self, step: Step) {
+        if let Some(&pane) = panes_of(step).last() {
+            self.show(pane);
+        }
+    }
+
+    /// The panes that are drawn, and not behind another tab.
+    pub fn in_front(&self) -> Vec<Pane> {
+        let slots = self.tree.active_tiles().into_iter().filter_map(|id| self.tree.tiles.get_pane(&id));
+        slots.filter_map(Slot::pane).collect()
+    }
+
     /// The tab containers, which are drawn as cards.
     pub fn cards(&self) -> impl Iterator<Item = TileId> + '_ {
         self.tree
@@ -162,10 +175,8 @@ impl Layout {
     }
 
     /// Whether a pane is drawn, and not behind another tab.
-    #[cfg(test)]
     pub fn is_in_front(&self, pane: Pane) -> bool {
-        let slot = Slot::from(pane);
-        self.tree.active_tiles().into_iter().any(|id| self.tree.tiles.get_pane(&id) == Some(&slot))
+        self.in_front().contains(&pane)
     }
 }
 

@@ -4,6 +4,7 @@
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
 mod actions;
+mod arrival;
 mod captures;
 mod dialogs;
 mod fonts;
@@ -20,6 +21,7 @@ mod rail;
 #[cfg(test)]
 pub mod sample;
 mod session;
+mod signals;
 #[cfg(test)]
 mod snapshot_tests;
 mod status;
@@ -47,6 +49,7 @@ use crate::rerun_log::RerunChoice;
 use crate::settings::{self, SettingsFile};
 use crate::worker::{Clock, LiveConnector, Waker};
 pub use layout::Layout;
+use signals::Signals;
 use window::Remembered;
 pub use window::Window;
 
@@ -56,7 +59,7 @@ const APP_ID: &str = "handeye-workbench";
 /// What the workers report within this time is drawn at once: a picture and the board in it, the robot's state.
 const GATHER: Duration = Duration::from_millis(20);
 
-/// Opens the window and returns when it is closed.
+/// Opens the window and returns when it is closed, by a person or by a signal that asks for the end.
 ///
 /// # Errors
 /// When no window can be opened, most likely because there is no screen.
@@ -74,7 +77,9 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         dithering: false,
         ..NativeOptions::default()
     };
+    let signals = Signals::listen();
     let open = move |creation: &eframe::CreationContext<'_>| {
+        signals.wakes(&creation.egui_ctx);
         let ctx = creation.egui_ctx.clone();
         let waker: Waker = Arc::new(move || ctx.request_repaint_after(GATHER));
         let started = Instant::now();
@@ -98,7 +103,8 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
             creation.egui_ctx.add_plugin(widget_list::WidgetList::new(file.into()));
         }
         let layout = stored_layout(creation.storage);
-        Ok(Box::new(Window::new(app, layout, file, &creation.egui_ctx)) as Box<dyn eframe::App>)
+        let window = Window::new(app, layout, file, &creation.egui_ctx).that_heeds(signals);
+        Ok(Box::new(window) as Box<dyn eframe::App>)
     };
     eframe::run_native(APP_ID, options, Box::new(open)).map_err(|error| {
         anyhow!("cannot open a window: {error}; without a screen use the subcommands, see `handeye --help`")

@@ -27,7 +27,7 @@ use crate::model::{
     TrackPoint, TrackState, Tracked, Truth, ViewSettings,
 };
 use crate::session_start::{self, BOARD};
-use crate::{observe, truth};
+use crate::truth;
 
 /// Captures of the fit.
 pub const FITTED: u32 = 10;
@@ -67,7 +67,11 @@ fn base_from_tip(n: u32) -> Pose<Base, Tip> {
 
 /// Corners with a noise of about 0.05 px that is the same in every run.
 fn corners(n: u32) -> Vec<Corner> {
-    let chain = camera_from_target(n);
+    corners_at(n, &camera_from_target(n))
+}
+
+/// The same of a board elsewhere.
+fn corners_at(n: u32, chain: &Pose<Camera, Target>) -> Vec<Corner> {
     let wiggle = |i: usize, phase: f64| 0.07 * (f64::from(n) * 12.9 + i as f64 * 78.2 + phase).sin();
     BOARD
         .points()
@@ -188,7 +192,7 @@ fn observations() -> Observations {
         mode: Some(Mode::EyeInHand),
         target: BOARD,
         image_size: (640, 480),
-        camera: CameraKnowledge::Estimate { model: observe::DEFAULT_MODEL, start: None },
+        camera: CameraKnowledge::NOTHING,
         views: views.collect(),
     }
 }
@@ -289,9 +293,14 @@ pub fn tracking() -> Model {
     let mut model = solved();
     let time_s = 30.0;
     let truth = moving_board(time_s);
+    let chain = (base_from_tip(1) * tip_from_camera()).inverse() * truth;
+    if let Some(detection) = &mut model.detection {
+        detection.corners = Some(corners_at(1, &chain));
+        detection.camera_from_target = Some(chain);
+    }
     let seen = Seen {
-        corners: corners(1),
-        camera_from_target: camera_from_target(1),
+        corners: corners_at(1, &chain),
+        camera_from_target: chain,
         base_from_target: truth.perturbed(&small(time_s, 0.4e-3)),
         covariance: Matrix6::identity() * 1e-8,
         rms_px: 0.08,
@@ -334,6 +343,7 @@ pub fn tracking() -> Model {
     };
     if let Some(frame) = &mut model.frame {
         frame.info.base_from_target_true = Some(truth);
+        frame.info.sim_time_s = time_s;
     }
     let (from, to) = (base_from_tip(2).translation(), base_from_tip(1).translation());
     for n in 0..=60 {

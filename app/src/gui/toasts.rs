@@ -6,9 +6,10 @@ use egui::text::LayoutJob;
 use egui::{CornerRadius, FontId, Galley, Rect, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, WidgetType};
 
 use super::icons::{self, Icon};
+use super::layout::Layout;
 use super::theme::{CARD_RADIUS, Palette};
 use crate::command::{Command, Outbox};
-use crate::model::{Message, Model, Severity};
+use crate::model::{Home, Message, Model, Severity};
 use crate::text::Language;
 use crate::tr;
 
@@ -34,21 +35,27 @@ fn lifetime_s(severity: Severity) -> Option<f64> {
     }
 }
 
-/// The messages that are up now, newest first.
-fn up(model: &Model) -> Vec<&Message> {
+/// The messages that are up now, newest first: those that stand nowhere else where they could be seen.
+fn up<'a>(model: &'a Model, layout: &Layout) -> Vec<&'a Message> {
     let is_up = |message: &&Message| {
-        !message.dismissed
+        let has_no_other_place = match message.home {
+            Home::Toast => true,
+            Home::Pane(pane) => !layout.is_in_front(pane),
+            Home::StatusLine | Home::Connection => false,
+        };
+        has_no_other_place
+            && !message.dismissed
             && lifetime_s(message.severity).is_none_or(|lifetime_s| model.now_s - message.at_s < lifetime_s)
     };
     model.messages.iter().rev().filter(is_up).take(MOST).collect()
 }
 
 /// Draws them into the room that is left, newest at the bottom. What has no room is in the log.
-pub fn toasts_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+pub fn toasts_ui(ui: &mut Ui, model: &Model, layout: &Layout, outbox: &mut Outbox) {
     let language = model.view.language;
     let room = ui.available_rect_before_wrap();
     let mut bottom = room.bottom();
-    for message in up(model) {
+    for message in up(model, layout) {
         let said = said(message, language);
         let galley = galley(ui, &said, room.width() - LEFT - RIGHT);
         let height = galley.size().y + 2.0 * ABOVE;
@@ -104,16 +111,17 @@ fn toast_ui(ui: &mut Ui, rect: Rect, message: &Message, said: &str, galley: Arc<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{CellSource, ViewSettings};
+    use crate::model::{CellSource, Pane, ViewSettings};
     use crate::text::Text;
 
     #[test]
     fn messages_go_by_themselves_but_errors_wait_for_the_user() {
         let mut model = Model::new(CellSource::BuiltIn, ViewSettings::default());
         for severity in [Severity::Info, Severity::Warning, Severity::Error] {
-            model.messages.say(severity, Text::verbatim("so it is"), 10.0);
+            model.messages.say_at(Home::Toast, severity, Text::verbatim("so it is"), 10.0);
         }
-        let seen = |model: &Model| up(model).into_iter().map(|message| message.severity).collect::<Vec<_>>();
+        let layout = Layout::default();
+        let seen = |model: &Model| up(model, &layout).into_iter().map(|message| message.severity).collect::<Vec<_>>();
         model.now_s = 11.0;
         assert_eq!(seen(&model), [Severity::Error, Severity::Warning, Severity::Info]);
         model.now_s = 15.0;
@@ -122,5 +130,21 @@ mod tests {
         assert_eq!(seen(&model), [Severity::Error]);
         model.messages.dismiss(2);
         assert_eq!(seen(&model), []);
+    }
+
+    #[test]
+    fn what_a_pane_in_front_or_a_strip_or_the_status_line_says_is_not_said_again() {
+        let mut model = Model::new(CellSource::BuiltIn, ViewSettings::default());
+        model.now_s = 10.0;
+        let homes = [Home::Pane(Pane::Track), Home::Connection, Home::StatusLine];
+        for home in homes {
+            model.messages.say_at(home, Severity::Warning, Text::verbatim(format!("{home:?}")), 10.0);
+        }
+        let mut layout = Layout::default();
+        layout.show(Pane::Jog);
+        let seen = |layout: &Layout| up(&model, layout).into_iter().map(|it| it.home).collect::<Vec<_>>();
+        assert_eq!(seen(&layout), [Home::Pane(Pane::Track)], "nothing else says it now");
+        layout.show(Pane::Track);
+        assert_eq!(seen(&layout), []);
     }
 }

@@ -1,16 +1,19 @@
 //! The window: collects what happened, draws the panes, applies what the user wants.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use egui::Ui;
 use serde::{Deserialize, Serialize};
 
 use super::actions;
+use super::arrival::{Arrival, Busy};
 use super::dialogs;
 use super::fonts;
 use super::layout::{self, Layout};
 use super::palette::CommandPalette;
 use super::panes;
+use super::signals::Signals;
 use super::textures::Textures;
 use super::theme;
 use crate::app::App;
@@ -66,8 +69,12 @@ pub struct Window {
     theme: Option<ThemeChoice>,
     outbox: Outbox,
     layout: Layout,
+    arrival: Arrival,
     palette: CommandPalette,
     settings: SettingsFile,
+    /// Whether the system asks for the end.
+    signals: Option<Arc<Signals>>,
+    leaving: bool,
 }
 
 impl Window {
@@ -80,8 +87,26 @@ impl Window {
             theme: None,
             outbox: Outbox::default(),
             layout,
+            arrival: Arrival::default(),
             palette: CommandPalette::default(),
             settings,
+            signals: None,
+            leaving: false,
+        }
+    }
+
+    /// Closes when a signal asks for it.
+    #[must_use]
+    pub fn that_heeds(self, signals: Arc<Signals>) -> Self {
+        Self { signals: Some(signals), ..self }
+    }
+
+    /// Closes the window if it is time; the arm need not wait for the last frames.
+    fn heed_signals(&mut self, ctx: &egui::Context) {
+        if !self.leaving && self.signals.as_ref().is_some_and(|signals| signals.is_asked()) {
+            self.leaving = true;
+            self.app.begin_to_leave();
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
     }
 
@@ -105,10 +130,15 @@ impl Window {
         }
         self.keyboard(ui.ctx());
         self.dropped(ui.ctx());
-        let Self { app, textures, outbox, layout, palette, .. } = self;
+        self.arrive(ui.ctx());
+        let Self { app, textures, outbox, layout, arrival, palette, .. } = self;
         let model = app.model();
         textures.live.update(ui.ctx(), model);
+        let in_front = layout.in_front();
         panes::all_ui(ui, model, textures, layout, outbox);
+        if layout.in_front() != in_front {
+            arrival.chosen();
+        }
         dialogs::dialogs_ui(ui.ctx(), model, outbox);
         if model.dialog == Some(Dialog::Palette) {
             palette.palette_ui(ui.ctx(), model, outbox);
@@ -136,6 +166,18 @@ impl Window {
         }
     }
 
+    /// Shows what a sequence has led to, unless somebody is busy elsewhere.
+    fn arrive(&mut self, ctx: &egui::Context) {
+        let model = self.app.model();
+        let busy = Busy {
+            elsewhere: ctx.text_edit_focused() || model.dialog.is_some(),
+            pointing: ctx.input(|input| input.pointer.any_down()),
+        };
+        if let Some(step) = self.arrival.look(model, busy) {
+            self.layout.arrive_at(step);
+        }
+    }
+
     /// A session or a data set that is dropped on the window is opened.
     fn dropped(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|input| input.raw.dropped_files.last().map(|file| file.path().to_path_buf()));
@@ -160,10 +202,14 @@ impl Window {
     pub(super) fn apply(&mut self, command: Command) {
         match command {
             Command::GoToStep(step) => {
+                self.arrival.chosen();
                 self.layout.go_to(step);
                 self.app.apply(command);
             }
-            Command::ShowPane(pane) => self.layout.show(pane),
+            Command::ShowPane(pane) => {
+                self.arrival.chosen();
+                self.layout.show(pane);
+            }
             Command::ResetLayout => self.layout = Layout::default(),
             Command::SetDialog(_) => {
                 self.palette = CommandPalette::default();
@@ -199,6 +245,7 @@ impl Window {
 
 impl eframe::App for Window {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.heed_signals(ctx);
         self.collect(ctx);
     }
 

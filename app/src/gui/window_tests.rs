@@ -267,10 +267,7 @@ fn an_error_stays_on_the_screen_until_it_is_put_aside_and_then_in_the_log() {
     let mut silent = Silent::live();
     let text = crate::text::Text::verbatim("the lens cap is on");
     silent.absorb(Event::Notice { severity: crate::model::Severity::Error, text });
-    assert!(
-        silent.harness.query_all_by_label("the lens cap is on").count() >= 2,
-        "over the panes and in the status bar"
-    );
+    assert_eq!(silent.harness.query_all_by_label("the lens cap is on").count(), 1, "below the steps and nowhere else");
     let all = silent.app().model().messages.iter().len();
     for _ in 0..all {
         if let Some(button) = silent.harness.query_all_by_label("Dismiss").next() {
@@ -281,7 +278,7 @@ fn an_error_stays_on_the_screen_until_it_is_put_aside_and_then_in_the_log() {
     assert!(silent.harness.query_all_by_label("Dismiss").next().is_none());
     silent.show(Pane::Log);
     silent.click("Errors");
-    assert!(silent.harness.query_all_by_label("the lens cap is on").count() >= 2, "in the log and the status bar");
+    assert_eq!(silent.harness.query_all_by_label("the lens cap is on").count(), 1, "in the log");
 }
 
 #[test]
@@ -375,4 +372,47 @@ fn missing(silent: &Silent, text: &str) -> String {
         }
         missing
     })
+}
+
+#[test]
+fn the_same_warning_is_on_the_screen_once() {
+    let mut silent = Silent::live();
+    silent.show_model(crate::gui::sample::tracking());
+    silent.show(Pane::Track);
+    let why = "joint 3 is at its limit";
+    let text = crate::text::Text::verbatim(why);
+    let count = |silent: &Silent| silent.harness.query_all_by_label_contains(why).count();
+    let app = silent.app();
+    let mut model = app.model().clone();
+    model.track.follow = crate::model::FollowStatus::Ended(text.clone());
+    let (home, now_s) = (crate::model::Home::Pane(Pane::Track), model.now_s);
+    model.messages.say_at(home, crate::model::Severity::Warning, text, now_s);
+    silent.show_model(model);
+    assert_eq!(count(&silent), 1, "in its pane");
+    silent.show(Pane::Jog);
+    assert_eq!(count(&silent), 1, "below the steps, because its pane is not in front");
+    silent.show(Pane::Track);
+    assert_eq!(count(&silent), 1);
+}
+
+#[test]
+fn why_there_is_no_capture_is_on_the_screen_once_and_the_table_keeps_it() {
+    let mut silent = Silent::live();
+    silent.show(Pane::Poses);
+    let why = crate::text::Text::verbatim("the board is not in view");
+    let mut model = crate::gui::sample::captured();
+    let said = crate::text!("No capture: {why}", why = why.clone());
+    let at_s = model.now_s;
+    let home = crate::model::Home::Pane(Pane::Colour);
+    model.messages.say_at(home, crate::model::Severity::Warning, said, at_s);
+    let kind = crate::model::RefusalKind::NoBoard;
+    model.refused = Some(crate::model::CaptureRefused { kind, why, at_s });
+    silent.show_model(model.clone());
+    let count = |silent: &Silent| silent.harness.query_all_by_label_contains("the board is not in view").count();
+    assert_eq!(count(&silent), 1, "over the picture");
+    if let Some(refused) = &mut model.refused {
+        refused.at_s = at_s - 60.0;
+    }
+    silent.show_model(model);
+    assert_eq!(count(&silent), 1, "in the table");
 }

@@ -120,3 +120,13 @@ pub enum RefusalKind {
     /// The disk did not take it.
     NotSaved,
 }
+
+impl RefusalKind {
+    /// Whether other poses may give a capture all the same: then a tour leaves this one out and goes on.
+    pub fn concerns_the_pose(self) -> bool {
+        match self {
+            Self::NoBoard | Self::NotSettled | Self::Blurred | Self::TooSimilar => true,
+            Self::NoPictures | Self::Cancelled | Self::NotSaved => false,
+        }
+    }
+}

@@ -19,6 +19,7 @@ mod workflow;
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_core::calibrate::Method;
@@ -38,7 +39,7 @@ pub use capture::{
 pub use estimated::{Estimated, estimated};
 pub use export::{ExportState, Preview, PreviewFile, Written};
 pub use handeye_sim_link::client::cell::BoardPath;
-pub use messages::{Message, Messages};
+pub use messages::{Home, Message, Messages};
 pub use motion::{
     Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
@@ -368,10 +369,14 @@ pub struct Model {
     pub tour: Option<Tour>,
     /// Whether that tour is still under way.
     pub touring: bool,
+    /// The poses of a tour are being planned.
+    pub planning: bool,
     /// The session.
     pub session: SessionState,
     /// Whether a session is being opened.
     pub opening: bool,
+    /// Where new sessions go.
+    pub sessions: PathBuf,
     /// What was seen in its captures; `None` for a picture that cannot be read. One that is not here is being looked at.
     pub observed: BTreeMap<CaptureId, Option<Arc<Observed>>>,
     /// Captures that are selected, the last one last.
@@ -437,6 +442,7 @@ impl Model {
             refused: None,
             tour: None,
             touring: false,
+            planning: false,
             session: SessionState {
                 folder: None,
                 document: Arc::new(Document::new(session_start::meta(None, String::new()))),
@@ -444,6 +450,7 @@ impl Model {
                 redo: None,
             },
             opening: false,
+            sessions: PathBuf::new(),
             observed: BTreeMap::new(),
             selection: Vec::new(),
             review: None,

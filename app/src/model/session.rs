@@ -6,6 +6,7 @@ use std::sync::Arc;
 use handeye_core::image::RgbImage;
 use handeye_core::observation::Corner;
 use handeye_core::session::{CaptureId, Document, Edit};
+use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 
 use super::{CapturePurpose, FrameImages};
@@ -74,6 +75,8 @@ pub enum StopOutcome {
 pub struct Tour {
     /// The poses in their order.
     pub names: Vec<String>,
+    /// The joints at each [rad], of poses that were planned; `None` for taught ones, which the session has.
+    pub planned: Option<Vec<JointAngles>>,
     /// What is captured at each; `None` only moves.
     pub purpose: Option<CapturePurpose>,
     /// How the poses up to now went; the next one is under way.
@@ -86,6 +89,11 @@ impl Tour {
     /// The pose that is under way.
     pub fn current(&self) -> Option<&str> {
         self.names.get(self.outcomes.len()).map(String::as_str)
+    }
+
+    /// Whether it leads to poses that were planned to verify at.
+    pub fn is_planned(&self) -> bool {
+        self.planned.is_some()
     }
 }
 

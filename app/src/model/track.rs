@@ -59,6 +59,8 @@ pub struct TrackPoint {
 pub enum FollowWish {
     /// Keep the camera where it is relative to the board now.
     KeepView,
+    /// The same; where the arm has no room to go along with the board from there, from the nearest place where it has.
+    KeepViewWithRoom,
     /// Keep the camera at this pose relative to the board.
     KeepPose(Pose<Camera, Target>),
     /// Bring the tip to a corner of the board, this far off along its normal [m].
@@ -76,6 +78,8 @@ pub enum FollowStatus {
     /// Nothing.
     #[default]
     Off,
+    /// It moves to a place from which it has room to follow.
+    MakingRoom,
     /// It follows.
     Following {
         /// Distance of the tip from its goal [m].

@@ -90,6 +90,8 @@ pub enum Dialog {
     Help,
     /// What this is.
     About,
+    /// The address of the web viewer, where no browser shows it by itself.
+    RerunAddress,
     /// Where a new session goes.
     New,
     /// Which session or data set to open.

@@ -1,7 +1,8 @@
-//! Dialogs over the window: folders and files, keys, and what this program is. They block nothing: STOP can be pressed
+//! Dialogs over the window: folders and files, keys, the address of a page, and what this program is. They block nothing: STOP can be pressed
 //! beside them.
 
 mod about;
+mod address;
 mod folders;
 
 use egui::{Align, Align2, Area, Context, Frame, Id, Key, Layout, Margin, Order, Rect, Ui};
@@ -31,6 +32,9 @@ pub fn dialogs_ui(ctx: &Context, model: &Model, outbox: &mut Outbox) {
             });
         }
         Some(Dialog::About) => over_ui(ctx, NARROW, outbox, |ui, outbox| about::about_ui(ui, model, outbox)),
+        Some(Dialog::RerunAddress) => {
+            over_ui(ctx, NARROW, outbox, |ui, outbox| address::address_ui(ui, model, outbox));
+        }
         Some(dialog) => {
             over_ui(ctx, NARROW, outbox, |ui, outbox| folders::folders_ui(ui, model, dialog, outbox));
         }

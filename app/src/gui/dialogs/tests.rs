@@ -6,8 +6,8 @@ use egui_kittest::kittest::Queryable as _;
 use super::*;
 use crate::gui::panes::driven::Driven;
 use crate::gui::sample;
-use crate::model::{FolderEntry, FolderKind, FolderListing, Messages, RecentSession, Severity};
-use crate::text::Text;
+use crate::model::{FolderEntry, FolderKind, FolderListing, Messages, RecentSession, Severity, ViewerState};
+use crate::text::{Language, Text};
 
 fn shown_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     dialogs_ui(ui.ctx(), model, outbox);
@@ -144,4 +144,31 @@ fn what_this_is_and_its_licences_can_be_read() {
     assert!(pane.sees("This program: MIT OR Apache-2.0"));
     assert!(pane.sees("Noto Sans SC: SIL Open Font License 1.1"));
     assert_eq!(pane.click("Close"), [Command::SetDialog(None)]);
+}
+
+#[test]
+fn the_address_of_the_web_viewer_can_be_read_and_copied_where_no_browser_opens() {
+    let url = "http://127.0.0.1:4321/?hide_welcome_screen=1&url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A4322%2Fproxy";
+    for (language, copy) in [(Language::English, "Copy"), (Language::Chinese, "复制")] {
+        let mut pane = driven(Dialog::RerunAddress);
+        pane.model().view.language = language;
+        pane.model().rerun.viewer = ViewerState::Web { url: url.to_owned() };
+        pane.steps();
+        assert!(pane.sees(url), "{language:?}");
+        assert!(pane.nothing_is_cut_off(), "{language:?}");
+        pane.harness.get_by_label(copy).click();
+        let expected = egui::OutputCommand::CopyText(url.to_owned());
+        let copied = (0..3).any(|_| {
+            pane.harness.step();
+            pane.harness.output().platform_output.commands.contains(&expected)
+        });
+        assert!(copied, "{language:?}");
+    }
+}
+
+#[test]
+fn the_address_of_a_viewer_that_is_gone_is_not_shown() {
+    let mut pane = driven(Dialog::RerunAddress);
+    pane.steps();
+    assert!(pane.commands().contains(&Command::SetDialog(None)));
 }

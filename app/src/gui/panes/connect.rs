@@ -3,7 +3,7 @@
 use egui::{Button, ComboBox, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::{Endpoint, LinkError};
 
-use super::form;
+use super::{form, parts};
 use crate::command::{Command, Outbox};
 use crate::gui::status;
 use crate::gui::theme::{Palette, Tone};
@@ -48,8 +48,31 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
         ui.add_space(4.0);
         state_ui(ui, model);
+        session_ui(ui, model, outbox);
     });
     ui.data_mut(|data| data.insert_temp(id, draft));
+}
+
+/// Where what is captured is kept.
+fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    form::heading_ui(ui, tr!(language, "Session"));
+    let folder = model.session.folder.as_ref().unwrap_or(&model.sessions);
+    let said = if model.session.folder.is_some() {
+        text!("Captures and results are kept in {folder}", folder = folder.display())
+    } else {
+        text!(
+            "From the first capture on, captures and results are kept in a folder of {folder}",
+            folder = folder.display()
+        )
+    };
+    form::hint_ui(ui, &said.say(language));
+    ui.horizontal(|ui| {
+        if ui.button(tr!(language, "Open the folder")).clicked() {
+            outbox.send(Command::OpenFolder(folder.clone()));
+        }
+        parts::copy_ui(ui, language, tr!(language, "the path of the folder"), || folder.display().to_string());
+    });
 }
 
 /// How each connection is doing.
@@ -130,4 +153,29 @@ fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Result<CellSourc
         draft.address = Some(address.clone());
     }
     address.parse::<Endpoint>().map(|endpoint| CellSource::Address(endpoint.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::gui::panes::driven::Driven;
+    use crate::gui::sample;
+
+    #[test]
+    fn it_is_said_where_captures_are_kept_and_the_folder_is_opened() {
+        let mut model = sample::connected();
+        model.sessions = PathBuf::from("/home/me/handeye-sessions");
+        let mut pane = Driven::new(connect_ui, model);
+        assert!(pane.sees("are kept in a folder of /home/me/handeye-sessions"));
+        let sessions = PathBuf::from("/home/me/handeye-sessions");
+        assert_eq!(pane.click("Open the folder"), [Command::OpenFolder(sessions.clone())]);
+        let session = sessions.join("2026-11-22");
+        pane.model().session.folder = Some(session.clone());
+        pane.steps();
+        assert!(pane.sees("Captures and results are kept in /home/me/handeye-sessions/2026-11-22"));
+        assert_eq!(pane.click("Open the folder"), [Command::OpenFolder(session)]);
+        assert!(pane.nothing_is_cut_off());
+    }
 }

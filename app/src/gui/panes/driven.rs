@@ -20,11 +20,24 @@ pub struct Driven {
 impl Driven {
     /// As wide as a tile, and so high that nothing has to be scrolled to.
     pub fn new(pane: PaneUi, model: Model) -> Self {
-        let harness = Harness::builder().with_size(vec2(420.0, 2400.0)).build_ui_state(
-            move |ui, (model, outbox): &mut (Model, Outbox)| pane(ui, model, outbox),
+        Self::of_width(420.0, pane, model)
+    }
+
+    /// The same in another width.
+    pub fn of_width(width: f32, pane: PaneUi, model: Model) -> Self {
+        let harness = Harness::builder().with_size(vec2(width, 2400.0)).build_ui_state(
+            move |ui, (model, outbox): &mut (Model, Outbox)| {
+                // Fonts are there from the frame after the one that they are installed in.
+                let installed = egui::Id::new("installed");
+                if ui.data(|data| data.get_temp::<()>(installed)).is_some() {
+                    pane(ui, model, outbox);
+                } else {
+                    theme::install(ui.ctx());
+                    ui.data_mut(|data| data.insert_temp(installed, ()));
+                }
+            },
             (model, Outbox::default()),
         );
-        theme::install(&harness.ctx);
         let mut driven = Self { harness };
         driven.steps();
         driven

@@ -84,6 +84,14 @@ pub fn stated_ui(ui: &mut Ui, caption: &str, value: &str) -> Response {
     .inner
 }
 
+/// Width of a caption with this value in one line.
+pub fn stated_width(ui: &Ui, value: &str) -> f32 {
+    let font = egui::TextStyle::Monospace.resolve(ui.style());
+    let value = ui.painter().layout_no_wrap(value.to_owned(), font, egui::Color32::WHITE).size().x;
+    // A point for rounding.
+    CAPTIONS + ui.spacing().item_spacing.x + value + 1.0
+}
+
 /// A value in figures of one width, with the caption that a screen reader says before it.
 pub fn value_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> Response {
     let label = ui.add(Label::new(RichText::new(value).monospace().color(colour)).wrap().sense(Sense::hover()));

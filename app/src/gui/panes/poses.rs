@@ -15,7 +15,7 @@ use crate::gui::captures::{self, CaptureTable};
 use crate::gui::marks::{self, Marks};
 use crate::gui::textures::Thumbnails;
 use crate::gui::theme::{Palette, Tone};
-use crate::model::{CaptureOptions, CapturePurpose, Model};
+use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model};
 use crate::{text, tr};
 
 /// Most pictures that are averaged: more take longer than they help.
@@ -31,7 +31,7 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
         actions_ui(ui, model, &table, outbox);
     });
     let room = ui.available_rect_before_wrap();
-    let has_status = model.capture.is_some() || model.refused.is_some();
+    let has_status = model.capture.is_some() || kept_refusal(model).is_some();
     let (mut above, mut below) = (room, room);
     if has_status {
         above.max.y -= STATUS;
@@ -192,12 +192,17 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
     }
 }
 
+/// Why the last capture was refused, once the picture no longer says so.
+fn kept_refusal(model: &Model) -> Option<&CaptureRefused> {
+    model.refused.as_ref().filter(|_| !live::stands_over_picture(model))
+}
+
 /// How the capture goes, or why the last one was refused.
 fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     let language = model.view.language;
     let rect = ui.max_rect();
-    let (tone, words) = match (&model.capture, &model.refused) {
+    let (tone, words) = match (&model.capture, kept_refusal(model)) {
         (Some(capture), _) => (Tone::Busy, live::waiting(capture).say(language)),
         (None, Some(refused)) => (Tone::Warning, text!("No capture: {why}", why = refused.why.clone()).say(language)),
         (None, None) => return,

@@ -1,4 +1,4 @@
-//! The bar at the bottom: the robot in numbers, the age of the pictures, the last message.
+//! The bar at the bottom: the robot in numbers, the age of the pictures, the last thing that went as asked.
 
 use egui::{Button, Label, RichText, Sense, Ui, Vec2};
 
@@ -6,7 +6,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::numbers;
 use crate::gui::status::STALE_AFTER_S;
 use crate::gui::theme::{CAPTION, Palette};
-use crate::model::{Model, RobotState, RotationFormat};
+use crate::model::{Model, RobotState, RotationFormat, Severity};
 use crate::tr;
 
 /// Shown where a number is not known.
@@ -119,11 +119,8 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
 
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
-    let (text, colour) = match model.messages.newest() {
-        None => (String::new(), palette.weak),
-        Some(message) => (message.text.say(model.view.language), palette.severity(message.severity)),
-    };
-    ui.add(Label::new(RichText::new(text).color(colour)).truncate());
+    let said = model.messages.status_line().map(|message| message.text.say(model.view.language)).unwrap_or_default();
+    ui.add(Label::new(RichText::new(said).color(palette.severity(Severity::Info))).truncate());
 }
 
 fn joints_deg(robot: &RobotState) -> String {

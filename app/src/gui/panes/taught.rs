@@ -2,7 +2,7 @@
 
 mod row;
 mod teach;
-mod tour;
+pub mod tour;
 
 use egui::Ui;
 
@@ -33,13 +33,13 @@ pub fn taught_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 }
 
 /// Why the arm cannot be sent anywhere now.
-fn immovable(model: &Model) -> Option<&'static str> {
+pub fn immovable(model: &Model) -> Option<&'static str> {
     let language = model.view.language;
     if !model.control.is_connected() || !model.mover.is_connected() {
         Some(tr!(language, "Not connected: the arm cannot be moved until the connection is there"))
     } else if model.resting_simulation().is_some() {
         Some(tr!(language, "The arm moves only while the simulation runs"))
-    } else if model.touring {
+    } else if model.touring || model.planning {
         Some(tr!(language, "A tour is under way"))
     } else {
         None

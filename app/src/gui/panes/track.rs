@@ -16,8 +16,8 @@ use crate::model::Model;
 use crate::tr;
 use blocked::Blocked;
 
-/// From this width on numbers stand beside the rest.
-const TWO_COLUMNS: f32 = 560.0;
+/// What stands beside the numbers has at least this width: its buttons and plots need it.
+const LEAST_BESIDE: f32 = 300.0;
 /// Distance of the columns.
 const GUTTER: f32 = 22.0;
 
@@ -26,27 +26,32 @@ pub fn track_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let blocked = Blocked::of(model);
     parts::body_ui(ui, "track", |ui| {
         tracking_ui(ui, model, &blocked, outbox);
-        if ui.available_width() < TWO_COLUMNS {
+        // No number is broken into two lines for the sake of a second column.
+        let numbers = pose::width(ui, model.view.rotation);
+        let beside = ui.available_width() - GUTTER - numbers;
+        if beside < LEAST_BESIDE {
             follow::follow_ui(ui, model, &blocked, outbox);
             pose::pose_ui(ui, model);
             plots::plots_ui(ui, model);
             cell_board::board_ui(ui, model, &blocked, outbox);
             return;
         }
-        let width = (ui.available_width() - GUTTER) / 2.0;
+        // Halves, unless the numbers need more.
+        let left = numbers.max((ui.available_width() - GUTTER) / 2.0);
+        let right = ui.available_width() - GUTTER - left;
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = GUTTER;
-            let column = |ui: &mut Ui, content_ui: &mut dyn FnMut(&mut Ui)| {
+            let column = |ui: &mut Ui, width: f32, content_ui: &mut dyn FnMut(&mut Ui)| {
                 ui.allocate_ui_with_layout(Vec2::new(width, 0.0), egui::Layout::top_down(egui::Align::Min), |ui| {
                     ui.spacing_mut().item_spacing = Vec2::new(8.0, 6.0);
                     ui.set_width(width);
                     content_ui(ui);
                 });
             };
-            column(ui, &mut |ui| {
+            column(ui, left, &mut |ui| {
                 pose::pose_ui(ui, model);
             });
-            column(ui, &mut |ui| {
+            column(ui, right, &mut |ui| {
                 follow::follow_ui(ui, model, &blocked, outbox);
                 cell_board::board_ui(ui, model, &blocked, outbox);
                 plots::plots_ui(ui, model);

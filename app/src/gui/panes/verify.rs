@@ -2,6 +2,7 @@
 
 mod captures;
 mod picked;
+mod planned;
 mod summary;
 
 use egui::{Button, Ui};
@@ -21,12 +22,13 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             tr!(
                 language,
-                "Move the arm to places that are not in the fit, with the board in view, and capture it there. The \
-                 calibration predicts where the board is; the picture says where it is seen. The board has to stay \
-                 where it was."
+                "Captures at places that are not in the fit, with the board in view: at poses that are planned for it, or \
+                 where you move the arm yourself. The calibration predicts where the board is; the picture says where it is \
+                 seen. The board has to stay where it was."
             ),
         );
         capture_ui(ui, model, outbox);
+        planned::planned_ui(ui, model, outbox);
         match model.solve.solved.as_ref().map(|solved| (solved, &solved.verification)) {
             None => parts::hint_ui(ui, tr!(language, "There is no calibration to verify yet.")),
             Some((_, None)) => {
@@ -62,7 +64,7 @@ fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             Some(tr!(language, "Pictures are renewed only while the simulation runs"))
         } else if model.capture.is_some() {
             Some(tr!(language, "A capture is under way"))
-        } else if model.touring {
+        } else if model.touring || model.planning {
             Some(tr!(language, "A tour is under way"))
         } else {
             None

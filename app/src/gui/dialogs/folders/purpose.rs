@@ -137,7 +137,7 @@ impl Purpose {
                 Some(Command::ExportTaught(named))
             }
             Dialog::ExportFolder => Some(Command::SetExportFolder(Some(path))),
-            Dialog::Help | Dialog::Palette | Dialog::About => None,
+            Dialog::Help | Dialog::Palette | Dialog::About | Dialog::RerunAddress => None,
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::numbers;
 use crate::gui::panes::parts::{self, Sign};
 use crate::gui::theme::{Palette, Tone};
-use crate::model::{Model, Motion, RotationFormat, Severity};
+use crate::model::{Model, Motion, Pane, RotationFormat, Severity};
 use crate::{text, tr};
 
 /// The motion with a button that ends it, and the last refusal.
@@ -39,8 +39,7 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 
 fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let refusal = model.messages.newest().filter(|message| message.severity != Severity::Info && !message.dismissed);
-    let Some(message) = refusal else { return };
+    let Some(message) = model.messages.standing_in(Pane::Jog) else { return };
     let tone = if message.severity == Severity::Error { Tone::Bad } else { Tone::Warning };
     let said = message.text.say(language);
     let close = tr!(language, "Dismiss the message");

@@ -6,7 +6,9 @@ use super::*;
 use crate::command::Command;
 use crate::gui::panes::driven::Driven;
 use crate::gui::sample;
-use crate::model::{Axis, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Severity, Simulation};
+use crate::model::{
+    Axis, Home, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Pane, Severity, Simulation,
+};
 use crate::text::Text;
 
 fn driven(model: Model) -> Driven {
@@ -224,7 +226,8 @@ fn an_arm_of_unknown_kinematics_has_its_joints_jogged_only() {
 fn what_the_arm_does_can_be_stopped_and_a_refusal_is_read() {
     let mut model = sample::connected();
     model.motion = Motion::Moving { id: MotionId(1), what: Text::verbatim("pose 3"), since_s: 96.0 };
-    model.messages.say(Severity::Warning, Text::verbatim("Joint 2 would leave its range"), 99.0);
+    let why = Text::verbatim("Joint 2 would leave its range");
+    model.messages.say_at(Home::Pane(Pane::Jog), Severity::Warning, why, 99.0);
     let mut pane = driven(model);
     assert!(pane.sees("Moving: pose 3 (4 s)"));
     assert_eq!(pane.click("Stop"), [Command::Stop]);

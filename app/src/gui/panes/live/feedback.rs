@@ -8,7 +8,7 @@ use egui::{
 };
 use handeye_core::session::CaptureId;
 
-use super::Shown;
+use super::{Shown, overlays};
 use crate::command::{Command, Outbox};
 use crate::gui::captures;
 use crate::gui::marks::{self, Marks};
@@ -20,7 +20,7 @@ use crate::{text, tr};
 
 /// Height of the strip over a recorded picture.
 pub const STRIP: f32 = 34.0;
-/// A refusal stands over the picture for so long [s]; the table of poses keeps it.
+/// A refusal stands over the picture for so long [s]; after that the table of poses keeps it.
 const REFUSAL_S: f64 = 8.0;
 /// The flash of a capture [s].
 const FLASH_S: f64 = 0.35;
@@ -65,7 +65,7 @@ pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, poin
 fn has_residuals(model: &Model, shown: &Shown<'_>) -> bool {
     match shown.capture {
         Some(id) => !captures::residuals(model, id).is_empty(),
-        None => model.calibrated().is_some() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_some()),
+        None => overlays::has_live_residuals(model),
     }
 }
 
@@ -131,10 +131,15 @@ pub fn capture_ui(ui: &mut Ui, model: &Model, room: Rect, in_words: bool, outbox
                 outbox.send(Command::CancelCapture);
             }
         });
-    } else if let Some(refused) = model.refused.as_ref().filter(|refused| model.now_s - refused.at_s < REFUSAL_S) {
+    } else if let Some(refused) = model.refused.as_ref().filter(|_| stands_over_picture(model)) {
         let words = text!("No capture: {why}", why = refused.why.clone()).say(language);
         plate_ui(ui, room, Tone::Warning, &words, |_| {});
     }
+}
+
+/// Whether the last refusal of a capture stands over the picture.
+pub fn stands_over_picture(model: &Model) -> bool {
+    model.refused.as_ref().is_some_and(|refused| model.now_s - refused.at_s < REFUSAL_S)
 }
 
 /// What a capture waits for, in words.

@@ -7,7 +7,7 @@ mod project;
 mod readout;
 mod toolbar;
 
-pub use feedback::waiting;
+pub use feedback::{stands_over_picture, waiting};
 
 use std::sync::Arc;
 

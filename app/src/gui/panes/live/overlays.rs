@@ -133,14 +133,22 @@ fn axes(painter: &Painter, projector: &Projector<'_>, target: &TargetSpec, stren
     }
 }
 
-/// The board where robot pose and calibration say that it is.
+/// Where the board is expected in the picture that is shown: where tracking has it in the live one while it is tracked,
+/// because it may then be anywhere; otherwise where robot pose and calibration say that it is.
+pub fn expected(model: &Model, shown: &Shown<'_>) -> Option<Pose<Camera, Target>> {
+    let (calibrated, base_from_tip) = (model.calibrated()?, shown.base_from_tip.as_ref()?);
+    if shown.capture.is_some() || !model.track.on {
+        return Some(calibrated.camera_from_target(base_from_tip));
+    }
+    let estimate = model.track.newest.as_ref()?.update.estimate.as_ref()?;
+    let now = estimate.carried_to(model.frame.as_ref()?.info.sim_time_s);
+    Some(calibrated.base_from_camera(base_from_tip).inverse() * now.base_from_target)
+}
+
+/// The board where it is expected.
 fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &TargetSpec, place: &Place) {
-    let (Some(calibrated), Some(base_from_tip)) = (model.calibrated(), &shown.base_from_tip) else { return };
-    let projector = Projector {
-        intrinsics: &calibrated.intrinsics,
-        camera_from_target: calibrated.camera_from_target(base_from_tip),
-        place,
-    };
+    let (Some(calibrated), Some(camera_from_target)) = (model.calibrated(), expected(model, shown)) else { return };
+    let projector = Projector { intrinsics: &calibrated.intrinsics, camera_from_target, place };
     // An answer of another set of captures is drawn, but does not shine.
     let colour = Marks::over_pictures().predicted.gamma_multiply(if model.solve.fresh { 1.0 } else { 0.5 });
     let lines = board_lines(target);
@@ -184,8 +192,24 @@ fn coverage(painter: &Painter, table: &CaptureTable, place: &Place) {
     }
 }
 
+/// Where the corners of the live picture should be: by the board's pose in this one picture while it is tracked, since
+/// the calibrated board is no longer there; otherwise by robot and calibration alone.
+pub fn live_chain(model: &Model) -> Option<Pose<Camera, Target>> {
+    let (calibrated, detection) = (model.calibrated()?, model.detection.as_ref()?);
+    if model.track.on {
+        detection.camera_from_target
+    } else {
+        Some(calibrated.camera_from_target(&detection.base_from_tip))
+    }
+}
+
+/// Whether the live picture has residuals.
+pub fn has_live_residuals(model: &Model) -> bool {
+    live_chain(model).is_some() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_some())
+}
+
 /// Measured minus predicted, exaggerated: a recorded picture has those of its fit or verification, the live one those of
-/// the bare chain.
+/// the bare chain, or of the pose of the tracked board.
 fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &Sight<'_>, place: &Place) {
     let exaggeration = model.view.overlays.exaggeration;
     let colour = Marks::over_pictures().residual.gamma_multiply(sight.strength);
@@ -209,8 +233,7 @@ fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &Sight<
         }
         return;
     }
-    let (Some(calibrated), Some(detection)) = (model.calibrated(), &model.detection) else { return };
-    let camera_from_target = calibrated.camera_from_target(&detection.base_from_tip);
+    let (Some(calibrated), Some(camera_from_target)) = (model.calibrated(), live_chain(model)) else { return };
     live_residuals(&calibrated.intrinsics, &camera_from_target, sight.corners, model, arrow);
 }
 

@@ -2,6 +2,7 @@ use std::sync::Arc;
 
 use egui::{Modifiers, PointerButton, Pos2, Vec2, vec2};
 use handeye_core::depth::ColourMap;
+use handeye_core::frames::{Camera, Target};
 use handeye_core::session::CaptureId;
 use handeye_core::verify::Calibrated;
 use nalgebra::{Point3, Vector2};
@@ -311,4 +312,46 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
     };
     assert_eq!(behind.point(&Point3::origin()), None);
     assert!(behind.line(&Point3::origin(), &Point3::new(0.1, 0.0, 0.0)).is_empty());
+}
+
+/// The corners of the live picture against where a pose has them: RMS [px].
+fn apart_px(model: &Model, camera_from_target: &Pose<Camera, Target>) -> f64 {
+    let (intrinsics, target) = (model.intrinsics().expect("a camera"), model.document().meta.target);
+    let corners = model.detection.as_ref().and_then(|seen| seen.corners.clone()).expect("seen");
+    let squares = corners.iter().map(|corner| {
+        let point = camera_from_target.isometry() * target.point(corner.index);
+        (intrinsics.project(&point).expect("in front") - corner.px).norm_squared()
+    });
+    (squares.sum::<f64>() / corners.len() as f64).sqrt()
+}
+
+#[test]
+fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_board() {
+    let mut model = sample::tracking();
+    // The board has gone 30 mm from where the calibration found it, and the picture shows it there.
+    let frame = model.frame.as_ref().expect("live").clone();
+    let calibrated = model.calibrated().expect("calibrated").clone();
+    let textures = LiveTextures::default();
+    let at = |model: &Model| overlays::expected(model, &Shown::of(model, &textures).expect("live"));
+    let of_calibration = calibrated.camera_from_target(&frame.info.base_from_tip);
+    assert!(apart_px(&model, &of_calibration) > 20.0, "the calibrated board is elsewhere");
+    // Estimate and picture are off by 0.2 mm and 0.07 px.
+    assert!(apart_px(&model, &at(&model).expect("tracked")) < 1.0);
+    assert!(apart_px(&model, &overlays::live_chain(&model).expect("seen")) < 1.0);
+
+    // Out of sight there is nothing to compare with, and the calibrated board is not drawn in its place.
+    let mut lost = model.clone();
+    let mut newest = crate::model::Tracked::clone(lost.track.newest.as_ref().expect("tracked"));
+    (newest.update.estimate, newest.update.seen) = (None, None);
+    lost.track.newest = Some(Arc::new(newest));
+    lost.detection.iter_mut().for_each(|it| (it.corners, it.camera_from_target) = (None, None));
+    assert!(at(&lost).is_none() && overlays::live_chain(&lost).is_none());
+    assert!(!colour(lost).sees("Residuals ×"));
+
+    model.track.on = false;
+    assert_eq!(at(&model), Some(of_calibration), "and without tracking they are of the calibration again");
+    model.review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::pictures())) });
+    model.track.on = true;
+    let record = model.document().capture(CaptureId(3)).expect("there").base_from_tip;
+    assert_eq!(at(&model), Some(calibrated.camera_from_target(&record)), "a recorded picture is of its own time");
 }

@@ -34,7 +34,7 @@ pub fn overlays_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             &mut now.predicted,
             tr!(language, "Predicted board"),
-            tr!(language, "The board where the robot's pose and the calibration say that it is"),
+            tr!(language, "The board where the robot's pose and the calibration say that it is; while it is tracked, where tracking has it"),
         );
         switch_ui(
             ui,
@@ -46,7 +46,7 @@ pub fn overlays_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             &mut now.residuals,
             tr!(language, "Residuals"),
-            tr!(language, "From predicted to measured corners, exaggerated: of a capture after the fit, of the live picture by robot and calibration alone"),
+            tr!(language, "From predicted to measured corners, exaggerated: of a capture after the fit, of the live picture by robot and calibration alone, or by the board's pose in it while the board is tracked"),
         );
         exaggeration_ui(ui, &mut now, tr!(language, "Exaggeration of residuals"));
     });

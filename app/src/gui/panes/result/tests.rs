@@ -221,7 +221,7 @@ fn observations(model: &Model) -> Observations {
         mode: Some(Mode::EyeInHand),
         target: BOARD,
         image_size: (640, 480),
-        camera: CameraKnowledge::Estimate { model: crate::observe::DEFAULT_MODEL, start: None },
+        camera: CameraKnowledge::NOTHING,
         views: views.collect(),
     }
 }

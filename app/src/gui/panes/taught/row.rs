@@ -75,7 +75,7 @@ pub fn row_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbo
 }
 
 fn mark(model: &Model, name: &str) -> Mark {
-    let Some(tour) = &model.tour else { return Mark::None };
+    let Some(tour) = model.tour.as_ref().filter(|tour| !tour.is_planned()) else { return Mark::None };
     let Some(place) = tour.names.iter().position(|visited| visited == name) else { return Mark::None };
     match tour.outcomes.get(place) {
         Some(StopOutcome::Done) => Mark::Done,

@@ -113,6 +113,7 @@ fn a_tour_says_how_each_pose_went_and_can_be_stopped() {
     model.touring = true;
     model.tour = Some(Tour {
         names: ["front", "left", "right"].map(str::to_owned).into(),
+        planned: None,
         purpose: Some(CapturePurpose::Calibrate),
         outcomes: vec![StopOutcome::Done, StopOutcome::Skipped(Text::verbatim("the board was not found"))],
         began_s: 90.0,

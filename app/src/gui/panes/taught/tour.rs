@@ -14,7 +14,7 @@ pub fn tour_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         Some(tour) if model.touring => progress_ui(ui, model, tour, outbox),
         tour => {
             begin_ui(ui, model, outbox);
-            if let Some(tour) = tour {
+            if let Some(tour) = tour.as_ref().filter(|tour| !tour.is_planned()) {
                 summary_ui(ui, model, tour);
             }
         }
@@ -48,7 +48,8 @@ fn begin_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     });
 }
 
-fn progress_ui(ui: &mut Ui, model: &Model, tour: &Tour, outbox: &mut Outbox) {
+/// How far it is, and the button that ends it.
+pub fn progress_ui(ui: &mut Ui, model: &Model, tour: &Tour, outbox: &mut Outbox) {
     let language = model.view.language;
     let (done, of) = (tour.outcomes.len(), tour.names.len());
     let said = match tour.current() {
@@ -61,7 +62,8 @@ fn progress_ui(ui: &mut Ui, model: &Model, tour: &Tour, outbox: &mut Outbox) {
     }
 }
 
-fn summary_ui(ui: &mut Ui, model: &Model, tour: &Tour) {
+/// How the last one went.
+pub fn summary_ui(ui: &mut Ui, model: &Model, tour: &Tour) {
     let done = tour.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
     let skipped = tour.outcomes.len() - done;
     let left = tour.names.len() - tour.outcomes.len();

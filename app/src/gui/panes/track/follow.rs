@@ -17,6 +17,8 @@ const STAND_OFFS_MM: std::ops::RangeInclusive<f64> = 20.0..=600.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Choice {
     to_corner: bool,
+    /// Whether the arm may go to another place first.
+    with_room: bool,
     /// Counted from 1.
     corner: usize,
     stand_off_mm: f64,
@@ -24,7 +26,7 @@ struct Choice {
 
 impl Default for Choice {
     fn default() -> Self {
-        Self { to_corner: false, corner: 1, stand_off_mm: 150.0 }
+        Self { to_corner: false, with_room: true, corner: 1, stand_off_mm: 150.0 }
     }
 }
 
@@ -32,6 +34,8 @@ impl Choice {
     fn wish(self) -> FollowWish {
         if self.to_corner {
             FollowWish::Corner { index: self.corner.saturating_sub(1), stand_off_m: self.stand_off_mm * 1e-3 }
+        } else if self.with_room {
+            FollowWish::KeepViewWithRoom
         } else {
             FollowWish::KeepView
         }
@@ -88,6 +92,12 @@ fn choice_ui(ui: &mut Ui, model: &Model, choice: &mut Choice) {
         choice.to_corner = to_corner;
     }
     if !choice.to_corner {
+        let what = tr!(
+            language,
+            "Where the arm would soon be stretched, too close to its column or have two axes in line, it first moves to the \
+             nearest place from which it can go along with the board, and keeps the view from there"
+        );
+        ui.checkbox(&mut choice.with_room, tr!(language, "Make room first where it is needed")).on_hover_text(what);
         return;
     }
     let grid = model.document().meta.target.grid();
@@ -130,6 +140,9 @@ fn status_ui(ui: &mut Ui, model: &Model, follows: bool) {
     let (colour, words) = match (&model.track.follow, follows) {
         (FollowStatus::Following { distance_m, angle_rad }, _) => {
             (palette.good, following(*distance_m, *angle_rad, language))
+        }
+        (FollowStatus::MakingRoom, _) => {
+            (palette.busy, tr!(language, "Moving to where the arm has room to follow…").to_owned())
         }
         (FollowStatus::Off, true) => (palette.busy, tr!(language, "Starting to follow…").to_owned()),
         (FollowStatus::Off | FollowStatus::Ended(_), _) => return,

@@ -14,6 +14,18 @@ use crate::{text, tr};
 /// An error stays within so many standard deviations with a probability of 95 %.
 const SIGMAS_95: f64 = 1.96;
 
+/// Figures of a coordinate: up to 9999.99 mm with its sign.
+const FIGURES: usize = 8;
+
+/// Width at which no row of numbers breaks: of three coordinates, or of the four parts of a quaternion.
+pub fn width(ui: &Ui, rotation: RotationFormat) -> f32 {
+    let widest = match rotation {
+        RotationFormat::RollPitchYaw => numbers::row(&[-8888.88; 3], 2, FIGURES),
+        RotationFormat::Quaternion => numbers::row(&[-0.8888; 4], 4, FIGURES - 1),
+    };
+    parts::stated_width(ui, &widest)
+}
+
 /// The numbers.
 pub fn pose_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
@@ -53,10 +65,15 @@ fn estimate_ui(ui: &mut Ui, estimate: &Estimate, rotation: RotationFormat, langu
         "As far as corners and motion cause it; the calibration is taken as exact. Its own error is stated with the result."
     );
     let what = tr!(language, "The first corner of the board, x y z in the base");
-    parts::stated_ui(ui, tr!(language, "Position [mm]"), &numbers::row((pose.translation() * 1e3).as_slice(), 2, 8))
-        .on_hover_text(what);
+    parts::stated_ui(
+        ui,
+        tr!(language, "Position [mm]"),
+        &numbers::row((pose.translation() * 1e3).as_slice(), 2, FIGURES),
+    )
+    .on_hover_text(what);
     let position = within_95(pose, &estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned()) * 1e3;
-    parts::stated_ui(ui, tr!(language, "± 95 % [mm]"), &numbers::row(position.as_slice(), 2, 8)).on_hover_text(exact);
+    parts::stated_ui(ui, tr!(language, "± 95 % [mm]"), &numbers::row(position.as_slice(), 2, FIGURES))
+        .on_hover_text(exact);
     match rotation {
         RotationFormat::RollPitchYaw => {
             parts::stated_ui(ui, tr!(language, "Roll pitch yaw [°]"), &format!(" {}", numbers::rpy_deg(pose)));
@@ -67,9 +84,9 @@ fn estimate_ui(ui: &mut Ui, estimate: &Estimate, rotation: RotationFormat, langu
     }
     let turn = within_95(pose, &estimate.covariance.fixed_view::<3, 3>(3, 3).into_owned()).map(f64::to_degrees);
     let about = tr!(language, "About x, y and z of the base; the calibration is taken as exact");
-    parts::stated_ui(ui, tr!(language, "± 95 % [°]"), &numbers::row(turn.as_slice(), 2, 8)).on_hover_text(about);
+    parts::stated_ui(ui, tr!(language, "± 95 % [°]"), &numbers::row(turn.as_slice(), 2, FIGURES)).on_hover_text(about);
     let velocity = estimate.velocity_m_s * 1e3;
-    parts::stated_ui(ui, tr!(language, "Velocity [mm/s]"), &numbers::row(velocity.as_slice(), 1, 8));
+    parts::stated_ui(ui, tr!(language, "Velocity [mm/s]"), &numbers::row(velocity.as_slice(), 1, FIGURES));
 }
 
 /// The newest picture alone, in two ways that share only the hand-eye transform.
@@ -78,7 +95,7 @@ fn newest_picture_ui(ui: &mut Ui, update: &Update, language: Language) {
         return;
     }
     parts::section_ui(ui, tr!(language, "Newest picture alone"));
-    let position = |pose: &Pose<Base, Target>| numbers::row((pose.translation() * 1e3).as_slice(), 2, 8);
+    let position = |pose: &Pose<Base, Target>| numbers::row((pose.translation() * 1e3).as_slice(), 2, FIGURES);
     if let Some(seen) = &update.seen {
         let what = text!(
             "From the corners and the size of the squares; corners are {rms} px from where the pose has them",
@@ -114,9 +131,9 @@ fn truth_ui(ui: &mut Ui, error: TrackError, language: Language) {
     parts::section_ui(ui, tr!(language, "Against the simulator's truth"));
     let what =
         tr!(language, "Distance of the middle of the board from where the simulated cell had it in the same picture");
-    parts::stated_ui(ui, tr!(language, "Position error [mm]"), &numbers::fixed(error.position_m * 1e3, 3, 8))
+    parts::stated_ui(ui, tr!(language, "Position error [mm]"), &numbers::fixed(error.position_m * 1e3, 3, FIGURES))
         .on_hover_text(what);
-    let turned = numbers::fixed(error.rotation_rad.to_degrees(), 3, 8);
+    let turned = numbers::fixed(error.rotation_rad.to_degrees(), 3, FIGURES);
     parts::stated_ui(ui, tr!(language, "Rotation error [°]"), &turned);
 }
 

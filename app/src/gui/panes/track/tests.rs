@@ -135,6 +135,8 @@ fn the_error_is_told_against_the_truth_of_the_simulator_and_only_where_there_is_
 #[test]
 fn the_arm_keeps_its_view_or_goes_to_a_corner_and_is_stopped() {
     let mut pane = driven(tracked());
+    assert_eq!(pane.click("Follow"), [Command::SetFollow(Some(FollowWish::KeepViewWithRoom))]);
+    pane.click("Make room first where it is needed");
     assert_eq!(pane.click("Follow"), [Command::SetFollow(Some(FollowWish::KeepView))]);
     pane.click("Tip to a corner");
     pane.type_into("Corner to go to", "12");
@@ -146,6 +148,9 @@ fn the_arm_keeps_its_view_or_goes_to_a_corner_and_is_stopped() {
     pane.model().track.wish = Some(FollowWish::KeepView);
     pane.steps();
     assert!(pane.sees("Starting to follow"));
+    pane.model().track.follow = FollowStatus::MakingRoom;
+    pane.steps();
+    assert!(pane.sees("Moving to where the arm has room to follow") && pane.sees("Stop following"));
     pane.model().track.follow = FollowStatus::Following { distance_m: 0.0012, angle_rad: 0.01 };
     pane.steps();
     assert!(pane.sees("Following: 1.2 mm and 0.57° from the goal"));
@@ -224,5 +229,31 @@ fn a_cell_that_does_not_say_where_its_board_is_has_no_controls_for_it() {
 fn nothing_is_wider_than_the_tile() {
     for model in [tracked(), sample::tracking(), sample::captured()] {
         assert!(driven(model).nothing_is_cut_off());
+    }
+}
+
+#[test]
+fn no_row_of_numbers_breaks_into_two_lines_whatever_the_width_of_the_tile() {
+    for rotation in [RotationFormat::RollPitchYaw, RotationFormat::Quaternion] {
+        for width in (430..=1100).step_by(30) {
+            let mut model = tracked();
+            model.view.rotation = rotation;
+            let mut pane = Driven::of_width(width as f32, track_ui, model);
+            // The widest there are within reach of an arm.
+            newest(&mut pane, |tracked| {
+                let far = Pose::from_translation_xyzw([-1.125, -1.4, -1.802], [0.5, 0.5, -0.5, 0.5]);
+                tracked.update.estimate.as_mut().expect("tracked").base_from_target = far;
+            });
+            for row in
+                ["Position [mm]: −1125.00", "± 95 % [mm]:", "± 95 % [°]:", "By corners [mm]:", "Velocity [mm/s]:"]
+            {
+                let heights: Vec<f32> =
+                    pane.harness.query_all_by_label_contains(row).map(|node| node.rect().height()).collect();
+                assert!(!heights.is_empty(), "{row} at {width}");
+                // A line of figures is 15 high, two are over 25.
+                assert!(heights.iter().all(|height| *height < 22.0), "{row} at {width}, {rotation:?}: {heights:?}");
+            }
+            assert!(pane.nothing_is_cut_off(), "{width}");
+        }
     }
 }

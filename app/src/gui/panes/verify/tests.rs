@@ -6,7 +6,9 @@ use std::sync::Arc;
 use super::*;
 use crate::gui::panes::driven::Driven;
 use crate::gui::sample;
-use crate::model::{CaptureUnderWay, CaptureWait, ImagePoint, LinkState, PickedPoint, Solved};
+use crate::model::{
+    CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, Pane, PickedPoint, Severity, Solved, StopOutcome, Tour,
+};
 
 fn driven(model: Model) -> Driven {
     Driven::new(verify_ui, model)
@@ -102,4 +104,52 @@ fn a_picked_point_is_measured_twice_and_the_difference_is_stated() {
     pane.steps();
     assert!(pane.sees("No depth at this pixel"));
     assert!(!pane.sees("Difference"));
+}
+
+const PLANNED: &str = "Verify at planned poses";
+
+#[test]
+fn captures_at_planned_poses_are_offered_where_they_can_be_taken_and_say_what_is_in_the_way() {
+    let mut pane = driven(sample::solved());
+    assert_eq!(pane.click(PLANNED), [Command::VerifyAtPlanned]);
+    let is_blocked = |change: fn(&mut Model)| {
+        let mut model = sample::solved();
+        change(&mut model);
+        assert!(!driven(model).is_enabled(PLANNED));
+    };
+    is_blocked(|model| model.solve.solved = None);
+    is_blocked(|model| model.mover = LinkState::Failed { why: "gone".to_owned() });
+    is_blocked(|model| model.camera = LinkState::Failed { why: "gone".to_owned() });
+    is_blocked(|model| model.cell.iter_mut().for_each(|cell| cell.kinematics_known = false));
+    is_blocked(|model| {
+        model.motion = crate::model::Motion::Jogging(crate::model::Jog::Joint { index: 0, forward: true });
+    });
+}
+
+#[test]
+fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane() {
+    let mut model = sample::solved();
+    model.planning = true;
+    let mut pane = driven(model);
+    assert!(pane.sees("Planning poses that are not in the fit"));
+    assert!(!pane.is_enabled("Capture for verification"));
+    pane.model().planning = false;
+    pane.model().touring = true;
+    pane.model().tour = Some(Tour {
+        names: vec!["check 1".to_owned(), "check 2".to_owned(), "check 3".to_owned()],
+        planned: Some(vec![[0.0; 6]; 3]),
+        purpose: Some(CapturePurpose::Verify),
+        outcomes: vec![StopOutcome::Done, StopOutcome::Skipped(Text::verbatim("the board was not found"))],
+        began_s: 90.0,
+    });
+    pane.steps();
+    assert!(pane.sees("Pose 3 of 3: check 3"));
+    assert_eq!(pane.click("Stop tour"), [Command::StopTour]);
+    pane.model().touring = false;
+    let why = Text::verbatim("it was broken off");
+    pane.model().messages.say_at(Home::Pane(Pane::Verify), Severity::Warning, why, 99.0);
+    pane.steps();
+    assert!(pane.sees("Last tour: 1 of 3 done, 1 skipped, 1 not visited"));
+    assert!(pane.sees("check 2 was skipped: the board was not found") && pane.sees("it was broken off"));
+    assert!(pane.is_enabled(PLANNED) && pane.nothing_is_cut_off());
 }
