@@ -1,13 +1,18 @@
 //! The window on a screen of its own (Xvfb), pressed by a real mouse and keyboard (xdotool).
 
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
+
+use handeye_core::testing::{Need, programs};
+
+use crate::process;
+use crate::watch::Watch;
 
 /// Longest wait for something to show.
 const PATIENCE: Duration = Duration::from_mins(4);
-/// Between two looks at the list of controls.
-const LOOK: Duration = Duration::from_millis(100);
+/// Longest time without a change of the controls after which a look at the window itself is due.
+const LOOK: Duration = Duration::from_secs(1);
 
 /// A screen with the workbench on it. Both end when it is dropped.
 pub struct Desktop {
@@ -17,6 +22,7 @@ pub struct Desktop {
     widgets: PathBuf,
     shots: PathBuf,
     clicks: u32,
+    watch: Watch,
     home: tempfile::TempDir,
 }
 
@@ -29,18 +35,9 @@ struct Widget {
     enabled: bool,
 }
 
-/// Whether the programs are there that a [`Desktop`] needs; says which is missing.
-pub fn is_possible(test: &str) -> bool {
-    let missing: Vec<&str> = ["Xvfb", "xdotool", "import"].into_iter().filter(|program| !is_there(program)).collect();
-    if !missing.is_empty() {
-        eprintln!("{test}: skipped, not installed: {}", missing.join(", "));
-    }
-    missing.is_empty()
-}
-
-fn is_there(program: &str) -> bool {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
+/// Whether the programs are there that a [`Desktop`] needs; where one is not, the running test has said that it skips.
+pub fn is_possible() -> bool {
+    programs(Need::Xvfb, &["Xvfb", "xdotool", "import"])
 }
 
 impl Desktop {
@@ -63,6 +60,7 @@ impl Desktop {
         std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number).expect("a number");
         let display = format!(":{}", number.trim());
         let widgets = home.path().join("widgets");
+        let watch = Watch::folder(home.path());
         let window = Command::new(crate::handeye_binary())
             .arg("gui")
             .args(arguments)
@@ -77,7 +75,7 @@ impl Desktop {
             .spawn()
             .expect("the workbench starts");
         std::fs::create_dir_all(shots).expect("a folder");
-        Self { screen, window, display, widgets, shots: shots.to_path_buf(), clicks: 0, home }
+        Self { screen, window, display, widgets, shots: shots.to_path_buf(), clicks: 0, watch, home }
     }
 
     /// Clicks of the mouse and presses of keys so far.
@@ -113,6 +111,25 @@ impl Desktop {
         self.until(&format!("{text:?}"), |widgets| widgets.iter().any(|widget| widget.label.contains(text)));
     }
 
+    /// The first label that begins with a text.
+    ///
+    /// # Panics
+    /// When there is none.
+    pub fn label(&mut self, start: &str) -> String {
+        self.until(&format!("{start:?}"), |widgets| widgets.iter().any(|widget| widget.label.starts_with(start)));
+        let found = self.widgets().into_iter().find(|widget| widget.label.starts_with(start));
+        found.map(|widget| widget.label).unwrap_or_default()
+    }
+
+    /// Waits until the label that begins with a text is another one than before.
+    ///
+    /// # Panics
+    /// When it stays as it is.
+    pub fn until_other(&mut self, start: &str, before: &str) {
+        let is_other = |widget: &Widget| widget.label.starts_with(start) && widget.label != before;
+        self.until(&format!("another {before:?}"), |widgets| widgets.iter().any(is_other));
+    }
+
     fn until(&mut self, what: &str, is_so: impl Fn(&[Widget]) -> bool) {
         let deadline = Instant::now() + PATIENCE;
         while !is_so(&self.widgets()) {
@@ -125,7 +142,7 @@ impl Desktop {
                 self.window.try_wait().ok().flatten().is_none(),
                 "the workbench has ended while waiting for {what}"
             );
-            std::thread::sleep(LOOK);
+            self.watch.changes_within(LOOK);
         }
     }
 
@@ -156,10 +173,25 @@ impl Desktop {
         assert!(done.is_ok_and(|status| status.success()), "xdotool {arguments:?}");
     }
 
-    /// A picture of the screen, `NAME.png`; the pointer is moved out of the way first.
+    /// Sends the workbench a signal by its name, `TERM`, and waits for its end: the status that it exits with, and how long
+    /// that takes.
+    pub fn end_by(&mut self, signal: &str) -> (ExitStatus, Duration) {
+        let asked = Instant::now();
+        process::signal(&self.window, signal);
+        let status = process::end_of(&mut self.window);
+        (status, asked.elapsed())
+    }
+
+    /// An image of the screen, `NAME.png`; the pointer is moved out of the way first, and what it opened closes.
     pub fn photograph(&self, name: &str) {
+        self.watch.forget();
         self.mouse(&["mousemove", "700", "12"]);
-        std::thread::sleep(Duration::from_millis(700));
+        // The window is drawn again without what the pointer was over, then without what hung there.
+        self.watch.changes_within(LOOK);
+        let deadline = Instant::now() + PATIENCE;
+        while self.widgets().iter().any(|widget| widget.role == "Tooltip") && Instant::now() < deadline {
+            self.watch.changes_within(LOOK);
+        }
         let file = self.shots.join(format!("{name}.png"));
         let taken = Command::new("import").args(["-window", "root"]).arg(&file).env("DISPLAY", &self.display).status();
         assert!(taken.is_ok_and(|status| status.success()), "{}", file.display());

@@ -4,7 +4,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use handeye_core::result::CalibrationResult;
-use handeye_tests::{handeye_binary, python, workspace_root};
+use handeye_core::session::Session;
+use handeye_core::testing::python;
+use handeye_tests::{handeye_binary, workspace_root};
 
 fn handeye(arguments: &[&str]) -> Output {
     Command::new(handeye_binary()).args(arguments).output().expect("the binary is built: cargo build -p handeye_app")
@@ -36,7 +38,8 @@ fn the_ten_reference_poses_calibrate_the_exact_cell() {
     let result = auto(folder.path(), &["--poses", "seed10", "--json", json.to_str().expect("UTF-8")]);
     let (mm, deg, percent) = errors(&result);
     println!("reference scene, ten poses: {mm:.3} mm, {deg:.4}°, focal length {percent:.4} %");
-    assert!(mm <= 0.5 && deg <= 0.03 && percent <= 0.2, "{mm} mm {deg}° {percent} %");
+    // The cell is exact and its pictures have no noise: what is left is rounding to grey levels.
+    assert!(mm <= 0.035 && deg <= 0.03 && percent <= 0.2, "{mm} mm {deg}° {percent} %");
     assert_eq!(result.views.len(), 10);
     assert_eq!(CalibrationResult::read(&json).expect("the copy"), result);
 
@@ -58,7 +61,7 @@ fn the_ten_reference_poses_calibrate_the_exact_cell() {
 }
 
 fn read_exports_with_python(session: &Path) {
-    let Some(python) = python("reading exports with OpenCV and PyYAML") else { return };
+    let Some(python) = python() else { return };
     let output = Command::new(python)
         .arg(workspace_root().join("tests/python/read_exports.py"))
         .arg(session.join("exports"))
@@ -104,13 +107,72 @@ fn planned_poses_calibrate_too() {
 #[test]
 fn an_earlier_session_is_kept() {
     let folder = tempfile::tempdir().expect("a folder");
-    let poses = folder.path().join("three.toml");
-    let all = std::fs::read_to_string(workspace_root().join("assets/poses/seed10.toml")).expect("poses");
-    let first_four: Vec<&str> = all.split("[[pose]]").take(5).collect();
-    std::fs::write(&poses, first_four.join("[[pose]]")).expect("written");
-    let poses = poses.to_str().expect("UTF-8");
-    auto(folder.path(), &["--poses", poses]);
-    auto(folder.path(), &["--poses", poses]);
+    let poses = poses(folder.path(), 4, "");
+    auto(folder.path(), &["--poses", &poses]);
+    auto(folder.path(), &["--poses", &poses]);
     assert!(folder.path().join("session.earlier-1/session.json").is_file());
     assert!(folder.path().join("session.earlier-1/images/0004.png").is_file());
+}
+
+/// A pose file with some of the reference poses, and more.
+fn poses(folder: &Path, count: usize, more: &str) -> String {
+    let all = std::fs::read_to_string(workspace_root().join("assets/poses/seed10.toml")).expect("poses");
+    let file = folder.join("poses.toml");
+    let some: Vec<&str> = all.split("[[pose]]").take(count + 1).collect();
+    std::fs::write(&file, some.join("[[pose]]") + more).expect("written");
+    file.to_str().expect("UTF-8").to_owned()
+}
+
+#[test]
+fn captures_are_taken_as_the_window_takes_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = workspace_root().join("assets/scenes/realistic.toml");
+    let mut digests = Vec::new();
+    for run in ["first", "second"] {
+        let out = folder.path().join(run);
+        let poses = poses(folder.path(), 5, "");
+        let scene = scene.to_str().expect("UTF-8");
+        let result = auto(&out, &["--scene", scene, "--poses", &poses, "--seed", "3", "--frames", "3"]);
+        digests.push(result.provenance.input_sha256.expect("a digest of images and poses"));
+        let session = Session::open(&out.join("session")).expect("a session");
+        assert_eq!(session.document.captures.len(), 5);
+        for capture in &session.document.captures {
+            assert_eq!(capture.frames, 3, "averaged: {capture:?}");
+            // Three intervals of a pass show that everything is at rest.
+            assert!(capture.settled_s.is_some_and(|settled_s| settled_s >= 0.15 - 1e-9), "{capture:?}");
+            assert!(capture.corner_noise_px.is_some_and(|noise_px| (1e-3..0.1).contains(&noise_px)), "{capture:?}");
+        }
+    }
+    assert_eq!(digests[0], digests[1], "the same command gives the same images and poses");
+}
+
+#[test]
+fn a_pose_that_gives_no_capture_is_named_and_left_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // The wrist is turned away from the board.
+    let away = "\n[[pose]]\nname = \"away\"\njoints_deg = [90.0, 45.0, -60.0, 0.0, -90.0, 0.0]\n";
+    let poses = poses(folder.path(), 5, away);
+    let out = folder.path().join("session");
+    let output = handeye(&["auto", "--out", out.to_str().expect("UTF-8"), "--poses", &poses]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains(r#"pose "away" is left out: The board was not found"#), "{said}");
+    let session = Session::open(&out).expect("a session");
+    let names: Vec<_> = session.document.captures.iter().filter_map(|capture| capture.pose_name.clone()).collect();
+    assert_eq!(names, ["first", "second", "third", "fourth", "fifth"]);
+}
+
+#[test]
+fn a_camera_out_of_focus_gives_no_session_to_solve_but_the_reason() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("blurred.toml");
+    std::fs::write(&scene, "[image]\nblur_px = 8.0\n").expect("written");
+    let poses = poses(folder.path(), 2, "");
+    let out = folder.path().join("session");
+    let [scene, out] = [&scene, &out].map(|path| path.to_str().expect("UTF-8"));
+    let output = handeye(&["auto", "--scene", scene, "--out", out, "--poses", &poses]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains(r#"pose "first" is left out: "#), "{said}");
+    assert!(said.contains("none of the 2 poses gave a capture"), "{said}");
 }

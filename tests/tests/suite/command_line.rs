@@ -2,17 +2,11 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Output};
 
-use handeye_tests::handeye_binary;
+use handeye_core::result::CalibrationResult;
+use serde_json::Value;
 
-fn handeye(arguments: &[&str]) -> Output {
-    Command::new(handeye_binary()).args(arguments).output().expect("the binary is built: cargo build -p handeye_app")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
+use crate::solved::{copy_of_session, handeye, text, utf8};
 
 /// A dataset folder of corners only: four views of a board on a robot whose poses are given.
 fn dataset(folder: &Path, poses: &str) {
@@ -60,7 +54,7 @@ distortion = []
 
 #[test]
 fn every_subcommand_has_help_with_an_example() {
-    for command in ["gui", "cell", "auto", "calibrate", "export", "target"] {
+    for command in ["gui", "cell", "auto", "calibrate", "doctor", "track", "export", "target"] {
         let output = handeye(&[command, "--help"]);
         assert_eq!(output.status.code(), Some(0));
         assert!(text(&output.stdout).contains("Example:\n  handeye "), "{command}");
@@ -92,12 +86,21 @@ fn wrong_usage_and_unreadable_input_exit_with_2_and_one_line() {
     assert_eq!(handeye(&["calibrate"]).status.code(), Some(2));
     assert_eq!(handeye(&["no-such-command"]).status.code(), Some(2));
     assert_eq!(handeye(&["calibrate", "x", "--method", "no-such-method"]).status.code(), Some(2));
+    assert_eq!(handeye(&["doctor"]).status.code(), Some(2));
+    assert_eq!(handeye(&["doctor", "x", "--goal", "small"]).status.code(), Some(2));
+    assert_eq!(handeye(&["track"]).status.code(), Some(2));
+    assert_eq!(handeye(&["track", "--calibration", "x", "--follow", "--reach", "0"]).status.code(), Some(2));
+    assert_eq!(handeye(&["track", "--calibration", "x", "--corner", "0"]).status.code(), Some(2));
     let folder = tempfile::tempdir().expect("a folder");
     dataset(folder.path(), "image,x,y,z,rx,ry,rz\na.png,0,0,0,0,0,0\na.png,0,0,nan,0,0,0\n");
     let path = folder.path().to_str().expect("UTF-8");
     for arguments in [
         &["calibrate", "/no/such/folder"][..],
         &["calibrate", path],
+        &["doctor", "/no/such/folder"],
+        &["doctor", path],
+        &["track", "--calibration", "/no/such/result.json"],
+        &["track", "--calibration", path],
         &["export", path, "--format", "json", "--out", path],
         &["auto", "--poses", "/no/such/poses.toml"],
         &["cell", "--scene", "/no/such/scene.toml"],
@@ -128,4 +131,93 @@ fn sets_without_an_answer_exit_with_1_and_say_what_to_do() {
         assert!(message.contains(words), "{message}");
         assert_eq!(message.trim_end().lines().count(), 1, "{message}");
     }
+}
+
+#[test]
+fn the_doctor_answers_for_a_healthy_session_and_for_one_without_an_answer() {
+    let (_home, session) = copy_of_session();
+    let report = handeye(&["doctor", utf8(&session)]);
+    assert_eq!(report.status.code(), Some(0), "{}", text(&report.stderr));
+    let file = session.join("diagnosis.json");
+    let again = handeye(&["doctor", utf8(&session), "--json", utf8(&file)]);
+    assert_eq!(again.stdout, report.stdout, "the report is the same with and without a file");
+    let diagnosis: Value = serde_json::from_slice(&std::fs::read(&file).expect("written")).expect("JSON");
+    assert_eq!(diagnosis["untested"], Value::Null);
+    let spoils = |finding: &&Value| finding["severity"] == "problem";
+    let findings = diagnosis["findings"].as_array().expect("findings");
+    assert_eq!(findings.iter().filter(spoils).count(), 0, "{diagnosis:#}");
+    for finding in findings {
+        let said = finding["text"].as_str().expect("a text");
+        assert!(text(&report.stdout).contains(said), "{said:?} is not in the report");
+    }
+
+    // That there is no calibration is what the diagnosis is about.
+    let folder = tempfile::tempdir().expect("a folder");
+    dataset(folder.path(), "image,x,y,z,rx,ry,rz\na.png,0,0,0,0,0,0\n");
+    let ill = handeye(&["doctor", utf8(folder.path())]);
+    assert_eq!(ill.status.code(), Some(0), "{}", text(&ill.stderr));
+    assert!(text(&ill.stderr).contains("no calibration: ") && !ill.stdout.is_empty());
+}
+
+#[test]
+fn a_track_has_a_pose_for_every_picture_and_needs_a_hand_eye_transform() {
+    let (_home, session) = copy_of_session();
+    let result = session.join("result.json");
+    let file = session.join("track.json");
+    // By the session and by its result: the board is known from both.
+    for calibration in [&session, &result] {
+        let run = ["track", "-q", "--calibration", utf8(calibration), "--frames", "5", "--json", utf8(&file)];
+        let output = handeye(&run);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        assert!(text(&output.stdout).starts_with("tracked in "), "{}", text(&output.stdout));
+        let track: Value = serde_json::from_slice(&std::fs::read(&file).expect("written")).expect("JSON");
+        assert_eq!(track["format"], "handeye-track");
+        let frames = track["frames"].as_array().expect("pictures");
+        assert_eq!((frames.len(), track["summary"]["frames"].as_u64()), (5, Some(5)));
+        assert!(frames.iter().all(|frame| frame["base_from_target"]["translation_m"].is_array()), "{track:#}");
+    }
+    let unusable = |arguments: &[&str], words: &str| {
+        let output = handeye(&[&["track", "-q", "--calibration", utf8(&result)][..], arguments].concat());
+        let message = text(&output.stderr);
+        assert_eq!((output.status.code(), message.lines().count()), (Some(2), 1), "{arguments:?}: {message}");
+        assert!(message.contains(words), "{arguments:?}: {message}");
+    };
+    unusable(&["--reach", "70"], "corners 0 to 69");
+    unusable(&["--reach", "0", "--stand-off=-1"], "-1 mm is no distance");
+    unusable(&["--target", "10x7"], "no chessboard");
+    unusable(&["--connect", "not an address"], "not an address");
+    unusable(&["--json", "/no/such/folder/track.json"], "cannot be written");
+    let mut without = CalibrationResult::read(&result).expect("a result");
+    (without.mode, without.hand_eye, without.target) = (None, None, None);
+    without.write(&result).expect("written");
+    unusable(&[], "has no hand-eye transform");
+}
+
+#[test]
+fn a_folder_without_a_description_is_answered_with_one_to_fill_in() {
+    let folder = tempfile::tempdir().expect("a folder");
+    dataset(folder.path(), "image,x,y,z,rx,ry,rz\na.png,0,0,0,0,0,0\nb.png,0,0,1.5,0,0,0\n");
+    std::fs::remove_file(folder.path().join("dataset.toml")).expect("removed");
+    for command in ["calibrate", "doctor"] {
+        let output = handeye(&[command, utf8(folder.path())]);
+        let (template, message) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!((output.status.code(), message.lines().count()), (Some(2), 1), "{message}");
+        assert!(message.contains("has no dataset.toml") && message.contains("standard output"), "{message}");
+        for line in ["poses = \"poses.csv\"", "#? rotation = \"rpy\"", "#? rotation = \"rotation_vector\""] {
+            assert!(template.lines().any(|found| found.starts_with(line)), "{line} is not in\n{template}");
+        }
+        // Saved as it is, it is refused: nothing in it was guessed. A shell makes the file before the command runs.
+        let file = std::fs::File::create(folder.path().join("dataset.toml")).expect("created");
+        let saving =
+            crate::solved::command().args([command, utf8(folder.path())]).stdout(file).output().expect("it runs");
+        assert_eq!(saving.status.code(), Some(2), "{}", text(&saving.stderr));
+        assert_eq!(std::fs::read_to_string(folder.path().join("dataset.toml")).expect("saved"), template);
+        let refused = handeye(&[command, utf8(folder.path())]);
+        assert_eq!((refused.status.code(), refused.stdout.len()), (Some(2), 0), "{}", text(&refused.stderr));
+        assert!(text(&refused.stderr).contains("dataset.toml, row "), "{}", text(&refused.stderr));
+        std::fs::remove_file(folder.path().join("dataset.toml")).expect("removed");
+    }
+    let empty = tempfile::tempdir().expect("a folder");
+    let output = handeye(&["calibrate", utf8(empty.path())]);
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
 }

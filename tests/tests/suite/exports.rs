@@ -10,7 +10,8 @@ use handeye_core::export::{self, CameraLink, ExportInput, ExportNames, ExportVie
 use handeye_core::frames::{Base, Pose, Target, Tip};
 use handeye_core::handeye::HandEye;
 use handeye_core::result::{CalibrationResult, IntrinsicsEstimate, Quality};
-use handeye_tests::{handeye_binary, python, workspace_root};
+use handeye_core::testing::python;
+use handeye_tests::{handeye_binary, workspace_root};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde_json::json;
 
@@ -76,8 +77,8 @@ fn write_case(folder: &Path, result: &CalibrationResult, names: &ExportNames) ->
     formats.iter().map(|format| format.name()).collect()
 }
 
-fn read_with_python(test: &str, arguments: &[&Path]) {
-    let Some(python) = python(test) else { return };
+fn read_with_python(arguments: &[&Path]) {
+    let Some(python) = python() else { return };
     let output = Command::new(python)
         .arg(workspace_root().join("tests/python/read_exports.py"))
         .args(arguments)
@@ -134,7 +135,7 @@ fn the_readers_of_every_format_find_the_calibration_in_it() {
     }
     let all: BTreeSet<_> = export::formats().iter().map(|format| format.name()).collect();
     assert_eq!(seen, all, "a format was never written");
-    read_with_python("reading exports", &[Path::new("--cases"), folder.path()]);
+    read_with_python(&[Path::new("--cases"), folder.path()]);
 }
 
 /// A dataset of poses alone, with a result in it.

@@ -5,18 +5,28 @@
 mod auto;
 mod command_line;
 mod exports;
+mod hostile_clients;
 mod layering;
 mod official_client;
 mod reference_sets;
 mod renderer_truth;
+mod rerun_doors;
 mod rerun_recording;
 mod restart;
+mod sessions;
+mod solved;
+#[cfg(unix)]
+mod streams;
 mod workbench;
 
 mod slow {
+    mod asleep;
     mod first_user;
     mod following;
     mod fuzz;
+    mod leaving;
     mod rerun_viewers;
     mod tracking;
+    mod verifying;
+    mod web_page;
 }

@@ -4,7 +4,8 @@
 use std::process::Command;
 
 use handeye_core::result::CalibrationResult;
-use handeye_tests::{CellProcess, handeye_binary, python, workspace_root};
+use handeye_core::testing::python;
+use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 
 fn run(python: &std::path::Path, script: &str, arguments: &[&str], cbor: &str) -> String {
     let output = Command::new(python)
@@ -20,7 +21,7 @@ fn run(python: &std::path::Path, script: &str, arguments: &[&str], cbor: &str) -
 
 #[test]
 fn the_official_client_drives_the_cell_with_either_cbor_library() {
-    let Some(python) = python("official client") else { return };
+    let Some(python) = python() else { return };
     for cbor in ["cbor", "cbor2"] {
         let cell = CellProcess::start(&[]);
         println!("{}", run(&python, "official_client.py", &[&cell.port().to_string()], cbor));
@@ -29,7 +30,7 @@ fn the_official_client_drives_the_cell_with_either_cbor_library() {
 
 #[test]
 fn a_script_with_opencv_and_handeye_find_the_same_calibration() {
-    let Some(python) = python("calibration with OpenCV in Python") else { return };
+    let Some(python) = python() else { return };
     let poses = workspace_root().join("assets/poses/seed10.toml");
     let cell = CellProcess::start(&["--fast"]);
     let port = cell.port().to_string();

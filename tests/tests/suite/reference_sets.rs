@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::process::Command;
 
 use handeye_core::result::{CalibrationResult, ViewStatus};
-use handeye_tests::{handeye_binary, reference_data};
+use handeye_core::testing::data_folder;
+use handeye_tests::handeye_binary;
 
 /// What is known of a set: hand-eye translation [mm] with the limit of its error, and focal length [px].
 struct Truth {
@@ -15,7 +16,7 @@ struct Truth {
 
 #[test]
 fn every_set_is_calibrated_with_every_board_found() {
-    let Some(data) = reference_data("reference data sets") else { return };
+    let Some(data) = data_folder() else { return };
     let caliban = Truth { translation_mm: [100.0, -200.0, 0.0], limit_mm: 0.1, focal_px: 1400.0 };
     let synthetic = Truth { translation_mm: [0.0; 3], limit_mm: 0.1, focal_px: 1080.0 };
     let sets = [
@@ -72,7 +73,7 @@ fn pose_table(poses: &[Vec<f64>]) -> String {
 
 #[test]
 fn fifty_recorded_pose_pairs_give_the_published_place_of_the_camera() {
-    let Some(data) = reference_data("recorded pose pairs") else { return };
+    let Some(data) = data_folder() else { return };
     let text = std::fs::read_to_string(data.join("moveit_pose_samples/pose_samples.json")).expect("readable");
     let pairs: Vec<[Vec<Vec<f64>>; 2]> = serde_json::from_str(&text).expect("pairs of matrices");
     let side = |k: usize| -> Vec<Vec<f64>> { pairs.iter().map(|pair| pair[k].concat()).collect() };

@@ -97,7 +97,9 @@ fn corners_and_depths_are_where_the_lens_model_says() {
             bias.y,
             errors.len()
         );
-        assert!(bias.amax() <= 0.01 && rms <= 0.03, "{name}: bias {bias}, rms {rms}");
+        // A third of a hundredth of a pixel is what rounding to grey levels leaves; the rest is for the straight edges that
+        // the model of a corner has where the lens bends them.
+        assert!(bias.amax() <= 0.002 && rms <= 0.008, "{name}: bias {bias}, rms {rms}");
         assert!(depth_mm <= 0.1, "{name}: {depth_mm} mm");
     }
 }

@@ -2,11 +2,12 @@
 
 use std::process::Command;
 
-use handeye_tests::{handeye_binary, python, workspace_root};
+use handeye_core::testing::python;
+use handeye_tests::{handeye_binary, workspace_root};
 
 #[test]
 fn transforms_composed_from_a_recording_are_the_calibration_and_put_the_corners_where_it_does() {
-    let Some(python) = python("reading a recording with Rerun") else { return };
+    let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let session = folder.path().join("session");
     let output = Command::new(handeye_binary())

@@ -11,9 +11,11 @@ use std::time::{Duration, Instant};
 use handeye_app::command::Command as WorkbenchCommand;
 use handeye_app::model::{CellSource, Model, ViewerState};
 use handeye_app::rerun_log::RerunChoice;
+use handeye_core::testing::{Need, programs, python, skip};
 use handeye_tests::desktop::{self, Desktop};
+use handeye_tests::watch::Watch;
 use handeye_tests::workbench::Workbench;
-use handeye_tests::{CellProcess, handeye_binary, python};
+use handeye_tests::{CellProcess, handeye_binary, process};
 
 /// Longer than anything that a test waits for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(4);
@@ -29,16 +31,16 @@ fn shots() -> PathBuf {
     folder
 }
 
-/// The native viewer of the Python environment. `None`, and a line that says so, where there is none.
-fn native_viewer(test: &str) -> Option<PathBuf> {
+/// The native viewer of the Python environment. `None` where there is none, and the test has said that it skips.
+fn native_viewer() -> Option<PathBuf> {
     // The program itself: the `rerun` on the path of Python starts it as a child, which signals do not reach.
     let where_it_is = "import rerun_cli, os; print(os.path.join(os.path.dirname(rerun_cli.__file__), 'rerun'))";
-    let said = Command::new(python(test)?).args(["-c", where_it_is]).output().expect("python runs");
+    let said = Command::new(python()?).args(["-c", where_it_is]).output().expect("python runs");
     let viewer = PathBuf::from(String::from_utf8_lossy(&said.stdout).trim());
     if viewer.is_file() {
         return Some(viewer);
     }
-    eprintln!("{test}: skipped, Python has no rerun-sdk");
+    skip(Need::Python, "Python has no rerun-sdk");
     None
 }
 
@@ -76,7 +78,7 @@ fn address(lines: impl std::io::Read) -> String {
 }
 
 /// Has a browser take a picture of a page.
-fn photograph(url: &str, picture: &Path, profile: &Path, deadline: Instant) {
+fn photograph(url: &str, picture: &Path, profile: &Path) {
     let mut browser = Command::new("chromium")
         .args(["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"])
         .args(["--enable-unsafe-swiftshader", "--disable-background-networking", "--disable-component-update"])
@@ -90,20 +92,13 @@ fn photograph(url: &str, picture: &Path, profile: &Path, deadline: Instant) {
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
-        .map(Ends)
         .expect("chromium starts");
-    while browser.0.try_wait().expect("a state").is_none() {
-        assert!(Instant::now() < deadline, "the browser takes no picture of {url}");
-        std::thread::sleep(Duration::from_millis(100));
-    }
+    process::end_of(&mut browser);
 }
 
 #[test]
 fn a_browser_without_network_shows_a_live_session_in_3d() {
-    let test = "web viewer";
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    if !std::env::split_paths(&path).any(|folder| folder.join("chromium").is_file()) {
-        eprintln!("{test}: skipped, not installed: chromium");
+    if !programs(Need::Chromium, &["chromium"]) {
         return;
     }
     let folder = tempfile::tempdir().expect("a folder");
@@ -122,7 +117,7 @@ fn a_browser_without_network_shows_a_live_session_in_3d() {
     let deadline = Instant::now() + PATIENCE;
     loop {
         let _old = std::fs::remove_file(&picture).is_ok();
-        photograph(&url, &picture, &folder.path().join("browser"), deadline);
+        photograph(&url, &picture, &folder.path().join("browser"));
         // The middle of the window, between the panels: 3D scene and pictures. A viewer without a recording has but a few.
         let seen = colours(&picture, [0.2, 0.1, 0.75, 0.7]);
         println!("web viewer: {seen} colours, {}", picture.display());
@@ -136,15 +131,15 @@ fn a_browser_without_network_shows_a_live_session_in_3d() {
 
 #[test]
 fn the_button_opens_the_native_viewer_which_shows_the_cell() {
-    let test = "native viewer";
-    let Some(viewer) = native_viewer(test) else { return };
-    if !desktop::is_possible(test) {
+    let Some(viewer) = native_viewer() else { return };
+    if !desktop::is_possible() {
         return;
     }
     // A viewer that takes a picture of itself: what it draws on a screen of memory is not to be had otherwise.
     let folder = tempfile::tempdir().expect("a folder");
     let picture = shots().join("rerun-native.png");
     let _old = std::fs::remove_file(&picture).is_ok();
+    let watch = Watch::folder(&shots());
     let wrapper = folder.path().join("rerun");
     let script = format!(
         "#!/bin/sh\n[ \"$1\" = --version ] && exec '{viewer}' --version\nexec '{viewer}' \"$@\" --screenshot-to \
@@ -163,17 +158,7 @@ fn the_button_opens_the_native_viewer_which_shows_the_cell() {
     desktop.click("Capture");
     desktop.until_seen("1 of");
     desktop.click("Rerun");
-    let deadline = Instant::now() + PATIENCE;
-    while !picture.is_file() {
-        assert!(Instant::now() < deadline, "the viewer takes no picture of itself");
-        std::thread::sleep(Duration::from_millis(200));
-    }
-    // It is there before it is whole.
-    let mut size = 0;
-    while size == 0 || std::fs::metadata(&picture).map_or(0, |file| file.len()) != size {
-        size = std::fs::metadata(&picture).map_or(0, |file| file.len());
-        std::thread::sleep(Duration::from_millis(500));
-    }
+    assert!(watch.closes_within(&picture, PATIENCE), "the viewer takes no picture of itself");
     let seen = colours(&picture, [0.2, 0.1, 0.75, 0.7]);
     println!("native viewer: {seen} colours, {}", picture.display());
     assert!(seen > 500, "{seen} colours: see {}", picture.display());
@@ -201,15 +186,9 @@ fn resident_bytes() -> u64 {
     line.split_whitespace().next().and_then(|number| number.parse::<u64>().ok()).unwrap_or(0) * 1024
 }
 
-fn signal(child: &Child, name: &str) {
-    let sent = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status();
-    assert!(sent.is_ok_and(|status| status.success()), "{name}");
-}
-
 #[test]
 fn a_viewer_that_is_stopped_changes_neither_the_pictures_nor_the_bound_of_the_memory() {
-    let test = "stopped viewer";
-    let Some(viewer) = native_viewer(test) else { return };
+    let Some(viewer) = native_viewer() else { return };
     // `HANDEYE_STOPPED_S=30` for the long run.
     let stopped_s = std::env::var("HANDEYE_STOPPED_S").ok().and_then(|text| text.parse().ok()).unwrap_or(8.0);
     let folder = tempfile::tempdir().expect("a folder");
@@ -229,9 +208,9 @@ fn a_viewer_that_is_stopped_changes_neither_the_pictures_nor_the_bound_of_the_me
     bench.until("a viewer that reads", |_| std::fs::metadata(&taken).is_ok_and(|file| file.len() > 1_000_000));
 
     let (before_hz, before_bytes) = at_work(&mut bench, stopped_s);
-    signal(&reader.0, "STOP");
+    process::signal(&reader.0, "STOP");
     let (stopped_hz, stopped_bytes) = at_work(&mut bench, stopped_s);
-    signal(&reader.0, "CONT");
+    process::signal(&reader.0, "CONT");
     let (after_hz, _) = at_work(&mut bench, 2.0);
     println!(
         "pictures per second: {before_hz:.1} with a viewer, {stopped_hz:.1} while it is stopped, {after_hz:.1} \

@@ -5,9 +5,10 @@ use std::process::{Command, Output};
 
 use handeye_core::frames::{Base, Pose, Target};
 use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::testing::python;
 use handeye_sim_link::client::cell::{Arm, CellClient, CellPaths, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, MotionLimits};
-use handeye_tests::{CellProcess, handeye_binary, python, workspace_root};
+use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 use nalgebra::Point3;
 use serde_json::Value;
 
@@ -76,7 +77,7 @@ fn a_moving_board_is_tracked_to_a_millimetre_and_a_tenth_of_a_degree() {
 
 #[test]
 fn our_point_and_the_tip_there_are_those_of_the_program_that_people_write_by_hand() {
-    let Some(python) = python("our_point_and_the_tip_there") else { return };
+    let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let calibration = calibrated(folder.path(), "assets/scenes/reference.toml");
     let cell = CellProcess::start(&["--fast"]);

@@ -1,0 +1,95 @@
+//! `handeye auto` on a computer that falls asleep.
+
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::path::Path;
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use handeye_core::result::CalibrationResult;
+use handeye_core::session::Session;
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::ConnectionOptions;
+use handeye_sim_link::client::cell::{Arm, CellPaths};
+use handeye_tests::process::{end_of, put_to_sleep, signal};
+
+/// Longer than anything that is waited for takes on a busy machine.
+const PATIENCE: Duration = Duration::from_mins(4);
+
+fn auto(out: &Path, arguments: &[&str]) -> (Child, BufReader<ChildStderr>) {
+    let mut child = Command::new(handeye_tests::handeye_binary())
+        .args(["auto", "--rerun", "off", "--out"])
+        .arg(out)
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("handeye runs");
+    let said = BufReader::new(child.stderr.take().expect("its messages"));
+    (child, said)
+}
+
+/// Reads what it says until something is said.
+fn until_said(said: &mut BufReader<ChildStderr>, what: &str) {
+    let mut all = String::new();
+    while !all.contains(what) {
+        assert!(said.read_line(&mut all).is_ok_and(|bytes| bytes > 0), "{all}");
+    }
+}
+
+fn check(mut child: Child, mut said: BufReader<ChildStderr>, out: &Path) -> String {
+    let mut rest = String::new();
+    said.read_to_string(&mut rest).expect("text");
+    assert!(end_of(&mut child).success(), "{rest}");
+    let session = Session::open(out).expect("a session");
+    assert_eq!(session.document.captures.len(), 10, "{rest}");
+    let result = CalibrationResult::read(&out.join("result.json")).expect("a result");
+    let error_mm = result.truth.and_then(|truth| truth.translation_error_mm).expect("the cell publishes its truth");
+    assert!(error_mm < 0.5, "{error_mm} mm");
+    rest
+}
+
+#[test]
+fn a_tour_goes_on_when_the_cell_has_forgotten_the_sleeper() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("session");
+    let scene = Scene::reference().expect("a scene");
+    // The answers to pings are those of the library's thread, which is never busy for so long.
+    let silence = Duration::from_millis(900);
+    let cell = CellServer::start(CellConfig { real_time: Some(false), silence, ..CellConfig::new(scene) });
+    let endpoint = cell.as_ref().expect("a cell").endpoint();
+    let options = ConnectionOptions { heartbeat: None, ..ConnectionOptions::default() };
+    let mut witness =
+        Arm::connect(&endpoint.parse().expect("an address"), &options, &CellPaths::default()).expect("it answers");
+
+    let (child, mut said) = auto(&out, &["--connect", &endpoint]);
+    until_said(&mut said, "pose 2 of 10 captured");
+    let (at, deadline) = (witness.joint_angles().expect("an answer"), Instant::now() + PATIENCE);
+    while witness.joint_angles().expect("an answer") == at {
+        assert!(Instant::now() < deadline, "the arm does not move");
+    }
+    put_to_sleep(&child);
+    // Time stands still while it is waited for, until the server takes it for gone and lets time pass again.
+    let stood_s = witness.sim().get_simulation_time().expect("an answer");
+    while witness.sim().get_simulation_time().expect("an answer") < stood_s + 1.0 {
+        assert!(Instant::now() < deadline, "the sleeper is waited for without end");
+    }
+    signal(&child, "CONT");
+    let rest = check(child, said, &out);
+    assert!(rest.contains("asleep"), "it says what happened: {rest}");
+}
+
+#[test]
+fn a_tour_goes_on_when_the_cell_in_the_same_program_slept_as_well() {
+    /// Longer than a client waits for an answer.
+    const NAP: Duration = Duration::from_secs(6);
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("session");
+    let (child, mut said) = auto(&out, &[]);
+    until_said(&mut said, "pose 2 of 10 captured");
+    put_to_sleep(&child);
+    // Nothing is to be waited for but time itself.
+    std::thread::sleep(NAP);
+    signal(&child, "CONT");
+    check(child, said, &out);
+}
