@@ -56,7 +56,7 @@ impl Sequence {
         self.is_complete()
     }
 
-    /// Whether all pictures are there.
+    /// Whether all images are there.
     pub fn is_complete(&self) -> bool {
         self.machine.progress() == Progress::Complete
     }
@@ -91,7 +91,7 @@ impl Sequence {
     }
 
     /// Looks for the board in the average with all effort, which may take seconds when it is not there. `None` before
-    /// all pictures are there.
+    /// all images are there.
     pub fn measure(&self) -> Option<Result<Measured, Why>> {
         let (taken, last) = (self.machine.finish()?, self.last.as_ref()?);
         Some(match capture::observe_image(&taken.rgb, &self.target) {

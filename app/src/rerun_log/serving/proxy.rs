@@ -33,7 +33,7 @@ use super::door::{Door, Limits, plain};
 /// What a viewer asks for; what else the service can do is to write into the recording.
 const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
 
-/// Messages on their way to the server; a picture is one.
+/// Messages on their way to the server; an image is one.
 const ON_THE_WAY: usize = 8;
 
 /// Takes messages to a server.

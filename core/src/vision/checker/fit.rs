@@ -89,7 +89,7 @@ pub(super) fn fit(
         if let Some(light) = light {
             sums.expect(x, light);
         }
-        // No picture is sharper than its pixels: a blur that would go below stays where it is.
+        // No image is sharper than its pixels: a blur that would go below stays where it is.
         if x[BLUR] <= least_blur && sums.gradient[BLUR] > 0.0 {
             sums.hold(BLUR);
         }

@@ -48,7 +48,7 @@ impl Cell {
         self.pacer.set_stepping(is_paced).expect("a call");
     }
 
-    /// Has a pass go by, and waits until its picture is tracked.
+    /// Has a pass go by, and waits until its image is tracked.
     fn pass(&mut self, bench: &mut Workbench) {
         self.pacer.step(&CallOptions::default()).expect("a pass");
         let now_s = self.pacer.get_simulation_time().expect("a call");
