@@ -29,18 +29,20 @@ const BLURS_CLEAR: f64 = 2.5;
 const BAND: (f64, f64) = (2.6, 1.2);
 /// Steps of the corner that end the first and the second fit [px]: what is left after is a tenth of that.
 const CONVERGED_PX: [f64; 2] = [0.1, 0.003];
-/// A second fit that moved the corner further than this [px] is repeated with the window around it.
+/// A second fit that moved the corner further than this \[px\] is repeated with the window around it.
 const OFF_MIDDLE_PX: f64 = 0.35;
-/// Blur that a first fit starts from where no other corner was fitted yet [px], and the least as a part of how far off
+/// Second fits at the most: as the first one has it, around where that led to, and with the profile of a sharp edge.
+const MOST_FITS: usize = 3;
+/// Blur that a first fit starts from where no other corner was fitted yet \[px\], and the least as a part of how far off
 /// the corner may be: a wide edge is felt from further away.
 const START_BLUR_PX: f64 = 1.0;
 const BLUR_PER_PX: f64 = 0.3;
-/// Least blur that a second fit starts from [px].
+/// Least blur that a second fit starts from \[px\].
 const SHARPEST_PX: f64 = 0.4;
 /// Below this blur an edge is integrated over the pixels: beyond, a Gaussian is off by `2 · 0.55 / (24 · 120 σ⁴)` of the
 /// contrast at the most ([`super::edge`]), in full contrast less than the deviation of rounding to whole grey levels.
 const SHARP_PX: f64 = 0.64;
-/// Pixels within so many blurs of both edges see both, and how far off the corner may be besides [px].
+/// Pixels within so many blurs of both edges see both, and how far off the corner may be besides \[px\].
 const MEETING: (f64, f64) = (2.5, 0.2);
 /// Furthest usual move of the second fit, in pixels of the level and on top of what the first fit states.
 const USUAL_MOVE: f64 = 0.2;
@@ -158,21 +160,24 @@ fn second_fit(
     gradient: Option<Vector2<f64>>,
     first: &Fit,
 ) -> Option<Fit> {
-    let clear = 1.0 - BLURS_CLEAR * first.blur_px / spacing;
     let least = (LEAST_REACH_PX / spacing).min(LARGEST_PART);
-    let mut window = Window {
-        part: clear.clamp(0.25, SECOND_PART).max(least),
-        reach_px: SECOND_REACH_PX,
-        band_px: BAND.0 * first.blur_px + BAND.1,
-        meeting_px: MEETING.0 * first.blur_px + MEETING.1,
-        ..*window
-    };
-    let profile = if first.blur_px < SHARP_PX { Profile::Pixels } else { Profile::Blurred };
     let light = gradient.map(|gradient| Light { gradient, sd: LIGHT_SD, noise: first.noise });
     let mut at = *first;
-    at.parameters[BLUR] = at.parameters[BLUR].max(SHARPEST_PX);
-    for _ in 0..2 {
-        window.centre = at.px;
+    let mut profile = Profile::Blurred;
+    for _ in 0..MOST_FITS {
+        if at.blur_px < SHARP_PX {
+            profile = Profile::Pixels;
+        }
+        at.parameters[BLUR] = at.parameters[BLUR].max(SHARPEST_PX);
+        let clear = 1.0 - BLURS_CLEAR * at.blur_px / spacing;
+        let mut window = Window {
+            centre: at.px,
+            part: clear.clamp(0.25, SECOND_PART).max(least),
+            reach_px: SECOND_REACH_PX,
+            band_px: BAND.0 * at.blur_px + BAND.1,
+            meeting_px: MEETING.0 * at.blur_px + MEETING.1,
+            ..*window
+        };
         let patch = Patch::of(image, &window).or_else(|| {
             // Cut by the border of the image.
             window.part = FIRST_PARTS[1].max(least);
@@ -181,7 +186,9 @@ fn second_fit(
         let next = fit(&patch, &window, profile, light.as_ref(), at.parameters, CONVERGED_PX[1])?;
         let moved = (next.px - at.px).norm();
         at = next;
-        if moved <= OFF_MIDDLE_PX {
+        // On a coarse level a sharp edge can look like a blurred one.
+        let is_sharper = profile == Profile::Blurred && at.blur_px < SHARP_PX;
+        if moved <= OFF_MIDDLE_PX && !is_sharper {
             break;
         }
     }

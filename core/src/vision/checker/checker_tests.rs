@@ -25,6 +25,15 @@ impl Errors {
         self.all.extend(order.points.iter().zip(truth).map(|(p, t)| p - t));
     }
 
+    /// The same of corners in any order.
+    fn add_unordered(&mut self, order: &Ordered, truth: &[Vector2<f64>]) {
+        assert_eq!(order.points.len(), truth.len());
+        self.all.extend(truth.iter().map(|t| {
+            let errors = order.points.iter().map(|p| p - t);
+            errors.min_by(|a, b| a.norm().total_cmp(&b.norm())).expect("corners")
+        }));
+    }
+
     fn bias(&self) -> Vector2<f64> {
         self.all.iter().sum::<Vector2<f64>>() / self.all.len() as f64
     }
@@ -60,7 +69,7 @@ fn compare(views: u64, blur_px: f64, noise: f64) -> [Errors; 2] {
 fn the_corner_model_beats_corner_sub_pix_on_rendered_boards() {
     // Blur [px], noise [grey levels], RMS per axis [px] allowed: a quarter above what was measured.
     let cases = [
-        (0.0, 0.0, 0.003),
+        (0.0, 0.0, 0.001),
         (0.0, 2.0, 0.008),
         (0.5, 0.0, 0.0045),
         (0.7, 2.0, 0.0095),
@@ -110,11 +119,11 @@ fn through_a_lens(scene: &Scene, seed: u64) -> GrayImage {
     })
 }
 
-/// The board straight before the camera, its edges along the pixels, or up to `off_rad` from that.
-fn upright_scene(rng: &mut ChaCha8Rng, off_rad: f64) -> Scene {
+/// The board before the camera, its rows along those of the image, or up to `off_rad` from that, and leaning back.
+fn upright_scene(rng: &mut ChaCha8Rng, off_rad: f64, leaning_rad: f64) -> Scene {
     let camera = Intrinsics::pinhole(640, 480, 581.0);
     let grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
-    let angles = [0.0, 0.0, off_rad * rng.random_range(-1.0..=1.0)];
+    let angles = [leaning_rad, 0.0, off_rad * rng.random_range(-1.0..=1.0)];
     let offset = Vector2::new(rng.random_range(-60.0..60.0), rng.random_range(-40.0..40.0));
     Scene::new(camera, grid, looking_at(&grid, &camera, rng.random_range(0.40..0.60), angles, offset))
 }
@@ -126,27 +135,34 @@ fn edges_along_the_pixels_are_as_good_as_any_however_sharp_they_are() {
     const ROUNDED: f64 = 0.004;
     // Two grey levels of noise leave as much as in any other view of this scene.
     const NOISY: f64 = 0.008;
-    for (lens, off_deg, noise, views, allowed) in [
-        (0.0, 0.0, 0.0, 6, ROUNDED),
-        (0.0, 0.3, 0.0, 6, ROUNDED),
-        (0.0, 2.0, 0.0, 6, ROUNDED),
-        (0.2, 0.0, 0.0, 2, ROUNDED),
-        (0.35, 1.0, 0.0, 2, ROUNDED),
-        (0.5, 0.0, 0.0, 2, ROUNDED),
-        (0.0, 0.0, 2.0, 6, NOISY),
-        (0.2, 2.0, 2.0, 2, NOISY),
+    for (lens, off_deg, leaning_deg, noise, views, allowed) in [
+        (0.0, 0.0, 0.0, 0.0, 6, ROUNDED),
+        (0.0, 0.3, 0.0, 0.0, 6, ROUNDED),
+        (0.0, 2.0, 0.0, 0.0, 6, ROUNDED),
+        // The rows still lie along the pixels, the columns cross them, each at its own angle.
+        (0.0, 0.0, 5.0, 0.0, 6, ROUNDED),
+        (0.0, 0.0, 16.0, 0.0, 6, ROUNDED),
+        (0.0, 0.5, 30.0, 0.0, 6, ROUNDED),
+        (0.2, 0.0, 0.0, 0.0, 2, ROUNDED),
+        (0.35, 1.0, 0.0, 0.0, 2, ROUNDED),
+        (0.5, 0.0, 0.0, 0.0, 2, ROUNDED),
+        (0.0, 0.0, 0.0, 2.0, 6, NOISY),
+        (0.2, 2.0, 0.0, 2.0, 2, NOISY),
     ] {
         let mut rng = ChaCha8Rng::seed_from_u64(19);
         let mut errors = Errors::default();
         for view in 0..views {
-            let mut scene = upright_scene(&mut rng, f64::to_radians(off_deg));
+            let mut scene = upright_scene(&mut rng, f64::to_radians(off_deg), f64::to_radians(leaning_deg));
             (scene.blur_px, scene.noise) = (lens, noise);
-            let truth = scene.truth();
-            errors.add(&refine(&through_a_lens(&scene, view), &rough(&truth)), &truth);
+            // Searched for: the board is found on a coarser level, where a sharp edge can look blurred.
+            let found = find(&through_a_lens(&scene, view), &scene.grid).expect("in sight");
+            errors.add_unordered(&found, &scene.truth());
         }
         let rms = errors.rms();
-        println!("lens {lens} px, {off_deg}° off, noise {noise}: rms {rms:.4}, worst {:.3}", errors.worst());
-        assert!(rms < allowed, "lens {lens} px, {off_deg}° off, noise {noise}: {rms}");
+        let case = format!("lens {lens} px, {off_deg}° off, leaning {leaning_deg}°, noise {noise}");
+        println!("{case}: rms {rms:.4}, worst {:.3}", errors.worst());
+        // A single corner whose fit has not got to its end is off by 0.05 px.
+        assert!(rms < allowed && errors.worst() < 5.0 * allowed, "{case}: {rms}, {}", errors.worst());
     }
 }
 

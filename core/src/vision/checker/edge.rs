@@ -12,7 +12,7 @@
 
 use super::patch::{Group, LANES};
 
-/// Variance of the area of a pixel [px²], in any direction.
+/// Variance of the area of a pixel \[px²\], in any direction.
 pub(super) const PIXEL_AREA: f64 = 1.0 / 12.0;
 /// Least blur of the lens that is told from none [px]: there an edge along the pixels has moved no grey level by as much
 /// as one in full contrast.
@@ -44,7 +44,7 @@ pub(super) struct Place {
 
 /// One edge as the pixels of a group see it.
 pub(super) struct Edge {
-    /// Distance along the edge from the corner [px].
+    /// Distance along the edge from the corner \[px\].
     pub along: [f32; LANES],
     /// What is seen of a step from −1 to 1, and its derivatives by the distance and by the blur [1/px].
     pub value: [f32; LANES],
@@ -122,7 +122,7 @@ fn from_corner(group: &Group, centre: [f32; 2], t: [f32; 2], bend: f32, l: usize
 /// The two boxes that a pixel is across an edge.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Boxes {
-    /// Half the sum and half the difference of their widths [px].
+    /// Half the sum and half the difference of their widths \[px\].
     outer: f32,
     inner: f32,
     /// One over the product of their widths.

@@ -36,9 +36,12 @@ const MIN_FREEDOM: f64 = 6.0;
 const MAX_STEPS: usize = 12;
 /// Part of the sum of squares that the last step may take off.
 const LAST_GAIN: f64 = 0.05;
-/// A step that changes the blur by as much as this [px] gains as much as rounding takes from one pixel.
+/// A step that changes the blur by as much as this \[px\] gains as much as rounding takes from one pixel.
 const SMALL_BLUR_PX: f64 = 0.1;
-/// At this blur [px] a fit has found something else than a corner.
+/// Part of the blur of the lens that one step may leave, and what is left of it in the end \[px\].
+const LENS_PER_STEP: f64 = 0.25;
+const NO_LENS_PX: f64 = 0.05;
+/// At this blur \[px\] a fit has found something else than a corner.
 const MAX_BLUR_PX: f64 = 8.0;
 /// Least contrast (half the difference between dark and light) in grey levels.
 const MIN_CONTRAST: f64 = 2.0;
@@ -55,7 +58,7 @@ const ROUNDING: f64 = 1.0 / 12.0;
 pub(super) struct Light {
     pub gradient: Vector2<f64>,
     pub sd: f64,
-    /// Variance of the noise [grey levels²].
+    /// Variance of the noise \[grey levels²\].
     pub noise: f64,
 }
 
@@ -67,9 +70,9 @@ pub(super) struct Fit {
     /// What a further fit starts from.
     pub parameters: Parameters,
     pub blur_px: f64,
-    /// Mean level at the corner [grey levels].
+    /// Mean level at the corner \[grey levels\].
     pub level: f64,
-    /// Variance that the fit leaves [grey levels²].
+    /// Variance that the fit leaves \[grey levels²\].
     pub noise: f64,
 }
 
@@ -84,25 +87,28 @@ pub(super) fn fit(
     converged_px: f64,
 ) -> Option<Fit> {
     let least_blur = PIXEL_AREA.sqrt();
-    let evaluate = |x: &Parameters| {
+    let evaluate = |x: &Parameters, is_sharp: bool| {
         let mut sums = Sums::at(patch, x, window.bend.map(|c| c as f32), profile);
+        // Sharp edges along the pixels may say nothing about a small change of the blur.
+        sums.normal[(BLUR, BLUR)] += ROUNDING / (SMALL_BLUR_PX * SMALL_BLUR_PX);
         if let Some(light) = light {
             sums.expect(x, light);
         }
         // No image is sharper than its pixels: a blur that would go below stays where it is.
-        if x[BLUR] <= least_blur && sums.gradient[BLUR] > 0.0 {
+        if x[BLUR] <= least_blur && (is_sharp || sums.gradient[BLUR] > 0.0) {
             sums.hold(BLUR);
         }
         sums
     };
     let mut x = start;
     x[BLUR] = x[BLUR].max(least_blur);
-    let mut sums = evaluate(&x);
+    let mut is_sharp = false;
+    let mut sums = evaluate(&x, is_sharp);
     let mut damping = 1e-4;
     for _ in 0..MAX_STEPS {
         let step = sums.step(damping)?;
         let mut candidate = x - step;
-        candidate[BLUR] = candidate[BLUR].clamp(least_blur, MAX_BLUR_PX);
+        candidate[BLUR] = candidate[BLUR].clamp(least_blur_after(x[BLUR], profile), MAX_BLUR_PX);
         let gain = step.dot(&sums.gradient);
         // A step cut short by the damping is no sign of the end.
         let ends = damping < 1e-2 && step[0].hypot(step[1]) < converged_px && gain < LAST_GAIN * sums.cost;
@@ -111,11 +117,15 @@ pub(super) fn fit(
             sums.misfit = (sums.misfit - gain).max(0.0);
             return finished(window, &candidate, &sums);
         }
-        let next = evaluate(&candidate);
+        let next = evaluate(&candidate, is_sharp);
         // Single precision of the sums is no reason to go on.
         if next.cost <= sums.cost * (1.0 + 1e-6) {
             (x, sums) = (candidate, next);
             damping *= 0.1;
+        } else if !is_sharp && x[BLUR] <= least_blur {
+            // Without blur the profile has kinks, about which a derivative by the blur says little.
+            is_sharp = true;
+            sums.hold(BLUR);
         } else {
             damping = f64::max(damping * 10.0, 1e-3);
             if damping > 1e3 {
@@ -124,6 +134,18 @@ pub(super) fn fit(
         }
     }
     finished(window, &x, &sums)
+}
+
+/// Least blur that one step may lead to: as the blur of the lens goes, pixels stop to feel an edge that is not in them, so
+/// the corner has to be in its place before.
+fn least_blur_after(blur: f64, profile: Profile) -> f64 {
+    match profile {
+        Profile::Blurred => PIXEL_AREA.sqrt(),
+        Profile::Pixels => {
+            let lens = (blur * blur - PIXEL_AREA).max(0.0).sqrt();
+            if lens < NO_LENS_PX { PIXEL_AREA.sqrt() } else { (LENS_PER_STEP * lens).hypot(PIXEL_AREA.sqrt()) }
+        }
+    }
 }
 
 fn finished(window: &Window, x: &Parameters, sums: &Sums) -> Option<Fit> {
@@ -190,8 +212,6 @@ impl Sums {
         for i in 0..FREE {
             damped[(i, i)] *= 1.0 + damping;
         }
-        // Sharp edges along the pixels may say nothing about a small change of the blur.
-        damped[(BLUR, BLUR)] += ROUNDING / (SMALL_BLUR_PX * SMALL_BLUR_PX);
         if self.together {
             return Some(damped.cholesky()?.solve(&self.gradient));
         }

@@ -5,8 +5,8 @@ const CONTRAST: f64 = 100.0;
 /// The mean level, clear of both ends of the scale.
 const LEVEL: f64 = 128.0;
 
-/// A corner seen by one pixel: the corner from the middle of the pixel [px], the directions of the edges [°], the blur of
-/// the lens [px].
+/// A corner seen by one pixel: the corner from the middle of the pixel \[px\], the directions of the edges [°], the blur of
+/// the lens \[px\].
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     corner: Vector2<f64>,

@@ -29,7 +29,7 @@ const MIN_SEEN: f64 = 0.85;
 const MIN_SEEN_IN_LINE: f64 = 0.6;
 /// A line beyond the board of which more than this part is seen makes it another board; less is clutter beside it.
 const MAX_BEYOND: f64 = 0.6;
-/// Bins of the search for neighbours [px of the level].
+/// Bins of the search for neighbours \[px of the level\].
 const BIN_PX: f64 = 8.0;
 
 type Node = (i32, i32);

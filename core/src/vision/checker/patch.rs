@@ -21,17 +21,17 @@ const MIN_PIXELS: usize = 16;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     pub centre: Vector2<f64>,
-    /// One step along x and along y of the board [px].
+    /// One step along x and along y of the board \[px\].
     pub along: [Vector2<f64>; 2],
     /// Curvature of the edges along x and y, positive towards the normal `(−y, x)` [1/px].
     pub bend: [f64; 2],
     /// Part of a step, along x and along y, up to which a pixel counts.
     pub part: f64,
-    /// Pixels further from the corner do not count [px].
+    /// Pixels further from the corner do not count \[px\].
     pub reach_px: f64,
     /// Nor do those further than this from both edges [px]: there is nothing to see but the level.
     pub band_px: f64,
-    /// Pixels closer than this to both edges [px] see both of them at once.
+    /// Pixels closer than this to both edges \[px\] see both of them at once.
     pub meeting_px: f64,
     /// Pixels in the light squares further than this part of a step from both edges do not count: there something is
     /// printed.
