@@ -147,6 +147,7 @@ impl App {
         {
             self.model.export.names = names;
         }
+        self.remember_session();
         let document = Arc::clone(&self.model.session.document);
         self.model.selection.retain(|id| document.capture(*id).is_some());
         if self.model.review.as_ref().is_some_and(|review| document.capture(review.id).is_none()) {
@@ -159,6 +160,14 @@ impl App {
         self.solve_if_changed();
     }
 
+    /// Puts the session on the disk, however it came to be, first among the recent ones.
+    fn remember_session(&mut self) {
+        let Some(folder) = self.model.session.folder.clone() else { return };
+        let captures = self.model.document().captures.len();
+        self.model.recent.retain(|recent| recent.folder != folder);
+        self.model.recent.insert(0, RecentSession { folder, captures });
+    }
+
     pub(super) fn session_opened(&mut self) {
         self.model.opening = false;
         self.model.selection.clear();
@@ -167,9 +176,6 @@ impl App {
             self.model.dialog = None;
         }
         if let Some(folder) = self.model.session.folder.clone() {
-            let captures = self.model.document().captures.len();
-            self.model.recent.retain(|recent| recent.folder != folder);
-            self.model.recent.insert(0, RecentSession { folder: folder.clone(), captures });
             self.say(Severity::Info, text!("Session {folder} is open", folder = folder.display()));
         }
     }

@@ -172,6 +172,10 @@ fn a_stop_ends_the_tour_and_keeps_what_was_captured() {
     bench.until("the arm at rest", |model| !model.touring && !model.stop_pending);
     let kept = bench.model().document().captures.len();
     assert!((2..10).contains(&kept), "{kept}");
+    // A session that the first capture began is a recent one as well.
+    let recent = bench.model().recent.first().expect("a recent session");
+    assert_eq!(recent.captures, kept);
+    assert_eq!(Some(&recent.folder), bench.model().session.folder.as_ref());
     let joints = |bench: &Workbench| bench.model().robot.as_ref().map(|robot| robot.joints_rad);
     let sim_time = |model: &Model| model.robot.as_ref().map_or(0.0, |robot| robot.sim_time_s);
     // It brakes within its limits, which takes a moment of simulated time.

@@ -93,6 +93,10 @@ fn a_tour_ended_by(signal: &str) {
         let image = image::open(folder.join(&capture.image)).expect("its image");
         assert_eq!((image.width(), image.height()), (640, 480));
     }
+    // The next start offers it among the recent sessions.
+    let remembered = desktop.home().join("data/handeye-workbench/app.ron");
+    let remembered = std::fs::read_to_string(remembered).expect("what the window remembers");
+    assert!(remembered.contains(&folder.display().to_string()), "{remembered}");
     // The recording is completed, too.
     assert!(folder.join("recording.rrd").metadata().is_ok_and(|file| file.len() > 0));
     cell.kill();
