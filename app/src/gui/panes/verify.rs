@@ -6,6 +6,7 @@ mod planned;
 mod summary;
 
 use egui::{Button, Ui};
+use handeye_core::session::Role;
 
 use super::parts;
 use crate::command::{Command, Outbox};
@@ -31,12 +32,7 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         planned::planned_ui(ui, model, outbox);
         match model.solve.solved.as_ref().map(|solved| (solved, &solved.verification)) {
             None => parts::hint_ui(ui, tr!(language, "There is no calibration to verify yet.")),
-            Some((_, None)) => {
-                parts::hint_ui(
-                    ui,
-                    tr!(language, "No captures for verification yet. Ten say something about the average."),
-                );
-            }
+            Some((_, None)) => parts::hint_ui(ui, without_verification(model)),
             Some((_, Some(Err(error)))) => {
                 let why = Text::verbatim(error.to_string());
                 let said = text!("Verification has no answer: {why}", why = why).say(language);
@@ -53,6 +49,19 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
         picked::picked_ui(ui, model, outbox);
     });
+}
+
+/// Why a calibration has no verification.
+fn without_verification(model: &Model) -> &'static str {
+    let language = model.view.language;
+    let is_kept = model.document().captures.iter().any(|it| it.role == Role::Verification && !it.excluded);
+    if !is_kept {
+        tr!(language, "No captures for verification yet. Ten say something about the average.")
+    } else if model.solve.fresh {
+        tr!(language, "The board was not found in any capture for verification.")
+    } else {
+        tr!(language, "The captures for verification are being evaluated.")
+    }
 }
 
 fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {

@@ -1,4 +1,4 @@
-use handeye_core::session::CaptureId;
+use handeye_core::session::{CaptureId, Role};
 use handeye_core::verify::VerifyError;
 use nalgebra::Vector2;
 use std::sync::Arc;
@@ -78,7 +78,21 @@ fn a_verification_without_an_answer_says_why() {
         solved.verification = Some(Err(VerifyError::PredictedBehind { name: "images/0011.png".to_owned() }));
     }));
     assert!(pane.sees("behind the camera"));
-    assert!(driven(changed(|solved| solved.verification = None)).sees("No captures for verification yet"));
+}
+
+#[test]
+fn it_says_why_there_is_no_verification() {
+    let mut model = changed(|solved| solved.verification = None);
+    model.solve.fresh = false;
+    let mut pane = driven(model);
+    assert!(pane.sees("The captures for verification are being evaluated"));
+    pane.model().solve.fresh = true;
+    pane.steps();
+    assert!(pane.sees("The board was not found in any capture for verification"));
+    let document = Arc::make_mut(&mut pane.model().session.document);
+    document.captures.retain(|capture| capture.role == Role::Calibration);
+    pane.steps();
+    assert!(pane.sees("No captures for verification yet"));
 }
 
 #[test]
