@@ -20,9 +20,9 @@ use crate::{text, tr};
 
 /// Height of the strip over a recorded picture.
 pub const STRIP: f32 = 34.0;
-/// A refusal stands over the picture for so long [s]; after that the table of poses keeps it.
+/// A refusal stands over the picture for so long \[s\]; after that the table of poses keeps it.
 const REFUSAL_S: f64 = 8.0;
-/// The flash of a capture [s].
+/// The flash of a capture \[s\].
 const FLASH_S: f64 = 0.35;
 
 /// Frame rate, age, what was dropped, zoom and exaggeration, in the corner of the picture.

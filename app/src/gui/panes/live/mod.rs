@@ -41,9 +41,9 @@ pub struct Shown<'a> {
     pub capture: Option<CaptureId>,
     /// Where the robot reported its tip then.
     pub base_from_tip: Option<Pose<Base, Tip>>,
-    /// The sensor's far plane [m].
+    /// The sensor's far plane \[m\].
     pub far_plane_m: f32,
-    /// Depths [m] at the ends of the colours.
+    /// Depths \[m\] at the ends of the colours.
     pub depth_range_m: Option<[f32; 2]>,
 }
 
@@ -70,7 +70,7 @@ impl<'a> Shown<'a> {
         })
     }
 
-    /// Depth [m] at a pixel of the colour picture; `None` without a surface.
+    /// Depth \[m\] at a pixel of the colour picture; `None` without a surface.
     fn depth_m(&self, point: ImagePoint) -> Option<f32> {
         match self.images.depth_at(point, self.far_plane_m) {
             DepthSample::Metres(depth_m) => Some(depth_m),

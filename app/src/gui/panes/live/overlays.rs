@@ -1,7 +1,7 @@
 //! What is drawn over the colour picture: corners, axes, the predicted board, coverage, residuals.
 
 use egui::{Color32, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
-use handeye_core::camera::Intrinsics;
+use handeye_core::board_shape::{BoardPoints, BoardShape};
 use handeye_core::frames::{Camera, Pose, Target};
 use handeye_core::observation::Corner;
 use handeye_core::target::TargetSpec;
@@ -233,25 +233,23 @@ fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &Sight<
         }
         return;
     }
-    let (Some(calibrated), Some(camera_from_target)) = (model.calibrated(), live_chain(model)) else { return };
-    live_residuals(&calibrated.intrinsics, &camera_from_target, sight.corners, model, arrow);
+    for (px, residual_px) in live_residuals(model, sight.corners) {
+        arrow(&px, &residual_px);
+    }
 }
 
-fn live_residuals(
-    intrinsics: &Intrinsics,
-    camera_from_target: &Pose<Camera, Target>,
-    corners: &[Corner],
-    model: &Model,
-    arrow: impl Fn(&Vector2<f64>, &Vector2<f64>),
-) {
-    let target = &model.document().meta.target;
-    if target.is_empty() {
-        return;
-    }
-    for corner in corners {
-        let point = camera_from_target.isometry() * target.point(corner.index);
-        if let Ok(predicted_px) = intrinsics.project(&point) {
-            arrow(&corner.px, &(corner.px - predicted_px));
-        }
-    }
+/// Corners of the live picture, and measured minus predicted.
+pub fn live_residuals(model: &Model, corners: &[Corner]) -> Vec<(Vector2<f64>, Vector2<f64>)> {
+    let (Some(calibrated), Some(camera_from_target)) = (model.calibrated(), live_chain(model)) else {
+        return Vec::new();
+    };
+    // The pose of a tracked board is that of a flat one of the stated size.
+    let shape = if model.track.on { BoardShape::default() } else { calibrated.shape };
+    let board = BoardPoints::new(&model.document().meta.target.points());
+    let residual = |corner: &Corner| {
+        let point = camera_from_target.isometry() * board.point(corner.index, &shape);
+        let predicted_px = calibrated.intrinsics.project(&point).ok()?;
+        Some((corner.px, corner.px - predicted_px))
+    };
+    corners.iter().filter(|corner| corner.index < board.len()).filter_map(residual).collect()
 }

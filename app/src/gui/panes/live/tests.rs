@@ -12,7 +12,9 @@ use super::*;
 use crate::command::Command;
 use crate::gui::pane_harness::{PaneHarness, PaneState};
 use crate::gui::sample;
-use crate::model::{CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, RefusalKind, Review, Step, Viewport};
+use crate::model::{
+    CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, RefusalKind, Review, Solved, Step, Viewport,
+};
 use crate::text::Text;
 
 fn colour(model: Model) -> PaneHarness {
@@ -314,7 +316,7 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
     assert!(behind.line(&Point3::origin(), &Point3::new(0.1, 0.0, 0.0)).is_empty());
 }
 
-/// The corners of the live picture against where a pose has them: RMS [px].
+/// The corners of the live picture against where a pose has them: RMS \[px\].
 fn apart_px(model: &Model, camera_from_target: &Pose<Camera, Target>) -> f64 {
     let (intrinsics, target) = (model.intrinsics().expect("a camera"), model.document().meta.target);
     let corners = model.detection.as_ref().and_then(|seen| seen.corners.clone()).expect("seen");
@@ -323,6 +325,23 @@ fn apart_px(model: &Model, camera_from_target: &Pose<Camera, Target>) -> f64 {
         (intrinsics.project(&point).expect("in front") - corner.px).norm_squared()
     });
     (squares.sum::<f64>() / corners.len() as f64).sqrt()
+}
+
+#[test]
+fn residuals_of_the_live_picture_are_those_of_the_board_that_the_calibration_found() {
+    let mut model = sample::solved();
+    let corners = model.detection.as_ref().and_then(|seen| seen.corners.clone()).expect("seen");
+    let largest = |model: &Model| {
+        let residuals = overlays::live_residuals(model, &corners);
+        assert_eq!(residuals.len(), corners.len());
+        residuals.iter().map(|(_, residual_px)| residual_px.norm()).fold(0.0, f64::max)
+    };
+    assert!(largest(&model) < 1.0, "{} px", largest(&model));
+    // A board of twice the size is not the one in the picture.
+    let mut solved = Solved::clone(model.solve.solved.as_ref().expect("solved"));
+    solved.calibrated.as_mut().expect("calibrated").shape.scale = 2.0;
+    model.solve.solved = Some(Arc::new(solved));
+    assert!(largest(&model) > 20.0, "{} px", largest(&model));
 }
 
 #[test]
