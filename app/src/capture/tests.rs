@@ -112,14 +112,16 @@ fn four_pictures_show_that_everything_is_at_rest_and_the_next_ones_are_averaged(
 fn what_is_no_good_is_refused_with_the_reason() {
     let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(RgbImage::new(320, 240)))));
     assert_eq!(kind, RefusalKind::NoBoard, "{why}");
-    let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(board(6, 0.0)))));
+    let blurred = board(6, 0.0);
+    let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(blurred.clone()))));
     assert_eq!(kind, RefusalKind::Blurred, "{why}");
     let near = CaptureRequest { others: vec![(12, Pose::identity())], ..request(1) };
-    let (kind, why) = refused(take(near, &BOARD, &mut Reel::new(|_| Ok(board(0, 0.0)))));
+    let sharp = board(0, 0.0);
+    let (kind, why) = refused(take(near, &BOARD, &mut Reel::new(|_| Ok(sharp.clone()))));
     assert_eq!(kind, RefusalKind::TooSimilar, "{why}");
     // Only a part of the image: that of a lamp would be no change.
     let waving = |number: u64| {
-        let mut rgb = board(0, 0.0);
+        let mut rgb = sharp.clone();
         (0..480).for_each(|u| (300..360).for_each(|v| rgb.put_pixel(u, v, Rgb([90 * (number % 2) as u8; 3]))));
         Ok(rgb)
     };
@@ -130,8 +132,9 @@ fn what_is_no_good_is_refused_with_the_reason() {
 
 #[test]
 fn a_simulation_without_time_ends_the_capture() {
+    let sharp = board(0, 0.0);
     for pass_s in [0.0, f64::NAN] {
-        let mut reel = Reel { pass_s, ..Reel::new(|_| Ok(board(0, 0.0))) };
+        let mut reel = Reel { pass_s, ..Reel::new(|_| Ok(sharp.clone())) };
         let (kind, why) = refused(take(request(1), &BOARD, &mut reel));
         assert_eq!(kind, RefusalKind::NotSettled);
         assert!(why.contains("paused"), "{why}");

@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use egui::vec2;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use handeye_core::handeye::Mode;
@@ -325,6 +327,7 @@ fn texts(shape: &egui::Shape, found: &mut Vec<String>) {
 #[test]
 fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
     let mut silent = Silent::live();
+    let alphabet = alphabet(&silent);
     let dialogs = [Dialog::Help, Dialog::About, Dialog::Palette].map(|dialog| Command::SetDialog(Some(dialog)));
     let views: Vec<_> = Pane::ALL.map(Command::ShowPane).into_iter().chain(dialogs).collect();
     for language in Language::ALL {
@@ -337,7 +340,7 @@ fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
                 silent.harness.output().shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut found));
                 assert!(found.len() > 20, "{view:?} {language:?}: nothing is drawn");
                 for text in found {
-                    assert_eq!(missing(&silent, &text), "", "{view:?} {language:?}: {text}");
+                    assert_eq!(missing(&alphabet, &text), "", "{view:?} {language:?}: {text}");
                 }
                 silent.command(Command::SetDialog(None));
             }
@@ -347,31 +350,26 @@ fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
 
 #[test]
 fn the_fonts_have_every_letter_of_every_catalogue() {
-    let silent = Silent::new(CellSource::BuiltIn);
+    let alphabet = alphabet(&Silent::new(CellSource::BuiltIn));
     for (english, chinese) in crate::text::every_translation() {
         for text in [english, chinese] {
-            assert_eq!(missing(&silent, text), "", "{text}");
+            assert_eq!(missing(&alphabet, text), "", "{text}");
         }
     }
 }
 
-/// The letters of a text that a font does not have.
-fn missing(silent: &Silent, text: &str) -> String {
+/// The letters that every font of the window has.
+fn alphabet(silent: &Silent) -> BTreeSet<char> {
     let families = [egui::FontFamily::Proportional, egui::FontFamily::Monospace, fonts::semibold()];
     silent.harness.ctx.fonts_mut(|fonts| {
-        let mut letters: std::collections::BTreeSet<char> =
-            text.chars().filter(|letter| !letter.is_whitespace()).collect();
-        let mut missing = String::new();
-        for family in &families {
-            let known = fonts.fonts.font(family).characters().clone();
-            let unknown: Vec<char> = letters.iter().copied().filter(|letter| !known.contains_key(letter)).collect();
-            for letter in unknown {
-                letters.remove(&letter);
-                missing.push(letter);
-            }
-        }
-        missing
+        let sets = families.map(|family| fonts.fonts.font(&family).characters().keys().copied().collect());
+        sets.into_iter().reduce(|common: BTreeSet<char>, other| &common & &other).expect("a font")
     })
+}
+
+/// The letters of a text that a font does not have.
+fn missing(alphabet: &BTreeSet<char>, text: &str) -> String {
+    text.chars().filter(|letter| !letter.is_whitespace() && !alphabet.contains(letter)).collect()
 }
 
 #[test]

@@ -11,6 +11,9 @@ use crate::model::Model;
 /// What a pane is.
 pub type PaneUi = fn(&mut Ui, &Model, &mut Outbox);
 
+/// Nothing has to be scrolled to.
+const HEIGHT: f32 = 2400.0;
+
 /// The pane with its model and what it asks for.
 pub struct Driven {
     /// Draws it.
@@ -20,12 +23,7 @@ pub struct Driven {
 impl Driven {
     /// As wide as a tile, and so high that nothing has to be scrolled to.
     pub fn new(pane: PaneUi, model: Model) -> Self {
-        Self::of_width(420.0, pane, model)
-    }
-
-    /// The same in another width.
-    pub fn of_width(width: f32, pane: PaneUi, model: Model) -> Self {
-        let harness = Harness::builder().with_size(vec2(width, 2400.0)).build_ui_state(
+        let harness = Harness::builder().with_size(vec2(420.0, HEIGHT)).build_ui_state(
             move |ui, (model, outbox): &mut (Model, Outbox)| {
                 // Fonts are there from the frame after the one that they are installed in.
                 let installed = egui::Id::new("installed");
@@ -41,6 +39,12 @@ impl Driven {
         let mut driven = Self { harness };
         driven.steps();
         driven
+    }
+
+    /// The same in another width.
+    pub fn widen(&mut self, width: f32) {
+        self.harness.set_size(vec2(width, HEIGHT));
+        self.steps();
     }
 
     /// Draws until what was done shows.

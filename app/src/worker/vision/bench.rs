@@ -251,7 +251,7 @@ impl CellBench {
         BOARD.points().into_iter().enumerate().map(project).collect()
     }
 
-    /// Largest distance of the corners of a capture from where the truth says that they are [px].
+    /// Largest distance of the corners of a capture from where the truth says that they are \[px\].
     pub fn worst_px(&self, measured: &Measured) -> f64 {
         let truth = self.projected(&measured.base_from_tip);
         measured.corners.iter().map(|corner| (corner.px - truth[corner.index].px).norm()).fold(0.0, f64::max)

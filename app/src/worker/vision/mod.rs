@@ -305,8 +305,10 @@ impl Vision {
 }
 
 #[cfg(test)]
-mod accuracy_tests;
-#[cfg(test)]
 mod bench;
+#[cfg(test)]
+mod slow {
+    mod accuracy;
+}
 #[cfg(test)]
 mod tests;

@@ -12,13 +12,13 @@ use crate::model::{Model, TrackPoint};
 use crate::text::Language;
 use crate::{text, tr};
 
-/// Length of the time axis [s].
+/// Length of the time axis \[s\].
 const WINDOW_S: f64 = 30.0;
-/// Numbers on the time axis are so far apart [s].
+/// Numbers on the time axis are so far apart \[s\].
 const TICK_S: f64 = 10.0;
 /// Height of a plot.
 const HEIGHT: f32 = 128.0;
-/// Points further apart than this are not joined: no picture was tracked meanwhile [s].
+/// Points further apart than this are not joined: no picture was tracked meanwhile \[s\].
 const GAP_S: f64 = 0.5;
 
 /// A line of a plot.

@@ -235,15 +235,16 @@ fn nothing_is_wider_than_the_tile() {
 #[test]
 fn no_row_of_numbers_breaks_into_two_lines_whatever_the_width_of_the_tile() {
     for rotation in [RotationFormat::RollPitchYaw, RotationFormat::Quaternion] {
+        let mut model = tracked();
+        model.view.rotation = rotation;
+        let mut pane = driven(model);
+        // The widest there are within reach of an arm.
+        newest(&mut pane, |tracked| {
+            let far = Pose::from_translation_xyzw([-1.125, -1.4, -1.802], [0.5, 0.5, -0.5, 0.5]);
+            tracked.update.estimate.as_mut().expect("tracked").base_from_target = far;
+        });
         for width in (430..=1100).step_by(30) {
-            let mut model = tracked();
-            model.view.rotation = rotation;
-            let mut pane = Driven::of_width(width as f32, track_ui, model);
-            // The widest there are within reach of an arm.
-            newest(&mut pane, |tracked| {
-                let far = Pose::from_translation_xyzw([-1.125, -1.4, -1.802], [0.5, 0.5, -0.5, 0.5]);
-                tracked.update.estimate.as_mut().expect("tracked").base_from_target = far;
-            });
+            pane.widen(width as f32);
             for row in
                 ["Position [mm]: −1125.00", "± 95 % [mm]:", "± 95 % [°]:", "By corners [mm]:", "Velocity [mm/s]:"]
             {

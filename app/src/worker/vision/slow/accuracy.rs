@@ -8,14 +8,14 @@ use handeye_core::poses_file::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::{CancelToken, MotionLimits};
 
-use super::VisionTask;
-use super::bench::{CellBench, request};
 use crate::command::Event;
 use crate::model::{CaptureWait, RefusalKind};
+use crate::worker::vision::VisionTask;
+use crate::worker::vision::bench::{CellBench, request};
 
 /// Views of the board as joint angles.
 fn views() -> Vec<[f64; 6]> {
-    let text = include_str!("../../../../assets/poses/realistic20.toml");
+    let text = include_str!("../../../../../assets/poses/realistic20.toml");
     let taught = TaughtPoses::parse(std::path::Path::new("realistic20"), text).expect("poses");
     let joints = |goal: &Goal| match goal {
         Goal::Joints(joints) => joints.as_slice().try_into().expect("six joints"),
