@@ -161,9 +161,9 @@ pub enum Command {
     SetKeepOutliers(bool),
     /// The box of the workspace over which the error is stated; `None` is that about the target.
     SetTipBox(Option<WorkBox>),
-    /// The error that is good enough [m].
+    /// The error that is good enough \[m\].
     SetGoal(f64),
-    /// Where the line between good and bad residuals is [px]; `None` takes it away.
+    /// Where the line between good and bad residuals is \[px\]; `None` takes it away.
     SetOutlierLine(Option<f64>),
     /// Measure the point at a pixel of the picture in base coordinates.
     Pick(Option<ImagePoint>),
@@ -245,7 +245,7 @@ pub enum Event {
     Planned {
         /// The number of the request.
         id: MotionId,
-        /// The joints at each [rad]; or why there are none.
+        /// The joints at each \[rad\]; or why there are none.
         views: Result<Vec<JointAngles>, Text>,
     },
     /// A held jog button can do no more, or may not: the arm stands.

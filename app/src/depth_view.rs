@@ -8,7 +8,7 @@ const RANGE_STRIDE: usize = 7;
 /// Share of the depths at each end that the range may leave out: single wild pixels must not set it.
 const RANGE_TAIL: f64 = 0.01;
 
-/// The range ends at multiples of this [m], so that it does not flicker.
+/// The range ends at multiples of this \[m\], so that it does not flicker.
 const RANGE_STEP_M: f32 = 0.05;
 
 /// Share of its length by which the range is longer at each end: the ends of the colour map are dark, and what is
@@ -21,7 +21,7 @@ const SHORTEST_RANGE_M: f32 = 0.10;
 /// A range that covers the picture may be so many times as long as it needs to be before it is made shorter.
 const LARGEST_EXCESS: f32 = 1.5;
 
-/// The depths [m] that a picture has, rounded outwards. `previous` is kept while it still fits, because a colour map
+/// The depths \[m\] that a picture has, rounded outwards. `previous` is kept while it still fits, because a colour map
 /// that changes with every frame cannot be read. `None` when there is nothing to see and there was no range.
 pub fn range_of(depth: &DepthImage, far_plane_m: f32, previous: Option<[f32; 2]>) -> Option<[f32; 2]> {
     let mut seen: Vec<f32> = samples(depth, far_plane_m).collect();

@@ -8,7 +8,7 @@ use nalgebra::{
     Isometry3, Matrix3, Matrix6, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3, Vector6,
 };
 
-/// Below this angle [rad] the series are used: the next term of each is then under the rounding of an `f64`, while
+/// Below this angle \[rad\] the series are used: the next term of each is then under the rounding of an `f64`, while
 /// above it the cancellation in the closed forms, scaled by the squared angle that multiplies it, is too.
 const SMALL_ANGLE: f64 = 1e-2;
 

@@ -13,7 +13,7 @@ use handeye_sim_link::client::cell::JointAngles;
 
 use crate::model::CapturePurpose;
 
-/// Width of a thumbnail [px].
+/// Width of a thumbnail \[px\].
 const THUMBNAIL_WIDTH: u32 = 160;
 
 /// A capture that is good.
@@ -27,19 +27,19 @@ pub struct Measured {
     pub target: TargetSpec,
     /// Mean of the pictures.
     pub rgb: Arc<RgbImage>,
-    /// Mean of the depths [m].
+    /// Mean of the depths \[m\].
     pub depth: DepthImage,
     /// The tip as the controller reported it with the last of the pictures.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The joints at the same instant [rad].
+    /// The joints at the same instant \[rad\].
     pub joints_rad: JointAngles,
-    /// Simulated time of the last picture [s].
+    /// Simulated time of the last picture \[s\].
     pub sim_time_s: f64,
     /// How many pictures there were.
     pub frames: u32,
-    /// Simulated time [s] until robot and picture had come to rest.
+    /// Simulated time \[s\] until robot and picture had come to rest.
     pub settled_s: f64,
-    /// Standard deviation of a corner in *one* of the pictures [px], see [`handeye_core::capture::Scatter::sigma_px`];
+    /// Standard deviation of a corner in *one* of the pictures \[px\], see [`handeye_core::capture::Scatter::sigma_px`];
     /// `None` below three pictures in which the quick search found the board.
     pub corner_noise_px: Option<f64>,
     /// The board's points in the mean picture.

@@ -12,7 +12,7 @@ pub trait Pictures {
     /// Why there are none.
     type Error;
 
-    /// The clock that pictures arrive by [s].
+    /// The clock that pictures arrive by \[s\].
     fn now_s(&self) -> f64;
 
     /// Waits for the pictures of a later instant than those before. Gives those of the same instant again where simulated

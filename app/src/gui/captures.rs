@@ -30,7 +30,7 @@ pub enum Seen {
 /// A capture that the estimate set aside, because it does not fit the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aside {
-    /// How far its board is from where the others put it [mm] and by how much it is turned [deg]; `None` where its corners
+    /// How far its board is from where the others put it \[mm\] and by how much it is turned \[deg\]; `None` where its corners
     /// are no picture of the board.
     pub board_off: Option<(f64, f64)>,
 }
@@ -48,15 +48,15 @@ pub struct CaptureRow {
     pub excluded: bool,
     /// What was seen.
     pub seen: Seen,
-    /// RMS of the residuals of its corners [px]; of a verifying capture the error of the prediction.
+    /// RMS of the residuals of its corners \[px\]; of a verifying capture the error of the prediction.
     pub rms_px: Option<f64>,
-    /// Length of the correction of its reported tip position [mm].
+    /// Length of the correction of its reported tip position \[mm\].
     pub correction_mm: Option<f64>,
-    /// Angle of the correction of its reported tip orientation [deg].
+    /// Angle of the correction of its reported tip orientation \[deg\].
     pub correction_deg: Option<f64>,
-    /// How far the answer moves without it [mm].
+    /// How far the answer moves without it \[mm\].
     pub influence_mm: Option<f64>,
-    /// Noise of a corner of its picture [px].
+    /// Noise of a corner of its picture \[px\].
     pub corner_noise_px: Option<f64>,
     /// How far it is from the others, where the estimate set it aside.
     pub aside: Option<Aside>,
@@ -95,7 +95,7 @@ pub struct CaptureTable {
     pub coverage: Option<Coverage>,
     /// The captures of the outlines of `coverage`, as indices into `rows`.
     pub outlined: Vec<usize>,
-    /// Width and height of the pictures [px].
+    /// Width and height of the pictures \[px\].
     pub image_size: (u32, u32),
     /// What all this was made from; kept so that it can be told from anything else.
     made_from: Sources,

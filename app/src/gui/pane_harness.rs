@@ -21,7 +21,7 @@ pub struct PaneState {
     pub pointed: Option<ImagePoint>,
 }
 
-/// As long as a frame on a usual screen, so that two clicks can be a double click [s].
+/// As long as a frame on a usual screen, so that two clicks can be a double click \[s\].
 const STEP_S: f32 = 1.0 / 60.0;
 
 /// A pane under test.

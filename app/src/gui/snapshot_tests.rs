@@ -17,7 +17,7 @@ use super::testing::Silent;
 use crate::model::{CellSource, LinkState, Model, Pane, Step, ThemeChoice, ViewSettings};
 use crate::text::Language;
 
-/// Small enough for a repository, large enough for everything; the harness takes 8 of them at each edge [points].
+/// Small enough for a repository, large enough for everything; the harness takes 8 of them at each edge \[points\].
 const SIZE: Vec2 = vec2(1280.0, 800.0);
 
 /// Draws on the processor through Vulkan; says why there is none on a machine that cannot.

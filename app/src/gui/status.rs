@@ -5,7 +5,7 @@ use crate::model::{CellSource, Link, LinkState, Model, Simulation};
 use crate::text;
 use crate::text::Text;
 
-/// Old enough [s] to say so: a picture that should come many times a second.
+/// Old enough \[s\] to say so: a picture that should come many times a second.
 pub const STALE_AFTER_S: f64 = 1.0;
 
 /// A state for the user.

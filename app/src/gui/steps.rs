@@ -52,7 +52,7 @@ pub struct Facts {
     pub solving: bool,
     /// There is an answer for the present captures.
     pub solved: bool,
-    /// Its expected error [m], 95 %.
+    /// Its expected error \[m\], 95 %.
     pub expected_error_m: Option<f64>,
     /// Captures that test the answer.
     pub check_captures: usize,

@@ -31,7 +31,7 @@ pub struct Silent {
     _sessions: tempfile::TempDir,
 }
 
-/// Size of the window [points].
+/// Size of the window \[points\].
 pub const SIZE: Vec2 = vec2(1440.0, 900.0);
 
 impl Silent {

@@ -56,7 +56,7 @@ impl LiveTextures {
         }
     }
 
-    /// Depths [m] at the ends of the colours of a recorded picture; `None` without any depth in it.
+    /// Depths \[m\] at the ends of the colours of a recorded picture; `None` without any depth in it.
     pub fn review_range_m(&self) -> Option<[f32; 2]> {
         self.review_range_m
     }

@@ -26,7 +26,7 @@ const ABOVE: f32 = 8.0;
 /// Distance between messages.
 const BETWEEN: f32 = 6.0;
 
-/// How long [s] a message stays; `None` until it is put aside.
+/// How long \[s\] a message stays; `None` until it is put aside.
 fn lifetime_s(severity: Severity) -> Option<f64> {
     match severity {
         Severity::Info => Some(4.0),

@@ -18,7 +18,7 @@ pub struct LiveDetection {
     pub camera_from_target: Option<Pose<Camera, Target>>,
     /// Where the tip was.
     pub base_from_tip: Pose<Base, Tip>,
-    /// How long the search took [s].
+    /// How long the search took \[s\].
     pub took_s: f64,
     /// Why the picture could not be searched at all, which is another thing than a board that is not in it.
     pub problem: Option<VisionError>,
@@ -42,11 +42,11 @@ pub enum CapturePurpose {
 pub struct CaptureOptions {
     /// Pictures that are averaged.
     pub frames: u32,
-    /// Captures closer than this to an earlier one in both distance [m] and angle are refused.
+    /// Captures closer than this to an earlier one in both distance \[m\] and angle are refused.
     pub least_distance_m: f64,
-    /// See `least_distance_m` [rad].
+    /// See `least_distance_m` \[rad\].
     pub least_angle_rad: f64,
-    /// Longest wait [s] for robot and image to settle.
+    /// Longest wait \[s\] for robot and image to settle.
     pub settle_limit_s: f64,
 }
 

@@ -150,9 +150,9 @@ pub enum Simulation {
 pub struct RobotState {
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints from the base up [rad].
+    /// Positions of the joints from the base up \[rad\].
     pub joints_rad: JointAngles,
-    /// Simulated time [s].
+    /// Simulated time \[s\].
     pub sim_time_s: f64,
     /// Whether it advances.
     pub simulation: Simulation,
@@ -163,19 +163,19 @@ pub struct RobotState {
 pub struct FrameInfo {
     /// Counts the frames since the start of the program; grows with every frame that the camera worker takes.
     pub number: u64,
-    /// Simulated time of the pictures [s].
+    /// Simulated time of the pictures \[s\].
     pub sim_time_s: f64,
     /// When they arrived.
     pub received_s: f64,
     /// Frames per second that arrive.
     pub rate_hz: f64,
-    /// Depths [m] at the two ends of the colour map.
+    /// Depths \[m\] at the two ends of the colour map.
     pub depth_range_m: [f32; 2],
     /// The sensor's far plane [m]: depths there are no surface.
     pub far_plane_m: f32,
     /// The tip as the controller reported it at the instant of the pictures.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The joints at the same instant [rad].
+    /// The joints at the same instant \[rad\].
     pub joints_rad: JointAngles,
     /// Where the board was at that instant, if the cell publishes it; only ever compared with.
     pub base_from_target_true: Option<Pose<Base, Target>>,
@@ -303,7 +303,7 @@ pub struct ViewSettings {
     pub depth_scale: DepthScale,
 }
 
-/// An error [m] that is good enough, 95 %.
+/// An error \[m\] that is good enough, 95 %.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Goal(pub f64);
 
@@ -391,7 +391,7 @@ pub struct Model {
     pub keep_outliers: bool,
     /// The box of the workspace over which the error is stated.
     pub tip_box: BoxState,
-    /// The line between good and bad residuals [px].
+    /// The line between good and bad residuals \[px\].
     pub outlier_line_px: Option<f64>,
     /// The point that was picked.
     pub picked: Option<PickedPoint>,
@@ -482,7 +482,7 @@ impl Model {
         }
     }
 
-    /// Age of the newest pictures [s].
+    /// Age of the newest pictures \[s\].
     pub fn frame_age_s(&self) -> Option<f64> {
         self.frame.as_ref().map(|frame| (self.now_s - frame.info.received_s).max(0.0))
     }

@@ -10,7 +10,7 @@ use crate::text::Text;
 /// What is known about the cell once it is connected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CellFacts {
-    /// Ranges of the joints [rad] from the base up; `None` for a joint that turns without end.
+    /// Ranges of the joints \[rad\] from the base up; `None` for a joint that turns without end.
     pub joint_ranges_rad: [Option<[f64; 2]>; 6],
     /// What the camera's settings say, without its lens: good enough to draw with before there is a calibration.
     pub nominal_intrinsics: Intrinsics,
@@ -38,7 +38,7 @@ pub struct MotionId(pub u64);
 /// Where to move.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum MotionGoal {
-    /// These joint positions [rad].
+    /// These joint positions \[rad\].
     Joints(JointAngles),
     /// This pose of the tip.
     Tip(Pose<Base, Tip>),

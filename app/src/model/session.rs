@@ -75,7 +75,7 @@ pub enum StopOutcome {
 pub struct Tour {
     /// The poses in their order.
     pub names: Vec<String>,
-    /// The joints at each [rad], of poses that were planned; `None` for taught ones, which the session has.
+    /// The joints at each \[rad\], of poses that were planned; `None` for taught ones, which the session has.
     pub planned: Option<Vec<JointAngles>>,
     /// What is captured at each; `None` only moves.
     pub purpose: Option<CapturePurpose>,

@@ -35,7 +35,7 @@ pub struct Solved {
     pub verification: Option<Result<Verification, VerifyError>>,
     /// The captures of `verification` in its order.
     pub verified_captures: Vec<CaptureId>,
-    /// How long it took [s].
+    /// How long it took \[s\].
     pub took_s: f64,
 }
 

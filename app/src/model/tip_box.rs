@@ -10,15 +10,15 @@ use serde::{Deserialize, Serialize};
 
 use super::Solved;
 
-/// Half a side of the box that is judged before anybody says which [m].
+/// Half a side of the box that is judged before anybody says which \[m\].
 const HALF_SIDE_M: f64 = 0.1;
 
 /// A box, its sides along the axes of the base.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorkBox {
-    /// One corner, in the base [m].
+    /// One corner, in the base \[m\].
     pub from_m: [f64; 3],
-    /// The opposite one, in the base [m].
+    /// The opposite one, in the base \[m\].
     pub to_m: [f64; 3],
 }
 

@@ -20,7 +20,7 @@ pub struct Tracked {
     pub frame: u64,
     /// The board.
     pub update: Update,
-    /// From the arrival of the picture to the published pose [s].
+    /// From the arrival of the picture to the published pose \[s\].
     pub latency_s: f64,
     /// Poses per second.
     pub rate_hz: f64,
@@ -33,24 +33,24 @@ pub struct Tracked {
 /// An estimate against the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackError {
-    /// Distance of the board's centre from where it is [m].
+    /// Distance of the board's centre from where it is \[m\].
     pub position_m: f64,
-    /// Angle between the axes [rad].
+    /// Angle between the axes \[rad\].
     pub rotation_rad: f64,
 }
 
 /// One point of the plots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackPoint {
-    /// Time of the picture [s].
+    /// Time of the picture \[s\].
     pub time_s: f64,
-    /// Origin of the board in the base [m]; `None` while it is not known.
+    /// Origin of the board in the base \[m\]; `None` while it is not known.
     pub position_m: Option<[f64; 3]>,
-    /// 95 % of the position: radius [m].
+    /// 95 % of the position: radius \[m\].
     pub position_95_m: Option<f64>,
     /// Against the truth.
     pub error: Option<TrackError>,
-    /// From picture to pose [s].
+    /// From picture to pose \[s\].
     pub latency_s: f64,
 }
 
@@ -63,11 +63,11 @@ pub enum FollowWish {
     KeepViewWithRoom,
     /// Keep the camera at this pose relative to the board.
     KeepPose(Pose<Camera, Target>),
-    /// Bring the tip to a corner of the board, this far off along its normal [m].
+    /// Bring the tip to a corner of the board, this far off along its normal \[m\].
     Corner {
         /// Index of the corner.
         index: usize,
-        /// Distance of the tip from it [m].
+        /// Distance of the tip from it \[m\].
         stand_off_m: f64,
     },
 }
@@ -82,9 +82,9 @@ pub enum FollowStatus {
     MakingRoom,
     /// It follows.
     Following {
-        /// Distance of the tip from its goal [m].
+        /// Distance of the tip from its goal \[m\].
         distance_m: f64,
-        /// Angle between tip and goal [rad].
+        /// Angle between tip and goal \[rad\].
         angle_rad: f64,
     },
     /// It came to rest by itself, and this is why.

@@ -15,7 +15,7 @@ pub struct Trail {
 }
 
 impl Trail {
-    /// The tip is at a point of the base now [m]. Keeps it where the tip has moved; what is no number is left out.
+    /// The tip is at a point of the base now \[m\]. Keeps it where the tip has moved; what is no number is left out.
     pub fn add(&mut self, point_m: [f64; 3]) {
         let is_same = |last: &[f64; 3]| {
             let square: f64 = last.iter().zip(point_m).map(|(last, now)| (last - now).powi(2)).sum();
@@ -30,7 +30,7 @@ impl Trail {
         self.points_m.push_back(point_m);
     }
 
-    /// The points in the base [m], oldest first.
+    /// The points in the base \[m\], oldest first.
     pub fn points_m(&self) -> impl DoubleEndedIterator<Item = [f64; 3]> + ExactSizeIterator + '_ {
         self.points_m.iter().copied()
     }

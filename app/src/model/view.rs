@@ -51,13 +51,13 @@ impl Default for Viewport {
 /// From where the 3D pane looks at the cell: an eye that circles about a point, with z of the base upwards.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SceneView {
-    /// The point in the middle of the pane, in the base [m].
+    /// The point in the middle of the pane, in the base \[m\].
     pub centre_m: [f64; 3],
-    /// Direction from there to the eye, about z of the base and counted from its x [rad].
+    /// Direction from there to the eye, about z of the base and counted from its x \[rad\].
     pub azimuth_rad: f64,
-    /// The same over the ground: from −π/2, straight from below, to π/2, straight from above [rad].
+    /// The same over the ground: from −π/2, straight from below, to π/2, straight from above \[rad\].
     pub elevation_rad: f64,
-    /// Distance of the eye from there [m].
+    /// Distance of the eye from there \[m\].
     pub distance_m: f64,
 }
 

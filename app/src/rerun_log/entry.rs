@@ -16,11 +16,11 @@ pub enum Entry {
     Cell(Arc<CellFacts>),
     /// The robot.
     Robot {
-        /// Simulated time [s].
+        /// Simulated time \[s\].
         sim_time_s: f64,
         /// The tip as the controller reports it.
         base_from_tip: Pose<Base, Tip>,
-        /// Joints [rad].
+        /// Joints \[rad\].
         joints_rad: JointAngles,
     },
     /// A live picture.

@@ -15,7 +15,7 @@ const MAX_SAID: usize = 1000;
 /// States of the robot that are kept as its trail.
 const MAX_TRAIL: usize = 2048;
 
-/// Simulated time between two states of the trail, at first [s].
+/// Simulated time between two states of the trail, at first \[s\].
 const TRAIL_STEP_S: f64 = 0.2;
 
 /// A recording: what its streams have in common.

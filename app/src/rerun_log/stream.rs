@@ -20,7 +20,7 @@ const FILE_TICK: Duration = Duration::from_secs(2);
 /// Rows for a viewer are gathered for so long; shorter than anybody sees.
 const VIEWER_TICK: Duration = Duration::from_millis(30);
 
-/// What may be on its way to a sink inside the stream [bytes].
+/// What may be on its way to a sink inside the stream \[bytes\].
 const MAX_BYTES_IN_FLIGHT: u64 = 16 * 1024 * 1024;
 
 /// A sink that several streams share.

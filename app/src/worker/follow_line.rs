@@ -12,11 +12,11 @@ use crate::model::{FollowStatus, FollowWish};
 use crate::text;
 use crate::text::Text;
 
-/// How far [s] the motion of the board is thought on from the newest picture: a few pictures, so that one that comes late
+/// How far \[s\] the motion of the board is thought on from the newest picture: a few pictures, so that one that comes late
 /// does not end everything, and less than what an arm at its speed limit makes of a wrong guess.
 const LONGEST_GUESS_S: f64 = 0.4;
 
-/// How long [s] an arm that was moved to another place waits there for the board to be seen again: the whole picture is
+/// How long \[s\] an arm that was moved to another place waits there for the board to be seen again: the whole picture is
 /// searched within a few pictures.
 const PATIENCE_S: f64 = 3.0;
 
@@ -31,7 +31,7 @@ struct Inner {
     setup: Option<Setup>,
     newest: Option<Update>,
     aim: Option<Aim>,
-    /// For so long the board may be out of sight before the first goal [s].
+    /// For so long the board may be out of sight before the first goal \[s\].
     patience_s: f64,
     /// Until then, once there was a pass.
     waits_until_s: Option<f64>,

@@ -3,7 +3,7 @@
 use super::port::JogRequest;
 use crate::model::Jog;
 
-/// A button counts as held for so long [s] after the window last said so: a few frames of a busy window, and short
+/// A button counts as held for so long \[s\] after the window last said so: a few frames of a busy window, and short
 /// enough for an arm that nobody holds.
 pub const HELD_S: f64 = 0.3;
 

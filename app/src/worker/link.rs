@@ -47,7 +47,7 @@ impl Outlet {
         self.report(Event::Notice { severity, text });
     }
 
-    /// The present time [s].
+    /// The present time \[s\].
     pub fn now_s(&self) -> f64 {
         (self.clock)()
     }

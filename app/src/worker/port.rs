@@ -121,7 +121,7 @@ pub struct ViewsRequest {
 pub enum Room {
     /// It can.
     Enough,
-    /// It can from these joints [rad].
+    /// It can from these joints \[rad\].
     At(JointAngles),
     /// It can from nowhere, and this is why.
     Nowhere(Text),
@@ -183,11 +183,11 @@ pub struct RawFrame {
     pub rgb: RgbImage,
     /// Depth in metres, row 0 on top.
     pub depth: DepthImage,
-    /// Simulated time [s].
+    /// Simulated time \[s\].
     pub sim_time_s: f64,
     /// The tip as the controller reports it at that instant.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The joints at that instant [rad].
+    /// The joints at that instant \[rad\].
     pub joints_rad: JointAngles,
     /// Where the board was at that instant, if the cell publishes it.
     pub base_from_target_true: Option<Pose<Base, Target>>,
@@ -207,6 +207,6 @@ pub trait CameraPort: Send {
     /// [`PortError`].
     fn grab(&mut self) -> Result<RawFrame, PortError>;
 
-    /// Depths [m] that the sensor can measure; it reports the far one where nothing reflects.
+    /// Depths \[m\] that the sensor can measure; it reports the far one where nothing reflects.
     fn depth_limits_m(&self) -> [f32; 2];
 }

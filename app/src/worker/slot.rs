@@ -48,7 +48,7 @@ impl<T> LatestSlot<T> {
 pub struct Tap<T> {
     slot: LatestSlot<T>,
     bell: Sender<()>,
-    /// Bits of the time [s] at which the one who puts last had an answer from its source; not a number before.
+    /// Bits of the time \[s\] at which the one who puts last had an answer from its source; not a number before.
     heard_s: AtomicU64,
 }
 

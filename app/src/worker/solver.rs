@@ -39,7 +39,7 @@ pub struct SolveJob {
     pub method: Method,
     /// What is changed about it.
     pub options: Options,
-    /// The error [m] that is good enough.
+    /// The error \[m\] that is good enough.
     pub goal_m: f64,
     /// For comparison with the answer, when that is there.
     pub truth: Option<Truth>,

@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 use opencv::calib3d;
 use opencv::core::{Mat, Point2f, Size, TermCriteria, TermCriteria_EPS, TermCriteria_MAX_ITER, Vector};
 
-/// Window of `cornerSubPix` as a part of the smallest distance between corners, and its bounds [px].
+/// Window of `cornerSubPix` as a part of the smallest distance between corners, and its bounds \[px\].
 const WINDOW: (f32, i32, i32) = (0.4, 2, 10);
 
 /// `findChessboardCorners`, then `cornerSubPix` with a window matched to the squares.

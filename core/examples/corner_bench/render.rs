@@ -17,7 +17,7 @@ pub struct Look {
     pub radial: f64,
     pub columns: usize,
     pub rows: usize,
-    /// Middle size of a square [px].
+    /// Middle size of a square \[px\].
     pub square_px: f64,
     pub max_tilt: f64,
     pub blur_px: f64,

@@ -16,7 +16,7 @@ use super::scene::{BOARD, Trial};
 /// Noise levels of an exact robot, as an estimator that weighs by their inverse can be given them: a nanometre and a
 /// nanoradian.
 const EXACT: f64 = 1e-9;
-/// Residual [px] at which a corner counts as simply wrong when the closed forms are ranked.
+/// Residual \[px\] at which a corner counts as simply wrong when the closed forms are ranked.
 const CAP_PX: f64 = 50.0;
 
 /// An estimate with everything that it says about itself.

@@ -200,7 +200,7 @@ fn view_normal(points: &[Point3<f64>], nudged: &[(Model, Model, f64)]) -> DMatri
     rows.tr_mul(&rows)
 }
 
-/// Square roots of the summed variances of translation [m] and rotation [rad].
+/// Square roots of the summed variances of translation \[m\] and rotation \[rad\].
 pub fn levels(bound: &Matrix6<f64>) -> (f64, f64) {
     let of = |range: std::ops::Range<usize>| range.map(|i| bound[(i, i)]).sum::<f64>().sqrt();
     (of(0..3), of(3..6))

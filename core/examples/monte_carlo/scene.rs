@@ -18,7 +18,7 @@ pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7
 const VIEW_ANGLE_DEG: f64 = 57.0;
 /// A mild barrel lens, so that no derivative by a coefficient is taken at zero distortion.
 const DISTORTION: Distortion = Distortion::BrownConrady([-0.08, 0.05, 0.0006, -0.0004, -0.01]);
-/// How far [px] the true corners stay from the edge of the image: seven times the largest corner noise of the study.
+/// How far \[px\] the true corners stay from the edge of the image: seven times the largest corner noise of the study.
 const MARGIN_PX: f64 = 2.0;
 
 /// What is the same in all trials of a cell of the table.

@@ -72,7 +72,7 @@ fn sampled(view: &View) -> View {
     View::new(view.name.clone(), view.base_from_tip, corners)
 }
 
-/// Residual [px] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.
+/// Residual \[px\] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.
 const CAP_PX: f64 = 50.0;
 
 /// Numbers the corners of some views from the other end of the target.

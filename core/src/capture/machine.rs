@@ -8,7 +8,7 @@ use crate::depth::DepthImage;
 use crate::frames::{Base, Pose, Tip};
 use crate::observation::Corner;
 
-/// So long [s], on the clock of whoever asks, pictures may stay away and simulated time may stand still.
+/// So long \[s\], on the clock of whoever asks, pictures may stay away and simulated time may stand still.
 pub const NO_PICTURES_S: f64 = 2.0;
 
 /// Pictures that must have come before robot or picture are said not to come to rest: twice as many as show that they
@@ -20,11 +20,11 @@ const FAIR_PICTURES: u32 = 8;
 pub struct Plan {
     /// Pictures to average; 0 counts as 1.
     pub frames: u32,
-    /// Longest wait for robot and picture to come to rest [s], simulated.
+    /// Longest wait for robot and picture to come to rest \[s\], simulated.
     pub settle_limit_s: f64,
-    /// See [`nearest_similar`] [m].
+    /// See [`nearest_similar`] \[m\].
     pub least_distance_m: f64,
-    /// See [`nearest_similar`] [rad].
+    /// See [`nearest_similar`] \[rad\].
     pub least_angle_rad: f64,
     /// The captures that there are: number and pose.
     pub others: Vec<(u32, Pose<Base, Tip>)>,
@@ -53,14 +53,14 @@ pub enum Wait {
 pub enum Refusal {
     /// The joints did not come to rest.
     RobotMoves {
-        /// How long was waited [s], simulated.
+        /// How long was waited \[s\], simulated.
         after_s: f64,
         /// How fast the fastest joint still moves [rad/s].
         rate_rad_s: f64,
     },
     /// The joints are at rest and the picture is not.
     PictureChanges {
-        /// How long was waited [s], simulated.
+        /// How long was waited \[s\], simulated.
         after_s: f64,
     },
     /// Simulated time stands still.
@@ -91,7 +91,7 @@ pub struct Taken {
     pub depth: DepthImage,
     /// Pictures in the average.
     pub frames: u32,
-    /// Simulated time [s] from the first picture until everything was at rest.
+    /// Simulated time \[s\] from the first picture until everything was at rest.
     pub settled_s: f64,
     /// See [`Scatter::sigma_px`].
     pub corner_noise_px: Option<f64>,

@@ -39,11 +39,11 @@ use crate::depth::DepthImage;
 pub struct Shot<'a> {
     /// Counts pictures.
     pub number: u64,
-    /// Simulated time [s].
+    /// Simulated time \[s\].
     pub sim_time_s: f64,
-    /// When it arrived, on the clock of whoever asks [s].
+    /// When it arrived, on the clock of whoever asks \[s\].
     pub received_s: f64,
-    /// Positions of the joints [rad].
+    /// Positions of the joints \[rad\].
     pub joints_rad: &'a [f64],
     /// Colour.
     pub rgb: &'a RgbImage,

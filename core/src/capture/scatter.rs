@@ -31,7 +31,7 @@ impl Scatter {
         }
     }
 
-    /// Estimates the standard deviation of a corner in one picture [px], per axis and pooled over corners and axes:
+    /// Estimates the standard deviation of a corner in one picture \[px\], per axis and pooled over corners and axes:
     ///
     /// `σ² = Σ (u − ū)² / Σ (n − 1)`
     ///

@@ -25,9 +25,9 @@ pub const MAX_BLUR_SHARE: f64 = 0.15;
 /// Blur of the board's edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeBlur {
-    /// Standard deviation [px] of the Gaussian that the edges look blurred by, the pixel's own area (0.29 px) included.
+    /// Standard deviation \[px\] of the Gaussian that the edges look blurred by, the pixel's own area (0.29 px) included.
     pub sigma_px: f64,
-    /// Side of a square [px] across the edges, as foreshortened as it is.
+    /// Side of a square \[px\] across the edges, as foreshortened as it is.
     pub square_px: f64,
 }
 
@@ -58,7 +58,7 @@ impl EdgeBlur {
         self.sigma_px > MAX_BLUR_SHARE * self.square_px
     }
 
-    /// Distance [px] over which an edge goes from 10 % to 90 % of its contrast.
+    /// Distance \[px\] over which an edge goes from 10 % to 90 % of its contrast.
     pub fn edge_width_px(&self) -> f64 {
         2.563 * self.sigma_px
     }

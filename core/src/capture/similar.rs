@@ -7,9 +7,9 @@ use crate::frames::{Base, Pose, Tip};
 pub struct Similar {
     /// Its number.
     pub id: u32,
-    /// How far away [m].
+    /// How far away \[m\].
     pub distance_m: f64,
-    /// How much turned [rad].
+    /// How much turned \[rad\].
     pub angle_rad: f64,
 }
 

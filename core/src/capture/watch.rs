@@ -9,11 +9,11 @@ use super::picture::Cells;
 /// a tenth of a pixel at 0.4 m. The same as where motions wait for the arm.
 pub const STILL_RATE_RAD_S: f64 = 1e-3;
 
-/// Over longer intervals [s] a joint may not travel further than in this one: what moved and stopped between two
+/// Over longer intervals \[s\] a joint may not travel further than in this one: what moved and stopped between two
 /// pictures has moved.
 const LONGEST_INTERVAL_S: f64 = 0.05;
 
-/// Pictures closer in simulated time [s] than this are one: what settles slowly looks still from one to the next.
+/// Pictures closer in simulated time \[s\] than this are one: what settles slowly looks still from one to the next.
 const SHORTEST_INTERVAL_S: f64 = 0.03;
 
 /// Pictures that must agree: three intervals. One interval may be the turning point of an oscillation, and a picture
@@ -29,7 +29,7 @@ const SPREAD_OF_ABSOLUTE: f64 = 0.756;
 /// Standard deviations of the mean difference that chance is given.
 const CHANCE: f64 = 5.0;
 
-/// Difference [grey levels] that is none: one level in half a percent of the cells, which is how a picture rounds that
+/// Difference \[grey levels\] that is none: one level in half a percent of the cells, which is how a picture rounds that
 /// moves by a hundredth of a pixel.
 const NO_DIFFERENCE: f64 = 0.005;
 
@@ -139,7 +139,7 @@ fn at_rest(travel_rad: f64, interval_s: f64) -> bool {
     travel_rad <= STILL_RATE_RAD_S * interval_s.min(LONGEST_INTERVAL_S)
 }
 
-/// Largest turn of a joint [rad], by the shorter way round; not a number when a joint is none.
+/// Largest turn of a joint \[rad\], by the shorter way round; not a number when a joint is none.
 fn travel_rad(from: &[f64], to: &[f64]) -> f64 {
     use std::f64::consts::{PI, TAU};
     if from.len() != to.len() {

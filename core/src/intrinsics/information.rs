@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use super::IntrinsicsError;
 use crate::camera::Intrinsics;
 
-/// Corner noise [px] for which a calibration is judged determined or not: that of a good camera.
+/// Corner noise \[px\] for which a calibration is judged determined or not: that of a good camera.
 const TYPICAL_NOISE_PX: f64 = 0.1;
 /// Largest standard deviation of the pinhole's numbers for that noise, as a part of the focal length: at 5 % every
 /// distance measured is off by a centimetre in twenty.

@@ -6,7 +6,7 @@ use super::IntrinsicsError;
 use super::adjust::{Estimate, Problem, refine_pose, seen};
 use crate::handeye::joint::equations::{FreeForm, PoseEquations};
 
-/// Normals nearer to the line of sight than this angle [rad] are their own mirror image.
+/// Normals nearer to the line of sight than this angle \[rad\] are their own mirror image.
 const HEAD_ON: f64 = 1e-3;
 /// Steps of a mirrored pose.
 const STEPS: usize = 10;

@@ -37,7 +37,7 @@ use adjust::{Estimate, Problem};
 pub const MIN_VIEWS: usize = 3;
 /// Corners that fix a planar pose.
 pub const MIN_CORNERS: usize = 4;
-/// Normals of the target that agree within this angle [deg] in all views leave the focal length undetermined.
+/// Normals of the target that agree within this angle \[deg\] in all views leave the focal length undetermined.
 const MIN_SPREAD_DEG: f64 = 2.0;
 /// Rounds of mirrored poses and optimum at the most; one is usual.
 const MIRROR_ROUNDS: usize = 4;

@@ -28,7 +28,7 @@ pub(crate) struct Photo {
     pub blur_px: f64,
     /// Standard deviation of the noise in grey levels.
     pub noise: f64,
-    /// Left, top, right and bottom of something in front of the target [px].
+    /// Left, top, right and bottom of something in front of the target \[px\].
     pub covered: Option<[u32; 4]>,
     target: TargetSpec,
     drawing: Drawing,

@@ -8,21 +8,21 @@ use nalgebra::Vector2;
 use super::{Drawing, PrintError, Shape};
 use crate::target::TargetSpec;
 
-/// What printers leave white [mm].
+/// What printers leave white \[mm\].
 const MARGIN_MM: f64 = 10.0;
-/// Strip of a ruler with its numbers [mm].
+/// Strip of a ruler with its numbers \[mm\].
 const RULER_STRIP_MM: f64 = 9.0;
-/// Length of the rulers [mm].
+/// Length of the rulers \[mm\].
 const RULER_MM: usize = 100;
-/// Strip of the two lines of text [mm].
+/// Strip of the two lines of text \[mm\].
 const TEXT_STRIP_MM: f64 = 10.0;
-/// Least white between the drawing and what stands around it [mm].
+/// Least white between the drawing and what stands around it \[mm\].
 const QUIET_MM: f64 = 5.0;
-/// Longest side of a page that PDF readers must take: 14,400 points [mm].
+/// Longest side of a page that PDF readers must take: 14,400 points \[mm\].
 const LONGEST_MM: f64 = 5080.0;
-/// Stroke of ticks [mm].
+/// Stroke of ticks \[mm\].
 const TICK_MM: f64 = 0.15;
-/// Largest text [mm], and the width of a letter as a part of its size at the most: Helvetica's average is a half.
+/// Largest text \[mm\], and the width of a letter as a part of its size at the most: Helvetica's average is a half.
 const TEXT_MM: f64 = 3.5;
 const LETTER: f64 = 0.56;
 
@@ -79,9 +79,9 @@ impl FromStr for Page {
 /// A line of text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Text {
-    /// Left end of its base line, from the top left of the page [mm].
+    /// Left end of its base line, from the top left of the page \[mm\].
     pub at_mm: [f64; 2],
-    /// Size of the letters [mm].
+    /// Size of the letters \[mm\].
     pub size_mm: f64,
     /// What it says, in ASCII.
     pub text: String,

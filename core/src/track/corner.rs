@@ -16,7 +16,7 @@ use crate::vision::subpixel::erf_and_slope;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub px: Vector2<f64>,
-    /// One step along x and along y of the board [px].
+    /// One step along x and along y of the board \[px\].
     pub along_x: Vector2<f64>,
     pub along_y: Vector2<f64>,
     /// Whether the square between both directions is dark.
@@ -28,14 +28,14 @@ pub(super) struct Place {
 pub(super) struct Found {
     pub px: Vector2<f64>,
     pub blur_px: f64,
-    /// Half the difference between light and dark [grey levels].
+    /// Half the difference between light and dark \[grey levels\].
     pub contrast: f64,
 }
 
 /// Samples in each of the four squares, as parts of its diagonal from the corner: clear of the blurred edges, and of the
 /// next corners.
 const SAMPLES: [f64; 3] = [0.14, 0.22, 0.30];
-/// Least difference [grey levels] between the darkest light and the lightest dark square: three deviations of the noise
+/// Least difference \[grey levels\] between the darkest light and the lightest dark square: three deviations of the noise
 /// of a grainy picture.
 const MIN_STEP: f64 = 10.0;
 /// Places with more than this part of the best difference make up the middle that counts.
@@ -46,7 +46,7 @@ const STEP_PER_SQUARE: f64 = 0.08;
 /// As in the full fit: part of a grid step up to which a pixel counts, and the part where the border of the picture
 /// cuts that.
 const CELL_PARTS: [f64; 2] = [0.42, 0.24];
-/// Pixels further from the corner do not count [px].
+/// Pixels further from the corner do not count \[px\].
 const REACH_PX: f64 = 7.0;
 const MIN_PIXELS: usize = 20;
 const MAX_STEPS: usize = 8;
@@ -57,9 +57,9 @@ const LONGEST_PX: f64 = 1.5;
 const BLUR_PX: (f64, f64) = (0.25, 4.0);
 /// Furthest from the start that is believed: a part of a step, at least that many pixels.
 const MAX_MOVE: (f64, f64) = (0.15, 1.5);
-/// The window is laid anew around a corner further than this from the middle of it [px].
+/// The window is laid anew around a corner further than this from the middle of it \[px\].
 const OFF_MIDDLE_PX: f64 = 0.5;
-/// Least contrast [grey levels], and largest misfit as a part of it, as in the full fit.
+/// Least contrast \[grey levels\], and largest misfit as a part of it, as in the full fit.
 const MIN_CONTRAST: f64 = 3.0;
 const MAX_MISFIT: f64 = 0.2;
 /// Sharper than this, edges along the rows or columns of pixels (tangent below [`ALIGNED`]) are left to the saddle, which
@@ -68,7 +68,7 @@ const SHARP_PX: f64 = 0.5;
 const ALIGNED: f64 = 0.1;
 
 impl Place {
-    /// The shorter step [px].
+    /// The shorter step \[px\].
     pub fn spacing(&self) -> f64 {
         self.along_x.norm().min(self.along_y.norm())
     }
@@ -149,7 +149,7 @@ pub(super) fn roughly(image: &GrayImage, place: &Place, radius_px: f64) -> Optio
 }
 
 struct Patch {
-    /// Offset from the start [px] and grey level.
+    /// Offset from the start \[px\] and grey level.
     pixels: Vec<[f64; 3]>,
 }
 

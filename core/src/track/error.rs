@@ -27,7 +27,7 @@ pub enum TrackError {
     /// The distance between points is not a length.
     #[error("the target's point distance of {square_m} m is not usable: it must be finite and positive")]
     BadSquare {
-        /// Its value [m].
+        /// Its value \[m\].
         square_m: f64,
     },
     /// A number of the motion model is none.
@@ -41,13 +41,13 @@ pub enum TrackError {
     /// The time of a picture is not a number.
     #[error("the time of the picture is {time_s} s, which is no time")]
     BadTime {
-        /// Its value [s].
+        /// Its value \[s\].
         time_s: f64,
     },
     /// The pose of the tip is not finite.
     #[error("the robot pose of the picture at {time_s} s is not finite: read it again with the next picture")]
     NotFinite {
-        /// Time of the picture [s].
+        /// Time of the picture \[s\].
         time_s: f64,
     },
     /// Picture and intrinsics are of different sizes.
@@ -58,13 +58,13 @@ pub enum TrackError {
     OtherSize {
         /// The picture or its depth image.
         what: &'static str,
-        /// Width [px].
+        /// Width \[px\].
         width: u32,
-        /// Height [px].
+        /// Height \[px\].
         height: u32,
-        /// Width that the intrinsics say [px].
+        /// Width that the intrinsics say \[px\].
         camera_width: u32,
-        /// Height that the intrinsics say [px].
+        /// Height that the intrinsics say \[px\].
         camera_height: u32,
     },
     /// The search for the board failed.

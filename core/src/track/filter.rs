@@ -175,7 +175,7 @@ impl Filter {
         Pose::from_isometry(Isometry3::from_parts(Translation3::from(origin), self.rotation))
     }
 
-    /// Largest standard deviations over all directions: of the centre [m] and of the turn [rad].
+    /// Largest standard deviations over all directions: of the centre \[m\] and of the turn \[rad\].
     pub fn sigmas(&self) -> (f64, f64) {
         let largest = |at: usize| {
             let block: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(at, at).into_owned();

@@ -17,7 +17,7 @@ pub enum Keep {
     Corner {
         /// Which one: index into the target's points.
         index: usize,
-        /// How far in front of it [m], along the board's normal towards the viewer.
+        /// How far in front of it \[m\], along the board's normal towards the viewer.
         stand_off_m: f64,
         /// How the tip is turned, in the base.
         base_from_tip_orientation: UnitQuaternion<f64>,

@@ -52,20 +52,20 @@ pub struct MotionModel {
     pub acceleration: f64,
     /// Of its angular acceleration [rad/s²/√Hz].
     pub angular_acceleration: f64,
-    /// How long [s] the board is assumed to go on as it went while it is not seen; after that it is lost.
+    /// How long \[s\] the board is assumed to go on as it went while it is not seen; after that it is lost.
     pub coast_s: f64,
 }
 
 /// A picture with its circumstances.
 #[derive(Debug, Clone, Copy)]
 pub struct Picture<'a> {
-    /// Its time [s]; must grow from picture to picture, a step back starts the tracker anew.
+    /// Its time \[s\]; must grow from picture to picture, a step back starts the tracker anew.
     pub time_s: f64,
     /// The picture.
     pub grey: &'a GrayImage,
     /// Depth of the same instant and the same camera, where there is one.
     pub depth: Option<&'a DepthImage>,
-    /// Depths there and beyond are no surface [m].
+    /// Depths there and beyond are no surface \[m\].
     pub far_plane_m: f32,
     /// The tip at the same instant.
     pub base_from_tip: Pose<Base, Tip>,
@@ -85,12 +85,12 @@ pub enum State {
     },
     /// It is not seen in this picture, and is assumed to go on as it went.
     Coasting {
-        /// Time of the last picture in which it was seen [s].
+        /// Time of the last picture in which it was seen \[s\].
         since_s: f64,
     },
     /// It has not been seen for too long; nothing is known of where it is.
     Lost {
-        /// Time of the last picture in which it was seen [s].
+        /// Time of the last picture in which it was seen \[s\].
         since_s: f64,
     },
 }
@@ -106,7 +106,7 @@ pub struct Seen {
     pub base_from_target: Pose<Base, Target>,
     /// Covariance of `base_from_target` from the noise of the corners: right perturbation `[t; r]`, m and rad.
     pub covariance: Matrix6<f64>,
-    /// RMS of the distances between corners and their model [px].
+    /// RMS of the distances between corners and their model \[px\].
     pub rms_px: f64,
 }
 
@@ -120,14 +120,14 @@ pub struct ByDepth {
     pub first_corner_in_base: Option<Point3<f64>>,
     /// Corners with a depth.
     pub corners: usize,
-    /// RMS distance of the points from the fitted board [m].
+    /// RMS distance of the points from the fitted board \[m\].
     pub rms_m: f64,
 }
 
 /// Where the board is by all pictures so far.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// For this time [s].
+    /// For this time \[s\].
     pub time_s: f64,
     /// The board.
     pub base_from_target: Pose<Base, Target>,
@@ -156,7 +156,7 @@ impl Estimate {
 /// What a picture has brought.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
-    /// Time of the picture [s].
+    /// Time of the picture \[s\].
     pub time_s: f64,
     /// Whether the board is followed.
     pub state: State,

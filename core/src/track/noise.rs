@@ -28,7 +28,7 @@ impl CornerNoise {
     }
 
     /// Takes the residuals of a picture in (`cost_px2` the sum of their squares over `corners`), and says what variance
-    /// [px²] its corners have.
+    /// \[px²\] its corners have.
     pub fn variance(&mut self, cost_px2: f64, corners: usize) -> f64 {
         let freedom = (2.0 * corners as f64 - 6.0).max(1.0);
         self.cost_px2 = FORGET * self.cost_px2 + cost_px2;

@@ -17,10 +17,10 @@ const INLIER: f64 = 4.5;
 const MEDIAN_LENGTH: f64 = 1.1774;
 const ROBUST_STEPS: usize = 10;
 const PLAIN_STEPS: usize = 10;
-/// A step whose rotation [rad] and translation [part of the distance] are below this ends the fit: a hundredth of what
+/// A step whose rotation \[rad\] and translation [part of the distance] are below this ends the fit: a hundredth of what
 /// the noise of good corners does.
 const CONVERGED: f64 = 1e-7;
-/// Below this angle [rad] between normal and line of sight the two planar solutions are one.
+/// Below this angle \[rad\] between normal and line of sight the two planar solutions are one.
 const SAME_POSE_RAD: f64 = 0.01;
 
 /// A pose that fits.
@@ -31,7 +31,7 @@ pub(super) struct Fit {
     pub inliers: Vec<bool>,
     /// JᵀJ of the inliers by the right perturbation `[t; r]` [px²/m² and px²/rad²].
     pub information: Matrix6<f64>,
-    /// Sum of squared residuals of the inliers [px²].
+    /// Sum of squared residuals of the inliers \[px²\].
     pub cost: f64,
 }
 

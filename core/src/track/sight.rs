@@ -32,7 +32,7 @@ const MIN_CONTRAST_PART: f64 = 0.3;
 /// Reduction of the cost, in variances of a corner, from which the mirrored pose is believed against the expected one: by
 /// chance it happens less than once in a million pictures.
 const MIRRORED_BETTER: f64 = 30.0;
-/// Smallest standard deviation of a corner [px] that costs are compared with: the grey levels are whole numbers.
+/// Smallest standard deviation of a corner \[px\] that costs are compared with: the grey levels are whole numbers.
 const MIN_SIGMA_PX: f64 = 0.01;
 
 /// The board in a picture.
@@ -40,7 +40,7 @@ const MIN_SIGMA_PX: f64 = 0.01;
 pub(super) struct Board {
     pub corners: Vec<Corner>,
     pub fit: Fit,
-    /// Blur of the edges, 1σ [px]; of corners near where they were expected.
+    /// Blur of the edges, 1σ \[px\]; of corners near where they were expected.
     pub blur_px: Option<f64>,
     /// Whether the square between the first four corners is dark; of a whole board.
     pub first_dark: Option<bool>,
@@ -50,7 +50,7 @@ pub(super) struct Board {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Expected {
     pub camera_from_target: Isometry3<f64>,
-    /// How far corners may be from there [px].
+    /// How far corners may be from there \[px\].
     pub radius_px: f64,
     pub blur_px: f64,
     /// Whether the square between the first four corners is dark.
@@ -97,7 +97,7 @@ impl Eye<'_> {
             .collect()
     }
 
-    /// Shortest distance between neighbours in the middle of the board [px]; `None` out of sight.
+    /// Shortest distance between neighbours in the middle of the board \[px\]; `None` out of sight.
     pub fn square_px(&self, board: &Isometry3<f64>) -> Option<f64> {
         let grid = self.grid();
         let (column, row) = (grid.columns as i64 / 2, grid.rows as i64 / 2);

@@ -35,10 +35,10 @@ pub struct Cover {
 pub struct Stage {
     pub camera: Intrinsics,
     pub blur_px: f64,
-    /// 1σ [grey levels].
+    /// 1σ \[grey levels\].
     pub noise: f64,
     pub covers: Vec<Cover>,
-    /// 1σ of depths [m].
+    /// 1σ of depths \[m\].
     pub depth_noise_m: f64,
     /// Ray of every pixel at depth 1.
     rays: Vec<Vector2<f64>>,
@@ -221,7 +221,7 @@ impl Watch {
     }
 }
 
-/// Distance of the centres [m] and angle between the axes [rad].
+/// Distance of the centres \[m\] and angle between the axes \[rad\].
 pub fn error(estimate: &Pose<Base, Target>, truth: &Pose<Base, Target>) -> (f64, f64) {
     let at = |pose: &Pose<Base, Target>| pose.isometry() * centre();
     ((at(estimate) - at(truth)).norm(), estimate.rotation().angle_to(&truth.rotation()))

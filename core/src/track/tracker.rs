@@ -32,7 +32,7 @@ pub struct Tracker {
     filter: Option<Filter>,
     /// Sights that the filter did not believe, and how many.
     elsewhere: Option<(Filter, usize)>,
-    /// Time of the last picture that the filter believed [s].
+    /// Time of the last picture that the filter believed \[s\].
     believed_s: Option<f64>,
     first_dark: bool,
     blur_px: f64,

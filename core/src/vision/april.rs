@@ -15,7 +15,7 @@ const BORDERS: [usize; 2] = [2, 1];
 
 /// Tags within this many pitches say where another one is.
 const AROUND: f64 = 2.3;
-/// Least difference between white and black cells [grey levels].
+/// Least difference between white and black cells \[grey levels\].
 const MIN_CONTRAST: f64 = 15.0;
 /// Part of the cells that must be of the right colour: two codes of the weakest family differ in a fifth of theirs.
 const MIN_RIGHT: f64 = 0.98;

@@ -20,7 +20,7 @@ const AROUND: f64 = 2.3;
 const NEIGHBOURS: usize = 5;
 /// How far from there it may be: a part of a square, and some pixels for corners of markers that are whole pixels.
 const REACH: (f64, f64) = (0.15, 1.5);
-/// Smallest squares [px] whose corner is not a mere speck.
+/// Smallest squares \[px\] whose corner is not a mere speck.
 const MIN_SQUARE_PX: f64 = 6.0;
 /// A corner with less than this part of the usual contrast is half covered.
 const MIN_CONTRAST_PART: f64 = 0.3;

@@ -23,7 +23,7 @@ const PIXELS_TO_REDUCE: u32 = 1_000_000;
 /// Images up to this many pixels are worth enlarging in search of a small board.
 const PIXELS_TO_ENLARGE: u32 = 500_000;
 
-/// Standard deviation per axis [px] stated for a corner that the model of a corner does not fit and `cornerSubPix`
+/// Standard deviation per axis \[px\] stated for a corner that the model of a corner does not fit and `cornerSubPix`
 /// refined: dirt, a reflection or a cut square is on it.
 const UNSURE_PX: f64 = 0.15;
 

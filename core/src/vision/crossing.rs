@@ -12,7 +12,7 @@ use super::subpixel::erf_and_slope;
 const CELL_PART: f64 = 0.42;
 /// Pixels further from the corner than this do not count: there a lens bends edges more than noise moves them.
 const REACH_PX: f64 = 9.0;
-/// The blur of a marker's border reaches this far over the margin [px].
+/// The blur of a marker's border reaches this far over the margin \[px\].
 const BORDER_BLUR_PX: f64 = 1.5;
 /// Arms are at least this wide on either side [px]: an edge and its blur.
 const MIN_ARM_PX: f64 = 1.2;
@@ -35,7 +35,7 @@ type Parameters = SVector<f64, 9>;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Expected {
     pub px: Vector2<f64>,
-    /// One step along x and along y of the board [px].
+    /// One step along x and along y of the board \[px\].
     pub along_x: Vector2<f64>,
     pub along_y: Vector2<f64>,
     /// Whether the square between both directions is dark.
@@ -49,7 +49,7 @@ pub(super) struct Expected {
 pub(super) struct Crossing {
     pub px: Vector2<f64>,
     pub covariance_px2: Matrix2<f64>,
-    /// Half the difference between light and dark [grey levels].
+    /// Half the difference between light and dark \[grey levels\].
     pub contrast: f64,
 }
 

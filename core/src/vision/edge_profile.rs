@@ -10,7 +10,7 @@ use super::subpixel::erf_and_slope;
 
 /// Largest RMS misfit of the Gaussian profile as a part of half the contrast.
 const MAX_MISFIT: f64 = 0.2;
-/// A step of the fit below this ends it [px].
+/// A step of the fit below this ends it \[px\].
 const CONVERGED_PX: f64 = 5e-4;
 const MAX_STEPS: usize = 15;
 /// Variance of rounding to whole grey levels: no picture is known better.
@@ -24,9 +24,9 @@ pub(super) struct Profile<'a> {
     pub scan: &'a Scan<'a>,
     /// Lines of pixels that count.
     pub along: Vec<i64>,
-    /// Deviation of the second coefficient of the curve a priori [px].
+    /// Deviation of the second coefficient of the curve a priori \[px\].
     pub bend: f64,
-    /// Least blur across the edge [px] of which the profile is true.
+    /// Least blur across the edge \[px\] of which the profile is true.
     pub least_blur: f64,
 }
 

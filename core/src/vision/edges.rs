@@ -15,11 +15,11 @@ use super::edge_profile::Profile;
 
 /// What lies beyond the dark border and beyond the light gap reaches so far into them [px]: twice the usual blur.
 const BLUR_BEYOND_PX: f64 = 1.5;
-/// Narrowest border or gap [px].
+/// Narrowest border or gap \[px\].
 const NARROWEST_PX: f64 = 1.9;
 /// Pixels on either side of an edge: fewer hold no blurred edge, more gain nothing but noise.
 const REACH_PX: (f64, f64) = (1.4, 4.5);
-/// The blur of the next edge reaches this far along an edge [px].
+/// The blur of the next edge reaches this far along an edge \[px\].
 const END_PX: f64 = 2.0;
 /// Fewest crossings that make an edge.
 const MIN_CROSSINGS: usize = 5;
@@ -27,7 +27,7 @@ const MIN_CROSSINGS: usize = 5;
 const MIN_KEPT: f64 = 0.6;
 /// Largest deviation of crossings from the curve [px RMS]: an outline without any blur has steps of a pixel, 0.29 px RMS.
 const MAX_RMS_PX: f64 = 0.5;
-/// Least difference between both sides [grey levels].
+/// Least difference between both sides \[grey levels\].
 const MIN_CONTRAST: f64 = 15.0;
 /// Times that the window is laid anew around the edge found: the first guess is off by a pixel or two.
 const PASSES: usize = 3;
@@ -40,7 +40,7 @@ const ANY_BEND: f64 = 1.0;
 const USUAL_BEND: (f64, f64) = (0.1, 2.0);
 /// No lens is straighter than this.
 const LEAST_BEND: f64 = 0.01;
-/// Below this blur [px] the profile of an edge is that of the pixels' area, not Gaussian.
+/// Below this blur \[px\] the profile of an edge is that of the pixels' area, not Gaussian.
 const SHARP_PX: f64 = 0.5;
 /// An edge with less than this part of the usual contrast has something else beside it.
 const MIN_CONTRAST_PART: f64 = 0.6;
@@ -58,7 +58,7 @@ pub(super) struct Edge {
     pub covariance: Matrix3<f64>,
     /// Cosine of the angle to its axis.
     cos: f64,
-    /// Usual difference between both sides [grey levels].
+    /// Usual difference between both sides \[grey levels\].
     contrast: f64,
 }
 

@@ -18,9 +18,9 @@ const MIN_RAY_Z: f64 = 0.05;
 /// Ratio of extents below which corners are taken for collinear.
 const MIN_FLATNESS: f64 = 1e-4;
 const MAX_STEPS: usize = 50;
-/// A step whose rotation [rad] and translation [part of the distance] are below this ends the refinement.
+/// A step whose rotation \[rad\] and translation [part of the distance] are below this ends the refinement.
 const CONVERGED: f64 = 1e-12;
-/// Two solutions closer than this angle [rad] are one: a tenth of what corner noise of 0.1 px does to a pose.
+/// Two solutions closer than this angle \[rad\] are one: a tenth of what corner noise of 0.1 px does to a pose.
 const SAME_ROTATION: f64 = 1e-4;
 
 /// A pose and how well it explains the corners.

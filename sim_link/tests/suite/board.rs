@@ -39,7 +39,7 @@ impl Bench {
         self.camera.grab().expect("a frame")
     }
 
-    /// How far behind the sheet, by moment and truth, the point is that the pixel in the middle of the board sees [m].
+    /// How far behind the sheet, by moment and truth, the point is that the pixel in the middle of the board sees \[m\].
     fn depth_error(&mut self, frame: &Frame) -> f64 {
         let truth = self.camera.ground_truth().expect("published");
         let camera_from_base = (frame.base_from_tip * truth.tip_from_camera).inverse();

@@ -7,7 +7,7 @@ use handeye_core::result::{CalibrationResult, ViewStatus};
 use handeye_core::testing::data_folder;
 use handeye_tests::handeye_binary;
 
-/// What is known of a set: hand-eye translation [mm] with the limit of its error, and focal length [px].
+/// What is known of a set: hand-eye translation \[mm\] with the limit of its error, and focal length \[px\].
 struct Truth {
     translation_mm: [f64; 3],
     limit_mm: f64,

@@ -10,7 +10,7 @@ use handeye_tests::handeye_binary;
 /// Longer than anything takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(2);
 
-/// As much of a recording as nobody else should get [bytes]; a refusal is shorter.
+/// As much of a recording as nobody else should get \[bytes\]; a refusal is shorter.
 const A_RECORDING: usize = 10_000;
 
 const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";

@@ -28,7 +28,7 @@ use crate::worker::{FollowLine, Sight, Tracking, end_of_following};
 /// Rest between two looks at the clock of the cell.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// A line of progress every so often [s].
+/// A line of progress every so often \[s\].
 const PROGRESS_S: f64 = 2.0;
 
 /// What the arm does about the board.
@@ -42,7 +42,7 @@ pub enum Task {
     Reach {
         /// To this corner.
         index: usize,
-        /// So far off the board [m].
+        /// So far off the board \[m\].
         stand_off_m: f64,
     },
 }

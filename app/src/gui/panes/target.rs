@@ -15,7 +15,7 @@ use crate::{text, tr};
 
 /// Points of a board along one side: what people print.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=40;
-/// Size of a square [mm].
+/// Size of a square \[mm\].
 const SQUARE_MM: std::ops::RangeInclusive<f64> = 0.5..=500.0;
 /// Least width that the drawing of the board needs beside the numbers.
 const BESIDE: f32 = 470.0;

@@ -115,7 +115,7 @@ pub(super) struct Known {
     pub solved: Option<Arc<Solved>>,
     /// The newest tip.
     pub base_from_tip: Option<Pose<Base, Tip>>,
-    /// The far plane of the depth sensor [m], once a picture told.
+    /// The far plane of the depth sensor \[m\], once a picture told.
     pub far_plane_m: Option<f32>,
 }
 

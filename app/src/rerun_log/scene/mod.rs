@@ -61,7 +61,7 @@ pub struct SceneWriter {
     session_trail: Trail,
     connection_trail: Trail,
     captures: Captures,
-    /// Number and time [s] of the newest picture.
+    /// Number and time \[s\] of the newest picture.
     newest_picture: Option<(u64, f64)>,
     depth_at_s: Option<f64>,
 }

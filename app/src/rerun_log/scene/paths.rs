@@ -44,25 +44,25 @@ pub const TRUE_BOARD: &str = "truth/board";
 /// The capture that was selected last: its picture, corners, predicted corners and residuals.
 pub const SELECTED: &str = "selected";
 
-/// Residual of the fit [px].
+/// Residual of the fit \[px\].
 pub const PLOT_RMS: &str = "plots/residual/fit";
-/// Residual of views held out of the fit [px].
+/// Residual of views held out of the fit \[px\].
 pub const PLOT_HELDOUT: &str = "plots/residual/held_out";
-/// Error of prediction on captures that verify [px].
+/// Error of prediction on captures that verify \[px\].
 pub const PLOT_VERIFIED: &str = "plots/residual/verification";
-/// Expected error of a measured point, 95 % [mm].
+/// Expected error of a measured point, 95 % \[mm\].
 pub const PLOT_EXPECTED: &str = "plots/expected_error";
-/// The six joints [deg].
+/// The six joints \[deg\].
 pub const PLOT_JOINTS: &str = "plots/joints";
-/// From picture to tracked pose [ms].
+/// From picture to tracked pose \[ms\].
 pub const PLOT_LATENCY: &str = "plots/track/latency";
-/// Time that the search for the board took [ms].
+/// Time that the search for the board took \[ms\].
 pub const PLOT_SEARCH: &str = "plots/live/search";
-/// Tracked board against its true position [mm].
+/// Tracked board against its true position \[mm\].
 pub const PLOT_TRACK_ERROR: &str = "plots/track/error";
-/// Tracked board against its true orientation [deg].
+/// Tracked board against its true orientation \[deg\].
 pub const PLOT_TRACK_TURN: &str = "plots/track/turn_error";
-/// What the tracker states for its position, 95 % [mm].
+/// What the tracker states for its position, 95 % \[mm\].
 pub const PLOT_TRACK_SIGMA: &str = "plots/track/stated_95";
 /// Tracked poses per second.
 pub const PLOT_TRACK_RATE: &str = "plots/track/rate";

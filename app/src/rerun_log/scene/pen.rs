@@ -10,7 +10,7 @@ use super::paths;
 pub(super) struct Instant {
     /// Number of the newest capture; `None` for what happens between captures.
     pub capture: Option<i64>,
-    /// Simulated time [s]; `None` for what is of another simulation than what is seen live.
+    /// Simulated time \[s\]; `None` for what is of another simulation than what is seen live.
     pub sim_time_s: Option<f64>,
 }
 
@@ -19,7 +19,7 @@ pub(super) struct Instant {
 pub(super) struct Clock {
     /// Captures so far.
     pub captures: i64,
-    /// The newest simulated time [s]; 0 before there is any.
+    /// The newest simulated time \[s\]; 0 before there is any.
     pub sim_time_s: f64,
     /// Whether robot or camera were seen live; then `sim_time_s` is their time.
     pub is_live: bool,

@@ -13,9 +13,9 @@ use super::error::RecordError;
 use super::pen::Pen;
 use super::{paths, style};
 
-/// Two configurations that differ by less [rad] say the same about where the arm stands.
+/// Two configurations that differ by less \[rad\] say the same about where the arm stands.
 const OTHER_CONFIGURATION_RAD: f64 = 0.2;
-/// How far apart two measurements of where the arm stands may be [m, rad].
+/// How far apart two measurements of where the arm stands may be \[m, rad\].
 const SAME_PLACE_M: f64 = 2e-3;
 const SAME_PLACE_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
@@ -223,9 +223,9 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    /// Points closer together than this [m] are one: thinner than the line on the screen.
+    /// Points closer together than this \[m\] are one: thinner than the line on the screen.
     const SPACING_M: f64 = 2e-3;
-    /// A tip that jumps farther [m] was not seen meanwhile, and there is no line.
+    /// A tip that jumps farther \[m\] was not seen meanwhile, and there is no line.
     const JUMP_M: f64 = 0.3;
     /// Points of a block.
     const BLOCK: usize = 100;

@@ -28,7 +28,7 @@ use tonic::body::Body;
 
 use super::names;
 
-/// What the head of a request, and what is to be sent before more of it is made, may take [bytes].
+/// What the head of a request, and what is to be sent before more of it is made, may take \[bytes\].
 const BUFFER: usize = 64 * 1024;
 
 /// Requests at a time on one connection.

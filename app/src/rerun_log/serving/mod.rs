@@ -23,10 +23,10 @@ use proxy::ProxySink;
 
 pub use page::Page;
 
-/// What is kept of what lasts, for viewers that come later [bytes].
+/// What is kept of what lasts, for viewers that come later \[bytes\].
 pub const LASTING_BYTES: u64 = 128 * 1024 * 1024;
 
-/// What is kept of what is live, for viewers that come later [bytes].
+/// What is kept of what is live, for viewers that come later \[bytes\].
 pub const LIVE_BYTES: u64 = 32 * 1024 * 1024;
 
 /// Threads of all servers and the page together, however many connections there are.

@@ -9,7 +9,7 @@ use crate::rerun_log::stream::Stream;
 /// Longer than anything takes on a busy machine.
 const SOON: Duration = Duration::from_mins(1);
 
-/// What a recording has before anything has happened [bytes]; all that is refused says less.
+/// What a recording has before anything has happened \[bytes\]; all that is refused says less.
 const A_RECORDING: usize = 1000;
 
 /// What comes after a call of the service as a browser makes it: the head, and as much of the rest as says whether there

@@ -7,7 +7,7 @@ use super::{Method, PosePair, horaud};
 use crate::frames::{Camera, Mount, Pose};
 use crate::handeye::{HandEyeError, motion};
 
-/// Nearer to a half turn than this [rad] the noise of the poses (0.26° at most in real data) can put robot and camera
+/// Nearer to a half turn than this \[rad\] the noise of the poses (0.26° at most in real data) can put robot and camera
 /// on different sides of it, where axes jump to their opposites: ten times that noise is safe.
 const HALF_TURN_RAD: f64 = 2.6f64.to_radians();
 

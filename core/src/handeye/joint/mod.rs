@@ -148,7 +148,7 @@ pub struct JointStart {
 pub struct ViewFit {
     /// RMS of its 2-D corner residuals with the robot pose corrected, pixels.
     pub rms_px: f64,
-    /// Correction of the reported tip pose: translation [m] and rotation vector [rad] in the tip frame.
+    /// Correction of the reported tip pose: translation \[m\] and rotation vector \[rad\] in the tip frame.
     pub correction: Vector6<f64>,
     /// The target's pose by the chain with the robot pose corrected.
     pub camera_from_target: Pose<Camera, Target>,

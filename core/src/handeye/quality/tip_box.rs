@@ -18,12 +18,12 @@ pub struct TipBox {
 }
 
 impl TipBox {
-    /// A box in camera coordinates, between two opposite corners [m].
+    /// A box in camera coordinates, between two opposite corners \[m\].
     pub fn in_camera(a: Point3<f64>, b: Point3<f64>) -> Self {
         Self { low: a.inf(&b), high: a.sup(&b), camera_from_box: Isometry3::identity() }
     }
 
-    /// A box in the robot's base between two opposite corners [m]. For a camera beside the robot `camera_from_base` is
+    /// A box in the robot's base between two opposite corners \[m\]. For a camera beside the robot `camera_from_base` is
     /// the inverse of the calibration; for one on the tip it holds at the tip pose from which the box will be seen,
     /// because the error of a point depends on where the camera sees it.
     pub fn in_base(a: Point3<f64>, b: Point3<f64>, camera_from_base: &Pose<Camera, Base>) -> Self {

@@ -13,13 +13,13 @@ use super::{JOINTS, JointAngles, JointLimits, dh};
 
 /// Sine of the fifth angle below which the fourth and sixth axes count as parallel: the sixth joint is then free.
 const PARALLEL_WRIST: f64 = 1e-10;
-/// How far past its reach [relative] a goal may be by rounding alone: the arm is then taken as exactly stretched.
+/// How far past its reach \[relative\] a goal may be by rounding alone: the arm is then taken as exactly stretched.
 const REACH_SLACK: f64 = 1e-9;
-/// A closed-form solution whose pose misses the goal by more [m, rad] is not one.
+/// A closed-form solution whose pose misses the goal by more \[m, rad\] is not one.
 const ACCEPT: f64 = 1e-8;
-/// Where the polishing stops [m, rad].
+/// Where the polishing stops \[m, rad\].
 const POLISHED: f64 = 1e-12;
-/// Two branches closer than this in every joint [rad] are one: at a stretched elbow the two halves meet.
+/// Two branches closer than this in every joint \[rad\] are one: at a stretched elbow the two halves meet.
 const SAME_BRANCH_RAD: f64 = 1e-6;
 
 /// What is in the way of a goal.
@@ -298,7 +298,7 @@ fn elbow_angles(base_from_flange: &Isometry3<f64>, pan: f64, wrist: f64, roll: f
     }))
 }
 
-/// Gauss–Newton on the pose error, keeping only steps that help; returns the remaining error [m, rad].
+/// Gauss–Newton on the pose error, keeping only steps that help; returns the remaining error \[m, rad\].
 fn polish(start: JointAngles, goal: &Isometry3<f64>) -> (JointAngles, f64) {
     let mut joints = start;
     let mut error = pose_error(&forward(&joints).arm_from_connection, goal);

@@ -19,7 +19,7 @@ pub const FLAG_JOINT_BASE: Handle = 0x0040_0000;
 /// `sim.handleflag_wxyzquat`.
 pub const FLAG_WXYZ: Handle = 0x0100_0000;
 
-/// Coordinates beyond this [m] are a script's mistake, and their products would leave the range of numbers.
+/// Coordinates beyond this \[m\] are a script's mistake, and their products would leave the range of numbers.
 const MAX_COORDINATE_M: f64 = 1e6;
 
 /// A handle as scripts give it: with flags added.

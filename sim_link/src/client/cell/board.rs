@@ -21,7 +21,7 @@ pub struct BoardMotion {
     pub path: BoardPath,
     /// Mean speed along the path [m/s], from 0.001 to 1 and at most 20/s times the size.
     pub speed_m_s: f64,
-    /// How far the path reaches [m], from 0.001 to 0.5.
+    /// How far the path reaches \[m\], from 0.001 to 0.5.
     pub size_m: Option<f64>,
     /// Largest angle by which the board is turned on its way [°], from 0 to 30.
     pub tilt_deg: Option<f64>,

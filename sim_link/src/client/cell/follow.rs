@@ -19,7 +19,7 @@ use crate::client::sim::ObjectHandle;
 /// What the arm is asked for, in messages.
 const TASK: &str = "following";
 
-/// An arm that got no point for longer [passes] has visibly come to rest, and starts from there. A network that misses a
+/// An arm that got no point for longer \[passes\] has visibly come to rest, and starts from there. A network that misses a
 /// pass now and then does not slow it down. Nor is a goal taken to move on by itself for longer.
 const LONGEST_PAUSE_PASSES: f64 = 4.0;
 
@@ -95,9 +95,9 @@ fn positive(values: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(),
 /// A box along the axes of the base in which the tip stays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Workspace {
-    /// The corner with the smallest coordinates [m].
+    /// The corner with the smallest coordinates \[m\].
     pub min: Point3<f64>,
-    /// The corner with the largest coordinates [m].
+    /// The corner with the largest coordinates \[m\].
     pub max: Point3<f64>,
 }
 
@@ -110,7 +110,7 @@ impl Default for Workspace {
 }
 
 impl Workspace {
-    /// Whether a point in base axes [m] is in it.
+    /// Whether a point in base axes \[m\] is in it.
     pub fn contains(&self, in_base: &Vector3<f64>) -> bool {
         (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&in_base[axis]))
     }
@@ -156,9 +156,9 @@ pub enum FollowWish {
 /// The arm in a pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FollowMoment {
-    /// Simulated time [s] that the next point is for: one pass from now. A goal is meant for this time.
+    /// Simulated time \[s\] that the next point is for: one pass from now. A goal is meant for this time.
     pub sim_time_s: f64,
-    /// The joints as they are sent [rad].
+    /// The joints as they are sent \[rad\].
     pub joints_rad: JointAngles,
     /// The tip by these joints.
     pub base_from_tip: Pose<Base, Tip>,

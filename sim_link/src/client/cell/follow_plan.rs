@@ -43,7 +43,7 @@ const HALVINGS: usize = 6;
 /// takes less than a second.
 const LONGEST_BRAKING: usize = 4000;
 
-/// What a limit may be exceeded by through rounding [relative].
+/// What a limit may be exceeded by through rounding \[relative\].
 const ROUNDING: f64 = 1e-6;
 
 /// The arm in motion: where it is, and its speeds in the last pass.
@@ -108,7 +108,7 @@ impl<'a> FollowPlan<'a> {
         Ok(Self { kinematics, limits: *limits, dt_s, now, obstacle: None })
     }
 
-    /// The joints as they were last sent [rad].
+    /// The joints as they were last sent \[rad\].
     pub fn joints(&self) -> &JointAngles {
         &self.now.joints
     }

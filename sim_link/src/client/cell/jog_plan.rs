@@ -34,13 +34,13 @@ const LOOK_AHEAD: usize = 8;
 /// Points of a step of known length that are looked at before it begins.
 const STEP_SAMPLES: usize = 64;
 
-/// A joint that turns by more between two neighbouring points of a path has changed to another configuration [rad].
+/// A joint that turns by more between two neighbouring points of a path has changed to another configuration \[rad\].
 const JUMP_RAD: f64 = 0.5;
 
 /// How often a step that is too fast is halved before it is given up: to less than the crawl.
 const SLOWER_STEPS: usize = 6;
 
-/// Closer to its end than this [m, rad] a path is at its end.
+/// Closer to its end than this \[m, rad\] a path is at its end.
 const AT_END: f64 = 1e-9;
 
 /// Why a jog goes no further.
@@ -172,7 +172,7 @@ pub(super) struct JogPlan<'a> {
 }
 
 impl<'a> JogPlan<'a> {
-    /// From a standstill at `joints`, in passes of `dt_s`; with a `length` [m, rad] it ends there.
+    /// From a standstill at `joints`, in passes of `dt_s`; with a `length` \[m, rad\] it ends there.
     ///
     /// # Errors
     /// What is in the way of a given length.

@@ -8,11 +8,11 @@ use crate::cell::kinematics::{self, IkError, JointLimits};
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
 
-/// How far an axis of a joint may be from where the built-in kinematics has it [m]. The model and the manufacturer's
+/// How far an axis of a joint may be from where the built-in kinematics has it \[m\]. The model and the manufacturer's
 /// table differ by 7 mm; a physics engine holds its joints together to a tenth of a millimetre.
 const AXIS_TOLERANCE_M: f64 = 1e-3;
 
-/// How far it may be turned [rad].
+/// How far it may be turned \[rad\].
 const AXIS_TOLERANCE_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
 
 /// How far the reported tip may be from the computed one [m, rad]: a tip that was moved on the flange, or another

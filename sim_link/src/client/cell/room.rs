@@ -38,11 +38,11 @@ const CANDIDATES: usize = 3000;
 /// How far a board may go from where it is now.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoardReach {
-    /// In its plane, either way along both sides [m].
+    /// In its plane, either way along both sides \[m\].
     pub in_plane_m: f64,
-    /// Along its normal, either way [m].
+    /// Along its normal, either way \[m\].
     pub out_of_plane_m: f64,
-    /// About any axis through its middle [rad].
+    /// About any axis through its middle \[rad\].
     pub turn_rad: f64,
 }
 
@@ -83,7 +83,7 @@ impl BoardReach {
 /// A place to follow a board from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FollowPlace {
-    /// The joints there [rad].
+    /// The joints there \[rad\].
     pub joints: JointAngles,
     /// The tip there.
     pub base_from_tip: Pose<Base, Tip>,

@@ -40,7 +40,7 @@ fn board_at(scene: &ResolvedScene, course: &Course, seconds: f64) -> Pose<Base, 
 }
 
 /// Follows the board on its way from some time on with the view kept: the worst distance of the tip from where the view
-/// wants it after the first seconds [m]; or after how many seconds it ended.
+/// wants it after the first seconds \[m\]; or after how many seconds it ended.
 fn followed(
     (scene, arm): (&ResolvedScene, &ArmKinematics),
     joints: JointAngles,

@@ -17,10 +17,10 @@ use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::sim::ObjectHandle;
 
-/// A joint that is where it is put may be off by rounding [rad].
+/// A joint that is where it is put may be off by rounding \[rad\].
 const PLACED_OFF_RAD: f64 = 1e-6;
 
-/// A joint moved by forces lags behind: by a few degrees at full speed, as its controller is tuned [rad].
+/// A joint moved by forces lags behind: by a few degrees at full speed, as its controller is tuned \[rad\].
 const DRIVEN_OFF_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 
 /// Points under way to an arm that nobody else moves.
@@ -38,9 +38,9 @@ pub(super) struct Stream {
 /// The pass for which a point is wanted.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slot {
-    /// Simulated time [s]; the point takes effect in the pass that begins now.
+    /// Simulated time \[s\]; the point takes effect in the pass that begins now.
     pub now_s: f64,
-    /// Since the point before [s], negative after a new start of the simulation; `None` for the first point.
+    /// Since the point before \[s\], negative after a new start of the simulation; `None` for the first point.
     pub since_last_s: Option<f64>,
     /// A client had the cell stop everything.
     pub is_stopped: bool,
@@ -49,7 +49,7 @@ pub(super) struct Slot {
 /// What is sent in a pass.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
-    /// Where the joints go [rad].
+    /// Where the joints go \[rad\].
     pub joints: JointAngles,
     /// Where the target dummy goes, if anywhere.
     pub target: Option<Pose<Base, Tip>>,

@@ -9,13 +9,13 @@ use super::JointAngles;
 use super::reach::ArmKinematics;
 use crate::cell::planning::{self, Obstacle, PlanError, ViewOptions, ViewSetup};
 
-/// How far below its frame the arm is mounted [m]. What it stands on is taken for a table.
+/// How far below its frame the arm is mounted \[m\]. What it stands on is taken for a table.
 const TABLE_BELOW_ARM_M: f64 = 0.0147;
 /// Edges of that table [m]: more than the arm reaches.
 const TABLE_M: [f64; 3] = [4.0, 4.0, 0.1];
 /// What is printed on has an edge about the pattern; this much of it on each side, in squares.
 const SHEET_EDGE_SQUARES: f64 = 2.0;
-/// Thickness of what is printed on [m].
+/// Thickness of what is printed on \[m\].
 const SHEET_M: f64 = 0.002;
 /// Views are planned from so much nearer and farther than those that there are.
 const OTHER_DISTANCES: [f64; 2] = [0.9, 1.1];
@@ -36,7 +36,7 @@ pub struct BoardInView {
 }
 
 impl BoardInView {
-    /// From the camera to the middle of the board when the tip is there [m].
+    /// From the camera to the middle of the board when the tip is there \[m\].
     pub fn distance_m(&self, base_from_tip: &Pose<Base, Tip>) -> f64 {
         let camera_from_target = (*base_from_tip * self.tip_from_camera).inverse() * self.base_from_target;
         (camera_from_target.isometry() * self.target.centre()).coords.norm()
@@ -44,7 +44,7 @@ impl BoardInView {
 }
 
 impl ArmKinematics {
-    /// Joints [rad] from which the whole board is seen, as different as possible from the views at `taken` and from each
+    /// Joints \[rad\] from which the whole board is seen, as different as possible from the views at `taken` and from each
     /// other: up to `count` of them, at least two, in an order with short ways. Nothing that is known is touched on the
     /// way from `start` to the first and from each to the next.
     ///

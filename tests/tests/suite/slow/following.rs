@@ -118,7 +118,7 @@ fn true_view(model: &Model) -> Pose<Camera, Target> {
     (frame.base_from_tip * truth.tip_from_camera).inverse() * base_from_target
 }
 
-/// How far the view is from the one to be kept over some simulated time: RMS [m, rad].
+/// How far the view is from the one to be kept over some simulated time: RMS \[m, rad\].
 fn deviation(bench: &mut Workbench, cell: &mut Cell, kept: &Pose<Camera, Target>, seconds: f64) -> [f64; 2] {
     let mut squares = [0.0; 2];
     for _ in 0..passes_in(seconds) {

@@ -164,7 +164,7 @@ fn the_button_opens_the_native_viewer_which_shows_the_cell() {
     assert!(seen > 500, "{seen} colours: see {}", picture.display());
 }
 
-/// Pictures that the workbench shows within a time, and the largest memory [bytes] that it had.
+/// Pictures that the workbench shows within a time, and the largest memory \[bytes\] that it had.
 fn at_work(bench: &mut Workbench, seconds: f64) -> (f64, u64) {
     let number = |model: &Model| model.frame.as_ref().map_or(0, |frame| frame.info.number);
     let first = number(bench.model());

@@ -12,9 +12,9 @@ use crate::gui::theme::Palette;
 use crate::model::{Jog, Model, Motion, MotionGoal};
 use crate::{text, tr};
 
-/// What a slider covers for a joint that turns without end [rad].
+/// What a slider covers for a joint that turns without end \[rad\].
 const ENDLESS_RAD: [f64; 2] = [-std::f64::consts::TAU, std::f64::consts::TAU];
-/// A goal is shown this long [s] without a motion towards it: by then it was refused.
+/// A goal is shown this long \[s\] without a motion towards it: by then it was refused.
 const GOAL_SHOWN_S: f64 = 0.5;
 
 /// Where the joints are sent, while they are on their way.
@@ -29,7 +29,7 @@ fn id() -> Id {
     Id::new("goal of the joint sliders")
 }
 
-/// Limits of a joint [rad].
+/// Limits of a joint \[rad\].
 pub fn range_rad(model: &Model, index: usize) -> [f64; 2] {
     model.cell.as_ref().and_then(|cell| cell.joint_ranges_rad[index]).unwrap_or(ENDLESS_RAD)
 }

@@ -14,7 +14,7 @@ use crate::{text, tr};
 
 /// Width of a field.
 const FIELD: f32 = 84.0;
-/// No arm on a table reaches further [mm].
+/// No arm on a table reaches further \[mm\].
 const FARTHEST_MM: f64 = 10_000.0;
 
 /// What is being typed.
@@ -23,7 +23,7 @@ struct Typed {
     is_tip: bool,
     /// Joints [°].
     joints_deg: [f64; 6],
-    /// x, y, z [mm]; roll, pitch, yaw [°].
+    /// x, y, z \[mm\]; roll, pitch, yaw [°].
     tip: [f64; 6],
     /// Whether it was filled with where the arm is.
     is_filled: bool,

@@ -21,7 +21,7 @@ pub struct Flag {
 /// What is known besides the row.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Circumstances {
-    /// The line between good and bad residuals [px].
+    /// The line between good and bad residuals \[px\].
     pub outlier_line_px: Option<f64>,
     /// The last capture was refused because the robot is where this one was taken.
     pub refused_here: bool,

@@ -15,9 +15,9 @@ const CHI_SQUARE_6_95: f64 = 12.592;
 /// What 95 % of the errors stay within, for every axis on its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Within95 {
-    /// Of the translation, along the axes of the parent [m].
+    /// Of the translation, along the axes of the parent \[m\].
     pub translation_m: [f64; 3],
-    /// Of the rotation, about the axes of the child [rad].
+    /// Of the rotation, about the axes of the child \[rad\].
     pub rotation_rad: [f64; 3],
 }
 
@@ -41,7 +41,7 @@ impl Within95 {
 /// An answer against where the camera really is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AgainstTruth {
-    /// By how much a point is off where the board was seen [m].
+    /// By how much a point is off where the board was seen \[m\].
     pub at_board_m: Option<f64>,
     /// Whether the whole transform is within its stated 95 %; `None` when it states none.
     pub is_within: Option<bool>,

@@ -9,7 +9,7 @@ use crate::model::Model;
 use crate::text::Language;
 use crate::{text, tr};
 
-/// Farther than any arm reaches [mm].
+/// Farther than any arm reaches \[mm\].
 const FARTHEST_MM: f64 = 10_000.0;
 /// Width of a field.
 const FIELD: f32 = 76.0;

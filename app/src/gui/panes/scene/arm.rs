@@ -10,7 +10,7 @@ use super::canvas::{Canvas, Cylinder};
 use crate::gui::theme::Palette;
 use crate::model::Model;
 
-/// Length of the tool between the end of the arm and the tip, as the reference scene has it [m]. The tip is always where
+/// Length of the tool between the end of the arm and the tip, as the reference scene has it \[m\]. The tip is always where
 /// the controller reports it; with a tool of another length the arm is drawn beside its place by the difference.
 const TOOL_M: f64 = 0.017;
 

@@ -15,7 +15,7 @@ const DOT_RADIUS: f64 = 0.25;
 /// White around the pattern, as part of a square.
 const MARGIN: f64 = 0.6;
 
-/// From the middle of the pattern to beyond its corners [m].
+/// From the middle of the pattern to beyond its corners \[m\].
 fn size_m(target: &TargetSpec) -> f64 {
     let [first, _, third, _] = outline(target, MARGIN);
     0.6 * (third - first).norm()

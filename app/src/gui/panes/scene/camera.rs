@@ -14,7 +14,7 @@ pub struct Frustum<'a> {
     pub base_from_camera: Pose<Base, Camera>,
     /// What it sees; the bend of the lens is not drawn.
     pub intrinsics: &'a Intrinsics,
-    /// How far its pyramid is drawn [m].
+    /// How far its pyramid is drawn \[m\].
     pub length_m: f64,
 }
 

@@ -42,7 +42,7 @@ pub struct Canvas {
 pub struct Cylinder {
     /// The middles of both ends.
     pub ends: [Point3<f64>; 2],
-    /// Its radius [m].
+    /// Its radius \[m\].
     pub radius_m: f64,
     /// Whether its ends can be seen; those of a tube are inside of other bodies.
     pub closed: bool,
@@ -73,7 +73,7 @@ impl Canvas {
         }
     }
 
-    /// A straight line on a face of about this size [m], which does not hide it; in dashes if wanted.
+    /// A straight line on a face of about this size \[m\], which does not hide it; in dashes if wanted.
     pub fn line_on_face(&mut self, ends: [Point3<f64>; 2], stroke: Stroke, dashed: bool, size_m: f64) {
         if let Some(ends) = self.eye.segment(ends) {
             let points = ends.map(|end| end.at);

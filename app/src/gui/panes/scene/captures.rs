@@ -26,11 +26,11 @@ pub struct Spot {
     pub id: CaptureId,
     /// Where.
     pub at: Pos2,
-    /// Where it was taken: the camera, or the tip while the camera on it is not known, in the base [m].
+    /// Where it was taken: the camera, or the tip while the camera on it is not known, in the base \[m\].
     pub taken_m: Point3<f64>,
 }
 
-/// The median residual of the captures of the fit [px].
+/// The median residual of the captures of the fit \[px\].
 fn median_px(table: &CaptureTable) -> Option<f64> {
     let fitted = table.rows.iter().filter(|row| !row.excluded && !row.verifies());
     let mut all: Vec<f64> = fitted.filter_map(|row| row.rms_px).collect();

@@ -20,9 +20,9 @@ use crate::model::Model;
 use crate::text::Language;
 use crate::{text, tr};
 
-/// Length of the frustum of the live camera [m].
+/// Length of the frustum of the live camera \[m\].
 const CAMERA_LENGTH_M: f64 = 0.2;
-/// Length of the axes of tip and camera [m].
+/// Length of the axes of tip and camera \[m\].
 const AXES_M: f64 = 0.08;
 
 /// Where a pose comes from.

@@ -9,11 +9,11 @@ use crate::model::SceneView;
 
 /// Angle that the shorter side of the pane takes in: narrow enough that nothing is distorted at its edges.
 const OPENING_RAD: f64 = 38.0 * std::f64::consts::PI / 180.0;
-/// What is nearer to the eye than this is cut off [m].
+/// What is nearer to the eye than this is cut off \[m\].
 const NEAR_M: f64 = 0.02;
-/// The eye comes no nearer to the middle than this, and goes no farther [m].
+/// The eye comes no nearer to the middle than this, and goes no farther \[m\].
 const DISTANCES_M: [f64; 2] = [0.08, 12.0];
-/// The middle leaves the base by at most this [m], so that the cell can be found again.
+/// The middle leaves the base by at most this \[m\], so that the cell can be found again.
 const FARTHEST_CENTRE_M: f64 = 5.0;
 /// Turn per point of a drag [rad]: across a pane of usual size it is half a turn.
 const RAD_PER_POINT: f64 = 0.008;
@@ -36,7 +36,7 @@ pub struct Eye {
 pub struct Seen {
     /// Where.
     pub at: Pos2,
-    /// How far in front of the eye [m].
+    /// How far in front of the eye \[m\].
     pub depth_m: f64,
 }
 

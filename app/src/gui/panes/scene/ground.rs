@@ -6,13 +6,13 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::canvas::Canvas;
 use crate::gui::theme::Palette;
 
-/// Distance of the lines [mm].
+/// Distance of the lines \[mm\].
 pub const SPACING_MM: i32 = 100;
 /// So many lines at each side of the middle.
 const LINES: i32 = 10;
 /// Every so many lines one is stronger.
 const MAJOR: i32 = 5;
-/// Length of the axes [m].
+/// Length of the axes \[m\].
 const AXES_M: f64 = 0.3;
 
 /// The grid, and the axes of the base with their names.
