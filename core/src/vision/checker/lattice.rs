@@ -95,9 +95,9 @@ impl Bins {
     /// All candidates in the bins that a circle touches.
     fn around(&self, px: Vector2<f64>, radius: f64) -> impl Iterator<Item = usize> + '_ {
         let range = |c: f64, n: usize| {
-            let low = ((c - radius) / BIN_PX).max(0.0) as usize;
             // A negative number becomes 0, a large one is cut: either way no bin too many is harmful.
-            low..(((c + radius) / BIN_PX + 1.0).max(0.0) as usize).min(n)
+            let bin = |c: f64| (c.max(0.0) as usize).min(n);
+            bin((c - radius) / BIN_PX)..bin((c + radius) / BIN_PX + 1.0)
         };
         let columns = range(px.x, self.columns);
         range(px.y, self.rows).flat_map(move |row| {
@@ -318,5 +318,20 @@ struct Window {
 impl Window {
     fn contains(&self, (x, y): Node) -> bool {
         (self.x..self.x + self.width).contains(&x) && (self.y..self.y + self.height).contains(&y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_candidate_is_around_a_place_outside_of_the_image() {
+        let bins = Bins::new(&[], (64, 48));
+        for u in [-1e9, -70.0, 63.9, 70.0, 200.0, 1e9, f64::NAN] {
+            for v in [-1e9, -70.0, 47.9, 70.0, 200.0, 1e9, f64::NAN] {
+                assert_eq!(bins.around(Vector2::new(u, v), 12.0).count(), 0);
+            }
+        }
     }
 }
