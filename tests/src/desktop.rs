@@ -13,6 +13,8 @@ use crate::watch::Watch;
 const PATIENCE: Duration = Duration::from_mins(4);
 /// Longest time without a change of the controls after which a look at the window itself is due.
 const LOOK: Duration = Duration::from_secs(1);
+/// The list of widgets is written, closed and renamed for every frame.
+const CHANGES_OF_A_FRAME: usize = 3;
 
 /// A screen with the workbench on it. Both end when it is dropped.
 pub struct Desktop {
@@ -130,7 +132,7 @@ impl Desktop {
         self.until(&format!("another {before:?}"), |widgets| widgets.iter().any(is_other));
     }
 
-    fn until(&mut self, what: &str, is_so: impl Fn(&[Widget]) -> bool) {
+    fn until(&mut self, what: &str, mut is_so: impl FnMut(&[Widget]) -> bool) {
         let deadline = Instant::now() + PATIENCE;
         while !is_so(&self.widgets()) {
             if Instant::now() > deadline {
@@ -146,20 +148,41 @@ impl Desktop {
         }
     }
 
-    /// Clicks the button whose label is, or begins with, a text.
+    /// Clicks the button whose label is, or begins with, a text, once it stands still.
     ///
     /// # Panics
     /// When there is none that can be pressed.
     pub fn click(&mut self, label: &str) {
+        let mut at = self.place_of(label);
+        loop {
+            // A pane that has just come to the front moves its widgets for a frame or two.
+            self.watch.forget();
+            for _ in 0..CHANGES_OF_A_FRAME {
+                self.watch.changes_within(LOOK);
+            }
+            let next = self.place_of(label);
+            if next == at {
+                break;
+            }
+            at = next;
+        }
+        let (x, y) = at;
+        self.mouse(&["mousemove", &format!("{x:.0}"), &format!("{y:.0}"), "click", "1"]);
+        self.clicks += 1;
+    }
+
+    /// Where the middle of a button is that can be pressed; waits for it.
+    fn place_of(&mut self, label: &str) -> (f64, f64) {
         let pressable = |widget: &Widget| {
             widget.enabled && widget.role != "Label" && (widget.label == label || widget.label.starts_with(label))
         };
-        self.until(&format!("the button {label:?}"), |widgets| widgets.iter().any(pressable));
-        let widgets = self.widgets();
-        let exact = widgets.iter().find(|widget| pressable(widget) && widget.label == label);
-        let (x, y) = exact.or_else(|| widgets.iter().find(|widget| pressable(widget))).expect("it was there").centre;
-        self.mouse(&["mousemove", &format!("{x:.0}"), &format!("{y:.0}"), "click", "1"]);
-        self.clicks += 1;
+        let mut place = None;
+        self.until(&format!("the button {label:?}"), |widgets| {
+            let exact = widgets.iter().find(|widget| pressable(widget) && widget.label == label);
+            place = exact.or_else(|| widgets.iter().find(|widget| pressable(widget))).map(|widget| widget.centre);
+            place.is_some()
+        });
+        place.expect("it was there")
     }
 
     /// Presses a key by its name, for example `space` or `ctrl+z`.
