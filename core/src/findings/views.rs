@@ -170,9 +170,10 @@ fn tilt(calibration: &Calibration) -> Option<Finding> {
     }
     let relative = (sigma[0] / intrinsics.fx).max(sigma[1] / intrinsics.fy);
     let severity = if relative > FOCAL_SIGMA { Severity::Warning } else { Severity::Advice };
+    let decimals = if relative < 1e-4 { 4 } else { 2 };
     let text = format!(
         "The board was never tilted by more than {largest_deg:.0}° against the camera, and the focal length is known to \
-         {:.2} % (one standard deviation). Add views with the board tilted by 30° to 45°.",
+         {:.decimals$} % (one standard deviation). Add views with the board tilted by 30° to 45°.",
         relative * 100.0
     );
     let finding = Finding::new(FindingCode::LittleTilt, severity, text);
