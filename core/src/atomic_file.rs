@@ -32,7 +32,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// An empty file in the place of `path`, for what is written bit by bit and read as far as it came.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write`](fn@write).
 pub fn create(path: &Path) -> io::Result<File> {
     partial(path)?.persist(path).map_err(|e| e.error)
 }

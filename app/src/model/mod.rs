@@ -1,6 +1,6 @@
 //! What the window shows: state of the connections, of the robot, the newest pictures, and how they are looked at.
 //!
-//! Only [`crate::gui::App::apply`] and [`crate::gui::App::absorb`] change a [`Model`]; panes read it. Times are seconds
+//! Only [`crate::app::App::apply`] and [`crate::app::App::absorb`] change a [`Model`]; panes read it. Times are seconds
 //! on the clock that the application was started with.
 
 mod capture;
@@ -171,7 +171,7 @@ pub struct FrameInfo {
     pub rate_hz: f64,
     /// Depths \[m\] at the two ends of the colour map.
     pub depth_range_m: [f32; 2],
-    /// The sensor's far plane [m]: depths there are no surface.
+    /// The sensor's far plane \[m\]: depths there are no surface.
     pub far_plane_m: f32,
     /// The tip as the controller reported it at the instant of the pictures.
     pub base_from_tip: Pose<Base, Tip>,

@@ -195,7 +195,7 @@ pub struct RawFrame {
 
 /// The camera.
 pub trait CameraPort: Send {
-    /// Simulated time [s]: cheap to ask for, and pictures of a time that has been seen are not fetched again.
+    /// Simulated time \[s\]: cheap to ask for, and pictures of a time that has been seen are not fetched again.
     ///
     /// # Errors
     /// [`PortError`].

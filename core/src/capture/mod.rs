@@ -51,7 +51,7 @@ pub struct Shot<'a> {
     pub grey: &'a GrayImage,
     /// Depth.
     pub depth: &'a DepthImage,
-    /// The depth sensor's far plane [m]: depths there are no surface.
+    /// The depth sensor's far plane \[m\]: depths there are no surface.
     pub far_plane_m: f32,
 }
 

@@ -6,7 +6,7 @@
 //! | matrix, 3×4, row by row: `[R | p]` | [`Pose`] |
 //! | image rows from the bottom up | row 0 on top |
 //! | depth as little-endian `f32`, metres along the optical axis, rows from the bottom up | [`DepthImage`], row 0 on top |
-//! | vision sensor axes: x left, y up, z forward | [`Camera`]: x right, y down, z forward |
+//! | vision sensor axes: x left, y up, z forward | [`Camera`](handeye_core::frames::Camera): x right, y down, z forward |
 
 use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;

@@ -182,7 +182,7 @@ pub struct JointSolution {
     pub views: Vec<ViewFit>,
     /// RMS of all 2-D corner residuals with robot poses corrected, pixels.
     pub rms_px: f64,
-    /// Middle of the target as the camera saw it on average, in camera coordinates [m]: where errors are stated.
+    /// Middle of the target as the camera saw it on average, in camera coordinates \[m\]: where errors are stated.
     pub reference_point: Point3<f64>,
     /// Steps of the optimiser in all rounds together.
     pub iterations: usize,
