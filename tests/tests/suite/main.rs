@@ -2,31 +2,31 @@
 //!
 //! `slow` is what the fast tier (`./test fast`) leaves out: real-time sequences, desktops, browsers, the long fuzz.
 
-mod auto;
 mod command_line;
 mod exports;
 mod hostile_clients;
 mod layering;
-mod official_client;
 mod reference_sets;
 mod renderer_truth;
 mod rerun_doors;
-mod rerun_recording;
 mod restart;
 mod sessions;
 mod solved;
 #[cfg(unix)]
 mod streams;
-mod workbench;
 
 mod slow {
     mod asleep;
+    mod auto;
     mod first_user;
     mod following;
     mod fuzz;
     mod leaving;
+    mod official_client;
+    mod rerun_recording;
     mod rerun_viewers;
     mod tracking;
     mod verifying;
     mod web_page;
+    mod workbench;
 }
