@@ -22,4 +22,6 @@ pub use sequence::Sequence;
 pub use take::{CaptureEnd, Pictures, take};
 
 #[cfg(test)]
+pub mod drawn;
+#[cfg(test)]
 mod tests;

@@ -61,8 +61,8 @@ impl Sequence {
         self.machine.progress() == Progress::Complete
     }
 
-    /// Whether [`Self::saw_board`] of the last picture is of use: where corners are to be compared from picture to
-    /// picture, and the picture is part of the average.
+    /// Whether [`Self::saw_board`] of the last image matters: where corners are to be compared from image to image, and
+    /// the image belongs to the average.
     pub fn compares_corners(&self) -> bool {
         let averages = matches!(self.machine.progress(), Progress::Waits(Wait::Averaging { .. }) | Progress::Complete);
         averages && self.request.options.frames >= capture::Scatter::LEAST_PICTURES

@@ -6,13 +6,11 @@ use std::sync::Arc;
 use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::target::{Grid, TargetSpec};
 
+use super::drawn::{BOARD, board, brighter_board};
 use super::{CaptureEnd, CaptureRequest, Pictures, take};
 use crate::model::{CaptureOptions, CapturePurpose, FrameImages, FrameInfo, LiveFrame, RefusalKind};
 use crate::text::Language;
-
-const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
 /// One picture after the other, a pass apart.
 struct Reel<F> {
@@ -66,25 +64,6 @@ fn request(frames: u32) -> CaptureRequest {
     }
 }
 
-/// The board straight on, squares of 24 px, box blur of a radius, brighter by some grey levels.
-fn board(blur_px: i32, brighter: f64) -> RgbImage {
-    let level = |u: i32, v: i32| {
-        let (x, y) = ((u - 100).div_euclid(24), (v - 100).div_euclid(24));
-        let on_board = (-1..10).contains(&x) && (-1..7).contains(&y);
-        if on_board && (x + y).rem_euclid(2) == 0 { 40.0 } else { 210.0 }
-    };
-    RgbImage::from_fn(480, 360, |u, v| {
-        let around = -blur_px..=blur_px;
-        let sum: f64 = around
-            .clone()
-            .flat_map(|du| around.clone().map(move |dv| (du, dv)))
-            .map(|(du, dv)| level(u as i32 + du, v as i32 + dv))
-            .sum();
-        let count = f64::from((2 * blur_px + 1).pow(2));
-        Rgb([(sum / count + brighter).round() as u8; 3])
-    })
-}
-
 fn refused(end: Result<CaptureEnd, &'static str>) -> (RefusalKind, String) {
     match end.expect("pictures came") {
         CaptureEnd::Refused(refused) => (refused.kind, refused.why.say(Language::English)),
@@ -94,12 +73,12 @@ fn refused(end: Result<CaptureEnd, &'static str>) -> (RefusalKind, String) {
 
 #[test]
 fn four_pictures_show_that_everything_is_at_rest_and_the_next_ones_are_averaged() {
-    let mut reel = Reel::new(|number| Ok(board(1, number as f64)));
+    let mut reel = Reel::new(|number| Ok(brighter_board(1, number as f64)));
     let CaptureEnd::Good(measured, last) = take(request(3), &BOARD, &mut reel).expect("pictures") else {
         panic!("a capture")
     };
     assert_eq!((measured.frames, reel.number, last.info.number), (3, 6, 6), "pictures 4, 5 and 6");
-    assert_eq!(*measured.rgb, board(1, 5.0), "their mean");
+    assert_eq!(*measured.rgb, brighter_board(1, 5.0), "their mean");
     assert_eq!(measured.sim_time_s, last.info.sim_time_s);
     // Three intervals, whose sum is rounded.
     assert!((measured.settled_s - 3.0 * 0.05).abs() < 1e-12, "{} s", measured.settled_s);
@@ -112,11 +91,11 @@ fn four_pictures_show_that_everything_is_at_rest_and_the_next_ones_are_averaged(
 fn what_is_no_good_is_refused_with_the_reason() {
     let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(RgbImage::new(320, 240)))));
     assert_eq!(kind, RefusalKind::NoBoard, "{why}");
-    let blurred = board(6, 0.0);
+    let blurred = board(6);
     let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(blurred.clone()))));
     assert_eq!(kind, RefusalKind::Blurred, "{why}");
     let near = CaptureRequest { others: vec![(12, Pose::identity())], ..request(1) };
-    let sharp = board(0, 0.0);
+    let sharp = board(0);
     let (kind, why) = refused(take(near, &BOARD, &mut Reel::new(|_| Ok(sharp.clone()))));
     assert_eq!(kind, RefusalKind::TooSimilar, "{why}");
     // Only a part of the image: that of a lamp would be no change.
@@ -132,7 +111,7 @@ fn what_is_no_good_is_refused_with_the_reason() {
 
 #[test]
 fn a_simulation_without_time_ends_the_capture() {
-    let sharp = board(0, 0.0);
+    let sharp = board(0);
     for pass_s in [0.0, f64::NAN] {
         let mut reel = Reel { pass_s, ..Reel::new(|_| Ok(sharp.clone())) };
         let (kind, why) = refused(take(request(1), &BOARD, &mut reel));
@@ -144,7 +123,6 @@ fn a_simulation_without_time_ends_the_capture() {
 
 #[test]
 fn the_error_of_a_camera_ends_the_capture() {
-    let end =
-        take(request(1), &BOARD, &mut Reel::new(|number| if number < 3 { Ok(board(0, 0.0)) } else { Err("gone") }));
+    let end = take(request(1), &BOARD, &mut Reel::new(|number| if number < 3 { Ok(board(0)) } else { Err("gone") }));
     assert_eq!(end.expect_err("no third picture"), "gone");
 }

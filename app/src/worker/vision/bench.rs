@@ -7,9 +7,8 @@ use crossbeam_channel::{Receiver, Sender, bounded, select};
 use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
 use handeye_core::frames::{Base, Pose, Target, Tip};
-use handeye_core::image::{Rgb, RgbImage};
+use handeye_core::image::RgbImage;
 use handeye_core::observation::Corner;
-use handeye_core::target::{Grid, TargetSpec};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths, GroundTruth};
@@ -17,14 +16,13 @@ use handeye_sim_link::client::{CancelToken, ConnectionOptions};
 
 use super::super::{Clock, Connector, LiveConnector, Waker, Workers};
 use super::{LatestSlot, Outlet, Sights, Tap, Vision, VisionTask};
+use crate::capture::drawn::BOARD;
 use crate::capture::{CaptureRequest, Measured};
 use crate::command::Event;
 use crate::model::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellSource, DepthScale, FrameImages, FrameInfo,
     LiveDetection, LiveFrame, ViewSettings,
 };
-
-pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
 /// A healthy cell answers within milliseconds; this is for a machine that does something else.
 const PATIENCE: Duration = Duration::from_mins(1);
@@ -141,25 +139,6 @@ impl Table {
         });
         waits.collect()
     }
-}
-
-/// The board straight on, squares of 24 px, with box blur of a radius.
-pub fn board_picture(blur_px: i32) -> RgbImage {
-    let level = |u: i32, v: i32| {
-        let (x, y) = ((u - 100).div_euclid(24), (v - 100).div_euclid(24));
-        let on_board = (-1..10).contains(&x) && (-1..7).contains(&y);
-        if on_board && (x + y).rem_euclid(2) == 0 { 40.0 } else { 210.0 }
-    };
-    RgbImage::from_fn(480, 360, |u, v| {
-        let around = -blur_px..=blur_px;
-        let sum: f64 = around
-            .clone()
-            .flat_map(|du| around.clone().map(move |dv| (du, dv)))
-            .map(|(du, dv)| level(u as i32 + du, v as i32 + dv))
-            .sum();
-        let count = f64::from((2 * blur_px + 1).pow(2));
-        Rgb([(sum / count).round() as u8; 3])
-    })
 }
 
 /// All workers on a built-in cell, over sockets.

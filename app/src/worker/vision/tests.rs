@@ -5,8 +5,9 @@ use handeye_core::target::{Grid, TargetSpec};
 use handeye_core::vision::VisionError;
 
 use super::VisionTask;
-use super::bench::{BOARD, Table, board_picture, request};
+use super::bench::{Table, request};
 use crate::capture::CaptureRequest;
+use crate::capture::drawn::{BOARD, board};
 use crate::model::{CaptureOptions, CaptureWait, RefusalKind};
 use crate::text::Language;
 
@@ -20,7 +21,7 @@ fn watching(target: TargetSpec) -> Table {
 fn the_newest_picture_is_searched_and_the_others_are_counted() {
     let mut table = watching(BOARD);
     table.ask(VisionTask::SetIntrinsics(Intrinsics::pinhole(480, 360, 400.0)));
-    let picture = board_picture(0);
+    let picture = board(0);
     for _ in 0..3 {
         table.put(&picture);
     }
@@ -39,16 +40,16 @@ fn the_newest_picture_is_searched_and_the_others_are_counted() {
 fn a_board_that_cannot_be_looked_for_is_a_state_and_not_the_end() {
     let impossible = TargetSpec::Circles(Grid { columns: 2, rows: 2, square_m: 0.01 });
     let mut table = watching(impossible);
-    table.put(&board_picture(0));
+    table.put(&board(0));
     assert!(table.turn());
     let (detection, _) = table.detections.take().expect("a detection");
     assert_eq!(detection.problem, Some(VisionError::TargetTooSmall { columns: 2, rows: 2 }));
     table.ask(VisionTask::Capture(request(1, 1)));
-    let refused = table.feed(&board_picture(0), 10).expect_err("nothing to measure");
+    let refused = table.feed(&board(0), 10).expect_err("nothing to measure");
     assert_eq!(refused.kind, RefusalKind::NoBoard);
     assert!(refused.why.say(Language::English).contains("at least 3 points"), "{refused:?}");
     table.ask(VisionTask::SetTarget(BOARD));
-    table.put(&board_picture(0));
+    table.put(&board(0));
     table.turn();
     assert!(table.detections.take().expect("it goes on").0.corners.is_some());
 }
@@ -57,11 +58,11 @@ fn a_board_that_cannot_be_looked_for_is_a_state_and_not_the_end() {
 fn what_a_capture_waits_for_is_told_when_it_changes() {
     let mut table = watching(BOARD);
     table.ask(VisionTask::Capture(request(7, 3)));
-    let measured = table.feed(&board_picture(1), 10).expect("a capture");
+    let measured = table.feed(&board(1), 10).expect("a capture");
     assert_eq!((measured.number, measured.frames), (7, 3));
     assert_eq!(measured.corner_noise_px, Some(0.0), "three pictures, all the same");
     assert_eq!(measured.thumbnail.dimensions(), (160, 120));
-    assert_eq!(*measured.rgb, board_picture(1), "nothing is drawn on it");
+    assert_eq!(*measured.rgb, board(1), "nothing is drawn on it");
     assert_eq!(measured.pose_name.as_deref(), Some("view"));
     let again = handeye_core::capture::observe_image(&measured.rgb, &BOARD).expect("searches").expect("the board");
     assert_eq!(again.corners, measured.corners, "the kept picture gives the same corners");
@@ -86,11 +87,11 @@ fn a_picture_without_the_board_or_with_a_blurred_one_is_refused_with_the_reason(
     assert!(refused.why.say(Language::English).contains("10×7"), "{refused:?}");
     // A box of 13 px has σ = 3.7 px, which is 0.156 of a square.
     table.ask(VisionTask::Capture(request(2, 1)));
-    let refused = table.feed(&board_picture(6), 10).expect_err("blurred");
+    let refused = table.feed(&board(6), 10).expect_err("blurred");
     assert_eq!(refused.kind, RefusalKind::Blurred);
     assert!(refused.why.say(Language::English).contains("squares 24 px"), "{refused:?}");
     table.ask(VisionTask::Capture(request(3, 1)));
-    assert!(table.feed(&board_picture(3), 10).is_ok(), "σ = 2 px is good enough");
+    assert!(table.feed(&board(3), 10).is_ok(), "σ = 2 px is good enough");
 }
 
 #[test]
@@ -98,7 +99,7 @@ fn a_pose_that_was_captured_before_is_named() {
     let mut table = watching(BOARD);
     let near = Pose::from_translation_xyzw([0.0031, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
     table.ask(VisionTask::Capture(CaptureRequest { others: vec![(12, near)], ..request(1, 1) }));
-    let refused = table.feed(&board_picture(0), 10).expect_err("too similar");
+    let refused = table.feed(&board(0), 10).expect_err("too similar");
     assert_eq!(refused.kind, RefusalKind::TooSimilar);
     let words = refused.why.say(Language::English);
     assert!(words.contains("Capture 12 was taken only 3.1 mm and 0.0°"), "{words}");
@@ -117,7 +118,7 @@ fn a_capture_that_is_cancelled_replaced_or_without_a_board_says_so() {
     ] {
         table.ask(VisionTask::Capture(request(number, 1)));
         table.events.try_iter().for_each(drop);
-        table.put(&board_picture(0));
+        table.put(&board(0));
         table.turn();
         table.ask(end);
         assert_eq!(table.refused().expect("a reason").kind, RefusalKind::Cancelled, "capture {number}");
@@ -131,11 +132,11 @@ fn a_request_to_cancel_is_taken_up_before_the_measurement_is_handed_over() {
     let mut table = watching(BOARD);
     table.ask(VisionTask::Capture(request(1, 1)));
     for _ in 0..3 {
-        table.put(&board_picture(0));
+        table.put(&board(0));
         table.turn();
     }
     // The picture that completes it and the request come together.
-    table.put(&board_picture(0));
+    table.put(&board(0));
     table.tasks.as_ref().expect("open").send(VisionTask::CancelCapture).expect("room");
     table.turn();
     assert!(table.measured.try_recv().is_err());
@@ -149,7 +150,7 @@ fn no_pictures_and_a_simulation_that_rests_are_told_apart() {
     {
         let mut table = watching(BOARD);
         table.ask(VisionTask::Capture(request(1, 1)));
-        table.put(&board_picture(0));
+        table.put(&board(0));
         table.turn();
         let now_s = {
             let mut now_s = table.now_s.lock().expect("no panic");
@@ -172,9 +173,9 @@ fn pictures_that_never_come_to_rest_are_refused_after_the_limit() {
     let options = CaptureOptions { settle_limit_s: 1.0, ..CaptureOptions::default() };
     table.ask(VisionTask::Capture(CaptureRequest { options, ..request(1, 1) }));
     // The lower half is now dark, now light: not the whole picture, so it is no flicker.
-    let board = board_picture(0);
+    let plain = board(0);
     let other = {
-        let mut other = board.clone();
+        let mut other = plain.clone();
         for v in 300..360 {
             for u in 0..480 {
                 other.put_pixel(u, v, Rgb([90, 90, 90]));
@@ -183,7 +184,7 @@ fn pictures_that_never_come_to_rest_are_refused_after_the_limit() {
         other
     };
     for i in 0..40 {
-        table.put(if i % 2 == 0 { &other } else { &board });
+        table.put(if i % 2 == 0 { &other } else { &plain });
         table.turn();
     }
     let refused = table.refused().expect("it gives up");
@@ -195,7 +196,7 @@ fn pictures_that_never_come_to_rest_are_refused_after_the_limit() {
 fn it_ends_with_the_application() {
     let mut table = watching(BOARD);
     table.shutdown.cancel();
-    table.put(&board_picture(0));
+    table.put(&board(0));
     assert!(!table.turn());
     let mut table = watching(BOARD);
     table.tasks = None;
