@@ -119,7 +119,7 @@ impl App {
                 let text = match link {
                     Link::Control => text!("Robot connection lost: {why}", why = why),
                     Link::Camera => text!("Camera connection lost: {why}", why = why),
-                    // Pictures and joints go on, so no strip tells of it.
+                    // Pictures and joints go on, so no strip reports it.
                     Link::Motion => {
                         let said = text!("Connection for motions lost: {why}", why = why);
                         return self.say(Severity::Warning, said);

@@ -52,7 +52,7 @@ impl Cell {
     fn pass(&mut self, bench: &mut Workbench) {
         self.pacer.step(&CallOptions::default()).expect("a pass");
         let now_s = self.pacer.get_simulation_time().expect("a call");
-        bench.until("the picture of the pass", |model| {
+        bench.until("the image of the pass", |model| {
             let tracked = model.track.newest.as_ref().map_or(0, |newest| newest.frame);
             let frame = model.frame.as_ref().map(|frame| &frame.info);
             frame.is_some_and(|frame| frame.sim_time_s >= now_s - 1e-9 && tracked >= frame.number)

@@ -354,7 +354,7 @@ fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_
     let at = |model: &Model| overlays::expected(model, &Shown::of(model, &textures).expect("live"));
     let of_calibration = calibrated.camera_from_target(&frame.info.base_from_tip);
     assert!(apart_px(&model, &of_calibration) > 20.0, "the calibrated board is elsewhere");
-    // Estimate and picture are off by 0.2 mm and 0.07 px.
+    // Estimate and image are off by 0.2 mm and 0.07 px.
     assert!(apart_px(&model, &at(&model).expect("tracked")) < 1.0);
     assert!(apart_px(&model, &overlays::live_chain(&model).expect("seen")) < 1.0);
 
@@ -372,5 +372,5 @@ fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_
     model.review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::pictures())) });
     model.track.on = true;
     let record = model.document().capture(CaptureId(3)).expect("there").base_from_tip;
-    assert_eq!(at(&model), Some(calibrated.camera_from_target(&record)), "a recorded picture is of its own time");
+    assert_eq!(at(&model), Some(calibrated.camera_from_target(&record)), "a recorded image belongs to its own time");
 }
