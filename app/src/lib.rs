@@ -14,6 +14,7 @@ pub mod parallel;
 pub mod rerun_log;
 pub mod session_start;
 pub mod settings;
+mod shortfall;
 pub mod text;
 pub mod truth;
 pub mod worker;

@@ -4,8 +4,8 @@ use std::thread::Builder;
 
 use super::App;
 use crate::model::{BoardMotion, CellFacts, CellSource, Link, LinkState, Motion, Severity, Trail};
-use crate::text;
 use crate::worker::{CameraTask, ControlTask, Request, Workers};
+use crate::{shortfall, text};
 
 /// Earlier addresses that are offered again.
 pub const ADDRESSES: usize = 8;
@@ -88,6 +88,9 @@ impl App {
     }
 
     pub(super) fn cell_found(&mut self, facts: CellFacts) {
+        if let Some(shortfall) = shortfall::of(facts.support, facts.kinematics_known) {
+            self.say(Severity::Warning, shortfall);
+        }
         self.model.cell = Some(facts);
         self.prepare_session();
         self.send_intrinsics();

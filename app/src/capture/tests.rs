@@ -39,6 +39,7 @@ impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Pictures for Reel<F> {
         let info = FrameInfo {
             number: self.number,
             sim_time_s: self.number as f64 * self.pass_s,
+            image_age_s: 0.0,
             received_s: self.now_s.get(),
             rate_hz: 0.0,
             depth_range_m: [0.1, 3.5],

@@ -22,6 +22,8 @@ use super::{Failure, RerunArg, out, record, rerun_arg, solve};
 use crate::model::{CaptureOptions, Step};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
 use crate::session_start::{BOARD, BUILT_IN_ARM};
+use crate::shortfall;
+use crate::text::Language;
 use poses::Plan;
 use solve::Solution;
 use tour::Tour;
@@ -91,6 +93,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     keep_earlier_session(&folder)?;
     // That it is another arm is no fault: its joint angles are then kept and not used.
     let arm = cell.arm().kinematics().map_err(Failure::failed)?.ok().map(|_ur5| BUILT_IN_ARM);
+    if let Some(shortfall) = shortfall::of(cell.info().support(), arm.is_some()) {
+        tracing::warn!("{}", shortfall.say(Language::English));
+    }
     let mut session = Store::create(&folder, meta(&truth, args.seed, arm)?).map_err(Failure::failed)?;
     recorder.note(Entry::Step(Step::Capture));
     record::document(&recorder, &session);

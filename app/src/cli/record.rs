@@ -25,6 +25,7 @@ fn facts(arm: &mut Arm, truth: &GroundTruth) -> Result<CellFacts, LinkError> {
         joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
         nominal_intrinsics: info.camera_intrinsics_nominal(),
         kinematics_known,
+        support: info.support(),
         truth: Some(known(truth)),
     })
 }
@@ -58,11 +59,12 @@ fn note(recorder: &Recorder, LiveFrame { info, images }: LiveFrame) {
 
 /// Pictures as the window has them, without colours of depths: those are the window's, and a viewer has its own.
 pub fn live_frame(info: &CellInfo, number: u64, received_s: f64, frame: Frame) -> LiveFrame {
-    let Frame { rgb, depth, sim_time_s, base_from_tip, joints, base_from_target_true } = frame;
+    let Frame { rgb, depth, sim_time_s, image_age_s, base_from_tip, joints, base_from_target_true } = frame;
     let depth_range_m = [info.depth_optics.near_m as f32, info.depth_optics.far_m as f32];
     let info = FrameInfo {
         number,
         sim_time_s,
+        image_age_s,
         received_s,
         rate_hz: 0.0,
         depth_range_m,

@@ -18,7 +18,7 @@ use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_core::track::{ByDepth, Estimate, Seen, State, Update};
 use handeye_core::verify::{self, Calibrated, CheckCapture};
 use handeye_sim_link::cell::kinematics::{JointLimits, inverse_nearest};
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_sim_link::client::cell::{JointAngles, Support};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
@@ -130,6 +130,7 @@ pub fn connected() -> Model {
         joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
         nominal_intrinsics: intrinsics(),
         kinematics_known: true,
+        support: Support::Whole,
         truth: Some(Truth {
             tip_from_camera: tip_from_camera(),
             base_from_target: Some(base_from_target()),
@@ -139,6 +140,7 @@ pub fn connected() -> Model {
     let info = FrameInfo {
         number: 1,
         sim_time_s: 12.3,
+        image_age_s: 0.0,
         received_s: 99.98,
         rate_hz: 20.0,
         depth_range_m: [0.3, 0.5],

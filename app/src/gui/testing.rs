@@ -203,6 +203,7 @@ pub fn frame(number: u64) -> Event {
     let info = FrameInfo {
         number,
         sim_time_s: 12.3,
+        image_age_s: 0.0,
         received_s: 100.0,
         rate_hz: 20.0,
         depth_range_m: [0.4, 1.2],

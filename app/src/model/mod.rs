@@ -165,6 +165,8 @@ pub struct FrameInfo {
     pub number: u64,
     /// Simulated time of the pictures \[s\].
     pub sim_time_s: f64,
+    /// How much older than pose and joints they may be \[s\] of simulated time: nothing where all is of one instant.
+    pub image_age_s: f64,
     /// When they arrived.
     pub received_s: f64,
     /// Frames per second that arrive.

@@ -2,7 +2,7 @@
 
 use handeye_core::camera::Intrinsics;
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_sim_link::client::cell::{JointAngles, Support};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -16,6 +16,8 @@ pub struct CellFacts {
     pub nominal_intrinsics: Intrinsics,
     /// Whether the arm is the one whose kinematics is built in, so that goals are checked before anything moves.
     pub kinematics_known: bool,
+    /// What works with the server's version.
+    pub support: Support,
     /// What a simulated cell publishes for comparison; never read by a solver.
     pub truth: Option<Truth>,
 }

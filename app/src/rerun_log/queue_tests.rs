@@ -22,6 +22,7 @@ fn picture(number: u64) -> Entry {
     let info = FrameInfo {
         number,
         sim_time_s: 0.0,
+        image_age_s: 0.0,
         received_s: 0.0,
         rate_hz: 0.0,
         depth_range_m: [0.0, 1.0],

@@ -69,6 +69,7 @@ impl Camera {
         let info = FrameInfo {
             number: self.number,
             sim_time_s: raw.sim_time_s,
+            image_age_s: raw.image_age_s,
             received_s,
             rate_hz: self.rate.rate_hz(),
             depth_range_m,

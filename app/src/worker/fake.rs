@@ -8,7 +8,7 @@ use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish, JointAngles};
+use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish, JointAngles, Support};
 
 use super::port::{
     CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
@@ -160,6 +160,7 @@ impl ControlPort for FakeCell {
             joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
             nominal_intrinsics: Intrinsics::pinhole(width, height, 60.0),
             kinematics_known: true,
+            support: Support::Whole,
             truth: None,
         })
     }
@@ -294,6 +295,7 @@ impl CameraPort for FakeCell {
             rgb: Self::rgb(script.frames),
             depth: DepthImage { width, height, metres },
             sim_time_s: script.frames as f64 * 0.05,
+            image_age_s: 0.0,
             base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
             joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0],
             base_from_target_true: None,

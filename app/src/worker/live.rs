@@ -81,8 +81,7 @@ impl LiveConnector {
         }
         match (info.program_version, info.protocol) {
             (1.., _) => {
-                let version = info.program_version;
-                format!("CoppeliaSim {}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
+                format!("CoppeliaSim {}", cell::version_name(info.program_version))
             }
             (_, ProtocolVersion::V1) => "CoppeliaSim up to 4.5".to_owned(),
             _ => "remote API server".to_owned(),
@@ -145,6 +144,7 @@ impl ControlPort for LiveControl {
             joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
             nominal_intrinsics: info.camera_intrinsics_nominal(),
             kinematics_known: kinematics.is_ok(),
+            support: info.support(),
             truth,
         })
     }
@@ -200,6 +200,7 @@ impl CameraPort for LiveCamera {
             rgb: frame.rgb,
             depth: frame.depth,
             sim_time_s: frame.sim_time_s,
+            image_age_s: frame.image_age_s,
             base_from_tip: frame.base_from_tip,
             joints_rad: frame.joints,
             base_from_target_true: frame.base_from_target_true,

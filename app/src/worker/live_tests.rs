@@ -7,9 +7,8 @@ use handeye_core::poses_file::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CellPaths, JointAngles};
-use handeye_sim_link::client::{
-    CallOptions, ConnectionOptions, Endpoint, JointMotion, MotionLimits, Sim, SimulationState,
-};
+use handeye_sim_link::client::{CallOptions, ConnectionOptions, Endpoint, Sim, SimulationState};
+use handeye_sim_link::wire;
 
 use super::fake::FakeCell;
 use super::motion_tests::Bench;
@@ -86,10 +85,16 @@ fn long_motion(server: &CellServer) -> JoinHandle<()> {
     let endpoint: Endpoint = server.endpoint().parse().expect("an address");
     std::thread::spawn(move || {
         let mut sim = Sim::connect(&endpoint, ConnectionOptions::default()).expect("a socket");
-        let joints = (0..6).map(|i| sim.get_object_index("/UR5/joint", i).expect("a joint")).collect();
-        let limits = MotionLimits::uniform(6, 1e-3, 1.0, 10.0);
-        let motion = JointMotion { joints, target_rad: vec![3.0, 0.8, -1.0, 0.0, 1.5, 0.0], limits };
-        sim.move_to_config(&motion, &CallOptions::long(PATIENCE, &CancelToken::default())).expect("it ends");
+        let joints = (0..6).map(|i| sim.get_object_index("/UR5/joint", i).expect("a joint").0).collect::<Vec<_>>();
+        let motion = wire::map([
+            ("joints", wire::integers(joints)),
+            ("targetPos", wire::floats([3.0, 0.8, -1.0, 0.0, 1.5, 0.0])),
+            ("maxVel", wire::floats([1e-3; 6])),
+            ("maxAccel", wire::floats([1.0; 6])),
+            ("maxJerk", wire::floats([10.0; 6])),
+        ]);
+        let patient = CallOptions::long(PATIENCE, &CancelToken::default());
+        sim.connection().call_with("sim.moveToConfig", vec![motion], &patient).expect("it ends");
     })
 }
 

@@ -185,6 +185,8 @@ pub struct RawFrame {
     pub depth: DepthImage,
     /// Simulated time \[s\].
     pub sim_time_s: f64,
+    /// How much older than pose and joints the images may be \[s\] of simulated time.
+    pub image_age_s: f64,
     /// The tip as the controller reports it at that instant.
     pub base_from_tip: Pose<Base, Tip>,
     /// The joints at that instant \[rad\].

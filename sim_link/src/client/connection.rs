@@ -11,13 +11,17 @@ use super::endpoint::Endpoint;
 use super::error::LinkError;
 use super::options::{CallOptions, ConnectionOptions};
 use super::protocol::{
-    self, CALLBACK_SUFFIX, ClientIds, END, EXECUTED, Introduction, ProtocolVersion, REPEAT, ReplyError, ServerMessage,
-    WAIT,
+    self, CALLBACK_SUFFIX, ClientIds, END, EXECUTED, ProtocolVersion, REPEAT, REQUIRE, ReplyError, Sender,
+    ServerMessage, UNKNOWN_FUNCTION, WAIT,
 };
 use super::returned::Returned;
 use super::transport::{Transport, TransportFault, ZmqTransport};
 use crate::wire::WireError;
 use handeye_core::progress::CancelToken;
+
+/// The module of the simulator's functions, and how their names begin.
+const MODULE: &str = "sim";
+const MODULE_PREFIX: &str = "sim.";
 
 /// Longest stretch of waiting without a look at the cancel token.
 const SLICE: Duration = Duration::from_millis(20);
@@ -36,6 +40,8 @@ pub struct Connection {
     ids: ClientIds,
     uuid: String,
     introduced: bool,
+    /// Names of the module are known to resolve, or were asked to: see [`Connection::converse`].
+    loaded: bool,
     version: Option<ProtocolVersion>,
     contacted: bool,
     epoch: u64,
@@ -93,6 +99,7 @@ impl Connection {
             ids,
             uuid,
             introduced: false,
+            loaded: false,
             version: None,
             contacted: false,
             epoch: 0,
@@ -191,29 +198,54 @@ impl Connection {
     pub fn renew(&mut self) {
         self.contacted |= self.transport.connected();
         if self.version != Some(ProtocolVersion::V1) && self.contacted {
-            let farewell = protocol::request(END, Vec::new(), &self.uuid, None);
+            let farewell = protocol::request(END, Vec::new(), &self.sender(None));
             self.transport.send_last(&farewell);
         } else {
             self.transport.reset();
         }
         self.uuid = self.ids.draw();
-        self.introduced = false;
+        (self.introduced, self.loaded) = (false, false);
         // The server knows nothing of the new client yet.
         self.contacted = false;
         self.epoch += 1;
     }
 
+    /// A call from its request to its result.
+    ///
+    /// Servers after CoppeliaSim 4.10 know names of the module only once some client has had it loaded, and forget that
+    /// when they are started again. So a name that is not known is asked for once more with the module loaded.
     fn converse(&mut self, exchange: &mut Exchange<'_>, args: Vec<Value>) -> Result<Vec<Value>, LinkError> {
         let mut callback_error = None;
         // Kept for a server that turns out to speak the other version by now.
         let mut retry = (self.version == Some(ProtocolVersion::V1)).then(|| args.clone());
         let mut message = self.request(exchange.func, args);
+        // The request, to be sent again with the module loaded.
+        let mut unloaded = (!self.loaded && exchange.func.starts_with(MODULE_PREFIX)).then(|| message.clone());
+        let mut loading = None;
         loop {
             let reply = self.exchange(exchange, &message)?;
+            let is_answer = matches!(reply, ServerMessage::Returned { .. } | ServerMessage::Failed { .. });
+            if is_answer && let Some(original) = loading.take() {
+                // Whether it could be loaded is for the call itself to say.
+                self.loaded = true;
+                message = original;
+                continue;
+            }
             match reply {
                 ServerMessage::Returned { values, version } => {
                     self.version = Some(version);
+                    self.loaded |= unloaded.is_some();
                     return callback_error.map_or(Ok(values), Err);
+                }
+                ServerMessage::Failed { message: text, version: ProtocolVersion::V2 }
+                    if unloaded.is_some() && text.starts_with(UNKNOWN_FUNCTION) =>
+                {
+                    loading = unloaded.take();
+                    message = self.request(REQUIRE, vec![Value::from(MODULE)]);
+                }
+                // What a server says that does not know what it was asked to go on with.
+                ServerMessage::Failed { message: text, .. } if exchange.asked && text.contains(EXECUTED) => {
+                    return Err(self.note(LinkError::Forgotten { call: exchange.func.to_owned() }));
                 }
                 ServerMessage::Failed { message, version } => {
                     self.version = Some(version);
@@ -303,7 +335,9 @@ impl Connection {
             Err(ReplyError::Wire(WireError::TooLarge { bytes })) => {
                 LinkError::ReplyTooLarge { call: call(), bytes: Some(bytes) }
             }
-            Err(ReplyError::Wire(source)) => LinkError::Malformed { call: call(), source },
+            Err(ReplyError::Wire(source)) => {
+                LinkError::Malformed { call: call(), source, has_spoken: self.version.is_some() }
+            }
             Err(ReplyError::Shape { expected, got }) => {
                 LinkError::UnexpectedReply { call: call(), expected: expected.to_owned(), got }
             }
@@ -348,10 +382,13 @@ impl Connection {
         if self.version == Some(ProtocolVersion::V1) {
             return protocol::request_v1(func, args);
         }
-        let introduction =
-            (!self.introduced).then_some(Introduction { lang: "rust", idle_timeout_s: self.options.idle_timeout_s });
+        let introduces = (!self.introduced).then_some("rust");
         self.introduced = true;
-        protocol::request(func, args, &self.uuid, introduction)
+        protocol::request(func, args, &self.sender(introduces))
+    }
+
+    fn sender(&self, introduces: Option<&'static str>) -> Sender<'_> {
+        Sender { uuid: &self.uuid, idle_timeout_s: self.options.idle_timeout_s, introduces }
     }
 
     fn late(&mut self, exchange: &Exchange<'_>, after: Duration) -> LinkError {
@@ -401,7 +438,7 @@ impl Connection {
 
     fn drop_exchange(&mut self) {
         self.transport.reset();
-        self.introduced = false;
+        (self.introduced, self.loaded) = (false, false);
         self.epoch += 1;
     }
 
@@ -415,7 +452,7 @@ impl Connection {
 impl Drop for Connection {
     fn drop(&mut self) {
         if self.version != Some(ProtocolVersion::V1) && self.contacted {
-            let farewell = protocol::request(END, Vec::new(), &self.uuid, None);
+            let farewell = protocol::request(END, Vec::new(), &self.sender(None));
             self.transport.send_last(&farewell);
         }
     }

@@ -1,4 +1,5 @@
-use std::sync::mpsc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 
 use super::*;
 use crate::client::testing::{Answer, Event, Log, args, ask, connection, err, func, ret};
@@ -29,8 +30,11 @@ fn only_the_first_message_introduces_the_client() {
     let requests = log.requests();
     assert_eq!(requests[0].get("ver").and_then(Reader::integer), Some(2));
     assert_eq!(requests[0].get("lang").and_then(|v| v.text()), Some("rust"));
-    assert_eq!(requests[0].get("timeout").and_then(Reader::integer), Some(60));
-    assert!(!has(&requests[1], "ver"));
+    assert!(!has(&requests[1], "ver") && !has(&requests[1], "lang"));
+    // A server that forgot the client in between would otherwise keep its locks for ten minutes.
+    for request in &requests {
+        assert_eq!(request.get("timeout").and_then(Reader::integer), Some(8));
+    }
     assert_eq!(requests[0].get("uuid"), requests[1].get("uuid"));
     assert_eq!(connection.version(), Some(ProtocolVersion::V2));
 }
@@ -42,6 +46,49 @@ fn a_refusal_keeps_the_servers_words() {
     let message = "354: in sim._getObject: object does not exist".to_owned();
     assert_eq!(error, LinkError::Remote { call: "sim.getObject".to_owned(), message });
     assert_eq!(log.events().len(), 1, "a refusal is an answer: nothing is reset");
+}
+
+/// A server after CoppeliaSim 4.10, which another client may restart.
+fn newest(loaded: &Arc<AtomicBool>) -> (Connection, Log) {
+    let loaded = Arc::clone(loaded);
+    connection(move |request| match func(request) {
+        REQUIRE => {
+            loaded.store(args(request)[0].text() == Some("sim"), Ordering::SeqCst);
+            ret([])
+        }
+        "sim.a" if loaded.load(Ordering::SeqCst) => ret([args(request)[0].clone()]),
+        name => err(&format!("No such function: {name}")),
+    })
+}
+
+#[test]
+fn a_name_that_is_not_known_is_asked_for_again_with_its_module_loaded() {
+    let loaded = Arc::new(AtomicBool::new(false));
+    let (mut connection, log) = newest(&loaded);
+    for value in [5, 6] {
+        let returned = connection.call("sim.a", vec![Value::from(value)]).expect("loaded");
+        assert_eq!(returned.integer(0), Ok(value));
+    }
+    assert_eq!(log.functions(), ["sim.a", REQUIRE, "sim.a", "sim.a"]);
+
+    // A restart of the server is seen as a new connection.
+    loaded.store(false, Ordering::SeqCst);
+    connection.renew();
+    connection.call("sim.a", vec![Value::from(1)]).expect("loaded again");
+    assert_eq!(log.functions()[4..], ["sim.a", REQUIRE, "sim.a"]);
+}
+
+#[test]
+fn a_name_that_the_module_lacks_is_said_so_once_it_is_loaded() {
+    let (mut connection, log) = newest(&Arc::default());
+    for _ in 0..2 {
+        let error = connection.call("sim.b", vec![]).expect_err("no such function");
+        assert!(error.is_unknown_function() && error.to_string().starts_with("sim.b failed"), "{error}");
+    }
+    assert_eq!(log.functions(), ["sim.b", REQUIRE, "sim.b", "sim.b"]);
+    // Other modules are the caller's matter.
+    connection.call("handeye.stop", vec![]).expect_err("no such function");
+    assert_eq!(log.functions().len(), 5);
 }
 
 #[test]

@@ -72,8 +72,8 @@ pub enum LinkError {
     },
     /// The server speaks another protocol.
     #[error(
-        "{call}: the server speaks another version of the remote API ({reply:?}); CoppeliaSim 4.2 to 4.10 with its ZMQ \
-         remote API add-on is supported"
+        "{call}: the server speaks another version of the remote API ({reply:?}); CoppeliaSim 4.6 or newer with its \
+         ZMQ remote API add-on is supported"
     )]
     VersionMismatch {
         /// Which call.
@@ -82,12 +82,14 @@ pub enum LinkError {
         reply: String,
     },
     /// The reply is not a message.
-    #[error("{call}: the reply cannot be read: {source}; is this the port of the ZMQ remote API (usually 23000)?")]
+    #[error("{call}: the reply cannot be read: {source}; {}", advice_on_bytes(*.has_spoken))]
     Malformed {
         /// Which call.
         call: String,
         /// What is wrong with it.
         source: WireError,
+        /// The server has sent messages that can be read.
+        has_spoken: bool,
     },
     /// The reply is longer than anything that is read.
     #[error(
@@ -102,7 +104,7 @@ pub enum LinkError {
         bytes: Option<usize>,
     },
     /// The reply is a message, but not one that the call can have.
-    #[error("{call}: expected {expected}, got {got}; check that the simulator's version is 4.2 to 4.10")]
+    #[error("{call}: expected {expected}, got {got}; check that the simulator is CoppeliaSim 4.6 or newer")]
     UnexpectedReply {
         /// Which call.
         call: String,
@@ -118,6 +120,14 @@ pub enum LinkError {
         call: String,
         /// What is wrong with it.
         source: ConvertError,
+    },
+    /// The server is too old for anything.
+    #[error(
+        "CoppeliaSim {version} lacks functions that are needed for every task: use 4.6 or newer, and 4.7 for any arm"
+    )]
+    TooOld {
+        /// Its version.
+        version: String,
     },
     /// The server is too old for the call.
     #[error("{call} is not available on this server: it needs {needs}")]
@@ -188,12 +198,12 @@ pub enum LinkError {
         /// Result of the motion generator.
         code: i64,
     },
-    /// The server has no record of a motion that this client was taking step by step.
+    /// The server has no record of this client, or of a motion that it was taking step by step.
     #[error(
-        "{call}: the server has forgotten the motion, as it does with a client that was silent for too long, for example \
-         because its computer slept; the arm stands where it was: move again"
+        "{call}: the server has forgotten this client, as it does with one that was silent for too long, for example \
+         because its computer slept; an arm that it was moving stands where it was: move again"
     )]
-    MotionForgotten {
+    Forgotten {
         /// Which call.
         call: String,
     },
@@ -202,6 +212,25 @@ pub enum LinkError {
     MotionStopped {
         /// What was asked for.
         task: &'static str,
+    },
+    /// A joint is not where a motion has put it.
+    #[error(
+        "joint {joint} stands at {at_deg:.3}° instead of {goal_deg:.3}°: another client or a script of the scene moves or \
+         holds it; end that, or start the simulation again"
+    )]
+    JointElsewhere {
+        /// Which joint, counted from 1 at the base.
+        joint: usize,
+        /// Where it is.
+        at_deg: f64,
+        /// Where it should be.
+        goal_deg: f64,
+    },
+    /// No motion fits the limits.
+    #[error("no motion fits these limits of velocity, acceleration and jerk: {reason}")]
+    NoProfile {
+        /// What is wrong with them.
+        reason: String,
     },
     /// The motion ended elsewhere; inverse kinematics failing is not an error for the simulator.
     #[error(
@@ -261,14 +290,14 @@ impl LinkError {
         matches!(self, Self::Remote { message, .. } if message.to_lowercase().contains(super::protocol::NO_SUCH_OBJECT))
     }
 
-    /// The same error, or [`Self::MotionForgotten`] when it is a server's answer to a step of a motion that it does not
+    /// The same error, or [`Self::Forgotten`] when it is a server's answer to a step of a motion that it does not
     /// know.
     pub(super) fn of_motion_step(self) -> Self {
         match self {
             // Servers name the object that they keep a motion in.
             Self::Remote { call, message } if message.to_ascii_lowercase().contains("ruckig") => {
                 tracing::debug!(call, message, "a motion was forgotten");
-                Self::MotionForgotten { call }
+                Self::Forgotten { call }
             }
             other => other,
         }
@@ -277,6 +306,15 @@ impl LinkError {
     /// Whether the server said that it has no such function.
     pub fn is_unknown_function(&self) -> bool {
         matches!(self, Self::Remote { message, .. } if message.contains(super::protocol::UNKNOWN_FUNCTION))
+    }
+}
+
+fn advice_on_bytes(has_spoken: bool) -> &'static str {
+    if has_spoken {
+        "the server has broken it off: CoppeliaSim's remote API does so with some maps; try again, and if it comes back \
+         report the call to the maker of the server"
+    } else {
+        "is this the port of the ZMQ remote API (usually 23000)?"
     }
 }
 

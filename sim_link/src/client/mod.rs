@@ -31,7 +31,7 @@ pub use options::{CallOptions, ConnectionOptions};
 pub use protocol::ProtocolVersion;
 pub use returned::Returned;
 pub use sim::{
-    JointInterval, JointMotion, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, SensorOptics, Sim,
+    JointInterval, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, SensorOptics, Sim,
     SimulationState,
 };
 pub use transport::{Transport, TransportFault, ZmqTransport};

@@ -15,7 +15,8 @@ pub struct ConnectionOptions {
     /// on the connection alone.
     pub heartbeat: Option<Duration>,
     /// After so many seconds without a message the server may forget this client, with its stepping mode and locks: it
-    /// bounds how long a client that crashed can hold the simulation.
+    /// bounds how long a client that crashed can hold the simulation. Longer than any call that holds it, so that
+    /// nothing has to be sent to keep a lock alive, and than a pass of a slow scene.
     pub idle_timeout_s: u32,
     /// Seed of the client ids; `None` draws them from the system. Two clients of one server must not share a seed.
     pub seed: Option<u64>,
@@ -29,7 +30,7 @@ impl Default for ConnectionOptions {
             reply_timeout: Duration::from_secs(5),
             total_timeout: Duration::from_mins(1),
             heartbeat: Some(Duration::from_millis(1500)),
-            idle_timeout_s: 60,
+            idle_timeout_s: 8,
             seed: None,
             shutdown: CancelToken::default(),
         }

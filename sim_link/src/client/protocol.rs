@@ -14,6 +14,8 @@ pub(super) const END: &str = "_*end*_";
 pub(super) const WAIT: &str = "_*wait*_";
 /// The server asks for the last request once more: it could not take it.
 pub(super) const REPEAT: &str = "_*repeat*_";
+/// Has the server load a module, so that its functions can be called by name.
+pub(super) const REQUIRE: &str = "zmqRemoteApi.require";
 /// Start of the error text for a name that the server does not know.
 pub(super) const UNKNOWN_FUNCTION: &str = "No such function";
 /// Part of the error text for a path that leads to no object: "object does not exist, or alias/path is ill formatted" in
@@ -33,30 +35,33 @@ pub enum ProtocolVersion {
     V2,
 }
 
-/// What a server of version 2 wants to know with the first message of a client.
+/// Who sends a request of version 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Introduction {
-    /// Language of the client, for the vendor's statistics.
-    pub lang: &'static str,
-    /// After how many seconds without a message the server may forget the client.
+pub(super) struct Sender<'a> {
+    /// The client's id.
+    pub uuid: &'a str,
+    /// After how many seconds without a message the server may forget the client. With every request: a server that
+    /// has forgotten a client makes a new record of it with the next one, and asks for nothing.
     pub idle_timeout_s: u32,
+    /// Language of the client, for the vendor's statistics; only with its first message.
+    pub introduces: Option<&'static str>,
 }
 
 /// A request of version 2.
-pub(super) fn request(func: &str, args: Vec<Value>, uuid: &str, introduction: Option<Introduction>) -> Vec<u8> {
+pub(super) fn request(func: &str, args: Vec<Value>, sender: &Sender<'_>) -> Vec<u8> {
     let count = args.len() as u64;
     let mut entries = vec![
         ("func", Value::from(func)),
         ("args", Value::Array(args)),
         // Lets the server keep trailing and inner nulls.
         ("argsL", Value::from(count)),
-        ("uuid", Value::from(uuid)),
+        ("uuid", Value::from(sender.uuid)),
     ];
-    if let Some(Introduction { lang, idle_timeout_s }) = introduction {
+    if let Some(lang) = sender.introduces {
         entries.push(("ver", Value::from(2)));
         entries.push(("lang", Value::from(lang)));
-        entries.push(("timeout", Value::from(idle_timeout_s)));
     }
+    entries.push(("timeout", Value::from(sender.idle_timeout_s)));
     wire::encode(&wire::map(entries))
 }
 

@@ -9,6 +9,15 @@ const UUID: &str = "c06b3832-5008-4cbb-b372-46ff92cacfe5";
 /// The `uuid` entry of every recorded request.
 const U: &str = "6475756964782463303662333833322d353030382d346362622d623337322d343666663932636163666535";
 
+const SENDER: Sender<'_> = Sender { uuid: UUID, idle_timeout_s: 600, introduces: None };
+
+/// A recorded request with the client's time limit, which the recorded client says only once.
+fn limited(hex: &str) -> Vec<u8> {
+    let mut bytes = bytes(&format!("{hex} 67 74696d656f7574 190258"));
+    bytes[0] += 1;
+    bytes
+}
+
 fn bytes(hex: &str) -> Vec<u8> {
     let digits: Vec<char> = hex.chars().filter(|c| !c.is_whitespace()).collect();
     let pair = |pair: &[char]| u8::from_str_radix(&pair.iter().collect::<String>(), 16).expect("hex");
@@ -24,12 +33,12 @@ fn returned(hex: &str) -> Vec<Value> {
 
 #[test]
 fn the_first_message_introduces_the_client_as_recorded() {
-    let introduction = Introduction { lang: "python", idle_timeout_s: 600 };
     let recorded = format!(
         "a7 64 66756e63 74 7a6d7152656d6f74654170692e72657175697265 64 61726773 81 63 73696d 65 617267734c 01 {U} \
          63 766572 02 64 6c616e67 66 707974686f6e 67 74696d656f7574 190258"
     );
-    let ours = request("zmqRemoteApi.require", vec![Value::from("sim")], UUID, Some(introduction));
+    let ours =
+        request("zmqRemoteApi.require", vec![Value::from("sim")], &Sender { introduces: Some("python"), ..SENDER });
     assert_eq!(ours, bytes(&recorded));
     assert_eq!(ours.len(), 115);
 }
@@ -38,28 +47,28 @@ fn the_first_message_introduces_the_client_as_recorded() {
 fn later_requests_are_the_recorded_bytes() {
     let info =
         format!("a4 6466756e63 71 7a6d7152656d6f74654170692e696e666f 6461726773 81 6373696d 65617267734c 01 {U}");
-    assert_eq!(request("zmqRemoteApi.info", vec![Value::from("sim")], UUID, None), bytes(&info));
+    assert_eq!(request("zmqRemoteApi.info", vec![Value::from("sim")], &SENDER), limited(&info));
 
     let indexed = format!(
         "a4 6466756e63 6d 73696d2e6765744f626a656374 6461726773 82 6a 2f5552352f6a6f696e74 a1 65696e646578 03 \
          65617267734c 02 {U}"
     );
     let args = vec![Value::from("/UR5/joint"), wire::map([("index", Value::from(3))])];
-    assert_eq!(request("sim.getObject", args, UUID, None), bytes(&indexed));
+    assert_eq!(request("sim.getObject", args, &SENDER), limited(&indexed));
 
     let executed = format!("a4 6466756e63 6c 5f2a65786563757465642a5f 6461726773 80 65617267734c 00 {U}");
-    assert_eq!(request(EXECUTED, Vec::new(), UUID, None), bytes(&executed));
+    assert_eq!(request(EXECUTED, Vec::new(), &SENDER), limited(&executed));
 
     let callback_result = format!("a4 6466756e63 6c 5f2a65786563757465642a5f 6461726773 81 f4 65617267734c 01 {U}");
-    assert_eq!(request(EXECUTED, vec![Value::from(false)], UUID, None), bytes(&callback_result));
+    assert_eq!(request(EXECUTED, vec![Value::from(false)], &SENDER), limited(&callback_result));
 
     let step = format!("a4 6466756e63 68 73696d2e73746570 6461726773 80 65617267734c 00 {U}");
-    assert_eq!(request("sim.step", Vec::new(), UUID, None), bytes(&step));
+    assert_eq!(request("sim.step", Vec::new(), &SENDER), limited(&step));
 }
 
 #[test]
 fn a_null_argument_is_sent_and_counted() {
-    let ours = request("sim.addLog", vec![Value::from(450), Value::Null], UUID, None);
+    let ours = request("sim.addLog", vec![Value::from(450), Value::Null], &SENDER);
     let needle = bytes("6461726773 82 1901c2 f6 65617267734c 02");
     assert!(ours.windows(needle.len()).any(|window| window == needle), "{ours:02x?}");
 }
@@ -70,7 +79,7 @@ fn a_pose_goes_out_with_the_numbers_and_the_order_that_were_recorded() {
     let recorded = bytes("83 182d 20 87 00 00 fb3ff0000000000000 00 00 00 01");
     let recorded = wire::decode(&recorded).expect("valid");
     let pose = wire::floats([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
-    let ours = request("sim.setObjectPose", vec![Value::from(45), Value::from(-1), pose], UUID, None);
+    let ours = request("sim.setObjectPose", vec![Value::from(45), Value::from(-1), pose], &SENDER);
     let ours = wire::decode(&ours).expect("valid");
     let (ours, recorded) =
         (ours.get("args").and_then(Value::as_array).expect("args"), recorded.as_array().expect("args"));

@@ -6,7 +6,9 @@ mod arm;
 mod board;
 mod client_faults;
 mod joint_offsets;
+mod vendor;
 
 mod slow {
     mod follow;
+    mod stops;
 }

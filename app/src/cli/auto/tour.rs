@@ -157,7 +157,7 @@ impl Tour<'_> {
 fn is_forgotten(error: &LinkError) -> bool {
     matches!(
         error,
-        LinkError::MotionForgotten { .. }
+        LinkError::Forgotten { .. }
             | LinkError::Disconnected { .. }
             | LinkError::Timeout { .. }
             | LinkError::Unreachable { .. }

@@ -22,6 +22,7 @@ use crate::limits;
 use crate::model::{FollowStatus, FollowWish, Step, Tracked};
 use crate::rerun_log::{Entry, Recorder};
 use crate::session_start::REFERENCE_POSES;
+use crate::shortfall;
 use crate::text::{Language, Text};
 use crate::worker::{FollowLine, Sight, Tracking, end_of_following};
 
@@ -107,6 +108,9 @@ impl Live {
     pub fn connect(endpoint: &Endpoint) -> Result<Self, Failure> {
         let cell = CellClient::connect(endpoint, &ConnectionOptions::default(), &CellPaths::default())
             .map_err(Failure::failed)?;
+        if let Some(shortfall) = shortfall::of(cell.info().support(), true) {
+            tracing::warn!("{}", shortfall.say(Language::English));
+        }
         let (arm, feed) = cell.split();
         Ok(Self { arm, feed })
     }

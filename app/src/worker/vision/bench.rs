@@ -96,6 +96,7 @@ impl Table {
         let info = FrameInfo {
             number: self.frames,
             sim_time_s: self.frames as f64 * 0.05,
+            image_age_s: 0.0,
             received_s: *now_s,
             rate_hz: 20.0,
             depth_range_m: [0.1, 3.5],

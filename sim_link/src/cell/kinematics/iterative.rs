@@ -44,26 +44,51 @@ pub fn damped_least_squares(
     options: &DlsOptions,
     limits: &JointLimits,
 ) -> Option<JointAngles> {
+    let (joints, is_there) = descend(arm_from_tip_goal, connection_from_tip, seed, options, limits);
+    is_there.then_some(joints)
+}
+
+/// As [`damped_least_squares`], for a goal that need not be in reach: where the iterations end, which is near the place
+/// that is nearest to the goal.
+pub fn towards(
+    arm_from_tip_goal: &Isometry3<f64>,
+    connection_from_tip: &Isometry3<f64>,
+    seed: &JointAngles,
+    options: &DlsOptions,
+    limits: &JointLimits,
+) -> JointAngles {
+    descend(arm_from_tip_goal, connection_from_tip, seed, options, limits).0
+}
+
+/// The last joints, and whether they are within the precision.
+fn descend(
+    arm_from_tip_goal: &Isometry3<f64>,
+    connection_from_tip: &Isometry3<f64>,
+    seed: &JointAngles,
+    options: &DlsOptions,
+    limits: &JointLimits,
+) -> (JointAngles, bool) {
     let mut joints = limits.clamp(seed);
     for iteration in 0..=options.iterations {
         let tip = forward(&joints).arm_from_connection * connection_from_tip;
         let error = pose_error(&tip, arm_from_tip_goal);
         if !error.iter().all(|v| v.is_finite()) {
-            return None;
+            break;
         }
         if error.fixed_rows::<3>(0).norm() <= options.precision_m
             && error.fixed_rows::<3>(3).norm() <= options.precision_rad
         {
-            return Some(joints);
+            return (joints, true);
         }
         if iteration == options.iterations {
             break;
         }
         let j = jacobian_at(&joints, connection_from_tip);
         let damped = j * j.transpose() + Matrix6::identity() * options.damping.powi(2);
-        let step = j.transpose() * damped.cholesky()?.solve(&error);
+        let Some(damped) = damped.cholesky() else { break };
+        let step = j.transpose() * damped.solve(&error);
         let scale = (MAX_STEP_RAD / step.amax()).min(1.0);
         joints = limits.clamp(&std::array::from_fn(|i| joints[i] + step[i] * scale));
     }
-    None
+    (joints, false)
 }

@@ -13,7 +13,7 @@ mod iterative;
 
 pub use forward::{ArmPose, forward, jacobian, jacobian_at};
 pub use inverse::{IkError, Obstacle, expand_limits, inverse_all, inverse_nearest};
-pub use iterative::{DlsOptions, damped_least_squares};
+pub use iterative::{DlsOptions, damped_least_squares, towards};
 
 /// Number of joints.
 pub const JOINTS: usize = 6;

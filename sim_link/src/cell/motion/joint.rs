@@ -184,9 +184,23 @@ fn heap(values: &[f64]) -> DataArrayOrVec<f64, 0> {
     DataArrayOrVec::Heap(values.to_vec())
 }
 
+/// Where a target is just so far away that the largest acceleration is reached for no time at all, the planner may find no
+/// profile by rounding; with a jerk that is smaller by this share there is one.
+const OFF_THE_EDGE: f64 = 1e-7;
+
 fn plan(start: &MotionState, limits: &MotionLimits, goal: &Goal<'_>) -> Result<Trajectory<0>, MotionError> {
+    check_limits(limits, start.pos.len())?;
+    match plan_exactly(start, limits, goal) {
+        Err(MotionError::NoProfile { .. }) => {
+            let max_jerk = limits.max_jerk.iter().map(|jerk| jerk * (1.0 - OFF_THE_EDGE)).collect();
+            plan_exactly(start, &MotionLimits { max_jerk, ..limits.clone() }, goal)
+        }
+        planned => planned,
+    }
+}
+
+fn plan_exactly(start: &MotionState, limits: &MotionLimits, goal: &Goal<'_>) -> Result<Trajectory<0>, MotionError> {
     let dofs = start.pos.len();
-    check_limits(limits, dofs)?;
     let mut input = InputParameter::<0>::new(Some(dofs));
     input.current_position = heap(&start.pos);
     input.current_velocity = heap(&start.vel);

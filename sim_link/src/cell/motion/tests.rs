@@ -312,3 +312,13 @@ fn pose_limits_of_the_wrong_length_and_a_bad_metric_are_errors() {
     let error = PoseMotion::new(&start, &goal, None, Some([1.0, -1.0, 1.0, 1.0]), Sync::Phase).unwrap_err();
     assert!(matches!(error, MotionError::BadLimit { what: "metric", dof: 1, .. }), "{error}");
 }
+
+#[test]
+fn a_target_that_needs_the_largest_acceleration_for_no_time_is_reached() {
+    // 2 a³ / j² is 0.04.
+    let limits = MotionLimits::uniform(4, 0.3, 2.0, 20.0);
+    let target = [0.1199999999999998, -0.0100000000000004, 0.04, 0.000000000000001];
+    let motion = JointMotion::new(MotionState::at_rest(vec![0.0; 4]), &target, &[0.0; 4], Some(&limits), Sync::Phase);
+    let end = motion.expect("there is a profile").step(10.0);
+    assert!(end.finished && end.pos == target);
+}

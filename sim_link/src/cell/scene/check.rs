@@ -78,6 +78,7 @@ fn check_robot(robot: &RobotSpec) -> Check {
         arm,
         tip,
         start_joints_deg,
+        joint_mode: _,
         min_joints_deg,
         max_joints_deg,
         repeatability_mm,

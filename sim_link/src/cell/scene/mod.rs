@@ -21,8 +21,8 @@ pub use error::SceneError;
 pub use errors_of_robot::RobotErrors;
 pub use resolved::{ResolvedScene, ResolvedSolid};
 pub use spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, RelativeTo, RobotSpec, SimulationSpec, SlipSpec,
-    SolidSpec,
+    BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, PoseSpec, RelativeTo, RobotSpec,
+    SimulationSpec, SlipSpec, SolidSpec,
 };
 
 const REFERENCE: &str = include_str!("../../../../assets/scenes/reference.toml");

@@ -10,8 +10,8 @@ use super::Scene;
 use super::board_motion::BoardMotionSpec;
 use super::errors_of_robot::{RobotErrors, gaussian};
 use super::spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo, SimulationSpec,
-    SlipSpec, SolidSpec,
+    BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo,
+    SimulationSpec, SlipSpec, SolidSpec,
 };
 use crate::cell::kinematics::{JointAngles, JointLimits, forward};
 
@@ -55,6 +55,8 @@ pub struct ResolvedScene {
     pub paper_m: [f64; 2],
     /// Joint values at the start, radians.
     pub start_joints: JointAngles,
+    /// What moves them.
+    pub joint_mode: JointModeSpec,
     /// Ranges of the joints.
     pub joint_limits: JointLimits,
     /// Errors of the arm.
@@ -130,6 +132,7 @@ pub(super) fn resolve(scene: &Scene, seed: u64) -> ResolvedScene {
         target,
         paper_m: board.paper_m,
         start_joints: robot.start_joints_deg.map(f64::to_radians),
+        joint_mode: robot.joint_mode,
         joint_limits: JointLimits {
             min_rad: robot.min_joints_deg.map(f64::to_radians),
             max_rad: robot.max_joints_deg.map(f64::to_radians),

@@ -55,6 +55,17 @@ impl Default for SimulationSpec {
     }
 }
 
+/// What moves the joints of the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JointModeSpec {
+    /// They are where they are put, as in the reference scene.
+    #[default]
+    Kinematic,
+    /// Their controllers take them to their target positions, with a lag.
+    Dynamic,
+}
+
 /// The arm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -65,6 +76,8 @@ pub struct RobotSpec {
     pub tip: PoseSpec,
     /// Joint values at the start, degrees.
     pub start_joints_deg: JointAngles,
+    /// What moves them.
+    pub joint_mode: JointModeSpec,
     /// Smallest joint values, degrees.
     pub min_joints_deg: JointAngles,
     /// Largest joint values, degrees.
@@ -83,6 +96,7 @@ impl Default for RobotSpec {
             arm: PoseSpec { position_m: [0.0, 0.0, 0.025], ..PoseSpec::default() },
             tip: PoseSpec { position_m: [0.0, 0.0, 0.017], ..PoseSpec::default() },
             start_joints_deg: [0.0, 45.0, -60.0, 0.0, 90.0, 0.0],
+            joint_mode: JointModeSpec::Kinematic,
             min_joints_deg: [-360.0; 6],
             max_joints_deg: [360.0; 6],
             repeatability_mm: 0.0,

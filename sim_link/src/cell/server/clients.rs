@@ -101,6 +101,9 @@ pub struct Running {
     pub task: Box<dyn Task>,
     /// What it waits for.
     pub waiting: Waiting,
+    /// Since when its client has been waiting for word; `None` while it is the client's turn, to run a callback or to
+    /// say that it goes on waiting.
+    pub owed_since: Option<Duration>,
 }
 
 /// One connection.
@@ -118,9 +121,9 @@ impl Connection {
         self.calls.last().is_some_and(|call| call.waiting == Waiting::Callback)
     }
 
-    /// The innermost call that waits for a callback.
-    pub fn waiting_for_callback(&self) -> Option<usize> {
-        self.calls.iter().rposition(|call| call.waiting == Waiting::Callback)
+    /// The innermost call whose client has something to answer.
+    pub fn asked(&self) -> Option<usize> {
+        self.calls.iter().rposition(|call| call.owed_since.is_none())
     }
 }
 
@@ -251,7 +254,7 @@ impl Clients {
     /// Whether calls of the client go on without it: its silence is then no sign of anything.
     fn is_working(&self, uuid: &str) -> bool {
         let mut calls = self.connections.values().flat_map(|connection| &connection.calls);
-        calls.any(|call| call.uuid == uuid && call.waiting != Waiting::Callback)
+        calls.any(|call| call.uuid == uuid && call.owed_since.is_some())
     }
 
     fn forget_idlest(&mut self, among: impl Fn(&Client) -> bool) -> bool {

@@ -1,5 +1,6 @@
 //! The server without its socket: requests in, replies out, passes of the simulation in between.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use super::api::{Call, Effect, Registry};
@@ -13,6 +14,14 @@ use crate::cell::world::State;
 /// Steps that calls may take in one turn before requests are looked at again. A motion in a stopped simulation has no
 /// pass to wait for and would otherwise keep everybody waiting until it is over.
 const STEPS_PER_TURN: usize = 200;
+
+/// How long a client whose call is under way may hear nothing. The vendor's Python clients of 4.9 and 4.10 give up after
+/// 5 s of silence.
+const SILENCE: Duration = Duration::from_secs(1);
+
+/// How long a pass that need not keep to real time waits for further requests, for each client that has made one since
+/// the last pass: a few calls in a row see the same instant, as they do in the simulator.
+const REQUEST_GRACE: Duration = Duration::from_millis(2);
 
 /// What the simulator puts before the message of an error: the line of its own script that made the call.
 const ERROR_LINE: u32 = 354;
@@ -41,6 +50,8 @@ pub struct Engine {
     step: u64,
     /// When the next pass is due, where time is real.
     next_pass: Option<Duration>,
+    /// When the first request since the last pass came, and who has made one.
+    requests: Option<(Duration, BTreeSet<String>)>,
     /// Motions whose clients have vanished, on their way to rest.
     orphans: Vec<Box<dyn Task>>,
     outgoing: Vec<Outgoing>,
@@ -55,6 +66,7 @@ impl Engine {
             registry: Registry::new(),
             step: 0,
             next_pass: None,
+            requests: None,
             orphans: Vec::new(),
             outgoing: Vec::new(),
         }
@@ -83,11 +95,33 @@ impl Engine {
             Ok(Request::Executed { uuid, values }) => self.executed(peer, &uuid, values),
             Ok(Request::Call { uuid, func, args, idle_limit }) => {
                 match self.clients.meet(peer, &uuid, idle_limit, now) {
-                    Ok(()) => self.call(peer, uuid, func, &Args::new(args)),
+                    Ok(()) => {
+                        self.heard(&uuid);
+                        self.call(peer, uuid, func, &Args::new(args));
+                    }
                     Err(crowded) => self.send(peer, message::failed(&crowded.to_string())),
                 }
             }
         }
+    }
+
+    fn heard(&mut self, uuid: &str) {
+        let (_, clients) = self.requests.get_or_insert_with(|| (self.cell.now, BTreeSet::new()));
+        if !clients.contains(uuid) {
+            clients.insert(uuid.to_owned());
+        }
+    }
+
+    /// Until when the next pass waits for requests.
+    fn grace_end(&self) -> Option<Duration> {
+        let (since, clients) = self.requests.as_ref()?;
+        let clients = u32::try_from(clients.len()).unwrap_or(u32::MAX);
+        Some(since.saturating_add(REQUEST_GRACE.saturating_mul(clients)))
+    }
+
+    /// When the next pass is due, if nobody holds it; `None` for at once.
+    fn pass_time(&self) -> Option<Duration> {
+        if self.cell.real_time { self.next_pass } else { self.grace_end() }
     }
 
     /// Answers a request that cannot be understood.
@@ -109,13 +143,16 @@ impl Engine {
             return Due::Now;
         }
         let calls = self.clients.connections().flat_map(|(_, connection)| &connection.calls);
-        let times = calls.filter_map(|call| match call.waiting {
-            Waiting::Time(time) => Some(time),
-            _ => None,
+        let times = calls.filter_map(|call| {
+            let word = call.owed_since? + SILENCE;
+            Some(match call.waiting {
+                Waiting::Time(time) => time.min(word),
+                _ => word,
+            })
         });
         let mut next = times.chain(self.clients.next_expiry()).min();
         if self.cell.world.simulation().is_advancing() && !self.clients.hold_pass(self.step) {
-            match self.next_pass.filter(|_| self.cell.real_time) {
+            match self.pass_time() {
                 None => return Due::Now,
                 Some(time) => next = Some(next.map_or(time, |next| next.min(time))),
             }
@@ -131,6 +168,7 @@ impl Engine {
             self.forget(&uuid);
         }
         self.resume_calls();
+        self.break_silence(now);
         if self.is_pass_due(now) {
             self.run_pass(now);
         }
@@ -139,12 +177,25 @@ impl Engine {
     fn is_pass_due(&self, now: Duration) -> bool {
         self.cell.world.simulation().is_advancing()
             && !self.clients.hold_pass(self.step)
-            && !(self.cell.real_time && self.next_pass.is_some_and(|time| time > now))
+            && self.pass_time().is_none_or(|time| time <= now)
+    }
+
+    /// Gives word to clients that have waited long for a call.
+    fn break_silence(&mut self, now: Duration) {
+        for (peer, connection) in self.clients.connections_mut() {
+            for call in &mut connection.calls {
+                if call.owed_since.is_some_and(|since| now.saturating_sub(since) >= SILENCE) {
+                    call.owed_since = None;
+                    self.outgoing.push((peer.clone(), message::wait()));
+                }
+            }
+        }
     }
 
     fn run_pass(&mut self, now: Duration) {
         self.cell.world.run_pass();
         self.step += 1;
+        self.requests = None;
         let seconds = self.cell.world.simulation().time_step_s() / self.cell.speed_factor;
         let length = Duration::try_from_secs_f64(seconds).unwrap_or_default();
         // A pass that was held for long is not made up for by a burst of others.
@@ -179,6 +230,7 @@ impl Engine {
                 .calls
                 .iter()
                 .enumerate()
+                .filter(|(_, call)| call.owed_since.is_some())
                 .find_map(|(index, call)| Some((peer.clone(), index, wake(call.waiting)?)))
         })
     }
@@ -198,7 +250,12 @@ impl Engine {
             Ok(Next::Callback { name, args }) => {
                 call.waiting = Waiting::Callback;
                 self.send(peer, message::callback(&name, args));
+                call.owed_since = None;
             }
+        }
+        // As often as the simulator: in every pass.
+        if call.owed_since.take().is_some() {
+            self.send(peer, message::wait());
         }
         let uuid = call.uuid.clone();
         let calls = &mut self.clients.connection(peer, &uuid).calls;
@@ -209,18 +266,20 @@ impl Engine {
         let now = self.cell.now;
         if let Some(client) = self.clients.record_mut(uuid) {
             client.last_seen = now;
+            self.heard(uuid);
         }
-        let waiting = self.clients.connection_mut(peer).and_then(|connection| {
-            let index = connection.waiting_for_callback()?;
-            Some((connection.calls.remove(index), index))
-        });
-        match waiting {
-            Some((call, index)) => {
-                self.run(peer, call, Wake::Executed(values), index);
-                self.resume_calls();
-            }
-            None => self.send(peer, message::failed("no function of this client was being called.")),
+        let asked = self.clients.connection_mut(peer).and_then(|connection| Some((connection.asked()?, connection)));
+        let Some((index, connection)) = asked else {
+            // As the simulator answers a client that it has forgotten.
+            return self.send(peer, message::failed(&format!("No such function: {}", message::EXECUTED)));
+        };
+        if connection.calls[index].waiting == Waiting::Callback {
+            let call = Running { owed_since: Some(now), ..connection.calls.remove(index) };
+            self.run(peer, call, Wake::Executed(values), index);
+        } else {
+            connection.calls[index].owed_since = Some(now);
         }
+        self.resume_calls();
     }
 
     fn call(&mut self, peer: &Peer, uuid: String, func: String, args: &Args) {
@@ -248,7 +307,7 @@ impl Engine {
             },
             Ok(Answer::Later(task)) => {
                 let index = self.clients.connection(peer, &uuid).calls.len();
-                let call = Running { uuid, func, task, waiting: Waiting::Nothing };
+                let call = Running { uuid, func, task, waiting: Waiting::Nothing, owed_since: Some(self.cell.now) };
                 self.run(peer, call, Wake::Started, index);
                 self.resume_calls();
             }

@@ -19,6 +19,9 @@ const MAX_UUID_BYTES: usize = 128;
 const DEFAULT_IDLE_LIMIT: Duration = Duration::from_mins(10);
 const MAX_IDLE_LIMIT: Duration = Duration::from_hours(24);
 
+/// The name of a request that says that a callback has returned, or that the client goes on waiting.
+pub const EXECUTED: &str = "_*executed*_";
+
 /// What a client wants.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Request {
@@ -100,7 +103,7 @@ pub fn parse(bytes: &[u8]) -> Result<Request, BadRequest> {
         "" if message.get("eval").is_some() => Ok(Request::Eval),
         "" => Ok(Request::Nothing),
         "_*end*_" => Ok(Request::End { uuid }),
-        "_*executed*_" => Ok(Request::Executed { uuid, values: arguments(&message)? }),
+        EXECUTED => Ok(Request::Executed { uuid, values: arguments(&message)? }),
         func => Ok(Request::Call {
             uuid,
             func: func.to_owned(),
@@ -155,6 +158,11 @@ pub fn failed(text: &str) -> Vec<u8> {
 /// Asks the client to run a callback.
 pub fn callback(name: &str, args: Vec<Value>) -> Vec<u8> {
     wire::encode(&wire::map([("func", Value::from(name)), ("args", list(args))]))
+}
+
+/// Asks the client to go on waiting for its call, and to say so.
+pub fn wait() -> Vec<u8> {
+    callback("_*wait*_", Vec::new())
 }
 
 /// What clients of protocol 1 are told.

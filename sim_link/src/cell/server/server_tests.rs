@@ -38,9 +38,16 @@ impl Client {
         wire::decode(&self.socket.recv_bytes(0).expect("a reply in time")).expect("decodes")
     }
 
+    /// The answer of a call, however long it is to be waited for.
     fn call(&self, func: &str, args: Vec<Value>) -> Value {
         self.send(func, args);
-        self.receive()
+        loop {
+            let reply = self.receive();
+            if reply.get("func").and_then(|func| func.text()) != Some("_*wait*_") {
+                return reply;
+            }
+            self.send("_*executed*_", Vec::new());
+        }
     }
 
     fn time_s(&self) -> f64 {

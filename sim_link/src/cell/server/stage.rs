@@ -7,8 +7,10 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use crate::cell::kinematics::{JOINTS, JointAngles, forward};
 use crate::cell::motion::Course;
 use crate::cell::render::{Finish, Shape, Solid, props};
-use crate::cell::scene::{RelativeTo, ResolvedScene, RobotErrors, Scene, SlipSpec};
-use crate::cell::world::{Carrier, Chain, Faults, Handle, Joint, Kind, Tree, VisionSensor, World, WorldError, turn_z};
+use crate::cell::scene::{JointModeSpec, RelativeTo, ResolvedScene, RobotErrors, Scene, SlipSpec};
+use crate::cell::world::{
+    Carrier, Chain, Faults, Handle, Joint, JointMode, Kind, Tree, VisionSensor, World, WorldError, turn_z,
+};
 
 /// Handles of the objects that the cell itself has to find again.
 #[derive(Debug, Clone)]
@@ -82,6 +84,10 @@ impl Builder {
         for (index, slot) in joints.iter_mut().enumerate() {
             let mut joint = Joint::new(resolved.joint_limits.min_rad[index], resolved.joint_limits.max_rad[index]);
             joint.set_position(resolved.start_joints[index])?;
+            joint.mode = match resolved.joint_mode {
+                JointModeSpec::Kinematic => JointMode::Kinematic,
+                JointModeSpec::Dynamic => JointMode::Dynamic,
+            };
             let parent_from_joint = arm_from_parent.inv_mul(&at_zero.arm_from_joint[index]);
             *slot = self.tree.add("joint", Kind::Joint(Box::new(joint)), Some(parent), parent_from_joint)?;
             parent = self.tree.add("link", Kind::Shape, Some(*slot), Isometry3::identity())?;

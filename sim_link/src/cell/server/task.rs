@@ -118,9 +118,8 @@ impl Task for WaitTask {
         // A simulation that was started anew has its clock back at zero.
         self.since_s = self.since_s.min(now_s);
         let over_s = now_s - self.since_s - self.seconds;
-        // Sums of time steps are not exact; a whole pass more would be.
-        if over_s >= -1e-9 {
-            return Ok(Next::Return(vec![Value::Float(over_s.max(0.0))]));
+        if over_s >= 0.0 {
+            return Ok(Next::Return(vec![Value::Float(over_s)]));
         }
         if !self.simulated {
             let left = Duration::try_from_secs_f64(-over_s).unwrap_or(Duration::MAX);

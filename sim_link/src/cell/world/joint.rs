@@ -11,29 +11,60 @@ pub type DriveLimits = [f64; 3];
 /// Limits that the stock UR5 model stores: 90°/s, 360°/s², 360°/s³.
 const DEFAULT_LIMITS: DriveLimits = [PI / 2.0, TAU, TAU];
 
-/// A revolute joint. It has no mass: it is where it is put, or on its way to a target.
+/// A kinematic joint that is sent to where it nearly stands is not moved by the simulator's main script \[rad\].
+const STANDS_WITHIN_RAD: f64 = 0.01 * PI / 180.0;
+
+/// A dynamic joint lags behind a steady target by its velocity times this \[s\].
+const LAG_S: f64 = 0.07;
+
+/// What moves a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum JointMode {
+    /// Whoever puts it somewhere, or sends it to a target position along a profile.
+    #[default]
+    Kinematic,
+    /// Its controller alone, which takes it to its target position.
+    Dynamic,
+}
+
+/// The motion that a target position sets for a kinematic joint.
+#[derive(Debug, Clone)]
+enum Drive {
+    /// It is on its way.
+    Moving(Box<JointMotion>),
+    /// It stood at its target already, so that nothing moves it there and the motion never ends: positions are refused
+    /// until another target has moved it, as CoppeliaSim does since 4.7.
+    Stuck,
+}
+
+/// A revolute joint without mass.
 #[derive(Debug, Clone)]
 pub struct Joint {
     /// Whether it turns without end; its position is then in (−π, π].
     pub cyclic: bool,
+    /// What moves it.
+    pub mode: JointMode,
     min_rad: f64,
     max_rad: f64,
     position_rad: f64,
     target_rad: f64,
+    velocity_rad_s: f64,
     limits: DriveLimits,
-    drive: Option<JointMotion>,
+    drive: Option<Drive>,
 }
 
 impl Joint {
-    /// A joint at 0, or at the end of its range that is nearest to 0.
+    /// A kinematic joint at 0, or at the end of its range that is nearest to 0.
     pub fn new(min_rad: f64, max_rad: f64) -> Self {
         let position_rad = 0.0_f64.max(min_rad).min(max_rad);
         Self {
             cyclic: false,
+            mode: JointMode::Kinematic,
             min_rad,
             max_rad,
             position_rad,
             target_rad: position_rad,
+            velocity_rad_s: 0.0,
             limits: DEFAULT_LIMITS,
             drive: None,
         }
@@ -51,7 +82,7 @@ impl Joint {
 
     /// Velocity of the motion towards a target position; zero where it is only put from place to place.
     pub fn velocity_rad_s(&self) -> f64 {
-        self.drive.as_ref().and_then(|drive| drive.at(drive.time_s()).vel.first().copied()).unwrap_or(0.0)
+        self.velocity_rad_s
     }
 
     /// Smallest and largest position.
@@ -59,14 +90,15 @@ impl Joint {
         (self.min_rad, self.max_rad)
     }
 
-    /// Whether it is on its way to a target position.
+    /// Whether a target position was set that it has not been moved to: a kinematic joint refuses positions then.
     pub fn is_driven(&self) -> bool {
         self.drive.is_some()
     }
 
-    /// Puts it to a position, at the end of its range if that lies outside.
+    /// Puts it to a position, at the end of its range if that lies outside. The controller of a dynamic joint takes it
+    /// back to its target.
     ///
-    /// `false`, and nothing happens, while it is on its way to a target position.
+    /// `false`, and nothing happens, while a target position drives it.
     ///
     /// # Errors
     /// [`WorldError::InvalidData`] for NaN and infinities.
@@ -76,12 +108,26 @@ impl Joint {
             return Ok(false);
         }
         self.position_rad = position_rad;
-        self.target_rad = position_rad;
+        if self.mode == JointMode::Kinematic {
+            self.target_rad = position_rad;
+        }
         Ok(true)
     }
 
-    /// Starts a jerk-limited motion to a position, at the end of its range if that lies outside; replaces the one
-    /// under way and takes over its velocity. The limits last until others are given.
+    /// Has it be at a position in the next pass, as a motion that is computed point by point does: a dynamic joint gets
+    /// a target, any other is put there. `false` if it refuses.
+    ///
+    /// # Errors
+    /// As [`Self::set_position`].
+    pub fn command(&mut self, position_rad: f64) -> Result<bool, WorldError> {
+        match self.mode {
+            JointMode::Kinematic => self.set_position(position_rad),
+            JointMode::Dynamic => self.drive_to(position_rad, None).map(|()| true),
+        }
+    }
+
+    /// Sends it to a position, at the end of its range if that lies outside. A kinematic joint moves there with limited
+    /// jerk, which replaces the motion under way and takes over its velocity; the limits last until others are given.
     ///
     /// # Errors
     /// [`WorldError::InvalidData`] for numbers that are not finite, and limits that are not positive.
@@ -89,44 +135,63 @@ impl Joint {
         let target_rad = self.allowed(target_rad)?;
         let limits = limits.unwrap_or(self.limits);
         let state = match &self.drive {
-            Some(drive) => drive.at(drive.time_s()).state(),
-            None => MotionState::at_rest(vec![self.position_rad]),
+            Some(Drive::Moving(drive)) => drive.at(drive.time_s()).state(),
+            _ => MotionState::at_rest(vec![self.position_rad]),
         };
+        let stands = !matches!(self.drive, Some(Drive::Moving(_)))
+            && (target_rad - self.position_rad).abs() <= STANDS_WITHIN_RAD;
         let [max_vel, max_accel, max_jerk] = limits;
         let bounds = MotionLimits::uniform(1, max_vel, max_accel, max_jerk);
-        let drive = JointMotion::new(state, &[target_rad], &[0.0], Some(&bounds), Sync::Time);
-        self.drive = Some(drive.map_err(|error| {
+        let drive = JointMotion::new(state, &[target_rad], &[0.0], Some(&bounds), Sync::Time).map_err(|error| {
             tracing::debug!(%error, "a joint's motion was refused");
             WorldError::InvalidData
-        })?);
+        })?;
+        self.drive = match self.mode {
+            JointMode::Dynamic => None,
+            JointMode::Kinematic if stands => Some(Drive::Stuck),
+            JointMode::Kinematic => Some(Drive::Moving(Box::new(drive))),
+        };
         self.limits = limits;
         self.target_rad = target_rad;
         Ok(())
     }
 
-    /// Brakes a motion to a target position as fast as its limits allow.
+    /// Brakes a motion to a target position as fast as its limits allow, and lets a joint that is stuck be moved again.
     pub fn brake(&mut self) {
-        let Some(drive) = self.drive.take() else { return };
+        if self.mode == JointMode::Dynamic {
+            self.target_rad = self.position_rad;
+        }
+        let Some(Drive::Moving(drive)) = self.drive.take() else { return };
         let [max_vel, max_accel, max_jerk] = self.limits;
         let state = drive.at(drive.time_s()).state();
         // The state comes from a motion within the same limits, so a profile exists; without one, standing still is
         // the safe answer.
-        self.drive = JointMotion::stop(state, &MotionLimits::uniform(1, max_vel, max_accel, max_jerk)).ok();
-        self.target_rad = self
-            .drive
+        let stop = JointMotion::stop(state, &MotionLimits::uniform(1, max_vel, max_accel, max_jerk)).ok();
+        self.target_rad = stop
             .as_ref()
             .and_then(|drive| drive.target_pos().first().copied())
             .map_or(self.position_rad, |target| target.clamp(self.min_rad, self.max_rad));
+        self.drive = stop.map(|stop| Drive::Moving(Box::new(stop)));
     }
 
     /// Moves on by one time step of the simulation.
     pub(super) fn advance(&mut self, dt_s: f64) {
-        let Some(drive) = &mut self.drive else { return };
+        if self.mode == JointMode::Dynamic {
+            let way_rad = (self.target_rad - self.position_rad) * (1.0 - (-dt_s / LAG_S).exp());
+            let most_rad = self.limits[0] * dt_s;
+            let step_rad = way_rad.clamp(-most_rad, most_rad);
+            self.velocity_rad_s = step_rad / dt_s;
+            self.position_rad = self.wrapped(self.position_rad + step_rad);
+            return;
+        }
+        let Some(Drive::Moving(drive)) = &mut self.drive else { return };
         let step = drive.step(dt_s);
-        if let Some(position) = step.pos.first() {
+        if let (Some(position), Some(velocity)) = (step.pos.first(), step.vel.first()) {
+            self.velocity_rad_s = *velocity;
             self.position_rad = self.wrapped(*position);
         }
         if step.finished {
+            self.velocity_rad_s = 0.0;
             self.drive = None;
         }
     }
@@ -135,6 +200,7 @@ impl Joint {
     pub(super) fn reset(&mut self, position_rad: f64) {
         self.position_rad = position_rad;
         self.target_rad = position_rad;
+        self.velocity_rad_s = 0.0;
         self.drive = None;
     }
 
@@ -206,6 +272,39 @@ mod tests {
             previous = joint.position_rad();
         }
         assert!(previous > at_brake && previous < at_brake + 0.3, "came to rest at {previous}");
+    }
+
+    #[test]
+    fn a_kinematic_joint_that_is_sent_to_where_it_stands_refuses_positions_until_it_was_moved() {
+        let mut joint = Joint::new(-TAU, TAU);
+        joint.drive_to(0.009_f64.to_radians(), None).expect("finite");
+        for _ in 0..100 {
+            joint.advance(0.05);
+        }
+        assert_eq!((joint.set_position(1.0), joint.position_rad()), (Ok(false), 0.0));
+        joint.drive_to(0.02_f64.to_radians(), None).expect("finite");
+        (0..100).for_each(|_| joint.advance(0.05));
+        assert_eq!((joint.set_position(1.0), joint.position_rad()), (Ok(true), 1.0));
+        joint.drive_to(1.0, None).expect("finite");
+        joint.brake();
+        assert_eq!(joint.set_position(0.0), Ok(true), "a stop frees it");
+    }
+
+    #[test]
+    fn a_dynamic_joint_follows_its_target_and_comes_back_to_it() {
+        let mut joint = Joint::new(-TAU, TAU);
+        joint.mode = JointMode::Dynamic;
+        joint.command(1.0).expect("finite");
+        joint.advance(0.05);
+        assert!((joint.position_rad() - DEFAULT_LIMITS[0] * 0.05).abs() < 1e-12, "at its largest speed");
+        (0..100).for_each(|_| joint.advance(0.05));
+        assert!((joint.position_rad() - 1.0).abs() < 1e-9);
+        assert_eq!(joint.set_position(-1.0), Ok(true));
+        (0..100).for_each(|_| joint.advance(0.05));
+        assert!((joint.position_rad() - 1.0).abs() < 1e-9, "{}", joint.position_rad());
+        // The same target again does no harm.
+        joint.drive_to(1.0, None).expect("finite");
+        assert_eq!(joint.set_position(0.5), Ok(true));
     }
 
     #[test]

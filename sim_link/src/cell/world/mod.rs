@@ -18,7 +18,7 @@ use nalgebra::Isometry3;
 
 pub use carrier::Carrier;
 pub use error::WorldError;
-pub use joint::{DriveLimits, Joint};
+pub use joint::{DriveLimits, Joint, JointMode};
 pub use poses::Flagged;
 pub use sensor::{Moment, Reported, Shown, VisionSensor};
 pub use simulation::{Simulation, State};
@@ -28,6 +28,27 @@ pub use tree::{Chain, Handle, Kind, Object, Tree, turn_z};
 pub trait Faults: std::fmt::Debug + Send {
     /// Sets the displacements of the objects. Called once per pass, after the joints have moved.
     fn apply(&mut self, tree: &mut Tree);
+}
+
+/// Which sensors are to take in what there is to see.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensors {
+    /// One that the simulation leaves alone.
+    One(Handle),
+    /// All that the simulation handles.
+    AllButExplicit,
+    /// All.
+    All,
+}
+
+impl Sensors {
+    fn include(self, handle: Handle, sensor: &VisionSensor) -> bool {
+        match self {
+            Self::One(one) => one == handle,
+            Self::AllButExplicit => !sensor.explicit,
+            Self::All => true,
+        }
+    }
 }
 
 /// The objects whose state belongs to every picture.
@@ -110,9 +131,9 @@ impl World {
         self.pass += 1;
         self.apply_faults();
         let shown = self.look(self.simulation.time_after_pass_s());
-        for (_, object) in self.tree.iter_mut() {
+        for (handle, object) in self.tree.iter_mut() {
             if let Kind::VisionSensor(sensor) = &mut object.kind
-                && !sensor.explicit
+                && Sensors::AllButExplicit.include(handle, sensor)
             {
                 sensor.shown = Some(shown.clone());
             }
@@ -131,16 +152,24 @@ impl World {
         }
     }
 
-    /// Refreshes a sensor that the simulation leaves alone.
+    /// Has sensors take in what there is to see now, between two passes.
     ///
     /// # Errors
-    /// No such sensor; [`WorldError::NotExplicitlyHandled`].
-    pub fn handle_sensor(&mut self, handle: Handle) -> Result<(), WorldError> {
-        if !self.tree.sensor(handle)?.explicit {
+    /// No such sensor; [`WorldError::NotExplicitlyHandled`] for a single one that the simulation handles by itself.
+    pub fn handle_sensors(&mut self, which: Sensors) -> Result<(), WorldError> {
+        if let Sensors::One(handle) = which
+            && !self.tree.sensor(handle)?.explicit
+        {
             return Err(WorldError::NotExplicitlyHandled);
         }
         let shown = self.look(self.simulation.time_s());
-        self.tree.sensor_mut(handle)?.shown = Some(shown);
+        for (handle, object) in self.tree.iter_mut() {
+            if let Kind::VisionSensor(sensor) = &mut object.kind
+                && which.include(handle, sensor)
+            {
+                sensor.shown = Some(shown.clone());
+            }
+        }
         Ok(())
     }
 

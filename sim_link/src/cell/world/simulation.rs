@@ -37,8 +37,6 @@ pub enum State {
 pub struct Simulation {
     state: State,
     time_s: f64,
-    /// Passes since the start; with the time step it gives the time without accumulated rounding.
-    passes: u64,
     time_step_s: f64,
     pause_wanted: bool,
     stop_wanted: bool,
@@ -60,7 +58,6 @@ impl Default for Simulation {
         Self {
             state: State::Stopped,
             time_s: 0.0,
-            passes: 0,
             time_step_s: DEFAULT_TIME_STEP_S,
             pause_wanted: false,
             stop_wanted: false,
@@ -80,14 +77,15 @@ impl Simulation {
         !matches!(self.state, State::Stopped | State::Paused)
     }
 
-    /// Simulated seconds since the start; keeps its last value after the end.
+    /// Simulated seconds since the start; keeps its last value after the end. Time steps are added up one by one, as the
+    /// simulator does, with what rounding makes of it: 5 s are 101 passes of 0.05 s away.
     pub fn time_s(&self) -> f64 {
         self.time_s
     }
 
     /// What [`Self::time_s`] is once the pass under way is over.
     pub(super) fn time_after_pass_s(&self) -> f64 {
-        (self.passes + 1) as f64 * self.time_step_s
+        self.time_s + self.time_step_s
     }
 
     /// Length of one pass in seconds.
@@ -117,7 +115,6 @@ impl Simulation {
             State::Stopped => {
                 self.state = State::FirstAfterStop;
                 self.time_s = 0.0;
-                self.passes = 0;
                 self.before_start = tree
                     .iter()
                     .map(|(handle, object)| {
@@ -152,8 +149,7 @@ impl Simulation {
 
     /// Ends a pass: time moves on, the state changes. `true` when this was the last pass.
     pub(super) fn end_pass(&mut self) -> bool {
-        self.passes += 1;
-        self.time_s = self.passes as f64 * self.time_step_s;
+        self.time_s = self.time_after_pass_s();
         self.state = match self.state {
             State::AboutToStop => State::LastBeforeStop,
             State::LastBeforeStop => State::Stopped,

@@ -12,21 +12,18 @@ use super::{CellInfo, CellObjects, CellPaths, JOINTS, JointAngles, discover, rea
 use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;
 use crate::client::options::{CallOptions, ConnectionOptions};
-use crate::client::sim::{JointMotion, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, Sim};
+use crate::client::sim::{ObjectHandle, Sim};
 use handeye_core::progress::CancelToken;
-
-/// Longest motion, in real time. The slowest sensible one takes a minute; a simulation may run slower than real time.
-const LONGEST_MOTION: Duration = Duration::from_mins(10);
 
 /// Passes in a row that have to be at rest: one alone may be the turning point of an oscillation.
 const RESTING_PASSES: u32 = 3;
 
-/// How long a pass that is under way may go on after a motion was cancelled: a pass takes a twentieth of a second, but
-/// another client may hold the simulation for ever.
-const BRAKE_GRACE: Duration = Duration::from_millis(300);
+/// How far a kinematic joint is sent to make it take positions again \[rad\]: the simulator moves it only if it is more
+/// than 0.01° away. A fifth of a millimetre at the reach of the arm.
+const NUDGE_RAD: f64 = 0.02 * std::f64::consts::PI / 180.0;
 
-/// Longest time to come to rest, in real time. From the fastest motion of the reference tour it takes about two seconds.
-const LONGEST_BRAKING: Duration = Duration::from_secs(10);
+/// How long that may take, in real time: a second at the limits that a joint has by default.
+const LONGEST_NUDGE: Duration = Duration::from_secs(5);
 
 /// The built-in cell's function that brakes every motion.
 const STOP_FUNCTION: &str = "handeye.stop";
@@ -72,42 +69,6 @@ pub struct Arm {
     pub(super) objects: Arc<CellObjects>,
     pub(super) info: Arc<CellInfo>,
     pub(super) hold: Hold,
-}
-
-/// What differs between motions of joints and of the tip.
-enum Motion {
-    Joints(JointMotion),
-    Pose(PoseMotion),
-}
-
-impl Motion {
-    fn init(&self, sim: &mut Sim) -> Result<MotionState, LinkError> {
-        match self {
-            Self::Joints(motion) => sim.move_to_config_init(motion),
-            Self::Pose(motion) => sim.move_to_pose_init(motion),
-        }
-    }
-
-    fn step(&self, sim: &mut Sim, state: &mut MotionState) -> Result<MotionStatus, LinkError> {
-        match self {
-            Self::Joints(_) => sim.move_to_config_step(state),
-            Self::Pose(_) => sim.move_to_pose_step(state),
-        }
-    }
-
-    fn cleanup(&self, sim: &mut Sim, state: MotionState) -> Result<(), LinkError> {
-        match self {
-            Self::Joints(_) => sim.move_to_config_cleanup(state),
-            Self::Pose(_) => sim.move_to_pose_cleanup(state),
-        }
-    }
-
-    fn whole(&self, sim: &mut Sim, options: &CallOptions) -> Result<(), LinkError> {
-        match self {
-            Self::Joints(motion) => sim.move_to_config(motion, options),
-            Self::Pose(motion) => sim.move_to_pose(motion, options),
-        }
-    }
 }
 
 impl Arm {
@@ -158,63 +119,9 @@ impl Arm {
         truth::read(&mut self.sim, &self.objects, &self.info)
     }
 
-    /// Moves the joints to `goal` (rad) within `limits` and returns when the motion is over; an arm with dynamic joints
-    /// still follows for a moment, see [`Arm::settle`].
-    ///
-    /// # Errors
-    /// [`LinkError::JointOutOfRange`] or [`LinkError::BadMotion`] before anything moves; [`LinkError::NotRunning`];
-    /// [`LinkError::Cancelled`] with the arm stopped, [`LinkError::MotionStopped`] when it was another client that
-    /// stopped it; [`LinkError::Unsupported`] before CoppeliaSim 4.7.
-    pub fn move_to_joints(
-        &mut self,
-        goal: &JointAngles,
-        limits: &MotionLimits,
-        cancel: &CancelToken,
-    ) -> Result<(), LinkError> {
-        self.check_range(goal)?;
-        self.drive(
-            &Motion::Joints(JointMotion {
-                joints: self.objects.joints.to_vec(),
-                target_rad: goal.to_vec(),
-                limits: limits.clone(),
-            }),
-            "moving the joints",
-            cancel,
-        )
-    }
-
-    /// Moves the tip to `goal` within `limits` (x, y, z, angle), waits until the arm stands still, and compares.
-    ///
-    /// # Errors
-    /// As [`Arm::move_to_joints`]; [`LinkError::Unreached`] when the tip is elsewhere, [`LinkError::NotSettled`] when it
-    /// does not come to rest, [`LinkError::NoSuchObject`] in a scene without a target dummy.
-    pub fn move_to_pose(
-        &mut self,
-        goal: &Pose<Base, Tip>,
-        limits: &MotionLimits,
-        tolerance: &MotionTolerance,
-        cancel: &CancelToken,
-    ) -> Result<(), LinkError> {
-        if !goal.is_finite() {
-            let value = f64::NAN;
-            return Err(LinkError::BadMotion { what: "the goal", expected: "a finite pose", value });
-        }
-        let Some(target) = self.objects.target else {
-            let path = self.objects.target_path.clone();
-            return Err(LinkError::NoSuchObject { path, what: "target dummy of motions" });
-        };
-        let motion = PoseMotion { tip: self.objects.tip, target, target_pose: *goal, limits: limits.clone() };
-        self.drive(&Motion::Pose(motion), "moving the tip", cancel)?;
-        self.settle(&SettleOptions::default(), cancel)?;
-        let (distance_m, angle_rad) = self.base_from_tip()?.distance_to(goal);
-        if distance_m <= tolerance.distance_m && angle_rad <= tolerance.angle_rad {
-            return Ok(());
-        }
-        Err(LinkError::Unreached { distance_mm: distance_m * 1e3, angle_deg: angle_rad.to_degrees() })
-    }
-
     /// Brings the arm to rest, whoever moves it: the built-in cell brakes every motion within its limits. CoppeliaSim has
-    /// no such call; there every joint is told to stay where it is now.
+    /// no such call; there a joint that a target position moves is told to stay where it is now. A joint that is put from
+    /// place to place stands as soon as nobody does so, and is left alone.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call; the arm may then still move.
@@ -222,15 +129,60 @@ impl Arm {
         if self.brake()? {
             return Ok(());
         }
-        for &joint in &self.objects.joints {
+        for index in 0..JOINTS {
+            let joint = self.objects.joints[index];
             let here_rad = self.sim.get_joint_position(joint)?;
-            self.sim.set_joint_target_position(joint, here_rad)?;
+            if self.sim.is_joint_dynamic(joint)? {
+                self.sim.set_joint_target_position(joint, here_rad)?;
+            } else if !self.sim.set_joint_position(joint, here_rad)? {
+                self.nudge(index, here_rad)?;
+            }
         }
         Ok(())
     }
 
+    /// Where the joints stand, each of them ready to be put elsewhere.
+    ///
+    /// A kinematic joint that was sent to a target position refuses any other until it has been moved there, and one that
+    /// stood there already is never moved: a script, or a client that stopped it, leaves an arm that reports success
+    /// without moving, until the simulation ends.
+    ///
+    /// # Errors
+    /// [`LinkError::JointElsewhere`] for a joint that something else keeps moving.
+    pub(super) fn movable_joints(&mut self) -> Result<JointAngles, LinkError> {
+        let started = Instant::now();
+        let mut is_nudged = [false; JOINTS];
+        loop {
+            let mut refuses = None;
+            let here = self.joint_angles()?;
+            for index in 0..JOINTS {
+                let joint = self.objects.joints[index];
+                if self.sim.is_joint_dynamic(joint)? || self.sim.set_joint_position(joint, here[index])? {
+                    continue;
+                }
+                refuses = Some(index);
+                if !std::mem::replace(&mut is_nudged[index], true) {
+                    self.nudge(index, here[index])?;
+                }
+            }
+            let Some(index) = refuses else { return Ok(here) };
+            if started.elapsed() > LONGEST_NUDGE {
+                let at_deg = here[index].to_degrees();
+                return Err(LinkError::JointElsewhere { joint: index + 1, at_deg, goal_deg: at_deg });
+            }
+            self.sim.step(&CallOptions::default())?;
+        }
+    }
+
+    /// Sends a kinematic joint a little towards the middle of its range.
+    fn nudge(&mut self, index: usize, here_rad: f64) -> Result<(), LinkError> {
+        let interval = &self.info.joint_intervals[index];
+        let to_middle = if here_rad > f64::midpoint(interval.min_rad, interval.max_rad) { -1.0 } else { 1.0 };
+        self.sim.set_joint_target_position(self.objects.joints[index], here_rad + to_middle * NUDGE_RAD)
+    }
+
     /// Has the server brake every motion; `false` when it has no function for that.
-    fn brake(&mut self) -> Result<bool, LinkError> {
+    pub(super) fn brake(&mut self) -> Result<bool, LinkError> {
         match self.sim.connection().call(STOP_FUNCTION, Vec::new()) {
             Ok(_nothing) => Ok(true),
             Err(error) if error.is_unknown_function() => Ok(false),
@@ -251,7 +203,7 @@ impl Arm {
         let started = Instant::now();
         let mut start_s = self.sim.get_simulation_time()?;
         let (mut before_s, mut before) = (start_s, self.joint_angles()?);
-        let mut resting = 0;
+        let (mut resting, mut looks) = (0, 0);
         loop {
             self.sim.step(&call)?;
             let (now_s, now) = (self.sim.get_simulation_time()?, self.joint_angles()?);
@@ -265,7 +217,7 @@ impl Arm {
                 require_running(&mut self.sim, task)?;
                 if now_s < before_s {
                     // The simulation was ended and started again.
-                    (start_s, before_s, before, resting) = (now_s, now_s, now, 0);
+                    (start_s, before_s, before, resting, looks) = (now_s, now_s, now, 0, 0);
                 }
                 continue;
             }
@@ -276,105 +228,12 @@ impl Arm {
             if resting >= RESTING_PASSES {
                 return Ok(after_s);
             }
-            // A simulation that runs faster than it is asked may be past the limit and at rest for long.
-            if resting == 0 && after_s > options.limit_s {
+            // A simulation that runs faster than it is asked may be past the limit at the first look, and at rest for long.
+            looks += 1;
+            if resting == 0 && looks > RESTING_PASSES && after_s > options.limit_s {
                 return Err(LinkError::NotSettled { after_s, rate_deg_s: rate_rad_s.to_degrees() });
             }
             (before_s, before) = (now_s, now);
-        }
-    }
-
-    fn check_range(&self, goal: &JointAngles) -> Result<(), LinkError> {
-        for (index, (&goal_rad, interval)) in goal.iter().zip(&self.info.joint_intervals).enumerate() {
-            if !goal_rad.is_finite() {
-                let expected = "finite angles";
-                return Err(LinkError::BadMotion { what: "the goal", expected, value: goal_rad });
-            }
-            // A millionth of a radian over the end is rounding, and clamping it moves nothing.
-            let inside = (interval.min_rad - 1e-6..=interval.max_rad + 1e-6).contains(&goal_rad);
-            if !interval.cyclic && !inside {
-                return Err(LinkError::JointOutOfRange {
-                    joint: index + 1,
-                    goal_deg: goal_rad.to_degrees(),
-                    min_deg: interval.min_rad.to_degrees(),
-                    max_deg: interval.max_rad.to_degrees(),
-                });
-            }
-        }
-        Ok(())
-    }
-
-    fn drive(&mut self, motion: &Motion, task: &'static str, cancel: &CancelToken) -> Result<(), LinkError> {
-        match motion {
-            Motion::Joints(motion) => motion.limits.validate(JOINTS)?,
-            Motion::Pose(motion) => motion.limits.validate(4)?,
-        }
-        require_running(&mut self.sim, task)?;
-        if cancel.is_cancelled() {
-            return Err(LinkError::Cancelled { call: task.to_owned() });
-        }
-        match motion.init(&mut self.sim) {
-            Ok(state) => self.drive_stepwise(motion, state, task, cancel),
-            Err(LinkError::Unsupported { .. }) => {
-                let outcome = motion.whole(&mut self.sim, &CallOptions::long(LONGEST_MOTION, cancel));
-                match outcome {
-                    Err(LinkError::Cancelled { .. } | LinkError::Timeout { .. }) => self.stop().and(outcome),
-                    outcome => outcome,
-                }
-            }
-            Err(error) => Err(error),
-        }
-    }
-
-    fn drive_stepwise(
-        &mut self,
-        motion: &Motion,
-        mut state: MotionState,
-        task: &'static str,
-        cancel: &CancelToken,
-    ) -> Result<(), LinkError> {
-        let started = Instant::now();
-        // A pass that is under way may end: then the motion is still there to be braked.
-        let patient = CallOptions { grace: BRAKE_GRACE, ..CallOptions::cancelled_by(cancel) };
-        let mut braking_since: Option<Instant> = None;
-        let outcome = loop {
-            if cancel.is_cancelled() && braking_since.is_none() {
-                match self.brake() {
-                    Ok(true) => braking_since = Some(Instant::now()),
-                    Ok(false) => break Err(LinkError::Cancelled { call: task.to_owned() }),
-                    Err(error) => break Err(error),
-                }
-            }
-            if let Some(since) = braking_since.filter(|since| since.elapsed() > LONGEST_BRAKING) {
-                let (awaited, after) = ("the arm to brake".to_owned(), since.elapsed());
-                break Err(LinkError::WaitedTooLong { task, awaited, after });
-            }
-            if started.elapsed() > LONGEST_MOTION {
-                let (awaited, after) = ("the arm to arrive".to_owned(), started.elapsed());
-                break Err(LinkError::WaitedTooLong { task, awaited, after });
-            }
-            let call = if braking_since.is_some() { CallOptions::default() } else { patient.clone() };
-            let stepped = motion.step(&mut self.sim, &mut state);
-            // The commanded point takes effect in the pass that follows, also the last one.
-            match stepped.and_then(|status| self.sim.step(&call).map(|()| status)) {
-                Ok(MotionStatus::Running) => {}
-                Ok(MotionStatus::Done) => break Ok(()),
-                Ok(MotionStatus::Stopped) => {
-                    motion.cleanup(&mut self.sim, state)?;
-                    return Err(match braking_since {
-                        Some(_) => LinkError::Cancelled { call: task.to_owned() },
-                        None => LinkError::MotionStopped { task },
-                    });
-                }
-                Err(error) => break Err(error),
-            }
-        };
-        match &outcome {
-            Ok(()) => motion.cleanup(&mut self.sim, state),
-            // A server that has gone or hangs drives nothing any more, and asking it to tidy up only takes time.
-            Err(LinkError::Disconnected { .. } | LinkError::Timeout { .. } | LinkError::Unreachable { .. }) => outcome,
-            // The arm has to stand before the caller hears of it. If it cannot be told to, that is the worse news.
-            Err(_) => self.stop().and(motion.cleanup(&mut self.sim, state)).and(outcome),
         }
     }
 }

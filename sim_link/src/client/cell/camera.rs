@@ -27,6 +27,9 @@ pub struct Frame {
     pub depth: DepthImage,
     /// Simulated time (s).
     pub sim_time_s: f64,
+    /// How much older than pose and joints the images may be (s of simulated time): nothing where all of it is of one
+    /// instant. An arm at rest for longer than that is in the images where it is.
+    pub image_age_s: f64,
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
     /// Positions of the joints (rad).
@@ -41,6 +44,8 @@ pub struct CameraFeed {
     objects: Arc<CellObjects>,
     info: Arc<CellInfo>,
     hold: Hold,
+    /// Whether the server takes images on request, as far as is known.
+    renews: bool,
     /// Whether the server tells what its images show, as far as is known.
     tells_moment: bool,
 }
@@ -48,7 +53,7 @@ pub struct CameraFeed {
 impl CameraFeed {
     pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
         let tells_moment = info.is_handeye_cell;
-        Self { sim, objects, info, hold: Hold::default(), tells_moment }
+        Self { sim, objects, info, hold: Hold::default(), renews: true, tells_moment }
     }
 
     /// Connects once, for a camera without its arm.
@@ -72,24 +77,22 @@ impl CameraFeed {
 
     /// Images, poses and time of one instant.
     ///
-    /// The simulation is held for the few milliseconds that it takes. A server that cannot be held is read until the
-    /// clock says the same before and after. Images are those of the last complete pass: after a motion they show the
-    /// arm at rest only once it has settled, see [`super::Arm::settle`]; while the simulation is stopped they are not
-    /// renewed at all.
+    /// The simulation is held for the few milliseconds that it takes, and has its sensors take their images meanwhile:
+    /// the simulator does so at the end of a pass, and answers at the beginning of the next, so a joint that was put
+    /// elsewhere since is in the pose and not yet in the image. A built-in cell also tells where its board was.
     ///
-    /// A built-in cell tells what it was that the images show, and all of the frame is of that pass. Elsewhere, and
-    /// before the first pass, poses and time are those of now: a joint that was put elsewhere since the last pass is
-    /// there already, and not yet in the images.
+    /// A server that cannot be held is read until the clock says the same before and after; there, and where images
+    /// cannot be asked for, [`Frame::image_age_s`] says how much older than the pose they may be.
     ///
     /// # Errors
     /// [`LinkError::MixedInstants`] when the simulation is never still for long enough; otherwise as for any call.
     pub fn grab(&mut self) -> Result<Frame, LinkError> {
         if let Some(held) = self.hold.acquire(&mut self.sim)? {
-            let outcome = self.read();
+            let outcome = self.renew().and_then(|image_age_s| self.read(image_age_s));
             return held.release(&mut self.sim, outcome);
         }
         for _ in 0..ATTEMPTS {
-            let frame = self.read()?;
+            let frame = self.read(self.info.time_step_s)?;
             if self.sim.get_simulation_time()? == frame.sim_time_s {
                 return Ok(frame);
             }
@@ -97,9 +100,24 @@ impl CameraFeed {
         Err(LinkError::MixedInstants { attempts: ATTEMPTS })
     }
 
-    fn read(&mut self) -> Result<Frame, LinkError> {
-        let Some(shown) = self.shown()? else { return self.read_present() };
+    /// Has the sensors take their images; returns how much older than the pose they may be even so.
+    fn renew(&mut self) -> Result<f64, LinkError> {
+        if self.renews {
+            match self.sim.handle_vision_sensors() {
+                Err(error @ LinkError::Remote { .. }) => {
+                    tracing::info!(%error, "images may be a pass older than the pose beside them");
+                    self.renews = false;
+                }
+                outcome => return outcome.map(|()| 0.0),
+            }
+        }
+        Ok(self.info.time_step_s)
+    }
+
+    fn read(&mut self, image_age_s: f64) -> Result<Frame, LinkError> {
+        let Some(shown) = self.shown()? else { return self.read_present(image_age_s) };
         Ok(Frame {
+            image_age_s: 0.0,
             rgb: self.sim.get_vision_sensor_image(self.objects.camera)?,
             depth: self.sim.get_vision_sensor_depth(self.objects.depth)?,
             sim_time_s: shown.sim_time_s,
@@ -122,9 +140,10 @@ impl CameraFeed {
         }
     }
 
-    fn read_present(&mut self) -> Result<Frame, LinkError> {
+    fn read_present(&mut self, image_age_s: f64) -> Result<Frame, LinkError> {
         // Time first: without a hold it is compared with the time after everything else.
         Ok(Frame {
+            image_age_s,
             sim_time_s: self.sim.get_simulation_time()?,
             base_from_tip: self.sim.get_object_pose(self.objects.tip, ObjectHandle::WORLD)?,
             joints: read_joint_angles(&mut self.sim, &self.objects.joints)?,

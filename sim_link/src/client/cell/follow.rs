@@ -210,7 +210,7 @@ impl Arm {
         limits.validate()?;
         positive([("the time step of the simulation", self.info.time_step_s)])?;
         require_running(&mut self.sim, TASK)?;
-        let start = self.joint_angles()?;
+        let start = self.movable_joints()?;
         if !kinematics.fits(&start, &self.base_from_tip()?) {
             return Ok(FollowEnd::OtherTip);
         }
@@ -267,7 +267,7 @@ impl Arm {
                 Point { joints, target: goal.map(|goal| goal.base_from_tip) }
             })?;
             match pass {
-                Pass::NotFollowing(joint) => return Ok(FollowEnd::NotFollowing { joint: joint + 1 }),
+                Pass::NotFollowing { joint, .. } => return Ok(FollowEnd::NotFollowing { joint: joint + 1 }),
                 Pass::None => require_running(&mut self.sim, TASK)?,
                 Pass::Sent if stream.is_stopped() => ending = Some(Ok(FollowEnd::Stopped)),
                 Pass::Sent => ending = ending.or(plan.obstacle().map(Ok)),

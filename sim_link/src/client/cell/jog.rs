@@ -95,7 +95,7 @@ impl Arm {
         if let Some(value) = length.filter(|length| !(length.is_finite() && *length >= 0.0)) {
             return Err(LinkError::BadMotion { what: "the length", expected: "zero or more", value });
         }
-        let start = self.joint_angles()?;
+        let start = self.movable_joints()?;
         if let ArmJog::Line { kinematics, .. } | ArmJog::Turn { kinematics, .. } = jog
             && !kinematics.fits(&start, &self.base_from_tip()?)
         {
@@ -125,7 +125,7 @@ impl Arm {
                 Point { joints: plan.advance(share), target: None }
             })?;
             match pass {
-                Pass::NotFollowing(joint) => return Ok(JogEnd::NotFollowing { joint: joint + 1 }),
+                Pass::NotFollowing { joint, .. } => return Ok(JogEnd::NotFollowing { joint: joint + 1 }),
                 Pass::None => require_running(&mut self.sim, TASK)?,
                 Pass::Sent if plan.is_at_end() => return Ok(JogEnd::Arrived),
                 Pass::Sent if plan.is_at_rest() => match plan.obstacle() {

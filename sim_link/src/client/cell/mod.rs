@@ -5,15 +5,11 @@
 //! its own, so that pictures keep coming while the arm moves.
 //!
 //! # How motions are driven
-//! A motion can be left to the server (`sim.moveToConfig`, one call that ends when the arm is there) or taken step by
-//! step (`_init`, then `_step` and `sim.step` for each pass, then `_cleanup`). [`Arm`] takes it step by step: between
-//! two steps the stop button is looked at, and a client that dies leaves an arm that stands still, not one that carries
-//! on. Jogging ([`Arm::jog`]) and following ([`Arm::follow`]) compute each point here and send it for one pass, for the
-//! same reasons. The API has no other way to end a motion of another client. The simulation is not taken into stepping
-//! mode for it: it keeps its pace, other clients keep theirs, and a crash cannot freeze it; the price is that a slow
-//! network makes the arm pause for a pass now and then on its way, which changes nothing about where it ends.
-//! A server without the step functions gets the single call. Cancelling that ends this client's record on the server
-//! and with it, on CoppeliaSim, the motion; the arm is told to stay where it is in either case.
+//! Each point of a motion, a jog or a path that is followed is computed here and sent for one pass of the simulation: the
+//! API has no way to end a motion of another client, and a client that dies must leave an arm that stands still. The
+//! simulation is not taken into stepping mode for it: it keeps its pace, other clients keep theirs, and a crash cannot
+//! freeze it; the price is that a slow network makes the arm pause for a pass now and then on its way, which changes
+//! nothing about where it ends. Only the inverse kinematics of an arm that is not known is left to the server.
 
 mod arm;
 mod board;
@@ -23,10 +19,13 @@ mod follow_plan;
 mod hold;
 mod jog;
 mod jog_plan;
+mod motion;
 mod reach;
 mod room;
 mod sentinel;
+mod served;
 mod stream;
+mod support;
 mod truth;
 mod views;
 
@@ -46,6 +45,7 @@ pub use jog_plan::{
 };
 pub use reach::{ArmKinematics, UnknownKinematics};
 pub use room::{BoardReach, FollowPlace, NoPlace};
+pub use support::{Support, version_name};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
 pub use views::BoardInView;
 
@@ -153,8 +153,7 @@ impl CellClient {
     /// # Errors
     /// As [`Self::connect`].
     pub fn over(mut control: Sim, camera: Sim, paths: &CellPaths) -> Result<Self, LinkError> {
-        let objects = Arc::new(CellObjects::find(&mut control, paths)?);
-        let info = Arc::new(CellInfo::read(&mut control, &objects)?);
+        let (objects, info) = look_around(&mut control, paths)?;
         Ok(Self {
             arm: Arm::new(control, Arc::clone(&objects), Arc::clone(&info)),
             camera: CameraFeed::new(camera, objects, Arc::clone(&info)),
@@ -262,17 +261,16 @@ impl CellInfo {
         self.optics.intrinsics()
     }
 
-    fn read(sim: &mut Sim, objects: &CellObjects) -> Result<Self, LinkError> {
+    /// What works with the server.
+    pub fn support(&self) -> Support {
+        Support::of(self.protocol, self.program_version)
+    }
+
+    fn read(sim: &mut Sim, objects: &CellObjects, program_version: i64) -> Result<Self, LinkError> {
         let mut joint_intervals = Vec::with_capacity(JOINTS);
         for &joint in &objects.joints {
             joint_intervals.push(sim.get_joint_interval(joint)?);
         }
-        let program_version = match sim.program_version() {
-            Ok(version) => version,
-            // Only shown to the user; a server that answers no still serves the cell.
-            Err(LinkError::Remote { .. } | LinkError::UnexpectedReply { .. }) => 0,
-            Err(error) => return Err(error),
-        };
         Ok(Self {
             endpoint: sim.connection().endpoint().clone(),
             protocol: sim.connection().version().unwrap_or(ProtocolVersion::V2),
@@ -313,9 +311,16 @@ fn discover(
     paths: &CellPaths,
 ) -> Result<(Sim, Arc<CellObjects>, Arc<CellInfo>), LinkError> {
     let mut sim = Sim::connect(endpoint, options.clone())?;
-    let objects = CellObjects::find(&mut sim, paths)?;
-    let info = CellInfo::read(&mut sim, &objects)?;
-    Ok((sim, Arc::new(objects), Arc::new(info)))
+    let (objects, info) = look_around(&mut sim, paths)?;
+    Ok((sim, objects, info))
+}
+
+/// The version first: an old server lacks what the rest asks for.
+fn look_around(sim: &mut Sim, paths: &CellPaths) -> Result<(Arc<CellObjects>, Arc<CellInfo>), LinkError> {
+    let program_version = support::program_version(sim)?;
+    let objects = CellObjects::find(sim, paths)?;
+    let info = CellInfo::read(sim, &objects, program_version)?;
+    Ok((Arc::new(objects), Arc::new(info)))
 }
 
 /// An object that the scene has to have. Only when the server says that there is none it is so; another refusal is the

@@ -4,7 +4,7 @@ use handeye_core::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Vector3};
 
 use super::{Arm, CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles};
-use crate::cell::kinematics::{self, IkError, JointLimits};
+use crate::cell::kinematics::{self, DlsOptions, IkError, JointLimits};
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
 
@@ -115,6 +115,13 @@ impl ArmKinematics {
         }
         let arm_from_connection = self.base_from_arm.inverse() * goal.isometry() * self.connection_from_tip.inverse();
         kinematics::inverse_nearest(&arm_from_connection, seed, limits)
+    }
+
+    /// The joint positions (rad), found from `seed` on, that take the tip as near to `goal` as the arm can.
+    pub(super) fn towards(&self, goal: &Pose<Base, Tip>, seed: &JointAngles) -> JointAngles {
+        let arm_from_tip = self.base_from_arm.inverse() * goal.isometry();
+        let options = DlsOptions { precision_m: 1e-6, precision_rad: 1e-6, ..DlsOptions::default() };
+        kinematics::towards(&arm_from_tip, &self.connection_from_tip, seed, &options, &self.limits)
     }
 
     /// Whether a reported tip is where it should be with these joints: the scene may have changed since.

@@ -56,14 +56,19 @@ pub(super) struct Point {
 }
 
 /// What became of a pass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Pass {
     /// None has gone by since the last point.
     None,
     /// A point was sent, and the pass is over.
     Sent,
-    /// This joint, counted from 0, is not where it was sent; nothing was sent.
-    NotFollowing(usize),
+    /// A joint is not where it was sent; nothing was sent.
+    NotFollowing {
+        /// Which, counted from 0.
+        joint: usize,
+        /// Where it is \[rad\].
+        at_rad: f64,
+    },
 }
 
 impl Stream {
@@ -84,6 +89,11 @@ impl Stream {
             Err(error) if error.is_connection_loss() => Err(error),
             outcome => self.sentinel.end(&mut arm.sim).and(outcome),
         }
+    }
+
+    /// Where the joints were sent last.
+    pub fn sent(&self) -> &JointAngles {
+        &self.sent
     }
 
     /// Whether a client had the cell stop everything since it began.
@@ -109,6 +119,16 @@ impl Stream {
     /// Sends the next point, if a pass has gone by since the last one and the joints are where they were sent, and waits
     /// for the end of the pass. `next` is called while the simulation is held, so it must be quick.
     pub fn pass(&mut self, arm: &mut Arm, next: impl FnOnce(&Slot) -> Point) -> Result<Pass, LinkError> {
+        self.pass_with(arm, &CallOptions::default(), next)
+    }
+
+    /// [`Self::pass`] with limits of its own for the wait.
+    pub fn pass_with(
+        &mut self,
+        arm: &mut Arm,
+        wait: &CallOptions,
+        next: impl FnOnce(&Slot) -> Point,
+    ) -> Result<Pass, LinkError> {
         // All joints go to a point in the same pass, however slow the network.
         let lock = arm.hold.acquire(&mut arm.sim)?;
         let pass = self.sentinel.is_stopped(&mut arm.sim).and_then(|now| {
@@ -120,7 +140,7 @@ impl Stream {
             None => pass?,
         };
         // A point takes effect in the pass that follows, also the last one.
-        arm.sim.step(&CallOptions::default())?;
+        arm.sim.step(wait)?;
         Ok(pass)
     }
 
@@ -134,7 +154,7 @@ impl Stream {
         let joints = read_joint_angles(&mut arm.sim, &arm.objects.joints)?;
         let tolerance = |joint: usize| if self.dynamic[joint] { DRIVEN_OFF_RAD } else { PLACED_OFF_RAD };
         if let Some(joint) = (0..JOINTS).find(|&i| difference_rad(joints[i], self.sent[i]) > tolerance(i)) {
-            return Ok(Pass::NotFollowing(joint));
+            return Ok(Pass::NotFollowing { joint, at_rad: joints[joint] });
         }
         let point = next(&Slot { now_s, since_last_s, is_stopped: self.is_stopped });
         for joint in (0..JOINTS).filter(|&i| point.joints[i] != self.sent[i]) {
@@ -159,7 +179,7 @@ pub(super) fn clock_past(now_s: f64) -> String {
 }
 
 /// Between two angles, the short way round: a joint that turns without end comes back from the other side.
-fn difference_rad(a: f64, b: f64) -> f64 {
+pub(super) fn difference_rad(a: f64, b: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     let rest = (a - b).rem_euclid(turn);
     rest.min(turn - rest)

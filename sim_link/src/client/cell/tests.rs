@@ -18,7 +18,6 @@ struct World {
     time_s: f64,
     joints: [f64; JOINTS],
     targets: [f64; JOINTS],
-    goal: Option<[f64; JOINTS]>,
     base_from_tip: Pose<Base, Tip>,
     /// Parts of the way that a joint goes towards its target in a pass.
     follow: f64,
@@ -27,11 +26,22 @@ struct World {
     moment: Option<Value>,
     passes_per_image: u32,
     cancel_at_step: Option<(u32, CancelToken)>,
+    /// Where joint 0 was in each pass.
+    track: Vec<f64>,
+    /// The mode of every joint: 0 is kinematic, 5 dynamic.
+    joint_mode: i64,
+    /// This joint refuses positions, until it was sent to a target that is not where it stands.
+    stuck: Option<i64>,
+    /// The account of a motion that the server gives.
+    motion_state: Option<Vec<u8>>,
+    /// Times that the sensors were handled.
+    handled: u32,
     die_in: Option<&'static str>,
     steps: u32,
     held: i32,
     /// Simulated time after a pass.
     clock: fn(f64) -> f64,
+    version: i64,
     /// What is wrong with every path.
     no_path: Option<&'static str>,
 }
@@ -49,7 +59,6 @@ fn world() -> Shared {
         time_s: 1.0,
         joints: [0.0; JOINTS],
         targets: [0.0; JOINTS],
-        goal: None,
         base_from_tip: Pose::from_translation_xyzw([0.1, 0.2, 0.9], [0.0, 0.0, 0.0, 1.0]),
         follow: 1.0,
         missing: Vec::new(),
@@ -57,10 +66,16 @@ fn world() -> Shared {
         moment: None,
         passes_per_image: 0,
         cancel_at_step: None,
+        track: Vec::new(),
+        joint_mode: 0,
+        stuck: None,
+        motion_state: None,
+        handled: 0,
         die_in: None,
         steps: 0,
         held: 0,
         clock: |time_s| time_s + 0.05,
+        version: 41_000,
         no_path: None,
     }))
 }
@@ -70,6 +85,12 @@ impl World {
         self.time_s = (self.clock)(self.time_s);
         for (joint, target) in self.joints.iter_mut().zip(self.targets) {
             *joint += self.follow * (target - *joint);
+        }
+        self.track.push(self.joints[0]);
+        if let Some((at, cancel)) = &self.cancel_at_step
+            && self.track.len() == *at as usize
+        {
+            cancel.cancel();
         }
     }
 
@@ -87,17 +108,27 @@ impl World {
             "sim.getJointInterval" => ret([Value::from(false), wire::floats([-3.0, 6.5])]),
             "sim.getJointPosition" => ret([Value::Float(self.joints[id as usize])]),
             "sim.setJointTargetPosition" => {
-                self.targets[id as usize] = args[1].number().expect("a number");
+                let target = args[1].number().expect("a number");
+                if (target - self.joints[id as usize]).abs() > 0.01_f64.to_radians() && self.stuck == Some(id) {
+                    self.stuck = None;
+                }
+                self.targets[id as usize] = target;
                 ret([Value::from(1)])
             }
-            "sim.getJointMode" => ret([Value::from(0)]),
+            "sim.getJointMode" => ret([Value::from(self.joint_mode)]),
+            "sim.setJointPosition" if self.stuck == Some(id) => ret([Value::from(0)]),
             "sim.setJointPosition" => {
                 self.joints[id as usize] = args[1].number().expect("a number");
                 self.targets[id as usize] = self.joints[id as usize];
-                ret([])
+                ret([Value::from(1)])
             }
-            "sim.setObjectPose" => ret([]),
-            "sim.getInt32Param" => ret([Value::from(41000)]),
+            "sim.handleVisionSensor" => {
+                assert_eq!((args[0].integer(), self.held), (Some(-3), 1), "all, while time stands");
+                self.handled += 1;
+                ret([Value::from(0)])
+            }
+            "sim.setObjectPose" | "zmqRemoteApi.require" => ret([]),
+            "sim.getInt32Param" => ret([Value::from(self.version)]),
             "sim.getVisionSensorRes" => ret([wire::integers([4, 2])]),
             "sim.getObjectInt32Param" => ret([Value::from(1)]),
             "sim.getObjectFloatParam" => ret([Value::Float(match args[1].integer() {
@@ -176,37 +207,25 @@ impl World {
         }
     }
 
-    /// Motions of three steps that end at their goal.
+    /// Motions to a pose of three steps; the inverse kinematics fails, and nothing moves.
     fn motion(&mut self, name: &str, args: &[Value]) -> Answer {
-        let numbers = |key: &str| args[0].get(key).and_then(Reader::numbers);
         match name {
-            "sim.moveToConfig_init" | "sim.moveToPose_init" => {
-                self.goal = numbers("targetPos").and_then(|q| q.try_into().ok());
+            "sim.moveToPose_init" => {
                 self.steps = 0;
-                ret([wire::map([("ruckigObj", Value::from(1))])])
+                match &self.motion_state {
+                    Some(bytes) => Answer::Raw(bytes.clone()),
+                    None => ret([wire::map([("ruckigObj", Value::from(1))])]),
+                }
             }
-            "sim.moveToConfig_step" | "sim.moveToPose_step" => {
+            "sim.moveToPose_step" => {
                 self.steps += 1;
-                if let Some((at, cancel)) = &self.cancel_at_step
-                    && *at == self.steps
-                {
-                    cancel.cancel();
-                }
-                let done = self.steps == 3;
-                if let Some(goal) = self.goal {
-                    self.targets = std::array::from_fn(|i| goal[i] * f64::from(self.steps) / 3.0);
-                }
-                ret([Value::from(i64::from(done)), args[0].clone()])
+                ret([Value::from(i64::from(self.steps == 3)), args[0].clone()])
             }
-            "sim.moveToConfig_cleanup" | "sim.moveToPose_cleanup" => {
+            "sim.moveToPose_cleanup" => {
                 self.steps = 0;
                 ret([])
             }
-            "sim.moveToConfig" => {
-                self.targets = numbers("targetPos").and_then(|q| q.try_into().ok()).expect("a goal");
-                self.pass();
-                ret([wire::map([("timeLeft", Value::Float(0.0))])])
-            }
+            "sim.moveToPose" => ret([wire::map([("timeLeft", Value::Float(0.0))])]),
             other => panic!("{other:?}"),
         }
     }
@@ -267,6 +286,21 @@ fn the_reference_scene_is_discovered() {
 }
 
 #[test]
+fn a_simulator_that_is_too_old_is_told_so_before_anything_else_is_asked() {
+    let world = world();
+    edit(&world, |w| w.version = 40_400);
+    let (client, control, _) = try_cell(&world);
+    let error = client.err().expect("4.4 has no resolution of a vision sensor");
+    assert!(error.to_string().contains("CoppeliaSim 4.4.0 lacks"), "{error}");
+    assert_eq!(control.functions(), ["sim.getInt32Param"]);
+
+    let support = |version| Support::of(ProtocolVersion::V2, version);
+    assert_eq!(Support::of(ProtocolVersion::V1, 40_501), Support::AtRest);
+    assert_eq!(support(40_600), Support::KnownArms);
+    assert!([40_700, 41_000, 0].map(support).iter().all(|support| *support == Support::Whole));
+}
+
+#[test]
 fn a_scene_without_its_tip_is_named_with_the_path() {
     let world = world();
     edit(&world, |w| w.missing.push("/UR5/Tip"));
@@ -304,32 +338,53 @@ fn a_scene_without_a_target_can_do_everything_but_motions_to_a_pose() {
 }
 
 #[test]
-fn a_motion_is_stepped_to_its_end_and_tidied_up() {
+fn a_motion_is_sent_point_by_point_within_its_limits() {
     let mut cell = cell(world());
     cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
     assert_eq!(cell.client.joint_angles(), Ok(GOAL));
     let functions = cell.control.functions();
-    let steps = functions.iter().filter(|f| *f == "sim.step").count();
-    assert_eq!(steps, 3, "every commanded point gets a pass, the last too");
-    assert!(functions.contains(&"sim.moveToConfig_cleanup".to_owned()));
-    assert!(!functions.contains(&"sim.setStepping".to_owned()), "other clients keep their clock");
+    for unwanted in ["sim.setStepping", "sim.setJointTargetPosition"] {
+        assert!(!functions.contains(&unwanted.to_owned()), "{unwanted}");
+    }
+    assert_gentle(&cell.world().track, 2.0);
+}
+
+/// Second differences over passes of 0.05 s are within an acceleration.
+fn assert_gentle(track: &[f64], most: f64) {
+    let start = [0.0; 2];
+    let passes: Vec<f64> = start.iter().chain(track).copied().collect();
+    for triple in passes.windows(3) {
+        let acceleration = (triple[2] - 2.0 * triple[1] + triple[0]) / (0.05 * 0.05);
+        assert!(acceleration.abs() <= most + 1e-6, "{acceleration} rad/s² over {triple:?}");
+    }
 }
 
 #[test]
-fn cancelling_between_steps_stops_the_arm_where_it_is() {
+fn a_motion_of_joints_that_controllers_move_waits_until_they_are_there() {
+    let world = world();
+    edit(&world, |w| (w.joint_mode, w.follow) = (5, 0.5));
+    let mut cell = cell(world);
+    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
+    let joints = cell.client.joint_angles().expect("a call");
+    assert!(joints.iter().zip(&GOAL).all(|(a, b)| (a - b).abs() < 1e-4), "{joints:?}");
+
+    edit(&cell.world, |w| w.follow = 0.0);
+    let error = cell.client.move_to_joints(&[0.0; JOINTS], &limits(), &CancelToken::default()).expect_err("they stand");
+    assert!(matches!(error, LinkError::JointElsewhere { .. }), "{error}");
+}
+
+#[test]
+fn a_cancelled_motion_is_braked_and_not_cut_off() {
     let world = world();
     let cancel = CancelToken::default();
-    edit(&world, |w| {
-        w.cancel_at_step = Some((2, cancel.clone()));
-        w.follow = 0.5;
-    });
+    edit(&world, |w| w.cancel_at_step = Some((12, cancel.clone())));
     let mut cell = cell(world);
     let error = cell.client.move_to_joints(&GOAL, &limits(), &cancel).expect_err("cancelled");
     assert!(matches!(error, LinkError::Cancelled { .. }), "{error}");
-    let world = cell.world();
-    assert_eq!(world.steps, 0, "the motion is tidied up on the server");
-    assert_eq!(world.targets, world.joints, "no joint has a way to go");
-    assert_ne!(world.joints, GOAL);
+    let track = cell.world().track.clone();
+    assert_gentle(&track, std::f64::consts::TAU);
+    assert!(track.len() > 13 && *track.last().expect("passes") < GOAL[0], "{track:?}");
+    assert!(!cell.control.functions().contains(&"sim.setJointTargetPosition".to_owned()), "that would lock the joints");
 }
 
 #[test]
@@ -338,16 +393,60 @@ fn a_motion_that_is_cancelled_before_it_begins_does_not_begin() {
     let cancel = CancelToken::default();
     cancel.cancel();
     assert!(matches!(cell.client.move_to_joints(&GOAL, &limits(), &cancel), Err(LinkError::Cancelled { .. })));
-    assert!(!cell.control.functions().contains(&"sim.moveToConfig_init".to_owned()));
+    assert!(!cell.control.functions().contains(&"sim.setJointPosition".to_owned()));
 }
 
 #[test]
-fn a_server_without_steps_gets_the_whole_motion() {
+fn a_stop_leaves_joints_alone_that_stand_where_they_were_put() {
+    let mut cell = cell(world());
+    cell.client.stop().expect("calls");
+    assert!(!cell.control.functions().contains(&"sim.setJointTargetPosition".to_owned()));
+    // What a target position moves is told to stay.
+    edit(&cell.world, |w| (w.joint_mode, w.targets, w.joints) = (5, [1.0; JOINTS], [0.5; JOINTS]));
+    cell.client.stop().expect("calls");
+    assert_eq!(cell.world().targets, [0.5; JOINTS]);
+}
+
+#[test]
+fn a_joint_that_takes_no_positions_is_freed_before_a_motion() {
     let world = world();
-    edit(&world, |w| w.missing.push("sim.moveToConfig_init"));
-    let mut cell = cell(world);
+    edit(&world, |w| w.stuck = Some(2));
+    let mut cell = cell(Arc::clone(&world));
     cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
     assert_eq!(cell.client.joint_angles(), Ok(GOAL));
+}
+
+#[test]
+fn a_joint_that_is_held_in_a_motion_is_named_with_where_it_stands() {
+    let world = world();
+    let mut cell = cell(Arc::clone(&world));
+    // Something locks it after the first points.
+    edit(&world, |w| w.clock = |time_s| time_s + 0.05);
+    let holding = Arc::clone(&world);
+    let held = std::thread::spawn(move || {
+        while holding.lock().unwrap_or_else(PoisonError::into_inner).track.len() < 3 {
+            std::thread::yield_now();
+        }
+        edit(&holding, |w| w.stuck = Some(4));
+    });
+    let slow = MotionLimits::uniform(JOINTS, 1e-3, 2.0, 1.0);
+    let error = cell.client.move_to_joints(&GOAL, &slow, &CancelToken::default()).expect_err("held");
+    held.join().expect("no panic");
+    let LinkError::JointElsewhere { joint: 5, at_deg, goal_deg } = error else { panic!("{error}") };
+    assert!(at_deg < goal_deg && goal_deg < GOAL[4].to_degrees(), "{at_deg}° {goal_deg}°");
+}
+
+#[test]
+fn a_motion_whose_account_breaks_off_is_made_in_one_call() {
+    let world = world();
+    // What the vendor's encoder makes of a map with 17 numbers as keys, of which it writes a few.
+    edit(&world, |w| w.motion_state = Some(b"\xa1\x63ret\x81\xa1\x62ik\x91\x0f\x01".to_vec()));
+    let mut cell = cell(world);
+    let here = cell.client.base_from_tip().expect("a pose");
+    cell.client
+        .move_to_pose(&here, &pose_limits(), &MotionTolerance::default(), &CancelToken::default())
+        .expect("there");
+    assert!(cell.control.functions().contains(&"sim.moveToPose".to_owned()));
 }
 
 #[test]
@@ -423,6 +522,7 @@ fn a_frame_is_of_one_instant_because_the_simulation_is_held() {
     let frame = cell.client.grab().expect("a frame");
     assert_eq!(frame.sim_time_s, cell.world().time_s, "time stood still");
     assert_eq!(cell.world().held, 0, "and goes on");
+    assert_eq!((cell.world().handled, frame.image_age_s), (1, 0.0), "the images show the joints of now");
     assert_eq!((frame.rgb.dimensions(), frame.depth.width, frame.depth.height), ((4, 2), 4, 2));
     assert_eq!(frame.rgb.get_pixel(0, 0).0, [12, 13, 14], "the second row of the buffer is the upper one");
 }
@@ -432,10 +532,23 @@ fn without_a_hold_a_frame_is_read_again_until_the_clock_stands() {
     let world = world();
     edit(&world, |w| w.missing.push("sim.acquireLock"));
     let mut cell = cell(world);
-    cell.client.grab().expect("the clock stands");
+    let frame = cell.client.grab().expect("the clock stands");
+    assert_eq!(frame.image_age_s, 0.05, "of the pass before, perhaps");
     cell.world().passes_per_image = 1;
     let error = cell.client.grab().expect_err("the clock runs");
     assert!(matches!(error, LinkError::MixedInstants { .. }), "{error}");
+}
+
+#[test]
+fn a_server_that_takes_no_images_on_request_is_asked_once() {
+    let world = world();
+    edit(&world, |w| w.missing.push("sim.handleVisionSensor"));
+    let mut cell = cell(world);
+    for _ in 0..2 {
+        assert_eq!(cell.client.grab().expect("a frame").image_age_s, 0.05);
+    }
+    let asked = cell.camera.functions().iter().filter(|f| *f == "sim.handleVisionSensor").count();
+    assert_eq!(asked, 1);
 }
 
 #[test]

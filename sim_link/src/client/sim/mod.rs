@@ -1,7 +1,7 @@
 //! The part of `sim.*` that the workbench uses, typed.
 //!
 //! Reference frames are always passed, and setters take `(object, frame, value)`: the order and the arity that every
-//! version from 4.2 to 4.10 accepts. What setters return (1 in version 1 of the protocol) is ignored.
+//! version from 4.5 on accepts. What setters return (1 in version 1 of the protocol) is ignored.
 
 mod control;
 mod motion;
@@ -11,7 +11,7 @@ mod sensors;
 use ciborium::Value;
 
 pub use control::SimulationState;
-pub use motion::{JointMotion, MotionLimits, MotionState, MotionStatus, PoseMotion};
+pub use motion::{MotionLimits, MotionState, MotionStatus, PoseMotion};
 pub use sensors::SensorOptics;
 
 use super::connection::Connection;

@@ -174,10 +174,14 @@ impl Sim {
 
     /// Puts a joint at a position (rad) at once. The simulator clamps to its interval.
     ///
+    /// `false` if the joint stays where it is: from CoppeliaSim 4.7 on one that a target position moves takes no other.
+    ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn set_joint_position(&mut self, joint: ObjectHandle, position_rad: f64) -> Result<(), LinkError> {
-        self.call("sim.setJointPosition", vec![joint.to_value(), Value::Float(position_rad)]).map(drop)
+    pub fn set_joint_position(&mut self, joint: ObjectHandle, position_rad: f64) -> Result<bool, LinkError> {
+        let reply = self.call("sim.setJointPosition", vec![joint.to_value(), Value::Float(position_rad)])?;
+        // Servers that never refuse may also say nothing.
+        Ok(reply.integer(0) != Ok(0))
     }
 
     /// Where the controller of a joint holds it or takes it (rad).

@@ -7,7 +7,8 @@ use handeye_core::image::RgbImage;
 
 use super::{ObjectHandle, Sim};
 use crate::client::constants::{
-    DEPTH_IN_METRES, VISION_FAR_CLIPPING, VISION_NEAR_CLIPPING, VISION_PERSPECTIVE, VISION_PERSPECTIVE_ANGLE,
+    DEPTH_IN_METRES, HANDLE_ALL_EXCEPT_EXPLICIT, VISION_FAR_CLIPPING, VISION_NEAR_CLIPPING, VISION_PERSPECTIVE,
+    VISION_PERSPECTIVE_ANGLE,
 };
 use crate::client::convert;
 use crate::client::error::LinkError;
@@ -35,7 +36,8 @@ impl SensorOptics {
 }
 
 impl Sim {
-    /// The colour image of a vision sensor, row 0 on top, as of the last pass of the simulation.
+    /// The colour image of a vision sensor, row 0 on top, as of when it was handled last: at the end of a pass, or in
+    /// [`Self::handle_vision_sensors`].
     ///
     /// # Errors
     /// Any [`LinkError`] of a call; [`LinkError::BadValue`] when buffer and size do not fit.
@@ -45,7 +47,8 @@ impl Sim {
         reply.checked(convert::rgb_from_bytes(reply.blob(0)?, width, height))
     }
 
-    /// The depth image of a vision sensor in metres, row 0 on top, as of the last pass of the simulation.
+    /// The depth image of a vision sensor in metres, row 0 on top, as of when it was handled last: at the end of a pass, or in
+    /// [`Self::handle_vision_sensors`].
     ///
     /// # Errors
     /// As [`Self::get_vision_sensor_image`].
@@ -90,12 +93,13 @@ impl Sim {
         })
     }
 
-    /// Has a sensor with explicit handling take its image now; returns how many detections its filters made.
+    /// Has every sensor that the simulation handles take its image now, and not only at the end of the pass: joints and
+    /// objects that were moved since are in the images then.
     ///
     /// # Errors
-    /// [`LinkError::Remote`] for a sensor that the simulation handles by itself.
-    pub fn handle_vision_sensor(&mut self, sensor: ObjectHandle) -> Result<i64, LinkError> {
-        self.call("sim.handleVisionSensor", vec![sensor.to_value()])?.integer(0)
+    /// Any [`LinkError`] of a call.
+    pub fn handle_vision_sensors(&mut self) -> Result<(), LinkError> {
+        self.call("sim.handleVisionSensor", vec![Value::from(HANDLE_ALL_EXCEPT_EXPLICIT)]).map(drop)
     }
 }
 

@@ -159,26 +159,13 @@ fn simulation_states_are_told_apart() {
     }
 }
 
-fn motion() -> JointMotion {
-    JointMotion {
-        joints: vec![ObjectHandle(19), ObjectHandle(22)],
-        target_rad: vec![0.5, 1.0],
-        limits: MotionLimits::uniform(2, 5.4, 1.7, 1.4),
+fn motion() -> PoseMotion {
+    PoseMotion {
+        tip: ObjectHandle(7),
+        target: ObjectHandle(8),
+        target_pose: Pose::from_translation_xyzw([0.1, 0.2, 0.3], [0.0, 0.0, 1.0, 0.0]),
+        limits: MotionLimits::uniform(4, 30.0, 1.5, 1.0),
     }
-}
-
-#[test]
-fn a_motion_is_a_map_without_callback() {
-    let (mut sim, log) = answering(vec![Value::Map(vec![])]);
-    sim.move_to_config(&motion(), &CallOptions::default()).expect("done");
-    let request = only_request(&log);
-    let params = &args(&request)[0];
-    assert_eq!(params.get("joints"), Some(&wire::integers([19, 22])));
-    assert_eq!(params.get("targetPos").and_then(Reader::numbers), Some(vec![0.5, 1.0]));
-    for (key, value) in [("maxVel", 5.4), ("maxAccel", 1.7), ("maxJerk", 1.4)] {
-        assert_eq!(params.get(key).and_then(Reader::numbers), Some(vec![value; 2]), "{key}");
-    }
-    assert!(params.get("callback").is_none());
 }
 
 #[test]
@@ -201,10 +188,10 @@ fn the_state_of_a_motion_goes_back_as_it_came() {
             _ => ret([]),
         }
     });
-    let mut moving = sim.move_to_config_init(&motion()).expect("started");
-    assert_eq!(sim.move_to_config_step(&mut moving), Ok(MotionStatus::Running));
-    assert_eq!(sim.move_to_config_step(&mut moving), Ok(MotionStatus::Done));
-    sim.move_to_config_cleanup(moving).expect("done");
+    let mut moving = sim.move_to_pose_init(&motion()).expect("started");
+    assert_eq!(sim.move_to_pose_step(&mut moving), Ok(MotionStatus::Running));
+    assert_eq!(sim.move_to_pose_step(&mut moving), Ok(MotionStatus::Done));
+    sim.move_to_pose_cleanup(moving).expect("done");
     for request in &log.requests()[1..] {
         assert_eq!(args(request), std::slice::from_ref(&state), "{}", func(request));
     }
@@ -218,37 +205,34 @@ fn a_motion_generator_that_gives_up_is_an_error() {
         turn += 1;
         if turn == 1 { ret([state()]) } else { ret([Value::from(-3), state()]) }
     });
-    let mut moving = sim.move_to_config_init(&motion()).expect("started");
-    assert!(matches!(sim.move_to_config_step(&mut moving), Err(LinkError::MotionFailed { code: -3, .. })));
+    let mut moving = sim.move_to_pose_init(&motion()).expect("started");
+    assert!(matches!(sim.move_to_pose_step(&mut moving), Err(LinkError::MotionFailed { code: -3, .. })));
 }
 
 #[test]
 fn a_motion_to_a_pose_names_tip_and_target_and_no_metric() {
     let (mut sim, log) = answering(vec![Value::Map(vec![])]);
-    let motion = PoseMotion {
-        tip: ObjectHandle(7),
-        target: ObjectHandle(8),
-        target_pose: Pose::from_translation_xyzw([0.1, 0.2, 0.3], [0.0, 0.0, 1.0, 0.0]),
-        limits: MotionLimits::uniform(4, 30.0, 1.0, 1.0),
-    };
-    sim.move_to_pose(&motion, &CallOptions::default()).expect("done");
+    sim.move_to_pose(&motion(), &CallOptions::default()).expect("done");
     let request = only_request(&log);
     let params = &args(&request)[0];
     assert_eq!(params.get("ik"), Some(&wire::map([("tip", Value::from(7)), ("target", Value::from(8))])));
     assert_eq!(params.get("targetPose").and_then(Reader::numbers), Some(vec![0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 0.0]));
-    assert!(params.get("metric").is_none());
+    for (key, value) in [("maxVel", 30.0), ("maxAccel", 1.5), ("maxJerk", 1.0)] {
+        assert_eq!(params.get(key).and_then(Reader::numbers), Some(vec![value; 4]), "{key}");
+    }
+    assert!(params.get("metric").is_none() && params.get("callback").is_none());
 }
 
 #[test]
 fn limits_that_are_none_are_refused_before_anything_is_sent() {
     let (mut sim, log) = answering(vec![]);
     for limits in [
-        MotionLimits::uniform(2, 0.0, 1.0, 1.0),
-        MotionLimits::uniform(2, 1.0, f64::NAN, 1.0),
-        MotionLimits::uniform(2, 1.0, 1.0, -1.0),
+        MotionLimits::uniform(4, 0.0, 1.0, 1.0),
+        MotionLimits::uniform(4, 1.0, f64::NAN, 1.0),
+        MotionLimits::uniform(4, 1.0, 1.0, -1.0),
         MotionLimits::uniform(3, 1.0, 1.0, 1.0),
     ] {
-        let error = sim.move_to_config(&JointMotion { limits, ..motion() }, &CallOptions::default()).expect_err("bad");
+        let error = sim.move_to_pose(&PoseMotion { limits, ..motion() }, &CallOptions::default()).expect_err("bad");
         assert!(matches!(error, LinkError::BadMotion { .. }), "{error}");
     }
     assert!(log.events().is_empty());
@@ -257,17 +241,17 @@ fn limits_that_are_none_are_refused_before_anything_is_sent() {
 #[test]
 fn an_old_server_has_no_motions_and_says_1_where_others_say_nothing() {
     let (mut sim, log) = sim(|_| v1(vec![Value::from(1)]));
-    sim.set_joint_position(OBJECT, 0.5).expect("the returned 1 is no error");
+    assert_eq!(sim.set_joint_position(OBJECT, 0.5), Ok(true));
     assert_eq!(sim.connection().version(), Some(ProtocolVersion::V1));
-    let error = sim.move_to_config(&motion(), &CallOptions::default()).expect_err("not there");
+    let error = sim.move_to_pose(&motion(), &CallOptions::default()).expect_err("not there");
     assert!(matches!(error, LinkError::Unsupported { .. }), "{error}");
     assert_eq!(log.requests().len(), 1, "asking would only give an error in Lua");
 }
 
 #[test]
 fn a_server_without_motions_is_too_old() {
-    let (mut sim, _log) = sim(|_| err("No such function: sim.moveToConfig_init"));
-    assert!(matches!(sim.move_to_config_init(&motion()), Err(LinkError::Unsupported { .. })));
+    let (mut sim, _log) = sim(|_| err("No such function: sim.moveToPose_init"));
+    assert!(matches!(sim.move_to_pose_init(&motion()), Err(LinkError::Unsupported { .. })));
 }
 
 #[test]

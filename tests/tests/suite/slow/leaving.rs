@@ -13,8 +13,9 @@ use handeye_tests::CellProcess;
 use handeye_tests::desktop::{self, Desktop};
 use handeye_tests::workbench::Workbench;
 
-/// What somebody who asks a program to end may count on.
-const LIMIT: Duration = Duration::from_secs(2);
+/// The workbench gives itself 2 s to end. The rest is what a machine with other work takes to run it at all; one that waits
+/// for an answer, a motion or a file takes longer.
+const LIMIT: Duration = Duration::from_secs(6);
 /// Longer than anything that is waited for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(4);
 

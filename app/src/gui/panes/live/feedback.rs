@@ -41,6 +41,11 @@ pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, poin
         );
         let colour = if stale { Marks::over_pictures().review } else { Color32::from_gray(215) };
         lines.push((words.say(language), colour));
+        if frame.info.image_age_s > 0.0 {
+            let ms = format!("{:.0}", frame.info.image_age_s * 1e3);
+            let words = text!("Image up to {ms} ms older than the pose: let the arm stand", ms = ms);
+            lines.push((words.say(language), Marks::over_pictures().review));
+        }
     }
     if shown.capture.is_none() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_none()) {
         lines.push((tr!(language, "Board not found").to_owned(), Marks::over_pictures().review));

@@ -4,7 +4,7 @@ use ciborium::Value;
 
 use super::{Call, Outcome, Table, one, several};
 use crate::cell::server::args::ApiError;
-use crate::cell::world::{DriveLimits, Joint};
+use crate::cell::world::{DriveLimits, Joint, JointMode, State};
 use crate::wire;
 
 pub(super) const FUNCTIONS: Table = &[
@@ -16,10 +16,12 @@ pub(super) const FUNCTIONS: Table = &[
     ("getJointType", get_joint_type),
     ("getJointMode", get_joint_mode),
     ("getJointVelocity", get_joint_velocity),
+    ("isDynamicallyEnabled", is_dynamically_enabled),
 ];
 
 const JOINT_REVOLUTE: i64 = 10;
 const JOINTMODE_KINEMATIC: i64 = 0;
+const JOINTMODE_DYNAMIC: i64 = 5;
 
 fn joint<'a>(call: &'a Call<'_>) -> Result<&'a Joint, ApiError> {
     Ok(call.cell.world.tree.joint(call.args.handle(0)?)?)
@@ -63,8 +65,16 @@ fn get_joint_type(call: &mut Call<'_>) -> Outcome {
 }
 
 fn get_joint_mode(call: &mut Call<'_>) -> Outcome {
-    joint(call)?;
-    several([Value::from(JOINTMODE_KINEMATIC), Value::from(0)])
+    let mode = match joint(call)?.mode {
+        JointMode::Kinematic => JOINTMODE_KINEMATIC,
+        JointMode::Dynamic => JOINTMODE_DYNAMIC,
+    };
+    several([Value::from(mode), Value::from(0)])
+}
+
+fn is_dynamically_enabled(call: &mut Call<'_>) -> Outcome {
+    let is_dynamic = joint(call)?.mode == JointMode::Dynamic;
+    one(is_dynamic && call.cell.world.simulation().state() != State::Stopped)
 }
 
 fn get_joint_velocity(call: &mut Call<'_>) -> Outcome {

@@ -52,7 +52,7 @@ impl Plan for ConfigPlan {
 
     fn apply(&mut self, cell: &mut Cell) -> Result<(), ApiError> {
         for (&handle, &position_rad) in self.joints.iter().zip(&self.latest.pos) {
-            cell.world.tree.joint_mut(handle)?.set_position(position_rad)?;
+            cell.world.tree.joint_mut(handle)?.command(position_rad)?;
         }
         Ok(())
     }

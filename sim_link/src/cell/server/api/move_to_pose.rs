@@ -172,7 +172,7 @@ impl ArmIk {
         let tip = world_from_connection.inv_mul(&tree.world_pose(self.tip, Chain::Reported)?);
         let Some(joints) = self.solve(&goal, &tip, &seed, &limits) else { return Ok(()) };
         for (&handle, position_rad) in cell.stage.joints.iter().zip(joints) {
-            cell.world.tree.joint_mut(handle)?.set_position(position_rad)?;
+            cell.world.tree.joint_mut(handle)?.command(position_rad)?;
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use super::{Call, Outcome, Table, one, several};
 use crate::cell::server::args::ApiError;
 use crate::cell::server::message;
 use crate::cell::server::task::Answer;
-use crate::cell::world::{VisionSensor, WorldError};
+use crate::cell::world::{Sensors, VisionSensor, WorldError};
 use crate::wire;
 
 pub(super) const FUNCTIONS: Table = &[
@@ -20,6 +20,8 @@ pub(super) const FUNCTIONS: Table = &[
 const GREY: i64 = 1;
 const ALPHA: i64 = 2;
 const METRES: i64 = 1;
+const HANDLE_ALL: i64 = -2;
+const HANDLE_ALL_EXCEPT_EXPLICIT: i64 = -3;
 
 /// A part of an image, pixels from the bottom left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,7 +141,12 @@ fn packets(detections: i64) -> Outcome {
 }
 
 fn handle_vision_sensor(call: &mut Call<'_>) -> Outcome {
-    call.cell.world.handle_sensor(call.args.handle(0)?)?;
+    let which = match call.args.integer(0)? {
+        HANDLE_ALL => Sensors::All,
+        HANDLE_ALL_EXCEPT_EXPLICIT => Sensors::AllButExplicit,
+        handle => Sensors::One(handle),
+    };
+    call.cell.world.handle_sensors(which)?;
     packets(0)
 }
 

@@ -12,7 +12,7 @@ fn a_move_ends_exactly_at_its_target_and_others_are_served_meanwhile() {
         if let Some(reply) = bench.reply(A) {
             break reply;
         }
-        bench.engine.turn(bench.now);
+        bench.turn();
         seen.push(bench.call(B, "sim.getJointPosition", vec![Value::from(bench.engine.cell.stage.joints[0])]));
     };
     assert_eq!(bench.joints(), GOAL);
@@ -50,7 +50,7 @@ fn a_move_in_a_stopped_simulation_jumps_along_in_no_time() {
 fn an_endless_move_in_a_stopped_simulation_keeps_nobody_waiting() {
     let mut bench = Bench::new();
     bench.send(A, "sim.moveToConfig", vec![to_config(&bench, GOAL, 1e-4)]);
-    bench.engine.turn(bench.now);
+    bench.turn();
     assert_eq!(bench.reply(A), None);
     bench.send(B, "sim.getSimulationState", vec![]);
     assert!(bench.reply(B).is_some());
@@ -65,7 +65,7 @@ fn a_move_is_cut_off_by_the_end_of_the_simulation() {
     bench.call(A, "sim.startSimulation", vec![]);
     bench.send(A, "sim.moveToConfig", vec![to_config(&bench, GOAL, 0.1)]);
     for _ in 0..5 {
-        bench.engine.turn(bench.now);
+        bench.turn();
     }
     assert_ne!(bench.joints(), start);
     bench.call(B, "sim.stopSimulation", vec![Value::from(true)]);
@@ -89,7 +89,7 @@ fn a_callback_moves_instead_of_the_server_may_call_back_and_holds_time() {
         assert_eq!(reply.get("func").and_then(Reader::text), Some("cb_7f"));
         let before = bench.time_s();
         for _ in 0..5 {
-            bench.engine.turn(bench.now);
+            bench.turn();
         }
         // A call from inside the callback, and one that waits for a pass.
         assert_eq!(bench.call(A, "sim.getSimulationTime", vec![]).numbers(), Some(vec![before]));
@@ -223,7 +223,7 @@ fn the_tip_follows_its_target_on_a_straight_line() {
     bench.send(A, "sim.moveToPose", vec![params]);
     let mut passes = 0;
     while bench.reply(A).is_none() {
-        bench.engine.turn(bench.now);
+        bench.turn();
         passes += 1;
         let tip = bench.engine.cell.stage.tip;
         let at = bench.call(B, "sim.getObjectPosition", vec![Value::from(tip)]);
@@ -279,7 +279,7 @@ fn a_stop_brakes_within_the_limits_and_the_call_returns_where_the_arm_rests() {
     bench.send(A, "sim.moveToConfig", vec![to_config(&bench, [3.0, 0.785, -1.047, 0.0, FRAC_PI_2, 0.0], 1.0)]);
     let mut path = vec![bench.joints()[0]];
     for _ in 0..20 {
-        bench.engine.turn(bench.now);
+        bench.turn();
         path.push(bench.joints()[0]);
     }
     bench.call(B, "handeye.stop", vec![]);
@@ -287,7 +287,7 @@ fn a_stop_brakes_within_the_limits_and_the_call_returns_where_the_arm_rests() {
         if let Some(reply) = bench.reply(A) {
             break reply;
         }
-        bench.engine.turn(bench.now);
+        bench.turn();
         path.push(bench.joints()[0]);
     };
     let speeds: Vec<f64> = path.windows(2).map(|pair| (pair[1] - pair[0]) / 0.05).collect();
@@ -310,7 +310,7 @@ fn a_stop_ends_a_move_of_the_tip_too() {
     let params = to_pose(&mut bench, &goal, vec![]);
     bench.send(A, "sim.moveToPose", vec![params]);
     for _ in 0..8 {
-        bench.engine.turn(bench.now);
+        bench.turn();
     }
     bench.call(B, "handeye.stop", vec![]);
     assert!(bench.await_reply(A).expect("returns").get("ret").is_some());
@@ -325,17 +325,17 @@ fn a_client_that_vanishes_during_a_move_leaves_a_braking_arm_and_no_frozen_time(
     bench.call(B, "sim.startSimulation", vec![]);
     bench.send(A, "sim.moveToConfig", vec![to_config(&bench, [3.0, 0.785, -1.047, 0.0, FRAC_PI_2, 0.0], 1.0)]);
     for _ in 0..20 {
-        bench.engine.turn(bench.now);
+        bench.turn();
     }
     bench.engine.disconnected(&peer(A), bench.now);
     // The pass that it had asked for still comes.
-    bench.engine.turn(bench.now);
+    bench.turn();
     let frozen_at = bench.time_s();
-    bench.engine.turn(bench.now);
+    bench.turn();
     assert_eq!(bench.time_s(), frozen_at, "it may come back with a new socket");
     bench.now += Duration::from_millis(2100);
     for _ in 0..100 {
-        bench.engine.turn(bench.now);
+        bench.turn();
     }
     assert!(bench.time_s() > frozen_at + 2.0);
     assert!(bench.joints()[0] < 1.6, "went on to {}", bench.joints()[0]);

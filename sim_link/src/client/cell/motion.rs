@@ -1,0 +1,381 @@
+//! Motions to a goal: of the joints, and of the tip along a straight line.
+//!
+//! Each point is computed here and sent for one pass of the simulation, as for a jog: the arm stands within a pass when
+//! this client hangs, dies, or loses its connection, a stop is braked on every simulator, and it takes nothing of a server
+//! but to put a joint somewhere. In every pass the joints are where they were sent, or the motion
+//! ends and says which is not.
+//!
+//! For the tip that takes an arm whose kinematics is known; any other is left to the server, see [`super::served`].
+
+use std::time::{Duration, Instant};
+
+use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::progress::CancelToken;
+
+use super::arm::{MotionTolerance, SettleOptions};
+use super::reach::ArmKinematics;
+use super::stream::{Pass, Point, Stream};
+use super::{Arm, JOINTS, JointAngles, require_running};
+use crate::cell::motion::{self, JointMotion, MotionState, Sync};
+use crate::client::error::LinkError;
+use crate::client::options::CallOptions;
+use crate::client::sim::MotionLimits;
+
+/// Longest motion, in real time. The slowest sensible one takes a minute; a simulation may run slower than real time.
+pub(super) const LONGEST_MOTION: Duration = Duration::from_mins(10);
+
+/// How long a pass that is under way may go on after a motion was cancelled: a pass takes a twentieth of a second, but
+/// another client may hold the simulation for ever.
+pub(super) const BRAKE_GRACE: Duration = Duration::from_millis(300);
+
+/// Longest time to come to rest, in real time. From the fastest motion of the reference tour it takes about two seconds.
+pub(super) const LONGEST_BRAKING: Duration = Duration::from_secs(10);
+
+/// An arm that got no point for longer has come to rest for all to see, and starts from there. Passes do not count: a
+/// simulation that does not keep to real time runs many while a point is computed.
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+
+/// Fastest joint on a straight line \[rad/s\], that of the stock UR5 model: where some joint would have to be faster, the
+/// line leads past a singular position.
+const LINE_JOINT_SPEED_RAD_S: f64 = std::f64::consts::FRAC_PI_2;
+
+/// How a stop brakes, not as gently as the motion goes: joints as hard as those of the stock UR5 may [rad/s², rad/s³], the
+/// tip, which stays on its line, from 0.3 m/s within two passes and 15 mm [m/s² and rad/s², m/s³ and rad/s³].
+const JOINT_BRAKE: [f64; 2] = [2.0 * std::f64::consts::PI, 20.0 * std::f64::consts::PI];
+const LINE_BRAKE: [f64; 2] = [6.0, 240.0];
+
+/// Joints that move by less in a pass stand \[rad\], and passes after which an arm stands that does not come nearer.
+const STANDS_RAD: f64 = 1e-5;
+const LONGEST_OVERTIME_PASSES: u32 = 100;
+
+/// How far from its goal a joint may stand when a motion is over \[rad\]: one that is put where it is, and one that a
+/// controller moves, which a load keeps from its target by a little.
+const PLACED_OFF_RAD: f64 = 1e-6;
+const DRIVEN_OFF_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
+/// A way to a goal, and where on it the arm is.
+#[derive(Debug, Clone)]
+enum Way<'a> {
+    /// All joints at once.
+    Joints { motion: Box<JointMotion>, limits: motion::MotionLimits, goal: JointAngles },
+    /// The tip along a line.
+    Line(Box<Line<'a>>),
+}
+
+#[derive(Debug, Clone)]
+struct Line<'a> {
+    kinematics: &'a ArmKinematics,
+    motion: motion::PoseMotion,
+    limits: motion::MotionLimits,
+    goal: Pose<Base, Tip>,
+    joints: JointAngles,
+    /// Of the tip, along x, y, z and about its axis.
+    speeds: Vec<f64>,
+    /// Passes since the end of the line.
+    overtime: u32,
+    is_over: bool,
+}
+
+impl<'a> Way<'a> {
+    fn joints(start: &JointAngles, goal: &JointAngles, limits: &MotionLimits) -> Result<Self, LinkError> {
+        let limits = generator_limits(limits);
+        let rest = MotionState::at_rest(start.to_vec());
+        let motion = JointMotion::new(rest, goal, &[0.0; JOINTS], Some(&limits), Sync::Phase)
+            .map_err(|error| unplanned(&error))?;
+        Ok(Self::Joints { motion: Box::new(motion), limits, goal: *goal })
+    }
+
+    fn line(
+        kinematics: &'a ArmKinematics,
+        start: &JointAngles,
+        goal: &Pose<Base, Tip>,
+        limits: &MotionLimits,
+    ) -> Result<Self, LinkError> {
+        let limits = generator_limits(limits);
+        let tip = kinematics.tip(start);
+        let motion = motion::PoseMotion::new(tip.isometry(), goal.isometry(), Some(&limits), None, Sync::Phase)
+            .map_err(|error| unplanned(&error))?;
+        Ok(Self::Line(Box::new(Line {
+            kinematics,
+            motion,
+            limits,
+            goal: *goal,
+            joints: *start,
+            speeds: vec![0.0; 4],
+            overtime: 0,
+            is_over: false,
+        })))
+    }
+
+    /// The joints one pass later.
+    fn next(&mut self, time_step_s: f64) -> JointAngles {
+        match self {
+            Self::Joints { motion, .. } => {
+                let step = motion.step(time_step_s);
+                std::array::from_fn(|i| step.pos[i])
+            }
+            Self::Line(line) => line.next(time_step_s),
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        match self {
+            Self::Joints { motion, .. } => motion.at(motion.time_s()).finished,
+            Self::Line(line) => line.is_over,
+        }
+    }
+
+    /// Replaces the rest by coming to rest.
+    fn brake(&mut self) {
+        let limits = |dofs: usize, vel: &[f64], [acceleration, jerk]: [f64; 2]| {
+            // Braking makes nothing faster, so the limit of speed is only not to be in the way.
+            let fastest = vel.iter().fold(1.0_f64, |fastest, vel| fastest.max(vel.abs()));
+            motion::MotionLimits::uniform(dofs, 2.0 * fastest, acceleration, jerk)
+        };
+        let braked = match self {
+            Self::Joints { motion, .. } => {
+                let state = motion.at(motion.time_s()).state();
+                let limits = limits(JOINTS, &state.vel, JOINT_BRAKE);
+                JointMotion::stop(state, &limits).map(|stop| **motion = stop)
+            }
+            Self::Line(line) => line.motion.stop(&limits(4, &line.speeds, LINE_BRAKE)).map(|stop| line.motion = stop),
+        };
+        if let Err(error) = braked {
+            // There is a way to rest from any state.
+            tracing::error!(%error, "a motion could not be braked");
+        }
+    }
+
+    /// The same goal from a standstill.
+    fn begin_again(&mut self, joints: &JointAngles) {
+        let rest = MotionState::at_rest(joints.to_vec());
+        match self {
+            Self::Joints { motion, limits, goal } => {
+                if let Ok(anew) = JointMotion::new(rest, &goal[..], &[0.0; JOINTS], Some(limits), Sync::Phase) {
+                    **motion = anew;
+                }
+            }
+            Self::Line(line) => {
+                let tip = line.kinematics.tip(joints);
+                let (goal, limits) = (line.goal.isometry(), Some(&line.limits));
+                if let Ok(anew) = motion::PoseMotion::new(tip.isometry(), goal, limits, None, Sync::Phase) {
+                    (line.motion, line.joints) = (anew, *joints);
+                }
+            }
+        }
+    }
+}
+
+impl Line<'_> {
+    /// The joints one pass later.
+    ///
+    /// Where the line leads out of reach, past a singular position or to the end of a joint, the tip leaves it by as much
+    /// as it takes, and comes back to it as fast as the joints may.
+    fn next(&mut self, time_step_s: f64) -> JointAngles {
+        let step = self.motion.step(time_step_s);
+        let most_rad = LINE_JOINT_SPEED_RAD_S * time_step_s;
+        let on_line = Pose::from_isometry(step.pose);
+        let solved = self.kinematics.reach(&on_line, &self.joints).ok();
+        let exact = solved.filter(|joints| travel_rad(joints, &self.joints) <= most_rad);
+        let joints = exact.unwrap_or_else(|| {
+            // The way back may lead through what kept the tip from its line; the goal itself is worth a detour.
+            let goal = solved.filter(|_| step.finished);
+            let wanted = goal.unwrap_or_else(|| self.kinematics.towards(&on_line, &self.joints));
+            let share = (most_rad / travel_rad(&wanted, &self.joints)).min(1.0);
+            std::array::from_fn(|i| self.joints[i] + share * (wanted[i] - self.joints[i]))
+        });
+        self.overtime += u32::from(step.finished);
+        let stands = exact.is_some() || travel_rad(&joints, &self.joints) < STANDS_RAD;
+        self.is_over = step.finished && (stands || self.overtime > LONGEST_OVERTIME_PASSES);
+        (self.joints, self.speeds) = (joints, step.vel);
+        joints
+    }
+}
+
+fn travel_rad(from: &JointAngles, to: &JointAngles) -> f64 {
+    from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn generator_limits(limits: &MotionLimits) -> motion::MotionLimits {
+    motion::MotionLimits {
+        max_vel: limits.velocity.clone(),
+        max_accel: limits.acceleration.clone(),
+        max_jerk: limits.jerk.clone(),
+        min_vel: None,
+        min_accel: None,
+    }
+}
+
+fn unplanned(error: &motion::MotionError) -> LinkError {
+    LinkError::NoProfile { reason: error.to_string() }
+}
+
+impl Arm {
+    /// Moves the joints to `goal` (rad) within `limits`, and returns when they are there and, where a controller moves
+    /// them, at rest.
+    ///
+    /// # Errors
+    /// [`LinkError::JointOutOfRange`] or [`LinkError::BadMotion`] before anything moves; [`LinkError::NotRunning`];
+    /// [`LinkError::Cancelled`] with the arm at rest, [`LinkError::MotionStopped`] when it was another client that
+    /// stopped it; [`LinkError::JointElsewhere`] when something else moves or holds a joint.
+    pub fn move_to_joints(
+        &mut self,
+        goal: &JointAngles,
+        limits: &MotionLimits,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        const TASK: &str = "moving the joints";
+        self.check_range(goal)?;
+        limits.validate(JOINTS)?;
+        let start = self.ready(TASK, cancel)?;
+        self.send_motion(Way::joints(&start, goal, limits)?, start, TASK, cancel)?;
+        if self.has_dynamic_joint()? {
+            self.settle(&SettleOptions::default(), cancel)?;
+        }
+        let here = self.joint_angles()?;
+        for (index, (&at_rad, &goal_rad)) in here.iter().zip(goal).enumerate() {
+            let off_rad = super::stream::difference_rad(at_rad, goal_rad);
+            let dynamic = off_rad > PLACED_OFF_RAD && self.sim.is_joint_dynamic(self.objects.joints[index])?;
+            if off_rad > if dynamic { DRIVEN_OFF_RAD } else { PLACED_OFF_RAD } {
+                return Err(joint_elsewhere(index, at_rad, goal_rad));
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves the tip to `goal` within `limits` (x, y, z, angle), waits until the arm stands still, and compares.
+    ///
+    /// An arm whose kinematics is known goes along a straight line as far as it can; towards a goal out of reach it ends as
+    /// near as it gets. Any other is moved by the inverse kinematics of the server.
+    ///
+    /// # Errors
+    /// As [`Arm::move_to_joints`]; [`LinkError::Unreached`] when the tip is elsewhere, [`LinkError::NotSettled`] when it
+    /// does not come to rest; where the server moves it, [`LinkError::NoSuchObject`] in a scene without a target dummy
+    /// and [`LinkError::Unsupported`] before CoppeliaSim 4.7.
+    pub fn move_to_pose(
+        &mut self,
+        goal: &Pose<Base, Tip>,
+        limits: &MotionLimits,
+        tolerance: &MotionTolerance,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        const TASK: &str = "moving the tip";
+        if !goal.is_finite() {
+            let value = f64::NAN;
+            return Err(LinkError::BadMotion { what: "the goal", expected: "a finite pose", value });
+        }
+        limits.validate(4)?;
+        let start = self.ready(TASK, cancel)?;
+        let kinematics = self.kinematics()?.ok();
+        match &kinematics {
+            Some(kinematics) => {
+                self.send_motion(Way::line(kinematics, &start, goal, limits)?, start, TASK, cancel)?;
+            }
+            None => self.move_by_server(goal, limits, TASK, cancel)?,
+        }
+        self.settle(&SettleOptions::default(), cancel)?;
+        let (distance_m, angle_rad) = self.base_from_tip()?.distance_to(goal);
+        if distance_m <= tolerance.distance_m && angle_rad <= tolerance.angle_rad {
+            return Ok(());
+        }
+        Err(LinkError::Unreached { distance_mm: distance_m * 1e3, angle_deg: angle_rad.to_degrees() })
+    }
+
+    /// Where the joints stand, ready to be moved.
+    fn ready(&mut self, task: &'static str, cancel: &CancelToken) -> Result<JointAngles, LinkError> {
+        require_running(&mut self.sim, task)?;
+        if cancel.is_cancelled() {
+            return Err(LinkError::Cancelled { call: task.to_owned() });
+        }
+        self.movable_joints()
+    }
+
+    fn send_motion(
+        &mut self,
+        way: Way<'_>,
+        start: JointAngles,
+        task: &'static str,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        let mut stream = Stream::begin(self, start, task)?;
+        let outcome = self.send_points(way, &mut stream, task, cancel);
+        stream.end(self, outcome)
+    }
+
+    fn send_points(
+        &mut self,
+        mut way: Way<'_>,
+        stream: &mut Stream,
+        task: &'static str,
+        cancel: &CancelToken,
+    ) -> Result<(), LinkError> {
+        let dt_s = self.info.time_step_s;
+        let started = Instant::now();
+        let patient = CallOptions { grace: BRAKE_GRACE, ..CallOptions::cancelled_by(cancel) };
+        let mut braking_since: Option<Instant> = None;
+        let (mut sent, mut sent_at) = (*stream.sent(), started);
+        loop {
+            let call = if braking_since.is_some() { CallOptions::default() } else { patient.clone() };
+            let pass = stream.pass_with(self, &call, |slot| {
+                if sent_at.elapsed() > LONGEST_PAUSE && braking_since.is_none() {
+                    way.begin_again(&sent);
+                }
+                sent_at = Instant::now();
+                if (slot.is_stopped || cancel.is_cancelled()) && braking_since.is_none() {
+                    way.brake();
+                    braking_since = Some(Instant::now());
+                }
+                sent = way.next(dt_s);
+                Point { joints: sent, target: None }
+            })?;
+            match pass {
+                Pass::NotFollowing { joint, at_rad } => return Err(joint_elsewhere(joint, at_rad, sent[joint])),
+                Pass::None => require_running(&mut self.sim, task)?,
+                Pass::Sent if !way.is_over() => {}
+                Pass::Sent if stream.is_stopped() => return Err(LinkError::MotionStopped { task }),
+                Pass::Sent if braking_since.is_some() => return Err(LinkError::Cancelled { call: task.to_owned() }),
+                Pass::Sent => return Ok(()),
+            }
+            let awaited = match braking_since {
+                Some(since) if since.elapsed() > LONGEST_BRAKING => "the arm to brake",
+                _ if started.elapsed() > LONGEST_MOTION => "the arm to arrive",
+                _ => continue,
+            };
+            return Err(LinkError::WaitedTooLong { task, awaited: awaited.to_owned(), after: started.elapsed() });
+        }
+    }
+
+    fn has_dynamic_joint(&mut self) -> Result<bool, LinkError> {
+        for &joint in &self.objects.joints {
+            if self.sim.is_joint_dynamic(joint)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn check_range(&self, goal: &JointAngles) -> Result<(), LinkError> {
+        for (index, (&goal_rad, interval)) in goal.iter().zip(&self.info.joint_intervals).enumerate() {
+            if !goal_rad.is_finite() {
+                let expected = "finite angles";
+                return Err(LinkError::BadMotion { what: "the goal", expected, value: goal_rad });
+            }
+            // A millionth of a radian over the end is rounding, and clamping it moves nothing.
+            let inside = (interval.min_rad - 1e-6..=interval.max_rad + 1e-6).contains(&goal_rad);
+            if !interval.cyclic && !inside {
+                return Err(LinkError::JointOutOfRange {
+                    joint: index + 1,
+                    goal_deg: goal_rad.to_degrees(),
+                    min_deg: interval.min_rad.to_degrees(),
+                    max_deg: interval.max_rad.to_degrees(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn joint_elsewhere(index: usize, at_rad: f64, goal_rad: f64) -> LinkError {
+    let (at_deg, goal_deg) = (at_rad.to_degrees(), goal_rad.to_degrees());
+    LinkError::JointElsewhere { joint: index + 1, at_deg, goal_deg }
+}
