@@ -305,6 +305,8 @@ impl Engine {
                 Some(info) => self.send(peer, message::returned(vec![info])),
                 None => self.send(peer, message::failed(&format!("module '{name}' not found"))),
             },
+            Ok(Answer::Require(name)) if self.registry.has(&name) => self.send(peer, message::returned(Vec::new())),
+            Ok(Answer::Require(name)) => self.send(peer, message::failed(&format!("module '{name}' not found:"))),
             Ok(Answer::Later(task)) => {
                 let index = self.clients.connection(peer, &uuid).calls.len();
                 let call = Running { uuid, func, task, waiting: Waiting::Nothing, owed_since: Some(self.cell.now) };

@@ -218,6 +218,17 @@ pub fn time_step_of(given: Option<f64>) -> Result<Option<f64>, ApiError> {
     Ok(Some(time_step_s))
 }
 
+/// Time step and flags as a state map shows them: with limits the time step of the simulation is 0, and without any the
+/// motion is over in a step of 10 s whatever was asked for; minimum velocities and accelerations are always in use.
+pub fn stated(time_step_s: Option<f64>, flags: Option<i64>, has_limits: bool) -> (f64, i64) {
+    const NO_SYNC: i64 = 3;
+    const MINIMA: i64 = 0x300;
+    if !has_limits {
+        return (10.0, NO_SYNC | MINIMA);
+    }
+    (time_step_s.unwrap_or(0.0), flags.filter(|&flags| flags >= 0).unwrap_or(0) | MINIMA)
+}
+
 /// Limits of a motion: all of `maxVel`, `maxAccel` and `maxJerk`, or none for a jump.
 ///
 /// # Errors

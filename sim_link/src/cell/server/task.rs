@@ -17,6 +17,8 @@ pub enum Answer {
     Encoded(Vec<u8>),
     /// The list of what a namespace offers, or an error if there is none of that name.
     Info(String),
+    /// Nothing, or an error if there is no namespace of this name.
+    Require(String),
     /// Something that takes longer.
     Later(Box<dyn Task>),
 }

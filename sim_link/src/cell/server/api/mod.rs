@@ -116,6 +116,11 @@ impl Registry {
         }
     }
 
+    /// Whether there is a namespace of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.namespaces.contains_key(name)
+    }
+
     /// What a namespace offers, in the form that clients build their own objects from.
     pub fn info(&self, name: &str) -> Option<Value> {
         let Namespace { functions, constants } = self.namespaces.get(name)?;

@@ -7,7 +7,7 @@ use crate::cell::motion::{JointMotion, MotionLimits, MotionState, MotionStep, sh
 use crate::cell::server::args::{ApiError, Args, Fields};
 use crate::cell::server::cell::Cell;
 use crate::cell::server::plans::{
-    Motion, MotionTask, Plan, entry, limits_in_state, limits_of, sync_of, time_step_of, with_fields,
+    Motion, MotionTask, Plan, entry, limits_in_state, limits_of, stated, sync_of, time_step_of, with_fields,
 };
 use crate::cell::server::task::Answer;
 use crate::cell::world::Handle;
@@ -45,7 +45,6 @@ struct ConfigPlan {
 
 impl Plan for ConfigPlan {
     fn advance(&mut self, dt_s: f64) -> Result<(), ApiError> {
-        self.time_step_s = dt_s;
         self.latest = self.motion.step(dt_s);
         Ok(())
     }
@@ -126,7 +125,7 @@ struct Wanted {
 }
 
 impl Wanted {
-    fn plan(self, time_step_s: f64) -> Result<ConfigPlan, ApiError> {
+    fn plan(self, time_step_s: Option<f64>) -> Result<ConfigPlan, ApiError> {
         if self.start.pos.len() > MAX_DOFS {
             return Err(ApiError::Other(format!("a motion has at most {MAX_DOFS} degrees of freedom.")));
         }
@@ -140,8 +139,7 @@ impl Wanted {
             time_left: 0.0,
         };
         let motion = JointMotion::new(self.start, &target_pos, &self.target_vel, self.limits.as_ref(), sync)?;
-        // Minimum velocities and accelerations are always in use, which the simulator's flags show.
-        let flags = self.flags.filter(|&flags| flags >= 0).unwrap_or(0) | 0x300;
+        let (time_step_s, flags) = stated(time_step_s, self.flags, self.limits.is_some());
         let Self { given, form, joints, limits, .. } = self;
         Ok(ConfigPlan { given, form, joints, motion, limits, latest, time_step_s, flags })
     }
@@ -184,7 +182,7 @@ fn from_map(call: &Call<'_>, fields: &Fields<'_>) -> Result<Motion, ApiError> {
         target_pos,
     };
     let time_step_s = time_step_of(fields.number("timeStep")?)?;
-    let plan = wanted.plan(time_step_s.unwrap_or_else(|| call.cell.world.simulation().time_step_s()))?;
+    let plan = wanted.plan(time_step_s)?;
     Ok(Motion::new(Box::new(plan), fields.callback("callback"), time_step_s))
 }
 
@@ -230,7 +228,7 @@ fn from_positions(call: &Call<'_>) -> Result<Motion, ApiError> {
         flags: Some(args.integer(0)?),
     };
     let time_step_s = time_step_of(args.get(12).map(|_| args.number(12)).transpose()?)?;
-    let plan = wanted.plan(time_step_s.unwrap_or_else(|| call.cell.world.simulation().time_step_s()))?;
+    let plan = wanted.plan(time_step_s)?;
     Ok(Motion::new(Box::new(plan), Some(name), time_step_s))
 }
 

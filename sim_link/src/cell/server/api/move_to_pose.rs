@@ -10,7 +10,7 @@ use crate::cell::motion::{MotionLimits, PoseMotion, PoseStep};
 use crate::cell::server::args::{ApiError, Fields};
 use crate::cell::server::cell::Cell;
 use crate::cell::server::plans::{
-    Motion, MotionTask, Plan, entry, limits_in_state, limits_of, sync_of, time_step_of, with_fields,
+    Motion, MotionTask, Plan, entry, limits_in_state, limits_of, stated, sync_of, time_step_of, with_fields,
 };
 use crate::cell::server::task::Answer;
 use crate::cell::world::{Chain, Flagged, Handle, poses};
@@ -73,7 +73,6 @@ struct PosePlan {
 
 impl Plan for PosePlan {
     fn advance(&mut self, dt_s: f64) -> Result<(), ApiError> {
-        self.time_step_s = dt_s;
         let left_s = self.latest.time_left;
         self.latest = self.motion.step(dt_s);
         if self.latest.finished {
@@ -280,14 +279,14 @@ struct Wanted {
 }
 
 impl Wanted {
-    fn plan(self, time_step_s: f64) -> Result<PosePlan, ApiError> {
+    fn plan(self, time_step_s: Option<f64>) -> Result<PosePlan, ApiError> {
         let Self { given, form, mover, start, goal, metric, target_vel, limits, flags } = self;
         let sync = sync_of(flags);
         let motion = PoseMotion::with_target_velocity(&start, &goal, &target_vel, limits.as_ref(), metric, sync)?;
         let zeros = vec![0.0; target_vel.len()];
         let time_left = motion.duration_s();
         let latest = PoseStep { pose: start, vel: zeros.clone(), accel: zeros, finished: false, time_left };
-        let flags = flags.filter(|&flags| flags >= 0).unwrap_or(0) | 0x300;
+        let (time_step_s, flags) = stated(time_step_s, flags, limits.is_some());
         Ok(PosePlan { given, form, mover, start, motion, limits, target_vel, latest, time_step_s, over_s: 0.0, flags })
     }
 }
@@ -313,7 +312,7 @@ fn from_map(call: &mut Call<'_>, fields: &Fields<'_>) -> Result<Motion, ApiError
     let (mover, start) = mover(call, fields)?;
     let given = fields.entries().to_vec();
     let wanted = Wanted { given, form: Form::Map, mover, start, goal, metric, target_vel, limits, flags };
-    let plan = wanted.plan(time_step_s.unwrap_or_else(|| call.cell.world.simulation().time_step_s()))?;
+    let plan = wanted.plan(time_step_s)?;
     Ok(Motion::new(Box::new(plan), fields.callback("callback"), time_step_s))
 }
 
@@ -347,7 +346,7 @@ fn from_positions(call: &Call<'_>) -> Result<Motion, ApiError> {
         limits: Some(MotionLimits { max_vel, max_accel, max_jerk, min_vel: None, min_accel: None }),
         flags,
     };
-    let plan = wanted.plan(time_step_s.unwrap_or_else(|| call.cell.world.simulation().time_step_s()))?;
+    let plan = wanted.plan(time_step_s)?;
     Ok(Motion::new(Box::new(plan), Some(name), time_step_s))
 }
 

@@ -1,14 +1,13 @@
 //! `zmqRemoteApi.*`: what a client asks first.
 
-use super::{Call, Outcome, Table, nothing};
+use super::{Call, Outcome, Table};
 use crate::cell::server::task::Answer;
 
 pub(super) const FUNCTIONS: Table = &[("require", require), ("info", info)];
 
-/// Everything is loaded already; whether the name exists is for `info`, which every client calls next.
+/// Everything is loaded already.
 fn require(call: &mut Call<'_>) -> Outcome {
-    call.args.text(0)?;
-    nothing()
+    Ok(Answer::Require(call.args.text(0)?.to_owned()))
 }
 
 fn info(call: &mut Call<'_>) -> Outcome {

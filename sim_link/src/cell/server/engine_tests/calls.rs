@@ -21,6 +21,8 @@ fn wrong_calls_are_told_so_in_the_simulators_words() {
     assert_eq!(bench.error("sim.getObject", vec![Value::from("/nope")]), path);
     assert_eq!(bench.error("sim.foo", vec![]), "No such function: sim.foo");
     assert_eq!(bench.error("foo", vec![]), "No such function: foo");
+    let module = bench.error("zmqRemoteApi.require", vec![Value::from("simNope")]);
+    assert_eq!(module, "module 'simNope' not found:");
     assert_eq!(bench.error("sim.handle_world", vec![]), "attempt to call a number value (upvalue 'func')");
     let missing = "354: in sim.getObjectPose: object does not exist.";
     assert_eq!(bench.error("sim.getObjectPose", vec![Value::from(9999)]), missing);

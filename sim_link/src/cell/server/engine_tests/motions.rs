@@ -47,6 +47,20 @@ fn a_move_in_a_stopped_simulation_jumps_along_in_no_time() {
 }
 
 #[test]
+fn time_step_and_flags_of_a_prepared_move_are_the_simulators() {
+    let mut bench = Bench::new();
+    let stated = |bench: &mut Bench, params: Value| {
+        let state = bench.get("sim.moveToConfig_init", vec![params]);
+        let number = |field: &str| state.get(field).and_then(Reader::number).expect("a number");
+        (number("timeStep"), number("flags"))
+    };
+    let limited = to_config(&bench, GOAL, 1.0);
+    assert_eq!(stated(&mut bench, limited), (0.0, f64::from(0x300)));
+    let free = wire::map([("joints", bench.arm()), ("targetPos", floats(&GOAL))]);
+    assert_eq!(stated(&mut bench, free), (10.0, f64::from(0x303)));
+}
+
+#[test]
 fn an_endless_move_in_a_stopped_simulation_keeps_nobody_waiting() {
     let mut bench = Bench::new();
     bench.send(A, "sim.moveToConfig", vec![to_config(&bench, GOAL, 1e-4)]);
