@@ -53,7 +53,7 @@ pub struct CameraFeed {
 impl CameraFeed {
     pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
         let tells_moment = info.is_handeye_cell;
-        Self { sim, objects, info, hold: Hold::default(), renews: true, tells_moment }
+        Self { sim, objects, info, hold: Hold::default(), renews: !tells_moment, tells_moment }
     }
 
     /// Connects once, for a camera without its arm.
@@ -79,7 +79,8 @@ impl CameraFeed {
     ///
     /// The simulation is held for the few milliseconds that it takes, and has its sensors take their images meanwhile:
     /// the simulator does so at the end of a pass, and answers at the beginning of the next, so a joint that was put
-    /// elsewhere since is in the pose and not yet in the image. A built-in cell also tells where its board was.
+    /// elsewhere since is in the pose and not yet in the image. A built-in cell tells instead what it was that the images
+    /// of the last pass show, board included, and all of the frame is of the end of that pass.
     ///
     /// A server that cannot be held is read until the clock says the same before and after; there, and where images
     /// cannot be asked for, [`Frame::image_age_s`] says how much older than the pose they may be.
@@ -111,7 +112,8 @@ impl CameraFeed {
                 outcome => return outcome.map(|()| 0.0),
             }
         }
-        Ok(self.info.time_step_s)
+        // What tells of its images tells of everything at the same instant.
+        Ok(if self.tells_moment { 0.0 } else { self.info.time_step_s })
     }
 
     fn read(&mut self, image_age_s: f64) -> Result<Frame, LinkError> {
