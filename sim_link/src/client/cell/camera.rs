@@ -112,7 +112,7 @@ impl CameraFeed {
                 outcome => return outcome.map(|()| 0.0),
             }
         }
-        // What tells of its images tells of everything at the same instant.
+        // A cell that says what its images show says so of pose and joints at the same instant.
         Ok(if self.tells_moment { 0.0 } else { self.info.time_step_s })
     }
 
