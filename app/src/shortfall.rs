@@ -18,3 +18,18 @@ pub fn of(support: Support, is_arm_known: bool) -> Option<Text> {
         )),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::text::Language;
+
+    #[test]
+    fn what_an_old_simulator_cannot_do_is_said_only_where_it_matters() {
+        let said = |support, is_arm_known| of(support, is_arm_known).map(|text| text.say(Language::English));
+        assert_eq!(said(Support::Whole, false), None);
+        assert_eq!(said(Support::KnownArms, true), None);
+        assert!(said(Support::KnownArms, false).is_some_and(|text| text.contains("takes 4.7 or newer")));
+        assert!(said(Support::AtRest, true).is_some_and(|text| text.contains("Following takes 4.6 or newer")));
+    }
+}

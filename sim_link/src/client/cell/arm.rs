@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use handeye_core::frames::{Base, Pose, Tip};
 
 use super::hold::Hold;
+use super::motion::joint_elsewhere;
 use super::stream::clock_past;
 use super::truth::{self, GroundTruth};
 use super::{CellInfo, CellObjects, CellPaths, JOINTS, JointAngles, discover, read_joint_angles, require_running};
@@ -151,7 +152,7 @@ impl Arm {
     /// [`LinkError::JointElsewhere`] for a joint that something else keeps moving.
     pub(super) fn movable_joints(&mut self) -> Result<JointAngles, LinkError> {
         let started = Instant::now();
-        let mut is_nudged = [false; JOINTS];
+        let mut nudged_to = [None; JOINTS];
         loop {
             let mut refuses = None;
             let here = self.joint_angles()?;
@@ -160,25 +161,27 @@ impl Arm {
                 if self.sim.is_joint_dynamic(joint)? || self.sim.set_joint_position(joint, here[index])? {
                     continue;
                 }
-                refuses = Some(index);
-                if !std::mem::replace(&mut is_nudged[index], true) {
-                    self.nudge(index, here[index])?;
-                }
+                let goal_rad = match nudged_to[index] {
+                    Some(goal_rad) => goal_rad,
+                    None => *nudged_to[index].insert(self.nudge(index, here[index])?),
+                };
+                refuses = Some((index, goal_rad));
             }
-            let Some(index) = refuses else { return Ok(here) };
+            let Some((index, goal_rad)) = refuses else { return Ok(here) };
             if started.elapsed() > LONGEST_NUDGE {
-                let at_deg = here[index].to_degrees();
-                return Err(LinkError::JointElsewhere { joint: index + 1, at_deg, goal_deg: at_deg });
+                return Err(joint_elsewhere(index, here[index], goal_rad));
             }
             self.sim.step(&CallOptions::default())?;
         }
     }
 
-    /// Sends a kinematic joint a little towards the middle of its range.
-    fn nudge(&mut self, index: usize, here_rad: f64) -> Result<(), LinkError> {
+    /// Sends a kinematic joint a little towards the middle of its range, and returns where.
+    fn nudge(&mut self, index: usize, here_rad: f64) -> Result<f64, LinkError> {
         let interval = &self.info.joint_intervals[index];
         let to_middle = if here_rad > f64::midpoint(interval.min_rad, interval.max_rad) { -1.0 } else { 1.0 };
-        self.sim.set_joint_target_position(self.objects.joints[index], here_rad + to_middle * NUDGE_RAD)
+        let goal_rad = here_rad + to_middle * NUDGE_RAD;
+        self.sim.set_joint_target_position(self.objects.joints[index], goal_rad)?;
+        Ok(goal_rad)
     }
 
     /// Has the server brake every motion; `false` when it has no function for that.

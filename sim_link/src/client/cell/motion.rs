@@ -2,8 +2,8 @@
 //!
 //! Each point is computed here and sent for one pass of the simulation, as for a jog: the arm stands within a pass when
 //! this client hangs, dies, or loses its connection, a stop is braked on every simulator, and it takes nothing of a server
-//! but to put a joint somewhere. In every pass the joints are where they were sent, or the motion
-//! ends and says which is not.
+//! but to put a joint somewhere. In every pass the joints are where they were sent, or the motion ends and says which is
+//! not.
 //!
 //! For the tip that takes an arm whose kinematics is known; any other is left to the server, see [`super::served`].
 
@@ -14,7 +14,7 @@ use handeye_core::progress::CancelToken;
 
 use super::arm::{MotionTolerance, SettleOptions};
 use super::reach::ArmKinematics;
-use super::stream::{Pass, Point, Stream};
+use super::stream::{PLACED_OFF_RAD, Pass, Point, Stream, difference_rad};
 use super::{Arm, JOINTS, JointAngles, require_running};
 use crate::cell::motion::{self, JointMotion, MotionState, Sync};
 use crate::client::error::LinkError;
@@ -48,10 +48,9 @@ const LINE_BRAKE: [f64; 2] = [6.0, 240.0];
 const STANDS_RAD: f64 = 1e-5;
 const LONGEST_OVERTIME_PASSES: u32 = 100;
 
-/// How far from its goal a joint may stand when a motion is over \[rad\]: one that is put where it is, and one that a
-/// controller moves, which a load keeps from its target by a little.
-const PLACED_OFF_RAD: f64 = 1e-6;
-const DRIVEN_OFF_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
+/// How far from its goal a joint may stand when a motion is over that a controller moves \[rad\]: a load keeps it from its
+/// target by a little.
+const ARRIVED_OFF_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 /// A way to a goal, and where on it the arm is.
 #[derive(Debug, Clone)]
@@ -71,6 +70,8 @@ struct Line<'a> {
     joints: JointAngles,
     /// Of the tip, along x, y, z and about its axis.
     speeds: Vec<f64>,
+    /// Velocities of the joints while the tip is off its line.
+    astray_rad_s: Option<JointAngles>,
     /// Passes since the end of the line.
     overtime: u32,
     is_over: bool,
@@ -102,6 +103,7 @@ impl<'a> Way<'a> {
             goal: *goal,
             joints: *start,
             speeds: vec![0.0; 4],
+            astray_rad_s: None,
             overtime: 0,
             is_over: false,
         })))
@@ -125,13 +127,28 @@ impl<'a> Way<'a> {
         }
     }
 
-    /// Replaces the rest by coming to rest.
+    /// Replaces the rest by coming to rest: of the tip on its line, or of the joints where it is off its line, so that it
+    /// does not go there first.
     fn brake(&mut self) {
         let limits = |dofs: usize, vel: &[f64], [acceleration, jerk]: [f64; 2]| {
             // Braking makes nothing faster, so the limit of speed is only not to be in the way.
             let fastest = vel.iter().fold(1.0_f64, |fastest, vel| fastest.max(vel.abs()));
             motion::MotionLimits::uniform(dofs, 2.0 * fastest, acceleration, jerk)
         };
+        if let Self::Line(line) = self
+            && let Some(vel) = line.astray_rad_s
+        {
+            let state = MotionState { vel: vel.to_vec(), ..MotionState::at_rest(line.joints.to_vec()) };
+            let limits = limits(JOINTS, &vel, JOINT_BRAKE);
+            match JointMotion::stop(state, &limits) {
+                Ok(stop) => {
+                    let goal = std::array::from_fn(|i| stop.target_pos()[i]);
+                    *self = Self::Joints { motion: Box::new(stop), limits, goal };
+                }
+                Err(error) => tracing::error!(%error, "a motion could not be braked"),
+            }
+            return;
+        }
         let braked = match self {
             Self::Joints { motion, .. } => {
                 let state = motion.at(motion.time_s()).state();
@@ -159,7 +176,7 @@ impl<'a> Way<'a> {
                 let tip = line.kinematics.tip(joints);
                 let (goal, limits) = (line.goal.isometry(), Some(&line.limits));
                 if let Ok(anew) = motion::PoseMotion::new(tip.isometry(), goal, limits, None, Sync::Phase) {
-                    (line.motion, line.joints) = (anew, *joints);
+                    (line.motion, line.joints, line.astray_rad_s) = (anew, *joints, None);
                 }
             }
         }
@@ -187,6 +204,8 @@ impl Line<'_> {
         self.overtime += u32::from(step.finished);
         let stands = exact.is_some() || travel_rad(&joints, &self.joints) < STANDS_RAD;
         self.is_over = step.finished && (stands || self.overtime > LONGEST_OVERTIME_PASSES);
+        let vel_rad_s = std::array::from_fn(|i| (joints[i] - self.joints[i]) / time_step_s);
+        self.astray_rad_s = exact.is_none().then_some(vel_rad_s);
         (self.joints, self.speeds) = (joints, step.vel);
         joints
     }
@@ -228,19 +247,16 @@ impl Arm {
         self.check_range(goal)?;
         limits.validate(JOINTS)?;
         let start = self.ready(TASK, cancel)?;
-        self.send_motion(Way::joints(&start, goal, limits)?, start, TASK, cancel)?;
-        if self.has_dynamic_joint()? {
+        let dynamic = self.send_motion(Way::joints(&start, goal, limits)?, start, TASK, cancel)?;
+        if dynamic.contains(&true) {
             self.settle(&SettleOptions::default(), cancel)?;
         }
         let here = self.joint_angles()?;
-        for (index, (&at_rad, &goal_rad)) in here.iter().zip(goal).enumerate() {
-            let off_rad = super::stream::difference_rad(at_rad, goal_rad);
-            let dynamic = off_rad > PLACED_OFF_RAD && self.sim.is_joint_dynamic(self.objects.joints[index])?;
-            if off_rad > if dynamic { DRIVEN_OFF_RAD } else { PLACED_OFF_RAD } {
-                return Err(joint_elsewhere(index, at_rad, goal_rad));
-            }
+        let most_rad = |joint: usize| if dynamic[joint] { ARRIVED_OFF_RAD } else { PLACED_OFF_RAD };
+        match (0..JOINTS).find(|&i| difference_rad(here[i], goal[i]) > most_rad(i)) {
+            Some(joint) => Err(joint_elsewhere(joint, here[joint], goal[joint])),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Moves the tip to `goal` within `limits` (x, y, z, angle), waits until the arm stands still, and compares.
@@ -290,15 +306,17 @@ impl Arm {
         self.movable_joints()
     }
 
+    /// Returns which joints are moved by their controllers.
     fn send_motion(
         &mut self,
         way: Way<'_>,
         start: JointAngles,
         task: &'static str,
         cancel: &CancelToken,
-    ) -> Result<(), LinkError> {
+    ) -> Result<[bool; JOINTS], LinkError> {
         let mut stream = Stream::begin(self, start, task)?;
-        let outcome = self.send_points(way, &mut stream, task, cancel);
+        let dynamic = *stream.dynamic();
+        let outcome = self.send_points(way, &mut stream, task, cancel).map(|()| dynamic);
         stream.end(self, outcome)
     }
 
@@ -345,15 +363,6 @@ impl Arm {
         }
     }
 
-    fn has_dynamic_joint(&mut self) -> Result<bool, LinkError> {
-        for &joint in &self.objects.joints {
-            if self.sim.is_joint_dynamic(joint)? {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
     fn check_range(&self, goal: &JointAngles) -> Result<(), LinkError> {
         for (index, (&goal_rad, interval)) in goal.iter().zip(&self.info.joint_intervals).enumerate() {
             if !goal_rad.is_finite() {
@@ -375,7 +384,44 @@ impl Arm {
     }
 }
 
-fn joint_elsewhere(index: usize, at_rad: f64, goal_rad: f64) -> LinkError {
+pub(super) fn joint_elsewhere(index: usize, at_rad: f64, goal_rad: f64) -> LinkError {
     let (at_deg, goal_deg) = (at_rad.to_degrees(), goal_rad.to_degrees());
     LinkError::JointElsewhere { joint: index + 1, at_deg, goal_deg }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::cell::kinematics::JointLimits;
+
+    /// A tip whose line leads through the column of the arm strays, and a stop does not take it back to its line first.
+    #[test]
+    fn a_stop_of_a_tip_that_is_off_its_line_brakes_the_joints_at_once() {
+        let kinematics = ArmKinematics::new(Isometry3::identity(), Isometry3::identity(), JointLimits::default());
+        let start: JointAngles = [0.0, 0.8, -1.2, 0.2, 1.5, 0.0];
+        let mut behind = start;
+        behind[0] += 2.5;
+        let (goal, limits) = (kinematics.tip(&behind), MotionLimits::uniform(4, 0.5, 2.0, 20.0));
+        let mut way = Way::line(&kinematics, &start, &goal, &limits).expect("a profile");
+        let is_astray =
+            |way: &Way<'_>| matches!(way, Way::Line(line) if line.astray_rad_s.is_some_and(|v| v[0].abs() > 0.5));
+        let mut joints = start;
+        for _ in 0..400 {
+            joints = way.next(0.05);
+            if is_astray(&way) {
+                break;
+            }
+        }
+        assert!(is_astray(&way), "the line leads past the column: {joints:?}");
+        way.brake();
+        let mut passes = 0;
+        while !way.is_over() {
+            joints = way.next(0.05);
+            passes += 1;
+            assert!(passes <= 10, "at pi / 2 rad/s it takes a third of a second to stop");
+        }
+        assert_eq!(way.next(0.05), joints, "and it stands");
+    }
 }

@@ -18,7 +18,7 @@ use crate::client::options::CallOptions;
 use crate::client::sim::ObjectHandle;
 
 /// A joint that is where it is put may be off by rounding \[rad\].
-const PLACED_OFF_RAD: f64 = 1e-6;
+pub(super) const PLACED_OFF_RAD: f64 = 1e-6;
 
 /// A joint moved by forces lags behind: by a few degrees at full speed, as its controller is tuned \[rad\].
 const DRIVEN_OFF_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
@@ -89,6 +89,11 @@ impl Stream {
             Err(error) if error.is_connection_loss() => Err(error),
             outcome => self.sentinel.end(&mut arm.sim).and(outcome),
         }
+    }
+
+    /// Which joints are moved by their controllers.
+    pub fn dynamic(&self) -> &[bool; JOINTS] {
+        &self.dynamic
     }
 
     /// Where the joints were sent last.

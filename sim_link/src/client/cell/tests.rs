@@ -421,7 +421,6 @@ fn a_joint_that_is_held_in_a_motion_is_named_with_where_it_stands() {
     let world = world();
     let mut cell = cell(Arc::clone(&world));
     // Something locks it after the first points.
-    edit(&world, |w| w.clock = |time_s| time_s + 0.05);
     let holding = Arc::clone(&world);
     let held = std::thread::spawn(move || {
         while holding.lock().unwrap_or_else(PoisonError::into_inner).track.len() < 3 {

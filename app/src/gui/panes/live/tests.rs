@@ -46,6 +46,16 @@ fn viewport(commands: &[Command]) -> Option<Viewport> {
 }
 
 #[test]
+fn an_image_that_may_be_older_than_its_pose_says_by_how_much() {
+    let mut pane = colour(sample::connected());
+    pane.steps();
+    assert!(!pane.sees("older than the pose"), "all of it is of one instant");
+    let mut model = sample::connected();
+    model.frame.as_mut().expect("a frame").info.image_age_s = 0.05;
+    assert!(colour(model).sees("Image up to 50 ms older than the pose"));
+}
+
+#[test]
 fn the_pixel_under_the_pointer_is_that_of_the_picture_also_when_it_is_zoomed() {
     let mut pane = colour(sample::connected());
     for viewport in [Viewport::default(), Viewport { centre: [0.3, 0.6], zoom: 5.0 }] {
