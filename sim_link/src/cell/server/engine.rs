@@ -23,11 +23,19 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// the last pass: a few calls in a row see the same instant, as they do in the simulator.
 const REQUEST_GRACE: Duration = Duration::from_millis(2);
 
-/// What the simulator puts before the message of an error: the line of its own script that made the call.
+/// What the simulator puts before the message of an error: the line of its own script that made the call, which is this
+/// one in version 4.10.
 const ERROR_LINE: u32 = 354;
 
 /// A reply and the connection that it goes to.
 pub type Outgoing = (Peer, Vec<u8>);
+
+fn no_module(name: &str) -> String {
+    format!(
+        "module '{name}' not found: the built-in cell has sim, handeye and zmqRemoteApi. Inverse kinematics is in \
+         sim.moveToPose with 'ik'."
+    )
+}
 
 /// When there is something to do without a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -303,10 +311,10 @@ impl Engine {
             Ok(Answer::Encoded(bytes)) => self.send(peer, bytes),
             Ok(Answer::Info(name)) => match self.registry.info(&name) {
                 Some(info) => self.send(peer, message::returned(vec![info])),
-                None => self.send(peer, message::failed(&format!("module '{name}' not found"))),
+                None => self.send(peer, message::failed(&no_module(&name))),
             },
             Ok(Answer::Require(name)) if self.registry.has(&name) => self.send(peer, message::returned(Vec::new())),
-            Ok(Answer::Require(name)) => self.send(peer, message::failed(&format!("module '{name}' not found:"))),
+            Ok(Answer::Require(name)) => self.send(peer, message::failed(&no_module(&name))),
             Ok(Answer::Later(task)) => {
                 let index = self.clients.connection(peer, &uuid).calls.len();
                 let call = Running { uuid, func, task, waiting: Waiting::Nothing, owed_since: Some(self.cell.now) };

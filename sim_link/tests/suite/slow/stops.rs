@@ -3,9 +3,9 @@
 use handeye_core::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::{JointModeSpec, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{ArmJog, CellClient, MotionTolerance};
+use handeye_sim_link::client::cell::{ArmJog, CellClient, FollowEnd, FollowGoal, FollowLimits, FollowWish, MotionTolerance};
 use handeye_sim_link::client::{CancelToken, LinkError, MotionLimits};
-use nalgebra::Translation3;
+use nalgebra::{Translation3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use std::sync::{Arc, Mutex};
@@ -42,15 +42,27 @@ fn stop_and_go_on(joint_mode: JointModeSpec) {
     let (joint_limits, tip_limits) =
         (MotionLimits::uniform(6, 1.0, 4.0, 40.0), MotionLimits::uniform(4, 0.3, 2.0, 20.0));
     let start = cell.joint_angles().expect("a call");
+    let kinematics = cell.arm().kinematics().expect("calls").expect("a UR5");
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    for round in 0..50 {
+    for round in 0..100 {
         let cancel = CancelToken::default();
         *trigger.lock().expect("no panic") = Some((rng.random_range(0..25), cancel.clone()));
-        let stopped = match round % 3 {
+        let stopped = match round % 4 {
             0 => cell.move_to_joints(&start.map(|angle| angle + 0.4), &joint_limits, &cancel),
             1 => cell.move_to_pose(&moved(0.1, -0.05, 0.05), &tip_limits, &MotionTolerance::default(), &cancel),
+            2 => {
+                let velocity_m_s = Vector3::new(0.1, 0.0, if round % 8 == 2 { 0.05 } else { -0.05 });
+                let base_from_tip = cell.base_from_tip().expect("a call");
+                let angular_velocity_rad_s = Vector3::zeros();
+                let mut goal = FollowGoal { base_from_tip, velocity_m_s, angular_velocity_rad_s };
+                let end = cell.arm().follow(&kinematics, &FollowLimits::default(), &mut |_| {
+                    goal = goal.after(0.05);
+                    if cancel.is_cancelled() { FollowWish::End } else { FollowWish::Towards(goal) }
+                });
+                end.map(|end| assert_eq!(end, FollowEnd::Released, "{round}"))
+            }
             _ => {
-                let jog = ArmJog::Joint { index: 1, forward: round % 2 == 0 };
+                let jog = ArmJog::Joint { index: 1, forward: round % 8 == 3 };
                 let mut held = || (!cancel.is_cancelled()).then_some(1.0);
                 cell.arm().jog(&jog, Some(0.3), &mut held).map(drop)
             }
@@ -68,11 +80,11 @@ fn stop_and_go_on(joint_mode: JointModeSpec) {
 }
 
 #[test]
-fn an_arm_that_is_put_from_place_to_place_goes_on_after_a_stop_at_fifty_instants() {
+fn an_arm_that_is_put_from_place_to_place_goes_on_after_a_stop_at_a_hundred_instants() {
     stop_and_go_on(JointModeSpec::Kinematic);
 }
 
 #[test]
-fn an_arm_that_controllers_move_goes_on_after_a_stop_at_fifty_instants() {
+fn an_arm_that_controllers_move_goes_on_after_a_stop_at_a_hundred_instants() {
     stop_and_go_on(JointModeSpec::Dynamic);
 }

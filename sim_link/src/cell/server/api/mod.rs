@@ -1,5 +1,6 @@
 //! The functions and constants that clients can reach, by namespace.
 
+mod absent;
 mod constants;
 mod handeye;
 mod joints;
@@ -58,6 +59,7 @@ pub type Function = fn(&mut Call<'_>) -> Outcome;
 type Table = &'static [(&'static str, Function)];
 
 const SIM: &[Table] = &[
+    absent::FUNCTIONS,
     objects::FUNCTIONS,
     poses::FUNCTIONS,
     matrices::FUNCTIONS,
@@ -112,7 +114,7 @@ impl Registry {
         if constant {
             "attempt to call a number value (upvalue 'func')".to_owned()
         } else {
-            format!("No such function: {name}")
+            format!("No such function: {name} (functions of the built-in cell: docs/cell.md)")
         }
     }
 

@@ -41,15 +41,25 @@ fn get_object(call: &mut Call<'_>) -> Outcome {
     let no_error = options.boolean("noError")?.unwrap_or(false);
     match paths::find(&call.cell.world.tree, path, index, proxy) {
         Err(_) if no_error => one(-1),
-        found => one(found?),
+        found => one(found.map_err(|error| unknown(error, path))?),
     }
+}
+
+/// The simulator's words, and which of a program's paths it was.
+fn unknown(error: WorldError, path: &str) -> ApiError {
+    if error != WorldError::NoSuchPath {
+        return error.into();
+    }
+    const SHOWN: usize = 100;
+    let path: String = path.chars().take(SHOWN).collect();
+    ApiError::Other(format!("{error} ('{path}'; sim.getObjectsInTree(sim.handle_scene) lists what is there)"))
 }
 
 /// The old form: a path, or an alias alone.
 fn get_object_handle(call: &mut Call<'_>) -> Outcome {
     let name = call.args.text(0)?;
     let path = if name.starts_with('/') { name.to_owned() } else { format!("/{name}") };
-    one(paths::find(&call.cell.world.tree, &path, None, None)?)
+    one(paths::find(&call.cell.world.tree, &path, None, None).map_err(|error| unknown(error, &path))?)
 }
 
 fn get_object_alias(call: &mut Call<'_>) -> Outcome {

@@ -27,8 +27,6 @@ pub(super) const FUNCTIONS: Table = &[
     ("setThreadSwitchTiming", set_thread_switch_timing),
     ("setThreadAutomaticSwitch", set_thread_automatic_switch),
     ("addLog", add_log),
-    ("loadScene", load_scene),
-    ("closeScene", load_scene),
     ("testCB", test_cb),
 ];
 
@@ -111,21 +109,14 @@ fn set_thread_automatic_switch(_call: &mut Call<'_>) -> Outcome {
 }
 
 fn add_log(call: &mut Call<'_>) -> Outcome {
-    const SCRIPT_ERRORS: i64 = 420;
     const MAX_LINE: usize = 4000;
     let verbosity = call.args.integer(0)? & 0xfff;
     let Some(text) = call.args.get(1) else { return nothing() };
     let text = text.text().ok_or(ApiError::WrongType { number: 2, expected: "a string" })?;
     let text: String = text.chars().take(MAX_LINE).collect();
     tracing::info!(verbosity, "{text}");
-    call.cell.add_log(text.clone());
-    // The simulator raises what is logged as an error.
-    if verbosity == SCRIPT_ERRORS { Err(ApiError::Other(text)) } else { nothing() }
-}
-
-fn load_scene(_call: &mut Call<'_>) -> Outcome {
-    let text = "the built-in cell cannot load scenes: start `handeye cell --scene FILE` instead.";
-    Err(ApiError::Other(text.to_owned()))
+    call.cell.add_log(text);
+    nothing()
 }
 
 /// Calls a function of the client with two values, 99 times unless told otherwise, and once more for its result.
