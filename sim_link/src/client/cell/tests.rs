@@ -123,7 +123,8 @@ impl World {
                 ret([Value::from(1)])
             }
             "sim.handleVisionSensor" => {
-                assert_eq!((args[0].integer(), self.held), (Some(-3), 1), "all, while time stands");
+                // A motion on the other connection may hold it too.
+                assert!(args[0].integer() == Some(-3) && self.held > 0, "all, while time stands");
                 self.handled += 1;
                 ret([Value::from(0)])
             }
