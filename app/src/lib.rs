@@ -18,3 +18,5 @@ mod shortfall;
 pub mod text;
 pub mod truth;
 pub mod worker;
+
+pub use handeye_core::text;

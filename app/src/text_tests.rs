@@ -48,9 +48,11 @@ fn literal(source: &str) -> Option<String> {
 /// Every text in the sources with the places where it stands.
 fn texts() -> BTreeMap<String, PathBuf> {
     let mut files = Vec::new();
-    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    for folder in ["src", "../core/src"] {
+        sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
+    }
     let mut texts = BTreeMap::new();
-    for file in files.into_iter().filter(|file| !file.ends_with("text.rs")) {
+    for file in files {
         let source = std::fs::read_to_string(&file).expect("a source");
         for macro_name in ["tr!(", "text!("] {
             for (at, _) in source.match_indices(macro_name) {

@@ -43,5 +43,6 @@ pub mod track;
 pub mod verify;
 #[cfg(feature = "opencv")]
 pub mod vision;
+pub mod wording;
 
 pub use image;

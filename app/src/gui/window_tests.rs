@@ -161,7 +161,7 @@ fn nothing_is_cut_off_at_the_smallest_size() {
     for language in Language::ALL {
         silent.command(Command::SetLanguage(language));
         silent.command(Command::SetRotationFormat(RotationFormat::Quaternion));
-        let tr = |english| crate::text::translation(language, english).unwrap_or(english).to_owned();
+        let tr = |english| crate::text::Catalogue::translation(language, english).unwrap_or(english).to_owned();
         let mut labels: Vec<_> = ["STOP", "Menu", "Undo", "Redo", "Full range", "Colour picture", "Depth picture"]
             .into_iter()
             .map(tr)

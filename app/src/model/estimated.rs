@@ -1,7 +1,6 @@
 //! What the joint estimate decided and found out besides the answer, in words with units.
 
 use handeye_core::calibrate::{Calibration, JointOffsets, ShapeEstimate, ViewStatus};
-use handeye_core::handeye::widening::Evidence;
 
 use crate::text;
 use crate::text::Text;
@@ -106,21 +105,8 @@ fn widening(calibration: &Calibration) -> Option<Estimated> {
         meaning: text!(
             "The stated errors are so many times what independent noise explains, because the data show more than that"
         ),
-        why: Some(reason(by)),
+        why: Some(by.reason()),
     })
-}
-
-/// What was seen, as the findings say it.
-fn reason(by: Evidence) -> Text {
-    match by {
-        Evidence::Neighbours => text!("the robot is off in the same direction in neighbouring poses"),
-        Evidence::TimeBlocks => text!("the answer moves too far without views that follow each other"),
-        Evidence::PoseBlocks => text!("the answer moves too far without neighbouring poses"),
-        Evidence::Halves => text!("two halves of the views disagree by more than stated"),
-        Evidence::Jackknife => text!("the answer moves too far without single views"),
-        Evidence::CrossValidation => text!("views left out are predicted worse than stated"),
-        other => Text::verbatim(other.reason()),
-    }
 }
 
 fn freedom(calibration: &Calibration) -> Option<Estimated> {
@@ -167,7 +153,7 @@ fn joint_offsets(offsets: &JointOffsets) -> Estimated {
 #[cfg(test)]
 mod tests {
     use handeye_core::board_shape::BoardShape;
-    use handeye_core::handeye::widening::Widening;
+    use handeye_core::handeye::widening::{Evidence, Widening};
 
     use super::*;
     use crate::gui::sample;

@@ -52,7 +52,7 @@ fn findings(out: &mut String, solved: &Solved) {
             Severity::Warning => "Warning",
             Severity::Problem => "Problem",
         };
-        line!(out, "- *{mark}:* {}", finding.text);
+        line!(out, "- *{mark}:* {finding}");
     }
     if !solved.findings.is_empty() {
         line!(out);

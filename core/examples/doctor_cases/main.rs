@@ -9,6 +9,7 @@ mod faults;
 mod sim;
 
 use handeye_core::findings::Severity;
+use handeye_core::wording::English;
 
 fn number(argument: Option<String>, otherwise: u64) -> u64 {
     argument.and_then(|a| a.parse().ok()).unwrap_or(otherwise)
@@ -40,7 +41,7 @@ fn main() {
         if !diagnosis.is_healthy() {
             alarms += 1;
             let grave = diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning);
-            let said: Vec<String> = grave.map(|f| format!("{:?}: {}", f.code, f.text)).collect();
+            let said: Vec<String> = grave.map(|f| format!("{:?}: {}", f.code, f)).collect();
             println!(
                 "healthy {seed}, {} views: {} {:?}",
                 observations.views.len(),
@@ -66,7 +67,7 @@ fn main() {
             if best.is_some_and(|h| h.code == code && h.accepted) {
                 first += 1;
             } else {
-                println!("  {name}, seed {seed}: {:?}", best.map(|h| (h.code, h.accepted, &h.text)));
+                println!("  {name}, seed {seed}: {:?}", best.map(|h| (h.code, h.accepted, h.text.say(English))));
             }
         }
         println!("{name}: first in {first} of {seeds}");

@@ -33,6 +33,7 @@ use serde::Serialize;
 use crate::calibrate::{Calibration, Observations};
 use crate::findings::{self, Evidence, Finding, FindingCode, FindingOptions, Severity};
 use crate::progress::Work;
+use crate::wording::Text;
 
 /// A hypothesis about the data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -43,9 +44,11 @@ pub struct Hypothesis {
     /// (inverted poses and the other mode are the same equations).
     pub with: Vec<FindingCode>,
     /// It in words, with what it explains.
-    pub text: String,
+    #[serde(serialize_with = "Text::serialize_english")]
+    pub text: Text,
     /// What to do if it is true.
-    pub advice: String,
+    #[serde(serialize_with = "Text::serialize_english")]
+    pub advice: Text,
     /// Natural logarithm of how many times better it explains the data than they are explained without it; negative when
     /// it explains them worse.
     pub gain: f64,
@@ -60,6 +63,13 @@ pub struct Hypothesis {
     /// Whether it is also large enough to matter, better on views held out, and not explained by one that explains more.
     /// It is then among the findings.
     pub accepted: bool,
+}
+
+impl Hypothesis {
+    /// It in words, with what to do.
+    fn text_with_advice(&self) -> Text {
+        Text::sentences([self.text.clone(), self.advice.clone()])
+    }
 }
 
 /// A number that a hypothesis estimates.

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::{Diagnosis, Hypothesis};
 use crate::findings::{Finding, Severity};
+use crate::wording::English;
 
 /// Writing into a `String` cannot fail.
 macro_rules! line {
@@ -43,7 +44,7 @@ fn finding(out: &mut String, finding: &Finding) {
         Severity::Advice => "advice",
         Severity::Info => "note",
     };
-    line!(out, "{severity} [{}] {}", code(finding.code), finding.text);
+    line!(out, "{severity} [{}] {}", code(finding.code), finding);
 }
 
 fn hypothesis(out: &mut String, number: usize, h: &Hypothesis) {
@@ -52,7 +53,7 @@ fn hypothesis(out: &mut String, number: usize, h: &Hypothesis) {
         (false, true) => "significant, but too small or explained by another",
         (false, false) => "not supported",
     };
-    line!(out, "  {number}. [{}] {verdict}: {}", code(h.code), h.text);
+    line!(out, "  {number}. [{}] {verdict}: {}", code(h.code), h.text.say(English));
 }
 
 /// The code as it stands in JSON.

@@ -7,8 +7,10 @@ pub(super) use fine::{finding_of, fine};
 use super::gross::{self, Gross, Tried};
 use super::sight::Sight;
 use super::{Estimate, Hypothesis};
-use crate::findings::{Evidence, Finding, FindingCode, Severity, listed, plural};
+use crate::findings::{Evidence, Finding, FindingCode, Severity, listed};
 use crate::handeye::Mode;
+use crate::text;
+use crate::wording::Text;
 
 /// Natural logarithm of a likelihood ratio that a gross hypothesis needs after allowance for all that are tried.
 const CERTAIN: f64 = 5.0;
@@ -18,7 +20,7 @@ const FARTHER: f64 = 2.0;
 /// How many times better, from the logarithm.
 fn times(gain: f64) -> String {
     // Beyond a few thousand times the size of the number tells nothing.
-    if gain < 8.0 { format!("{:.1} times", gain.exp()) } else { format!("e^{gain:.0} times") }
+    if gain < 8.0 { format!("{:.1}", gain.exp()) } else { format!("e^{gain:.0}") }
 }
 
 fn evidence(name: &'static str, value: f64, unit: &'static str) -> Evidence {
@@ -30,15 +32,17 @@ pub(super) fn not_finite(sight: &Sight) -> Option<Finding> {
     if names.is_empty() {
         return None;
     }
-    let text = format!(
-        "{} view{} with a pose or a corner that is not a number ({}). Write the table anew, or leave them out.",
-        names.len(),
-        plural(names.len()),
-        listed(names)
-    );
+    let count = names.len();
+    let what = if count == 1 {
+        text!("{count} view with a pose or a corner that is not a number ({list}).")
+    } else {
+        text!("{count} views with a pose or a corner that is not a number ({list}).")
+    };
+    let what = what.with("count", count).with("list", listed(names));
+    let text = Text::sentences([what, text!("Write the table anew, or leave them out.")]);
     let mut finding = Finding::new(FindingCode::NotFinite, Severity::Problem, text);
     finding.views.clone_from(names);
-    Some(finding.with("views", names.len() as f64, ""))
+    Some(finding.with("views", count as f64, ""))
 }
 
 pub(super) fn wrong_corners(sight: &Sight) -> Option<Finding> {
@@ -49,10 +53,12 @@ pub(super) fn wrong_corners(sight: &Sight) -> Option<Finding> {
     let names: Vec<String> = views.iter().map(|v| v.name.clone()).collect();
     let wrong: usize = views.iter().map(|v| v.wrong_corners.len()).sum();
     let corners: usize = views.iter().map(|v| v.corners).sum();
-    let text = format!(
-        "{wrong} of {corners} corners are not where the rest of their view puts them ({}). Look there for reflections, a \
+    let text = text!(
+        "{wrong} of {corners} corners are not where the rest of their view puts them ({list}). Look there for reflections, a \
          covered corner or a wrong index; leave the view out or capture it again.",
-        listed(&names)
+        wrong = wrong,
+        corners = corners,
+        list = listed(&names)
     );
     let mut finding = Finding::new(FindingCode::OutlierCorners, Severity::Warning, text);
     finding.views = names;
@@ -115,18 +121,18 @@ fn gross_hypothesis(sight: &Sight, gross: &Gross, tried: &Tried, codes: &[Findin
     let (given_mm, so_mm) = (given_m * 1e3, so_m * 1e3);
     let freedom = 0.5 * (6.0 * gross.views as f64 - 12.0).max(1.0);
     let ratio = (given_m.max(1e-9) / so_m.max(1e-9)).ln();
-    let said: Vec<String> = codes.iter().map(|code| gross_words(*code, tried)).collect();
-    let text = format!(
-        "{} So read, the board comes together within {so_mm:.2} mm, as stated within {given_mm:.2} mm (median view).",
-        said.join(" ")
+    let so_read = text!(
+        "So read, the board comes together within {so} mm, as stated within {given} mm (median view).",
+        so = format!("{so_mm:.2}"),
+        given = format!("{given_mm:.2}")
     );
-    let advice: Vec<&str> = codes.iter().map(|code| gross_advice(*code)).collect();
+    let what = codes.iter().filter_map(|code| gross_words(*code, tried));
     let (camera_m, target_m) = distances(tried);
     Hypothesis {
         code: codes.first().copied().unwrap_or(FindingCode::InconsistentPoses),
         with: codes.iter().skip(1).copied().collect(),
-        text,
-        advice: advice.join(" "),
+        text: Text::sentences(what.chain([so_read])),
+        advice: Text::sentences(codes.iter().filter_map(|code| gross_advice(*code))),
         gain: freedom * ratio,
         estimate: None,
         evidence: vec![
@@ -141,44 +147,52 @@ fn gross_hypothesis(sight: &Sight, gross: &Gross, tried: &Tried, codes: &[Findin
     }
 }
 
-fn gross_words(code: FindingCode, tried: &Tried) -> String {
+fn gross_words(code: FindingCode, tried: &Tried) -> Option<Text> {
     let (camera_m, target_m) = distances(tried);
-    match code {
-        FindingCode::InvertedPoses => format!(
+    Some(match code {
+        FindingCode::InvertedPoses => text!(
             "The robot poses are the inverse of what is stated, or the camera sits on the other side (eye in hand against \
-             eye to hand): both are the same equations. The camera would be {camera_m:.2} m from what carries it and the \
-             board {target_m:.2} m."
+             eye to hand): both are the same equations. The camera would be {camera} m from what carries it and the board \
+             {target} m.",
+            camera = format!("{camera_m:.2}"),
+            target = format!("{target_m:.2}")
         ),
         FindingCode::WrongQuaternionOrder => {
             let (has, stated) = if tried.change.w_first() { ("w x y z", "x y z w") } else { ("x y z w", "w x y z") };
-            format!("The quaternions of the robot poses are in the order {has} and were read as {stated}.")
-        }
-        FindingCode::WrongLengthUnit => {
-            let (has, stated) =
-                if tried.change.unit < 1.0 { ("millimetres", "metres") } else { ("metres", "millimetres") };
-            format!(
-                "The positions of the robot poses are in {has} where {stated} were stated, or the size of the target is in \
-                 the wrong unit."
+            text!(
+                "The quaternions of the robot poses are in the order {has} and were read as {stated}.",
+                has = has,
+                stated = stated
             )
         }
-        FindingCode::ShiftedPoses => {
-            let where_to = if tried.change.shift > 0 { "after" } else { "before" };
-            format!("Every picture belongs to the robot pose of the row {where_to} it.")
+        FindingCode::WrongLengthUnit => {
+            let (metres, millimetres) = (text!("metres"), text!("millimetres"));
+            let (has, stated) = if tried.change.unit < 1.0 { (millimetres, metres) } else { (metres, millimetres) };
+            text!(
+                "The positions of the robot poses are in {has} where {stated} were stated, or the size of the target is in \
+                 the wrong unit.",
+                has = has,
+                stated = stated
+            )
         }
-        _ => String::new(),
-    }
+        FindingCode::ShiftedPoses if tried.change.shift > 0 => {
+            text!("Every picture belongs to the robot pose of the row after it.")
+        }
+        FindingCode::ShiftedPoses => text!("Every picture belongs to the robot pose of the row before it."),
+        _ => return None,
+    })
 }
 
-fn gross_advice(code: FindingCode) -> &'static str {
-    match code {
+fn gross_advice(code: FindingCode) -> Option<Text> {
+    Some(match code {
         FindingCode::InvertedPoses => {
-            "Check whether the table has base_from_tip or tip_from_base, and whether the camera is on the tip."
+            text!("Check whether the table has base_from_tip or tip_from_base, and whether the camera is on the tip.")
         }
-        FindingCode::WrongQuaternionOrder => "Check the order of the columns.",
-        FindingCode::WrongLengthUnit => "Check the unit of the poses and the size of the target.",
-        FindingCode::ShiftedPoses => "Check how pictures and poses were paired.",
-        _ => "",
-    }
+        FindingCode::WrongQuaternionOrder => text!("Check the order of the columns."),
+        FindingCode::WrongLengthUnit => text!("Check the unit of the poses and the size of the target."),
+        FindingCode::ShiftedPoses => text!("Check how pictures and poses were paired."),
+        _ => return None,
+    })
 }
 
 /// An accused gross hypothesis as findings, one per code.
@@ -190,19 +204,19 @@ pub(super) fn gross_findings(hypotheses: &[Hypothesis]) -> Vec<Finding> {
     std::iter::once(h.code)
         .chain(others)
         .map(|code| {
-            let finding = Finding::new(code, Severity::Problem, format!("{} {}", h.text, h.advice));
+            let finding = Finding::new(code, Severity::Problem, h.text_with_advice());
             Finding { evidence: h.evidence.clone(), ..finding }
         })
         .collect()
 }
 
 pub(super) fn hopeless(sight: &Sight, misfit_m: f64) -> Finding {
-    let text = format!(
-        "Robot poses and pictures contradict each other: the board comes together within {:.0} mm only, at a distance of \
-         {:.0} mm. Inverted poses, the other mode, millimetres, quaternion order and rows out of step do not explain it. \
-         Check that the poses belong to these pictures, and the axes and angles that the poses were made from.",
-        misfit_m * 1e3,
-        sight.distance_m * 1e3
+    let text = text!(
+        "Robot poses and pictures contradict each other: the board comes together within {misfit} mm only, at a distance of \
+         {distance} mm. Inverted poses, the other mode, millimetres, quaternion order and rows out of step do not explain \
+         it. Check that the poses belong to these pictures, and the axes and angles that the poses were made from.",
+        misfit = format!("{:.0}", misfit_m * 1e3),
+        distance = format!("{:.0}", sight.distance_m * 1e3)
     );
     let finding = Finding::new(FindingCode::InconsistentPoses, Severity::Problem, text);
     finding.with("misfit", misfit_m * 1e3, "mm").with("distance", sight.distance_m * 1e3, "mm")
@@ -211,12 +225,23 @@ pub(super) fn hopeless(sight: &Sight, misfit_m: f64) -> Finding {
 /// Noise beyond that of an arm, whatever else was found.
 pub(super) fn implausible(robot_m: f64, robot_rad: f64, beside: bool) -> Finding {
     let (mm, deg) = (robot_m * 1e3, robot_rad.to_degrees());
-    let beside = if beside { "even with what else was found, " } else { "" };
-    let text = format!(
-        "The robot poses scatter by {mm:.2} mm and {deg:.3}° per axis about what the pictures say, {beside}more than an arm \
-         errs (below 2 mm and 0.5°). The arm may have been moving, poses and pictures may not be of the same moment, or the \
-         arm's own geometry is wrong. Capture again at rest; no solver can mend it."
+    let what = if beside {
+        text!(
+            "The robot poses scatter by {mm} mm and {deg}° per axis about what the pictures say, even with what else was \
+             found, more than an arm errs (below 2 mm and 0.5°)."
+        )
+    } else {
+        text!(
+            "The robot poses scatter by {mm} mm and {deg}° per axis about what the pictures say, more than an arm errs \
+             (below 2 mm and 0.5°)."
+        )
+    };
+    let what = what.with("mm", format!("{mm:.2}")).with("deg", format!("{deg:.3}"));
+    let advice = text!(
+        "The arm may have been moving, poses and pictures may not be of the same moment, or the arm's own geometry is wrong. \
+         Capture again at rest; no solver can mend it."
     );
+    let text = Text::sentences([what, advice]);
     let finding = Finding::new(FindingCode::InconsistentPoses, Severity::Warning, text);
     finding.with("robot_sigma", mm, "mm").with("robot_sigma_angle", deg, "°")
 }

@@ -4,6 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::{Finding, FindingCode, FindingOptions, Severity};
 use crate::calibrate::{Calibration, ViewResult, ViewStatus};
+use crate::text;
+use crate::wording::Text;
 
 /// Views below which none can stand out from the others.
 const MIN_FOR_OUTLIERS: usize = 5;
@@ -68,12 +70,12 @@ fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding>
     if largest_m < INFLUENCE * error_m {
         return None;
     }
-    let text = format!(
-        "View {} alone moves the answer by {:.2} mm; the median view moves it by {:.2} mm. Check its picture and its robot \
-         pose, or add views like it so that it does not stand alone.",
-        view.name,
-        largest_m * 1e3,
-        median_m * 1e3
+    let text = text!(
+        "View {view} alone moves the answer by {influence} mm; the median view moves it by {median} mm. Check its picture \
+         and its robot pose, or add views like it so that it does not stand alone.",
+        view = &view.name,
+        influence = format!("{:.2}", largest_m * 1e3),
+        median = format!("{:.2}", median_m * 1e3)
     );
     // Where a view stands alone is geometry; one that is wrong is told by what it contradicts.
     let finding = Finding::new(FindingCode::InfluentialView, Severity::Advice, text).of_view(&view.name);
@@ -83,10 +85,12 @@ fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding>
 
 fn residuals(used: &[&ViewResult]) -> Option<Finding> {
     let (view, largest, middle) = stands_out(used, |v| v.rms_px)?;
-    let text = format!(
-        "The corners of view {} fit with {largest:.2} px, those of the median view with {middle:.2} px. Look at its picture \
-         for blur, reflections and wrong corners; leave it out if there are any.",
-        view.name
+    let text = text!(
+        "The corners of view {view} fit with {rms} px, those of the median view with {median} px. Look at its picture for \
+         blur, reflections and wrong corners; leave it out if there are any.",
+        view = &view.name,
+        rms = format!("{largest:.2}"),
+        median = format!("{middle:.2}")
     );
     let finding = Finding::new(FindingCode::LargeResidual, Severity::Warning, text).of_view(&view.name);
     Some(finding.with("rms", largest, "px").with("median_rms", middle, "px"))
@@ -108,11 +112,15 @@ fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Findin
     let middle = |value: fn(&ViewResult) -> Option<f64>| median(used.iter().filter_map(|v| value(v)).collect());
     let (mm, deg) = (view.correction_m? * 1e3, view.correction_rad?.to_degrees());
     let (median_mm, median_deg) = (middle(|v| v.correction_m)? * 1e3, middle(|v| v.correction_rad)?.to_degrees());
-    let text = format!(
-        "The robot pose of view {} had to be corrected by {mm:.2} mm and {deg:.3}°, the median by {median_mm:.2} mm and \
-         {median_deg:.3}°. The arm may have moved when the picture was taken, or the board has; leave the view out or \
-         capture it again.",
-        view.name
+    let text = text!(
+        "The robot pose of view {view} had to be corrected by {mm} mm and {deg}°, the median by {median_mm} mm and \
+         {median_deg}°. The arm may have moved when the picture was taken, or the board has; leave the view out or capture \
+         it again.",
+        view = &view.name,
+        mm = format!("{mm:.2}"),
+        deg = format!("{deg:.3}"),
+        median_mm = format!("{median_mm:.2}"),
+        median_deg = format!("{median_deg:.3}")
     );
     let finding = Finding::new(FindingCode::LargeCorrection, Severity::Warning, text).of_view(&view.name);
     let finding = finding.with("correction", mm, "mm").with("correction_angle", deg, "°");
@@ -124,10 +132,12 @@ fn prediction(calibration: &Calibration) -> Option<Finding> {
     if heldout <= PREDICTION * expected {
         return None;
     }
-    let text = format!(
-        "Views left out of the fit are predicted to {heldout:.2} px, where robot and corner noise explain {expected:.2} px. \
-         The model misses something: a wrong view, a board that is bent or not of the stated size, too few views for so \
-         many unknowns, or robot errors that depend on the pose. Capture more views and check those that stand out."
+    let text = text!(
+        "Views left out of the fit are predicted to {heldout} px, where robot and corner noise explain {expected} px. The \
+         model misses something: a wrong view, a board that is bent or not of the stated size, too few views for so many \
+         unknowns, or robot errors that depend on the pose. Capture more views and check those that stand out.",
+        heldout = format!("{heldout:.2}"),
+        expected = format!("{expected:.2}")
     );
     let finding = Finding::new(FindingCode::PoorPrediction, Severity::Warning, text);
     Some(finding.with("heldout_rms", heldout, "px").with("explained_rms", expected, "px"))
@@ -141,10 +151,13 @@ fn robot_noise(calibration: &Calibration) -> Option<Finding> {
         return None;
     }
     let (mm, deg) = (noise.robot_m * 1e3, noise.robot_rad.to_degrees());
-    let text = format!(
-        "The robot limits the answer: its noise of {mm:.3} mm and {deg:.3}° per axis moves corners by {robot_px:.2} px, \
-         their own noise is {corner_px:.2} px. Better pictures will not help much; more views, and settling longer before \
-         each, will."
+    let text = text!(
+        "The robot limits the answer: its noise of {mm} mm and {deg}° per axis moves corners by {robot} px, their own noise \
+         is {corner} px. Better pictures will not help much; more views, and settling longer before each, will.",
+        mm = format!("{mm:.3}"),
+        deg = format!("{deg:.3}"),
+        robot = format!("{robot_px:.2}"),
+        corner = format!("{corner_px:.2}")
     );
     let finding = Finding::new(FindingCode::RobotNoise, Severity::Info, text);
     let finding = finding.with("robot_effect", robot_px, "px").with("corner_noise", corner_px, "px");
@@ -171,17 +184,19 @@ fn closed_forms(calibration: &Calibration) -> Option<Finding> {
         return None;
     }
     off.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let list: Vec<String> = off.iter().map(|(name, d)| format!("{name} by {:.1} mm", d * 1e3)).collect();
-    let list = list.join(", ");
-    let (severity, what_to_do) = if typical_m > DISAGREE_M {
+    let each = off
+        .iter()
+        .map(|(name, d)| text!("{method} by {distance} mm", method = name, distance = format!("{:.1}", d * 1e3)));
+    let (severity, advice) = if typical_m > DISAGREE_M {
         (
             Severity::Warning,
-            "Most of them do, so the views determine the answer weakly: add views with more tilt and turn.",
+            text!("Most of them do, so the views determine the answer weakly: add views with more tilt and turn."),
         )
     } else {
-        (Severity::Info, "The others agree; these weigh noise badly and are for comparison only.")
+        (Severity::Info, text!("The others agree; these weigh noise badly and are for comparison only."))
     };
-    let text = format!("Closed forms differ from the middle of all: {list}. {what_to_do}");
+    let list = Text::list(each);
+    let text = text!("Closed forms differ from the middle of all: {list}. {advice}", list = list, advice = advice);
     let finding = Finding::new(FindingCode::ClosedFormsDisagree, severity, text);
     let finding = finding.with("median_distance", typical_m * 1e3, "mm");
     Some(off.iter().fold(finding, |f, (name, d)| f.with(name, d * 1e3, "mm")))
@@ -189,30 +204,41 @@ fn closed_forms(calibration: &Calibration) -> Option<Finding> {
 
 fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
     let error_mm = calibration.tip_error_95_m? * 1e3;
-    let finding = |code, severity, text: String| {
+    let finding = |code, severity, text| {
         Finding::new(code, severity, text).with("expected_error_95", error_mm, "mm").with("goal", goal_mm, "mm")
     };
     if error_mm <= goal_mm {
-        let text = format!(
-            "Good enough: the expected error of {error_mm:.3} mm (95 %) is below the goal of {goal_mm:.3} mm. Verify with \
-             captures that were not in the fit."
+        let text = text!(
+            "Good enough: the expected error of {error} mm (95 %) is below the goal of {goal} mm. Verify with captures that \
+             were not in the fit.",
+            error = format!("{error_mm:.3}"),
+            goal = format!("{goal_mm:.3}")
         );
         return Some(finding(FindingCode::GoalReached, Severity::Info, text));
     }
     let curve = calibration.error_curve.as_ref()?;
     let (views, _) = curve.now()?;
     let needed = curve.views_for(goal_mm * 1e-3);
-    let start = format!("The expected error of {error_mm:.3} mm (95 %) is above the goal of {goal_mm:.3} mm.");
-    let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {
-        let text = format!(
-            "{start} More views like these would take too many: tilt and turn the camera more, come closer, or reduce the \
-             noise."
+    let not_reached = |advice: Text| {
+        let text = text!(
+            "The expected error of {error} mm (95 %) is above the goal of {goal} mm. {advice}",
+            error = format!("{error_mm:.3}"),
+            goal = format!("{goal_mm:.3}"),
+            advice = advice
         );
-        return Some(finding(FindingCode::GoalNotReached, Severity::Advice, text));
+        finding(FindingCode::GoalNotReached, Severity::Advice, text)
+    };
+    let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {
+        return Some(not_reached(text!(
+            "More views like these would take too many: tilt and turn the camera more, come closer, or reduce the noise."
+        )));
     };
     // The curve's error equals the stated one but for rounding, so one more is the least that can help.
     let more = needed.saturating_sub(views).max(1);
-    let s = super::plural(more);
-    let text = format!("{start} About {more} more view{s} like those gathered will reach it.");
-    Some(finding(FindingCode::GoalNotReached, Severity::Advice, text).with("more_views", more as f64, ""))
+    let advice = if more == 1 {
+        text!("About {more} more view like those gathered will reach it.")
+    } else {
+        text!("About {more} more views like those gathered will reach it.")
+    };
+    Some(not_reached(advice.with("more", more)).with("more_views", more as f64, ""))
 }

@@ -10,6 +10,8 @@ use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector3};
 use super::{Finding, FindingCode, Severity};
 use crate::calibrate::Calibration;
 use crate::se3::skew;
+use crate::text;
+use crate::wording::Text;
 
 /// Weakest over best from which a word is worth it: views on a wide cone leave a factor of three or four.
 const UNEVEN: f64 = 5.0;
@@ -45,16 +47,26 @@ pub fn finding(calibration: &Calibration) -> Option<Finding> {
     let (what, size) = if is_turn {
         let sigma_deg = (sigma_m * turn.norm() / distance_m).to_degrees();
         (
-            format!("the camera's turn about {}", named(&axis)),
-            format!("±{sigma_deg:.4}°, which is {sigma_mm:.3} mm at the board"),
+            text!("the camera's turn about {axis}", axis = named(&axis)),
+            text!(
+                "±{deg}°, which is {mm} mm at the board",
+                deg = format!("{sigma_deg:.4}"),
+                mm = format!("{sigma_mm:.3}")
+            ),
         )
     } else {
-        (format!("the place of what it sees along {}", named(&axis)), format!("±{sigma_mm:.3} mm"))
+        (
+            text!("the place of what it sees along {axis}", axis = named(&axis)),
+            Text::verbatim(format!("±{sigma_mm:.3} mm")),
+        )
     };
-    let text = format!(
-        "The weakest direction of the answer is {what}: {size} (one standard deviation), {ratio:.0} times the best. Add \
-         views turned by 30° and more to both sides about {}.",
-        across(&axis)
+    let text = text!(
+        "The weakest direction of the answer is {what}: {size} (one standard deviation), {ratio} times the best. Add views \
+         turned by 30° and more to both sides about {across}.",
+        what = what,
+        size = size,
+        ratio = format!("{ratio:.0}"),
+        across = across(&axis)
     );
     let severity = if sigma_m > MATTERS_M { Severity::Advice } else { Severity::Info };
     let finding = Finding::new(FindingCode::WeakDirection, severity, text);
@@ -63,19 +75,24 @@ pub fn finding(calibration: &Calibration) -> Option<Finding> {
 }
 
 /// A direction in camera axes in words.
-fn named(axis: &Vector3<f64>) -> String {
+fn named(axis: &Vector3<f64>) -> Text {
     // Within 25° of an axis of the camera one word is near enough to act on.
     if axis.amax() < 0.9 {
-        return format!("the axis [{:.2} {:.2} {:.2}] of the camera", axis.x, axis.y, axis.z);
+        let axis = format!("[{:.2} {:.2} {:.2}]", axis.x, axis.y, axis.z);
+        return text!("the axis {axis} of the camera", axis = axis);
     }
-    ["the camera's x axis (right)", "the camera's y axis (down)", "the camera's line of sight"][axis.iamax()].to_owned()
+    match axis.iamax() {
+        0 => text!("the camera's x axis (right)"),
+        1 => text!("the camera's y axis (down)"),
+        _ => text!("the camera's line of sight"),
+    }
 }
 
 /// The camera axes across a direction.
-fn across(axis: &Vector3<f64>) -> &'static str {
-    [
-        "the camera's y axis and its line of sight",
-        "the camera's x axis and its line of sight",
-        "the camera's x and y axes",
-    ][axis.iamax()]
+fn across(axis: &Vector3<f64>) -> Text {
+    match axis.iamax() {
+        0 => text!("the camera's y axis and its line of sight"),
+        1 => text!("the camera's x axis and its line of sight"),
+        _ => text!("the camera's x and y axes"),
+    }
 }

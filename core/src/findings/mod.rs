@@ -1,8 +1,8 @@
 //! What is wrong or weak in a set of views and its calibration, and what to do next.
 //!
-//! A finding is data first: a code, a severity, numbers with units and the views concerned; as text it says what it is,
-//! by which evidence, and what to do. Residuals say how well the model fits, and are never given as accuracy; where a
-//! finding speaks of the expected error it is the one stated by the covariance.
+//! A finding is data first: a code, a severity, numbers with units and the views concerned; as text, in any language, it
+//! says what it is, by which evidence, and what to do. Residuals say how well the model fits, and are never given as
+//! accuracy; where a finding speaks of the expected error it is the one stated by the covariance.
 //!
 //! Before a calibration only the views themselves are judged; with one, also the answer.
 
@@ -17,6 +17,8 @@ use serde::Serialize;
 
 use crate::calibrate::{Calibration, Observations};
 use crate::findings_record::{EvidenceRecord, FindingRecord};
+use crate::text;
+use crate::wording::{English, Text};
 
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -129,18 +131,19 @@ pub struct Finding {
     pub evidence: Vec<Evidence>,
     /// The views concerned, by name; empty when it concerns the whole set.
     pub views: Vec<String>,
-    /// The finding in words.
-    pub text: String,
+    /// The finding in words; in documents the English ones.
+    #[serde(serialize_with = "Text::serialize_english")]
+    pub text: Text,
 }
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text)
+        f.write_str(&self.text.say(English))
     }
 }
 
 impl Finding {
-    pub(crate) fn new(code: FindingCode, severity: Severity, text: String) -> Self {
+    pub(crate) fn new(code: FindingCode, severity: Severity, text: Text) -> Self {
         Self { code, severity, evidence: Vec::new(), views: Vec::new(), text }
     }
 
@@ -167,7 +170,7 @@ impl Finding {
         FindingRecord {
             code: name(serde_json::to_value(self.code).ok()),
             severity: name(serde_json::to_value(self.severity).ok()),
-            text: self.text.clone(),
+            text: self.to_string(),
             views: self.views.clone(),
             evidence: self.evidence.iter().map(evidence).collect(),
         }
@@ -211,17 +214,13 @@ pub(crate) fn sort(found: &mut [Finding]) {
 }
 
 /// The names of views for a sentence: all of a few, else the first and how many more.
-pub(crate) fn listed(names: &[String]) -> String {
+pub(crate) fn listed(names: &[String]) -> Text {
     const SHOWN: usize = 4;
+    let shown = Text::list(names.iter().take(SHOWN).map(Text::verbatim));
     if names.len() <= SHOWN {
-        return names.join(", ");
+        return shown;
     }
-    format!("{} and {} more", names[..SHOWN].join(", "), names.len() - SHOWN)
-}
-
-/// `s` unless there is one.
-pub(crate) fn plural(count: usize) -> &'static str {
-    if count == 1 { "" } else { "s" }
+    text!("{names} and {more} more", names = shown, more = names.len() - SHOWN)
 }
 
 #[cfg(test)]

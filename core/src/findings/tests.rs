@@ -257,7 +257,7 @@ fn a_board_that_is_never_tilted_leaves_the_focal_length_weak() {
 
 #[test]
 fn codes_are_snake_case_in_json() {
-    let finding = Finding::new(FindingCode::TooFewViews, Severity::Advice, String::new());
+    let finding = Finding::new(FindingCode::TooFewViews, Severity::Advice, Text::default());
     let json = serde_json::to_value(&finding).expect("JSON");
     assert_eq!((json["code"].as_str(), json["severity"].as_str()), (Some("too_few_views"), Some("advice")));
 }

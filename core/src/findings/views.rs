@@ -2,11 +2,13 @@
 
 use nalgebra::Vector3;
 
-use super::{Finding, FindingCode, Severity, listed, plural};
+use super::{Finding, FindingCode, Severity, listed};
 use crate::calibrate::{Calibration, CameraKnowledge, Observations, ObservedView, ViewStatus};
 use crate::coverage::{Coverage, CoveredView};
 use crate::frames::{Anchor, Mount, Pose};
 use crate::handeye::{HandEyeError, motion};
+use crate::text;
+use crate::wording::Text;
 
 /// Least number of views of any calibration.
 const NEED: usize = 3;
@@ -53,19 +55,22 @@ pub fn findings(observations: &Observations, calibration: Option<&Calibration>) 
 
 fn number(views: usize) -> Option<Finding> {
     let (severity, need, text) = if views < NEED {
-        let s = plural(views);
-        let text =
-            format!("{views} view{s} of the target: a calibration takes {NEED} at the least. Capture more poses.");
+        let text = if views == 1 {
+            text!("{views} view of the target: a calibration takes {need} at the least. Capture more poses.")
+        } else {
+            text!("{views} views of the target: a calibration takes {need} at the least. Capture more poses.")
+        };
         (Severity::Problem, NEED, text)
     } else if views < GOOD_VIEWS {
-        let text = format!(
+        let text = text!(
             "{views} views of the target: enough for an answer, few for the noise levels on which its stated uncertainty \
-             rests. Capture {GOOD_VIEWS} or more."
+             rests. Capture {need} or more."
         );
         (Severity::Advice, GOOD_VIEWS, text)
     } else {
         return None;
     };
+    let text = text.with("views", views).with("need", need);
     let finding = Finding::new(FindingCode::TooFewViews, severity, text);
     Some(finding.with("views", views as f64, "").with("needed", need as f64, ""))
 }
@@ -78,12 +83,12 @@ fn not_found(in_fit: &[&ObservedView], only_poses: bool) -> Option<Finding> {
     if missing.is_empty() {
         return None;
     }
-    let text = format!(
-        "The target was not found in {} of {} views ({}). Look at these pictures: is it wholly in view, sharp and lit, and \
-         are its columns and rows right?",
-        missing.len(),
-        in_fit.len(),
-        listed(&missing)
+    let text = text!(
+        "The target was not found in {count} of {of} views ({list}). Look at these pictures: is it wholly in view, sharp and \
+         lit, and are its columns and rows right?",
+        count = missing.len(),
+        of = in_fit.len(),
+        list = listed(&missing)
     );
     let (count, of) = (missing.len() as f64, in_fit.len() as f64);
     let mut finding =
@@ -100,10 +105,11 @@ fn turns(seen: &[&ObservedView]) -> Option<Finding> {
         Err(HandEyeError::NoRotation { largest_deg }) => Some(alike(largest_deg, Severity::Problem)),
         Err(HandEyeError::ParallelAxes { axis, spread_deg, .. }) => {
             let axis = Vector3::from(axis);
-            let text = format!(
-                "All turns are about the same axis of the tip, {}, within {spread_deg:.1}°: the camera's place along it \
-                 cannot be seen. Add views turned by 30° about an axis across it.",
-                named(&axis)
+            let text = text!(
+                "All turns are about the same axis of the tip, {axis}, within {spread}°: the camera's place along it cannot \
+                 be seen. Add views turned by 30° about an axis across it.",
+                axis = named(&axis),
+                spread = format!("{spread_deg:.1}")
             );
             let finding = Finding::new(FindingCode::OneRotationAxis, Severity::Problem, text);
             Some(with_axis(finding, &axis).with("spread", spread_deg, "°"))
@@ -121,14 +127,14 @@ fn turns(seen: &[&ObservedView]) -> Option<Finding> {
             }
             let severity = if turns[1] < WEAK_DEG { Severity::Warning } else { Severity::Advice };
             let weak = &summary.principal_axes[2];
-            let text = format!(
-                "The tip turned by {:.0}° (RMS between views) about its axis {}, but by only {:.0}° and {:.0}° about the \
-                 axes across it. Add views turned by 30° to both sides, most of all about {}.",
-                turns[0],
-                named(&summary.principal_axes[0]),
-                turns[1],
-                turns[2],
-                named(weak)
+            let text = text!(
+                "The tip turned by {strongest}° (RMS between views) about its axis {axis}, but by only {second}° and \
+                 {weakest}° about the axes across it. Add views turned by 30° to both sides, most of all about {weak}.",
+                strongest = format!("{:.0}", turns[0]),
+                axis = named(&summary.principal_axes[0]),
+                second = format!("{:.0}", turns[1]),
+                weakest = format!("{:.0}", turns[2]),
+                weak = named(weak)
             );
             let finding = Finding::new(FindingCode::WeakRotation, severity, text);
             let finding = with_axis(finding, weak).with("turn_about_strongest", turns[0], "°");
@@ -138,9 +144,10 @@ fn turns(seen: &[&ObservedView]) -> Option<Finding> {
 }
 
 fn alike(largest_deg: f64, severity: Severity) -> Finding {
-    let text = format!(
-        "The views are all alike: the tip turned by no more than {largest_deg:.1}° between any two. Turn it by 30° and more \
-         to all sides about two axes, with the board in view."
+    let text = text!(
+        "The views are all alike: the tip turned by no more than {largest}° between any two. Turn it by 30° and more to all \
+         sides about two axes, with the board in view.",
+        largest = format!("{largest_deg:.1}")
     );
     Finding::new(FindingCode::ViewsAlike, severity, text).with("largest_turn", largest_deg, "°")
 }
@@ -171,10 +178,11 @@ fn tilt(calibration: &Calibration) -> Option<Finding> {
     let relative = (sigma[0] / intrinsics.fx).max(sigma[1] / intrinsics.fy);
     let severity = if relative > FOCAL_SIGMA { Severity::Warning } else { Severity::Advice };
     let decimals = if relative < 1e-4 { 4 } else { 2 };
-    let text = format!(
-        "The board was never tilted by more than {largest_deg:.0}° against the camera, and the focal length is known to \
-         {:.decimals$} % (one standard deviation). Add views with the board tilted by 30° to 45°.",
-        relative * 100.0
+    let text = text!(
+        "The board was never tilted by more than {largest}° against the camera, and the focal length is known to {sigma} % \
+         (one standard deviation). Add views with the board tilted by 30° to 45°.",
+        largest = format!("{largest_deg:.0}"),
+        sigma = format!("{:.decimals$}", relative * 100.0)
     );
     let finding = Finding::new(FindingCode::LittleTilt, severity, text);
     Some(finding.with("largest_tilt", largest_deg, "°").with("focal_sigma", relative * 100.0, "%"))
@@ -192,27 +200,42 @@ fn coverage(observations: &Observations, seen: &[&ObservedView]) -> Option<Findi
         return None;
     }
     let empty = empty_ninths(&coverage);
+    let empty_count = empty.len();
     let where_empty = if empty.is_empty() {
-        "it is seen in patches".to_owned()
+        text!("it is seen in patches")
     } else {
-        format!("nothing was seen at the {}", empty.join(", "))
+        text!("nothing was seen at the {places}", places = Text::list(empty))
     };
     // A lens that is given needs no coverage; a lens that is estimated is only known where something was seen.
     let (severity, why) = match observations.camera {
-        CameraKnowledge::Fixed(_) => (Severity::Info, "The intrinsics are given, so this matters little"),
+        CameraKnowledge::Fixed(_) => (Severity::Info, text!("The intrinsics are given, so this matters little")),
         CameraKnowledge::Estimate { .. } => {
-            (Severity::Advice, "Bring the board there: the lens is only known where it was seen")
+            (Severity::Advice, text!("Bring the board there: the lens is only known where it was seen"))
         }
     };
-    let text = format!("The board covered {:.0} % of the image; {where_empty}. {why}.", covered * 100.0);
+    let text = text!(
+        "The board covered {covered} % of the image; {where}. {why}.",
+        covered = format!("{:.0}", covered * 100.0),
+        where = where_empty,
+        why = why
+    );
     let finding = Finding::new(FindingCode::PoorCoverage, severity, text).with("covered", covered * 100.0, "%");
-    Some(finding.with("empty_ninths", empty.len() as f64, ""))
+    Some(finding.with("empty_ninths", empty_count as f64, ""))
 }
 
 /// The ninths of the image in which no corner was seen.
-fn empty_ninths(coverage: &Coverage) -> Vec<&'static str> {
-    const NAMES: [&str; 9] =
-        ["top left", "top", "top right", "left", "middle", "right", "bottom left", "bottom", "bottom right"];
+fn empty_ninths(coverage: &Coverage) -> Vec<Text> {
+    let names = [
+        text!("top left"),
+        text!("top"),
+        text!("top right"),
+        text!("left"),
+        text!("middle"),
+        text!("right"),
+        text!("bottom left"),
+        text!("bottom"),
+        text!("bottom right"),
+    ];
     let mut seen = [false; 9];
     for row in 0..coverage.rows {
         for column in 0..coverage.columns {
@@ -221,5 +244,5 @@ fn empty_ninths(coverage: &Coverage) -> Vec<&'static str> {
             seen[ninth(row, coverage.rows) * 3 + ninth(column, coverage.columns)] |= coverage.count(column, row) > 0;
         }
     }
-    NAMES.into_iter().zip(seen).filter(|(_, seen)| !seen).map(|(name, _)| name).collect()
+    names.into_iter().zip(seen).filter(|(_, seen)| !seen).map(|(name, _)| name).collect()
 }

@@ -12,8 +12,10 @@ mod sim;
 use handeye_core::doctor::diagnose;
 use handeye_core::findings::{FindingCode, FindingOptions, Severity};
 use handeye_core::handeye::Mode;
+use handeye_core::handeye::closed_form;
 use handeye_core::progress::CancelToken;
 use handeye_core::vision::pnp;
+use handeye_core::wording::Catalogue;
 
 use sim::{Fault, Setup, session};
 
@@ -26,6 +28,35 @@ fn every_degenerate_or_hostile_session_gets_its_code_and_none_is_called_healthy(
         .filter_map(|case| Some(format!("{}: {}", case.name, case.verdict(faults::examined_alone).err()?)))
         .collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Leaves of every template its values alone.
+#[derive(Clone, Copy)]
+struct Wordless;
+
+impl Catalogue for Wordless {
+    fn translation(self, english: &str) -> Option<&'static str> {
+        let values = english.split('{').skip(1).filter_map(|part| part.split_once('}'));
+        let alone: Vec<String> = values.map(|(name, _)| format!("{{{name}}}")).collect();
+        Some(alone.join(" ").leak())
+    }
+}
+
+#[test]
+fn whatever_is_found_is_said_in_words_that_can_be_translated() {
+    let closed_forms: Vec<&str> = closed_form::all().iter().map(|solver| solver.name()).collect();
+    let faulty = (0..faults::FAULTS.len()).map(|fault| faults::faulty(fault, 0).0);
+    for observations in cases::cases().into_iter().map(|case| case.observations).chain(faulty) {
+        let diagnosis = faults::examined(&observations);
+        let of_hypotheses = diagnosis.hypotheses.iter().flat_map(|h| [&h.text, &h.advice]);
+        for text in diagnosis.findings.iter().map(|finding| &finding.text).chain(of_hypotheses) {
+            let values = text.say(Wordless);
+            let is_prose = |word: &str| word.len() > 3 && !closed_forms.contains(&word);
+            let prose: Vec<&str> =
+                values.split(|c: char| !c.is_alphabetic() && c != '_').filter(|word| is_prose(word)).collect();
+            assert!(prose.is_empty(), "{prose:?} can be said in English only: {text:?}");
+        }
+    }
 }
 
 #[test]

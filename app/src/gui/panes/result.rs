@@ -9,7 +9,6 @@ mod headline;
 mod methods;
 mod quality;
 mod status;
-mod words;
 mod workspace;
 
 use egui::Ui;

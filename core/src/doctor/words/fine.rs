@@ -10,6 +10,8 @@ use super::super::select::Selection;
 use super::{estimate, evidence};
 use crate::findings::{Evidence, Finding, FindingCode, Severity, listed};
 use crate::handeye::Mode;
+use crate::text;
+use crate::wording::Text;
 
 /// A turn from which a view is likelier seen the wrong way round than moved, degrees.
 const TURNED_DEG: f64 = 20.0;
@@ -47,14 +49,13 @@ pub(in super::super) fn fine(selection: &Selection<'_>) -> Vec<Hypothesis> {
 
 /// A hypothesis that explains as much as the first.
 fn beside(hypothesis: Hypothesis) -> Hypothesis {
-    let advice = format!("{} What else was found explains much the same: check both.", hypothesis.advice);
-    Hypothesis { accepted: true, advice, ..hypothesis }
+    let both = text!("What else was found explains much the same: check both.");
+    Hypothesis { accepted: true, advice: Text::sentences([hypothesis.advice, both]), ..hypothesis }
 }
 
 /// An accepted hypothesis as a finding.
 pub(in super::super) fn finding_of(hypothesis: &Hypothesis) -> Finding {
-    let text = format!("{} {}", hypothesis.text, hypothesis.advice);
-    let finding = Finding::new(hypothesis.code, Severity::Warning, text);
+    let finding = Finding::new(hypothesis.code, Severity::Warning, hypothesis.text_with_advice());
     Finding { evidence: hypothesis.evidence.clone(), views: hypothesis.views.clone(), ..finding }
 }
 
@@ -66,36 +67,43 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
     let (code, what, to_do, estimate) = match effect {
         Effect::Scale => {
             let (percent, sigma) = (100.0 * number(0), 100.0 * sigma(0));
-            let than = if percent < 0.0 { "smaller" } else { "larger" };
-            let size = percent.abs();
-            let what = format!(
-                "The motion of the robot says that the target is {size:.2} % ± {sigma:.2} % {than} than stated."
-            );
+            let what = if percent < 0.0 {
+                text!("The motion of the robot says that the target is {size} % ± {sigma} % smaller than stated.")
+            } else {
+                text!("The motion of the robot says that the target is {size} % ± {sigma} % larger than stated.")
+            };
+            let size = format!("{:.2}", percent.abs());
+            let what = what.with("size", size).with("sigma", format!("{sigma:.2}"));
             let scale = estimate("true_over_stated_size", 1.0 + number(0), Some(sigma / 100.0), "");
             numbers.push(evidence("true_over_stated_size", 1.0 + number(0), ""));
             numbers.push(evidence("true_over_stated_size_sigma", sigma / 100.0, ""));
-            (FindingCode::WrongScale, what, "Measure the target with a ruler, over as many squares as it has.", scale)
+            let to_do = text!("Measure the target with a ruler, over as many squares as it has.");
+            (FindingCode::WrongScale, what, to_do, scale)
         }
         Effect::Warp => {
             let [x_mm, y_mm] = [number(0) * 1e3, number(1) * 1e3];
-            let what =
-                format!("The target is bent: its middle stands {x_mm:.2} mm (along x) and {y_mm:.2} mm (along y) out.");
+            let what = text!(
+                "The target is bent: its middle stands {x} mm (along x) and {y} mm (along y) out.",
+                x = format!("{x_mm:.2}"),
+                y = format!("{y_mm:.2}")
+            );
             numbers.push(evidence("warp_x", x_mm, "mm"));
             numbers.push(evidence("warp_y", y_mm, "mm"));
             let k = usize::from(number(1).abs() > number(0).abs());
             let warp = estimate("warp", number(k) * 1e3, Some(sigma(k) * 1e3), "mm");
-            (FindingCode::BoardBent, what, "Fix it to a flat plate.", warp)
+            (FindingCode::BoardBent, what, text!("Fix it to a flat plate."), warp)
         }
         Effect::Lens => {
             let fx = model.sight.intrinsics.map_or(1.0, |camera| camera.fx);
             let percent = 100.0 * number(0) / fx;
-            let what = format!(
-                "The intrinsics given do not fit the pictures: the focal length would be {percent:+.2} % ± {:.2} % off.",
-                100.0 * sigma(0) / fx
+            let what = text!(
+                "The intrinsics given do not fit the pictures: the focal length would be {percent} % ± {sigma} % off.",
+                percent = format!("{percent:+.2}"),
+                sigma = format!("{:.2}", 100.0 * sigma(0) / fx)
             );
             numbers.push(evidence("focal_change", percent, "%"));
             let change = estimate("focal_change", percent, Some(100.0 * sigma(0) / fx), "%");
-            let to_do = "Let them be estimated, or give those of this camera at this image size and focus.";
+            let to_do = text!("Let them be estimated, or give those of this camera at this image size and focus.");
             (FindingCode::WrongIntrinsics, what, to_do, change)
         }
         Effect::BoardMoved(from) | Effect::CameraMoved(from) => {
@@ -103,42 +111,49 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
             let (mm, deg) = twist_size(&judged.numbers);
             let at_board_mm = moved_m(model, effect, &judged.numbers) * 1e3;
             let board = matches!(effect, Effect::BoardMoved(_));
-            let (code, who) = if board {
-                (
-                    FindingCode::BoardMoved,
-                    if model.sight.mode == Mode::EyeInHand { "The target" } else { "The target on the tip" },
-                )
-            } else {
-                (
-                    FindingCode::CameraMoved,
-                    if model.sight.mode == Mode::EyeInHand { "The camera on the tip" } else { "The camera" },
-                )
+            let code = if board { FindingCode::BoardMoved } else { FindingCode::CameraMoved };
+            let who = match (board, model.sight.mode) {
+                (true, Mode::EyeInHand) => text!("The target"),
+                (true, Mode::EyeToHand) => text!("The target on the tip"),
+                (false, Mode::EyeInHand) => text!("The camera on the tip"),
+                (false, Mode::EyeToHand) => text!("The camera"),
             };
-            let what = format!("{who} moved before view {name}, by {mm:.2} mm and {deg:.3}°.");
+            let what = text!(
+                "{who} moved before view {view}, by {mm} mm and {deg}°.",
+                who = who,
+                view = &name,
+                mm = format!("{mm:.2}"),
+                deg = format!("{deg:.3}")
+            );
             numbers.push(evidence("first_view_after", from as f64, ""));
             numbers.push(evidence("moved", mm, "mm"));
             numbers.push(evidence("turned", deg, "°"));
             numbers.push(evidence("moved_at_target", at_board_mm, "mm"));
             views.push(name);
             let sigma_mm = judged.sigma.iter().take(3).map(|s| s * s).sum::<f64>().sqrt() * 1e3;
-            let to_do = "Fix it and capture again, or keep only the views before or after.";
+            let to_do = text!("Fix it and capture again, or keep only the views before or after.");
             (code, what, to_do, estimate("moved", mm, Some(sigma_mm), "mm"))
         }
         Effect::Joint(joint) => {
             let (deg, sigma) = (number(0).to_degrees(), sigma(0).to_degrees());
-            let what = format!("The zero of joint {} is off by {deg:+.3}° ± {sigma:.3}°.", joint + 1);
+            let what = text!(
+                "The zero of joint {joint} is off by {offset}° ± {sigma}°.",
+                joint = joint + 1,
+                offset = format!("{deg:+.3}"),
+                sigma = format!("{sigma:.3}")
+            );
             numbers.push(evidence("joint", (joint + 1) as f64, ""));
             numbers.push(evidence("offset", deg, "°"));
             numbers.push(evidence("offset_sigma", sigma, "°"));
-            let to_do = "Master the arm anew, or let the offset be estimated with the calibration.";
+            let to_do = text!("Master the arm anew, or let the offset be estimated with the calibration.");
             (FindingCode::JointOffset, what, to_do, estimate("offset", deg, Some(sigma), "°"))
         }
     };
     Hypothesis {
         code,
         with: Vec::new(),
-        text: format!("{what} {}", worth(judged)),
-        advice: to_do.to_owned(),
+        text: Text::sentences([what, worth(judged)]),
+        advice: to_do,
         gain: judged.gain,
         estimate: Some(estimate),
         evidence: numbers,
@@ -162,23 +177,22 @@ fn of_views(selection: &Selection<'_>, judged: &Judged, views: &[usize]) -> Hypo
     let deg = by_robot.map_or(0.0, |c: Vector6<f64>| c.fixed_rows::<3>(3).norm().to_degrees());
     numbers.push(evidence("displacement", mm, "mm"));
     numbers.push(evidence("turn", deg, "°"));
-    let s = if views.len() == 1 { "View" } else { "Views" };
-    let verb = if views.len() == 1 { "contradicts" } else { "contradict" };
-    let why = if deg > TURNED_DEG {
-        "The board may have been read the wrong way round, or the pose belongs to another picture."
+    let what = if views.len() == 1 {
+        text!("View {list} contradicts the others: the board is out by up to {mm} mm and {deg}°.")
     } else {
-        "The arm or the board may have been moving, or the pose belongs to another picture."
+        text!("Views {list} contradict the others: the board is out by up to {mm} mm and {deg}°.")
     };
-    let text = format!(
-        "{s} {} {verb} the others: the board is out by up to {mm:.2} mm and {deg:.2}°. {}",
-        listed(&names),
-        worth(judged)
-    );
+    let what = what.with("list", listed(&names)).with("mm", format!("{mm:.2}")).with("deg", format!("{deg:.2}"));
+    let why = if deg > TURNED_DEG {
+        text!("The board may have been read the wrong way round, or the pose belongs to another picture.")
+    } else {
+        text!("The arm or the board may have been moving, or the pose belongs to another picture.")
+    };
     Hypothesis {
         code: FindingCode::OutlierView,
         with: Vec::new(),
-        text,
-        advice: format!("{why} Leave it out and see what changes."),
+        text: Text::sentences([what, worth(judged)]),
+        advice: Text::sentences([why, text!("Leave it out and see what changes.")]),
         gain: judged.gain,
         estimate: Some(estimate("displacement", mm, None, "mm")),
         evidence: numbers,
@@ -213,18 +227,23 @@ fn common(judged: &Judged) -> Vec<Evidence> {
 }
 
 /// By how much it explains the data better.
-fn worth(judged: &Judged) -> String {
+fn worth(judged: &Judged) -> Text {
     let [(without_m, with_m), (without_rad, with_rad)] = judged.robot;
-    let held_out = judged.held_out.map_or_else(String::new, |(without, with)| {
-        format!(" Views left out are predicted to {:.2} mm instead of {:.2} mm.", with.rms_m * 1e3, without.rms_m * 1e3)
+    let held_out = judged.held_out.map(|(without, with)| {
+        text!(
+            "Views left out are predicted to {with} mm instead of {without} mm.",
+            with = format!("{:.2}", with.rms_m * 1e3),
+            without = format!("{:.2}", without.rms_m * 1e3)
+        )
     });
-    let times = super::times(judged.gain);
-    format!(
-        "This explains the data {times} better: the robot's noise goes from {:.3} mm and {:.3}° to {:.3} mm and \
-         {:.3}°.{held_out}",
-        without_m * 1e3,
-        without_rad.to_degrees(),
-        with_m * 1e3,
-        with_rad.to_degrees()
-    )
+    let explained = text!(
+        "This explains the data {times} times better: the robot's noise goes from {mm_before} mm and {deg_before}° to {mm} \
+         mm and {deg}°.",
+        times = super::times(judged.gain),
+        mm_before = format!("{:.3}", without_m * 1e3),
+        deg_before = format!("{:.3}", without_rad.to_degrees()),
+        mm = format!("{:.3}", with_m * 1e3),
+        deg = format!("{:.3}", with_rad.to_degrees())
+    );
+    Text::sentences([explained].into_iter().chain(held_out))
 }

@@ -35,6 +35,8 @@ use serde::{Deserialize, Serialize};
 use super::HandEyeError;
 use super::joint::{JointProblem, JointSolution};
 use crate::progress::Work;
+use crate::text;
+use crate::wording::Text;
 
 /// What a ratio was found by; see the table of [this module](self).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -69,14 +71,14 @@ impl Evidence {
     }
 
     /// What was seen, to complete "the stated uncertainty is widened because …".
-    pub fn reason(self) -> &'static str {
+    pub fn reason(self) -> Text {
         match self {
-            Self::Neighbours => "the robot is off in the same direction in neighbouring poses",
-            Self::TimeBlocks => "the answer moves too far without views that follow each other",
-            Self::PoseBlocks => "the answer moves too far without neighbouring poses",
-            Self::Halves => "two halves of the views disagree by more than stated",
-            Self::Jackknife => "the answer moves too far without single views",
-            Self::CrossValidation => "views left out are predicted worse than stated",
+            Self::Neighbours => text!("the robot is off in the same direction in neighbouring poses"),
+            Self::TimeBlocks => text!("the answer moves too far without views that follow each other"),
+            Self::PoseBlocks => text!("the answer moves too far without neighbouring poses"),
+            Self::Halves => text!("two halves of the views disagree by more than stated"),
+            Self::Jackknife => text!("the answer moves too far without single views"),
+            Self::CrossValidation => text!("views left out are predicted worse than stated"),
         }
     }
 }

@@ -3,7 +3,7 @@
 use egui::{Label, RichText, Ui};
 use handeye_core::findings::{Finding, Severity};
 
-use super::{evidence, words};
+use super::evidence;
 use crate::gui::panes::parts;
 use crate::gui::theme::Palette;
 use crate::model::{Model, Solved};
@@ -35,7 +35,7 @@ fn finding_ui(ui: &mut Ui, finding: &Finding, language: Language) {
         ui.vertical(|ui| {
             ui.spacing_mut().item_spacing.y = 1.0;
             ui.label(RichText::new(severity).small().color(colour));
-            let said = words::of(finding).say(language);
+            let said = finding.text.say(language);
             ui.add(Label::new(RichText::new(said).color(palette.text)).wrap());
             let numbers = evidence::line(finding, language);
             if !numbers.is_empty() {

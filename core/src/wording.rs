@@ -1,0 +1,136 @@
+//! Sentences with values in them, which can be said in any language.
+//!
+//! The English sentence is the template. `text!("{n} degrees of freedom", n = 12)` makes a [`Text`] that can be kept, sent
+//! between threads and logged; whoever shows it has a [`Catalogue`]. What a library or the cell says in its own words
+//! stays as it is.
+
+use std::borrow::Cow;
+use std::fmt::Display;
+
+use serde::{Deserialize, Serialize, Serializer};
+
+use crate::text;
+
+/// A language, with the templates in it.
+pub trait Catalogue: Copy {
+    /// That of an English one, with the same values; `None` where there is none, and for English.
+    fn translation(self, english: &str) -> Option<&'static str>;
+}
+
+/// The language of the templates, of documents and of the command line.
+#[derive(Debug, Clone, Copy)]
+pub struct English;
+
+impl Catalogue for English {
+    fn translation(self, _: &str) -> Option<&'static str> {
+        None
+    }
+}
+
+/// A sentence with values in it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Text {
+    english: Cow<'static, str>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    values: Vec<(Cow<'static, str>, Value)>,
+    /// Whether somebody else's words stand here, which are not looked up.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    verbatim: bool,
+}
+
+/// What stands for a `{name}` in a sentence.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Value {
+    /// The same in every language.
+    Plain(String),
+    /// Translated as well.
+    Text(Text),
+}
+
+impl<T: Display> From<T> for Value {
+    fn from(value: T) -> Self {
+        Self::Plain(value.to_string())
+    }
+}
+
+impl From<Text> for Value {
+    fn from(text: Text) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl Text {
+    /// A sentence of the catalogue; see the macro [`text!`](crate::text!).
+    pub fn new(english: &'static str, values: Vec<(&'static str, Value)>) -> Self {
+        let values = values.into_iter().map(|(name, value)| (Cow::Borrowed(name), value)).collect();
+        Self { english: Cow::Borrowed(english), values, verbatim: false }
+    }
+
+    /// Words of a library, of the cell or of the user: the same in every language.
+    pub fn verbatim(words: impl Into<String>) -> Self {
+        Self { english: Cow::Owned(words.into()), values: Vec::new(), verbatim: true }
+    }
+
+    /// With a value more, for what is said with one of several templates.
+    #[must_use]
+    pub fn with(mut self, name: &'static str, value: impl Into<Value>) -> Self {
+        self.values.push((Cow::Borrowed(name), value.into()));
+        self
+    }
+
+    /// Sentences one after the other.
+    pub fn sentences(all: impl IntoIterator<Item = Self>) -> Self {
+        let joined = all.into_iter().reduce(|first, next| text!("{first} {next}", first = first, next = next));
+        joined.unwrap_or_default()
+    }
+
+    /// Things that are listed within a sentence.
+    pub fn list(all: impl IntoIterator<Item = Self>) -> Self {
+        let joined = all.into_iter().reduce(|first, rest| text!("{first}, {rest}", first = first, rest = rest));
+        joined.unwrap_or_default()
+    }
+
+    /// The sentence in a language.
+    pub fn say(&self, language: impl Catalogue) -> String {
+        if self.verbatim {
+            return self.english.to_string();
+        }
+        let template = language.translation(&self.english).unwrap_or(&self.english);
+        let mut said = String::with_capacity(template.len() + 16);
+        let mut rest = template;
+        while let Some((before, after)) = rest.split_once('{') {
+            said.push_str(before);
+            let (name, after) = after.split_once('}').unwrap_or((after, ""));
+            if let Some((_, value)) = self.values.iter().find(|(known, _)| known == name) {
+                match value {
+                    Value::Plain(plain) => said.push_str(plain),
+                    Value::Text(text) => said.push_str(&text.say(language)),
+                }
+            }
+            rest = after;
+        }
+        said.push_str(rest);
+        said
+    }
+
+    /// Whether there is nothing to say.
+    pub fn is_empty(&self) -> bool {
+        self.english.is_empty()
+    }
+
+    /// The English sentence, for fields of documents.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize_english<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.say(English))
+    }
+}
+
+/// A [`Text`](crate::wording::Text): `text!("{n} degrees of freedom", n = 12)`.
+#[macro_export]
+macro_rules! text {
+    ($english:literal $(, $name:ident = $value:expr)* $(,)?) => {
+        $crate::wording::Text::new($english, vec![$((stringify!($name), $crate::wording::Value::from($value))),*])
+    };
+}
