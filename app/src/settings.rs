@@ -8,7 +8,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use handeye_core::depth::ColourMap;
-use toml::de::{DeTable, DeValue};
+use serde::{Deserialize, Serialize};
+use toml::de::{DeTable, ValueDeserializer};
 
 use crate::command::Event;
 use crate::model::{CellSource, DepthScale, RotationFormat, Severity, ThemeChoice, ViewSettings};
@@ -18,17 +19,21 @@ use crate::text::{Language, Text};
 /// Earlier addresses that are kept.
 pub const ADDRESSES: usize = 8;
 
-/// The settings.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// The settings: each field is a key of the file and, in capitals after `HANDEYE_`, a variable of the environment.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// How the window looks.
-    pub view: ViewSettings,
-    /// Which cell to work with at the start; `None` is the built-in one.
-    pub connect: Option<String>,
+    theme: ThemeChoice,
+    language: Language,
+    rotation: RotationFormat,
+    depth_scale: DepthScale,
+    depth_colours: ColourMap,
+    /// Which cell to work with at the start; empty is the built-in one.
+    connect: String,
+    /// Where new sessions go; empty is `handeye-sessions` in the home folder.
+    sessions: String,
     /// Addresses that were connected to, newest first.
     pub addresses: Vec<String>,
-    /// Where new sessions go; `None` is `handeye-sessions` in the home folder.
-    pub sessions: Option<PathBuf>,
 }
 
 /// Something in the settings that was left out, and where.
@@ -41,64 +46,18 @@ impl From<Warning> for Event {
     }
 }
 
-/// A setting that is one of a few words.
-trait Word: Sized + Copy + PartialEq + 'static {
-    /// The words and what they mean.
-    const WORDS: &'static [(&'static str, Self)];
-
-    fn from_word(word: &str) -> Result<Self, String> {
-        Self::WORDS.iter().find(|(known, _)| *known == word).map(|(_, value)| *value).ok_or_else(|| {
-            let words: Vec<_> = Self::WORDS.iter().map(|(known, _)| format!("{known:?}")).collect();
-            words.join(", ")
-        })
-    }
-
-    fn word(self) -> &'static str {
-        Self::WORDS.iter().find(|(_, value)| *value == self).map_or("", |(word, _)| *word)
-    }
-}
-
-impl Word for ThemeChoice {
-    const WORDS: &'static [(&'static str, Self)] = &[("dark", Self::Dark), ("light", Self::Light)];
-}
-
-impl Word for Language {
-    const WORDS: &'static [(&'static str, Self)] = &[("en", Self::English), ("zh-CN", Self::Chinese)];
-}
-
-impl Word for RotationFormat {
-    const WORDS: &'static [(&'static str, Self)] = &[("rpy", Self::RollPitchYaw), ("quaternion", Self::Quaternion)];
-}
-
-impl Word for DepthScale {
-    const WORDS: &'static [(&'static str, Self)] = &[("auto", Self::Auto), ("full", Self::Full)];
-}
-
-impl Word for ColourMap {
-    const WORDS: &'static [(&'static str, Self)] =
-        &[("turbo", Self::Turbo), ("viridis", Self::Viridis), ("grey", Self::Grey)];
-}
-
-/// The keys, as the file and (in capitals, after `HANDEYE_`) the environment have them.
-const KEYS: [&str; 8] =
-    ["theme", "language", "rotation", "depth_scale", "depth_colours", "connect", "sessions", "addresses"];
-
 impl Settings {
-    /// Sets one value from text.
-    ///
-    /// # Errors
-    /// What may stand there.
-    fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match key {
-            "theme" => self.view.theme = Word::from_word(value)?,
-            "language" => self.view.language = Word::from_word(value)?,
-            "rotation" => self.view.rotation = Word::from_word(value)?,
-            "depth_scale" => self.view.depth_scale = Word::from_word(value)?,
-            "depth_colours" => self.view.depth_colours = Word::from_word(value)?,
-            "connect" => self.connect = Some(value.to_owned()).filter(|value| !value.is_empty()),
-            "sessions" => self.sessions = Some(PathBuf::from(value)).filter(|_| !value.is_empty()),
-            _ => return Err(KEYS.map(|key| format!("{key:?}")).join(", ")),
-        }
+    /// As TOML has them.
+    fn table(&self) -> toml::Table {
+        toml::Table::try_from(self).expect("words and lists of words can be written as TOML")
+    }
+
+    /// Sets one key. The others stay as they are when it cannot have that value.
+    fn set(&mut self, key: &str, value: toml::Value) -> Result<(), toml::de::Error> {
+        let mut table = self.table();
+        table.insert(key.to_owned(), value);
+        *self = table.try_into()?;
+        self.addresses.truncate(ADDRESSES);
         Ok(())
     }
 
@@ -113,28 +72,16 @@ impl Settings {
             })
             .collect();
         for (key, value) in table.into_inner() {
-            let line = line_of(content, key.span().start);
-            let key = key.into_inner();
-            let expected = match (key.as_ref(), value.into_inner()) {
-                ("addresses", DeValue::Array(all)) => {
-                    let text = |value: toml::Spanned<DeValue<'_>>| value.into_inner().as_str().map(str::to_owned);
-                    self.addresses = all.into_iter().filter_map(text).take(ADDRESSES).collect();
-                    continue;
-                }
-                ("addresses", _) => "[\"tcp://host:port\", …]".to_owned(),
-                (key, DeValue::String(value)) => match self.set(key, &value) {
-                    Ok(()) => continue,
-                    Err(expected) => expected,
-                },
-                _ => "\"…\"".to_owned(),
-            };
-            warnings.push(Warning(text!(
-                "{file}, line {line}: {key} is left out; it can be one of {expected}",
-                file = file,
-                line = line,
-                key = key,
-                expected = expected
-            )));
+            let value = toml::Value::deserialize(ValueDeserializer::from(value));
+            if let Err(error) = value.and_then(|value| self.set(key.get_ref(), value)) {
+                warnings.push(Warning(text!(
+                    "{file}, line {line}: {key} is left out: {why}",
+                    file = file,
+                    line = line_of(content, key.span().start),
+                    key = key.get_ref(),
+                    why = error.message()
+                )));
+            }
         }
         warnings
     }
@@ -142,54 +89,41 @@ impl Settings {
     /// Takes in the environment, given as a function that looks a variable up.
     pub fn read_environment(&mut self, variable: impl Fn(&str) -> Option<String>) -> Vec<Warning> {
         let mut warnings = Vec::new();
-        for key in KEYS.into_iter().filter(|key| *key != "addresses") {
+        // A list cannot stand in a variable.
+        for (key, _) in self.table().into_iter().filter(|(_, value)| value.is_str()) {
             let name = format!("HANDEYE_{}", key.to_uppercase());
             if let Some(value) = variable(&name)
-                && let Err(expected) = self.set(key, &value)
+                && let Err(error) = self.set(&key, value.into())
             {
-                warnings.push(Warning(text!(
-                    "{name} is left out; it can be one of {expected}",
-                    name = name,
-                    expected = expected
-                )));
+                warnings.push(Warning(text!("{name} is left out: {why}", name = name, why = error.message())));
             }
         }
         warnings
     }
 
+    /// How the window looks at the start; what is not kept here has its default.
+    pub fn view(&self) -> ViewSettings {
+        let Self { theme, language, rotation, depth_scale, depth_colours, .. } = *self;
+        ViewSettings { theme, language, rotation, depth_scale, depth_colours, ..ViewSettings::default() }
+    }
+
     /// The cell to work with at the start.
     pub fn source(&self) -> CellSource {
-        self.connect.clone().map_or(CellSource::BuiltIn, CellSource::Address)
+        if self.connect.is_empty() { CellSource::BuiltIn } else { CellSource::Address(self.connect.clone()) }
     }
 
     /// Where new sessions go.
     pub fn sessions_folder(&self, variable: impl Fn(&str) -> Option<String>) -> PathBuf {
-        let home = || variable("HOME").filter(|home| !home.is_empty()).map(PathBuf::from).unwrap_or_default();
-        self.sessions.clone().unwrap_or_else(|| home().join("handeye-sessions"))
+        if !self.sessions.is_empty() {
+            return PathBuf::from(&self.sessions);
+        }
+        let home = variable("HOME").filter(|home| !home.is_empty()).map(PathBuf::from).unwrap_or_default();
+        home.join("handeye-sessions")
     }
 
     /// The file that says this.
     fn written(&self) -> String {
-        let mut table = toml::Table::new();
-        let ViewSettings { theme, language, rotation, depth_scale, depth_colours, .. } = self.view;
-        for (key, word) in [
-            ("theme", theme.word()),
-            ("language", language.word()),
-            ("rotation", rotation.word()),
-            ("depth_scale", depth_scale.word()),
-            ("depth_colours", depth_colours.word()),
-        ] {
-            table.insert(key.to_owned(), word.into());
-        }
-        if let Some(connect) = &self.connect {
-            table.insert("connect".to_owned(), connect.as_str().into());
-        }
-        if let Some(sessions) = &self.sessions {
-            table.insert("sessions".to_owned(), sessions.to_string_lossy().into_owned().into());
-        }
-        if !self.addresses.is_empty() {
-            table.insert("addresses".to_owned(), self.addresses.clone().into());
-        }
+        let table = self.table();
         format!(
             "# Settings of the Handeye Workbench, see docs/settings.md. Written when one is changed in the window.\n{table}"
         )
@@ -233,7 +167,7 @@ impl SettingsFile {
         }
         let mut settings = in_file.clone();
         warnings.extend(settings.read_environment(variable));
-        let last_view = settings.view;
+        let last_view = settings.view();
         (Self { path, in_file, last_view }, settings, warnings)
     }
 
@@ -245,7 +179,7 @@ impl SettingsFile {
         let before_text = self.in_file.written();
         // What the environment says and the user did not touch stays out of the file.
         let ViewSettings { theme, language, rotation, depth_scale, depth_colours, .. } = view;
-        let (before, kept) = (self.last_view, &mut self.in_file.view);
+        let (before, kept) = (self.last_view, &mut self.in_file);
         keep(&mut kept.theme, before.theme, theme);
         keep(&mut kept.language, before.language, language);
         keep(&mut kept.rotation, before.rotation, rotation);

@@ -15,17 +15,14 @@ fn said(warnings: &[Warning]) -> Vec<String> {
 #[test]
 fn what_was_written_is_read_again() {
     let settings = Settings {
-        view: ViewSettings {
-            theme: ThemeChoice::Light,
-            language: Language::Chinese,
-            rotation: RotationFormat::Quaternion,
-            depth_scale: DepthScale::Full,
-            depth_colours: ColourMap::Viridis,
-            ..ViewSettings::default()
-        },
-        connect: Some("tcp://a:1".to_owned()),
+        theme: ThemeChoice::Light,
+        language: Language::Chinese,
+        rotation: RotationFormat::Quaternion,
+        depth_scale: DepthScale::Full,
+        depth_colours: ColourMap::Viridis,
+        connect: "tcp://a:1".to_owned(),
         addresses: vec!["tcp://a:1".to_owned(), "tcp://b:2".to_owned()],
-        sessions: Some(PathBuf::from("/data/sessions")),
+        sessions: "/data/sessions".to_owned(),
     };
     let mut read = Settings::default();
     assert_eq!(read.read("settings.toml", &settings.written()), []);
@@ -38,11 +35,35 @@ fn a_bad_value_is_told_with_its_line_and_key_and_the_others_are_taken() {
     let content = "# mine\ntheme = \"blue\"\nlanguage = \"zh-CN\"\n\ndepth_scale = 3\ncolour = \"red\"\n";
     let warnings = said(&settings.read("settings.toml", content));
     assert_eq!(warnings.len(), 3, "{warnings:?}");
-    assert!(warnings.iter().any(|text| text.contains("line 2") && text.contains("theme") && text.contains("\"dark\"")));
+    assert!(
+        warnings
+            .iter()
+            .any(|text| text.contains("line 2") && text.contains("theme") && text.contains("`dark` or `light`"))
+    );
     assert!(warnings.iter().any(|text| text.contains("line 5") && text.contains("depth_scale")));
-    assert!(warnings.iter().any(|text| text.contains("line 6") && text.contains("colour")));
-    assert_eq!(settings.view.language, Language::Chinese);
-    assert_eq!(settings.view.theme, ThemeChoice::Dark);
+    assert!(warnings.iter().any(|text| text.contains("line 6") && text.contains("`depth_colours`")));
+    assert_eq!(settings.language, Language::Chinese);
+    assert_eq!(settings.theme, ThemeChoice::Dark);
+}
+
+#[test]
+fn a_bad_list_is_told_and_a_long_one_is_cut() {
+    let mut settings = Settings::default();
+    let warnings = said(&settings.read("settings.toml", "addresses = [\"tcp://a:1\", 3]\ntheme = \"light\"\n"));
+    assert!(warnings[0].contains("line 1") && warnings[0].contains("addresses"), "{warnings:?}");
+    assert_eq!((settings.addresses.len(), settings.theme), (0, ThemeChoice::Light));
+    let many = format!("addresses = {:?}", ["tcp://a:1"; ADDRESSES + 1]);
+    assert_eq!(settings.read("settings.toml", &many), []);
+    assert_eq!(settings.addresses.len(), ADDRESSES);
+}
+
+#[test]
+fn a_bad_variable_is_told_with_what_it_may_be() {
+    let mut settings = Settings::default();
+    let bad = |name: &str| (name == "HANDEYE_ROTATION").then(|| "euler".to_owned());
+    let warnings = said(&settings.read_environment(bad));
+    assert!(warnings[0].contains("HANDEYE_ROTATION") && warnings[0].contains("`rpy` or `quaternion`"), "{warnings:?}");
+    assert_eq!(warnings.len(), 1);
 }
 
 #[test]
@@ -50,7 +71,7 @@ fn a_line_that_is_no_toml_is_told_and_the_lines_around_it_are_taken() {
     let mut settings = Settings::default();
     let warnings = said(&settings.read("settings.toml", "theme = \"light\"\n= what\nlanguage = \"zh-CN\"\n"));
     assert!(warnings.iter().any(|text| text.contains("line 2")), "{warnings:?}");
-    assert_eq!(settings.view.theme, ThemeChoice::Light);
+    assert_eq!(settings.theme, ThemeChoice::Light);
 }
 
 #[test]
@@ -62,10 +83,10 @@ fn the_environment_goes_before_the_file_and_does_not_get_into_it() {
     let variable = |name: &str| (name == "HANDEYE_LANGUAGE").then(|| "zh-CN".to_owned());
     let (mut file, settings, warnings) = SettingsFile::open(Some(path.clone()), variable);
     assert_eq!(warnings, []);
-    assert_eq!((settings.view.theme, settings.view.language), (ThemeChoice::Light, Language::Chinese));
-    write(file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view }, &[])).expect("it can be written");
+    assert_eq!((settings.theme, settings.language), (ThemeChoice::Light, Language::Chinese));
+    write(file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view() }, &[])).expect("it can be written");
     let (_, again, _) = SettingsFile::open(Some(path), nothing);
-    assert_eq!((again.view.theme, again.view.language), (ThemeChoice::Dark, Language::English));
+    assert_eq!((again.theme, again.language), (ThemeChoice::Dark, Language::English));
 }
 
 #[test]
@@ -73,7 +94,7 @@ fn nothing_is_written_before_something_is_changed() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("settings.toml");
     let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
-    assert_eq!(file.keep(settings.view, &[]), None, "there is nothing to do");
+    assert_eq!(file.keep(settings.view(), &[]), None, "there is nothing to do");
     assert!(!path.exists());
 }
 
@@ -83,7 +104,7 @@ fn earlier_addresses_are_in_the_file() {
     let path = folder.path().join("settings.toml");
     let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
     let addresses = vec!["tcp://a:1".to_owned(), "tcp://b:1".to_owned()];
-    write(file.keep(settings.view, &addresses)).expect("it can be written");
+    write(file.keep(settings.view(), &addresses)).expect("it can be written");
     assert_eq!(SettingsFile::open(Some(path), nothing).1.addresses, addresses);
 }
 
@@ -93,7 +114,7 @@ fn a_file_that_cannot_be_written_is_told() {
     let blocked = folder.path().join("file");
     std::fs::write(&blocked, "").expect("written");
     let (mut file, settings, _) = SettingsFile::open(Some(blocked.join("settings.toml")), nothing);
-    let view = ViewSettings { theme: settings.view.theme.other(), ..settings.view };
+    let view = ViewSettings { theme: settings.theme.other(), ..settings.view() };
     let Err(Warning(text)) = write(file.keep(view, &[])) else { panic!("it went well") };
     assert!(text.say(Language::English).contains("settings.toml"));
 }

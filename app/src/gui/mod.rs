@@ -88,7 +88,7 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let remembered = Remembered::stored(creation.storage);
         let start = Start {
             source,
-            view: remembered.view(settings.view),
+            view: remembered.view(settings.view()),
             addresses: settings.addresses.clone(),
             sessions: settings.sessions_folder(variable),
             open: args.session,

@@ -242,6 +242,7 @@ pub struct ImagePoint {
 
 /// Which depths the colour map covers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum DepthScale {
     /// Those that are in the picture.
     #[default]
@@ -252,6 +253,7 @@ pub enum DepthScale {
 
 /// Light or dark.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ThemeChoice {
     /// Dark surfaces.
     #[default]
@@ -273,17 +275,18 @@ impl ThemeChoice {
 
 /// How the rotation of the tip is written.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum RotationFormat {
     /// Roll, pitch, yaw in degrees, URDF's order.
     #[default]
+    #[serde(rename = "rpy")]
     RollPitchYaw,
     /// Quaternion x, y, z, w.
     Quaternion,
 }
 
 /// What the window remembers from one start to the next.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ViewSettings {
     /// The colours of depths.
     pub depth_colours: ColourMap,
