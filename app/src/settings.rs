@@ -7,6 +7,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use directories::BaseDirs;
 use handeye_core::depth::ColourMap;
 use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, ValueDeserializer};
@@ -15,6 +16,9 @@ use crate::command::Event;
 use crate::model::{CellSource, DepthScale, RotationFormat, Severity, ThemeChoice, ViewSettings};
 use crate::text;
 use crate::text::{Language, Text};
+
+/// The name of this program's folders in those of the system.
+pub const FOLDER: &str = "handeye-workbench";
 
 /// Earlier addresses that are kept.
 pub const ADDRESSES: usize = 8;
@@ -113,12 +117,12 @@ impl Settings {
     }
 
     /// Where new sessions go.
-    pub fn sessions_folder(&self, variable: impl Fn(&str) -> Option<String>) -> PathBuf {
+    pub fn sessions_folder(&self) -> PathBuf {
         if !self.sessions.is_empty() {
             return PathBuf::from(&self.sessions);
         }
-        let home = variable("HOME").filter(|home| !home.is_empty()).map(PathBuf::from).unwrap_or_default();
-        home.join("handeye-sessions")
+        let home = BaseDirs::new().map(|folders| folders.home_dir().to_path_buf());
+        home.unwrap_or_default().join("handeye-sessions")
     }
 
     /// The file that says this.
@@ -134,13 +138,9 @@ fn line_of(content: &str, at: usize) -> usize {
     content.bytes().take(at).filter(|&byte| byte == b'\n').count() + 1
 }
 
-/// Where the file is by the environment; `None` without a home.
-pub fn default_path(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
-    let set = |name| variable(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    // The specification of these folders has relative paths ignored.
-    let config = set("XDG_CONFIG_HOME").filter(|path| path.is_absolute());
-    let config = config.or_else(|| Some(set("HOME")?.join(".config")))?;
-    Some(config.join("handeye-workbench").join("settings.toml"))
+/// Where the system has the file; `None` without a home.
+pub fn default_path() -> Option<PathBuf> {
+    Some(BaseDirs::new()?.config_dir().join(FOLDER).join("settings.toml"))
 }
 
 /// The file, what it says, and what the user has changed since.

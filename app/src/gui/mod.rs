@@ -53,9 +53,6 @@ use signals::Signals;
 use window::Remembered;
 pub use window::Window;
 
-/// Name under which the system keeps layout and size of the window.
-const APP_ID: &str = "handeye-workbench";
-
 /// What the workers report within this time is drawn at once: a picture and the board in it, the robot's state.
 const GATHER: Duration = Duration::from_millis(20);
 
@@ -65,11 +62,11 @@ const GATHER: Duration = Duration::from_millis(20);
 /// When no window can be opened, most likely because there is no screen.
 pub fn run(args: GuiArgs) -> anyhow::Result<()> {
     let variable = |name: &str| std::env::var(name).ok();
-    let (file, settings, warnings) = SettingsFile::open(settings::default_path(variable), variable);
+    let (file, settings, warnings) = SettingsFile::open(settings::default_path(), variable);
     let source = args.connect.map_or_else(|| settings.source(), CellSource::Address);
     let options = NativeOptions {
         viewport: ViewportBuilder::default()
-            .with_app_id(APP_ID)
+            .with_app_id(settings::FOLDER)
             .with_title("Handeye Workbench")
             .with_inner_size([1440.0, 900.0])
             .with_min_inner_size([1024.0, 700.0]),
@@ -90,7 +87,7 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
             source,
             view: remembered.view(settings.view()),
             addresses: settings.addresses.clone(),
-            sessions: settings.sessions_folder(variable),
+            sessions: settings.sessions_folder(),
             open: args.session,
             rerun: args.rerun.choice(RerunChoice::Record),
         };
@@ -106,7 +103,8 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let window = Window::new(app, layout, file, &creation.egui_ctx).that_heeds(signals);
         Ok(Box::new(window) as Box<dyn eframe::App>)
     };
-    eframe::run_native(APP_ID, options, Box::new(open)).map_err(|error| {
+    // Layout and size of the window are kept in a folder of that name.
+    eframe::run_native(settings::FOLDER, options, Box::new(open)).map_err(|error| {
         anyhow!("cannot open a window: {error}; without a screen use the subcommands, see `handeye --help`")
     })
 }
