@@ -1,17 +1,8 @@
 //! The browser of the system.
 
-use std::ffi::OsStr;
-use std::io;
-use std::process::{Command, Stdio};
-use std::thread::Builder;
 use std::time::Duration;
 
-use super::native;
-
-/// The program that knows which browser there is.
-const PROGRAM: &str = "xdg-open";
-
-/// It says within this that there is none. One that goes on has become the browser itself.
+/// The system says within this that there is none. A program that goes on has become the browser itself.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Has the system show a page; whether there is a browser that does, as far as the system knows.
@@ -20,41 +11,11 @@ pub fn open(url: &str) -> bool {
         // Some systems would start a browser in the terminal.
         return false;
     }
-    match open_with(OsStr::new(PROGRAM), url, PATIENCE) {
-        Ok(shown) => shown,
+    match open::that_detached_with_timeout(url, PATIENCE) {
+        Ok(()) => true,
         Err(error) => {
             tracing::info!(%error, "no browser was opened");
             false
         }
-    }
-}
-
-fn open_with(program: &OsStr, url: &str, patience: Duration) -> io::Result<bool> {
-    let mut command = Command::new(program);
-    let mut asked = command.arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
-    if let Some(status) = native::wait(&mut asked, patience, || false)? {
-        return Ok(status.success());
-    }
-    let waited = Builder::new().name("browser".to_owned()).spawn(move || asked.wait());
-    tracing::debug!(?waited, "the browser goes on");
-    Ok(true)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_system_that_finds_no_browser_is_believed() {
-        let long = Duration::from_mins(1);
-        assert!(open_with(OsStr::new("true"), "http://127.0.0.1/", long).expect("it runs"));
-        assert!(!open_with(OsStr::new("false"), "http://127.0.0.1/", long).expect("it runs"));
-        assert!(open_with(OsStr::new("no program has this name"), "http://127.0.0.1/", long).is_err());
-    }
-
-    #[test]
-    fn a_browser_that_stays_is_not_waited_for() {
-        // What is opened here is the standard input of `sleep`: a second, a thousand times the patience.
-        assert!(open_with(OsStr::new("sleep"), "1", Duration::from_millis(1)).expect("it runs"));
     }
 }

@@ -1,7 +1,7 @@
 //! Reading and writing that has to do with one click: pictures of a capture, folders, exports, pose files.
 
+use std::io;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::thread::Builder;
 
@@ -80,7 +80,7 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
     match task {
         FileTask::Review { folder, capture, colours } => review(&folder, &capture, colours, outlet),
         FileTask::List(folder) => outlet.report(Event::Folder(list(folder))),
-        FileTask::OpenFolder(folder) => open_folder(&folder, FILE_MANAGER, outlet),
+        FileTask::OpenFolder(folder) => open_folder(folder, |folder| open::that(folder), outlet),
         FileTask::Preview(job) => outlet.report(Event::Previews(preview(&job))),
         FileTask::Export { job, formats, folder } => {
             let files = write(&job, &formats, &folder);
@@ -131,46 +131,26 @@ fn pictures(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Resul
     Ok(FrameImages { rgb, depth, depth_coloured })
 }
 
-/// What shows a folder.
-const FILE_MANAGER: &str = if cfg!(target_os = "macos") {
-    "open"
-} else if cfg!(windows) {
-    "explorer"
-} else {
-    "xdg-open"
-};
-
-/// Has a program show a folder; says where it is when there is none.
-fn open_folder(folder: &Path, program: &str, outlet: &Outlet) {
+/// Has a program show a folder, until the program ends; says where the folder is when there is none.
+fn open_folder(folder: PathBuf, show: impl FnOnce(&Path) -> io::Result<()> + Send + 'static, outlet: &Outlet) {
     if !folder.is_dir() {
         let said = text!("{folder} is not there yet: it is made with the first capture", folder = folder.display());
         return outlet.notice(Severity::Warning, said);
     }
-    let begun =
-        Command::new(program).arg(folder).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-    match begun {
-        // It may stay as long as its window.
-        Ok(mut child) => {
-            let (folder, outlet) = (folder.to_path_buf(), outlet.clone());
-            let waited = Builder::new().name("file manager".to_owned()).spawn(move || match child.wait() {
-                Ok(status) if status.success() => {}
-                Ok(status) => not_shown(&folder, &status, &outlet),
-                Err(error) => not_shown(&folder, &error, &outlet),
-            });
-            tracing::debug!(?waited, program, "a folder is shown");
+    // The program may stay as long as its window.
+    let outlet = outlet.clone();
+    let waited = Builder::new().name("file manager".to_owned()).spawn(move || {
+        if let Err(error) = show(&folder) {
+            let said = text!("No program shows the folder {folder}: {why}", folder = folder.display(), why = error);
+            outlet.notice(Severity::Warning, said);
         }
-        Err(error) => not_shown(folder, &error, outlet),
-    }
-}
-
-fn not_shown(folder: &Path, why: &dyn std::fmt::Display, outlet: &Outlet) {
-    let said = text!("No program shows the folder {folder}: {why}", folder = folder.display(), why = why);
-    outlet.notice(Severity::Warning, said);
+    });
+    tracing::debug!(?waited, "a folder is shown");
 }
 
 /// Folders with what they are, sessions first, and files of poses.
 fn list(folder: PathBuf) -> FolderListing {
-    let read = || -> std::io::Result<Vec<FolderEntry>> {
+    let read = || -> io::Result<Vec<FolderEntry>> {
         let mut entries = Vec::new();
         for entry in std::fs::read_dir(&folder)? {
             let path = entry?.path();
@@ -227,10 +207,11 @@ mod tests {
     use crate::text::Language;
 
     /// What is said until nobody is left who could say something.
-    fn said(folder: &Path, program: &str) -> Vec<String> {
+    fn said(folder: &Path, is_shown: bool) -> Vec<String> {
+        let show = move |_: &Path| if is_shown { Ok(()) } else { Err(io::Error::other("no program")) };
         let (events, reported) = crossbeam_channel::bounded(4);
         let outlet = Outlet { events, waker: Arc::new(|| {}), clock: Arc::new(|| 0.0) };
-        open_folder(folder, program, &outlet);
+        open_folder(folder.to_path_buf(), show, &outlet);
         drop(outlet);
         let notices = reported.iter().map(|event| match event {
             Event::Notice { text, .. } => text.say(Language::English),
@@ -243,11 +224,9 @@ mod tests {
     fn a_folder_that_nothing_can_show_is_named() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().display().to_string();
-        let words = said(folder.path(), "no-such-file-manager");
-        assert!(words[0].starts_with(&format!("No program shows the folder {path}: ")), "{words:?}");
-        assert_eq!(said(folder.path(), "false").len(), 1, "a program that fails is told of");
-        let words = said(&folder.path().join("later"), "no-such-file-manager");
+        assert_eq!(said(folder.path(), false), [format!("No program shows the folder {path}: no program")]);
+        let words = said(&folder.path().join("later"), false);
         assert_eq!(words, [format!("{path}/later is not there yet: it is made with the first capture")]);
-        assert!(said(folder.path(), "true").is_empty());
+        assert!(said(folder.path(), true).is_empty());
     }
 }
