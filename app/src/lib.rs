@@ -10,7 +10,6 @@ pub mod gui;
 pub mod limits;
 pub mod model;
 pub mod observe;
-pub mod parallel;
 pub mod rerun_log;
 pub mod session_start;
 pub mod settings;

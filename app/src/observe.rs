@@ -12,8 +12,7 @@ use handeye_core::progress::CancelToken;
 use handeye_core::session::{CaptureId, Session, SessionError, SessionObservations};
 use handeye_core::target::TargetSpec;
 use handeye_core::vision::{self, VisionError};
-
-use crate::parallel::map_in_order;
+use rayon::prelude::*;
 
 /// Why a data set or a session could not be observed.
 #[derive(Debug, thiserror::Error)]
@@ -102,15 +101,17 @@ fn of_each<T: Send>(
     work: impl Fn(usize) -> Result<T, ObserveError> + Sync,
 ) -> Result<Vec<T>, ObserveError> {
     let done = AtomicUsize::new(0);
-    let each = map_in_order(count, |index| {
+    let one = |index| {
         if cancel.is_cancelled() {
             return Err(ObserveError::Cancelled);
         }
         let result = work(index);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
         result
-    });
-    each.into_iter().map(|result| result.unwrap_or(Err(ObserveError::Cancelled))).collect()
+    };
+    // All of them before the first error: in parallel another one could come first.
+    let each: Vec<_> = (0..count).into_par_iter().with_max_len(1).map(one).collect();
+    each.into_iter().collect()
 }
 
 fn corners_of(dataset: &Dataset, entry: &Entry) -> Result<Option<Vec<Corner>>, ObserveError> {

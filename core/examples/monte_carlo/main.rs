@@ -24,15 +24,14 @@ mod small_sample;
 mod tables;
 mod tally;
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use handeye_core::handeye::Mode;
 use handeye_core::handeye::joint::Noise;
+use rayon::prelude::*;
 
 use scene::Cell;
-use tally::{Outcome, Summary};
+use tally::Summary;
 
 /// The robots of the grid: metres and degrees per axis.
 const ROBOTS: [(f64, f64); 3] = [(0.0, 0.0), (1e-4, 0.02), (5e-4, 0.1)];
@@ -116,32 +115,15 @@ fn cell_seed(cell: &Cell, seed: u64) -> u64 {
 fn run_cell(cell: Cell, arguments: &Arguments) -> Summary {
     let began = Instant::now();
     let seed = cell_seed(&cell, arguments.seed);
-    let next = AtomicUsize::new(0);
-    let results: Mutex<Vec<Option<Result<Outcome, String>>>> =
-        Mutex::new((0..arguments.trials).map(|_| None).collect());
-    std::thread::scope(|scope| {
-        for _ in 0..arguments.threads {
-            scope.spawn(|| {
-                loop {
-                    let number = next.fetch_add(1, Ordering::Relaxed);
-                    if number >= arguments.trials {
-                        break;
-                    }
-                    let outcome = tally::run(&cell, seed, number as u64, arguments.product);
-                    if let Ok(mut results) = results.lock() {
-                        results[number] = Some(outcome);
-                    }
-                }
-            });
-        }
-    });
-    // A thread that panicked has left its trial empty; the scope has passed its panic on by now.
-    let results: Vec<_> = results.into_inner().unwrap_or_default().into_iter().flatten().collect();
+    let trial = |number| tally::run(&cell, seed, number as u64, arguments.product);
+    let results: Vec<_> = (0..arguments.trials).into_par_iter().map(trial).collect();
     Summary::of(cell, &results, began.elapsed().as_secs_f64() * arguments.threads as f64)
 }
 
 fn main() -> Result<(), String> {
     let arguments = arguments(std::env::args().skip(1))?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads);
+    pool.build_global().map_err(|error| error.to_string())?;
     let began = Instant::now();
     let mut summaries = Vec::new();
     for (done, cell) in arguments.cells.iter().enumerate() {

@@ -12,6 +12,7 @@ use handeye_core::testing::data_folder;
 use handeye_core::vision::intrinsics::calibrate;
 use handeye_core::vision::{DetectOptions, detect_with};
 use nalgebra::Vector2;
+use rayon::prelude::*;
 
 fn load(path: &Path) -> GrayImage {
     handeye_core::image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_luma8()
@@ -38,7 +39,7 @@ struct Found {
     millis: f64,
 }
 
-/// Detects in all images, two at a time.
+/// Detects in all images.
 fn detect_all(paths: &[PathBuf], target: &TargetSpec, options: DetectOptions) -> Vec<Found> {
     let detect_one = |path: &PathBuf| {
         let image = load(path);
@@ -47,13 +48,7 @@ fn detect_all(paths: &[PathBuf], target: &TargetSpec, options: DetectOptions) ->
         let name = path.file_name().expect("a file").to_string_lossy().into_owned();
         Found { name, corners, millis: start.elapsed().as_secs_f64() * 1e3 }
     };
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = paths
-            .chunks(paths.len().div_ceil(2).max(1))
-            .map(|part| scope.spawn(move || part.iter().map(detect_one).collect::<Vec<_>>()))
-            .collect();
-        workers.into_iter().flat_map(|w| w.join().expect("no panic")).collect()
-    })
+    paths.par_iter().map(detect_one).collect()
 }
 
 /// Corners of a reference detector: view name to pixels in its order.

@@ -1,6 +1,5 @@
 //! Pictures of the cell against the analytic projection of what is in them, with the detector that users have.
 
-use handeye_app::parallel::map_in_order;
 use handeye_core::camera::{Distortion, Intrinsics};
 use handeye_core::image_file::gray_from_rgb;
 use handeye_core::target::{Grid, TargetSpec};
@@ -9,6 +8,7 @@ use handeye_sim_link::cell::render::{BoardSurface, Imaging, Light, RenderScene, 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 const VIEWS: usize = 200;
@@ -83,10 +83,7 @@ fn corners_and_depths_are_where_the_lens_model_says() {
     let bent = Intrinsics { distortion: Distortion::BrownConrady([-0.08, 0.05, 6e-4, -4e-4, 0.0]), ..ideal };
     for (name, camera) in [("no distortion", ideal), ("distortion", bent)] {
         let renderer = Renderer::new(camera, 0.01, FAR_M);
-        let views: Vec<Errors> = map_in_order(VIEWS, |view| measure(&renderer, &camera, view))
-            .into_iter()
-            .map(|e| e.expect("no panic"))
-            .collect();
+        let views: Vec<Errors> = (0..VIEWS).into_par_iter().map(|view| measure(&renderer, &camera, view)).collect();
         let errors: Vec<Vector2<f64>> = views.iter().flat_map(|v| v.corners.iter().copied()).collect();
         let bias = errors.iter().sum::<Vector2<f64>>() / errors.len() as f64;
         let rms = (errors.iter().map(Vector2::norm_squared).sum::<f64>() / (2.0 * errors.len() as f64)).sqrt();
