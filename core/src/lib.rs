@@ -34,6 +34,7 @@ pub mod progress;
 pub mod result;
 pub mod se3;
 pub mod session;
+pub mod statistics;
 pub mod target;
 #[cfg(feature = "testing")]
 pub mod testing;

@@ -12,6 +12,7 @@ use std::time::Instant;
 
 use handeye_core::image::GrayImage;
 use handeye_core::observation::Corner;
+use handeye_core::statistics::median_high;
 use handeye_core::target::{Grid, TargetSpec};
 use handeye_core::vision::{DetectOptions, detect_with};
 use nalgebra::{Matrix2, Vector2};
@@ -100,8 +101,8 @@ fn rendered(detector: &Detector, look: &Look, pictures: &[Picture]) {
          {:.2} ms/MP found, {:.2} ms/MP not found",
         detector.name,
         pictures.len(),
-        median(&mut hit_ms) / megapixels,
-        median(&mut miss_ms) / megapixels
+        median_high(hit_ms).unwrap_or(f64::NAN) / megapixels,
+        median_high(miss_ms).unwrap_or(f64::NAN) / megapixels
     );
 }
 
@@ -115,10 +116,4 @@ pub fn timed(detector: &Detector, image: &GrayImage, grid: &Grid) -> (Option<Vec
         shortest = shortest.min(start.elapsed().as_secs_f64() * 1e3);
     }
     (corners, shortest)
-}
-
-/// The middle of them; sorts them.
-pub fn median(all: &mut [f64]) -> f64 {
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
 }

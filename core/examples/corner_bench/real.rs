@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use handeye_core::image::GrayImage;
 use handeye_core::observation::Corner;
+use handeye_core::statistics::median_high;
 use handeye_core::target::Grid;
 use nalgebra::Vector2;
 
-use crate::{Detector, detectors, median, timed};
+use crate::{Detector, detectors, timed};
 
 /// Folder, columns and rows.
 const SETS: [(&str, usize, usize); 8] = [
@@ -49,7 +50,13 @@ fn one(detector: &Detector, images: &[GrayImage], grid: &Grid, repeats: bool) {
         times.push(ms / (f64::from(image.width()) * f64::from(image.height()) / 1e6));
         views.extend(corners);
     }
-    println!("  {:37} found {}/{}, {:.2} ms/MP", detector.name, views.len(), images.len(), median(&mut times));
+    println!(
+        "  {:37} found {}/{}, {:.2} ms/MP",
+        detector.name,
+        views.len(),
+        images.len(),
+        median_high(times).unwrap_or(f64::NAN)
+    );
     if repeats && views.len() > 1 {
         println!("  {:37} repeats to {:.4} px per axis", "", repeatability(&views));
     }

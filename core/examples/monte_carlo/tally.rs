@@ -1,6 +1,7 @@
 //! What is counted over the trials of a cell.
 
 use handeye_core::handeye::closed_form;
+use handeye_core::statistics::median_high;
 use nalgebra::{Isometry3, Matrix6, Vector6};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
@@ -233,8 +234,6 @@ impl Performance {
         };
         let known: Vec<Recipes> = good.iter().filter_map(|(_, j)| j.recipes).collect();
         let by = |is: fn(&Recipes) -> bool| known.iter().filter(|r| is(r)).count() as f64 / known.len().max(1) as f64;
-        let mut freedom: Vec<f64> = known.iter().map(|r| r.degrees_of_freedom).collect();
-        freedom.sort_by(f64::total_cmp);
         let recipes = [
             by(|r| r.gaussian),
             by(|r| r.by_directions),
@@ -247,7 +246,7 @@ impl Performance {
         let noise_mean: [f64; 3] = std::array::from_fn(|i| mean(&|j| j.noise[i]));
         Self {
             recipes,
-            median_degrees_of_freedom: freedom.get(freedom.len() / 2).copied().unwrap_or_default(),
+            median_degrees_of_freedom: median_high(known.iter().map(|r| r.degrees_of_freedom)).unwrap_or_default(),
             translation: Ratio::of(&pairs(|d| d.metres2, |l| l.0)),
             rotation: Ratio::of(&pairs(|d| d.radians2, |l| l.1)),
             covered: share(|j| j.covered),

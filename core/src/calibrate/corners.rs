@@ -16,6 +16,7 @@ use crate::handeye::joint::{self, JointProblem, camera_from_target};
 use crate::handeye::{HandEye, Mode, PosePair, quality};
 use crate::observation::{Corner, View};
 use crate::progress::Work;
+use crate::statistics::median_high;
 
 /// Least number of views with the target in sight.
 pub(crate) const NEED: usize = 3;
@@ -77,9 +78,8 @@ fn believable<'a>(
     work: &Work<'_>,
 ) -> Result<(Vec<Seen<'a>>, Vec<usize>, Lens), CalibrateError> {
     let lens = Lens::find(observations, &seen, work)?;
-    let mut sorted = lens.rms_px.clone();
-    sorted.sort_by(f64::total_cmp);
-    let limit = (WRONG_CORNERS * sorted[sorted.len() / 2]).max(FINE_PX);
+    let usual = median_high(lens.rms_px.iter().copied()).unwrap_or(0.0);
+    let limit = (WRONG_CORNERS * usual).max(FINE_PX);
     let good = lens.rms_px.iter().filter(|rms| **rms <= limit).count();
     if options.keep_outliers || good == seen.len() || good < NEED {
         return Ok((seen, Vec::new(), lens));

@@ -4,6 +4,7 @@ use image::GrayImage;
 use nalgebra::Vector2;
 
 use crate::observation::Corner;
+use crate::statistics::median_high;
 use crate::target::Grid;
 
 /// Part of an edge, from either of its corners, that is left out: near a corner the other edge is seen.
@@ -101,15 +102,10 @@ fn direction(
             }
         }
     }
-    Some(EdgeBlur { sigma_px: median(&mut sigmas)?, square_px: median(&mut sides)? })
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    if values.len() < MIN_EDGES {
+    if sigmas.len() < MIN_EDGES {
         return None;
     }
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    Some(EdgeBlur { sigma_px: median_high(sigmas)?, square_px: median_high(sides)? })
 }
 
 /// Blur of one edge, from the pixels up to `reach` to either side of it.

@@ -6,6 +6,7 @@ use super::sight::Sight;
 use crate::frames::{Base, Pose, Tip};
 use crate::handeye::closed_form::{ClosedForm, ClosedFormSolution, ParkMartin, Shah};
 use crate::handeye::{HandEyeError, PosePair, subset};
+use crate::statistics::median;
 
 /// Choices of views that are tried besides all of them. With three of ten views wrong a choice of five is clean once in
 /// six times, and the two steps below mend choices with one wrong view.
@@ -99,7 +100,7 @@ fn judged(sight: &Sight, pairs: &[PosePair], solution: ClosedFormSolution) -> Ag
             misfit(sight, chain.isometry(), pair.camera_from_target.isometry())
         })
         .collect();
-    let median_m = super::median(misfit_m.clone()).unwrap_or(f64::INFINITY);
+    let median_m = median(misfit_m.iter().copied()).unwrap_or(f64::INFINITY);
     Agreement { solution, misfit_m, median_m }
 }
 

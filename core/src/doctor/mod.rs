@@ -192,11 +192,3 @@ fn examine(observations: &Observations, diagnosis: &mut Diagnosis, work: &Work<'
     });
     Ok(())
 }
-
-/// Median; `None` when there is no number.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.retain(|v| !v.is_nan());
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    (n > 0).then(|| 0.5 * (values[n / 2] + values[(n - 1) / 2]))
-}

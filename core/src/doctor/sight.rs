@@ -10,6 +10,7 @@ use crate::handeye::joint::equations::{FreeForm, PoseEquations, Seen};
 use crate::handeye::{Mode, subset};
 use crate::observation::Corner;
 use crate::se3::skew;
+use crate::statistics::median;
 use crate::target::TargetSpec;
 use crate::vision::{intrinsics, pnp};
 
@@ -108,7 +109,7 @@ impl Sight {
         }
         let middle = Point3::from(outer.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / 4.0);
         let distances = sight.views.iter().map(|v| (v.camera_from_target * middle).coords.norm()).collect();
-        sight.distance_m = super::median(distances).unwrap_or(0.0);
+        sight.distance_m = median(distances).unwrap_or(0.0);
         Ok(sight)
     }
 
@@ -143,7 +144,7 @@ impl Sight {
         let free = FreeForm { lens: true, warp: true, scale: false };
         let count = free.count(&camera);
         let variances = fits.iter().flatten().map(Fit::variance_px2).collect();
-        let Some(typical) = super::median(variances) else {
+        let Some(typical) = median(variances) else {
             return Err("the target's pose could not be found in any view".to_owned());
         };
         // Exact corners would have a weight that is not finite.
@@ -246,7 +247,7 @@ fn fit_all(views: &[Vec<Corner>], target: &TargetSpec, camera: &Intrinsics) -> V
         .iter()
         .map(|corners| Some(Fit { pose: solve(corners)?, corners: corners.clone(), wrong: Vec::new() }))
         .collect();
-    let Some(typical) = super::median(fits.iter().flatten().map(|f| f.pose.best.rms_px).collect()) else {
+    let Some(typical) = median(fits.iter().flatten().map(|f| f.pose.best.rms_px)) else {
         return fits;
     };
     let limit = (WRONG_SIGMAS * typical / std::f64::consts::SQRT_2).max(WRONG_PX);

@@ -8,6 +8,7 @@ use crate::depth::{DepthImage, DepthSample};
 use crate::frames::{Base, Camera, PointIn, Pose};
 use crate::observation::Corner;
 use crate::se3;
+use crate::statistics::{SIGMA_PER_MEDIAN_SIZE, median_high};
 use crate::target::TargetSpec;
 use crate::verify::Calibrated;
 
@@ -20,8 +21,6 @@ const MIN_AROUND: usize = 3;
 const ONE_SURFACE: f64 = 0.02;
 /// Points off by more than this many standard deviations (from the median) are not on the board.
 const OUTLIER: f64 = 4.0;
-/// The median of a normal error's size is this part of its standard deviation.
-const MEDIAN_SIZE: f64 = 0.6745;
 /// Depths are never called outliers below this [m]: a depth camera's steps.
 const FLOOR_M: f64 = 1e-3;
 const ROUNDS: usize = 4;
@@ -52,7 +51,7 @@ pub(super) fn by_depth(
     // One wrong offset of all depths must not empty the set, hence the deviation from the median.
     let ahead: Vec<f64> =
         points.iter().map(|p| p.in_camera.z - (seen.camera_from_target.isometry() * p.on_board).z).collect();
-    let middle = median(ahead.clone())?;
+    let middle = median_high(ahead.iter().copied())?;
     let off: Vec<f64> = ahead.iter().map(|a| (a - middle).abs()).collect();
     let reach = reach(&off);
     let mut off = off.into_iter();
@@ -107,16 +106,11 @@ fn depth_at(depth: &DepthImage, px: Vector2<f64>, far_m: f32) -> Option<f64> {
     for (du, dv) in [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)] {
         around.extend(measured(u + f64::from(du), v + f64::from(dv)));
     }
-    if around.len() < MIN_AROUND { None } else { median(around) }
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    if around.len() < MIN_AROUND { None } else { median_high(around) }
 }
 
 fn reach(off: &[f64]) -> f64 {
-    (OUTLIER * median(off.to_vec()).unwrap_or(0.0) / MEDIAN_SIZE).max(FLOOR_M)
+    (OUTLIER * SIGMA_PER_MEDIAN_SIZE * median_high(off.iter().copied()).unwrap_or(0.0)).max(FLOOR_M)
 }
 
 /// Rigid fit; points that do not fit are taken out of the set.

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Unit, UnitQuaternion, Vector2, Vector
 
 use crate::camera::Intrinsics;
 use crate::se3;
+use crate::statistics::median_high;
 use crate::vision::pnp::px_by_pose;
 
 /// A point of the board and where it is seen.
@@ -97,9 +98,7 @@ fn lengths(seen: &[Seen], camera: &Intrinsics, pose: &Isometry3<f64>) -> Option<
 }
 
 fn sigma_of(lengths: &[f64]) -> f64 {
-    let mut sorted = lengths.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).map_or(0.0, |median| median / MEDIAN_LENGTH)
+    median_high(lengths.iter().copied()).map_or(0.0, |median| median / MEDIAN_LENGTH)
 }
 
 /// Least squares in which points that do not fit lose their weight, then plain least squares over those that fit.

@@ -8,6 +8,7 @@ use super::glance;
 use super::pose::{self, Fit, Seen};
 use crate::camera::Intrinsics;
 use crate::observation::Corner;
+use crate::statistics::median_high;
 use crate::target::{Grid, TargetSpec};
 use crate::vision::{DetectOptions, VisionError, detect_with, pnp};
 
@@ -124,9 +125,9 @@ impl Eye<'_> {
             .into_iter()
             .filter_map(|(i, place)| Some((i, corner::exactly(self.image, &place, expected.blur_px)?)))
             .collect();
-        let usual = median(found.iter().map(|(_, corner)| corner.contrast))?;
+        let usual = median_high(found.iter().map(|(_, corner)| corner.contrast))?;
         found.retain(|(_, corner)| corner.contrast >= MIN_CONTRAST_PART * usual);
-        let blur_px = median(found.iter().map(|(_, corner)| corner.blur_px));
+        let blur_px = median_high(found.iter().map(|(_, corner)| corner.blur_px));
         let corners: Vec<Corner> = found.into_iter().map(|(index, corner)| Corner::new(index, corner.px)).collect();
         let board = self.fitted(&corners, &rough, blur_px)?;
         if board.corners.len() < self.grid().len() && self.goes_on(&board.fit.pose, expected) {
@@ -138,7 +139,7 @@ impl Eye<'_> {
     /// The pose by corners found to a pixel or so.
     fn rough(&self, expected: &Expected) -> Option<Isometry3<f64>> {
         let places = self.places(&expected.camera_from_target, expected.first_dark);
-        let square = median(places.iter().map(|(_, place)| place.spacing()))?;
+        let square = median_high(places.iter().map(|(_, place)| place.spacing()))?;
         let radius = expected.radius_px.clamp(MIN_RADIUS_PX, (MAX_RADIUS * square).max(MIN_RADIUS_PX));
         let seen: Vec<Seen> = places
             .iter()
@@ -258,10 +259,4 @@ impl Eye<'_> {
 
 fn inliers<'a>(seen: &'a [Seen], fit: &'a Fit) -> impl Iterator<Item = Point3<f64>> + Clone + 'a {
     seen.iter().zip(&fit.inliers).filter(|(_, inlier)| **inlier).map(|((point, _), _)| *point)
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut all: Vec<f64> = values.collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied()
 }

@@ -19,6 +19,7 @@ use crate::frames::{Anchor, Base, Camera, Pose, Target, Tip};
 use crate::observation::{Corner, View};
 use crate::progress::{Stage, Work};
 use crate::se3;
+use crate::statistics::median_high;
 use crate::target::TargetSpec;
 use crate::vision::{VisionError, pnp};
 
@@ -256,8 +257,7 @@ fn depth_error_m(
             errors.push(f64::from(depth) - on_board.z);
         }
     }
-    errors.sort_by(f64::total_cmp);
-    errors.get(errors.len() / 2).copied()
+    median_high(errors)
 }
 
 fn rms(squares: impl ExactSizeIterator<Item = f64>) -> f64 {

@@ -12,6 +12,7 @@ use super::homography::{homography, jacobian, mapped};
 use super::markers::{self, Marker, Placed};
 use super::{VisionError, spread};
 use crate::observation::Corner;
+use crate::statistics::median_high;
 use crate::target::{Charuco, Layout};
 
 /// Markers within this many squares of a corner say where it is.
@@ -85,9 +86,7 @@ fn corners(image: &GrayImage, board: &Charuco, layout: Layout, placed: &[Placed]
         }
     }
     grow(image, board, layout, &mut found);
-    let mut contrasts: Vec<f64> = found.iter().map(|(_, contrast)| *contrast).collect();
-    contrasts.sort_by(f64::total_cmp);
-    let usual = contrasts.get(contrasts.len() / 2).copied().unwrap_or(0.0);
+    let usual = median_high(found.iter().map(|(_, contrast)| *contrast)).unwrap_or(0.0);
     found.into_iter().filter(|(_, contrast)| *contrast >= MIN_CONTRAST_PART * usual).map(|(corner, _)| corner).collect()
 }
 

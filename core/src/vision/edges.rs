@@ -12,6 +12,7 @@ use image::GrayImage;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::edge_profile::Profile;
+use crate::statistics::median_high;
 
 /// What lies beyond the dark border and beyond the light gap reaches so far into them [px]: twice the usual blur.
 const BLUR_BEYOND_PX: f64 = 1.5;
@@ -141,9 +142,8 @@ fn crossings(corners: &[Vector2<f64>; 4], edges: &[Option<Edge>; 4]) -> [Option<
 
 /// Leaves out edges of little contrast.
 fn keep_clear(squares: &mut [[Option<Edge>; 4]]) {
-    let mut contrasts: Vec<f64> = squares.iter().flatten().flatten().map(|edge| edge.contrast).collect();
-    contrasts.sort_by(f64::total_cmp);
-    let Some(usual) = contrasts.get(contrasts.len() / 2) else { return };
+    let contrasts = squares.iter().flatten().flatten().map(|edge| edge.contrast);
+    let Some(usual) = median_high(contrasts) else { return };
     for edge in squares.iter_mut().flatten() {
         *edge = edge.filter(|edge| edge.contrast >= MIN_CONTRAST_PART * usual);
     }
@@ -247,9 +247,7 @@ impl Scan<'_> {
     fn contrast(&self, edge: &Edge) -> Option<f64> {
         let lines = self.lines(edge)?;
         let difference = |levels: &[f64]| Some((levels.last()? - levels.first()?).abs());
-        let mut all: Vec<f64> = lines.iter().filter_map(|(_, _, levels)| difference(levels)).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied()
+        median_high(lines.iter().filter_map(|(_, _, levels)| difference(levels)))
     }
 
     /// Where every line of pixels has its steepest steps of the right sign: along and across.
@@ -335,10 +333,8 @@ fn fitted(edge: Edge, crossings: &[Vector2<f64>], bend: f64) -> Option<(Edge, Ve
         out.curve = inverse * rhs;
         out.covariance = inverse * sigma * sigma;
         let off = |p: &Vector2<f64>| (p.y - out.across(p.x)).abs();
-        let mut sizes: Vec<f64> = crossings.iter().map(off).collect();
-        sizes.sort_by(f64::total_cmp);
         // 1.48 medians are a standard deviation.
-        let robust = 1.48 * sizes.get(sizes.len() / 2)?;
+        let robust = 1.48 * median_high(crossings.iter().map(off))?;
         sigma = robust.max(FLOOR_PX);
         let limit = (3.5 * sigma).max(0.05);
         kept = crossings.iter().copied().filter(|p| off(p) <= limit).collect();

@@ -9,6 +9,7 @@ use handeye_core::frames::{Base, Pose, Tip};
 use handeye_core::image_file::gray_from_rgb;
 use handeye_core::poses_file::{Goal, TaughtPoses};
 use handeye_core::progress::CancelToken;
+use handeye_core::statistics::median_high;
 use handeye_core::track::{Estimate, Keep, Picture, Setup, State};
 use handeye_sim_link::client::cell::{
     Arm, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment, FollowWish as ArmWish,
@@ -311,9 +312,7 @@ impl Summary {
     }
 
     fn latency_s(&self) -> Option<f64> {
-        let mut sorted = self.latencies_s.clone();
-        sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied()
+        median_high(self.latencies_s.iter().copied())
     }
 
     fn rate_hz(&self) -> f64 {

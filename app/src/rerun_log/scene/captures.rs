@@ -11,6 +11,7 @@ use handeye_core::frames::{Camera, Pose, Target};
 use handeye_core::image::RgbImage;
 use handeye_core::observation::Corner;
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role, Session, SessionError};
+use handeye_core::statistics::median_high;
 use handeye_core::target::TargetSpec;
 use handeye_core::vision::pnp;
 use rerun::{Arrows2D, AsComponents, Color, EncodedImage, Points3D, Radius};
@@ -287,9 +288,7 @@ fn outcome(solved: &Solved, id: CaptureId) -> Option<Outcome<'_>> {
 }
 
 fn redness(rms_px: f64, all: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut all: Vec<f64> = all.collect();
-    all.sort_by(f64::total_cmp);
-    let median = *all.get(all.len() / 2)?;
+    let median = median_high(all)?;
     (median > 0.0).then(|| rms_px / (style::RED_AT_MEDIANS * median))
 }
 

@@ -31,6 +31,7 @@ use crate::handeye::HandEyeError;
 use crate::observation::{Corner, View};
 use crate::progress::{CancelToken, Work};
 use crate::se3;
+use crate::statistics::median;
 
 /// Share of healthy sessions in which some view may be set aside.
 const FALSE_ALARM: f64 = 0.001;
@@ -257,7 +258,7 @@ fn misfits(problem: &JointProblem<'_>, start: &JointStart, views: &[View], own: 
 
 /// Whether some view is so far from the start that it may lead a fit astray.
 fn stands_out(misfits: &[f64]) -> bool {
-    misfits.iter().copied().fold(0.0, f64::max) > TIMES_MEDIAN * median(misfits.iter().copied())
+    misfits.iter().copied().fold(0.0, f64::max) > TIMES_MEDIAN * median(misfits.iter().copied()).unwrap_or(0.0)
 }
 
 /// The fit of the views that the start fits best; `None` when they determine nothing.
@@ -408,14 +409,7 @@ fn without_wrong_corners(
 }
 
 fn median_of(judged: &[Judged]) -> f64 {
-    median(judged.iter().map(|j| j.squared))
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    if n == 0 { 0.0 } else { 0.5 * (values[n / 2] + values[(n - 1) / 2]) }
+    median(judged.iter().map(|j| j.squared)).unwrap_or(0.0)
 }
 
 #[cfg(test)]

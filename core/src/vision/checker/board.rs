@@ -10,6 +10,7 @@ use super::edge::{PIXEL_AREA, Profile};
 use super::fit::{Fit, Light, fit};
 use super::patch::{BLUR, Patch, Window};
 use super::pyramid::Level;
+use crate::statistics::median_high;
 use crate::vision::order::Ordered;
 
 /// Part of a grid step up to which a pixel counts for the first fit, and the part tried when that fails: the outermost
@@ -256,10 +257,8 @@ impl Fall {
                 }
             }
             fall.coefficients = normal.cholesky()?.solve(&rhs);
-            let mut off: Vec<f64> =
-                known.iter().map(|fit| (fit.level - fall.row(fit.px).dot(&fall.coefficients)).abs()).collect();
-            off.sort_by(f64::total_cmp);
-            limit = 4.0 * off[off.len() / 2] + 1e-9;
+            let off = known.iter().map(|fit| (fit.level - fall.row(fit.px).dot(&fall.coefficients)).abs());
+            limit = 4.0 * median_high(off)? + 1e-9;
         }
         Some(fall)
     }

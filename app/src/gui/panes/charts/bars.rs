@@ -3,6 +3,7 @@
 use egui::{Align, Align2, Color32, CursorIcon, FontId, Layout, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2};
 use egui::{WidgetInfo, WidgetType};
 use handeye_core::session::CaptureId;
+use handeye_core::statistics::median_high;
 
 use super::axes::{self, Scale};
 use super::instead_ui;
@@ -71,9 +72,8 @@ pub fn above(table: &CaptureTable, line_px: f64) -> Vec<CaptureId> {
 
 /// Where the line is drawn first.
 fn first_line_px(table: &CaptureTable) -> Option<f64> {
-    let mut all: Vec<f64> = table.rows.iter().filter(|row| !row.verifies()).filter_map(|row| row.rms_px).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).map(|median| FIRST_LINE * median)
+    let all = table.rows.iter().filter(|row| !row.verifies()).filter_map(|row| row.rms_px);
+    median_high(all).map(|median| FIRST_LINE * median)
 }
 
 fn controls_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Outbox) {

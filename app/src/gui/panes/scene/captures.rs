@@ -3,6 +3,7 @@
 use egui::{Color32, Pos2, Stroke};
 use handeye_core::handeye::HandEye;
 use handeye_core::session::{CaptureId, CaptureRecord};
+use handeye_core::statistics::median_high;
 use nalgebra::Point3;
 
 use super::board::{self, Line};
@@ -33,9 +34,7 @@ pub struct Spot {
 /// The median residual of the captures of the fit \[px\].
 fn median_px(table: &CaptureTable) -> Option<f64> {
     let fitted = table.rows.iter().filter(|row| !row.excluded && !row.verifies());
-    let mut all: Vec<f64> = fitted.filter_map(|row| row.rms_px).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().filter(|median| *median > 0.0)
+    median_high(fitted.filter_map(|row| row.rms_px)).filter(|median| *median > 0.0)
 }
 
 /// The colour of a capture: by what it is for, and the nearer to that of a warning the larger its residual is against
