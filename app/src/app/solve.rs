@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use handeye_core::calibrate::{Method, Options};
+use handeye_core::handeye::motion::MIN_VIEWS;
 use handeye_core::observation::Corner;
 use handeye_core::progress::Stage;
 use handeye_core::session::{CaptureId, Document, Role, SessionObservations};
@@ -13,9 +14,6 @@ use crate::model::{BoxState, Goal, JobId, Severity, SolveState, SolveStatus, Wor
 use crate::text;
 use crate::text::Text;
 use crate::worker::{ArchiveTask, SolveJob};
-
-/// Fewer views than this have no answer.
-const LEAST_VIEWS: usize = 3;
 
 /// What a calibration depends on. When it is another, there is something to solve.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +69,7 @@ impl App {
         self.model.solve.fresh = false;
         let document = Arc::clone(&self.model.session.document);
         let seen = document.in_use().filter(|it| self.corners(it.id).is_some()).count();
-        if seen < LEAST_VIEWS {
+        if seen < MIN_VIEWS {
             self.desk.cancel_solve();
             self.model.solve.status = if document.captures.is_empty() {
                 SolveStatus::Idle
@@ -80,7 +78,7 @@ impl App {
                     why: text!(
                         "{seen} captures with the board are in use, at least {need} are needed: capture more poses",
                         seen = seen,
-                        need = LEAST_VIEWS
+                        need = MIN_VIEWS
                     ),
                 }
             };

@@ -1,16 +1,12 @@
 //! How far the calibration has come: what is done, what can be done now, and what stands in the way.
 
+use handeye_core::calibrate::GOOD_VIEWS;
+use handeye_core::handeye::motion::MIN_VIEWS;
 use handeye_core::session::Role;
 
 use crate::model::{Model, Step};
 use crate::text;
 use crate::text::Text;
-
-/// Captures that are asked for before the answer is called good: fewer leave the expected error large and unsure.
-const CAPTURES_WANTED: usize = 10;
-
-/// Captures without which nothing can be solved.
-const CAPTURES_NEEDED: usize = 3;
 
 /// How a step is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,18 +136,18 @@ fn target(facts: &Facts) -> (StepState, Text) {
 
 fn capture(facts: &Facts) -> (StepState, Text) {
     let Facts { captures_in_use: count, .. } = *facts;
-    if count >= CAPTURES_WANTED {
+    if count >= GOOD_VIEWS {
         (StepState::Done, text!("{count} poses", count = count))
     } else if count > 0 || facts.board_seen {
-        (StepState::Now, text!("{count} of {wanted} poses", count = count, wanted = CAPTURES_WANTED))
+        (StepState::Now, text!("{count} of {wanted} poses", count = count, wanted = GOOD_VIEWS))
     } else {
         (StepState::Blocked, text!("Needs the board"))
     }
 }
 
 fn solve(facts: &Facts) -> (StepState, Text) {
-    if facts.captures_in_use < CAPTURES_NEEDED {
-        return (StepState::Blocked, text!("Needs {count} poses", count = CAPTURES_NEEDED));
+    if facts.captures_in_use < MIN_VIEWS {
+        return (StepState::Blocked, text!("Needs {count} poses", count = MIN_VIEWS));
     }
     match (facts.solving, facts.solved, facts.expected_error_m) {
         (true, ..) => (StepState::Now, text!("At work…")),

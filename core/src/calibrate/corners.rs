@@ -13,13 +13,11 @@ use crate::camera::Intrinsics;
 use crate::frames::{Camera, Pose, Target};
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::joint::{self, JointProblem, camera_from_target};
+use crate::handeye::motion::MIN_VIEWS;
 use crate::handeye::{HandEye, Mode, PosePair, quality};
 use crate::observation::{Corner, View};
 use crate::progress::Work;
 use crate::statistics::median_high;
-
-/// Least number of views with the target in sight.
-pub(crate) const NEED: usize = 3;
 
 pub fn calibrate(
     observations: &Observations,
@@ -28,7 +26,7 @@ pub fn calibrate(
     work: &Work<'_>,
 ) -> Result<Calibration, CalibrateError> {
     let seen: Vec<Seen<'_>> = observations.views.iter().enumerate().filter_map(Seen::new).collect();
-    if seen.len() < NEED {
+    if seen.len() < MIN_VIEWS {
         return Err(too_few(observations, seen.len()));
     }
     let (seen, wrong, lens) = believable(observations, seen, options, work)?;
@@ -81,7 +79,7 @@ fn believable<'a>(
     let usual = median_high(lens.rms_px.iter().copied()).unwrap_or(0.0);
     let limit = (WRONG_CORNERS * usual).max(FINE_PX);
     let good = lens.rms_px.iter().filter(|rms| **rms <= limit).count();
-    if options.keep_outliers || good == seen.len() || good < NEED {
+    if options.keep_outliers || good == seen.len() || good < MIN_VIEWS {
         return Ok((seen, Vec::new(), lens));
     }
     let (kept, wrong): (Vec<_>, Vec<_>) = seen.into_iter().zip(&lens.rms_px).partition(|(_, rms)| **rms <= limit);
@@ -95,13 +93,13 @@ fn believable<'a>(
 fn too_few(observations: &Observations, found: usize) -> CalibrateError {
     let excluded = observations.views.iter().filter(|v| !v.in_fit).count();
     let with_excluded = observations.views.iter().filter(|v| v.corners.is_some()).count();
-    if with_excluded >= NEED {
-        return CalibrateError::TooFewLeft { left: found, excluded, need: NEED };
+    if with_excluded >= MIN_VIEWS {
+        return CalibrateError::TooFewLeft { left: found, excluded, need: MIN_VIEWS };
     }
     CalibrateError::TargetNotFound {
         found,
         images: observations.views.len() - excluded,
-        need: NEED,
+        need: MIN_VIEWS,
         target: observations.target.to_string(),
     }
 }

@@ -88,6 +88,9 @@ impl CameraKnowledge {
     }
 }
 
+/// Views of a good session: the noise levels rest on as many numbers, and with ten they are known to a fifth.
+pub const GOOD_VIEWS: usize = 10;
+
 /// Lens model that is estimated when none is named: what OpenCV estimates by default.
 pub const DEFAULT_MODEL: Distortion = Distortion::BrownConrady([0.0; 5]);
 

@@ -9,6 +9,7 @@
 use nalgebra::{Cholesky, Matrix6, SMatrix, SVector, Vector6};
 
 use super::closed_form::ClosedFormSolution;
+use super::motion::MIN_VIEWS;
 use super::{HandEyeError, PosePair};
 use crate::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::se3;
@@ -45,9 +46,8 @@ const LEVEL_FLOOR: f64 = 1e-12;
 /// # Errors
 /// [`HandEyeError::TooFewViews`], [`HandEyeError::NoSolution`] for a singular system.
 pub fn refine(pairs: &[PosePair], start: &ClosedFormSolution) -> Result<PoseGraphSolution, HandEyeError> {
-    const NEED: usize = 3;
-    if pairs.len() < NEED {
-        return Err(HandEyeError::TooFewViews { got: pairs.len(), need: NEED });
+    if pairs.len() < MIN_VIEWS {
+        return Err(HandEyeError::TooFewViews { got: pairs.len(), need: MIN_VIEWS });
     }
     let mut x = start.mount_from_camera;
     let mut y = start.anchor_from_target;

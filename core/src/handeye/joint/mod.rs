@@ -38,6 +38,7 @@ mod weights;
 
 use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
 
+use super::motion::MIN_VIEWS;
 use super::{HandEye, HandEyeError, Mode};
 use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::Intrinsics;
@@ -245,8 +246,6 @@ impl JointSolution {
 /// Standard deviation of a joint's offset before any data: a robot that is a degree off is a broken one, and without a
 /// prior the offsets of the first and the last joint could not be told from the links.
 pub const JOINT_PRIOR_RAD: f64 = 0.02;
-/// Views below which nothing is determined.
-pub(crate) const NEED: usize = 3;
 /// Rounds of weights and optimum at the most.
 const MAX_ROUNDS: usize = 20;
 /// Relative change of every noise level below which the rounds end: a thousandth moves the answer by far less than its
@@ -269,8 +268,8 @@ pub fn estimate<'a>(
     work: impl Into<Work<'a>>,
 ) -> Result<JointSolution, HandEyeError> {
     let work = work.into();
-    if problem.views.len() < NEED {
-        return Err(HandEyeError::TooFewViews { got: problem.views.len(), need: NEED });
+    if problem.views.len() < MIN_VIEWS {
+        return Err(HandEyeError::TooFewViews { got: problem.views.len(), need: MIN_VIEWS });
     }
     let mut state = optimise::State::new(problem, start);
     let mut noise = problem.noise.or(start.noise).unwrap_or_else(|| variance::starting_noise(problem, &state));

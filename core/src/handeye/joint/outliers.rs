@@ -28,6 +28,7 @@ use super::view_block::{MAX_SHARED, prior_weight};
 use super::{JointProblem, JointSolution, JointStart, estimate};
 use crate::frames::{Camera, Pose, Target};
 use crate::handeye::HandEyeError;
+use crate::handeye::motion::MIN_VIEWS;
 use crate::observation::{Corner, View};
 use crate::progress::{CancelToken, Work};
 use crate::se3;
@@ -149,7 +150,7 @@ pub fn estimate_screened<'a>(
         }
     }
     let least = (LEAST_KEPT * views.len() as f64).ceil() as usize;
-    if fit.kept.len() < least.max(super::NEED) {
+    if fit.kept.len() < least.max(MIN_VIEWS) {
         fit = of_all(fit_all()?);
         judged = judge(&fit)?;
     }
@@ -185,7 +186,7 @@ fn settle(
     let mut seen = vec![fit.kept.clone()];
     for _ in 0..ROUNDS {
         let mut good: Vec<usize> = (0..views.len()).filter(|&i| judged[i].squared <= judged[i].limit).collect();
-        if good == fit.kept || good.len() < super::NEED {
+        if good == fit.kept || good.len() < MIN_VIEWS {
             break;
         }
         if seen.contains(&good) {
@@ -271,7 +272,7 @@ fn core_fit(
 ) -> Option<Fit> {
     let mut order: Vec<usize> = (0..views.len()).collect();
     order.sort_by(|a, b| misfits[*a].total_cmp(&misfits[*b]));
-    let count = ((CORE * views.len() as f64).ceil() as usize).max(super::NEED + 1).min(views.len());
+    let count = ((CORE * views.len() as f64).ceil() as usize).max(MIN_VIEWS + 1).min(views.len());
     let mut kept = order[..count].to_vec();
     kept.sort_unstable();
     fit_of(problem, start, views, kept, cancel).ok()

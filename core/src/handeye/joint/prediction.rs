@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, Matrix6, Vector6};
 use super::normal::{System, covariance_of};
 use super::optimise::State;
 use super::view_block::prior_weight;
-use super::{JointProblem, JointSolution, NEED};
+use super::{JointProblem, JointSolution};
+use crate::handeye::motion::MIN_VIEWS;
 use crate::handeye::{HandEyeError, quality};
 use crate::progress::{Stage, Work};
 
@@ -72,7 +73,7 @@ pub fn error_by_views<'a>(
     let work = work.into();
     let count = problem.views.len();
     let system = System::new(problem, &state_of(problem, solution)?, work.cancel)?;
-    let wanted = spaced(NEED, count);
+    let wanted = spaced(MIN_VIEWS, count);
     let mut wanted = wanted.iter().peekable();
     let n = system.layout.count();
     let mut information = DMatrix::zeros(n, n);
@@ -116,7 +117,7 @@ pub fn error_by_views<'a>(
 /// The state of a solution, if it is one of this problem.
 fn state_of(problem: &JointProblem<'_>, solution: &JointSolution) -> Result<State, HandEyeError> {
     let views = problem.views.len();
-    if solution.views.len() != views || views < NEED {
+    if solution.views.len() != views || views < MIN_VIEWS {
         let reason = "the solution is of another set of views";
         return Err(HandEyeError::NoSolution { method: "the prediction", views, reason });
     }

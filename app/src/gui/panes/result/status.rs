@@ -1,6 +1,7 @@
 //! What the solver does, and what to do when it has no answer.
 
 use egui::{Button, RichText, Ui};
+use handeye_core::handeye::motion::MIN_VIEWS;
 use handeye_core::progress::Stage;
 
 use crate::command::{Command, Outbox};
@@ -9,9 +10,6 @@ use crate::gui::theme::{Palette, Tone};
 use crate::model::{Model, SolveStatus};
 use crate::text::Language;
 use crate::{text, tr};
-
-/// The least number of captures that a hand-eye calibration takes.
-const LEAST_CAPTURES: usize = 3;
 
 /// Progress, failure, or how the answer came about.
 pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -54,7 +52,7 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         );
         parts::empty_ui(ui, tr!(language, "No calibration yet"), &detail.say(language));
         ui.vertical_centered(|ui| {
-            let reason = (count < LEAST_CAPTURES).then(|| tr!(language, "Capture the board from more poses first"));
+            let reason = (count < MIN_VIEWS).then(|| tr!(language, "Capture the board from more poses first"));
             if parts::gated_ui(ui, reason, Button::new(tr!(language, "Solve"))).clicked() {
                 outbox.send(Command::Solve);
             }
