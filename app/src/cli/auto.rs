@@ -6,24 +6,21 @@ mod tour;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use handeye_core::arm::ArmModel;
 use handeye_core::calibrate::{Method, Options};
-use handeye_core::handeye::{HandEye, Mode};
-use handeye_core::session::{FolderLock, GroundTruth, Session, SessionMeta, Store};
+use handeye_core::session::{FolderLock, Session, SessionMeta, Store};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
-use time::OffsetDateTime;
-use time::macros::format_description;
 
 use super::cell::SceneArg;
 use super::output::Output;
 use super::{Failure, RerunArg, out, record, rerun_arg, solve};
-use crate::model::{CaptureOptions, Step};
+use crate::model::{CaptureOptions, Step, Truth};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
-use crate::session_start::{BOARD, BUILT_IN_ARM};
+use crate::session_start::{self, BUILT_IN_ARM};
 use crate::shortfall;
 use crate::text::Language;
+use crate::worker::{timestamp, timestamp_rfc3339};
 use poses::Plan;
 use solve::Solution;
 use tour::Tour;
@@ -85,7 +82,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         (None, None) => String::new(),
     };
     let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
-    let folder = args.out.clone().map_or_else(new_session_folder, Ok)?;
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("sessions").join(timestamp()));
     let mut cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())
         .map_err(Failure::failed)?;
     let truth = cell.ground_truth().map_err(Failure::failed)?;
@@ -96,7 +93,12 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     if let Some(shortfall) = shortfall::of(cell.info().support(), arm.is_some()) {
         tracing::warn!("{}", shortfall.say(Language::English));
     }
-    let mut session = Store::create(&folder, meta(&truth, args.seed, arm)?).map_err(Failure::failed)?;
+    let meta = SessionMeta {
+        seeds: args.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
+        arm,
+        ..session_start::meta(Some(&Truth::from(&truth)), timestamp_rfc3339())
+    };
+    let mut session = Store::create(&folder, meta).map_err(Failure::failed)?;
     recorder.note(Entry::Step(Step::Capture));
     record::document(&recorder, &session);
     record::cell(&recorder, cell.arm(), &truth).map_err(Failure::failed)?;
@@ -127,7 +129,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     drop(cell);
     drop(server);
 
-    let solution = solve::folder(&folder, Method::Joint, Options::default(), Some(record::known(&truth)), &cancel)?;
+    let solution = solve::folder(&folder, Method::Joint, Options::default(), Some(Truth::from(&truth)), &cancel)?;
     finish(&session, args.json.as_ref(), &solution)?;
     solution.note(&recorder);
     rerun_arg::finish(recorder, &cancel)
@@ -161,34 +163,4 @@ fn keep_earlier_session(folder: &Path) -> Result<(), Failure> {
     })?;
     tracing::warn!("{} held a session already; it is now {}", folder.display(), kept.display());
     Ok(())
-}
-
-/// `sessions/2026-05-02T10-11-12`, under the current folder.
-fn new_session_folder() -> Result<PathBuf, Failure> {
-    let name = OffsetDateTime::now_utc()
-        .format(format_description!("[year]-[month]-[day]T[hour]-[minute]-[second]"))
-        .map_err(Failure::failed)?;
-    Ok(Path::new("sessions").join(name))
-}
-
-fn meta(
-    truth: &handeye_sim_link::client::cell::GroundTruth,
-    seed: Option<u64>,
-    arm: Option<ArmModel>,
-) -> Result<SessionMeta, Failure> {
-    let created =
-        OffsetDateTime::now_utc().format(&time::format_description::well_known::Rfc3339).map_err(Failure::failed)?;
-    Ok(SessionMeta {
-        created,
-        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
-        mode: Mode::EyeInHand,
-        target: BOARD,
-        camera: None,
-        seeds: seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
-        ground_truth: truth.base_from_target.map(|base_from_target| {
-            let links = HandEye::EyeInHand { tip_from_camera: truth.tip_from_camera, base_from_target };
-            GroundTruth::new(&links, Some(truth.intrinsics))
-        }),
-        arm,
-    })
 }

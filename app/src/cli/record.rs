@@ -7,33 +7,16 @@ use handeye_core::session::Store;
 use handeye_sim_link::client::LinkError;
 use handeye_sim_link::client::cell::{Arm, CellInfo, Frame, GroundTruth};
 
-use crate::model::{CellFacts, FrameImages, FrameInfo, LiveFrame, Truth};
+use crate::model::{CellFacts, FrameImages, FrameInfo, LiveFrame};
 use crate::rerun_log::{Entry, Recorder};
 
 /// The cell and what it publishes of itself.
 pub fn cell(recorder: &Recorder, arm: &mut Arm, truth: &GroundTruth) -> Result<(), LinkError> {
     if recorder.is_on() {
-        recorder.note(Entry::Cell(Arc::new(facts(arm, truth)?)));
+        let kinematics_known = arm.kinematics()?.is_ok();
+        recorder.note(Entry::Cell(Arc::new(CellFacts::new(arm.info(), kinematics_known, Some(truth)))));
     }
     Ok(())
-}
-
-fn facts(arm: &mut Arm, truth: &GroundTruth) -> Result<CellFacts, LinkError> {
-    let kinematics_known = arm.kinematics()?.is_ok();
-    let info = arm.info();
-    Ok(CellFacts {
-        joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
-        nominal_intrinsics: info.camera_intrinsics_nominal(),
-        kinematics_known,
-        support: info.support(),
-        truth: Some(known(truth)),
-    })
-}
-
-/// What the cell publishes of itself, as the solver's report compares it.
-pub fn known(truth: &GroundTruth) -> Truth {
-    let GroundTruth { tip_from_camera, base_from_target, intrinsics, .. } = *truth;
-    Truth { tip_from_camera, base_from_target, intrinsics }
 }
 
 /// A capture: the robot, the last of its pictures, and the session with it.

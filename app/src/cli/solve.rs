@@ -1,6 +1,5 @@
 //! What `calibrate` and `auto` share: from a folder to a result, and from a result to files.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -21,6 +20,7 @@ use super::{Failure, out, report};
 use crate::model::{Goal, JobId, Observed, Solved, Step, Truth};
 use crate::observe::{ObserveError, observe, observe_session};
 use crate::rerun_log::{Entry, Recorder};
+use crate::session_start;
 use crate::worker::{self, SolveJob};
 
 /// Name of the result in a session.
@@ -182,14 +182,10 @@ pub fn folder(
 /// A data set as a session would have it.
 fn as_document(dataset: &Dataset) -> Document {
     let mut document = Document::new(SessionMeta {
-        created: String::new(),
-        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         mode: dataset.mode.unwrap_or(Mode::EyeInHand),
         target: dataset.target,
         camera: dataset.camera,
-        seeds: BTreeMap::new(),
-        ground_truth: None,
-        arm: None,
+        ..session_start::meta(None, String::new())
     });
     for (entry, number) in dataset.entries.iter().zip(1..) {
         let Some(base_from_tip) = entry.base_from_tip else { continue };

@@ -2,7 +2,7 @@
 
 use handeye_core::camera::Intrinsics;
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_sim_link::client::cell::{JointAngles, Support};
+use handeye_sim_link::client::cell::{CellInfo, GroundTruth, JointAngles, Support};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -22,6 +22,19 @@ pub struct CellFacts {
     pub truth: Option<Truth>,
 }
 
+impl CellFacts {
+    /// By what the cell says of itself.
+    pub fn new(info: &CellInfo, kinematics_known: bool, truth: Option<&GroundTruth>) -> Self {
+        Self {
+            joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
+            nominal_intrinsics: info.camera_intrinsics_nominal(),
+            kinematics_known,
+            support: info.support(),
+            truth: truth.map(Truth::from),
+        }
+    }
+}
+
 /// Where everything really is, in a simulated cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
@@ -31,6 +44,13 @@ pub struct Truth {
     pub base_from_target: Option<Pose<Base, Target>>,
     /// The camera.
     pub intrinsics: Intrinsics,
+}
+
+impl From<&GroundTruth> for Truth {
+    fn from(published: &GroundTruth) -> Self {
+        let GroundTruth { tip_from_camera, base_from_target, intrinsics, .. } = *published;
+        Self { tip_from_camera, base_from_target, intrinsics }
+    }
 }
 
 /// Counts motions, so that what is reported can be told from what came before.

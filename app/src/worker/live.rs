@@ -10,7 +10,7 @@ use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkErr
 
 use super::live_motion::LiveMotion;
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
-use crate::model::{BoardMotion, CellFacts, CellSource, RobotState, Simulation, Truth};
+use crate::model::{BoardMotion, CellFacts, CellSource, RobotState, Simulation};
 
 /// Why nothing answers any more.
 const CLOSED: &str = "the server closed the connection; start it again if it has ended";
@@ -127,11 +127,7 @@ impl ControlPort for LiveControl {
     fn facts(&mut self) -> Result<CellFacts, PortError> {
         let kinematics = self.arm.kinematics().map_err(port_error)?;
         let truth = match self.arm.ground_truth() {
-            Ok(truth) => Some(Truth {
-                tip_from_camera: truth.tip_from_camera,
-                base_from_target: truth.base_from_target,
-                intrinsics: truth.intrinsics,
-            }),
+            Ok(truth) => Some(truth),
             Err(error) if error.is_connection_loss() => return Err(port_error(error)),
             // Only compared with; a cell without it is a cell all the same.
             Err(error) => {
@@ -139,14 +135,7 @@ impl ControlPort for LiveControl {
                 None
             }
         };
-        let info = self.arm.info();
-        Ok(CellFacts {
-            joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
-            nominal_intrinsics: info.camera_intrinsics_nominal(),
-            kinematics_known: kinematics.is_ok(),
-            support: info.support(),
-            truth,
-        })
+        Ok(CellFacts::new(self.arm.info(), kinematics.is_ok(), truth.as_ref()))
     }
 
     fn state(&mut self) -> Result<RobotState, PortError> {

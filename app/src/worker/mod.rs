@@ -44,7 +44,7 @@ use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use handeye_core::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
-pub use archive::{ArchiveTask, Beginning, timestamp_rfc3339};
+pub use archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};
 pub use camera::CameraTask;
 pub use control::{ControlTask, StopLine};
 pub use desk::Desk;
