@@ -4,10 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::Builder;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
-
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::lasting::{Item, Lasting, Recording, Trail, is_live};
 use super::pump::{Pump, Route};
@@ -19,7 +16,7 @@ use super::{Entry, RerunChoice, ViewerWish, file};
 use crate::command::Event;
 use crate::model::{RerunState, Severity};
 use crate::text;
-use crate::worker::Waker;
+use crate::worker::{Started, Waker};
 
 /// How long the end of the program waits for what is still to be written.
 const DEADLINE: Duration = Duration::from_secs(2);
@@ -114,8 +111,7 @@ struct State {
 /// A thread that writes.
 struct Writer {
     queue: Arc<Queue>,
-    /// Closes when it has ended.
-    done: Receiver<()>,
+    thread: Started,
 }
 
 impl Recorder {
@@ -321,14 +317,9 @@ impl Shared {
     }
 
     fn writer(&self, name: &str, queue: Arc<Queue>, route: Route) -> Option<Writer> {
-        let (running, done) = bounded(0);
         let pump = Pump::new(Arc::clone(&queue), route, Arc::clone(&self.reports));
-        let started = Builder::new().name(name.to_owned()).spawn(move || {
-            let _running: Sender<()> = running;
-            pump.run();
-        });
-        match started {
-            Ok(_handle) => Some(Writer { queue, done }),
+        match Started::spawn(name, move || pump.run()) {
+            Ok(thread) => Some(Writer { queue, thread }),
             Err(error) => {
                 let text = text!("Nothing is recorded for Rerun: {error}; the session itself is safe", error = error);
                 self.reports.notice(Severity::Warning, text);
@@ -347,10 +338,7 @@ impl Shared {
         for writer in &writers {
             writer.queue.end();
         }
-        // Nothing is ever sent: either the thread is done and the channel closed, or time is up.
-        let left_alone =
-            writers.iter().filter(|it| matches!(it.done.recv_deadline(end), Err(RecvTimeoutError::Timeout))).count();
-        left_alone == 0
+        writers.into_iter().all(|writer| writer.thread.join_until(end))
     }
 }
 

@@ -4,7 +4,6 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::thread::Builder;
 use std::time::Instant;
 
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -12,9 +11,10 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use super::archive::{Archive, ArchiveTask};
 use super::files::{self, FileTask};
 use super::link::Outlet;
-use super::newest::{NewestWins, Started};
+use super::newest::NewestWins;
 use super::observer::{self, ObserveJob};
 use super::solver::{self, SolveJob};
+use super::started::Started;
 use super::{Busy, Clock, JOIN_DEADLINE, MAX_EVENTS, MAX_REQUESTS, POLL, Waker};
 use crate::capture::Measured;
 use crate::command::Event;
@@ -45,10 +45,10 @@ impl Desk {
         let (archive, archive_tasks) = bounded(MAX_REQUESTS);
         let (captures, measured) = bounded(MAX_CAPTURES);
         let keeper = Archive::new(sessions.clone(), outlet());
-        let archiving = thread("archive", move || keeper.run(&archive_tasks, &measured))?;
+        let archiving = Started::spawn("archive", move || keeper.run(&archive_tasks, &measured))?;
         let (files, file_tasks) = bounded::<FileTask>(MAX_REQUESTS);
         let out = outlet();
-        let filing = thread("files", move || {
+        let filing = Started::spawn("files", move || {
             for task in &file_tasks {
                 files::perform(task, &out);
             }
@@ -131,17 +131,12 @@ impl Desk {
         self.solver.end();
         self.archive = None;
         self.files = None;
-        for Started { handle, done } in self.threads.drain(..) {
+        for thread in self.threads.drain(..) {
             // A thread whose report nobody takes would wait for ever.
-            while matches!(done.try_recv(), Err(crossbeam_channel::TryRecvError::Empty)) && Instant::now() < end {
+            while thread.is_running() && Instant::now() < end {
                 let _dropped = self.events.recv_timeout(POLL).is_ok();
             }
-            let name = handle.thread().name().unwrap_or_default().to_owned();
-            if !handle.is_finished() {
-                tracing::warn!(name, "a worker does not end and is left alone");
-            } else if handle.join().is_err() {
-                tracing::error!(name, "a worker ended with a panic");
-            }
+            thread.join_until(end);
         }
     }
 }
@@ -154,13 +149,4 @@ impl Drop for Desk {
 
 fn hand_in<Task>(worker: Option<&Sender<Task>>, task: Task) -> Result<(), Busy> {
     worker.map_or(Err(Busy), |worker| worker.try_send(task).map_err(|_full| Busy))
-}
-
-fn thread(name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<Started> {
-    let (running, done) = bounded(0);
-    let handle = Builder::new().name(name.to_owned()).spawn(move || {
-        let _running: Sender<()> = running;
-        work();
-    })?;
-    Ok(Started { handle, done })
 }

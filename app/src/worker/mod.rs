@@ -29,6 +29,7 @@ mod rate;
 mod reconnect;
 mod slot;
 mod solver;
+mod started;
 mod tracking;
 mod vision;
 
@@ -37,7 +38,6 @@ pub mod fake;
 
 use std::io;
 use std::sync::Arc;
-use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
@@ -62,6 +62,7 @@ pub use port::{
 };
 pub use slot::LatestSlot;
 pub use solver::{SolveJob, answer};
+pub use started::Started;
 pub use tracking::{Sight, Tracking};
 pub use vision::VisionTask;
 
@@ -117,13 +118,7 @@ pub struct Workers {
     tracked: Arc<LatestSlot<Tracked>>,
     follow: Arc<FollowLine>,
     shutdown: CancelToken,
-    threads: Vec<Thread>,
-}
-
-struct Thread {
-    handle: JoinHandle<()>,
-    /// Closes when the thread is done.
-    done: Receiver<()>,
+    threads: Vec<Started>,
 }
 
 impl Workers {
@@ -202,13 +197,7 @@ impl Workers {
     }
 
     fn run(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
-        let (running, done) = bounded(0);
-        let handle = Builder::new().name(name.to_owned()).spawn(move || {
-            // Dropped last, also when the worker panics.
-            let _running: Sender<()> = running;
-            work();
-        })?;
-        self.threads.push(Thread { handle, done });
+        self.threads.push(Started::spawn(name, work)?);
         Ok(())
     }
 
@@ -392,18 +381,7 @@ impl Workers {
         self.vision = None;
         self.events = None;
         let end = Instant::now() + deadline;
-        let mut left_alone = 0;
-        for Thread { handle, done } in self.threads.drain(..) {
-            let name = handle.thread().name().unwrap_or_default().to_owned();
-            // Nothing is ever sent: either the worker is done and the channel closed, or time is up.
-            if matches!(done.recv_deadline(end), Err(crossbeam_channel::RecvTimeoutError::Timeout)) {
-                tracing::warn!(name, "a worker does not end and is left alone");
-                left_alone += 1;
-            } else if handle.join().is_err() {
-                tracing::error!(name, "a worker ended with a panic");
-            }
-        }
-        left_alone
+        self.threads.drain(..).map(|thread| thread.join_until(end)).filter(|has_ended| !has_ended).count()
     }
 }
 

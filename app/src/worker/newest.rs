@@ -2,12 +2,12 @@
 
 use std::io;
 use std::sync::Arc;
-use std::thread::{Builder, JoinHandle};
 
-use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use crossbeam_channel::{Sender, TrySendError, bounded};
 use handeye_sim_link::client::CancelToken;
 
 use super::slot::LatestSlot;
+use super::started::Started;
 
 /// Runs one job at a time. A job that is handed in takes the place of the one that waits and cancels the one that
 /// runs, so that the answer to the newest question comes as soon as it can.
@@ -15,14 +15,6 @@ pub struct NewestWins<Job> {
     jobs: Arc<LatestSlot<(Job, CancelToken)>>,
     wake: Option<Sender<()>>,
     running: CancelToken,
-}
-
-/// A thread that was started, and a channel that closes when it ends.
-pub struct Started {
-    /// To join it.
-    pub handle: JoinHandle<()>,
-    /// Closes when it is done.
-    pub done: Receiver<()>,
 }
 
 impl<Job: Send + 'static> NewestWins<Job> {
@@ -33,10 +25,8 @@ impl<Job: Send + 'static> NewestWins<Job> {
     pub fn start(name: &str, mut work: impl FnMut(Job, &CancelToken) + Send + 'static) -> io::Result<(Self, Started)> {
         let jobs: Arc<LatestSlot<(Job, CancelToken)>> = Arc::default();
         let (wake, woken) = bounded::<()>(1);
-        let (running, done) = bounded(0);
         let waiting = Arc::clone(&jobs);
-        let handle = Builder::new().name(name.to_owned()).spawn(move || {
-            let _running: Sender<()> = running;
+        let started = Started::spawn(name, move || {
             while woken.recv().is_ok() {
                 if let Some(((job, cancel), _replaced)) = waiting.take()
                     && !cancel.is_cancelled()
@@ -45,7 +35,7 @@ impl<Job: Send + 'static> NewestWins<Job> {
                 }
             }
         })?;
-        Ok((Self { jobs, wake: Some(wake), running: CancelToken::default() }, Started { handle, done }))
+        Ok((Self { jobs, wake: Some(wake), running: CancelToken::default() }, started))
     }
 
     /// Hands in a job.
@@ -98,7 +88,6 @@ mod tests {
         assert_eq!(endings.recv_timeout(SOON), Ok((0, true)), "the first job was cancelled");
         assert_eq!(endings.recv_timeout(SOON).map(|(job, _)| job), Ok(3), "jobs 1 and 2 were never begun");
         worker.end();
-        assert!(started.done.recv_timeout(SOON).is_err(), "the channel closes when the thread ends");
-        started.handle.join().expect("no panic");
+        assert!(started.join_until(std::time::Instant::now() + SOON));
     }
 }
