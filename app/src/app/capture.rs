@@ -1,5 +1,6 @@
 //! Captures.
 
+use handeye_core::capture::Wait;
 use handeye_core::session::CaptureId;
 
 use super::App;
@@ -22,7 +23,8 @@ impl App {
         let asked = self.workers.ask_vision(VisionTask::Capture(request));
         if asked.is_ok() {
             let since_s = self.model.now_s;
-            self.model.capture = Some(CaptureUnderWay { number, purpose, wait: CaptureWait::ForPicture, since_s });
+            self.model.capture =
+                Some(CaptureUnderWay { number, purpose, wait: CaptureWait::Pictures(Wait::ForPicture), since_s });
             self.model.refused = None;
         }
         self.expect(text!("There is no capture"), asked);

@@ -81,10 +81,7 @@ impl Sequence {
     /// What it waits for, or why it has ended.
     pub fn state(&self) -> Result<CaptureWait, Why> {
         match self.machine.progress() {
-            Progress::Waits(Wait::ForPicture) => Ok(CaptureWait::ForPicture),
-            Progress::Waits(Wait::RobotMoves) => Ok(CaptureWait::RobotMoves),
-            Progress::Waits(Wait::PictureChanges) => Ok(CaptureWait::PictureChanges),
-            Progress::Waits(Wait::Averaging { done, of }) => Ok(CaptureWait::Averaging { done, of }),
+            Progress::Waits(wait) => Ok(CaptureWait::Pictures(wait)),
             Progress::Complete => Ok(CaptureWait::Measuring),
             Progress::Refused(why) => Err(refusal::of_machine(&why)),
         }

@@ -1,5 +1,6 @@
 //! The newest sight of the board, and the capture that is under way.
 
+use handeye_core::capture::Wait;
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::observation::Corner;
 use handeye_core::vision::VisionError;
@@ -59,19 +60,8 @@ impl Default for CaptureOptions {
 /// Why a capture is not there yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CaptureWait {
-    /// No picture has come since it was asked for.
-    ForPicture,
-    /// The joints move.
-    RobotMoves,
-    /// The picture still changes.
-    PictureChanges,
-    /// Pictures are being averaged.
-    Averaging {
-        /// So many are there.
-        done: u32,
-        /// Of so many.
-        of: u32,
-    },
+    /// More pictures are needed.
+    Pictures(Wait),
     /// The board is looked for and measured.
     Measuring,
     /// It is being written to the disk.

@@ -1,6 +1,7 @@
 //! From the request for a capture to the average of its pictures.
 
 use image::RgbImage;
+use serde::{Deserialize, Serialize};
 
 use super::watch::Reference;
 use super::{Average, Rest, Scatter, Shot, Similar, Watch, nearest_similar};
@@ -31,7 +32,7 @@ pub struct Plan {
 }
 
 /// What a capture waits for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Wait {
     /// Pictures from after the request.
     ForPicture,

@@ -1,4 +1,5 @@
 use handeye_core::camera::Intrinsics;
+use handeye_core::capture::Wait;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::target::{Grid, TargetSpec};
@@ -66,9 +67,9 @@ fn what_a_capture_waits_for_is_told_when_it_changes() {
     assert_eq!(measured.pose_name.as_deref(), Some("view"));
     let again = handeye_core::capture::observe_image(&measured.rgb, &BOARD).expect("searches").expect("the board");
     assert_eq!(again.corners, measured.corners, "the kept picture gives the same corners");
-    let averaging = |done| (7, CaptureWait::Averaging { done, of: 3 });
+    let averaging = |done| (7, CaptureWait::Pictures(Wait::Averaging { done, of: 3 }));
     let told = [
-        (7, CaptureWait::ForPicture),
+        (7, CaptureWait::Pictures(Wait::ForPicture)),
         averaging(1),
         averaging(2),
         (7, CaptureWait::Measuring),

@@ -6,6 +6,7 @@ use egui::{
     Align, Align2, Color32, CornerRadius, Id, Layout, Rect, RichText, Sense, Spinner, Stroke, StrokeKind, Ui,
     UiBuilder, Vec2, WidgetInfo, WidgetType,
 };
+use handeye_core::capture::Wait;
 use handeye_core::session::CaptureId;
 
 use super::{Shown, overlays};
@@ -150,10 +151,12 @@ pub fn stands_over_picture(model: &Model) -> bool {
 /// What a capture waits for, in words.
 pub fn waiting(capture: &CaptureUnderWay) -> Text {
     let what = match capture.wait {
-        CaptureWait::ForPicture => text!("waiting for a picture"),
-        CaptureWait::RobotMoves => text!("waiting for the robot to stand still"),
-        CaptureWait::PictureChanges => text!("waiting for the picture to come to rest"),
-        CaptureWait::Averaging { done, of } => text!("averaging pictures, {done} of {of}", done = done, of = of),
+        CaptureWait::Pictures(Wait::ForPicture) => text!("waiting for a picture"),
+        CaptureWait::Pictures(Wait::RobotMoves) => text!("waiting for the robot to stand still"),
+        CaptureWait::Pictures(Wait::PictureChanges) => text!("waiting for the picture to come to rest"),
+        CaptureWait::Pictures(Wait::Averaging { done, of }) => {
+            text!("averaging pictures, {done} of {of}", done = done, of = of)
+        }
         CaptureWait::Measuring => text!("measuring the board"),
         CaptureWait::Saving => text!("saving"),
     };

@@ -1,6 +1,7 @@
 use std::sync::Arc;
 
 use egui::{Modifiers, PointerButton, Pos2, Vec2, vec2};
+use handeye_core::capture::Wait;
 use handeye_core::depth::ColourMap;
 use handeye_core::frames::{Camera, Target};
 use handeye_core::session::CaptureId;
@@ -277,7 +278,7 @@ fn a_click_picks_a_point_in_the_step_that_verifies_and_only_in_the_live_picture(
 #[test]
 fn a_capture_says_what_it_waits_for_and_a_refusal_goes_away() {
     let mut model = sample::connected();
-    let wait = CaptureWait::RobotMoves;
+    let wait = CaptureWait::Pictures(Wait::RobotMoves);
     model.capture = Some(CaptureUnderWay { number: 1, purpose: CapturePurpose::Calibrate, wait, since_s: 99.0 });
     let mut pane = colour(model);
     assert!(pane.sees("Capturing… waiting for the robot to stand still"));

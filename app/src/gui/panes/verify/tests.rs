@@ -1,3 +1,4 @@
+use handeye_core::capture::Wait;
 use handeye_core::session::{CaptureId, Role};
 use handeye_core::verify::VerifyError;
 use nalgebra::Vector2;
@@ -30,7 +31,7 @@ fn a_capture_for_verification_is_asked_for_and_cancelled() {
     pane.model().capture = Some(CaptureUnderWay {
         number: 1,
         purpose: CapturePurpose::Verify,
-        wait: CaptureWait::RobotMoves,
+        wait: CaptureWait::Pictures(Wait::RobotMoves),
         since_s: 99.0,
     });
     pane.steps();

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crossbeam_channel::bounded;
-use handeye_core::capture::Scatter;
+use handeye_core::capture::{Scatter, Wait};
 use handeye_core::poses_file::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::{CancelToken, MotionLimits};
@@ -62,8 +62,10 @@ fn captured_around_moves(scene: Scene, bound_px: f64) {
         }
         motion.join().expect("the motion ends well");
     }
-    let moved =
-        bench.events.iter().filter(|event| matches!(event, Event::CaptureWaits { wait: CaptureWait::RobotMoves, .. }));
+    let moved = bench
+        .events
+        .iter()
+        .filter(|event| matches!(event, Event::CaptureWaits { wait: CaptureWait::Pictures(Wait::RobotMoves), .. }));
     assert!(moved.count() >= 3, "captures were asked for in motion");
 }
 
