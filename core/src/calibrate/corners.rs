@@ -136,27 +136,12 @@ fn without_hand_eye(observations: &Observations, seen: &[Seen<'_>], lens: &Lens)
         view.camera_from_target = Some(*pose);
     }
     Calibration {
-        hand_eye: None,
-        hand_eye_covariance: None,
-        target_covariance: None,
-        shared: None,
         intrinsics: Some(lens.intrinsics),
         intrinsics_fixed: !lens.free,
         intrinsics_sigma: lens.sigma,
-        noise: None,
         rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(seen.iter().map(|s| s.corners.len())))),
-        heldout_rms_px: None,
-        expected_heldout_rms_px: None,
-        robot_effect_px: None,
-        small_sample: None,
-        widening: None,
-        shape: None,
-        joint_offsets: None,
-        tip_error_95_m: None,
-        reference_point: None,
-        error_curve: None,
-        methods: Vec::new(),
         views,
+        ..Calibration::default()
     }
 }
 

@@ -217,7 +217,7 @@ pub enum CalibrateError {
 }
 
 /// A finished calibration.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Calibration {
     /// Both rigid links; `None` without a robot.
     pub hand_eye: Option<HandEye>,

@@ -25,30 +25,14 @@ pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -
     check_motion(&pairs)?;
     let methods = closed_forms(&pairs, work)?;
     let mut calibration = Calibration {
-        hand_eye: None,
-        hand_eye_covariance: None,
-        target_covariance: None,
-        shared: None,
         intrinsics: match observations.camera {
             CameraKnowledge::Fixed(intrinsics) => Some(intrinsics),
             CameraKnowledge::Estimate { .. } => None,
         },
         intrinsics_fixed: true,
-        intrinsics_sigma: None,
-        noise: None,
-        rms_px: None,
-        heldout_rms_px: None,
-        expected_heldout_rms_px: None,
-        robot_effect_px: None,
-        small_sample: None,
-        widening: None,
-        shape: None,
-        joint_offsets: None,
-        tip_error_95_m: None,
-        reference_point: None,
-        error_curve: None,
         methods,
         views: observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::Used)).collect(),
+        ..Calibration::default()
     };
     let (x, y) = match method {
         Method::ClosedForm(name) => {

@@ -66,7 +66,7 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             folder = folder.display()
         )
     };
-    form::hint_ui(ui, &said.say(language));
+    parts::hint_ui(ui, &said.say(language));
     ui.horizontal(|ui| {
         if ui.button(tr!(language, "Open the folder")).clicked() {
             outbox.send(Command::OpenFolder(folder.clone()));

@@ -1,7 +1,8 @@
 //! Parts of panes in which something is entered.
 
-use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, RichText, ScrollArea, Stroke, Ui};
+use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, RichText, ScrollArea, Ui};
 
+use super::parts;
 use crate::gui::theme::{self, Palette, Tone};
 
 /// Width of the captions.
@@ -38,28 +39,16 @@ pub fn row_ui<R>(ui: &mut Ui, caption: &str, content_ui: impl FnOnce(&mut Ui) ->
     .inner
 }
 
-/// A sentence that explains.
-pub fn hint_ui(ui: &mut Ui, text: &str) {
-    let weak = Palette::of(ui).weak;
-    ui.add(Label::new(RichText::new(text).color(weak)).wrap());
-}
-
 /// A sentence with a tone, on a tinted strip.
 pub fn note_ui(ui: &mut Ui, tone: Tone, title: &str, detail: &str) {
-    let palette = Palette::of(ui);
-    Frame::new()
-        .fill(palette.tinted(tone))
-        .stroke(Stroke::new(1.0, palette.tone(tone).gamma_multiply(0.5)))
-        .corner_radius(CornerRadius::same(6))
-        .inner_margin(Margin::symmetric(10, 7))
-        .show(ui, |ui| {
-            ui.set_min_width(ui.available_width());
-            ui.spacing_mut().item_spacing.y = 2.0;
-            ui.add(Label::new(RichText::new(title).color(palette.text)).wrap());
+    ui.scope(|ui| {
+        ui.spacing_mut().item_spacing.y = 2.0;
+        parts::notice_ui(ui, tone, title, |ui| {
             if !detail.is_empty() {
-                ui.add(Label::new(RichText::new(detail).color(palette.weak)).wrap());
+                parts::hint_ui(ui, detail);
             }
         });
+    });
 }
 
 /// Buttons side by side of which one is on; gives the one that was clicked.

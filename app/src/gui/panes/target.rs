@@ -6,7 +6,7 @@ use handeye_core::dataset::CameraInput;
 use handeye_core::handeye::Mode;
 use handeye_core::target::{Grid, TargetSpec};
 
-use super::form;
+use super::{form, parts};
 use crate::command::{Command, Outbox};
 use crate::gui::theme::{CAPTION, Palette, Tone};
 use crate::model::Model;
@@ -72,7 +72,7 @@ fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             text!("{board}. Its numbers are those of the file that it was opened from.", board = target)
         }
     };
-    form::hint_ui(ui, &hint.say(language));
+    parts::hint_ui(ui, &hint.say(language));
     if target.is_symmetric() {
         let title = tr!(language, "This board looks the same after half a turn");
         let detail = match target {
@@ -219,7 +219,7 @@ fn mode_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     if let Some(mode) = form::choice_ui(ui, mode, &choices) {
         outbox.send(Command::SetMode(mode));
     }
-    form::hint_ui(
+    parts::hint_ui(
         ui,
         match mode {
             Mode::EyeInHand => tr!(
@@ -251,7 +251,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         })));
     }
     let Some(CameraInput { intrinsics: Some(before), .. }) = camera.filter(|camera| camera.fixed) else {
-        form::hint_ui(ui, tr!(language, "Focal lengths, principal point and lens are estimated with the hand-eye."));
+        parts::hint_ui(ui, tr!(language, "Focal lengths, principal point and lens are estimated with the hand-eye."));
         return;
     };
     let mut now = before;
