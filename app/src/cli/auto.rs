@@ -85,7 +85,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| Path::new("sessions").join(timestamp()));
     let mut cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())
         .map_err(Failure::failed)?;
-    let truth = cell.ground_truth().map_err(Failure::failed)?;
+    let truth = cell.camera().ground_truth().map_err(Failure::failed)?;
 
     keep_earlier_session(&folder)?;
     // That it is another arm is no fault: its joint angles are then kept and not used.
@@ -113,7 +113,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     }
     .run();
     // Whatever happened on the way, the arm is not left moving and the simulation not running or waiting for steps.
-    let ended = cell.stop().and_then(|()| {
+    let ended = cell.arm().stop().and_then(|()| {
         let sim = cell.arm().sim();
         sim.set_stepping(false)?;
         sim.stop_simulation()

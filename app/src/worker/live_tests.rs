@@ -1,6 +1,7 @@
 //! The workers with the real cell, over sockets.
 
 use std::path::Path;
+use std::thread::JoinHandle;
 
 use handeye_core::frames::Base;
 use handeye_core::poses_file::{Goal, TaughtPoses};

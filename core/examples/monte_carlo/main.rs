@@ -115,7 +115,7 @@ fn cell_seed(cell: &Cell, seed: u64) -> u64 {
 fn run_cell(cell: Cell, arguments: &Arguments) -> Summary {
     let began = Instant::now();
     let seed = cell_seed(&cell, arguments.seed);
-    let trial = |number| tally::run(&cell, seed, number as u64, arguments.product);
+    let trial = |number: usize| tally::run(&cell, seed, number as u64, arguments.product);
     let results: Vec<_> = (0..arguments.trials).into_par_iter().map(trial).collect();
     Summary::of(cell, &results, began.elapsed().as_secs_f64() * arguments.threads as f64)
 }

@@ -108,7 +108,7 @@ impl Sight {
             sight.take_corners(observations, &with_corners)?;
         }
         let middle = Point3::from(outer.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / 4.0);
-        let distances = sight.views.iter().map(|v| (v.camera_from_target * middle).coords.norm()).collect();
+        let distances = sight.views.iter().map(|v| (v.camera_from_target * middle).coords.norm());
         sight.distance_m = median(distances).unwrap_or(0.0);
         Ok(sight)
     }
@@ -143,7 +143,7 @@ impl Sight {
         let points = BoardPoints::new(&observations.target.points());
         let free = FreeForm { lens: true, warp: true, scale: false };
         let count = free.count(&camera);
-        let variances = fits.iter().flatten().map(Fit::variance_px2).collect();
+        let variances = fits.iter().flatten().map(Fit::variance_px2);
         let Some(typical) = median(variances) else {
             return Err("the target's pose could not be found in any view".to_owned());
         };

@@ -94,12 +94,13 @@ fn a_motion_that_the_server_has_forgotten_is_named_and_can_be_made_again() {
     });
     uuids.send(cell.arm().sim().connection().uuid().to_owned()).expect("the transport listens");
     cell.arm().sim().set_stepping(true).expect("a call");
-    let error = cell.move_to_joints(&goal, &slow(), &CancelToken::default()).expect_err("nobody knows the motion");
+    let error =
+        cell.arm().move_to_joints(&goal, &slow(), &CancelToken::default()).expect_err("nobody knows the motion");
     assert!(matches!(error, LinkError::Forgotten { .. }), "{error}");
     assert!(error.to_string().contains("slept"), "{error}");
-    assert!(cell.joint_angles().expect("a call") != goal);
+    assert!(cell.arm().joint_angles().expect("a call") != goal);
     let limits = MotionLimits::uniform(6, 3.0, 9.0, 90.0);
-    cell.move_to_joints(&goal, &limits, &CancelToken::default()).expect("there");
+    cell.arm().move_to_joints(&goal, &limits, &CancelToken::default()).expect("there");
 }
 
 /// Held for a number of passes.
@@ -368,9 +369,9 @@ fn a_cancelled_motion_is_braked_and_not_cut_off() {
     let mut cell = watched(&server, look);
     // Passes come only when this client steps: every one of them is seen.
     cell.arm().sim().set_stepping(true).expect("a call");
-    let outcome = cell.move_to_joints(&goal, &limits, &cancel);
+    let outcome = cell.arm().move_to_joints(&goal, &limits, &cancel);
     assert!(matches!(outcome, Err(LinkError::Cancelled { .. })), "{outcome:?}");
-    let rest = cell.joint_angles().expect("a call")[0];
+    let rest = cell.arm().joint_angles().expect("a call")[0];
     let seen: Vec<f64> = passes.try_iter().collect();
     let cancelled_at = *seen.iter().find(|angle| **angle > CANCELLED_AT_RAD).expect("it was cancelled");
     assert!(rest < 1.6, "it stopped on its way, at {rest}");

@@ -46,7 +46,9 @@ impl Tour<'_> {
         let mut pictures = 0;
         self.set_going().map_err(Failure::failed)?;
         if let Some(start) = &plan.start_joints {
-            self.persisting("the start", |tour| tour.cell.move_to_joints(start, &plan.joint_limits, tour.cancel))?;
+            self.persisting("the start", |tour| {
+                tour.cell.arm().move_to_joints(start, &plan.joint_limits, tour.cancel)
+            })?;
         }
         for (index, (name, goal)) in plan.goals.iter().enumerate() {
             let number = index as u64 + 1;
@@ -101,14 +103,14 @@ impl Tour<'_> {
     fn go_to(&mut self, goal: &Goal) -> Result<(), LinkError> {
         let Self { cell, plan, cancel, .. } = self;
         match goal {
-            Goal::Tip(pose) => cell.move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), cancel),
+            Goal::Tip(pose) => cell.arm().move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), cancel),
             Goal::Joints(joints) => {
                 let joints = joints.as_slice().try_into().map_err(|_wrong_length| LinkError::BadMotion {
                     what: "the goal",
                     expected: "six joints",
                     value: joints.len() as f64,
                 })?;
-                cell.move_to_joints(joints, &plan.joint_limits, cancel)?;
+                cell.arm().move_to_joints(joints, &plan.joint_limits, cancel)?;
                 // Waiting for the joints costs no pictures.
                 cell.arm().settle(&SettleOptions::default(), cancel).map(drop)
             }
@@ -186,7 +188,7 @@ impl Pictures for Passes<'_> {
         if !std::mem::take(&mut self.first) {
             self.cell.arm().sim().step(&CallOptions::cancelled_by(self.cancel))?;
         }
-        let frame = self.cell.grab()?;
+        let frame = self.cell.camera().grab()?;
         *self.pictures += 1;
         Ok(record::live_frame(&self.info, *self.pictures, self.now_s(), frame))
     }

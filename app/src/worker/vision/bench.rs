@@ -170,7 +170,7 @@ impl CellBench {
         let workers = Workers::start(&source, &view, &connector, sender, &clock, &waker).expect("threads");
         let mut client = connect(&server);
         client.arm().sim().start_simulation().expect("it starts");
-        let truth = client.ground_truth().expect("the cell is simulated");
+        let truth = client.camera().ground_truth().expect("the cell is simulated");
         workers.ask_vision(VisionTask::SetTarget(BOARD)).expect("it takes tasks");
         workers.ask_vision(VisionTask::SetIntrinsics(truth.intrinsics)).expect("it takes tasks");
         Self { workers, measured, woken, events: Vec::new(), client, truth, server }

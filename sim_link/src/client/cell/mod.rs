@@ -32,7 +32,6 @@ mod views;
 use std::sync::Arc;
 
 use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Base, Pose, Tip};
 
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use board::{BoardMotion, BoardPath, UnknownPath};
@@ -53,8 +52,7 @@ use super::endpoint::Endpoint;
 use super::error::LinkError;
 use super::options::ConnectionOptions;
 use super::protocol::ProtocolVersion;
-use super::sim::{JointInterval, MotionLimits, ObjectHandle, SensorOptics, Sim, SimulationState};
-use handeye_core::progress::CancelToken;
+use super::sim::{JointInterval, ObjectHandle, SensorOptics, Sim, SimulationState};
 
 /// Number of joints of the arm.
 pub const JOINTS: usize = 6;
@@ -179,78 +177,6 @@ impl CellClient {
     /// The two halves, each for a thread of its own.
     pub fn split(self) -> (Arm, CameraFeed) {
         (self.arm, self.camera)
-    }
-
-    /// See [`Arm::joint_angles`].
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call, as for all that follow.
-    pub fn joint_angles(&mut self) -> Result<JointAngles, LinkError> {
-        self.arm.joint_angles()
-    }
-
-    /// See [`Arm::base_from_tip`].
-    ///
-    /// # Errors
-    /// As [`Arm::base_from_tip`].
-    pub fn base_from_tip(&mut self) -> Result<Pose<Base, Tip>, LinkError> {
-        self.arm.base_from_tip()
-    }
-
-    /// See [`Arm::move_to_joints`].
-    ///
-    /// # Errors
-    /// As [`Arm::move_to_joints`].
-    pub fn move_to_joints(
-        &mut self,
-        goal: &JointAngles,
-        limits: &MotionLimits,
-        cancel: &CancelToken,
-    ) -> Result<(), LinkError> {
-        self.arm.move_to_joints(goal, limits, cancel)
-    }
-
-    /// See [`Arm::move_to_pose`].
-    ///
-    /// # Errors
-    /// As [`Arm::move_to_pose`].
-    pub fn move_to_pose(
-        &mut self,
-        goal: &Pose<Base, Tip>,
-        limits: &MotionLimits,
-        tolerance: &MotionTolerance,
-        cancel: &CancelToken,
-    ) -> Result<(), LinkError> {
-        self.arm.move_to_pose(goal, limits, tolerance, cancel)
-    }
-
-    /// See [`Arm::stop`].
-    ///
-    /// # Errors
-    /// As [`Arm::stop`].
-    pub fn stop(&mut self) -> Result<(), LinkError> {
-        self.arm.stop()
-    }
-
-    /// See [`CameraFeed::grab`].
-    ///
-    /// # Errors
-    /// As [`CameraFeed::grab`].
-    pub fn grab(&mut self) -> Result<Frame, LinkError> {
-        self.camera.grab()
-    }
-
-    /// See [`CameraFeed::ground_truth`].
-    ///
-    /// # Errors
-    /// As [`CameraFeed::ground_truth`].
-    pub fn ground_truth(&mut self) -> Result<GroundTruth, LinkError> {
-        self.camera.ground_truth()
-    }
-
-    /// See [`CellInfo::camera_intrinsics_nominal`].
-    pub fn camera_intrinsics_nominal(&self) -> Intrinsics {
-        self.info.camera_intrinsics_nominal()
     }
 }
 

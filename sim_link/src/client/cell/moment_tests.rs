@@ -27,7 +27,7 @@ fn cell_that_tells(moment: Option<Value>) -> Cell {
 #[test]
 fn a_frame_of_a_built_in_cell_has_all_of_the_pass_that_its_images_show() {
     let mut cell = cell_that_tells(Some(wire::map(shown())));
-    let frame = cell.client.grab().expect("a frame");
+    let frame = cell.client.camera().grab().expect("a frame");
     assert_eq!((frame.sim_time_s, frame.joints), (0.95, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]));
     assert_eq!(frame.base_from_tip.translation(), Vector3::new(0.3, 0.2, 0.1));
     assert_eq!(frame.base_from_target_true.map(|pose| pose.translation()), Some(Vector3::new(0.0, -0.4, 0.8)));
@@ -37,9 +37,9 @@ fn a_frame_of_a_built_in_cell_has_all_of_the_pass_that_its_images_show() {
 #[test]
 fn before_the_first_pass_a_frame_has_the_present_state() {
     let mut cell = cell_that_tells(Some(wire::map([])));
-    let frame = cell.client.grab().expect("a frame");
+    let frame = cell.client.camera().grab().expect("a frame");
     assert_eq!((frame.sim_time_s, frame.base_from_target_true), (1.0, None));
-    cell.client.grab().expect("a frame");
+    cell.client.camera().grab().expect("a frame");
     assert_eq!(calls(&cell, "handeye.moment"), 2, "the next one may be there");
 }
 
@@ -48,7 +48,7 @@ fn a_cell_that_cannot_tell_is_asked_once() {
     let mut cell = cell_that_tells(None);
     assert!(cell.client.info().is_handeye_cell);
     for _ in 0..2 {
-        assert_eq!(cell.client.grab().expect("a frame").sim_time_s, 1.0);
+        assert_eq!(cell.client.camera().grab().expect("a frame").sim_time_s, 1.0);
     }
     assert_eq!(calls(&cell, "handeye.moment"), 1);
 }
@@ -56,7 +56,7 @@ fn a_cell_that_cannot_tell_is_asked_once() {
 #[test]
 fn coppeliasim_is_not_asked_what_its_images_show() {
     let mut cell = cell(world());
-    cell.client.grab().expect("a frame");
+    cell.client.camera().grab().expect("a frame");
     assert_eq!(calls(&cell, "handeye.moment"), 0);
 }
 
@@ -66,7 +66,7 @@ fn a_moment_that_cannot_be_computed_with_is_an_error_and_leaves_nothing_held() {
     for (key, value) in bad {
         let fields = shown().into_iter().map(|(name, old)| (name, if name == key { value.clone() } else { old }));
         let mut cell = cell_that_tells(Some(wire::map(fields.collect::<Vec<_>>())));
-        assert!(matches!(cell.client.grab(), Err(LinkError::BadTruth { .. })));
+        assert!(matches!(cell.client.camera().grab(), Err(LinkError::BadTruth { .. })));
         assert_eq!(cell.world().held, 0);
     }
 }

@@ -4,10 +4,13 @@ use std::sync::{Mutex, PoisonError};
 
 use approx::assert_relative_eq;
 use ciborium::Value;
+use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::progress::CancelToken;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::*;
 use crate::client::convert::seven_from_pose;
+use crate::client::sim::MotionLimits;
 use crate::client::testing::{Answer, Log, args, connection, err, func, ret};
 use crate::client::transport::TransportFault;
 use crate::wire::{self, Reader};
@@ -283,7 +286,7 @@ fn the_reference_scene_is_discovered() {
     assert_eq!((info.optics.width, info.optics.height, info.depth_optics.far_m), (4, 2, 3.5));
     assert_relative_eq!(info.joint_intervals[5].max_rad, 3.5, epsilon = 1e-12);
     // f = 2 / tan(0.5)
-    assert_relative_eq!(cell.client.camera_intrinsics_nominal().fx, 3.6609754, epsilon = 1e-6);
+    assert_relative_eq!(cell.client.info().camera_intrinsics_nominal().fx, 3.6609754, epsilon = 1e-6);
 }
 
 #[test]
@@ -332,17 +335,18 @@ fn a_scene_without_a_target_can_do_everything_but_motions_to_a_pose() {
     let world = world();
     edit(&world, |w| w.missing.push("/UR5/Target"));
     let mut cell = cell(world);
-    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("joints need no target");
+    cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("joints need no target");
     let goal = Pose::identity();
-    let error = cell.client.move_to_pose(&goal, &pose_limits(), &MotionTolerance::default(), &CancelToken::default());
+    let error =
+        cell.client.arm().move_to_pose(&goal, &pose_limits(), &MotionTolerance::default(), &CancelToken::default());
     assert!(matches!(error, Err(LinkError::NoSuchObject { path, .. }) if path == "/UR5/Target"));
 }
 
 #[test]
 fn a_motion_is_sent_point_by_point_within_its_limits() {
     let mut cell = cell(world());
-    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
-    assert_eq!(cell.client.joint_angles(), Ok(GOAL));
+    cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
+    assert_eq!(cell.client.arm().joint_angles(), Ok(GOAL));
     let functions = cell.control.functions();
     for unwanted in ["sim.setStepping", "sim.setJointTargetPosition"] {
         assert!(!functions.contains(&unwanted.to_owned()), "{unwanted}");
@@ -365,12 +369,13 @@ fn a_motion_of_joints_that_controllers_move_waits_until_they_are_there() {
     let world = world();
     edit(&world, |w| (w.joint_mode, w.follow) = (5, 0.5));
     let mut cell = cell(world);
-    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
-    let joints = cell.client.joint_angles().expect("a call");
+    cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
+    let joints = cell.client.arm().joint_angles().expect("a call");
     assert!(joints.iter().zip(&GOAL).all(|(a, b)| (a - b).abs() < 1e-4), "{joints:?}");
 
     edit(&cell.world, |w| w.follow = 0.0);
-    let error = cell.client.move_to_joints(&[0.0; JOINTS], &limits(), &CancelToken::default()).expect_err("they stand");
+    let error =
+        cell.client.arm().move_to_joints(&[0.0; JOINTS], &limits(), &CancelToken::default()).expect_err("they stand");
     assert!(matches!(error, LinkError::JointElsewhere { .. }), "{error}");
 }
 
@@ -380,7 +385,7 @@ fn a_cancelled_motion_is_braked_and_not_cut_off() {
     let cancel = CancelToken::default();
     edit(&world, |w| w.cancel_at_step = Some((12, cancel.clone())));
     let mut cell = cell(world);
-    let error = cell.client.move_to_joints(&GOAL, &limits(), &cancel).expect_err("cancelled");
+    let error = cell.client.arm().move_to_joints(&GOAL, &limits(), &cancel).expect_err("cancelled");
     assert!(matches!(error, LinkError::Cancelled { .. }), "{error}");
     let track = cell.world().track.clone();
     assert_gentle(&track, std::f64::consts::TAU);
@@ -393,18 +398,18 @@ fn a_motion_that_is_cancelled_before_it_begins_does_not_begin() {
     let mut cell = cell(world());
     let cancel = CancelToken::default();
     cancel.cancel();
-    assert!(matches!(cell.client.move_to_joints(&GOAL, &limits(), &cancel), Err(LinkError::Cancelled { .. })));
+    assert!(matches!(cell.client.arm().move_to_joints(&GOAL, &limits(), &cancel), Err(LinkError::Cancelled { .. })));
     assert!(!cell.control.functions().contains(&"sim.setJointPosition".to_owned()));
 }
 
 #[test]
 fn a_stop_leaves_joints_alone_that_stand_where_they_were_put() {
     let mut cell = cell(world());
-    cell.client.stop().expect("calls");
+    cell.client.arm().stop().expect("calls");
     assert!(!cell.control.functions().contains(&"sim.setJointTargetPosition".to_owned()));
     // What a target position moves is told to stay.
     edit(&cell.world, |w| (w.joint_mode, w.targets, w.joints) = (5, [1.0; JOINTS], [0.5; JOINTS]));
-    cell.client.stop().expect("calls");
+    cell.client.arm().stop().expect("calls");
     assert_eq!(cell.world().targets, [0.5; JOINTS]);
 }
 
@@ -413,8 +418,8 @@ fn a_joint_that_takes_no_positions_is_freed_before_a_motion() {
     let world = world();
     edit(&world, |w| w.stuck = Some(2));
     let mut cell = cell(Arc::clone(&world));
-    cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
-    assert_eq!(cell.client.joint_angles(), Ok(GOAL));
+    cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
+    assert_eq!(cell.client.arm().joint_angles(), Ok(GOAL));
 }
 
 #[test]
@@ -430,7 +435,7 @@ fn a_joint_that_is_held_in_a_motion_is_named_with_where_it_stands() {
         edit(&holding, |w| w.stuck = Some(4));
     });
     let slow = MotionLimits::uniform(JOINTS, 1e-3, 2.0, 1.0);
-    let error = cell.client.move_to_joints(&GOAL, &slow, &CancelToken::default()).expect_err("held");
+    let error = cell.client.arm().move_to_joints(&GOAL, &slow, &CancelToken::default()).expect_err("held");
     held.join().expect("no panic");
     let LinkError::JointElsewhere { joint: 5, at_deg, goal_deg } = error else { panic!("{error}") };
     assert!(at_deg < goal_deg && goal_deg < GOAL[4].to_degrees(), "{at_deg}° {goal_deg}°");
@@ -442,8 +447,9 @@ fn a_motion_whose_account_breaks_off_is_made_in_one_call() {
     // What the vendor's encoder makes of a map with 17 numbers as keys, of which it writes a few.
     edit(&world, |w| w.motion_state = Some(b"\xa1\x63ret\x81\xa1\x62ik\x91\x0f\x01".to_vec()));
     let mut cell = cell(world);
-    let here = cell.client.base_from_tip().expect("a pose");
+    let here = cell.client.arm().base_from_tip().expect("a pose");
     cell.client
+        .arm()
         .move_to_pose(&here, &pose_limits(), &MotionTolerance::default(), &CancelToken::default())
         .expect("there");
     assert!(cell.control.functions().contains(&"sim.moveToPose".to_owned()));
@@ -454,7 +460,7 @@ fn a_server_that_dies_in_a_motion_is_reported_without_further_calls() {
     let world = world();
     let mut cell = cell(Arc::clone(&world));
     edit(&world, |w| w.die_in = Some("sim.step"));
-    let error = cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect_err("died");
+    let error = cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect_err("died");
     assert_eq!(error, LinkError::Disconnected { call: "sim.step".to_owned() });
     assert_eq!(cell.control.functions().last().map(String::as_str), Some("sim.step"));
 }
@@ -465,7 +471,8 @@ fn nothing_moves_while_the_simulation_does_not_run() {
         let world = world();
         edit(&world, |w| w.state = state);
         let mut cell = cell(world);
-        let error = cell.client.move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect_err("not running");
+        let error =
+            cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect_err("not running");
         assert_eq!(error, LinkError::NotRunning { task: "moving the joints", state: expected });
     }
 }
@@ -475,10 +482,10 @@ fn a_goal_out_of_range_is_refused_with_joint_and_range() {
     let mut cell = cell(world());
     let mut goal = GOAL;
     goal[3] = 7.0;
-    let error = cell.client.move_to_joints(&goal, &limits(), &CancelToken::default()).expect_err("out of range");
+    let error = cell.client.arm().move_to_joints(&goal, &limits(), &CancelToken::default()).expect_err("out of range");
     assert!(matches!(error, LinkError::JointOutOfRange { joint: 4, .. }), "{error}");
     goal[3] = f64::NAN;
-    let error = cell.client.move_to_joints(&goal, &limits(), &CancelToken::default()).expect_err("not a number");
+    let error = cell.client.arm().move_to_joints(&goal, &limits(), &CancelToken::default()).expect_err("not a number");
     assert!(matches!(error, LinkError::BadMotion { .. }), "{error}");
 }
 
@@ -486,11 +493,12 @@ fn a_goal_out_of_range_is_refused_with_joint_and_range() {
 fn a_tip_that_did_not_arrive_is_an_error_with_the_distance() {
     let mut cell = cell(world());
     let (tolerance, cancel) = (MotionTolerance::default(), CancelToken::default());
-    let here = cell.client.base_from_tip().expect("a pose");
-    cell.client.move_to_pose(&here, &pose_limits(), &tolerance, &cancel).expect("already there");
+    let here = cell.client.arm().base_from_tip().expect("a pose");
+    cell.client.arm().move_to_pose(&here, &pose_limits(), &tolerance, &cancel).expect("already there");
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.1);
     let goal = Pose::from_isometry(nalgebra::Isometry3::from_parts(Vector3::new(0.1, 0.25, 0.9).into(), turn));
-    let error = cell.client.move_to_pose(&goal, &pose_limits(), &tolerance, &cancel).expect_err("inverse kinematics");
+    let error =
+        cell.client.arm().move_to_pose(&goal, &pose_limits(), &tolerance, &cancel).expect_err("inverse kinematics");
     let LinkError::Unreached { distance_mm, angle_deg } = error else { panic!("{error}") };
     assert_relative_eq!(distance_mm, 50.0, epsilon = 1e-9);
     assert_relative_eq!(angle_deg, 0.1_f64.to_degrees(), epsilon = 1e-9);
@@ -519,7 +527,7 @@ fn a_frame_is_of_one_instant_because_the_simulation_is_held() {
     let world = world();
     edit(&world, |w| w.passes_per_image = 1);
     let mut cell = cell(world);
-    let frame = cell.client.grab().expect("a frame");
+    let frame = cell.client.camera().grab().expect("a frame");
     assert_eq!(frame.sim_time_s, cell.world().time_s, "time stood still");
     assert_eq!(cell.world().held, 0, "and goes on");
     assert_eq!((cell.world().handled, frame.image_age_s), (1, 0.0), "the images show the joints of now");
@@ -532,10 +540,10 @@ fn without_a_hold_a_frame_is_read_again_until_the_clock_stands() {
     let world = world();
     edit(&world, |w| w.missing.push("sim.acquireLock"));
     let mut cell = cell(world);
-    let frame = cell.client.grab().expect("the clock stands");
+    let frame = cell.client.camera().grab().expect("the clock stands");
     assert_eq!(frame.image_age_s, 0.05, "of the pass before, perhaps");
     cell.world().passes_per_image = 1;
-    let error = cell.client.grab().expect_err("the clock runs");
+    let error = cell.client.camera().grab().expect_err("the clock runs");
     assert!(matches!(error, LinkError::MixedInstants { .. }), "{error}");
 }
 
@@ -545,7 +553,7 @@ fn a_server_that_takes_no_images_on_request_is_asked_once() {
     edit(&world, |w| w.missing.push("sim.handleVisionSensor"));
     let mut cell = cell(world);
     for _ in 0..2 {
-        assert_eq!(cell.client.grab().expect("a frame").image_age_s, 0.05);
+        assert_eq!(cell.client.camera().grab().expect("a frame").image_age_s, 0.05);
     }
     let asked = cell.camera.functions().iter().filter(|f| *f == "sim.handleVisionSensor").count();
     assert_eq!(asked, 1);
@@ -556,19 +564,19 @@ fn a_frame_that_fails_does_not_leave_the_simulation_held() {
     let world = world();
     let mut cell = cell(Arc::clone(&world));
     edit(&world, |w| w.missing.push("sim.getVisionSensorDepth"));
-    assert!(cell.client.grab().is_err());
+    assert!(cell.client.camera().grab().is_err());
     assert_eq!(cell.world().held, 0);
 
     edit(&world, |w| w.die_in = Some("sim.getVisionSensorImg"));
     let uuid = cell.client.camera().sim().connection().uuid().to_owned();
-    assert!(matches!(cell.client.grab(), Err(LinkError::Disconnected { .. })));
+    assert!(matches!(cell.client.camera().grab(), Err(LinkError::Disconnected { .. })));
     assert_ne!(cell.client.camera().sim().connection().uuid(), uuid, "the record that holds is ended");
 }
 
 #[test]
 fn frames_and_motions_go_over_two_connections() {
     let mut cell = cell(world());
-    cell.client.grab().expect("a frame");
+    cell.client.camera().grab().expect("a frame");
     assert!(!cell.control.functions().contains(&"sim.getVisionSensorImg".to_owned()));
     assert!(cell.camera.functions().contains(&"sim.getVisionSensorImg".to_owned()));
     let (mut arm, mut camera) = cell.client.split();
@@ -580,7 +588,7 @@ fn frames_and_motions_go_over_two_connections() {
 #[test]
 fn the_truth_of_the_reference_scene_is_in_opencv_axes() {
     let mut cell = cell(world());
-    let truth = cell.client.ground_truth().expect("a scene");
+    let truth = cell.client.camera().ground_truth().expect("a scene");
     // Rz(+90°) and 50 mm along x of the tip.
     let x_in_tip = truth.tip_from_camera.rotation() * Vector3::x();
     let ahead_in_tip = truth.tip_from_camera.rotation() * Vector3::z();
@@ -588,7 +596,7 @@ fn the_truth_of_the_reference_scene_is_in_opencv_axes() {
     assert_relative_eq!(ahead_in_tip, Vector3::z(), epsilon = 1e-12);
     assert_relative_eq!(truth.tip_from_camera.translation(), Vector3::new(0.05, 0.0, 0.0), epsilon = 1e-12);
     assert_eq!((truth.base_from_target, truth.intrinsics_published), (None, false));
-    assert_eq!(truth.intrinsics, cell.client.camera_intrinsics_nominal());
+    assert_eq!(truth.intrinsics, cell.client.info().camera_intrinsics_nominal());
 }
 
 #[test]
@@ -617,7 +625,7 @@ fn what_the_cell_publishes_goes_before_what_the_scene_shows() {
     let world = world();
     edit(&world, |w| w.truth = Some(published));
     let mut cell = cell(Arc::clone(&world));
-    let truth = cell.client.ground_truth().expect("published");
+    let truth = cell.client.camera().ground_truth().expect("published");
     assert_eq!((truth.intrinsics, truth.intrinsics_published), (intrinsics, true));
     let (distance_m, angle_rad) = truth.base_from_target.expect("published").distance_to(&base_from_target);
     assert!(distance_m < 1e-15 && angle_rad < 1e-7);
@@ -628,7 +636,7 @@ fn what_the_cell_publishes_goes_before_what_the_scene_shows() {
         wire::map([("tip_from_camera", wire::floats([f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))]),
     ] {
         edit(&world, |w| w.truth = Some(bad));
-        assert!(matches!(cell.client.ground_truth(), Err(LinkError::BadTruth { .. })));
+        assert!(matches!(cell.client.camera().ground_truth(), Err(LinkError::BadTruth { .. })));
     }
 }
 

@@ -15,7 +15,7 @@ fn with_clock(clock: fn(f64) -> f64) -> Cell {
         w.targets = [0.5; JOINTS];
         w.follow = 0.5;
     });
-    assert!(cell.client.joint_angles().is_ok());
+    assert!(cell.client.arm().joint_angles().is_ok());
     cell
 }
 
@@ -75,7 +75,7 @@ fn a_jog_and_a_following_arm_do_not_wait_for_a_clock_that_stands() {
     edit(&cell.world, |w| (w.joints, w.targets) = ([0.1, 0.2, -0.9, 0.3, 0.8, 0.1], [0.1, 0.2, -0.9, 0.3, 0.8, 0.1]));
     let limits = crate::cell::kinematics::JointLimits { min_rad: [-6.0; JOINTS], max_rad: [6.0; JOINTS] };
     let kinematics = ArmKinematics::new(nalgebra::Isometry3::identity(), nalgebra::Isometry3::identity(), limits);
-    let tip = kinematics.tip(&cell.client.joint_angles().expect("angles"));
+    let tip = kinematics.tip(&cell.client.arm().joint_angles().expect("angles"));
     edit(&cell.world, |w| w.base_from_tip = tip);
     let outcome = cell.client.arm().follow(&kinematics, &FollowLimits::default(), &mut |_| FollowWish::Rest);
     assert!(matches!(outcome, Err(LinkError::WaitedTooLong { task: "following", .. })), "{outcome:?}");

@@ -3,7 +3,9 @@
 use handeye_core::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::{JointModeSpec, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{ArmJog, CellClient, FollowEnd, FollowGoal, FollowLimits, FollowWish, MotionTolerance};
+use handeye_sim_link::client::cell::{
+    ArmJog, CellClient, FollowEnd, FollowGoal, FollowLimits, FollowWish, MotionTolerance,
+};
 use handeye_sim_link::client::{CancelToken, LinkError, MotionLimits};
 use nalgebra::{Translation3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
@@ -35,24 +37,24 @@ fn stop_and_go_on(joint_mode: JointModeSpec) {
     let server = CellServer::start(CellConfig { real_time: Some(false), ..CellConfig::new(scene) }).expect("a port");
     let (mut cell, trigger) = cell_with_trigger(&server);
     cell.arm().sim().start_simulation().expect("a call");
-    let home = cell.base_from_tip().expect("a call");
+    let home = cell.arm().base_from_tip().expect("a call");
     let moved = |x: f64, y: f64, z: f64| -> Pose<Base, Tip> {
         Pose::from_isometry(Translation3::new(x, y, z) * home.isometry())
     };
     let (joint_limits, tip_limits) =
         (MotionLimits::uniform(6, 1.0, 4.0, 40.0), MotionLimits::uniform(4, 0.3, 2.0, 20.0));
-    let start = cell.joint_angles().expect("a call");
+    let start = cell.arm().joint_angles().expect("a call");
     let kinematics = cell.arm().kinematics().expect("calls").expect("a UR5");
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     for round in 0..100 {
         let cancel = CancelToken::default();
         *trigger.lock().expect("no panic") = Some((rng.random_range(0..25), cancel.clone()));
         let stopped = match round % 4 {
-            0 => cell.move_to_joints(&start.map(|angle| angle + 0.4), &joint_limits, &cancel),
-            1 => cell.move_to_pose(&moved(0.1, -0.05, 0.05), &tip_limits, &MotionTolerance::default(), &cancel),
+            0 => cell.arm().move_to_joints(&start.map(|angle| angle + 0.4), &joint_limits, &cancel),
+            1 => cell.arm().move_to_pose(&moved(0.1, -0.05, 0.05), &tip_limits, &MotionTolerance::default(), &cancel),
             2 => {
                 let velocity_m_s = Vector3::new(0.1, 0.0, if round % 8 == 2 { 0.05 } else { -0.05 });
-                let base_from_tip = cell.base_from_tip().expect("a call");
+                let base_from_tip = cell.arm().base_from_tip().expect("a call");
                 let angular_velocity_rad_s = Vector3::zeros();
                 let mut goal = FollowGoal { base_from_tip, velocity_m_s, angular_velocity_rad_s };
                 let end = cell.arm().follow(&kinematics, &FollowLimits::default(), &mut |_| {
@@ -69,12 +71,13 @@ fn stop_and_go_on(joint_mode: JointModeSpec) {
         };
         assert!(matches!(stopped, Ok(()) | Err(LinkError::Cancelled { .. })), "{round}: {stopped:?}");
         *trigger.lock().expect("no panic") = None;
-        cell.stop().expect("a call");
+        cell.arm().stop().expect("a call");
 
         let goal = moved(-0.02 * f64::from(round % 4), -0.04, 0.01);
-        cell.move_to_pose(&goal, &tip_limits, &MotionTolerance::default(), &CancelToken::default())
+        cell.arm()
+            .move_to_pose(&goal, &tip_limits, &MotionTolerance::default(), &CancelToken::default())
             .unwrap_or_else(|error| panic!("{round}: {error}"));
-        let (distance_m, _) = cell.base_from_tip().expect("a call").distance_to(&goal);
+        let (distance_m, _) = cell.arm().base_from_tip().expect("a call").distance_to(&goal);
         assert!(distance_m < 1e-4, "{round}: {distance_m} m from its goal");
     }
 }

@@ -40,14 +40,14 @@ fn exact_robot(mut scene: Scene) -> Scene {
 fn captured_around_moves(scene: Scene, bound_px: f64) {
     let mut bench = CellBench::start(exact_robot(scene), true);
     let views = views();
-    bench.client.move_to_joints(&views[0], &brisk(), &CancelToken::default()).expect("it gets there");
+    bench.client.arm().move_to_joints(&views[0], &brisk(), &CancelToken::default()).expect("it gets there");
     let mut number = 0;
     for view in [views[2], views[5], views[0]] {
         let mut mover = bench.connect();
         let (commanded, begun) = bounded(0);
         let motion = std::thread::spawn(move || {
             commanded.send(()).expect("the test waits");
-            mover.move_to_joints(&view, &brisk(), &CancelToken::default()).expect("it gets there");
+            mover.arm().move_to_joints(&view, &brisk(), &CancelToken::default()).expect("it gets there");
         });
         begun.recv().expect("the thread lives");
         let mut last = None;
@@ -95,7 +95,7 @@ fn averaging_sixteen_pictures_lowers_corner_noise_as_far_as_whole_levels_allow()
         let mut scene = Scene::realistic().expect("a scene");
         scene.image.noise_grey = noise_grey;
         let mut bench = CellBench::start(scene, false);
-        bench.client.move_to_joints(&views()[0], &brisk(), &CancelToken::default()).expect("it gets there");
+        bench.client.arm().move_to_joints(&views()[0], &brisk(), &CancelToken::default()).expect("it gets there");
         let (mut single, mut averaged, mut stated) = (Scatter::default(), Scatter::default(), Vec::new());
         for number in 0..CAPTURES {
             let one = bench.capture(request(2 * number, 1)).expect("a capture");
@@ -126,7 +126,7 @@ fn averaging_sixteen_pictures_lowers_corner_noise_as_far_as_whole_levels_allow()
 #[test]
 fn every_live_picture_is_judged_and_a_paused_simulation_is_named() {
     let mut bench = CellBench::start(Scene::reference().expect("a scene"), true);
-    bench.client.move_to_joints(&views()[0], &brisk(), &CancelToken::default()).expect("it gets there");
+    bench.client.arm().move_to_joints(&views()[0], &brisk(), &CancelToken::default()).expect("it gets there");
     bench.live(10);
     let mut waits_ms = Vec::new();
     for number in 1..=5 {
