@@ -11,6 +11,7 @@ pub mod limits;
 pub mod model;
 pub mod observe;
 pub mod rerun_log;
+mod scene;
 pub mod session_start;
 pub mod settings;
 mod shortfall;

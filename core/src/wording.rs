@@ -101,11 +101,12 @@ impl Text {
         while let Some((before, after)) = rest.split_once('{') {
             said.push_str(before);
             let (name, after) = after.split_once('}').unwrap_or((after, ""));
-            if let Some((_, value)) = self.values.iter().find(|(known, _)| known == name) {
-                match value {
-                    Value::Plain(plain) => said.push_str(plain),
-                    Value::Text(text) => said.push_str(&text.say(language)),
-                }
+            let value = self.values.iter().find(|(known, _)| known == name);
+            debug_assert!(value.is_some(), "{template:?} has no value {name}");
+            match value {
+                Some((_, Value::Plain(plain))) => said.push_str(plain),
+                Some((_, Value::Text(text))) => said.push_str(&text.say(language)),
+                None => {}
             }
             rest = after;
         }

@@ -88,7 +88,7 @@ impl App {
     }
 
     pub(super) fn cell_found(&mut self, facts: CellFacts) {
-        if let Some(shortfall) = shortfall::of(facts.support, facts.kinematics_known) {
+        if let Some(shortfall) = shortfall::of(facts.support, facts.arm.is_some()) {
             self.say(Severity::Warning, shortfall);
         }
         self.model.cell = Some(facts);

@@ -13,8 +13,8 @@ use crate::rerun_log::{Entry, Recorder};
 /// The cell and what it publishes of itself.
 pub fn cell(recorder: &Recorder, arm: &mut Arm, truth: &GroundTruth) -> Result<(), LinkError> {
     if recorder.is_on() {
-        let kinematics_known = arm.kinematics()?.is_ok();
-        recorder.note(Entry::Cell(Arc::new(CellFacts::new(arm.info(), kinematics_known, Some(truth)))));
+        let chain = arm.kinematics()?.ok().map(|kinematics| *kinematics.chain());
+        recorder.note(Entry::Cell(Arc::new(CellFacts::new(arm.info(), chain, Some(truth)))));
     }
     Ok(())
 }

@@ -10,6 +10,7 @@ use handeye_core::findings::{Finding, FindingCode};
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
 
 use crate::model::{Model, Observed, Solved};
+use crate::scene;
 
 /// Cells of the image on which coverage is shown: as the findings judge it.
 pub const CELLS: (usize, usize) = (8, 6);
@@ -261,14 +262,8 @@ fn add_findings(rows: &mut [CaptureRow], document: &Document, findings: &[Findin
 
 /// The residuals of a capture, from the fit or from the verification; empty when there are none.
 pub fn residuals(model: &Model, id: CaptureId) -> &[CornerResidual] {
-    let Some(solved) = &model.solve.solved else { return &[] };
-    if let Some(at) = solved.captures.iter().position(|&other| other == id) {
-        return solved.calibration.views.get(at).map_or(&[], |view| &view.residuals);
-    }
-    match (&solved.verification, solved.verified_captures.iter().position(|&other| other == id)) {
-        (Some(Ok(verification)), Some(at)) => verification.captures.get(at).map_or(&[], |check| &check.residuals),
-        _ => &[],
-    }
+    let outcome = model.solve.solved.as_deref().and_then(|solved| scene::outcome(solved, id));
+    outcome.map_or(&[], |outcome| outcome.residuals)
 }
 
 #[cfg(test)]

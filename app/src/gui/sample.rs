@@ -18,7 +18,7 @@ use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_core::track::{ByDepth, Estimate, Seen, State, Update};
 use handeye_core::verify::{self, Calibrated, CheckCapture};
 use handeye_sim_link::cell::kinematics::{JointLimits, inverse_nearest};
-use handeye_sim_link::client::cell::{JointAngles, Support};
+use handeye_sim_link::client::cell::{ArmChain, JointAngles, Support};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
@@ -129,7 +129,7 @@ pub fn connected() -> Model {
     model.cell = Some(CellFacts {
         joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
         nominal_intrinsics: intrinsics(),
-        kinematics_known: true,
+        arm: Some(arm()),
         support: Support::Whole,
         truth: Some(Truth {
             tip_from_camera: tip_from_camera(),
@@ -359,10 +359,18 @@ pub fn tracking() -> Model {
     model
 }
 
+/// The arm of the reference scene.
+fn arm() -> ArmChain {
+    ArmChain {
+        base_from_arm: Isometry3::translation(0.0, 0.0, 0.025),
+        connection_from_tip: Isometry3::translation(0.0, 0.0, 0.017),
+    }
+}
+
 /// The joints with which the arm of the reference scene has its tip there.
 fn joints_at(base_from_tip: &Pose<Base, Tip>) -> JointAngles {
-    let (base_from_arm, tool) = (Translation3::new(0.0, 0.0, 0.025), Translation3::new(0.0, 0.0, 0.017));
-    let arm_from_connection = base_from_arm.inverse() * base_from_tip.isometry() * tool.inverse();
+    let ArmChain { base_from_arm, connection_from_tip } = arm();
+    let arm_from_connection = base_from_arm.inverse() * base_from_tip.isometry() * connection_from_tip.inverse();
     let near = [0.0, 0.8, -1.5, 0.5, 1.5, 0.0];
     inverse_nearest(&arm_from_connection, &near, &JointLimits::default()).expect("within reach")
 }

@@ -2,7 +2,7 @@
 
 use handeye_core::camera::Intrinsics;
 use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_sim_link::client::cell::{CellInfo, GroundTruth, JointAngles, Support};
+use handeye_sim_link::client::cell::{ArmChain, CellInfo, GroundTruth, JointAngles, Support};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -14,8 +14,9 @@ pub struct CellFacts {
     pub joint_ranges_rad: [Option<[f64; 2]>; 6],
     /// What the camera's settings say, without its lens: good enough to draw with before there is a calibration.
     pub nominal_intrinsics: Intrinsics,
-    /// Whether the arm is the one whose kinematics is built in, so that goals are checked before anything moves.
-    pub kinematics_known: bool,
+    /// The arm as it was measured, if it is the one whose kinematics is built in: where it is drawn, and why goals can be
+    /// checked before anything moves.
+    pub arm: Option<ArmChain>,
     /// What works with the server's version.
     pub support: Support,
     /// What a simulated cell publishes for comparison; never read by a solver.
@@ -24,11 +25,11 @@ pub struct CellFacts {
 
 impl CellFacts {
     /// By what the cell says of itself.
-    pub fn new(info: &CellInfo, kinematics_known: bool, truth: Option<&GroundTruth>) -> Self {
+    pub fn new(info: &CellInfo, arm: Option<ArmChain>, truth: Option<&GroundTruth>) -> Self {
         Self {
             joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
             nominal_intrinsics: info.camera_intrinsics_nominal(),
-            kinematics_known,
+            arm,
             support: info.support(),
             truth: truth.map(Truth::from),
         }

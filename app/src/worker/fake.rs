@@ -8,7 +8,8 @@ use handeye_core::depth::DepthImage;
 use handeye_core::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish, JointAngles, Support};
+use handeye_sim_link::client::cell::{ArmChain, BoardInView, FollowMoment, FollowWish, JointAngles, Support};
+use nalgebra::Isometry3;
 
 use super::port::{
     CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
@@ -159,7 +160,7 @@ impl ControlPort for FakeCell {
         Ok(CellFacts {
             joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
             nominal_intrinsics: Intrinsics::pinhole(width, height, 60.0),
-            kinematics_known: true,
+            arm: Some(ArmChain { base_from_arm: Isometry3::identity(), connection_from_tip: Isometry3::identity() }),
             support: Support::Whole,
             truth: None,
         })

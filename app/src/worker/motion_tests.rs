@@ -142,7 +142,7 @@ fn begun(cell: &FakeCell, count: usize) {
 #[test]
 fn the_facts_of_the_cell_are_told_after_connecting() {
     let (_cell, mut bench) = fake(FakeMotions::Arrive);
-    assert!(bench.facts().kinematics_known);
+    assert!(bench.facts().arm.is_some());
 }
 
 #[test]

@@ -8,14 +8,14 @@ use handeye_core::image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use handeye_core::image::{ExtendedColorType, ImageEncoder as _, ImageError, RgbImage};
 use handeye_core::target::TargetSpec;
 use nalgebra::Vector2;
-use rerun::{AsComponents, Color, EncodedDepthImage, EncodedImage, MediaType, Points3D, Radius};
+use rerun::{Color, EncodedDepthImage, EncodedImage, MediaType, Points3D, Radius};
 
-use super::convert::{axes, marks, pinhole, point, transform};
+use super::convert::{marks, point};
 use super::error::RecordError;
-use super::known::{Known, Mount};
 use super::paths::{self, below};
 use super::pen::Pen;
 use super::style;
+use crate::scene::Known;
 
 /// No loss that an eye sees, at a tenth of the bytes.
 const JPEG_QUALITY: u8 = 80;
@@ -24,19 +24,6 @@ const POINT_STEP: usize = 8;
 /// Depths are kept in steps of a tenth of a millimetre while they fit into 16 bits, and of a millimetre beyond.
 const FINE_STEPS_PER_METRE: f32 = 10_000.0;
 const COARSE_STEPS_PER_METRE: f32 = 1_000.0;
-
-/// Camera and lens where they are known. Without a place there is no lens either, or pictures would hang in the base.
-pub(super) fn write_camera(pen: Pen<'_>, known: &Known) -> Result<(), RecordError> {
-    let path = paths::camera(known.mode());
-    let (Some(mount), Some(intrinsics)) = (known.mount(), known.intrinsics()) else { return Ok(()) };
-    let place = match mount {
-        Mount::Tip(tip_from_camera) => transform(&tip_from_camera),
-        Mount::Base(base_from_camera) => transform(&base_from_camera),
-    };
-    pen.write(path, &[&place as &dyn AsComponents, &axes(style::AXES)])?;
-    let lens = pinhole(&intrinsics, style::LIVE_IMAGE_PLANE, style::ESTIMATED, style::THIN_UI_POINTS);
-    pen.write(&below(path, paths::LENS), &lens)
-}
 
 /// The lens of the live camera.
 pub(super) fn lens(known: &Known) -> String {
@@ -62,10 +49,12 @@ pub(super) fn write_depth(
     pen: Pen<'_>,
     known: &Known,
     base_from_tip: &Pose<Base, Tip>,
-    depth: &DepthImage,
-    rgb: Option<&RgbImage>,
+    (depth, rgb): (&DepthImage, &RgbImage),
+    far_plane_m: Option<f32>,
 ) -> Result<(), RecordError> {
-    let far_m = far_plane_m(known, depth);
+    // Of a recorded image whose sensor is not known, its largest depth: nothing lies behind.
+    let far_m =
+        far_plane_m.unwrap_or_else(|| depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max));
     let path = below(&lens(known), paths::DEPTH);
     pen.write(&path, &compressed_depth(&path, depth, far_m)?)?;
     let (Some(base_from_camera), Some(intrinsics)) = (known.base_from_camera(base_from_tip), known.intrinsics()) else {
@@ -76,11 +65,6 @@ pub(super) fn write_depth(
         paths::POINTS,
         &Points3D::new(points).with_colors(colours).with_radii([Radius::new_ui_points(style::THIN_UI_POINTS)]),
     )
-}
-
-/// The sensor's far plane; of a recorded image whose sensor is not known, its largest depth: nothing lies behind.
-fn far_plane_m(known: &Known, depth: &DepthImage) -> f32 {
-    known.far_plane_m.unwrap_or_else(|| depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max))
 }
 
 /// 16 bits without loss; 0 where there is no surface.
@@ -110,7 +94,7 @@ fn compressed_depth(path: &str, depth: &DepthImage, far_m: f32) -> Result<Encode
 
 fn points_in_base(
     depth: &DepthImage,
-    rgb: Option<&RgbImage>,
+    rgb: &RgbImage,
     far_m: f32,
     intrinsics: &Intrinsics,
     base_from_camera: &Pose<Base, Camera>,
@@ -121,7 +105,7 @@ fn points_in_base(
             // An image of another size than the lens, or a pixel beyond its model, has no points.
             let Ok(Some(in_camera)) = depth.point(column, row, far_m, intrinsics) else { continue };
             points.push(point(&(*base_from_camera * in_camera).point()));
-            let colour = rgb.and_then(|rgb| rgb.get_pixel_checked(column, row)).map_or([160; 3], |pixel| pixel.0);
+            let colour = rgb.get_pixel_checked(column, row).map_or([160; 3], |pixel| pixel.0);
             colours.push(Color::from_rgb(colour[0], colour[1], colour[2]));
         }
     }

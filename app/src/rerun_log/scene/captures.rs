@@ -4,25 +4,23 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::calibrate::{CornerResidual, ViewStatus};
+use handeye_core::calibrate::CornerResidual;
 use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
 use handeye_core::frames::{Camera, Pose, Target};
 use handeye_core::image::RgbImage;
 use handeye_core::observation::Corner;
-use handeye_core::session::{CaptureId, CaptureRecord, Document, Role, Session, SessionError};
-use handeye_core::statistics::median_high;
+use handeye_core::session::{CaptureId, CaptureRecord, Document, Session, SessionError};
 use handeye_core::target::TargetSpec;
 use handeye_core::vision::pnp;
 use rerun::{Arrows2D, AsComponents, Color, EncodedImage, Points3D, Radius};
 
-use super::convert::{axes, corner_marks, marks, no_axes, no_lines, outline, pinhole, pixel, transform};
+use super::convert::{corner_marks, marks, no_lines, outline, pinhole, pixel, transform};
 use super::error::RecordError;
-use super::known::Known;
 use super::paths::{self, below};
 use super::pen::{Clock, Instant, Pen};
 use super::style;
-use crate::model::Solved;
+use crate::scene::{self, BAD_AT_MEDIANS, CaptureItem, Known, Standing, outcome};
 
 /// A capture that is in the recording.
 #[derive(Debug)]
@@ -52,16 +50,6 @@ pub(super) struct Changes {
     pub gone: Vec<CaptureId>,
     pub new: Vec<CaptureId>,
     pub changed: Vec<CaptureId>,
-}
-
-/// What a calibration says of one capture.
-struct Outcome<'a> {
-    residuals: &'a [CornerResidual],
-    /// 0 for a perfect fit, 1 for [`style::RED_AT_MEDIANS`] times the median and beyond.
-    redness: Option<f64>,
-    /// Whether the estimate set it aside.
-    is_aside: bool,
-    camera_from_target: Option<Pose<Camera, Target>>,
 }
 
 impl Captures {
@@ -162,41 +150,26 @@ impl Captures {
     /// Where a capture was taken, coloured by what is known of it.
     pub fn write_place(&self, pen: Pen<'_>, known: &Known, shown: &Shown) -> Result<(), RecordError> {
         let record = &shown.record;
-        let (Some(base_from_camera), Some(intrinsics)) =
-            (known.base_from_camera(&record.base_from_tip), known.intrinsics())
-        else {
+        let item = scene::Captures::new(known).item(record);
+        let (Some(base_from_camera), Some(intrinsics)) = (item.base_from_camera, known.intrinsics()) else {
             return Ok(());
         };
         let is_selected = self.selected.contains(&record.id);
-        let colour = self.colour(known, record);
+        let colour = if is_selected { style::SELECTED } else { colour(&item) };
         let path = paths::capture(record.id);
         let name = Points3D::new([[0.0_f32; 3]])
-            .with_labels([label(known, record)])
+            .with_labels([label(record.id, item.standing)])
             .with_colors([colour])
             .with_radii([Radius::new_ui_points(style::CORNER_UI_POINTS)]);
-        pen.write(&path, &[&transform(&base_from_camera) as &dyn AsComponents, &name])?;
+        pen.write(&path, &[&transform(base_from_camera.isometry()) as &dyn AsComponents, &name])?;
         let line = if is_selected { style::THICK_UI_POINTS } else { style::THIN_UI_POINTS };
         pen.write(&below(&path, paths::LENS), &pinhole(&intrinsics, style::CAPTURE_IMAGE_PLANE, colour, line))
-    }
-
-    fn colour(&self, known: &Known, record: &CaptureRecord) -> Color {
-        if self.selected.contains(&record.id) {
-            return style::SELECTED;
-        }
-        if record.excluded {
-            return style::EXCLUDED;
-        }
-        if is_aside(known, record) {
-            return style::SET_ASIDE;
-        }
-        let outcome = known.solved.as_deref().and_then(|solved| outcome(solved, record.id));
-        outcome.and_then(|outcome| outcome.redness).map_or(style::NEUTRAL, style::residual_colour)
     }
 
     /// All that is in the picture of a capture, below a lens or another place of pictures.
     pub fn write_marks(pen: Pen<'_>, known: &Known, shown: &Shown, below_path: &str) -> Result<(), RecordError> {
         let outcome = known.solved.as_deref().and_then(|solved| outcome(solved, shown.record.id));
-        let residuals = outcome.map_or::<&[CornerResidual], _>(&[], |outcome| outcome.residuals);
+        let residuals = outcome.map_or(&[][..], |outcome| outcome.residuals);
         let corners = shown.corners.as_deref().unwrap_or_default();
         pen.write(&below(below_path, paths::CORNERS), &corner_marks(corners, style::SEEN))?;
         let predicted = residuals.iter().map(|r| r.px - r.residual_px);
@@ -216,16 +189,13 @@ impl Captures {
             return Ok(());
         }
         let seen_path = below(&path, paths::SEEN_BOARD);
-        match seen(known, shown.corners.as_deref()) {
-            Some(seen) => pen.write(&seen_path, &[&transform(&seen) as &dyn AsComponents, &axes(style::SMALL_AXES)])?,
-            None => pen.write(&seen_path, &no_axes())?,
-        }
+        pen.frame_if(&seen_path, seen(known, shown.corners.as_deref()).as_ref(), style::SMALL_AXES)?;
         let predicted_path = below(&path, paths::PREDICTED_BOARD);
         let outcome = known.solved.as_deref().and_then(|solved| outcome(solved, shown.record.id));
         match (outcome.and_then(|outcome| outcome.camera_from_target), known.target) {
             (Some(predicted), Some(target)) => pen.write(
                 &predicted_path,
-                &[&transform(&predicted) as &dyn AsComponents, &outline(&target, style::PREDICTED)],
+                &[&transform(predicted.isometry()) as &dyn AsComponents, &outline(&target, style::PREDICTED)],
             ),
             _ => pen.write(&predicted_path, &no_lines()),
         }
@@ -253,63 +223,34 @@ fn seen(known: &Known, corners: Option<&[Corner]>) -> Option<Pose<Camera, Target
     pnp::camera_from_target(corners?, &target, &intrinsics).ok()
 }
 
-/// Whether the answer is without a capture that is meant to be in the fit.
-fn is_aside(known: &Known, record: &CaptureRecord) -> bool {
-    let outcome = known.solved.as_deref().and_then(|solved| outcome(solved, record.id));
-    !record.excluded && record.role == Role::Calibration && outcome.is_some_and(|outcome| outcome.is_aside)
+/// Its colour, unless it is selected.
+fn colour(item: &CaptureItem) -> Color {
+    match item.standing {
+        Standing::Excluded => style::EXCLUDED,
+        Standing::Aside => style::SET_ASIDE,
+        Standing::Fit | Standing::Verification => {
+            item.times_median.map_or(style::NEUTRAL, |times| style::residual_colour(times / BAD_AT_MEDIANS))
+        }
+    }
 }
 
 /// Its number, and that it was set aside where it was.
-fn label(known: &Known, record: &CaptureRecord) -> String {
-    if is_aside(known, record) { format!("{} (set aside)", record.id) } else { record.id.to_string() }
-}
-
-/// What a calibration says of a capture: of its fit, or of its verification.
-fn outcome(solved: &Solved, id: CaptureId) -> Option<Outcome<'_>> {
-    if let Some(index) = solved.captures.iter().position(|capture| *capture == id) {
-        let view = solved.calibration.views.get(index)?;
-        let all = solved.calibration.views.iter().filter_map(|view| view.rms_px);
-        return Some(Outcome {
-            residuals: &view.residuals,
-            redness: view.rms_px.and_then(|rms| redness(rms, all)),
-            is_aside: view.status == ViewStatus::Outlier,
-            camera_from_target: view.camera_from_target,
-        });
-    }
-    let index = solved.verified_captures.iter().position(|capture| *capture == id)?;
-    let Some(Ok(verification)) = &solved.verification else { return None };
-    let check = verification.captures.get(index)?;
-    Some(Outcome {
-        residuals: &check.residuals,
-        redness: redness(check.rms_px, verification.captures.iter().map(|check| check.rms_px)),
-        is_aside: false,
-        camera_from_target: Some(check.predicted_camera_from_target),
-    })
-}
-
-fn redness(rms_px: f64, all: impl Iterator<Item = f64>) -> Option<f64> {
-    let median = median_high(all)?;
-    (median > 0.0).then(|| rms_px / (style::RED_AT_MEDIANS * median))
+fn label(id: CaptureId, standing: Standing) -> String {
+    if standing == Standing::Aside { format!("{id} (set aside)") } else { id.to_string() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::sample;
 
     #[test]
     fn a_capture_that_was_set_aside_is_named_so_and_has_the_colour_of_a_warning() {
-        let model = sample::with_an_outlier();
-        let known = Known { solved: model.solve.solved.clone(), ..Known::default() };
-        let mut captures = Captures::default();
-        let record = |id: CaptureId| model.document().capture(id).expect("a capture").clone();
-        assert_eq!(label(&known, &record(sample::OUTLIER)), format!("{} (set aside)", sample::OUTLIER));
-        assert_eq!(captures.colour(&known, &record(sample::OUTLIER)), style::SET_ASIDE);
-        assert_eq!(label(&known, &record(CaptureId(1))), CaptureId(1).to_string());
-        assert_ne!(captures.colour(&known, &record(CaptureId(1))), style::SET_ASIDE);
-        let excluded = CaptureRecord { excluded: true, ..record(sample::OUTLIER) };
-        assert_eq!(captures.colour(&known, &excluded), style::EXCLUDED, "who took it out by hand knows");
-        captures.select(&[sample::OUTLIER]);
-        assert_eq!(captures.colour(&known, &record(sample::OUTLIER)), style::SELECTED);
+        let item = |standing| CaptureItem { base_from_camera: None, standing, rms_px: None, times_median: Some(1.0) };
+        let id = CaptureId(7);
+        assert_eq!(label(id, Standing::Aside), "7 (set aside)");
+        assert_eq!(colour(&item(Standing::Aside)), style::SET_ASIDE);
+        assert_eq!(label(id, Standing::Fit), "7");
+        assert_ne!(colour(&item(Standing::Fit)), style::SET_ASIDE);
+        assert_eq!(colour(&item(Standing::Excluded)), style::EXCLUDED);
     }
 }

@@ -1,7 +1,6 @@
 //! From our numbers to those of Rerun.
 
 use handeye_core::camera::Intrinsics;
-use handeye_core::frames::Pose;
 use handeye_core::observation::Corner;
 use handeye_core::target::TargetSpec;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SymmetricEigen, UnitQuaternion, Vector2, Vector3};
@@ -9,6 +8,7 @@ use rerun::{Color, Ellipsoids3D, LineStrips3D, Pinhole, Points2D, Points3D, Quat
 use rerun::{FillMode, TransformAxes3D};
 
 use super::style;
+use crate::scene;
 
 /// Squared radius that holds 95 % of a Gaussian in three dimensions: the quantile of chi square.
 const CHI_SQUARE_3_95: f64 = 7.814_728;
@@ -17,12 +17,7 @@ const CHI_SQUARE_3_95: f64 = 7.814_728;
 const PIXEL_SHIFT: f64 = 0.5;
 
 /// A pose as a transform along the tree of entities.
-pub(super) fn transform<Dst, Src>(dst_from_src: &Pose<Dst, Src>) -> Transform3D {
-    transform_of(dst_from_src.isometry())
-}
-
-/// The same without frames.
-pub(super) fn transform_of(isometry: &Isometry3<f64>) -> Transform3D {
+pub(super) fn transform(isometry: &Isometry3<f64>) -> Transform3D {
     Transform3D::from_translation_rotation(vector(&isometry.translation.vector), quaternion(&isometry.rotation))
 }
 
@@ -83,13 +78,10 @@ pub(super) fn corner_marks(corners: &[Corner], colour: Color) -> Points2D {
     marks(corners.iter().map(|corner| corner.px), colour)
 }
 
-/// The outer edge of a board, with the row of squares around the inner corners of a chessboard.
+/// The outer edge of a board.
 pub(super) fn outline(target: &TargetSpec, colour: Color) -> LineStrips3D {
-    let side = target.grid().square_m;
-    let far = target.extent().add_scalar(side);
-    let (right, bottom) = (far.x, far.y);
-    let edge = [[-side, -side], [right, -side], [right, bottom], [-side, bottom], [-side, -side]];
-    LineStrips3D::new([edge.map(|[x, y]| [x as f32, y as f32, 0.0])])
+    let [first, second, third, fourth] = scene::outline(target, 0.0).map(|corner| point(&corner));
+    LineStrips3D::new([[first, second, third, fourth, first]])
         .with_colors([colour])
         .with_radii([Radius::new_ui_points(style::THIN_UI_POINTS)])
 }

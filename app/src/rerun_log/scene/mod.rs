@@ -6,10 +6,10 @@
 //! | part | writes |
 //! | --- | --- |
 //! | `robot` | arm, tip, the way that the tip went |
-//! | `camera` | the live camera: place, picture, depths, points in the base |
+//! | `items` | cameras and boards of the scene, those that a simulated cell says are true among them |
+//! | `camera` | the live camera: image, depths, points in the base |
 //! | `captures` | a frustum per capture with picture, corners, residuals, boards |
 //! | `result` | the board as calibrated, uncertainties, numbers, report |
-//! | `truth` | what a simulated cell says is true |
 //! | `track` | the board as it is tracked |
 //!
 //! What happens between captures has no time on the time line `capture`; there robot and camera are as they were when
@@ -19,14 +19,13 @@ mod camera;
 mod captures;
 mod convert;
 mod error;
-mod known;
+mod items;
 pub mod paths;
 mod pen;
 mod result;
 mod robot;
 pub mod style;
 mod track;
-mod truth;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -34,19 +33,20 @@ use std::sync::Arc;
 use handeye_core::frames::{Base, Pose, Tip};
 use handeye_core::session::{CaptureId, Document};
 use handeye_sim_link::client::cell::JointAngles;
-use rerun::{AsComponents, RecordingStream, TextLog, TextLogLevel};
+use rerun::{RecordingStream, TextLog, TextLogLevel};
 
 pub use error::RecordError;
 
 use super::Entry;
 use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved};
+use crate::scene::{CameraItem, Known, Truth, posed_arm};
 use captures::Captures;
-use convert::{axes, corner_marks, no_axes, transform};
+use convert::{axes, corner_marks};
 use error::Faults;
-use known::{Known, Truth};
+use items::{write_board, write_camera};
 use paths::below;
 use pen::{Clock, Instant, Pen};
-use robot::{Arm, Trail};
+use robot::Trail;
 
 /// Depths and points of live pictures are recorded once in this time [s, simulated]: they are ten times the size of the
 /// picture, and what they show changes slowly.
@@ -57,13 +57,16 @@ const DEPTH_EVERY_S: f64 = 1.0;
 pub struct SceneWriter {
     clock: Clock,
     known: Known,
-    arm: Arm,
+    /// Whether the solids of the arm are written.
+    has_solids: bool,
     session_trail: Trail,
     connection_trail: Trail,
     captures: Captures,
     /// Number and time \[s\] of the newest picture.
     newest_picture: Option<(u64, f64)>,
     depth_at_s: Option<f64>,
+    /// The far plane of the depth sensor \[m\], once an image says.
+    far_plane_m: Option<f32>,
 }
 
 impl Default for SceneWriter {
@@ -78,12 +81,13 @@ impl SceneWriter {
         Self {
             clock: Clock::default(),
             known: Known::default(),
-            arm: Arm::new(),
+            has_solids: false,
             session_trail: Trail::new(paths::TRAJECTORY_SESSION, style::PAST_WAY),
             connection_trail: Trail::new(paths::TRAJECTORY_CONNECTION, style::WAY),
             captures: Captures::default(),
             newest_picture: None,
             depth_at_s: None,
+            far_plane_m: None,
         }
     }
 
@@ -122,6 +126,9 @@ impl SceneWriter {
             Entry::Solved(solved) => self.solved(pen, solved),
             Entry::Tracked(tracked) => {
                 self.clock.tick(tracked.update.time_s);
+                let known = &mut self.known;
+                known.base_from_target_tracked = tracked.update.estimate.as_ref().map(|it| it.base_from_target);
+                known.base_from_target_true = tracked.truth.or(known.base_from_target_true);
                 pen.at(self.clock.live());
                 track::write(pen, &self.known, tracked)
             }
@@ -141,8 +148,8 @@ impl SceneWriter {
     }
 
     fn cell(&mut self, pen: Pen<'_>, facts: &Arc<CellFacts>) -> Result<(), RecordError> {
-        self.arm.reconnected(facts.kinematics_known);
-        self.known.cell = Some(Arc::clone(facts));
+        self.known.cell = Some(CellFacts::clone(facts));
+        self.known.base_from_target_true = None;
         pen.at(self.clock.now());
         self.connection_trail.restart(pen)?;
         if self.known.truth().is_none() {
@@ -153,8 +160,14 @@ impl SceneWriter {
 
     /// What follows from cell, document and calibration together.
     fn surroundings(&self, pen: Pen<'_>) -> Result<(), RecordError> {
-        camera::write_camera(pen, &self.known)?;
-        self.known.base_from_tip.map_or(Ok(()), |tip| truth::write(pen, &self.known, &tip))
+        write_camera(pen, &self.known, self.known.camera())?;
+        if self.known.base_from_tip.is_some() { self.truth(pen) } else { Ok(()) }
+    }
+
+    /// Camera and board where they truly are; nothing where the cell does not say.
+    fn truth(&self, pen: Pen<'_>) -> Result<(), RecordError> {
+        write_camera(pen, &self.known, self.known.true_camera())?;
+        write_board(pen, &self.known, self.known.true_board())
     }
 
     fn robot(
@@ -180,14 +193,20 @@ impl SceneWriter {
         joints: Option<&JointAngles>,
     ) -> Result<(), RecordError> {
         let is_first = self.known.base_from_tip.replace(*base_from_tip).is_none();
-        robot::write_tip(pen, base_from_tip)?;
-        if let Some(joints) = joints {
-            self.arm.write(pen, base_from_tip, joints)?;
+        pen.frame(paths::TIP, base_from_tip.isometry(), style::LARGE_AXES)?;
+        if let Some(arm) = joints.and_then(|joints| posed_arm(self.known.cell.as_ref(), base_from_tip, joints)) {
+            if !self.has_solids {
+                robot::write_solids(pen)?;
+                self.has_solids = true;
+            }
+            robot::write_arm(pen, &arm)?;
         }
         if is_first {
-            truth::write(pen, &self.known, base_from_tip)
+            self.truth(pen)
         } else {
-            truth::write_camera(pen, &self.known, base_from_tip)
+            // Its lens stays as it is.
+            let camera = self.known.true_camera();
+            write_camera(pen, &self.known, camera.map(|camera| CameraItem { shape: None, ..camera }))
         }
     }
 
@@ -200,11 +219,12 @@ impl SceneWriter {
     fn picture(&mut self, pen: Pen<'_>, info: &FrameInfo, images: &FrameImages) -> Result<(), RecordError> {
         self.clock.tick(info.sim_time_s);
         self.newest_picture = Some((info.number, self.clock.sim_time_s));
-        self.known.far_plane_m = Some(info.far_plane_m);
+        self.far_plane_m = Some(info.far_plane_m);
         pen.at(self.clock.live());
         self.tip(pen, &info.base_from_tip, Some(&info.joints_rad))?;
-        if let Some(board) = &info.base_from_target_true {
-            truth::write_board(pen, &self.known, board)?;
+        if info.base_from_target_true.is_some() {
+            self.known.base_from_target_true = info.base_from_target_true;
+            write_board(pen, &self.known, self.known.true_board())?;
         }
         let mut faults = Faults::default();
         faults.tolerate(camera::write_picture(pen, &self.known, &images.rgb))?;
@@ -213,8 +233,8 @@ impl SceneWriter {
         // A negative age is a simulation that was started again.
         if age_s.is_none_or(|age| !(0.0..DEPTH_EVERY_S).contains(&age)) {
             self.depth_at_s = Some(self.clock.sim_time_s);
-            let rgb = Some(&images.rgb);
-            faults.tolerate(camera::write_depth(pen, &self.known, &info.base_from_tip, &images.depth, rgb))?;
+            let images = (&images.depth, &images.rgb);
+            faults.tolerate(camera::write_depth(pen, &self.known, &info.base_from_tip, images, self.far_plane_m))?;
         }
         faults.finish()
     }
@@ -227,10 +247,8 @@ impl SceneWriter {
         pen.write(&below(&camera::lens(&self.known), paths::CORNERS), &corner_marks(corners, style::SEEN))?;
         result::number(pen, paths::PLOT_SEARCH, Some(detection.took_s * 1e3))?;
         let board = below(paths::camera(self.known.mode()), paths::SEEN_BOARD);
-        match detection.camera_from_target.filter(|_| self.known.mount().is_some()) {
-            Some(seen) => pen.write(&board, &[&transform(&seen) as &dyn AsComponents, &axes(style::SMALL_AXES)]),
-            None => pen.write(&board, &no_axes()),
-        }
+        let seen = detection.camera_from_target.filter(|_| self.known.mount().is_some());
+        pen.frame_if(&board, seen.as_ref(), style::SMALL_AXES)
     }
 
     fn document(&mut self, pen: Pen<'_>, folder: Option<PathBuf>, document: &Arc<Document>) -> Result<(), RecordError> {
@@ -288,8 +306,8 @@ impl SceneWriter {
         }
         match self.captures.depth(&record) {
             Ok(Some((depth, rgb))) => {
-                let tip = &record.base_from_tip;
-                faults.tolerate(camera::write_depth(pen, &self.known, tip, &depth, Some(&rgb)))?;
+                let (tip, images) = (&record.base_from_tip, (&depth, &rgb));
+                faults.tolerate(camera::write_depth(pen, &self.known, tip, images, self.far_plane_m))?;
             }
             Ok(None) => {}
             Err(error) => faults.tolerate(Err(error))?,
@@ -330,7 +348,7 @@ impl SceneWriter {
         let mut faults = Faults::default();
         faults.tolerate(result::write(pen, &self.known, solved))?;
         if let Some(tip) = &self.known.base_from_tip {
-            truth::write(pen, &self.known, tip)?;
+            self.truth(pen)?;
             camera::write_prediction(pen, &self.known, tip)?;
         }
         self.captures.write_all(pen, &self.known)?;

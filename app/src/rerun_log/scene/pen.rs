@@ -1,7 +1,10 @@
 //! Writes archetypes at a time.
 
+use handeye_core::frames::Pose;
+use nalgebra::Isometry3;
 use rerun::{AsComponents, RecordingStream};
 
+use super::convert::{axes, no_axes, transform};
 use super::error::RecordError;
 use super::paths;
 
@@ -78,6 +81,24 @@ impl<'a> Pen<'a> {
     /// Writes for all times.
     pub fn write_static(self, path: &str, what: &impl AsComponents) -> Result<(), RecordError> {
         self.rec.log_static(path, what).map_err(|source| failed(path, source))
+    }
+
+    /// A frame with axes of a length in metres.
+    pub fn frame(self, path: &str, parent_from_it: &Isometry3<f64>, axes_m: f32) -> Result<(), RecordError> {
+        self.write(path, &[&transform(parent_from_it) as &dyn AsComponents, &axes(axes_m)])
+    }
+
+    /// The same of a frame that comes and goes.
+    pub fn frame_if<Dst, Src>(
+        self,
+        path: &str,
+        dst_from_src: Option<&Pose<Dst, Src>>,
+        axes_m: f32,
+    ) -> Result<(), RecordError> {
+        match dst_from_src {
+            Some(dst_from_src) => self.frame(path, dst_from_src.isometry(), axes_m),
+            None => self.write(path, &no_axes()),
+        }
     }
 
     /// From the present time on there is nothing there and below.

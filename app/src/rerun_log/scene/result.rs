@@ -1,17 +1,17 @@
 //! A calibration: the board, how uncertain it is, the numbers, and the report.
 
-use handeye_core::handeye::HandEye;
-use rerun::{AsComponents, Scalars, SeriesLines, TextDocument};
+use nalgebra::Matrix6;
+use rerun::{Scalars, SeriesLines, TextDocument};
 
-use super::camera::write_camera;
-use super::convert::{axes, board_points, ellipsoid, of_position, outline, transform};
+use super::convert::{board_points, ellipsoid, of_position};
 use super::error::RecordError;
-use super::known::Known;
+use super::items::{write_board, write_camera};
 use super::paths::{self, below};
 use super::pen::Pen;
 use super::style;
 use crate::model::Solved;
 use crate::rerun_log::report;
+use crate::scene::Known;
 
 /// Names of the series, for all times.
 pub(super) const SERIES: [(&str, &str); 11] = [
@@ -44,16 +44,15 @@ pub(super) fn named(name: &str) -> SeriesLines {
 /// The calibration that `known` has just learnt.
 pub(super) fn write(pen: Pen<'_>, known: &Known, solved: &Solved) -> Result<(), RecordError> {
     let calibration = &solved.calibration;
-    write_camera(pen, known)?;
-    if let Some(hand_eye) = &calibration.hand_eye {
-        write_board(pen, known, hand_eye, solved)?;
-        let camera = below(paths::camera(hand_eye.mode()), paths::UNCERTAINTY);
-        match &calibration.hand_eye_covariance {
-            Some(c) => {
-                pen.write(&camera, &ellipsoid(&of_position(c), style::UNCERTAINTY_FACTOR, style::ESTIMATED))?;
-            }
-            None => pen.clear(&camera)?,
+    write_camera(pen, known, known.camera())?;
+    if let Some(board) = known.board() {
+        if let Some(target) = &board.shape {
+            write_board(pen, known, Some(board))?;
+            let path = paths::board(known.mode());
+            pen.write(&below(path, paths::CORNERS), &board_points(target, style::ESTIMATED))?;
+            write_uncertainty(pen, path, calibration.target_covariance.as_ref())?;
         }
+        write_uncertainty(pen, paths::camera(known.mode()), calibration.hand_eye_covariance.as_ref())?;
     }
     number(pen, paths::PLOT_RMS, calibration.rms_px)?;
     number(pen, paths::PLOT_HELDOUT, calibration.heldout_rms_px)?;
@@ -65,19 +64,11 @@ pub(super) fn write(pen: Pen<'_>, known: &Known, solved: &Solved) -> Result<(), 
     pen.write(paths::RESULT, &TextDocument::new(json))
 }
 
-fn write_board(pen: Pen<'_>, known: &Known, hand_eye: &HandEye, solved: &Solved) -> Result<(), RecordError> {
-    let Some(target) = known.target else { return Ok(()) };
-    let path = paths::board(hand_eye.mode());
-    let place = match hand_eye {
-        HandEye::EyeInHand { base_from_target, .. } => transform(base_from_target),
-        HandEye::EyeToHand { tip_from_target, .. } => transform(tip_from_target),
-    };
-    pen.write(path, &[&place as &dyn AsComponents, &axes(style::AXES)])?;
-    pen.write(&below(path, paths::OUTLINE), &outline(&target, style::ESTIMATED))?;
-    pen.write(&below(path, paths::CORNERS), &board_points(&target, style::ESTIMATED))?;
-    let uncertainty = below(path, paths::UNCERTAINTY);
-    match &solved.calibration.target_covariance {
-        Some(c) => pen.write(&uncertainty, &ellipsoid(&of_position(c), style::UNCERTAINTY_FACTOR, style::ESTIMATED)),
-        None => pen.clear(&uncertainty),
+/// Where a camera or a board may be.
+fn write_uncertainty(pen: Pen<'_>, path: &str, covariance: Option<&Matrix6<f64>>) -> Result<(), RecordError> {
+    let path = below(path, paths::UNCERTAINTY);
+    match covariance {
+        Some(c) => pen.write(&path, &ellipsoid(&of_position(c), style::UNCERTAINTY_FACTOR, style::ESTIMATED)),
+        None => pen.clear(&path),
     }
 }

@@ -2,15 +2,14 @@
 
 use rerun::Color;
 
+use crate::scene::Role;
+
 /// Uncertainties of a calibration are drawn this many times their size, or nothing of them would be seen.
 pub const UNCERTAINTY_FACTOR: f64 = 100.0;
 /// The same for a tracked board, of which less is known.
 pub const TRACK_UNCERTAINTY_FACTOR: f64 = 10.0;
 /// Residuals are drawn this many times their length: a tenth of a pixel is five.
 pub const RESIDUAL_FACTOR: f64 = 50.0;
-/// A view whose residual is this many times that of the median view is as red as it gets. It is also where a view
-/// starts to be named in the findings.
-pub const RED_AT_MEDIANS: f64 = 3.0;
 
 /// Axes of base and tip.
 pub const LARGE_AXES: f32 = 0.1;
@@ -53,6 +52,15 @@ pub const TRACKED: Color = colour(190, 120, 255);
 pub const PAST_WAY: Color = colour(110, 120, 140);
 /// The way of the tip since the cell was connected.
 pub const WAY: Color = colour(90, 200, 230);
+
+/// The colour of what is known in some way.
+pub(super) fn of(role: Role) -> Color {
+    match role {
+        Role::Calibrated | Role::Said => ESTIMATED,
+        Role::Tracked => TRACKED,
+        Role::True => TRUE,
+    }
+}
 
 const fn colour(red: u8, green: u8, blue: u8) -> Color {
     Color(rerun::Rgba32::from_rgb(red, green, blue))

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use handeye_core::session::{CaptureId, Document};
 use handeye_core::track::{Estimate, State, Update};
-use handeye_sim_link::cell::scene::Scene;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use rerun::RecordingStreamBuilder;
 use rerun::log::{Chunk, LogMsg};
@@ -315,34 +314,18 @@ fn a_board_that_is_lost_is_no_longer_there() {
 }
 
 #[test]
-fn the_arm_is_drawn_where_it_stands_or_not_at_all() {
-    let scene = Scene::reference().and_then(|scene| scene.resolve(0)).expect("the built-in scene");
-    let bent = [0.4, 0.6, -1.1, 0.2, 1.5, 0.3];
-    let pen_and = |arm: &mut Arm, base_from_tip: &Pose<Base, Tip>, joints: &JointAngles| {
-        let bench = Bench::new();
-        arm.write(Pen::new(&bench.rec), base_from_tip, joints).expect("written");
-        bench.written().contains_key("/base/arm/link_6")
-    };
-    // The arm of the built-in scene, at once.
-    assert!(pen_and(&mut Arm::new(), &scene.reported_tip(&bent), &bent));
-
-    // One that stands elsewhere, once two configurations agree.
-    let shift = nalgebra::Isometry3::translation(1.0, 0.0, 0.0);
-    let elsewhere = |joints: &JointAngles| Pose::from_isometry(shift * scene.reported_tip(joints).isometry());
-    let mut arm = Arm::new();
-    arm.reconnected(true);
-    assert!(!pen_and(&mut arm, &elsewhere(&scene.start_joints), &scene.start_joints));
-    assert!(pen_and(&mut arm, &elsewhere(&bent), &bent));
-
-    // A longer tool is not known, and an arm that ends beside its tip would be a lie.
-    let longer = |joints: &JointAngles| {
-        Pose::from_isometry(scene.reported_tip(joints).isometry() * nalgebra::Translation3::new(0.0, 0.0, 0.1))
-    };
-    let mut arm = Arm::new();
-    arm.reconnected(true);
-    assert!(!pen_and(&mut arm, &longer(&scene.start_joints), &scene.start_joints));
-    assert!(!pen_and(&mut arm, &longer(&bent), &bent));
-    assert!(!pen_and(&mut arm, &longer(&scene.start_joints), &scene.start_joints));
+fn the_arm_has_its_solids_once_and_its_links_with_every_configuration() {
+    let model = sample::tracking();
+    let mut bench = Bench::new();
+    bench.write(&Entry::Cell(Arc::new(model.cell.clone().expect("connected"))));
+    let first = bench.write(&robot(&model));
+    assert!(first["/base/arm"].components.contains("Transform3D:translation"));
+    assert!(first.contains_key("/base/arm/link_2/housings") && first.contains_key("/base/arm/link_2/tubes"));
+    let second = bench.write(&robot(&model));
+    assert!(second.contains_key("/base/arm/link_6") && !second.contains_key("/base/arm/link_2/housings"));
+    let other = CellFacts { arm: None, ..model.cell.clone().expect("connected") };
+    bench.write(&Entry::Cell(Arc::new(other)));
+    assert!(!bench.write(&robot(&model)).contains_key("/base/arm"), "an arm of another kind");
 }
 
 #[test]

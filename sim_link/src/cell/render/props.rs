@@ -62,21 +62,26 @@ const PARTS: [Part; 19] = [
 /// `motion_of_link(n)` is `base_from_link_n(q) · base_from_link_n(0)⁻¹`, what the joints 1 to n do to points that are
 /// given in the base frame at zero angles; for n = 0 the identity.
 pub fn ur5(world_from_base: &Isometry3<f64>, motion_of_link: impl Fn(usize) -> Isometry3<f64>) -> Vec<Solid> {
-    PARTS
-        .iter()
-        .map(|part| {
-            let world_from_part = world_from_base * motion_of_link(part.link);
-            let (a, b) = (Point3::from(part.from), Point3::from(part.to));
-            let solid = if part.round {
-                Solid::new(Shape::Capsule { a, b, radius: part.radius }, world_from_part, part.colour)
-            } else {
-                let (shape, part_from_shape) = cylinder_between(&a, &b, part.radius);
-                Solid::new(shape, world_from_part * part_from_shape, part.colour)
-            };
-            let finish = if part.colour == ALUMINIUM && !part.round { Finish::Brushed } else { Finish::Satin };
-            solid.with_finish(finish)
-        })
-        .collect()
+    let placed = |(link, solid): (usize, Solid)| {
+        let world_from_shape = world_from_base * motion_of_link(link) * solid.world_from_shape;
+        Solid { world_from_shape, ..solid }
+    };
+    ur5_parts().map(placed).collect()
+}
+
+/// Its solids in its base frame at zero angles, each with the number of its link.
+pub fn ur5_parts() -> impl Iterator<Item = (usize, Solid)> {
+    PARTS.iter().map(|part| {
+        let (a, b) = (Point3::from(part.from), Point3::from(part.to));
+        let solid = if part.round {
+            Solid::new(Shape::Capsule { a, b, radius: part.radius }, Isometry3::identity(), part.colour)
+        } else {
+            let (shape, base_from_shape) = cylinder_between(&a, &b, part.radius);
+            Solid::new(shape, base_from_shape, part.colour)
+        };
+        let finish = if part.colour == ALUMINIUM && !part.round { Finish::Brushed } else { Finish::Satin };
+        (part.link, solid.with_finish(finish))
+    })
 }
 
 /// The cylinder from `a` to `b` and the pose of its frame.

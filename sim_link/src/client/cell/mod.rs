@@ -42,7 +42,7 @@ pub use jog_plan::{
     JOINT_SPEED as JOG_JOINT_SPEED_RAD_S, JogObstacle, LINE_SPEED as JOG_LINE_SPEED_M_S,
     TURN_SPEED as JOG_TURN_SPEED_RAD_S,
 };
-pub use reach::{ArmKinematics, UnknownKinematics};
+pub use reach::{ArmChain, ArmKinematics, UnknownKinematics};
 pub use room::{BoardReach, FollowPlace, NoPlace};
 pub use support::{Support, version_name};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};

@@ -2,6 +2,7 @@
 
 use handeye_core::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::{Arm, CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles};
 use crate::cell::kinematics::{self, DlsOptions, IkError, JointLimits};
@@ -26,11 +27,33 @@ const ATTEMPTS: u32 = 5;
 /// Objects between the tip and the last joint, at most; more is a loop.
 const LONGEST_CHAIN: usize = 32;
 
-/// The kinematics of the arm in a scene: the built-in one of a UR5 between where the arm stands and where its tip is.
+/// The chain from the base to the tip of a UR5: the built-in kinematics lies between its two ends.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ArmChain {
+    /// Where the arm stands.
+    pub base_from_arm: Isometry3<f64>,
+    /// How it carries its tip.
+    pub connection_from_tip: Isometry3<f64>,
+}
+
+impl ArmChain {
+    /// Where the tip is with the joints at `joints` (rad).
+    pub fn tip(&self, joints: &JointAngles) -> Pose<Base, Tip> {
+        let arm_from_connection = kinematics::forward(joints).arm_from_connection;
+        Pose::from_isometry(self.base_from_arm * arm_from_connection * self.connection_from_tip)
+    }
+
+    /// Whether a reported tip is where it should be with these joints: the scene may have changed since.
+    pub fn fits(&self, joints: &JointAngles, base_from_tip: &Pose<Base, Tip>) -> bool {
+        let (distance_m, angle_rad) = self.tip(joints).distance_to(base_from_tip);
+        distance_m <= TIP_TOLERANCE_M && angle_rad <= TIP_TOLERANCE_RAD
+    }
+}
+
+/// The kinematics of the arm in a scene: its chain, and how far its joints turn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmKinematics {
-    base_from_arm: Isometry3<f64>,
-    connection_from_tip: Isometry3<f64>,
+    chain: ArmChain,
     limits: JointLimits,
 }
 
@@ -71,7 +94,7 @@ pub enum UnknownKinematics {
 impl ArmKinematics {
     /// For an arm that stands at `base_from_arm` and carries its tip at `connection_from_tip`.
     pub fn new(base_from_arm: Isometry3<f64>, connection_from_tip: Isometry3<f64>, limits: JointLimits) -> Self {
-        Self { base_from_arm, connection_from_tip, limits }
+        Self { chain: ArmChain { base_from_arm, connection_from_tip }, limits }
     }
 
     /// Ranges of the joints; infinite for one that turns without end.
@@ -79,20 +102,14 @@ impl ArmKinematics {
         &self.limits
     }
 
-    /// Where the arm stands.
-    pub(super) fn base_from_arm(&self) -> &Isometry3<f64> {
-        &self.base_from_arm
+    /// Where the arm stands, and how it carries its tip.
+    pub fn chain(&self) -> &ArmChain {
+        &self.chain
     }
 
-    /// How it carries its tip.
-    pub(super) fn connection_from_tip(&self) -> &Isometry3<f64> {
-        &self.connection_from_tip
-    }
-
-    /// Where the tip is with the joints at `joints` (rad).
+    /// See [`ArmChain::tip`].
     pub fn tip(&self, joints: &JointAngles) -> Pose<Base, Tip> {
-        let arm_from_connection = kinematics::forward(joints).arm_from_connection;
-        Pose::from_isometry(self.base_from_arm * arm_from_connection * self.connection_from_tip)
+        self.chain.tip(joints)
     }
 
     /// The joint positions (rad) nearest to `seed` that put the tip to `goal`.
@@ -113,21 +130,16 @@ impl ArmKinematics {
         if !goal.is_finite() {
             return Err(IkError::NotFinite);
         }
-        let arm_from_connection = self.base_from_arm.inverse() * goal.isometry() * self.connection_from_tip.inverse();
+        let ArmChain { base_from_arm, connection_from_tip } = &self.chain;
+        let arm_from_connection = base_from_arm.inverse() * goal.isometry() * connection_from_tip.inverse();
         kinematics::inverse_nearest(&arm_from_connection, seed, limits)
     }
 
     /// The joint positions (rad), found from `seed` on, that take the tip as near to `goal` as the arm can.
     pub(super) fn towards(&self, goal: &Pose<Base, Tip>, seed: &JointAngles) -> JointAngles {
-        let arm_from_tip = self.base_from_arm.inverse() * goal.isometry();
+        let arm_from_tip = self.chain.base_from_arm.inverse() * goal.isometry();
         let options = DlsOptions { precision_m: 1e-6, precision_rad: 1e-6, ..DlsOptions::default() };
-        kinematics::towards(&arm_from_tip, &self.connection_from_tip, seed, &options, &self.limits)
-    }
-
-    /// Whether a reported tip is where it should be with these joints: the scene may have changed since.
-    pub fn fits(&self, joints: &JointAngles, base_from_tip: &Pose<Base, Tip>) -> bool {
-        let (distance_m, angle_rad) = self.tip(joints).distance_to(base_from_tip);
-        distance_m <= TIP_TOLERANCE_M && angle_rad <= TIP_TOLERANCE_RAD
+        kinematics::towards(&arm_from_tip, &self.chain.connection_from_tip, seed, &options, &self.limits)
     }
 }
 

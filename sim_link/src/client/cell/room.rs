@@ -206,7 +206,7 @@ impl ArmKinematics {
 
     /// The share of its limits of speed that the tip can have in every direction at once, so that no joint is too fast.
     fn share_of_limits(&self, limits: &FollowLimits, joints: &JointAngles) -> f64 {
-        let Some(per_twist) = jacobian_at(joints, self.connection_from_tip()).try_inverse() else { return 0.0 };
+        let Some(per_twist) = jacobian_at(joints, &self.chain().connection_from_tip).try_inverse() else { return 0.0 };
         let fastest = per_twist
             .row_iter()
             .map(|row| {

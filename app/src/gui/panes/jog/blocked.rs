@@ -36,7 +36,7 @@ impl Blocked {
         } else {
             None
         };
-        let knows_kinematics = model.cell.as_ref().is_none_or(|cell| cell.kinematics_known);
+        let knows_kinematics = model.cell.as_ref().is_none_or(|cell| cell.arm.is_some());
         let tip = arm.or_else(|| {
             (!knows_kinematics)
                 .then(|| tr!(language, "This arm's kinematics is not known, so only its joints can be moved"))

@@ -214,7 +214,7 @@ fn a_simulation_that_rests_is_said_and_can_be_started() {
 fn an_arm_of_unknown_kinematics_has_its_joints_jogged_only() {
     let mut model = sample::connected();
     if let Some(cell) = &mut model.cell {
-        cell.kinematics_known = false;
+        cell.arm = None;
     }
     let pane = driven(model);
     assert!(pane.sees("kinematics is not known"));

@@ -7,6 +7,7 @@ use nalgebra::{Point3, Vector2, Vector3};
 
 use super::canvas::Canvas;
 use crate::gui::theme::Palette;
+use crate::scene::outline;
 
 /// Corners of a dot of a board of dots.
 const DOT_CORNERS: usize = 12;
@@ -19,14 +20,6 @@ const MARGIN: f64 = 0.6;
 fn size_m(target: &TargetSpec) -> f64 {
     let [first, _, third, _] = outline(target, MARGIN);
     0.6 * (third - first).norm()
-}
-
-/// The corners of the pattern, wider by a part of a square.
-fn outline(target: &TargetSpec, margin: f64) -> [Point3<f64>; 4] {
-    let before = (1.0 + margin) * target.grid().square_m;
-    let far = target.extent().add_scalar(before);
-    let at = |x: f64, y: f64| Point3::new(x, y, 0.0);
-    [at(-before, -before), at(far.x, -before), at(far.x, far.y), at(-before, far.y)]
 }
 
 /// The dark parts of the pattern; markers without their codes, which nobody reads at this size.

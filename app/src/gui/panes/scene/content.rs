@@ -1,8 +1,7 @@
 //! What there is to see in the cell, and what of it is known how.
 
 use egui::{Color32, Stroke, Ui};
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::handeye::HandEye;
+use handeye_core::frames::Pose;
 use handeye_core::session::CaptureId;
 use nalgebra::Point3;
 
@@ -17,6 +16,7 @@ use crate::gui::captures::CaptureTable;
 use crate::gui::marks::Marks;
 use crate::gui::theme::Palette;
 use crate::model::Model;
+use crate::scene::{BoardItem, CameraItem, Known, Role, posed_arm};
 use crate::text::Language;
 use crate::{text, tr};
 
@@ -24,44 +24,6 @@ use crate::{text, tr};
 const CAMERA_LENGTH_M: f64 = 0.2;
 /// Length of the axes of tip and camera \[m\].
 const AXES_M: f64 = 0.08;
-
-/// Where a pose comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum KnownBy {
-    /// The calibration.
-    Calibration,
-    /// What the cell says of itself.
-    Cell,
-}
-
-/// The camera when the robot reports a pose: by the calibration, or else by what the cell says of it.
-pub fn base_from_camera(model: &Model, base_from_tip: &Pose<Base, Tip>) -> Option<(Pose<Base, Camera>, KnownBy)> {
-    if let Some(calibrated) = model.calibrated() {
-        return Some((calibrated.base_from_camera(base_from_tip), KnownBy::Calibration));
-    }
-    let truth = model.cell.as_ref()?.truth.as_ref()?;
-    Some((*base_from_tip * truth.tip_from_camera, KnownBy::Cell))
-}
-
-/// The board by the calibration: where it stood, or on the tip where it is now.
-fn calibrated_board(model: &Model) -> Option<Pose<Base, Target>> {
-    match model.calibrated()?.hand_eye {
-        HandEye::EyeInHand { base_from_target, .. } => Some(base_from_target),
-        HandEye::EyeToHand { tip_from_target, .. } => Some(model.robot.as_ref()?.base_from_tip * tip_from_target),
-    }
-}
-
-/// The board as it is tracked now.
-fn tracked_board(model: &Model) -> Option<Pose<Base, Target>> {
-    let newest = model.track.newest.as_ref().filter(|_| model.track.on)?;
-    newest.update.estimate.as_ref().map(|estimate| estimate.base_from_target)
-}
-
-/// The board where a simulated cell says that it is, as new as possible.
-fn true_board(model: &Model) -> Option<Pose<Base, Target>> {
-    let of_frame = model.frame.as_ref().and_then(|frame| frame.info.base_from_target_true);
-    of_frame.or_else(|| model.cell.as_ref()?.truth.as_ref()?.base_from_target)
-}
 
 /// Whether there is anything of the cell to draw.
 pub fn is_empty(model: &Model) -> bool {
@@ -82,12 +44,15 @@ pub fn draw(canvas: &mut Canvas, ui: &Ui, model: &Model, table: &CaptureTable, p
     ground::ground(canvas, palette, marks.axes);
     let mut entries = Vec::new();
     trail(canvas, model, palette, &mut entries);
-    arm::arm(canvas, model, palette);
+    let known = Known::of(model);
     if let Some(robot) = model.robot.as_ref().filter(|robot| robot.base_from_tip.is_finite()) {
+        if let Some(posed) = posed_arm(model.cell.as_ref(), &robot.base_from_tip, &robot.joints_rad) {
+            arm::arm(canvas, &posed, palette);
+        }
         canvas.axes(robot.base_from_tip.isometry(), AXES_M, 2.2, marks.axes);
     }
-    live_camera(canvas, model, palette, &mut entries);
-    let spots = captures::captures(canvas, model, table, palette, marks, pointed);
+    live_camera(canvas, &known, language, palette, &mut entries);
+    let spots = captures::captures(canvas, model, &known, palette, marks, pointed);
     if !table.rows.is_empty() {
         entries.push(Entry {
             sign: Sign::Frustum,
@@ -102,7 +67,7 @@ pub fn draw(canvas: &mut Canvas, ui: &Ui, model: &Model, table: &CaptureTable, p
             .to_owned(),
         });
     }
-    boards(canvas, model, palette, marks, &mut entries);
+    boards(canvas, &known, language, (palette, marks), &mut entries);
     entries.push(grid_entry(palette, language));
     Drawn { entries, spots }
 }
@@ -121,71 +86,65 @@ fn grid_entry(palette: &Palette, language: Language) -> Entry {
     }
 }
 
-fn live_camera(canvas: &mut Canvas, model: &Model, palette: &Palette, entries: &mut Vec<Entry>) {
-    let language = model.view.language;
+fn live_camera(canvas: &mut Canvas, known: &Known, language: Language, palette: &Palette, entries: &mut Vec<Entry>) {
     // A camera that stands still is known without the robot.
-    let base_from_tip = model.robot.as_ref().map_or_else(Pose::identity, |robot| robot.base_from_tip);
-    let is_fixed = matches!(model.calibrated().map(|it| it.hand_eye), Some(HandEye::EyeToHand { .. }));
-    if (model.robot.is_none() && !is_fixed) || !base_from_tip.is_finite() {
-        return;
-    }
-    let (Some((base_from_camera, from)), Some(intrinsics)) =
-        (base_from_camera(model, &base_from_tip), model.intrinsics())
-    else {
-        return;
-    };
+    let Some(CameraItem { role, place, shape: Some(intrinsics) }) = known.camera() else { return };
+    let Some(base_from_camera) = place.in_base(known.base_from_tip.as_ref()).filter(Pose::is_finite) else { return };
     let frustum = Frustum { base_from_camera, intrinsics: &intrinsics, length_m: CAMERA_LENGTH_M };
     let colour = palette.good;
     frustum.draw(canvas, 1.8, colour, colour.gamma_multiply(0.10));
-    let (name, what) = match from {
-        KnownBy::Calibration => (
+    let (name, what) = if role == Role::Calibrated {
+        (
             tr!(language, "Camera"),
             tr!(language, "The camera where the calibration has it, and what it sees up to 200 mm in front of it"),
-        ),
-        KnownBy::Cell => (
+        )
+    } else {
+        (
             tr!(language, "Camera, as the cell says"),
             tr!(language, "There is no calibration yet: this is where the simulated cell says that its camera is"),
-        ),
+        )
     };
     entries.push(Entry { sign: Sign::Frustum, colour, name: name.to_owned(), what: what.to_owned() });
 }
 
-fn boards(canvas: &mut Canvas, model: &Model, palette: &Palette, marks: &Marks, entries: &mut Vec<Entry>) {
-    let language = model.view.language;
-    let target = model.document().meta.target;
-    let (calibrated, tracked) = (calibrated_board(model), tracked_board(model));
-    if let Some(pose) = tracked.filter(Pose::is_finite) {
-        board::printed(canvas, &pose, &target, palette);
-        board::outlined(canvas, &pose, &target, (2.0, marks.predicted), Line::Solid);
-        entries.push(Entry {
-            sign: Sign::Board,
-            colour: marks.predicted,
-            name: tr!(language, "Board, tracked").to_owned(),
-            what: tr!(language, "The board where tracking has it now").to_owned(),
-        });
-    }
-    if let Some(pose) = calibrated.filter(Pose::is_finite) {
-        if tracked.is_none() {
-            board::printed(canvas, &pose, &target, palette);
-        } else {
-            board::outlined(canvas, &pose, &target, (1.2, palette.weak), Line::Solid);
-        }
-        entries.push(Entry {
-            sign: if tracked.is_none() { Sign::Board } else { Sign::Line },
-            colour: palette.weak,
-            name: tr!(language, "Board, calibrated").to_owned(),
-            what: tr!(language, "The board where the calibration found it in its captures").to_owned(),
-        });
-    }
-    if let Some(pose) = true_board(model).filter(Pose::is_finite) {
-        board::outlined(canvas, &pose, &target, (1.8, marks.truth), Line::Dashed);
-        entries.push(Entry {
-            sign: Sign::Dashes,
-            colour: marks.truth,
-            name: tr!(language, "Board, true").to_owned(),
-            what: tr!(language, "Where the simulated cell says that its board is. It is only compared with.")
-                .to_owned(),
-        });
+fn boards(
+    canvas: &mut Canvas,
+    known: &Known,
+    language: Language,
+    (palette, marks): (&Palette, &Marks),
+    entries: &mut Vec<Entry>,
+) {
+    // Of a board that is tracked the pattern is there.
+    let mut has_pattern = false;
+    for BoardItem { role, place, shape } in known.boards() {
+        let Some(target) = &shape else { continue };
+        let Some(pose) = place.in_base(known.base_from_tip.as_ref()).filter(Pose::is_finite) else { continue };
+        let (sign, colour, name, what) = match role {
+            Role::Tracked => {
+                board::printed(canvas, &pose, target, palette);
+                board::outlined(canvas, &pose, target, (2.0, marks.predicted), Line::Solid);
+                has_pattern = true;
+                let what = tr!(language, "The board where tracking has it now");
+                (Sign::Board, marks.predicted, tr!(language, "Board, tracked"), what)
+            }
+            Role::Calibrated | Role::Said => {
+                let sign = if has_pattern {
+                    board::outlined(canvas, &pose, target, (1.2, palette.weak), Line::Solid);
+                    Sign::Line
+                } else {
+                    board::printed(canvas, &pose, target, palette);
+                    Sign::Board
+                };
+                let what = tr!(language, "The board where the calibration found it in its captures");
+                (sign, palette.weak, tr!(language, "Board, calibrated"), what)
+            }
+            Role::True => {
+                board::outlined(canvas, &pose, target, (1.8, marks.truth), Line::Dashed);
+                let what = tr!(language, "Where the simulated cell says that its board is. It is only compared with.");
+                (Sign::Dashes, marks.truth, tr!(language, "Board, true"), what)
+            }
+        };
+        entries.push(Entry { sign, colour, name: name.to_owned(), what: what.to_owned() });
     }
 }
 

@@ -174,7 +174,7 @@ fn the_arm_says_why_it_cannot_follow() {
     blocked(|model| model.track.on = false, "Start tracking first");
     blocked(|model| model.mover = LinkState::Failed { why: "gone".to_owned() }, "the arm cannot be moved until");
     blocked(|model| model.touring = true, "A tour is under way");
-    let unknown = |model: &mut Model| model.cell.iter_mut().for_each(|cell| cell.kinematics_known = false);
+    let unknown = |model: &mut Model| model.cell.iter_mut().for_each(|cell| cell.arm = None);
     blocked(unknown, "This arm's kinematics is not known");
     let rests = |model: &mut Model| model.robot.iter_mut().for_each(|it| it.simulation = Simulation::Stopped);
     blocked(rests, "The simulation is stopped");

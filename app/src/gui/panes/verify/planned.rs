@@ -56,7 +56,7 @@ fn blocked(model: &Model) -> Option<&'static str> {
         Some(tr!(language, "There is no calibration to verify yet."))
     } else if is_hand {
         Some(tr!(language, "Poses are planned for a camera on the tip only: take these captures yourself"))
-    } else if model.cell.as_ref().is_none_or(|cell| !cell.kinematics_known) {
+    } else if model.cell.as_ref().is_none_or(|cell| cell.arm.is_none()) {
         Some(tr!(
             language,
             "This arm's kinematics is not known, so no poses can be planned: take these captures yourself"

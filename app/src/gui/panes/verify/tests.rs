@@ -135,7 +135,7 @@ fn captures_at_planned_poses_are_offered_where_they_can_be_taken_and_say_what_is
     is_blocked(|model| model.solve.solved = None);
     is_blocked(|model| model.mover = LinkState::Failed { why: "gone".to_owned() });
     is_blocked(|model| model.camera = LinkState::Failed { why: "gone".to_owned() });
-    is_blocked(|model| model.cell.iter_mut().for_each(|cell| cell.kinematics_known = false));
+    is_blocked(|model| model.cell.iter_mut().for_each(|cell| cell.arm = None));
     is_blocked(|model| {
         model.motion = crate::model::Motion::Jogging(crate::model::Jog::Joint { index: 0, forward: true });
     });
