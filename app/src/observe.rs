@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use handeye_core::calibrate::{CameraKnowledge, Observations, ObservedView};
+use handeye_core::calibrate::Observations;
 use handeye_core::dataset::{Dataset, DatasetError, Entry};
 use handeye_core::image::GrayImage;
 use handeye_core::image_file::gray_from_rgb;
@@ -48,29 +48,9 @@ pub fn observe(dataset: &Dataset, progress: Progress<'_>, cancel: &CancelToken) 
     if let Some(Err(why)) = dataset.arm.as_ref().map(|arm| &arm.placement) {
         tracing::warn!("the joint angles are not used: {why}");
     }
-    let corners =
+    let mut corners =
         of_each(dataset.entries.len(), progress, cancel, |index| corners_of(dataset, &dataset.entries[index]))?;
-    let views = dataset
-        .entries
-        .iter()
-        .zip(corners)
-        .map(|(entry, corners)| ObservedView {
-            name: entry.name.clone(),
-            base_from_tip: entry.base_from_tip,
-            corners,
-            tip_by_joint: entry.tip_by_joint.clone(),
-            camera_from_target: entry.camera_from_target,
-            in_fit: true,
-        })
-        .collect();
-    Ok(Observations {
-        mode: dataset.mode,
-        target: dataset.target,
-        // Only pose pairs come without a size, and they need none.
-        image_size: dataset.image_size.unwrap_or_default(),
-        camera: CameraKnowledge::of(dataset.camera.as_ref()),
-        views,
-    })
+    Ok(dataset.observations(|index| corners[index].take()))
 }
 
 /// Loads the image of every capture of a session and finds the target in it, on all cores. Also of those that are not in the
@@ -115,10 +95,8 @@ fn of_each<T: Send>(
 }
 
 fn corners_of(dataset: &Dataset, entry: &Entry) -> Result<Option<Vec<Corner>>, ObserveError> {
-    if let Some(corners) = &entry.corners {
-        return Ok((!corners.is_empty()).then(|| corners.clone()));
-    }
-    if entry.image_path.is_none() {
+    // A corner table says what was found in each image.
+    if entry.corners.is_some() || entry.image_path.is_none() {
         return Ok(None);
     }
     detect(&dataset.load_gray(entry)?, &dataset.target, &entry.name)

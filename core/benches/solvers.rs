@@ -7,7 +7,6 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use handeye_core::board_shape::BoardPoints;
 use handeye_core::calibrate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
 use handeye_core::camera::{Distortion, Intrinsics};
 use handeye_core::frames::Pose;
@@ -97,8 +96,7 @@ fn projection(c: &mut Criterion) {
 fn intrinsics(c: &mut Criterion) {
     let mut group = c.benchmark_group("intrinsics");
     group.sample_size(10).measurement_time(Duration::from_secs(5));
-    let points: Vec<Point3<f64>> = (0..GRID.len()).map(|i| GRID.point(i)).collect();
-    let board = BoardPoints::new(&points);
+    let target = TargetSpec::Chessboard(GRID);
     for lens in LENSES {
         for count in [10, 100, 1_000, 10_000] {
             if count > 100 && lens.name() != "brown_conrady" {
@@ -110,7 +108,7 @@ fn intrinsics(c: &mut Criterion) {
             group.throughput(Throughput::Elements(count as u64));
             group.bench_with_input(BenchmarkId::new(lens.name(), count), &seen, |b, seen| {
                 let cancel = CancelToken::default();
-                b.iter(|| solve(black_box(seen), &board, SIZE, &Options::new(lens), &cancel).expect("solves"));
+                b.iter(|| solve(black_box(seen), &target, SIZE, &Options::new(lens), &cancel).expect("solves"));
             });
         }
     }

@@ -9,7 +9,6 @@
 
 use std::error::Error;
 
-use handeye_core::board_shape::BoardPoints;
 use handeye_core::calibrate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
 use handeye_core::camera::Distortion;
 use handeye_core::frames::Pose;
@@ -100,10 +99,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let CameraKnowledge::Estimate { model, .. } = observations.camera else { return Err("no model".into()) };
     let seen: Vec<SeenView<'_>> =
         observations.views.iter().filter_map(|v| v.corners.as_deref()).map(SeenView::unweighted).collect();
-    let board = BoardPoints::new(&observations.target.points());
     let cancel = CancelToken::default();
     let (found, seconds) =
-        timed(repeats, || solve(&seen, &board, observations.image_size, &Options::new(model), &cancel))?;
+        timed(repeats, || solve(&seen, &observations.target, observations.image_size, &Options::new(model), &cancel))?;
     let memory_mb = usage().map(|(_, megabytes)| megabytes);
     let whole = if observations.views.len() <= MOST_WHOLE {
         Some(timed(repeats, || calibrate(&observations, Method::Joint, &cancel))?.1)

@@ -16,10 +16,14 @@ pub struct BoardShape {
     pub scale: f64,
 }
 
-impl Default for BoardShape {
+impl BoardShape {
     /// Flat and of the stated size.
+    pub const FLAT: Self = Self { warp_m: [0.0, 0.0], scale: 1.0 };
+}
+
+impl Default for BoardShape {
     fn default() -> Self {
-        Self { warp_m: [0.0, 0.0], scale: 1.0 }
+        Self::FLAT
     }
 }
 

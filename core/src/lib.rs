@@ -6,7 +6,6 @@
 pub mod arm;
 pub mod atomic_file;
 pub mod board_shape;
-#[cfg(feature = "opencv")]
 pub mod calibrate;
 pub mod camera;
 pub mod capture;
@@ -14,10 +13,8 @@ pub mod coverage;
 pub mod dataset;
 pub mod depth;
 mod digest;
-#[cfg(feature = "opencv")]
 pub mod doctor;
 pub mod export;
-#[cfg(feature = "opencv")]
 pub mod findings;
 pub mod findings_record;
 pub mod frames;
@@ -27,8 +24,8 @@ pub mod intrinsics;
 mod json_text;
 pub mod observation;
 pub mod own_folder;
+pub mod planar_pose;
 pub mod poses_file;
-#[cfg(feature = "opencv")]
 pub mod print;
 pub mod progress;
 pub mod result;
@@ -38,9 +35,7 @@ pub mod statistics;
 pub mod target;
 #[cfg(feature = "testing")]
 pub mod testing;
-#[cfg(feature = "opencv")]
 pub mod track;
-#[cfg(feature = "opencv")]
 pub mod verify;
 #[cfg(feature = "opencv")]
 pub mod vision;

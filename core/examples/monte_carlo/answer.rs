@@ -7,8 +7,9 @@ use handeye_core::frames::{Camera, Mount, Pose};
 use handeye_core::handeye::closed_form::{self, ClosedFormSolution};
 use handeye_core::handeye::joint::{self, Free, JointProblem, JointStart, Noise, SmallSample};
 use handeye_core::handeye::{PosePair, quality};
+use handeye_core::intrinsics::{self, Options, SeenView};
+use handeye_core::planar_pose;
 use handeye_core::progress::CancelToken;
-use handeye_core::vision::{intrinsics, pnp};
 use nalgebra::{Matrix6, Point3};
 
 use super::scene::{BOARD, Trial};
@@ -45,9 +46,9 @@ pub struct Start {
 pub fn start(trial: &Trial) -> Result<Start, String> {
     let size = (trial.intrinsics.width, trial.intrinsics.height);
     let lens = if trial.cell.free_intrinsics {
-        let corners: Vec<_> = trial.views.iter().map(|v| v.corners.as_slice()).collect();
-        let model = Distortion::BrownConrady([0.0; 5]);
-        intrinsics::calibrate(&corners, &BOARD, size, model, None).map_err(|e| e.to_string())?.intrinsics
+        let seen: Vec<_> = trial.views.iter().map(|v| SeenView::unweighted(&v.corners)).collect();
+        let options = Options::new(Distortion::BrownConrady([0.0; 5]));
+        intrinsics::solve(&seen, &BOARD, size, &options, &CancelToken::default()).map_err(|e| e.to_string())?.intrinsics
     } else {
         trial.intrinsics
     };
@@ -55,7 +56,8 @@ pub fn start(trial: &Trial) -> Result<Start, String> {
         .views
         .iter()
         .map(|view| {
-            let pose = pnp::solve(&view.corners, &BOARD, &lens).map_err(|e| e.to_string())?.best.camera_from_target;
+            let pose =
+                planar_pose::solve(&view.corners, &BOARD, &lens).map_err(|e| e.to_string())?.best.camera_from_target;
             let anchor_from_mount = trial.cell.mode.anchor_from_mount(&view.base_from_tip);
             Ok(PosePair { anchor_from_mount, camera_from_target: pose })
         })

@@ -5,11 +5,9 @@ use super::{CalibrateError, CameraKnowledge, Observations};
 use crate::camera::Intrinsics;
 use crate::frames::{Camera, Pose, Target};
 use crate::handeye::HandEyeError;
-use crate::intrinsics::Options;
-use crate::observation::Corner;
+use crate::intrinsics::{self, IntrinsicsError, Options, SeenView};
+use crate::planar_pose;
 use crate::progress::{Stage, Work};
-use crate::vision::intrinsics::{PinholeSigma, calibrate_with};
-use crate::vision::{VisionError, pnp};
 
 /// Camera and target poses.
 pub struct Lens {
@@ -27,24 +25,22 @@ impl Lens {
             CameraKnowledge::Fixed(intrinsics) => Self::given(intrinsics, observations, seen, work),
             CameraKnowledge::Estimate { model, start } => {
                 work.report(Stage::Intrinsics, 0, 1);
-                let corners: Vec<&[Corner]> = seen.iter().map(|s| s.corners).collect();
+                let views: Vec<SeenView<'_>> = seen.iter().map(|s| SeenView::unweighted(s.corners)).collect();
                 let options = Options { start, ..Options::new(model) };
                 let (target, size) = (&observations.target, observations.image_size);
-                let found =
-                    calibrate_with(&corners, &[], target, size, &options, work.cancel).map_err(|e| match e {
-                        VisionError::Cancelled => CalibrateError::from(HandEyeError::Cancelled),
-                        other => other.into(),
-                    })?;
+                let found = intrinsics::solve(&views, target, size, &options, work.cancel).map_err(|e| match e {
+                    IntrinsicsError::Cancelled => CalibrateError::from(HandEyeError::Cancelled),
+                    other => other.into(),
+                })?;
                 // The poses come with the camera.
                 work.report(Stage::TargetPoses, 0, seen.len());
                 if work.is_cancelled() {
                     return Err(HandEyeError::Cancelled.into());
                 }
-                let sigma = PinholeSigma::of(&found);
                 Ok(Self {
                     intrinsics: found.intrinsics,
                     free: true,
-                    sigma: Some([sigma.fx, sigma.fy, sigma.cx, sigma.cy]),
+                    sigma: Some(found.pinhole_sigma_px()),
                     camera_from_target: found.camera_from_target,
                     rms_px: found.rms_px,
                 })
@@ -65,7 +61,7 @@ impl Lens {
                 return Err(HandEyeError::Cancelled.into());
             }
             work.report(Stage::TargetPoses, done, seen.len());
-            let pose = pnp::solve(s.corners, &observations.target, &intrinsics)?.best;
+            let pose = planar_pose::solve(s.corners, &observations.target, &intrinsics)?.best;
             camera_from_target.push(pose.camera_from_target);
             rms_px.push(pose.rms_px);
         }

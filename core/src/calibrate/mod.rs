@@ -1,7 +1,6 @@
 //! From observations to a calibration: intrinsics, closed forms, the joint estimate, and what it is worth.
 //!
-//! One path for the window, the command line and the tests. It needs PnP and intrinsics and with them the feature
-//! `opencv`.
+//! One path for the window, the command line and the tests.
 
 mod corners;
 mod lens;
@@ -21,10 +20,11 @@ use crate::handeye::joint::prediction::ErrorCurve;
 use crate::handeye::joint::{Free, Noise, SmallSample};
 use crate::handeye::widening::Widening;
 use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, subset};
+use crate::intrinsics::IntrinsicsError;
 use crate::observation::Corner;
+use crate::planar_pose::PoseError;
 use crate::progress::{Stage, Work};
 use crate::target::TargetSpec;
-use crate::vision::VisionError;
 
 /// What was observed, from a dataset folder, a session or a live capture.
 #[derive(Debug, Clone)]
@@ -196,9 +196,12 @@ pub enum CalibrateError {
         /// Least number.
         need: usize,
     },
-    /// Intrinsics or PnP failed.
+    /// The camera could not be calibrated.
     #[error(transparent)]
-    Vision(#[from] VisionError),
+    Intrinsics(#[from] IntrinsicsError),
+    /// The target has no pose in a view.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
     /// The hand-eye solve failed.
     #[error(transparent)]
     HandEye(#[from] HandEyeError),

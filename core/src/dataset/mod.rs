@@ -24,6 +24,7 @@ mod error;
 mod images;
 mod joints;
 mod natural_order;
+mod observations;
 mod outside;
 mod poses;
 mod target_table;

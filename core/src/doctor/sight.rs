@@ -8,11 +8,13 @@ use crate::camera::Intrinsics;
 use crate::frames::{Base, Pose, Tip};
 use crate::handeye::joint::equations::{FreeForm, PoseEquations, Seen};
 use crate::handeye::{Mode, subset};
+use crate::intrinsics::{self, Options, SeenView};
 use crate::observation::Corner;
+use crate::planar_pose::{self, PlanarPose};
+use crate::progress::CancelToken;
 use crate::se3::skew;
 use crate::statistics::median;
 use crate::target::TargetSpec;
-use crate::vision::{intrinsics, pnp};
 
 /// A corner this many robust standard deviations from where its view puts it is wrong. Real detectors have long tails,
 /// so the limit is wide.
@@ -70,7 +72,7 @@ pub(super) struct Sight {
 struct Fit {
     corners: Vec<Corner>,
     wrong: Vec<usize>,
-    pose: pnp::PlanarPose,
+    pose: PlanarPose,
 }
 
 impl Sight {
@@ -158,7 +160,7 @@ impl Sight {
             let seen = Seen {
                 intrinsics: &camera,
                 board: &points,
-                shape: &BoardShape::default(),
+                shape: &BoardShape::FLAT,
                 corners: &fit.corners,
                 whiteners: &[],
             };
@@ -232,9 +234,11 @@ fn camera_of(observations: &Observations, views: &[Vec<Corner>]) -> Result<Intri
     match observations.camera {
         CameraKnowledge::Fixed(intrinsics) => Ok(intrinsics),
         CameraKnowledge::Estimate { model, start } => {
-            let chosen: Vec<&[Corner]> =
-                subset::spread(views.len(), subset::MOST_VIEWS).into_iter().map(|i| views[i].as_slice()).collect();
-            intrinsics::calibrate(&chosen, &observations.target, observations.image_size, model, start)
+            let chosen = subset::spread(views.len(), subset::MOST_VIEWS);
+            let chosen: Vec<SeenView<'_>> = chosen.into_iter().map(|i| SeenView::unweighted(&views[i])).collect();
+            let options = Options { start, ..Options::new(model) };
+            let (target, size) = (&observations.target, observations.image_size);
+            intrinsics::solve(&chosen, target, size, &options, &CancelToken::default())
                 .map(|found| found.intrinsics)
                 .map_err(|error| format!("the camera could not be calibrated: {error}"))
         }
@@ -242,7 +246,7 @@ fn camera_of(observations: &Observations, views: &[Vec<Corner>]) -> Result<Intri
 }
 
 fn fit_all(views: &[Vec<Corner>], target: &TargetSpec, camera: &Intrinsics) -> Vec<Option<Fit>> {
-    let solve = |corners: &[Corner]| pnp::solve(corners, target, camera).ok();
+    let solve = |corners: &[Corner]| planar_pose::solve(corners, target, camera).ok();
     let mut fits: Vec<Option<Fit>> = views
         .iter()
         .map(|corners| Some(Fit { pose: solve(corners)?, corners: corners.clone(), wrong: Vec::new() }))
@@ -265,7 +269,7 @@ fn set_wrong_aside(
     limit_px: f64,
     points: &[Point3<f64>],
     camera: &Intrinsics,
-    solve: &impl Fn(&[Corner]) -> Option<pnp::PlanarPose>,
+    solve: &impl Fn(&[Corner]) -> Option<PlanarPose>,
 ) {
     let most = (WRONG_PART * fit.corners.len() as f64) as usize;
     let (mut corners, mut wrong, mut pose) = (fit.corners.clone(), Vec::new(), fit.pose);

@@ -1,11 +1,14 @@
 //! Levenberg–Marquardt on lens, shape and all poses, the poses eliminated view by view.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use super::{IntrinsicsError, SeenView};
 use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::Intrinsics;
 use crate::handeye::joint::equations::{FreeForm, MAX_FORM, PoseEquations, Seen};
+use crate::planar_pose::PoseError;
+use crate::planar_pose::mirror::mirrored;
+use crate::planar_pose::refine::refine;
 use crate::progress::CancelToken;
 use crate::se3;
 
@@ -26,6 +29,10 @@ const TIGHTEN: f64 = 10.0;
 const LEAST_RISE: f64 = 1e-8;
 /// Past this damping a step is too small to matter.
 const LARGEST_DAMPING: f64 = 1e10;
+/// Steps of a mirrored pose.
+const MIRROR_STEPS: usize = 10;
+/// A mirrored pose is taken when it lowers the cost of its view by more than this part: less is rounding.
+const WORTHWHILE: f64 = 1e-6;
 
 /// What is given.
 pub(super) struct Problem<'a> {
@@ -148,7 +155,7 @@ impl Linear {
         let n = problem.free.count(&estimate.intrinsics);
         let Some((matrix, _, _)) = self.eliminate(n, 0.0) else {
             let view = self.blocks.iter().position(|b| b.factor(0.0).is_none()).unwrap_or(0);
-            return Err(IntrinsicsError::DegenerateView { view, corners: problem.views[view].corners.len() });
+            return Err(PoseError::CollinearCorners { view }.into());
         };
         Ok(DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]))
     }
@@ -232,40 +239,24 @@ pub(super) fn minimise(problem: &Problem<'_>, estimate: &mut Estimate) -> Result
     Ok(Some(MAX_STEPS))
 }
 
-/// Levenberg–Marquardt on one pose with the camera kept; the pose and its cost. `None` when the start has a corner
-/// without image.
-pub(super) fn refine_pose(
-    view: &SeenView<'_>,
-    board: &BoardPoints,
-    shape: &BoardShape,
-    intrinsics: &Intrinsics,
-    start: &Isometry3<f64>,
-    steps: usize,
-) -> Option<(Isometry3<f64>, f64)> {
-    let seen = seen(view, board, shape, intrinsics);
-    let linear = |pose: &Isometry3<f64>| PoseEquations::new(&seen, pose, FreeForm::default()).ok();
-    let (mut pose, mut at) = (*start, linear(start)?);
-    let mut damping = 1e-6;
-    for _ in 0..steps {
-        let mut damped = at.pose;
-        for i in 0..6 {
-            damped[(i, i)] *= 1.0 + damping;
-        }
-        let own = -Cholesky::new(damped)?.solve(&at.pose_gradient);
-        let promised = -own.dot(&at.pose_gradient);
-        if promised <= COST_TOLERANCE * at.squared_px {
-            break;
-        }
-        let candidate = pose * se3::exp(&own);
-        match linear(&candidate).filter(|next| next.squared_px < at.squared_px) {
-            Some(next) => {
-                (pose, at) = (candidate, next);
-                damping *= 0.1;
-            }
-            None => damping = (damping * 100.0).max(1e-6),
+/// Tries the mirror image of every pose and keeps what fits better; whether any did. Both are minima of the cost, and the
+/// descent ends in the one nearer to its start.
+pub(super) fn mirror_poses(problem: &Problem<'_>, estimate: &mut Estimate) -> Result<bool, IntrinsicsError> {
+    let mut improved = false;
+    let Estimate { intrinsics, shape, poses } = estimate;
+    for (view, pose) in problem.views.iter().zip(poses.iter_mut()) {
+        problem.check_cancel()?;
+        let seen = seen(view, problem.board, shape, intrinsics);
+        let sum: Vector3<f64> = view.corners.iter().map(|c| problem.board.point(c.index, shape).coords).sum();
+        let Some(start) = mirrored(pose, &(sum / view.corners.len() as f64)) else { continue };
+        let Some(other) = refine(&seen, &start, MIRROR_STEPS) else { continue };
+        let Ok(own) = PoseEquations::new(&seen, pose, FreeForm::default()) else { continue };
+        if other.squared_px < (1.0 - WORTHWHILE) * own.squared_px {
+            *pose = other.pose;
+            improved = true;
         }
     }
-    Some((pose, at.squared_px))
+    Ok(improved)
 }
 
 /// Root mean square of the 2-D residuals of one view, pixels.

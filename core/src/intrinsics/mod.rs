@@ -17,9 +17,7 @@
 //! synthesis", §6; Kannala & Brandt 2006 for the fisheye.
 
 mod adjust;
-mod homography;
 mod information;
-mod mirror;
 mod start;
 
 use nalgebra::{DMatrix, Matrix2};
@@ -29,14 +27,14 @@ use crate::camera::{CameraError, Distortion, Intrinsics};
 use crate::frames::{Camera, Pose, Target};
 use crate::handeye::joint::equations::FreeForm;
 use crate::observation::Corner;
+use crate::planar_pose::{self, PoseError};
 use crate::progress::CancelToken;
+use crate::target::TargetSpec;
 
 use adjust::{Estimate, Problem};
 
 /// Views that a calibration needs: two orientations determine the four numbers of a pinhole, a third checks them.
 pub const MIN_VIEWS: usize = 3;
-/// Corners that fix a planar pose.
-pub const MIN_CORNERS: usize = 4;
 /// Normals of the target that agree within this angle \[deg\] in all views leave the focal length undetermined.
 const MIN_SPREAD_DEG: f64 = 2.0;
 /// Rounds of mirrored poses and optimum at the most; one is usual.
@@ -64,7 +62,7 @@ impl Options {
 /// The corners of one view.
 #[derive(Debug, Clone, Copy)]
 pub struct SeenView<'a> {
-    /// At least [`MIN_CORNERS`] that do not lie on one line.
+    /// At least [`planar_pose::MIN_CORNERS`] that do not lie on one line.
     pub corners: &'a [Corner],
     /// One matrix `W` per corner, whose residual counts as `W r`; empty where all corners count alike.
     pub whiteners: &'a [Matrix2<f64>],
@@ -103,6 +101,17 @@ pub struct Found {
 }
 
 impl Found {
+    /// Root mean square of the 2-D residuals of all views, pixels; without whiteners.
+    pub fn total_rms_px(&self) -> f64 {
+        (self.cost / self.corners as f64).sqrt()
+    }
+
+    /// Standard deviations of fx, fy, cx and cy in pixels, for independent corner noise of the size that the residuals
+    /// show. Errors of the board (bent, misprinted) are not in them.
+    pub fn pinhole_sigma_px(&self) -> [f64; 4] {
+        std::array::from_fn(|i| self.sigma * self.unit_covariance[(i, i)].sqrt())
+    }
+
     /// Covariance of `[fx fy cx cy, distortion…, warp x, warp y]` for the noise that the residuals show.
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.unit_covariance * (self.sigma * self.sigma)
@@ -121,24 +130,21 @@ pub enum IntrinsicsError {
         /// Views needed.
         need: usize,
     },
-    /// A view has fewer corners than a pose needs, or they lie on one line.
-    #[error("view {view}: its {corners} corners fix no pose; leave it out or detect it again")]
-    DegenerateView {
+    /// The corners of a view fix no pose, by the index of the view.
+    #[error(transparent)]
+    Corners(#[from] PoseError),
+    /// A list of whiteners of another length than that of the corners.
+    #[error("view {view}: there are {whiteners} weights for {corners} corners")]
+    BadWeights {
         /// Index of the view.
         view: usize,
+        /// Whiteners given.
+        whiteners: usize,
         /// Corners given.
         corners: usize,
     },
-    /// A corner that is no point of the target or not a number, or a list of whiteners of another length.
-    #[error("view {view}: {reason}")]
-    BadView {
-        /// Index of the view.
-        view: usize,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
     /// The image size or the start is not usable.
-    #[error("the camera to start from: {source}")]
+    #[error("camera model: {source}")]
     BadStart {
         /// What the model says.
         #[from]
@@ -182,14 +188,14 @@ pub enum IntrinsicsError {
 /// Calibrates a camera of `(width, height)` pixels.
 ///
 /// # Needs
-/// [`MIN_VIEWS`] views, tilted in different directions; partial views are welcome. The points of the target lie in the
-/// plane z = 0 as drawn. For the bend of the target, views tilted by 20° or more.
+/// [`MIN_VIEWS`] views with corners, tilted in different directions; partial views are welcome. For the bend of the target,
+/// views tilted by 20° or more.
 ///
 /// # Errors
 /// [`IntrinsicsError`] says what is missing and what to do. `cancel` is polled at every view.
 pub fn solve(
     views: &[SeenView<'_>],
-    board: &BoardPoints,
+    target: &TargetSpec,
     (width, height): (u32, u32),
     options: &Options,
     cancel: &CancelToken,
@@ -198,8 +204,13 @@ pub fn solve(
         return Err(IntrinsicsError::TooFewViews { got: views.len(), need: MIN_VIEWS });
     }
     for (index, view) in views.iter().enumerate() {
-        check(index, view, board)?;
+        planar_pose::check_corners(view.corners, target, index)?;
+        let (whiteners, corners) = (view.whiteners.len(), view.corners.len());
+        if whiteners > 0 && whiteners != corners {
+            return Err(IntrinsicsError::BadWeights { view: index, whiteners, corners });
+        }
     }
+    let board = &BoardPoints::new(&target.points());
     let usual = Intrinsics::pinhole(width, height, f64::from(width.max(height)));
     let nominal = options.start.map_or(usual, |start| Intrinsics { width, height, ..start });
     nominal.validate()?;
@@ -212,29 +223,12 @@ pub fn solve(
     let problem = Problem { views, board, free, cancel };
     let (mut estimate, mut steps) = first_optimum(&problem, &planes, &nominal, options)?;
     for _ in 0..MIRROR_ROUNDS {
-        if !mirror::improve(&problem, &mut estimate)? {
+        if !adjust::mirror_poses(&problem, &mut estimate)? {
             break;
         }
         steps += adjust::minimise(&problem, &mut estimate)?.unwrap_or(0);
     }
     finish(&problem, estimate, steps)
-}
-
-fn check(index: usize, view: &SeenView<'_>, board: &BoardPoints) -> Result<(), IntrinsicsError> {
-    let bad = |reason| Err(IntrinsicsError::BadView { view: index, reason });
-    if view.corners.len() < MIN_CORNERS {
-        return Err(IntrinsicsError::DegenerateView { view: index, corners: view.corners.len() });
-    }
-    if !(view.whiteners.is_empty() || view.whiteners.len() == view.corners.len()) {
-        return bad("there are not as many weights as corners");
-    }
-    if view.corners.iter().any(|c| c.index >= board.len()) {
-        return bad("a corner is no point of the target; check its columns and rows");
-    }
-    if view.corners.iter().any(|c| !(c.px.x.is_finite() && c.px.y.is_finite())) {
-        return bad("a corner is not a number");
-    }
-    Ok(())
 }
 
 /// The optimum from the first start that leads to one.
@@ -296,5 +290,7 @@ fn finish(problem: &Problem<'_>, estimate: Estimate, steps: usize) -> Result<Fou
     })
 }
 
+#[cfg(test)]
+mod study_tests;
 #[cfg(test)]
 mod tests;

@@ -1,12 +1,14 @@
 //! Where the optimisation starts: a focal length from homographies, or the best of a sweep; then the poses.
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::adjust::{Problem, refine_pose};
-use super::homography;
-use super::{IntrinsicsError, MIN_CORNERS, SeenView};
+use super::adjust::{Problem, seen};
+use super::{IntrinsicsError, SeenView};
 use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::{Distortion, Intrinsics};
+use crate::planar_pose::homography::homography;
+use crate::planar_pose::refine::refine;
+use crate::planar_pose::start::{pair, starts};
 use crate::progress::CancelToken;
 
 /// Focal lengths that a camera may have, as parts of its larger side: from 160° of view to a long telephoto lens.
@@ -20,8 +22,6 @@ const SWEEP_VIEWS: usize = 12;
 const SWEEP_STEPS: usize = 4;
 /// Most optimisations from the sweep.
 const SWEEP_STARTS: usize = 4;
-/// Smallest cosine to the optical axis of the rays that start a pose: the plane z = 1 has no room for more.
-const MIN_RAY_Z: f64 = 0.05;
 
 /// The map of the target's plane to the image in every view, `None` where the corners determine none.
 pub(super) struct Planes(Vec<Option<Matrix3<f64>>>);
@@ -36,7 +36,7 @@ impl Planes {
             }
             pairs.clear();
             pairs.extend(view.corners.iter().map(|c| (board.drawn()[c.index].coords.xy(), c.px)));
-            all.push(homography::fit(&pairs));
+            all.push(homography(&pairs));
         }
         Ok(Self(all))
     }
@@ -105,7 +105,7 @@ pub(super) fn poses(
         if problem.cancel.is_cancelled() {
             return Err(IntrinsicsError::Cancelled);
         }
-        match pose(view, problem.board, camera) {
+        match pose(problem, view, camera) {
             Some(pose) => poses.push(pose),
             None => return Ok(None),
         }
@@ -113,31 +113,11 @@ pub(super) fn poses(
     Ok(Some(poses))
 }
 
-/// The pose whose plane maps to the rays of the corners, from their homography.
-fn pose(view: &SeenView<'_>, board: &BoardPoints, camera: &Intrinsics) -> Option<Isometry3<f64>> {
-    let mut pairs: Vec<(Vector2<f64>, Vector2<f64>)> = Vec::with_capacity(view.corners.len());
-    for corner in view.corners {
-        if let Ok(ray) = camera.unproject(&corner.px)
-            && ray.z > MIN_RAY_Z
-        {
-            pairs.push((board.drawn()[corner.index].coords.xy(), ray.xy() / ray.z));
-        }
-    }
-    if pairs.len() < MIN_CORNERS {
-        return None;
-    }
-    let plane = homography::fit(&pairs)?;
-    let [a, b, c] = [0, 1, 2].map(|i| plane.column(i).into_owned());
-    let size = 0.5 * (a.norm() + b.norm());
-    // The nearest pair of perpendicular unit vectors: the diagonals of a rhombus are perpendicular.
-    let (a, b) = (a.try_normalize(0.0)?, b.try_normalize(0.0)?);
-    let (sum, difference) = ((a + b).try_normalize(0.0)?, (a - b).try_normalize(0.0)?);
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    let (x, y) = ((sum + difference) * half, (sum - difference) * half);
-    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, x.cross(&y)]));
-    let translation = c / size;
-    let pose = Isometry3::from_parts(Translation3::from(translation), UnitQuaternion::from_rotation_matrix(&rotation));
-    pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|v| v.is_finite()).then_some(pose)
+/// The better of both starts of a pose, from the corners that have a ray.
+fn pose(problem: &Problem<'_>, view: &SeenView<'_>, camera: &Intrinsics) -> Option<Isometry3<f64>> {
+    let seen = seen(view, problem.board, &BoardShape::FLAT, camera);
+    let pairs: Vec<_> = view.corners.iter().filter_map(|corner| pair(&seen, corner).ok().flatten()).collect();
+    starts(&pairs).map(|[best, _]| best)
 }
 
 /// Cameras of many focal lengths without distortion, the most promising first: those that fit some of the views best.
@@ -159,9 +139,9 @@ pub(super) fn sweep(problem: &Problem<'_>, camera: &Intrinsics) -> Result<Vec<In
         let cost: Option<f64> = judges
             .iter()
             .map(|view| {
-                let start = pose(view, problem.board, &candidate)?;
-                let shape = BoardShape::default();
-                refine_pose(view, problem.board, &shape, &candidate, &start, SWEEP_STEPS).map(|(_, cost)| cost)
+                let start = pose(problem, view, &candidate)?;
+                let seen = seen(view, problem.board, &BoardShape::FLAT, &candidate);
+                refine(&seen, &start, SWEEP_STEPS).map(|minimum| minimum.squared_px)
             })
             .sum();
         ranked.extend(cost.filter(|cost| cost.is_finite()).map(|cost| (cost, candidate)));

@@ -1,9 +1,12 @@
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
 use super::*;
+use crate::planar_pose::mirror::mirrored;
+use crate::planar_pose::refine::refine;
+use crate::target::Grid;
 
 const SIZE: (u32, u32) = (640, 480);
 const BROWN: Distortion = Distortion::BrownConrady([-0.21, 0.12, 0.001, -0.002, -0.02]);
@@ -12,10 +15,10 @@ fn camera(distortion: Distortion) -> Intrinsics {
     Intrinsics { distortion, fy: 575.0, cx: 322.4, cy: 236.1, ..Intrinsics::pinhole(640, 480, 581.0) }
 }
 
+const TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.03 });
+
 fn board() -> BoardPoints {
-    let points: Vec<Point3<f64>> =
-        (0..70).map(|i| Point3::new(f64::from(i % 10) * 0.03, f64::from(i / 10) * 0.03, 0.0)).collect();
-    BoardPoints::new(&points)
+    BoardPoints::new(&TARGET.points())
 }
 
 struct Scene {
@@ -60,7 +63,7 @@ impl Scene {
 
 fn solved(views: &[Vec<Corner>], options: &Options) -> Result<Found, IntrinsicsError> {
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
-    solve(&seen, &board(), SIZE, options, &CancelToken::default())
+    solve(&seen, &TARGET, SIZE, options, &CancelToken::default())
 }
 
 /// The largest distance of a parameter in units of its standard deviation.
@@ -160,7 +163,7 @@ fn a_corner_of_little_weight_counts_little_and_one_of_none_not_at_all() {
     let mut whiteners = vec![Matrix2::identity(); 70];
     whiteners[0] = Matrix2::zeros();
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView { corners: v, whiteners: &whiteners }).collect();
-    let weighted = solve(&seen, &board(), SIZE, &options, &CancelToken::default()).expect("solves");
+    let weighted = solve(&seen, &TARGET, SIZE, &options, &CancelToken::default()).expect("solves");
     let without = solved(&without, &options).expect("solves");
     assert!((weighted.cost / without.cost - 1.0).abs() < 1e-9, "{} {}", weighted.cost, without.cost);
     assert!(off_in_sigmas(&without, &weighted) < 1e-4);
@@ -179,16 +182,18 @@ fn a_pose_that_began_as_its_mirror_image_is_turned_round() {
     let problem = Problem { views: &seen, board: &board, free, cancel: &cancel };
     let poses: Vec<Isometry3<f64>> = found.camera_from_target.iter().map(|p| *p.isometry()).collect();
     let mut estimate = Estimate { intrinsics: found.intrinsics, shape: found.shape, poses: poses.clone() };
-    assert!(!mirror::improve(&problem, &mut estimate).expect("not cancelled"), "the optimum is the better of both");
+    assert!(
+        !adjust::mirror_poses(&problem, &mut estimate).expect("not cancelled"),
+        "the optimum is the better of both"
+    );
     // Its mirror image, descended to where it rests.
     let middle = Vector3::new(0.135, 0.09, 0.0);
-    let start = mirror::mirrored(&poses[4], &middle).expect("it is tilted");
-    let (wrong, cost) =
-        adjust::refine_pose(&seen[4], &board, &found.shape, &found.intrinsics, &start, 50).expect("in front");
-    assert!(wrong.rotation.angle_to(&poses[4].rotation) > 0.1, "there are two minima");
-    assert!(cost > 70.0 * found.rms_px[4].powi(2));
-    estimate.poses[4] = wrong;
-    assert!(mirror::improve(&problem, &mut estimate).expect("not cancelled"));
+    let start = mirrored(&poses[4], &middle).expect("it is tilted");
+    let wrong = refine(&adjust::seen(&seen[4], &board, &found.shape, &found.intrinsics), &start, 50).expect("in front");
+    assert!(wrong.pose.rotation.angle_to(&poses[4].rotation) > 0.1, "there are two minima");
+    assert!(wrong.squared_px > 70.0 * found.rms_px[4].powi(2));
+    estimate.poses[4] = wrong.pose;
+    assert!(adjust::mirror_poses(&problem, &mut estimate).expect("not cancelled"));
     assert!(estimate.poses[4].rotation.angle_to(&poses[4].rotation) < 1e-6);
 }
 
@@ -202,14 +207,22 @@ fn unusable_input_is_refused_by_name() {
         change(&mut views[3]);
         solved(&views, &options)
     };
-    assert_eq!(with(&|v| v.truncate(3)), Err(IntrinsicsError::DegenerateView { view: 3, corners: 3 }));
-    assert!(matches!(with(&|v| v[0].index = 70), Err(IntrinsicsError::BadView { view: 3, .. })));
-    assert!(matches!(with(&|v| v[0].px.x = f64::NAN), Err(IntrinsicsError::BadView { view: 3, .. })));
-    assert!(with(&|v| v.truncate(6)).is_err(), "six corners of one row fix no pose");
+    assert_eq!(with(&|v| v.truncate(3)), Err(PoseError::TooFewCorners { view: 3, got: 3, need: 4 }.into()));
+    assert!(matches!(with(&|v| v[0].index = 70), Err(IntrinsicsError::Corners(PoseError::BadCorner { view: 3, .. }))));
+    assert!(matches!(
+        with(&|v| v[0].px.x = f64::NAN),
+        Err(IntrinsicsError::Corners(PoseError::BadCorner { view: 3, .. }))
+    ));
+    let row = Err(PoseError::CollinearCorners { view: 3 }.into());
+    assert_eq!(with(&|v| v.truncate(6)), row, "six corners of one row fix no pose");
     let bad = Options { start: Some(Intrinsics::pinhole(640, 480, -1.0)), ..options };
     assert!(matches!(solved(&views, &bad), Err(IntrinsicsError::BadStart { .. })));
     let cancel = CancelToken::default();
     cancel.cancel();
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
-    assert_eq!(solve(&seen, &board(), SIZE, &options, &cancel), Err(IntrinsicsError::Cancelled));
+    assert_eq!(solve(&seen, &TARGET, SIZE, &options, &cancel), Err(IntrinsicsError::Cancelled));
+    let whiteners = [Matrix2::identity()];
+    let uneven = vec![SeenView { corners: &views[0], whiteners: &whiteners }; 3];
+    let error = solve(&uneven, &TARGET, SIZE, &options, &CancelToken::default());
+    assert_eq!(error, Err(IntrinsicsError::BadWeights { view: 0, whiteners: 1, corners: 70 }));
 }

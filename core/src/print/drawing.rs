@@ -3,7 +3,8 @@
 use nalgebra::Vector2;
 
 use super::PrintError;
-use crate::target::{AprilGrid, Charuco, Grid, Layout, TargetSpec};
+use crate::target::{AprilGrid, Charuco, Dictionary, Grid, Layout, TargetSpec};
+#[cfg(feature = "opencv")]
 use crate::vision::markers;
 
 /// Radius of a dot as a part of the distance between dots, and that of the larger dot at the origin: both leave as much
@@ -120,7 +121,7 @@ fn charuco(board: &Charuco) -> Result<Drawing, PrintError> {
     let mut shapes = squares(&board.grid(), |column, row| board.is_dark(layout, column, row));
     for (id, square) in board.marker_squares(layout).into_iter().enumerate() {
         let [corner, ..] = board.marker_corners(square);
-        let cells = markers::cells(board.dictionary, id, 1)?;
+        let cells = cells(board.dictionary, id, 1)?;
         shapes.extend(marker(corner, board.marker_m, &cells));
     }
     Ok(Drawing { shapes, quiet_m: board.square_m / 2.0 })
@@ -132,7 +133,7 @@ fn tags(board: &AprilGrid) -> Result<Drawing, PrintError> {
     for row in 0..board.rows {
         for column in 0..board.columns {
             let [corner, ..] = board.tag_corners((column, row));
-            let mut cells = markers::cells(board.family, board.id_at(column, row), border_bits)?;
+            let mut cells = cells(board.family, board.id_at(column, row), border_bits)?;
             if board.family.is_apriltag() {
                 // OpenCV draws the tags of the AprilTag project upside down.
                 cells.reverse();
@@ -150,6 +151,18 @@ fn tags(board: &AprilGrid) -> Result<Drawing, PrintError> {
     }
     let cell = board.tag_m / (board.family.bits() + 2 * border_bits) as f64;
     Ok(Drawing { shapes, quiet_m: cell.max(gap / 2.0) })
+}
+
+/// The cells of a marker, row by row, its border included; `true` is black. The codes are in OpenCV.
+#[cfg(feature = "opencv")]
+fn cells(dictionary: Dictionary, id: usize, border_bits: usize) -> Result<Vec<bool>, PrintError> {
+    markers::cells(dictionary, id, border_bits).map_err(|e| PrintError::Markers { reason: e.to_string() })
+}
+
+#[cfg(not(feature = "opencv"))]
+fn cells(dictionary: Dictionary, _: usize, _: usize) -> Result<Vec<bool>, PrintError> {
+    let reason = format!("the codes of {dictionary} are in OpenCV, without which this program was built");
+    Err(PrintError::Markers { reason })
 }
 
 /// The black cells of a marker, those beside each other in a row as one.

@@ -8,7 +8,7 @@ mod drawing;
 mod pdf;
 mod sheet;
 
-#[cfg(test)]
+#[cfg(all(test, feature = "opencv"))]
 pub(crate) mod rendered;
 
 pub use drawing::{Drawing, Shape};
@@ -16,7 +16,6 @@ pub use pdf::pdf;
 pub use sheet::{Page, Sheet, Text};
 
 use crate::target::{BadTarget, TargetSpec};
-use crate::vision::VisionError;
 
 /// Why a target cannot be printed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -30,11 +29,10 @@ pub enum PrintError {
         source: BadTarget,
     },
     /// The markers cannot be drawn.
-    #[error("the markers cannot be drawn: {source}")]
+    #[error("the markers cannot be drawn: {reason}")]
     Markers {
         /// What the library of markers says.
-        #[from]
-        source: VisionError,
+        reason: String,
     },
     /// The page is too small.
     #[error(
@@ -65,5 +63,19 @@ pub fn target_pdf(target: &TargetSpec, page: Page) -> Result<Vec<u8>, PrintError
     Ok(pdf(&Sheet::new(target, page)?))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "opencv"))]
 mod tests;
+#[cfg(all(test, not(feature = "opencv")))]
+mod tests_without_opencv {
+    use super::*;
+    use crate::target::{AprilTag, Dictionary, Grid};
+
+    #[test]
+    fn chessboards_are_printed_and_markers_are_refused_by_name() {
+        let board = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
+        assert!(target_pdf(&board, Page::A4).expect("a page").starts_with(b"%PDF"));
+        let tag = AprilTag { tag_m: 0.1, id: 7, family: Dictionary::APRILTAG_36H11, border_bits: None };
+        let refused = target_pdf(&TargetSpec::AprilTag(tag), Page::A4).expect_err("no codes");
+        assert!(refused.to_string().contains("apriltag_36h11"), "{refused}");
+    }
+}

@@ -29,7 +29,6 @@ mod history;
 mod journal;
 mod load;
 mod lock;
-#[cfg(feature = "opencv")]
 mod observations;
 pub(crate) mod pose_record;
 mod save_as;
@@ -48,7 +47,6 @@ pub use error::{SessionError, SessionProblem};
 pub use history::{History, UNDO_STEPS};
 pub use journal::JOURNAL;
 pub use lock::FolderLock;
-#[cfg(feature = "opencv")]
 pub use observations::SessionObservations;
 pub use session_file::{FORMAT, MAJOR_VERSION, MINOR_VERSION};
 pub use store::Store;

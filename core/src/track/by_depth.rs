@@ -147,6 +147,6 @@ fn rigid(points: &[Point]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(to - rotation * from), rotation)
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "opencv"))]
 #[path = "by_depth_tests.rs"]
 mod tests;

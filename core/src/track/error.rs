@@ -1,6 +1,7 @@
 //! Why a picture cannot be tracked.
 
 use crate::camera::CameraError;
+#[cfg(feature = "opencv")]
 use crate::vision::VisionError;
 
 /// Why there is no tracker, or no update. A board that is not in the picture is not an error.
@@ -68,6 +69,7 @@ pub enum TrackError {
         camera_height: u32,
     },
     /// The search for the board failed.
+    #[cfg(feature = "opencv")]
     #[error(transparent)]
     Vision(#[from] VisionError),
 }

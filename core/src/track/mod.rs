@@ -5,20 +5,26 @@
 //! | [`Tracker`] | corners near where they are expected, pose, filter; lost and found |
 //! | [`Keep`] | where the tip has to be, so that the camera keeps its view of the board |
 //!
-//! Nothing here reads a clock or knows a thread: time is the simulated (or recorded) time of the pictures.
+//! Nothing here reads a clock or knows a thread: time is the simulated (or recorded) time of the pictures. The tracker
+//! searches pictures, which needs the feature `opencv`; the mathematics that it is made of does not.
+#![cfg_attr(not(feature = "opencv"), expect(dead_code, reason = "the tracker, which uses it, searches with OpenCV"))]
 
 mod by_depth;
+#[cfg(feature = "opencv")]
 mod corner;
 mod error;
 mod filter;
+#[cfg(feature = "opencv")]
 mod glance;
 mod goal;
 mod motion;
 mod noise;
 mod pose;
+#[cfg(feature = "opencv")]
 mod sight;
 #[cfg(test)]
 mod stage;
+#[cfg(feature = "opencv")]
 mod tracker;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
@@ -32,6 +38,7 @@ use crate::verify::Calibrated;
 
 pub use error::TrackError;
 pub use goal::{Keep, TipGoal};
+#[cfg(feature = "opencv")]
 pub use tracker::Tracker;
 
 /// What a tracker works with.

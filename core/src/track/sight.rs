@@ -5,12 +5,15 @@ use nalgebra::{Isometry3, Point3, Vector2};
 
 use super::corner::{self, Place};
 use super::glance;
-use super::pose::{self, Fit, Seen};
+use super::pose::{self, Fit};
+use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::Intrinsics;
+use crate::handeye::joint::equations::Seen;
 use crate::observation::Corner;
+use crate::planar_pose;
 use crate::statistics::median_high;
 use crate::target::{Grid, TargetSpec};
-use crate::vision::{DetectOptions, VisionError, detect_with, pnp};
+use crate::vision::{DetectOptions, VisionError, detect_with};
 
 /// Corners that a pose is believed from: twice what it needs, so that one wrong corner shows.
 pub(super) const MIN_CORNERS: usize = 8;
@@ -39,7 +42,6 @@ const MIN_SIGMA_PX: f64 = 0.01;
 /// The board in a picture.
 #[derive(Debug, Clone)]
 pub(super) struct Board {
-    pub corners: Vec<Corner>,
     pub fit: Fit,
     /// Blur of the edges, 1σ \[px\]; of corners near where they were expected.
     pub blur_px: Option<f64>,
@@ -63,6 +65,8 @@ pub(super) struct Expected {
 pub(super) struct Eye<'a> {
     pub image: &'a GrayImage,
     pub target: &'a TargetSpec,
+    /// The points of the target.
+    pub board: &'a BoardPoints,
     pub camera: &'a Intrinsics,
 }
 
@@ -130,7 +134,7 @@ impl Eye<'_> {
         let blur_px = median_high(found.iter().map(|(_, corner)| corner.blur_px));
         let corners: Vec<Corner> = found.into_iter().map(|(index, corner)| Corner::new(index, corner.px)).collect();
         let board = self.fitted(&corners, &rough, blur_px)?;
-        if board.corners.len() < self.grid().len() && self.goes_on(&board.fit.pose, expected) {
+        if board.fit.corners.len() < self.grid().len() && self.goes_on(&board.fit.pose, expected) {
             return None;
         }
         Some(board)
@@ -141,46 +145,46 @@ impl Eye<'_> {
         let places = self.places(&expected.camera_from_target, expected.first_dark);
         let square = median_high(places.iter().map(|(_, place)| place.spacing()))?;
         let radius = expected.radius_px.clamp(MIN_RADIUS_PX, (MAX_RADIUS * square).max(MIN_RADIUS_PX));
-        let seen: Vec<Seen> = places
+        let corners: Vec<Corner> = places
             .iter()
             .filter_map(|(i, place)| {
                 let reach = radius.min((MAX_RADIUS * place.spacing()).max(MIN_RADIUS_PX));
-                Some((self.target.point(*i), corner::roughly(self.image, place, reach)?))
+                Some(Corner::new(*i, corner::roughly(self.image, place, reach)?))
             })
             .collect();
-        self.check(seen.iter().map(|(point, _)| *point))?;
-        let fit = pose::robust(&seen, self.camera, &expected.camera_from_target, (ROUGH.0 * square).max(ROUGH.1))?;
-        self.check(inliers(&seen, &fit))?;
+        self.check(&corners)?;
+        let floor_px = (ROUGH.0 * square).max(ROUGH.1);
+        let fit = pose::robust(&self.seen(&corners), &expected.camera_from_target, floor_px)?;
+        self.check(&fit.corners)?;
         // Most of what looks like corners has to move as one board.
-        (2 * fit.count() > seen.len()).then_some(fit.pose)
+        (2 * fit.corners.len() > corners.len()).then_some(fit.pose)
     }
 
-    fn check(&self, points: impl Iterator<Item = Point3<f64>> + Clone) -> Option<()> {
-        let enough = points.clone().count() >= MIN_CORNERS;
-        (enough && pose::spans(points, MIN_SPREAD * self.grid().square_m)).then_some(())
+    fn check(&self, corners: &[Corner]) -> Option<()> {
+        let points = corners.iter().map(|corner| self.board.drawn()[corner.index]);
+        let spread = MIN_SPREAD * self.grid().square_m;
+        (corners.len() >= MIN_CORNERS && pose::spans(points, spread)).then_some(())
     }
 
     fn fitted(&self, corners: &[Corner], start: &Isometry3<f64>, blur_px: Option<f64>) -> Option<Board> {
+        self.check(corners)?;
         let seen = self.seen(corners);
-        self.check(seen.iter().map(|(point, _)| *point))?;
-        let fit = pose::robust(&seen, self.camera, start, EXACT_PX)?;
-        self.check(inliers(&seen, &fit))?;
-        if 2 * fit.count() <= seen.len() {
+        let fit = pose::robust(&seen, start, EXACT_PX)?;
+        self.check(&fit.corners)?;
+        if 2 * fit.corners.len() <= corners.len() {
             return None;
         }
-        let fit = self.better_of_both(&seen, fit);
-        let corners = corners.iter().zip(&fit.inliers).filter(|(_, inlier)| **inlier).map(|(corner, _)| *corner);
-        Some(Board { corners: corners.collect(), fit, blur_px, first_dark: None })
+        Some(Board { fit: self.better_of_both(&seen, fit), blur_px, first_dark: None })
     }
 
-    fn seen(&self, corners: &[Corner]) -> Vec<Seen> {
-        corners.iter().map(|corner| (self.target.point(corner.index), corner.px)).collect()
+    fn seen<'b>(&'b self, corners: &'b [Corner]) -> Seen<'b> {
+        Seen { intrinsics: self.camera, board: self.board, shape: &BoardShape::FLAT, corners, whiteners: &[] }
     }
 
     /// The mirrored pose, when the corners speak clearly for it.
-    fn better_of_both(&self, seen: &[Seen], fit: Fit) -> Fit {
-        let Some(other) = pose::mirrored(seen, self.camera, &fit, &self.target.centre()) else { return fit };
-        let freedom = (2 * fit.count()).saturating_sub(6).max(1) as f64;
+    fn better_of_both(&self, seen: &Seen<'_>, fit: Fit) -> Fit {
+        let Some(other) = pose::other_minimum(seen, &fit, &self.target.centre()) else { return fit };
+        let freedom = (2 * fit.corners.len()).saturating_sub(6).max(1) as f64;
         let variance = (other.cost / freedom).max(MIN_SIGMA_PX * MIN_SIGMA_PX);
         if fit.cost - other.cost > MIRRORED_BETTER * variance { other } else { fit }
     }
@@ -215,14 +219,8 @@ impl Eye<'_> {
         {
             self.number_like(expected, &mut corners);
         }
-        let solved = match pnp::solve(&corners, self.target, self.camera) {
-            Ok(solved) => solved,
-            // Corners that fix no pose are no board.
-            Err(VisionError::CollinearCorners { .. } | VisionError::NoPose { .. } | VisionError::Camera { .. }) => {
-                return Ok(None);
-            }
-            Err(other) => return Err(other),
-        };
+        // Corners that fix no pose are no board.
+        let Ok(solved) = planar_pose::solve(&corners, self.target, self.camera) else { return Ok(None) };
         let turned = |pose: &Isometry3<f64>| expected.map_or(0.0, |e| e.rotation.angle_to(&pose.rotation));
         let best = *solved.best.camera_from_target.isometry();
         let start = match solved.alternative.map(|other| *other.camera_from_target.isometry()) {
@@ -255,8 +253,4 @@ impl Eye<'_> {
         let sign = |dark: bool| if dark { 1.0 } else { -1.0 };
         places.iter().map(|(_, place)| sign(place.dark) * corner::darkness(self.image, place)).sum::<f64>() >= 0.0
     }
-}
-
-fn inliers<'a>(seen: &'a [Seen], fit: &'a Fit) -> impl Iterator<Item = Point3<f64>> + Clone + 'a {
-    seen.iter().zip(&fit.inliers).filter(|(_, inlier)| **inlier).map(|((point, _), _)| *point)
 }

@@ -6,7 +6,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::{MotionModel, Picture, Setup, Tracker, Update};
+use super::{MotionModel, Setup};
+#[cfg(feature = "opencv")]
+use super::{Picture, Tracker, Update};
 use crate::board_shape::BoardShape;
 use crate::camera::{Distortion, Intrinsics};
 use crate::depth::DepthImage;
@@ -182,6 +184,7 @@ pub fn board_at(shift: Vector3<f64>, tilt: Vector3<f64>) -> Pose<Base, Target> {
 }
 
 /// A tracker, the stage it watches and the time.
+#[cfg(feature = "opencv")]
 pub struct Watch {
     pub stage: Stage,
     pub tracker: Tracker,
@@ -190,6 +193,7 @@ pub struct Watch {
     pub base_from_tip: Pose<Base, Tip>,
 }
 
+#[cfg(feature = "opencv")]
 impl Watch {
     pub fn new() -> Self {
         Self::with(setup())

@@ -7,6 +7,7 @@ use super::filter::{Filter, Sight};
 use super::noise::CornerNoise;
 use super::sight::{Board, Expected, Eye};
 use super::{Estimate, Picture, Seen, Setup, State, TrackError, Update};
+use crate::board_shape::BoardPoints;
 use crate::frames::{Base, Camera, Pose};
 use crate::target::TargetSpec;
 
@@ -29,6 +30,7 @@ const USUAL_BLUR_PX: f64 = 0.8;
 #[derive(Debug, Clone)]
 pub struct Tracker {
     setup: Setup,
+    board: BoardPoints,
     filter: Option<Filter>,
     /// Sights that the filter did not believe, and how many.
     elsewhere: Option<(Filter, usize)>,
@@ -63,6 +65,7 @@ impl Tracker {
         setup.motion.check()?;
         let noise = CornerNoise::new(setup.calibrated.uncertainty.as_ref().map(|u| u.noise.corner_px));
         Ok(Self {
+            board: BoardPoints::new(&setup.target.points()),
             setup,
             filter: None,
             elsewhere: None,
@@ -177,7 +180,8 @@ impl Tracker {
         base_from_camera: &Pose<Base, Camera>,
         filter: Option<&Filter>,
     ) -> Result<Option<Board>, TrackError> {
-        let eye = Eye { image: picture.grey, target: &self.setup.target, camera: &self.setup.calibrated.intrinsics };
+        let Setup { target, calibrated, .. } = &self.setup;
+        let eye = Eye { image: picture.grey, target, board: &self.board, camera: &calibrated.intrinsics };
         let expected = filter.map(|filter| self.in_picture(filter, base_from_camera));
         let mut near = None;
         if let Some(expected) = &expected
@@ -185,7 +189,7 @@ impl Tracker {
         {
             near = eye.near(expected);
             // A part of the board could be another part of it, when it is not known well where to expect it.
-            let whole = near.as_ref().is_some_and(|board| board.corners.len() == self.setup.target.len());
+            let whole = near.as_ref().is_some_and(|board| board.fit.corners.len() == self.setup.target.len());
             if near.is_some() && (whole || !eye.is_vague(expected)) {
                 return Ok(near);
             }
@@ -217,13 +221,13 @@ impl Tracker {
     /// Pose and covariance of a board in the picture, and what the next picture can use of it.
     fn seen(&mut self, board: Board, base_from_camera: &Pose<Base, Camera>) -> Option<Seen> {
         let inverse = board.fit.information.cholesky()?.inverse();
-        let variance = self.noise.variance(board.fit.cost, board.fit.count());
+        let variance = self.noise.variance(board.fit.cost, board.fit.corners.len());
         self.blur_px = board.blur_px.unwrap_or(self.blur_px);
         self.first_dark = board.first_dark.unwrap_or(self.first_dark);
         let camera_from_target = Pose::from_isometry(board.fit.pose);
         let seen = Seen {
             rms_px: board.fit.rms_px(),
-            corners: board.corners,
+            corners: board.fit.corners,
             camera_from_target,
             base_from_target: *base_from_camera * camera_from_target,
             covariance: symmetric(&(inverse * variance)),

@@ -67,7 +67,7 @@ fn a_board_that_is_larger_than_stated_is_seen_where_it_is() {
 
         // A pixel on a corner is the corner, half a metre away.
         let (view, board) = (&t.views[0], BoardPoints::new(&t.points));
-        let flat = pnp::camera_from_target(&view.corners, &BOARD, &t.intrinsics).expect("a pose");
+        let flat = planar_pose::camera_from_target(&view.corners, &BOARD, &t.intrinsics).expect("a pose");
         let seen = exact.seen(&board, &view.corners, &flat).expect("in front of the camera");
         let centre = BOARD.centre();
         let nearer = seen.isometry() * (centre * SCALE) - flat.isometry() * centre;

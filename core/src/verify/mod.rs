@@ -17,11 +17,11 @@ use crate::camera::CameraError;
 use crate::depth::{DepthImage, DepthSample};
 use crate::frames::{Anchor, Base, Camera, Pose, Target, Tip};
 use crate::observation::{Corner, View};
+use crate::planar_pose::{self, PoseError};
 use crate::progress::{Stage, Work};
 use crate::se3;
 use crate::statistics::median_high;
 use crate::target::TargetSpec;
-use crate::vision::{VisionError, pnp};
 
 pub use calibrated::{Calibrated, Uncertainty};
 pub use consistency::Consistency;
@@ -42,11 +42,11 @@ pub enum VerifyError {
     NoCaptures,
     /// The target's pose could not be found in a capture.
     #[error("capture {name:?}: {source}")]
-    Vision {
+    NoPose {
         /// Which capture.
         name: String,
         /// What failed.
-        source: VisionError,
+        source: PoseError,
     },
     /// A capture whose robot pose is not finite.
     #[error("the robot pose of capture {name:?} is not finite: capture it again")]
@@ -201,12 +201,12 @@ fn check(
 ) -> Result<CaptureCheck, VerifyError> {
     let view = capture.view;
     let name = || view.name.clone();
-    let no_pose = |source| VerifyError::Vision { name: name(), source };
-    // PnP checks the corners, so every index below is a point of the target.
-    let flat = pnp::camera_from_target(&view.corners, target, &calibrated.intrinsics).map_err(no_pose)?;
+    let no_pose = |source| VerifyError::NoPose { name: name(), source };
+    // This checks the corners, so every index below is a point of the target.
+    let flat = planar_pose::camera_from_target(&view.corners, target, &calibrated.intrinsics).map_err(no_pose)?;
     let seen = calibrated
         .seen(board, &view.corners, &flat)
-        .ok_or_else(|| no_pose(VisionError::NoPose { corners: view.corners.len() }))?;
+        .ok_or_else(|| no_pose(PoseError::NoPose { corners: view.corners.len() }))?;
     let predicted = calibrated.camera_from_target(base_from_tip);
     let points = board.points(&calibrated.shape);
     let residuals_at = |camera_from_target: &Pose<Camera, Target>| -> Result<Vec<CornerResidual>, CameraError> {

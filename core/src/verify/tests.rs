@@ -210,7 +210,7 @@ fn what_cannot_be_verified_is_a_typed_error() {
     let mut views = t.views.clone();
     views[1].corners.truncate(3);
     let result = verify(&truth, &BOARD, &captures(&views), &CancelToken::default());
-    assert!(matches!(result, Err(VerifyError::Vision { ref name, .. }) if name == "1"), "{result:?}");
+    assert!(matches!(result, Err(VerifyError::NoPose { ref name, .. }) if name == "1"), "{result:?}");
 
     let pose = &t.views[0].base_from_tip;
     let px = Vector2::new(10.0, 10.0);

@@ -4,10 +4,10 @@ use image::GrayImage;
 use nalgebra::{Matrix3, Vector2};
 
 use super::detect::Effort;
-use super::homography::{homography, mapped};
 use super::markers::{self, Marker, Placed};
 use super::{VisionError, edges, spread};
 use crate::observation::Corner;
+use crate::planar_pose::homography::{homography, mapped};
 use crate::target::AprilGrid;
 
 /// Borders that are in use, in bits: Kalibr's, and that of nearly everyone else.

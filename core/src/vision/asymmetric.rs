@@ -5,9 +5,9 @@ use nalgebra::{Matrix3, Vector2};
 use opencv::calib3d;
 
 use super::detect::Effort;
-use super::homography::{homography, jacobian, mapped};
 use super::{VisionError, circles, dots};
 use crate::observation::Corner;
+use crate::planar_pose::homography::{homography, jacobian, mapped};
 use crate::target::{Grid, TargetSpec};
 
 /// Largest RMS deviation from the flat pattern as a part of the distance between rows: what a strong lens bends, and a

@@ -5,7 +5,7 @@ use opencv::calib3d;
 use opencv::core::{Mat, Point2d, Vector, no_array};
 use opencv::prelude::*;
 
-use super::bridge::{camera_matrix, coefficients, numbers, to_points2d, to_points3d};
+use super::bridge_for_tests::{camera_matrix, coefficients, numbers, to_points2d, to_points3d};
 use crate::camera::{Distortion, Intrinsics};
 
 fn cameras() -> Vec<Intrinsics> {

@@ -8,10 +8,10 @@ use nalgebra::{Matrix3, Vector2};
 
 use super::crossing::{self, Expected};
 use super::detect::Effort;
-use super::homography::{homography, jacobian, mapped};
 use super::markers::{self, Marker, Placed};
 use super::{VisionError, spread};
 use crate::observation::Corner;
+use crate::planar_pose::homography::{homography, jacobian, mapped};
 use crate::statistics::median_high;
 use crate::target::{Charuco, Layout};
 

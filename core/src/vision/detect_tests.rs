@@ -3,10 +3,11 @@ use nalgebra::Vector2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::rendered::{Scene, looking_at, random_scene};
+use super::rendered::{Scene, random_scene};
 use super::{DetectOptions, VisionError, detect, detect_with};
 use crate::camera::Intrinsics;
 use crate::observation::Corner;
+use crate::planar_pose::simulated::looking_at;
 use crate::target::{Grid, TargetSpec};
 
 /// Far above the fit's error on clean images, far below the distance between corners.

@@ -7,7 +7,7 @@ use opencv::features2d::{Feature2D, SimpleBlobDetector, SimpleBlobDetector_Param
 
 use super::VisionError;
 use super::bridge::failed;
-use super::homography::{homography, mapped};
+use crate::planar_pose::homography::{homography, mapped};
 
 /// Half window of the moments as a part of a step.
 const CELL_PART: f64 = 0.5;

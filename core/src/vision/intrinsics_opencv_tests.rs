@@ -13,12 +13,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-use super::bridge::{camera_matrix, coefficients, isometries, numbers, to_points2f, to_points3f};
-use super::intrinsics::calibrate_with;
-use super::rendered::looking_at;
+use super::bridge::to_points2f;
+use super::bridge_for_tests::{camera_matrix, coefficients, isometries, numbers, to_points3f};
 use crate::camera::{Distortion, Intrinsics};
-use crate::intrinsics::{Found, Options};
+use crate::intrinsics::{Found, Options, SeenView, solve};
 use crate::observation::Corner;
+use crate::planar_pose::simulated::looking_at;
 use crate::progress::CancelToken;
 use crate::target::{Grid, TargetSpec};
 use crate::testing::data_folder;
@@ -71,7 +71,8 @@ impl Set {
 
     fn ours(&self, model: Distortion) -> Found {
         let target = TargetSpec::Chessboard(self.grid);
-        calibrate_with(&self.views, &[], &target, self.size, &Options::new(model), &CancelToken::default())
+        let views: Vec<SeenView<'_>> = self.views.iter().map(|view| SeenView::unweighted(view)).collect();
+        solve(&views, &target, self.size, &Options::new(model), &CancelToken::default())
             .unwrap_or_else(|e| panic!("{model:?}: {e}"))
     }
 

@@ -1,7 +1,7 @@
 //! Square markers: found and read by OpenCV, believed where several lie as the target has them.
 
 use image::GrayImage;
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use opencv::aruco::{
     self, CORNER_REFINE_APRILTAG, CORNER_REFINE_NONE, DetectorParameters, DetectorParametersTrait as _,
 };
@@ -10,7 +10,7 @@ use opencv::core::{Mat, MatTraitConstManual as _, Point2f, Vector, no_array};
 use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray};
 use super::detect::Effort;
-use super::homography::{affinity, homography, mapped};
+use crate::planar_pose::homography::{homography, mapped};
 use crate::target::Dictionary;
 
 /// Markers this many pitches apart vouch for each other: next neighbours, also diagonally on a `ChArUco` board.
@@ -183,6 +183,22 @@ fn vouches(a: &Placed, b: &Placed) -> bool {
     (0.33..3.0).contains(&ratio)
         && (b.marker.centre() - a.marker.centre()).norm() > 0.0
         && maps.into_iter().flatten().any(|map| is_at(&map, b, sides_away))
+}
+
+/// The best map without perspective: steadier than [`homography`] where few noisy points lead far outside of them.
+fn affinity(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Option<Matrix3<f64>> {
+    let mut normal = Matrix3::zeros();
+    let mut rhs = [Vector3::zeros(); 2];
+    for (a, b) in pairs {
+        let row = Vector3::new(a.x, a.y, 1.0);
+        normal += row * row.transpose();
+        for axis in 0..2 {
+            rhs[axis] += row * b[axis];
+        }
+    }
+    let inverse = normal.try_inverse()?;
+    let (u, v) = (inverse * rhs[0], inverse * rhs[1]);
+    Some(Matrix3::new(u.x, u.y, u.z, v.x, v.y, v.z, 0.0, 0.0, 1.0))
 }
 
 /// Corners that are a pixel off swing what lies several sides away by as many pixels.

@@ -1,4 +1,4 @@
-//! From images to corners, poses and intrinsics. The only module that knows OpenCV.
+//! From images to corners. The only module that knows OpenCV.
 //!
 //! Pixels are in the convention of [`crate::camera`]: (0, 0) is the centre of the top-left pixel.
 //!
@@ -16,22 +16,16 @@ mod detect;
 mod dots;
 mod edge_profile;
 mod edges;
-mod homography;
 pub(crate) mod markers;
 mod order;
 pub(crate) mod saddle;
 mod spread;
 pub(crate) mod subpixel;
 
-pub mod intrinsics;
-pub mod pnp;
-
 pub use charuco::charuco_layout;
 pub use detect::{DetectOptions, Effort, detect, detect_with};
 
-use crate::camera::CameraError;
-
-/// Why there is no detection, pose or calibration.
+/// Why there is no detection.
 ///
 /// A board that is simply not in the picture is not an error: [`detect`] returns `None`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -63,12 +57,6 @@ pub enum VisionError {
         /// What is seen.
         seen: &'static str,
     },
-    /// The distance between points is not a length.
-    #[error("the target's point distance of {square_m} m is not usable: it must be finite and positive")]
-    BadSquare {
-        /// Its value in metres.
-        square_m: f64,
-    },
     /// The image has no pixels, or more than OpenCV can address.
     #[error("an image of {width}×{height} pixels cannot be searched")]
     BadImage {
@@ -77,90 +65,6 @@ pub enum VisionError {
         /// Height in pixels.
         height: u32,
     },
-    /// Not enough corners for a pose or for a view.
-    #[error("view {view} has {got} corners, {need} are needed; leave it out or detect it again")]
-    TooFewCorners {
-        /// Index of the view, 0 where there is only one.
-        view: usize,
-        /// Corners given.
-        got: usize,
-        /// Corners needed.
-        need: usize,
-    },
-    /// A corner that is not a point of the target, is listed twice, or is not a number.
-    #[error("view {view}: corner {index} at ({u_px}, {v_px}) px {reason}")]
-    BadCorner {
-        /// Index of the view, 0 where there is only one.
-        view: usize,
-        /// The corner's index.
-        index: usize,
-        /// Its column in pixels.
-        u_px: f64,
-        /// Its row in pixels.
-        v_px: f64,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
-    /// All corners of the view lie on one line, in the image or on the target, so that they fix no pose.
-    #[error("view {view}: the corners lie on one line and fix no pose")]
-    CollinearCorners {
-        /// Index of the view, 0 where there is only one.
-        view: usize,
-    },
-    /// Neither planar solution puts the whole target in front of the camera.
-    #[error("no pose puts all {corners} corners in front of the camera; check the order of corners and the intrinsics")]
-    NoPose {
-        /// Corners given.
-        corners: usize,
-    },
-    /// The camera model cannot be used or has no ray for a corner.
-    #[error("camera model: {source}")]
-    Camera {
-        /// What the model says.
-        #[from]
-        source: CameraError,
-    },
-    /// Not enough views to estimate intrinsics.
-    #[error("intrinsics need at least {need} views of the target, there are {got}; capture more from other angles")]
-    TooFewViews {
-        /// Views given.
-        got: usize,
-        /// Views needed.
-        need: usize,
-    },
-    /// The target has the same orientation to the camera in all views, which leaves the focal length undetermined.
-    #[error(
-        "the target is tilted the same way in all {views} views (within {spread_deg:.1}°), which leaves the focal length \
-         undetermined; capture views tilted by 20° or more about different axes"
-    )]
-    ParallelViews {
-        /// Views given.
-        views: usize,
-        /// Largest angle between the target's normals in two views, degrees.
-        spread_deg: f64,
-    },
-    /// The views determine the camera so weakly that its numbers would be noise.
-    #[error(
-        "the views leave {parameter} undetermined: 0.1 px of corner noise moves it by {sigma_px:.0} px; \
-         capture views tilted by 20° or more about different axes"
-    )]
-    Undetermined {
-        /// Which parameter.
-        parameter: &'static str,
-        /// Its standard deviation for 0.1 px of noise, in pixels.
-        sigma_px: f64,
-    },
-    /// The optimisation ended at numbers that are no camera.
-    #[error(
-        "the calibration did not converge to a camera ({reason}); check the order of corners and the target's size"
-    )]
-    NotACamera {
-        /// What is wrong with them.
-        reason: String,
-    },
-    /// The work was cancelled.
-    #[error("the calibration of the camera was cancelled")]
-    Cancelled,
     /// OpenCV refused or failed.
     #[error("OpenCV could not {operation}: {message}")]
     OpenCv {
@@ -172,6 +76,8 @@ pub enum VisionError {
 }
 
 #[cfg(test)]
+mod bridge_for_tests;
+#[cfg(test)]
 mod camera_tests;
 #[cfg(test)]
 mod detect_tests;
@@ -180,9 +86,7 @@ mod gray_tests;
 #[cfg(test)]
 mod intrinsics_opencv_tests;
 #[cfg(test)]
-mod intrinsics_tests;
-#[cfg(test)]
-mod pnp_tests;
+mod planar_pose_opencv_tests;
 #[cfg(test)]
 pub(crate) mod rendered;
 #[cfg(test)]

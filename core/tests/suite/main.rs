@@ -3,9 +3,7 @@
 //! `slow` is what the fast tier (`./test fast`) leaves out.
 
 mod broken_datasets;
-#[cfg(feature = "opencv")]
 mod doctor;
-#[cfg(feature = "opencv")]
 mod doctor_on_real_data;
 mod joint_on_real_data;
 mod reference_datasets;
@@ -15,7 +13,6 @@ mod target_data;
 mod vision_data;
 
 mod slow {
-    #[cfg(feature = "opencv")]
     mod monte_carlo;
     mod session_kill;
 }

@@ -6,10 +6,11 @@ use std::path::Path;
 use handeye_core::dataset::Dataset;
 use handeye_core::image::GrayImage;
 use handeye_core::observation::Corner;
+use handeye_core::planar_pose;
 use handeye_core::statistics::median;
 use handeye_core::target::{AprilGrid, AprilTag, Charuco, IdOrder, Layout, TargetSpec};
 use handeye_core::testing::data_folder;
-use handeye_core::vision::{charuco_layout, detect, pnp};
+use handeye_core::vision::{charuco_layout, detect};
 use nalgebra::Vector2;
 
 fn load(path: &Path) -> GrayImage {
@@ -83,7 +84,7 @@ fn the_tag_of_the_eye_to_hand_set_is_found_in_all_views() {
         for (index, px) in [3, 2, 0, 1].into_iter().zip(reference) {
             apart.push((corners[index].px - px).norm());
         }
-        rms.push(pnp::solve(&corners, &dataset.target, &camera).expect("a pose").best.rms_px);
+        rms.push(planar_pose::solve(&corners, &dataset.target, &camera).expect("a pose").best.rms_px);
     }
     println!("PnP rms {rms:.3?} px, apart {apart:.3?} px");
     // References in BASELINES.md: 0.210 px (sub-pixel corners of OpenCV) and 0.219 px (those compared here).
@@ -146,7 +147,7 @@ fn charuco_boards_of_others_are_found_whole() {
         assert_eq!(charuco_layout(&image, &board).expect("searches"), Some(Layout::New));
         // A flat board through a good lens: a homography explains its corners to a fraction of a pixel.
         let camera = handeye_core::camera::Intrinsics::pinhole(640, 480, 600.0);
-        let pose = pnp::solve(&corners, &TargetSpec::Charuco(board), &camera).expect("a pose");
+        let pose = planar_pose::solve(&corners, &TargetSpec::Charuco(board), &camera).expect("a pose");
         println!("{file}: {:.2} px RMS with a guessed camera", pose.best.rms_px);
         assert!(pose.best.rms_px < 3.0, "{file}: {}", pose.best.rms_px);
     }

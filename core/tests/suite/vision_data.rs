@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use handeye_core::camera::Distortion;
 use handeye_core::image::GrayImage;
+use handeye_core::intrinsics::{Options, SeenView, solve};
 use handeye_core::observation::Corner;
+use handeye_core::progress::CancelToken;
 use handeye_core::target::{Grid, TargetSpec};
 use handeye_core::testing::data_folder;
-use handeye_core::vision::intrinsics::calibrate;
 use handeye_core::vision::{DetectOptions, detect_with};
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -103,27 +104,29 @@ fn check(expected: &Expected) {
     let missed: Vec<&str> = found.iter().filter(|f| f.corners.is_none()).map(|f| f.name.as_str()).collect();
     assert_eq!((found.len(), missed), (expected.count, vec![]), "{}", expected.folder);
 
-    let views: Vec<&[Corner]> = found.iter().filter_map(|f| f.corners.as_deref()).collect();
-    let result = calibrate(&views, &expected.target, expected.size, Distortion::BrownConrady([0.0; 5]), None)
+    let views: Vec<_> = found.iter().filter_map(|f| f.corners.as_deref()).map(SeenView::unweighted).collect();
+    let options = Options::new(Distortion::BrownConrady([0.0; 5]));
+    let result = solve(&views, &expected.target, expected.size, &options, &CancelToken::default())
         .unwrap_or_else(|e| panic!("{}: {e}", expected.folder));
+    let (rms_px, [fx_sigma_px, ..]) = (result.total_rms_px(), result.pinhole_sigma_px());
     let camera = result.intrinsics;
     println!(
         "{}{}: {} views, rms {:.4} px, fx {:.2} ± {:.2}, fy {:.2}, cx {:.2}, cy {:.2}",
         expected.folder,
         expected.prefix,
         views.len(),
-        result.rms_px,
+        rms_px,
         camera.fx,
-        result.sigma.fx,
+        fx_sigma_px,
         camera.fy,
         camera.cx,
         camera.cy
     );
-    assert!(result.rms_px <= expected.rms_px, "{}: {}", expected.folder, result.rms_px);
+    assert!(rms_px <= expected.rms_px, "{}: {rms_px}", expected.folder);
     let off = (camera.fx - expected.focal_px).abs();
     assert!(off < expected.focal_tolerance_px, "{}: fx {}", expected.folder, camera.fx);
-    for (view, found) in result.views.iter().zip(&found) {
-        assert!(view.rms_px < 4.0 * expected.rms_px, "{}: {} px", found.name, view.rms_px);
+    for (rms_px, found) in result.rms_px.iter().zip(&found) {
+        assert!(*rms_px < 4.0 * expected.rms_px, "{}: {rms_px} px", found.name);
     }
     compare_with_reference(&folder, &found);
 }

@@ -10,9 +10,9 @@ use handeye_core::depth::DepthImage;
 use handeye_core::frames::{Camera, Pose, Target};
 use handeye_core::image::RgbImage;
 use handeye_core::observation::Corner;
+use handeye_core::planar_pose;
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Session, SessionError};
 use handeye_core::target::TargetSpec;
-use handeye_core::vision::pnp;
 use rerun::{Arrows2D, AsComponents, Color, EncodedImage, Points3D, Radius};
 
 use super::convert::{corner_marks, marks, no_lines, outline, pinhole, pixel, transform};
@@ -220,7 +220,7 @@ impl Captures {
 fn seen(known: &Known, corners: Option<&[Corner]>) -> Option<Pose<Camera, Target>> {
     let (target, intrinsics): (TargetSpec, Intrinsics) = (known.target?, known.intrinsics()?);
     // Corners that no pose explains have none; the table of captures says so too.
-    pnp::camera_from_target(corners?, &target, &intrinsics).ok()
+    planar_pose::camera_from_target(corners?, &target, &intrinsics).ok()
 }
 
 /// Its colour, unless it is selected.

@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use handeye_core::camera::Intrinsics;
 use handeye_core::image::GrayImage;
+use handeye_core::planar_pose;
 use handeye_core::target::TargetSpec;
-use handeye_core::vision::{DetectOptions, detect_with, pnp};
+use handeye_core::vision::{DetectOptions, detect_with};
 
 use crate::model::{LiveDetection, LiveFrame};
 
@@ -26,7 +27,7 @@ impl Search {
             Err(problem) => (None, Some(problem)),
         };
         let camera_from_target = corners.as_deref().zip(self.intrinsics).and_then(|(corners, intrinsics)| {
-            pnp::camera_from_target(corners, &target, &intrinsics)
+            planar_pose::camera_from_target(corners, &target, &intrinsics)
                 .inspect_err(|error| tracing::debug!(%error, "the board has no pose"))
                 .ok()
         });

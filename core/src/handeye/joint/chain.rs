@@ -55,7 +55,6 @@ pub struct Chain {
 }
 
 impl Chain {
-    #[cfg_attr(not(feature = "opencv"), expect(dead_code, reason = "what predicts with it needs OpenCV"))]
     pub fn new(
         mode: Mode,
         base_from_tip: &Pose<Base, Tip>,

@@ -6,11 +6,12 @@ use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::Intrinsics;
 use crate::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::handeye::HandEyeError;
-use crate::handeye::joint::equations::{FreeForm, PoseEquations, Seen};
+use crate::handeye::joint::equations::Seen;
 use crate::handeye::joint::{
     JointProblem, JointSolution, JointStart, base_from_tip_by_joints, camera_from_target, estimate,
 };
 use crate::observation::{Corner, View};
+use crate::planar_pose::refine::refine;
 use crate::progress::{Stage, Work};
 
 /// Most folds of the cross-validation.
@@ -124,17 +125,5 @@ pub fn pose_of_view(
     start: &Pose<Camera, Target>,
 ) -> Option<Pose<Camera, Target>> {
     let seen = Seen { intrinsics, board, shape, corners, whiteners: &[] };
-    let at = |pose: &Pose<Camera, Target>| PoseEquations::new(&seen, pose.isometry(), FreeForm::default());
-    let mut pose = *start;
-    let mut equations = at(&pose).ok()?;
-    for _ in 0..STEPS {
-        let Some(factor) = equations.pose.cholesky() else { break };
-        let next = pose.perturbed(&-factor.solve(&equations.pose_gradient));
-        let Ok(there) = at(&next) else { break };
-        if there.squared_px >= equations.squared_px {
-            break;
-        }
-        (pose, equations) = (next, there);
-    }
-    Some(pose)
+    refine(&seen, start.isometry(), STEPS).map(|minimum| Pose::from_isometry(minimum.pose))
 }

@@ -6,7 +6,8 @@ use rand_distr::{Distribution, Normal};
 
 use super::*;
 use crate::camera::Intrinsics;
-use crate::vision::rendered::{Scene, looking_at, random_scene};
+use crate::planar_pose::simulated::looking_at;
+use crate::vision::rendered::{Scene, random_scene};
 use crate::vision::subpixel::corner_sub_pix;
 
 /// The true corners to the pixel: a detector without refinement is off by up to half of one.

@@ -3,12 +3,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-use super::VisionError;
-use super::intrinsics::{IntrinsicsCalibration, calibrate};
-use super::rendered::looking_at;
-use crate::camera::{Distortion, Intrinsics};
-use crate::observation::Corner;
-use crate::target::{Grid, TargetSpec};
+use super::*;
+use crate::planar_pose::simulated::looking_at;
+use crate::target::Grid;
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
 const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);
@@ -38,9 +35,14 @@ fn views(camera: &Intrinsics, count: usize, tilt: (f64, f64), noise_px: f64, see
         .collect()
 }
 
-fn solved(camera: &Intrinsics, noise_px: f64, guess: Option<Intrinsics>, seed: u64) -> IntrinsicsCalibration {
+fn calibrate(views: &[Vec<Corner>], model: Distortion, start: Option<Intrinsics>) -> Result<Found, IntrinsicsError> {
+    let seen: Vec<SeenView<'_>> = views.iter().map(|view| SeenView::unweighted(view)).collect();
+    solve(&seen, &TARGET, SIZE, &Options { start, ..Options::new(model) }, &CancelToken::default())
+}
+
+fn solved(camera: &Intrinsics, noise_px: f64, guess: Option<Intrinsics>, seed: u64) -> Found {
     let views = views(camera, 15, (0.2, 0.7), noise_px, seed);
-    calibrate(&views, &TARGET, SIZE, camera.distortion, guess).expect("calibrates")
+    calibrate(&views, camera.distortion, guess).expect("calibrates")
 }
 
 #[test]
@@ -57,7 +59,7 @@ fn exact_corners_give_the_camera_back() {
             for (got, want) in found.intrinsics.parameters().iter().zip(truth.parameters()).take(4) {
                 assert!((got - want).abs() < 1e-6, "{distortion:?} {guess:?}: {:?}", found.intrinsics);
             }
-            assert!(found.rms_px < 1e-8, "{distortion:?}: {}", found.rms_px);
+            assert!(found.total_rms_px() < 1e-8, "{distortion:?}: {}", found.total_rms_px());
         }
     }
 }
@@ -67,7 +69,7 @@ fn the_rational_model_explains_its_own_corners() {
     // Its eight coefficients trade against one another, so the fit is judged by where it puts pixels.
     let truth = camera(Distortion::Rational([0.4, -0.2, 0.0006, -0.0004, 0.03, 0.35, -0.15, 0.02]));
     let found = solved(&truth, 0.0, None, 2);
-    assert!(found.rms_px < 2e-3, "{}", found.rms_px);
+    assert!(found.total_rms_px() < 2e-3, "{}", found.total_rms_px());
     assert!((found.intrinsics.fx - truth.fx).abs() < 0.5, "{:?}", found.intrinsics);
 }
 
@@ -77,12 +79,12 @@ fn the_errors_of_many_calibrations_are_as_large_as_their_sigmas() {
     let mut sum = [0.0; 4];
     for seed in 0..TRIALS {
         let found = solved(&truth, 0.1, None, seed);
-        let sigma = [found.sigma.fx, found.sigma.fy, found.sigma.cx, found.sigma.cy];
+        let sigma = found.pinhole_sigma_px();
         for (i, (got, want)) in found.intrinsics.parameters().iter().zip(truth.parameters()).take(4).enumerate() {
             sum[i] += ((got - want) / sigma[i]).powi(2);
         }
         // 0.1 px per axis is 0.141 px in 2-D, less the share that the unknowns explain (5 %).
-        assert!((0.12..0.15).contains(&found.rms_px), "{}", found.rms_px);
+        assert!((0.12..0.15).contains(&found.total_rms_px()), "{}", found.total_rms_px());
     }
     for (i, s) in sum.iter().enumerate() {
         // Chi-squared of 40 degrees of freedom over 40: 1 ± 0.22, at three deviations.
@@ -92,22 +94,18 @@ fn the_errors_of_many_calibrations_are_as_large_as_their_sigmas() {
 }
 
 #[test]
-fn both_figures_of_a_view_follow_from_its_residuals() {
-    let truth = camera(Distortion::None);
-    let found = solved(&truth, 0.1, None, 1);
-    let all: f64 = found.views.iter().map(|v| v.rms_px.powi(2)).sum::<f64>() / found.views.len() as f64;
-    assert!((all.sqrt() - found.rms_px).abs() < 1e-12);
-    for view in &found.views {
-        assert!((view.norm_per_corner_px * 70f64.sqrt() - view.rms_px).abs() < 1e-12);
-    }
+fn the_error_of_all_views_follows_from_those_of_each() {
+    let found = solved(&camera(Distortion::None), 0.1, None, 1);
+    let all: f64 = found.rms_px.iter().map(|rms| rms.powi(2)).sum::<f64>() / found.rms_px.len() as f64;
+    assert!((all.sqrt() - found.total_rms_px()).abs() < 1e-12);
     assert_eq!(found.camera_from_target.len(), 15);
 }
 
 #[test]
 fn too_few_views_are_refused() {
     let views = views(&camera(Distortion::None), 2, (0.2, 0.7), 0.0, 1);
-    let error = calibrate(&views, &TARGET, SIZE, Distortion::None, None).expect_err("too few");
-    assert_eq!(error, VisionError::TooFewViews { got: 2, need: 3 });
+    let error = calibrate(&views, Distortion::None, None).expect_err("too few");
+    assert_eq!(error, IntrinsicsError::TooFewViews { got: 2, need: 3 });
 }
 
 #[test]
@@ -116,13 +114,13 @@ fn views_that_all_look_the_same_way_are_refused() {
         let truth = camera(Distortion::None);
         let head_on = views(&truth, 8, (0.0, 0.0), 0.05, 1);
         assert!(
-            matches!(calibrate(&head_on, &TARGET, SIZE, model, None), Err(VisionError::ParallelViews { views: 8, .. })),
+            matches!(calibrate(&head_on, model, None), Err(IntrinsicsError::ParallelViews { views: 8, .. })),
             "{model:?}"
         );
         let one = views(&truth, 1, (0.5, 0.6), 0.05, 1);
         let same = vec![one[0].clone(); 6];
         assert!(
-            matches!(calibrate(&same, &TARGET, SIZE, model, None), Err(VisionError::ParallelViews { views: 6, .. })),
+            matches!(calibrate(&same, model, None), Err(IntrinsicsError::ParallelViews { views: 6, .. })),
             "{model:?}"
         );
     }
@@ -132,8 +130,8 @@ fn views_that_all_look_the_same_way_are_refused() {
 fn a_faint_tilt_is_not_sold_as_a_calibration() {
     // 2.5° of tilt passes for different orientations, but says next to nothing about the focal length.
     let nearly = views(&camera(Distortion::None), 6, (0.04, 0.045), 0.1, 1);
-    match calibrate(&nearly, &TARGET, SIZE, Distortion::BrownConrady([0.0; 5]), None) {
-        Err(VisionError::Undetermined { .. } | VisionError::NotACamera { .. }) => {}
+    match calibrate(&nearly, Distortion::BrownConrady([0.0; 5]), None) {
+        Err(IntrinsicsError::Undetermined { .. } | IntrinsicsError::NotACamera { .. }) => {}
         other => panic!("{other:?}"),
     }
 }
@@ -142,7 +140,7 @@ fn a_faint_tilt_is_not_sold_as_a_calibration() {
 fn a_bad_view_is_named() {
     let mut all = views(&camera(Distortion::None), 5, (0.2, 0.7), 0.0, 1);
     all[3].clear();
-    let error = calibrate(&all, &TARGET, SIZE, Distortion::None, None).expect_err("an empty view");
-    assert_eq!(error, VisionError::TooFewCorners { view: 3, got: 0, need: 4 });
+    let error = calibrate(&all, Distortion::None, None).expect_err("an empty view");
+    assert_eq!(error, PoseError::TooFewCorners { view: 3, got: 0, need: 4 }.into());
     assert!(error.to_string().contains("view 3"));
 }
