@@ -27,7 +27,7 @@ use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, View
 use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice};
 use crate::settings::SettingsWrite;
 use crate::text;
-use crate::worker::{Clock, Connector, Desk, FileTask, Waker, Workers};
+use crate::worker::{Clock, Connector, FileTask, SessionThreads, Waker, Workers};
 
 /// Makes what connects to a cell.
 pub type Connect = Arc<dyn Fn(&CellSource) -> Arc<dyn Connector> + Send + Sync>;
@@ -53,7 +53,7 @@ pub struct App {
     model: Model,
     /// The threads that talk to the cell; others take their place when another cell is chosen.
     workers: Workers,
-    desk: Desk,
+    desk: SessionThreads,
     connect: Connect,
     clock: Clock,
     waker: Waker,
@@ -92,7 +92,7 @@ impl App {
             open_browser: true,
             waker: Arc::clone(&waker),
         })?;
-        let desk = Desk::start(sessions, &clock, &waker)?;
+        let desk = SessionThreads::start(sessions, &clock, &waker)?;
         let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
         let model = Model { addresses, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
         let numbers = Numbers::default();

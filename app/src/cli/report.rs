@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use handeye_core::handeye::Mode;
-use handeye_core::result::{CalibrationResult, MethodStatus, TransformEstimate, ViewStatus};
+use handeye_core::result::{CalibrationResult, MethodStatus, TransformEstimate, ViewRecordStatus};
 
 use crate::model::Solved;
 
@@ -61,12 +61,12 @@ pub fn expected_error(result: &CalibrationResult) -> Option<String> {
 }
 
 /// What became of a view.
-pub fn status(status: ViewStatus) -> &'static str {
+pub fn status(status: ViewRecordStatus) -> &'static str {
     match status {
-        ViewStatus::Used => "used",
-        ViewStatus::Excluded => "excluded",
-        ViewStatus::Outlier => "outlier",
-        ViewStatus::NoTarget => "target not found",
+        ViewRecordStatus::Used => "used",
+        ViewRecordStatus::Excluded => "excluded",
+        ViewRecordStatus::Outlier => "outlier",
+        ViewRecordStatus::NoTarget => "target not found",
     }
 }
 

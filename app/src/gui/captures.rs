@@ -17,7 +17,7 @@ pub const CELLS: (usize, usize) = (8, 6);
 
 /// What was seen in the picture of a capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Seen {
+pub enum Detected {
     /// It is being looked at.
     NotYet,
     /// The board.
@@ -48,7 +48,7 @@ pub struct CaptureRow {
     /// Whether a person took it out.
     pub excluded: bool,
     /// What was seen.
-    pub seen: Seen,
+    pub seen: Detected,
     /// RMS of the residuals of its corners \[px\]; of a verifying capture the error of the prediction.
     pub rms_px: Option<f64>,
     /// Length of the correction of its reported tip position \[mm\].
@@ -195,10 +195,10 @@ impl CaptureTable {
 
 fn plain_row(model: &Model, record: &CaptureRecord) -> CaptureRow {
     let seen = match model.observed.get(&record.id) {
-        None => Seen::NotYet,
-        Some(None) => Seen::Unreadable,
-        Some(Some(observed)) if observed.corners.is_some() => Seen::Board,
-        Some(Some(_)) => Seen::NoBoard,
+        None => Detected::NotYet,
+        Some(None) => Detected::Unreadable,
+        Some(Some(observed)) if observed.corners.is_some() => Detected::Board,
+        Some(Some(_)) => Detected::NoBoard,
     };
     CaptureRow {
         id: record.id,
@@ -283,7 +283,7 @@ mod tests {
         let second = table(&ctx, &model);
         assert!(second.rows[2].excluded && !first.rows[2].excluded);
         model.observed.insert(CaptureId(4), None);
-        assert_eq!(table(&ctx, &model).rows[3].seen, Seen::Unreadable);
+        assert_eq!(table(&ctx, &model).rows[3].seen, Detected::Unreadable);
     }
 
     #[test]

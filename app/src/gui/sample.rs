@@ -15,8 +15,8 @@ use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::observation::{Corner, View};
 use handeye_core::progress::CancelToken;
 use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
-use handeye_core::track::{ByDepth, Estimate, Seen, State, Update};
-use handeye_core::verify::{self, Calibrated, CheckCapture};
+use handeye_core::track::{BoardDetection, ByDepth, Estimate, State, Update};
+use handeye_core::verify::{self, CheckCapture, Predictor};
 use handeye_sim_link::cell::kinematics::{JointLimits, inverse_nearest};
 use handeye_sim_link::client::cell::{ArmChain, JointAngles, Support};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
@@ -208,7 +208,7 @@ pub fn solved() -> Model {
     assert!(matches!(calibration.hand_eye, Some(HandEye::EyeInHand { .. })));
     let mut result = calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
     result.truth = truth::comparison(&result, &tip_from_camera(), &intrinsics());
-    let calibrated = Calibrated::new(&calibration).expect("a hand-eye");
+    let calibrated = Predictor::new(&calibration).expect("a hand-eye");
     let checks: Vec<View> =
         (FITTED + 1..=FITTED + VERIFYING).map(|n| View::new(record(n).image, base_from_tip(n), corners(n))).collect();
     let captures: Vec<CheckCapture<'_>> =
@@ -300,7 +300,7 @@ pub fn tracking() -> Model {
         detection.corners = Some(corners_at(1, &chain));
         detection.camera_from_target = Some(chain);
     }
-    let seen = Seen {
+    let seen = BoardDetection {
         corners: corners_at(1, &chain),
         camera_from_target: chain,
         base_from_target: truth.perturbed(&small(time_s, 0.4e-3)),

@@ -10,7 +10,7 @@ const KNOWN: f64 = 1e5;
 
 /// One thing to say.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Estimated {
+pub struct EstimatedValue {
     /// What it is.
     pub what: Text,
     /// How much, with its unit.
@@ -22,7 +22,7 @@ pub struct Estimated {
 }
 
 /// All of it, one line each; nothing is said of what is as usual.
-pub fn estimated(calibration: &Calibration) -> Vec<Estimated> {
+pub fn estimated(calibration: &Calibration) -> Vec<EstimatedValue> {
     let mut lines = Vec::new();
     lines.extend(views_aside(calibration));
     lines.extend(corners_aside(calibration));
@@ -37,10 +37,10 @@ pub fn estimated(calibration: &Calibration) -> Vec<Estimated> {
     lines
 }
 
-fn views_aside(calibration: &Calibration) -> Option<Estimated> {
+fn views_aside(calibration: &Calibration) -> Option<EstimatedValue> {
     let count = calibration.views.iter().filter(|view| view.status == ViewStatus::Outlier).count();
     let taken = calibration.views.iter().filter(|view| view.status == ViewStatus::Used).count();
-    (count > 0).then(|| Estimated {
+    (count > 0).then(|| EstimatedValue {
         what: text!("Views set aside"),
         value: text!("{count} of {of}", count = count, of = count + taken),
         meaning: text!("They do not fit the others, and the answer is without them; the table of captures says which"),
@@ -48,10 +48,10 @@ fn views_aside(calibration: &Calibration) -> Option<Estimated> {
     })
 }
 
-fn corners_aside(calibration: &Calibration) -> Option<Estimated> {
+fn corners_aside(calibration: &Calibration) -> Option<EstimatedValue> {
     let views = calibration.views.iter().filter(|view| !view.corners_aside.is_empty()).count();
     let count: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
-    (count > 0).then(|| Estimated {
+    (count > 0).then(|| EstimatedValue {
         what: text!("Corners set aside"),
         value: text!("{count}, in {views} of {of} views", count = count, views = views, of = calibration.views.len()),
         meaning: text!("They are far from where the rest of their view puts them, and the answer is without them"),
@@ -59,10 +59,10 @@ fn corners_aside(calibration: &Calibration) -> Option<Estimated> {
     })
 }
 
-fn bend(shape: &ShapeEstimate) -> Option<Estimated> {
+fn bend(shape: &ShapeEstimate) -> Option<EstimatedValue> {
     let [x_sigma, y_sigma] = shape.warp_sigma_m?.map(|metres| format!("{:.3}", metres * 1e3));
     let [x, y] = shape.shape.warp_m.map(|metres| format!("{:.3}", metres * 1e3));
-    Some(Estimated {
+    Some(EstimatedValue {
         what: text!("Bend of the board"),
         value: text!("x {x} ± {x_sigma} mm, y {y} ± {y_sigma} mm", x = x, x_sigma = x_sigma, y = y, y_sigma = y_sigma),
         meaning: text!(
@@ -73,9 +73,9 @@ fn bend(shape: &ShapeEstimate) -> Option<Estimated> {
     })
 }
 
-fn size(shape: &ShapeEstimate) -> Option<Estimated> {
+fn size(shape: &ShapeEstimate) -> Option<EstimatedValue> {
     let (percent, sigma) = (shape.shape.scale * 100.0, shape.scale_sigma? * 100.0);
-    Some(Estimated {
+    Some(EstimatedValue {
         what: text!("Size of the board"),
         value: Text::verbatim(format!("{percent:.3} ± {sigma:.3} %")),
         meaning: text!("Its true size over the stated one, by the motion of the robot; ± is one standard deviation"),
@@ -83,9 +83,9 @@ fn size(shape: &ShapeEstimate) -> Option<Estimated> {
     })
 }
 
-fn view_noise(calibration: &Calibration) -> Option<Estimated> {
+fn view_noise(calibration: &Calibration) -> Option<EstimatedValue> {
     let view_px = calibration.noise?.view_px;
-    (view_px > 0.0).then(|| Estimated {
+    (view_px > 0.0).then(|| EstimatedValue {
         what: text!("Noise of views"),
         value: Text::verbatim(format!("{view_px:.3} px")),
         meaning: text!(
@@ -96,10 +96,10 @@ fn view_noise(calibration: &Calibration) -> Option<Estimated> {
     })
 }
 
-fn widening(calibration: &Calibration) -> Option<Estimated> {
+fn widening(calibration: &Calibration) -> Option<EstimatedValue> {
     let widening = calibration.widening.as_ref()?;
     let by = widening.by?;
-    Some(Estimated {
+    Some(EstimatedValue {
         what: text!("Uncertainty widened"),
         value: text!("{times} times", times = format!("{:.1}", widening.factor.sqrt())),
         meaning: text!(
@@ -109,11 +109,11 @@ fn widening(calibration: &Calibration) -> Option<Estimated> {
     })
 }
 
-fn freedom(calibration: &Calibration) -> Option<Estimated> {
+fn freedom(calibration: &Calibration) -> Option<EstimatedValue> {
     let degrees = calibration.small_sample?.degrees_of_freedom;
     let value =
         if degrees > KNOWN { text!("known") } else { text!("{n} degrees of freedom", n = format!("{degrees:.1}")) };
-    Some(Estimated {
+    Some(EstimatedValue {
         what: text!("Noise levels"),
         value,
         meaning: text!(
@@ -123,7 +123,7 @@ fn freedom(calibration: &Calibration) -> Option<Estimated> {
     })
 }
 
-fn joint_offsets(offsets: &JointOffsets) -> Estimated {
+fn joint_offsets(offsets: &JointOffsets) -> EstimatedValue {
     let each = offsets.offsets_rad.iter().zip(&offsets.sigma_rad).enumerate().map(|(index, (offset, sigma))| {
         format!("{}: {:+.3} ± {:.3}°", index + 1, offset.to_degrees(), sigma.to_degrees())
     });
@@ -142,7 +142,7 @@ fn joint_offsets(offsets: &JointOffsets) -> Estimated {
             before = before
         )
     };
-    Estimated {
+    EstimatedValue {
         what: text!("Offsets of the joints"),
         value: Text::verbatim(each.collect::<Vec<_>>().join(", ")),
         meaning: text!("To be added to the angles that the robot reports, joint by joint; ± is one standard deviation"),

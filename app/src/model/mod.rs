@@ -29,14 +29,14 @@ use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::handeye::HandEye;
 use handeye_core::image::RgbImage;
 use handeye_core::session::{CaptureId, Document};
-use handeye_core::verify::Calibrated;
+use handeye_core::verify::Predictor;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 
 pub use capture::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
-pub use estimated::{Estimated, estimated};
+pub use estimated::{EstimatedValue, estimated};
 pub use export::{ExportState, Preview, PreviewFile, Written};
 pub use handeye_sim_link::client::cell::BoardPath;
 pub use messages::{Home, Message, Messages};
@@ -517,7 +517,7 @@ impl Model {
     }
 
     /// The newest calibration as what predicts and measures.
-    pub fn calibrated(&self) -> Option<&Calibrated> {
+    pub fn calibrated(&self) -> Option<&Predictor> {
         self.solve.solved.as_ref()?.calibrated.as_ref()
     }
 

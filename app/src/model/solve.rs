@@ -7,7 +7,7 @@ use handeye_core::findings::Finding;
 use handeye_core::progress::Stage;
 use handeye_core::result::CalibrationResult;
 use handeye_core::session::CaptureId;
-use handeye_core::verify::{Calibrated, Verification, VerifyError};
+use handeye_core::verify::{Predictor, Verification, VerifyError};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -30,7 +30,7 @@ pub struct Solved {
     /// What is weak and what to do next.
     pub findings: Vec<Finding>,
     /// The calibration as what predicts and measures; `None` without a hand-eye.
-    pub calibrated: Option<Calibrated>,
+    pub calibrated: Option<Predictor>,
     /// How well it does on captures that never entered the fit; `None` while there are none.
     pub verification: Option<Result<Verification, VerifyError>>,
     /// The captures of `verification` in its order.

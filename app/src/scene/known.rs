@@ -114,7 +114,7 @@ impl Known {
     /// before the first calibration. `None` for a robot that says nothing.
     pub fn mount(&self) -> Option<(Role, Fixed<Camera>)> {
         if let Some(hand_eye) = self.hand_eye() {
-            return Some((Role::Calibrated, places(hand_eye).0));
+            return Some((Role::Predictor, places(hand_eye).0));
         }
         let camera = self.truth()?.camera;
         let mode = if matches!(camera, Fixed::Tip(_)) { Mode::EyeInHand } else { Mode::EyeToHand };
@@ -152,7 +152,7 @@ impl Known {
 
     /// The board by the calibration: where it stood, or on the tip.
     pub fn board(&self) -> Option<BoardItem> {
-        Some(self.board_at(Role::Calibrated, places(self.hand_eye()?).1))
+        Some(self.board_at(Role::Predictor, places(self.hand_eye()?).1))
     }
 
     /// The board where it truly is.
@@ -183,7 +183,7 @@ mod tests {
         let beside = Known { document_mode: Some(Mode::EyeToHand), ..known };
         assert!(beside.camera().is_none());
         let calibrated = Known::of(&sample::solved());
-        assert_eq!(calibrated.camera().map(|camera| camera.role), Some(Role::Calibrated));
+        assert_eq!(calibrated.camera().map(|camera| camera.role), Some(Role::Predictor));
     }
 
     #[test]
@@ -196,6 +196,6 @@ mod tests {
         let place = still.true_board().and_then(|board| board.place.in_base(None)).expect("in the base");
         assert_ne!(place, newest);
         let roles: Vec<Role> = still.boards().map(|board| board.role).collect();
-        assert_eq!(roles, [Role::Tracked, Role::Calibrated, Role::True]);
+        assert_eq!(roles, [Role::Tracked, Role::Predictor, Role::True]);
     }
 }

@@ -47,7 +47,7 @@ impl<F: Frame> Fixed<F> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// By the calibration.
-    Calibrated,
+    Predictor,
     /// By what the cell says of itself, before there is a calibration.
     Said,
     /// By tracking.

@@ -23,7 +23,7 @@ use crate::command::Event;
 const MAX_CAPTURES: usize = 4;
 
 /// The application's end of these threads.
-pub struct Desk {
+pub struct SessionThreads {
     archive: Option<Sender<ArchiveTask>>,
     captures: Sender<Measured>,
     files: Option<Sender<FileTask>>,
@@ -34,7 +34,7 @@ pub struct Desk {
     threads: Vec<Started>,
 }
 
-impl Desk {
+impl SessionThreads {
     /// Starts the threads. New sessions go under `sessions`.
     ///
     /// # Errors
@@ -141,7 +141,7 @@ impl Desk {
     }
 }
 
-impl Drop for Desk {
+impl Drop for SessionThreads {
     fn drop(&mut self) {
         self.end(Instant::now() + JOIN_DEADLINE);
     }

@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
 //! | `camera` | pictures, colours of the depth | events; newest [`LiveFrame`] |
-//! | `motion` | motions and jogs, one at a time | events; refusals through the [`MotionDesk`] |
+//! | `motion` | motions and jogs, one at a time | events; refusals through the [`MotionQueue`] |
 //! | `vision` | board in the newest picture, captures | events; newest [`LiveDetection`]; [`Measured`] |
 //!
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
@@ -47,7 +47,7 @@ use handeye_sim_link::client::CancelToken;
 pub use archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};
 pub use camera::CameraTask;
 pub use control::{ControlTask, StopLine};
-pub use desk::Desk;
+pub use desk::SessionThreads;
 pub use files::{ExportJob, FileTask};
 pub use follow_line::FollowLine;
 pub use jog_line::HELD_S;
@@ -55,7 +55,7 @@ pub use link::Request;
 pub use live::LiveConnector;
 pub use live_motion::end_of_following;
 pub use motion::MotionLook;
-pub use motion_desk::{MotionDesk, MotionTask};
+pub use motion_desk::{MotionQueue, MotionTask};
 pub use observer::ObserveJob;
 pub use port::{
     CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
@@ -63,7 +63,7 @@ pub use port::{
 pub use slot::LatestSlot;
 pub use solver::{SolveJob, answer};
 pub use started::Started;
-pub use tracking::{Sight, Tracking};
+pub use tracking::{TrackedImage, Tracking};
 pub use vision::VisionTask;
 
 use crate::capture::Measured;
@@ -77,7 +77,7 @@ use link::{Duty, LinkLoop, Outlet};
 use motion::Motions;
 use reconnect::Reconnect;
 use slot::Tap;
-use vision::{Sights, Vision};
+use vision::{Vision, VisionSlots};
 
 /// Tells the window that there is something to look at. Called from any thread.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -110,7 +110,7 @@ pub struct Workers {
     vision: Option<Sender<VisionTask>>,
     events: Option<Receiver<Event>>,
     stop: Arc<StopLine>,
-    desk: Arc<MotionDesk>,
+    desk: Arc<MotionQueue>,
     clock: Clock,
     robot: Arc<LatestSlot<RobotState>>,
     frames: Arc<LatestSlot<LiveFrame>>,
@@ -146,7 +146,7 @@ impl Workers {
         let duty = Motions::new(Arc::clone(&workers.desk), Arc::clone(&workers.follow));
         workers.motion = Some(workers.spawn("motion", duty, source, connector, outlet())?);
         let (sender, tasks) = bounded(MAX_REQUESTS);
-        let sights = Sights {
+        let sights = VisionSlots {
             detections: Arc::clone(&workers.detections),
             tracked: Arc::clone(&workers.tracked),
             follow: Arc::clone(&workers.follow),
@@ -166,7 +166,7 @@ impl Workers {
             vision: None,
             events: Some(events),
             stop: Arc::default(),
-            desk: Arc::new(MotionDesk::new(Arc::clone(waker))),
+            desk: Arc::new(MotionQueue::new(Arc::clone(waker))),
             clock: Arc::clone(clock),
             robot: Arc::default(),
             frames: Arc::default(),

@@ -9,7 +9,7 @@ use handeye_sim_link::client::cell::{FollowMoment, FollowWish as ArmWish};
 use super::follow_line::FollowLine;
 use super::jog_line::Held;
 use super::link::{Duty, Outlet};
-use super::motion_desk::{MotionDesk, MotionTask, Work};
+use super::motion_desk::{MotionQueue, MotionTask, Work};
 use super::port::{Connected, Connector, JogRequest, MotionPort, PortError, Room, ViewsRequest};
 use crate::command::Event;
 use crate::model::{FollowStatus, FollowWish, Link, MotionGoal, MotionId, MotionOutcome, Severity};
@@ -18,19 +18,19 @@ use crate::text;
 /// Rest between two looks at the connection. Work does not wait for it: the worker is woken.
 const PERIOD: Duration = Duration::from_millis(100);
 
-/// Look at the [`MotionDesk`] now.
+/// Look at the [`MotionQueue`] now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MotionLook;
 
 /// The duty of the motion worker.
 pub struct Motions {
-    desk: Arc<MotionDesk>,
+    desk: Arc<MotionQueue>,
     line: Arc<FollowLine>,
 }
 
 impl Motions {
     /// With the places where it is told what to do, and where the board is.
-    pub fn new(desk: Arc<MotionDesk>, line: Arc<FollowLine>) -> Self {
+    pub fn new(desk: Arc<MotionQueue>, line: Arc<FollowLine>) -> Self {
         Self { desk, line }
     }
 

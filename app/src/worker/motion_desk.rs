@@ -102,12 +102,12 @@ struct Inner {
 }
 
 /// Shared by the application and the motion worker.
-pub struct MotionDesk {
+pub struct MotionQueue {
     inner: Mutex<Inner>,
     waker: Waker,
 }
 
-impl MotionDesk {
+impl MotionQueue {
     /// Nothing is asked for; `waker` tells the window that something was refused.
     pub fn new(waker: Waker) -> Self {
         Self { inner: Mutex::default(), waker }

@@ -4,8 +4,8 @@ use super::*;
 use crate::model::Jog;
 use crate::text::Language;
 
-fn desk() -> MotionDesk {
-    let desk = MotionDesk::new(std::sync::Arc::new(|| {}));
+fn desk() -> MotionQueue {
+    let desk = MotionQueue::new(std::sync::Arc::new(|| {}));
     desk.connected();
     desk
 }
@@ -18,7 +18,7 @@ fn button(index: usize) -> JogRequest {
     JogRequest { jog: Jog::Joint { index, forward: true }, tip_from_camera: None, speed: 0.5 }
 }
 
-fn said(desk: &MotionDesk) -> Vec<(u64, String)> {
+fn said(desk: &MotionQueue) -> Vec<(u64, String)> {
     desk.take_said()
         .into_iter()
         .map(|event| match event {

@@ -12,7 +12,7 @@ use handeye_core::observation::View;
 use handeye_core::progress::{CancelToken, Progress, Work};
 use handeye_core::result::VerificationSummary;
 use handeye_core::session::CaptureId;
-use handeye_core::verify::{self, Calibrated, CheckCapture, Verification, VerifyError};
+use handeye_core::verify::{self, CheckCapture, Predictor, Verification, VerifyError};
 
 use super::link::Outlet;
 use crate::command::{Event, SolveOutcome};
@@ -87,7 +87,7 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
     let options = FindingOptions { goal_mm: Some(job.goal_m * 1e3) };
     let findings = doctor::diagnose(&job.observations, Some(&calibration), &options, work.cancel).findings;
     result.findings = findings.iter().map(Finding::to_record).collect();
-    let calibrated = Calibrated::new(&calibration).ok();
+    let calibrated = Predictor::new(&calibration).ok();
     let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
         let captures: Vec<CheckCapture<'_>> =
             job.verification.iter().map(|(_, view)| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();

@@ -11,7 +11,7 @@ use super::rate::RateMeter;
 use crate::model::{TrackError, Tracked};
 
 /// A picture with what is known of it.
-pub struct Sight<'a> {
+pub struct TrackedImage<'a> {
     /// Counts pictures.
     pub number: u64,
     /// When it arrived.
@@ -45,7 +45,7 @@ impl Tracking {
     ///
     /// # Errors
     /// As [`Tracker::see`].
-    pub fn see(&mut self, sight: &Sight<'_>, now_s: &dyn Fn() -> f64) -> Result<Tracked, CannotTrack> {
+    pub fn see(&mut self, sight: &TrackedImage<'_>, now_s: &dyn Fn() -> f64) -> Result<Tracked, CannotTrack> {
         let update = self.tracker.see(&sight.picture)?;
         self.line.see(&update);
         let published_s = now_s();

@@ -25,7 +25,7 @@ pub fn calibrate(
     options: Options,
     work: &Work<'_>,
 ) -> Result<Calibration, CalibrateError> {
-    let seen: Vec<Seen<'_>> = observations.views.iter().enumerate().filter_map(Seen::new).collect();
+    let seen: Vec<DetectedView<'_>> = observations.views.iter().enumerate().filter_map(DetectedView::new).collect();
     if seen.len() < MIN_VIEWS {
         return Err(too_few(observations, seen.len()));
     }
@@ -71,10 +71,10 @@ const FINE_PX: f64 = 1.0;
 /// The views whose corners make sense as an image of the target, those whose do not, and the camera by the former.
 fn believable<'a>(
     observations: &Observations,
-    seen: Vec<Seen<'a>>,
+    seen: Vec<DetectedView<'a>>,
     options: Options,
     work: &Work<'_>,
-) -> Result<(Vec<Seen<'a>>, Vec<usize>, Lens), CalibrateError> {
+) -> Result<(Vec<DetectedView<'a>>, Vec<usize>, Lens), CalibrateError> {
     let lens = Lens::find(observations, &seen, work)?;
     let usual = median_high(lens.rms_px.iter().copied()).unwrap_or(0.0);
     let limit = (WRONG_CORNERS * usual).max(FINE_PX);
@@ -83,7 +83,7 @@ fn believable<'a>(
         return Ok((seen, Vec::new(), lens));
     }
     let (kept, wrong): (Vec<_>, Vec<_>) = seen.into_iter().zip(&lens.rms_px).partition(|(_, rms)| **rms <= limit);
-    let kept: Vec<Seen<'a>> = kept.into_iter().map(|(s, _)| s).collect();
+    let kept: Vec<DetectedView<'a>> = kept.into_iter().map(|(s, _)| s).collect();
     let wrong = wrong.into_iter().map(|(s, _)| s.index).collect();
     let lens = Lens::find(observations, &kept, work)?;
     Ok((kept, wrong, lens))
@@ -105,14 +105,14 @@ fn too_few(observations: &Observations, found: usize) -> CalibrateError {
 }
 
 /// A view in the fit in which the target was found.
-pub(super) struct Seen<'a> {
+pub(super) struct DetectedView<'a> {
     /// Its index among all views.
     index: usize,
     view: &'a super::ObservedView,
     pub(super) corners: &'a [Corner],
 }
 
-impl<'a> Seen<'a> {
+impl<'a> DetectedView<'a> {
     fn new((index, view): (usize, &'a super::ObservedView)) -> Option<Self> {
         Some(Self { index, view, corners: view.corners.as_deref().filter(|_| view.in_fit)? })
     }
@@ -124,7 +124,7 @@ fn total_rms(per_view: impl Iterator<Item = (f64, usize)>) -> f64 {
     (squared / corners.max(1) as f64).sqrt()
 }
 
-fn without_hand_eye(observations: &Observations, seen: &[Seen<'_>], lens: &Lens) -> Calibration {
+fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens: &Lens) -> Calibration {
     let mut views: Vec<ViewResult> =
         observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::NoTarget)).collect();
     let points = observations.target.points();
@@ -146,7 +146,11 @@ fn without_hand_eye(observations: &Observations, seen: &[Seen<'_>], lens: &Lens)
 }
 
 /// Views and pose pairs of the robot; a view without a robot pose cannot stand in a set with a mode.
-fn with_robot(mode: Mode, seen: &[Seen<'_>], lens: &Lens) -> Result<(Vec<View>, Vec<PosePair>), CalibrateError> {
+fn with_robot(
+    mode: Mode,
+    seen: &[DetectedView<'_>],
+    lens: &Lens,
+) -> Result<(Vec<View>, Vec<PosePair>), CalibrateError> {
     let mut views = Vec::with_capacity(seen.len());
     let mut pairs = Vec::with_capacity(seen.len());
     for (s, camera_from_target) in seen.iter().zip(&lens.camera_from_target) {
@@ -165,7 +169,7 @@ fn with_robot(mode: Mode, seen: &[Seen<'_>], lens: &Lens) -> Result<(Vec<View>, 
     Ok((views, pairs))
 }
 
-fn take_joint(calibration: &mut Calibration, problem: &JointProblem<'_>, refined: &Refined, seen: &[Seen<'_>]) {
+fn take_joint(calibration: &mut Calibration, problem: &JointProblem<'_>, refined: &Refined, seen: &[DetectedView<'_>]) {
     let screened = &refined.screened;
     let solution = &screened.solution;
     calibration.shared = Some(SharedCovariance { free: solution.free, covariance: solution.covariance.clone() });
@@ -226,7 +230,7 @@ fn take_closed_form(
     calibration: &mut Calibration,
     solution: &ClosedFormSolution,
     problem: &JointProblem<'_>,
-    seen: &[Seen<'_>],
+    seen: &[DetectedView<'_>],
     lens: &Lens,
 ) {
     let mut rms = Vec::with_capacity(seen.len());

@@ -1,6 +1,6 @@
 //! The camera, and the target's pose in every view that goes with it.
 
-use super::corners::Seen;
+use super::corners::DetectedView;
 use super::{CalibrateError, CameraKnowledge, Observations};
 use crate::camera::Intrinsics;
 use crate::frames::{Camera, Pose, Target};
@@ -20,7 +20,11 @@ pub struct Lens {
 
 impl Lens {
     /// The camera as it is known, or as all views together show it.
-    pub fn find(observations: &Observations, seen: &[Seen<'_>], work: &Work<'_>) -> Result<Self, CalibrateError> {
+    pub fn find(
+        observations: &Observations,
+        seen: &[DetectedView<'_>],
+        work: &Work<'_>,
+    ) -> Result<Self, CalibrateError> {
         match observations.camera {
             CameraKnowledge::Fixed(intrinsics) => Self::given(intrinsics, observations, seen, work),
             CameraKnowledge::Estimate { model, start } => {
@@ -51,7 +55,7 @@ impl Lens {
     fn given(
         intrinsics: Intrinsics,
         observations: &Observations,
-        seen: &[Seen<'_>],
+        seen: &[DetectedView<'_>],
         work: &Work<'_>,
     ) -> Result<Self, CalibrateError> {
         let mut camera_from_target = Vec::with_capacity(seen.len());

@@ -45,7 +45,7 @@ fn a_view_left_out_changes_the_answer_as_if_it_were_not_there() {
         assert_eq!(a.views[4], b.views[3], "results stay with their views");
     }
     let document = solve(&excluded, Method::Joint).to_result("0", None, std::collections::BTreeMap::new());
-    assert_eq!(document.views[3].status, crate::result::ViewStatus::Excluded);
+    assert_eq!(document.views[3].status, crate::result::ViewRecordStatus::Excluded);
 }
 
 #[test]

@@ -73,21 +73,21 @@ impl Calibration {
     }
 }
 
-fn method(method: &super::MethodResult) -> result::MethodResult {
+fn method(method: &super::MethodResult) -> result::MethodRecord {
     match &method.outcome {
-        Ok(solution) => result::MethodResult::solved(method.name, &solution.mount_from_camera),
-        Err(error) => result::MethodResult::failed(method.name, error),
+        Ok(solution) => result::MethodRecord::solved(method.name, &solution.mount_from_camera),
+        Err(error) => result::MethodRecord::failed(method.name, error),
     }
 }
 
-fn view(view: &super::ViewResult) -> result::ViewResult {
-    result::ViewResult {
+fn view(view: &super::ViewResult) -> result::ViewRecord {
+    result::ViewRecord {
         name: view.name.clone(),
         status: match view.status {
-            ViewStatus::Used => result::ViewStatus::Used,
-            ViewStatus::Excluded => result::ViewStatus::Excluded,
-            ViewStatus::Outlier => result::ViewStatus::Outlier,
-            ViewStatus::NoTarget => result::ViewStatus::NoTarget,
+            ViewStatus::Used => result::ViewRecordStatus::Used,
+            ViewStatus::Excluded => result::ViewRecordStatus::Excluded,
+            ViewStatus::Outlier => result::ViewRecordStatus::Outlier,
+            ViewStatus::NoTarget => result::ViewRecordStatus::NoTarget,
         },
         rms_px: view.rms_px,
         influence_mm: view.influence_m.map(|m| m * 1e3),

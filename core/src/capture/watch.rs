@@ -68,12 +68,12 @@ pub enum Rest {
 /// levels of noise. Light that flickers all over the picture is no change; light that flickers in stripes is one.
 #[derive(Debug, Clone, Default)]
 pub struct Watch {
-    seen: VecDeque<Seen>,
+    seen: VecDeque<Sample>,
     rest: Option<Rest>,
 }
 
 #[derive(Debug, Clone)]
-struct Seen {
+struct Sample {
     sim_time_s: f64,
     joints_rad: Vec<f64>,
     cells: Cells,
@@ -87,7 +87,7 @@ impl Watch {
             return self.rest.unwrap_or(Rest::Unknown);
         }
         let seen =
-            Seen { sim_time_s: shot.sim_time_s, joints_rad: shot.joints_rad.to_vec(), cells: Cells::of(shot.grey) };
+            Sample { sim_time_s: shot.sim_time_s, joints_rad: shot.joints_rad.to_vec(), cells: Cells::of(shot.grey) };
         if let Some(last) = self.seen.back() {
             let interval_s = seen.sim_time_s - last.sim_time_s;
             if interval_s < 0.0 || !seen.cells.fits(&last.cells) {
@@ -108,7 +108,7 @@ impl Watch {
         rest
     }
 
-    fn judge(&self, new: &Seen) -> Rest {
+    fn judge(&self, new: &Sample) -> Rest {
         let Some(last) = self.seen.back() else { return Rest::Unknown };
         let interval_s = new.sim_time_s - last.sim_time_s;
         let travel_rad = travel_rad(&last.joints_rad, &new.joints_rad);

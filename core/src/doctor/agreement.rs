@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::sight::Sight;
+use super::sight::SessionViews;
 use crate::frames::{Base, Pose, Tip};
 use crate::handeye::closed_form::{ClosedForm, ClosedFormSolution, ParkMartin, Shah};
 use crate::handeye::{HandEyeError, PosePair, subset};
@@ -31,8 +31,8 @@ pub(super) struct Agreement {
 }
 
 /// Pose pairs of the views with robot poses as given.
-pub(super) fn pairs_of(sight: &Sight, poses: &[Pose<Base, Tip>]) -> Vec<PosePair> {
-    let pair = |(view, pose): (&super::sight::SightedView, &Pose<Base, Tip>)| PosePair {
+pub(super) fn pairs_of(sight: &SessionViews, poses: &[Pose<Base, Tip>]) -> Vec<PosePair> {
+    let pair = |(view, pose): (&super::sight::SessionView, &Pose<Base, Tip>)| PosePair {
         anchor_from_mount: sight.mode.anchor_from_mount(pose),
         camera_from_target: Pose::from_isometry(view.camera_from_target),
     };
@@ -44,7 +44,7 @@ pub(super) fn pairs_of(sight: &Sight, poses: &[Pose<Base, Tip>]) -> Vec<PosePair
 ///
 /// # Errors
 /// That of the closed form when no choice has a solution.
-pub(super) fn agreement(sight: &Sight, pairs: &[PosePair], thorough: bool) -> Result<Agreement, HandEyeError> {
+pub(super) fn agreement(sight: &SessionViews, pairs: &[PosePair], thorough: bool) -> Result<Agreement, HandEyeError> {
     let all: Vec<usize> = (0..pairs.len()).collect();
     let mut tried = Vec::new();
     let mut error = None;
@@ -91,7 +91,7 @@ fn some_of(count: usize, size: usize, choice: usize) -> Vec<usize> {
     order.into_iter().take(size).map(|(_, i)| i).collect()
 }
 
-fn judged(sight: &Sight, pairs: &[PosePair], solution: ClosedFormSolution) -> Agreement {
+fn judged(sight: &SessionViews, pairs: &[PosePair], solution: ClosedFormSolution) -> Agreement {
     let misfit_m: Vec<f64> = pairs
         .iter()
         .map(|pair| {
@@ -105,7 +105,7 @@ fn judged(sight: &Sight, pairs: &[PosePair], solution: ClosedFormSolution) -> Ag
 }
 
 /// RMS distance of the target's outer points at two poses, metres.
-pub(super) fn misfit(sight: &Sight, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+pub(super) fn misfit(sight: &SessionViews, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     let squared: f64 = sight.outer.iter().map(|p| (a * p - b * p).norm_squared()).sum();
     (squared / sight.outer.len() as f64).sqrt()
 }

@@ -7,7 +7,7 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 
 use super::agreement::{Agreement, agreement, pairs_of};
-use super::sight::Sight;
+use super::sight::SessionViews;
 use crate::findings::FindingCode;
 use crate::frames::{Base, Pose, Tip};
 use crate::handeye::{HandEyeError, subset};
@@ -148,7 +148,7 @@ pub(super) struct Gross {
 }
 
 /// Tries everything. `None` when it was cancelled.
-pub(super) fn gross(sight: &Sight, work: &Work<'_>) -> Option<Gross> {
+pub(super) fn gross(sight: &SessionViews, work: &Work<'_>) -> Option<Gross> {
     let as_given = solve(sight, &Change::NONE, true);
     let given_m = as_given.as_ref().map_or(f64::INFINITY, |a| a.median_m);
     let sound = given_m < SOUND * sight.distance_m;
@@ -177,7 +177,7 @@ pub(super) fn gross(sight: &Sight, work: &Work<'_>) -> Option<Gross> {
 }
 
 /// The views with a changed robot pose, and what they agree on.
-fn solve(sight: &Sight, change: &Change, thorough: bool) -> Result<Agreement, HandEyeError> {
+fn solve(sight: &SessionViews, change: &Change, thorough: bool) -> Result<Agreement, HandEyeError> {
     let count = sight.views.len();
     let pose_of = |i: usize| {
         let from = i.checked_add_signed(change.shift).filter(|j| *j < count)?;

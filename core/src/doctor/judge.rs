@@ -5,7 +5,7 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
-use super::sight::Sight;
+use super::sight::SessionViews;
 
 /// Probability of a false alarm per hypothesis, after allowance for the alternatives among which the best was picked.
 /// One in ten thousand, because noise of real robots has longer tails than a Gaussian.
@@ -101,7 +101,7 @@ pub(super) fn alternatives(model: &Model<'_>, effect: Effect) -> f64 {
 }
 
 /// Joints that are known in every view.
-pub(super) fn joints(sight: &Sight) -> usize {
+pub(super) fn joints(sight: &SessionViews) -> usize {
     sight.views.iter().map(|v| v.tip_by_joint.len()).min().unwrap_or(0)
 }
 

@@ -150,7 +150,7 @@ pub fn diagnose<'a>(
 
 fn examine(observations: &Observations, diagnosis: &mut Diagnosis, work: &Work<'_>) -> Result<(), String> {
     let cancelled = || "cancelled".to_owned();
-    let sight = sight::Sight::new(observations)?;
+    let sight = sight::SessionViews::new(observations)?;
     diagnosis.findings.extend(words::not_finite(&sight));
     diagnosis.findings.extend(words::wrong_corners(&sight));
     let views = sight.views.len();

@@ -16,7 +16,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::effect::Effect;
-use super::sight::Sight;
+use super::sight::SessionViews;
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::joint::chain::Chain;
 use crate::se3;
@@ -40,7 +40,7 @@ pub(super) struct Row {
 
 /// All views at a solution.
 pub(super) struct Model<'a> {
-    pub sight: &'a Sight,
+    pub sight: &'a SessionViews,
     pub solution: ClosedFormSolution,
     pub rows: Vec<Row>,
 }
@@ -70,7 +70,7 @@ pub(super) struct Fit {
 }
 
 impl<'a> Model<'a> {
-    pub fn new(sight: &'a Sight, solution: ClosedFormSolution) -> Self {
+    pub fn new(sight: &'a SessionViews, solution: ClosedFormSolution) -> Self {
         let rows = sight
             .views
             .iter()
@@ -193,7 +193,7 @@ impl<'a> Model<'a> {
         (row.camera + row.robot[0] * robot[0] + row.robot[1] * robot[1]).try_inverse()
     }
 
-    fn solve(&self, state: &State, inside: &[usize], designs: &[DMatrix<f64>], robot: [f64; 2]) -> Option<Solved> {
+    fn solve(&self, state: &State, inside: &[usize], designs: &[DMatrix<f64>], robot: [f64; 2]) -> Option<Solution> {
         let width = designs.first()?.ncols();
         let weights: Vec<Matrix6<f64>> = (0..self.rows.len()).map(|i| self.weight(i, robot)).collect::<Option<_>>()?;
         let mut normal = DMatrix::zeros(width, width);
@@ -206,7 +206,7 @@ impl<'a> Model<'a> {
         self.add_form(state, &mut normal, &mut right);
         let covariance = inverse(&normal)?;
         let theta = &covariance * &right;
-        theta.iter().all(|v| v.is_finite()).then_some(Solved { weights, covariance, theta })
+        theta.iter().all(|v| v.is_finite()).then_some(Solution { weights, covariance, theta })
     }
 
     fn residual(&self, index: usize, design: &DMatrix<f64>, theta: &DVector<f64>) -> Vector6<f64> {
@@ -215,7 +215,7 @@ impl<'a> Model<'a> {
     }
 
     /// Logarithmic step of both variances.
-    fn scoring(&self, inside: &[usize], designs: &[DMatrix<f64>], solved: &Solved, robot: [f64; 2]) -> [f64; 2] {
+    fn scoring(&self, inside: &[usize], designs: &[DMatrix<f64>], solved: &Solution, robot: [f64; 2]) -> [f64; 2] {
         let mut gradient = [0.0; 2];
         let mut information = nalgebra::Matrix2::zeros();
         for &i in inside {
@@ -247,14 +247,14 @@ impl<'a> Model<'a> {
         [0, 1].map(|j: usize| step[j].clamp(-LARGEST_STEP, LARGEST_STEP))
     }
 
-    fn finished(&self, solved: Solved, robot: [f64; 2], designs: Vec<DMatrix<f64>>, inside: &[usize]) -> Fit {
-        let Solved { weights, covariance, theta } = solved;
+    fn finished(&self, solved: Solution, robot: [f64; 2], designs: Vec<DMatrix<f64>>, inside: &[usize]) -> Fit {
+        let Solution { weights, covariance, theta } = solved;
         let residuals = designs.iter().enumerate().map(|(i, design)| self.residual(i, design, &theta)).collect();
         Fit { theta, covariance, robot, residuals, weights, designs, views: inside.len() }
     }
 }
 
-struct Solved {
+struct Solution {
     weights: Vec<Matrix6<f64>>,
     covariance: DMatrix<f64>,
     theta: DVector<f64>,
@@ -262,8 +262,8 @@ struct Solved {
 
 /// The pose seen, or its mirrored twin where the corners cannot tell and the chain can.
 fn nearer(
-    sight: &Sight,
-    view: &super::sight::SightedView,
+    sight: &SessionViews,
+    view: &super::sight::SessionView,
     chain: &nalgebra::Isometry3<f64>,
 ) -> nalgebra::Isometry3<f64> {
     let off = |pose: &nalgebra::Isometry3<f64>| super::agreement::misfit(sight, chain, pose);

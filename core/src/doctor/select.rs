@@ -5,7 +5,7 @@ use super::agreement::Agreement;
 use super::judge::{Candidate, Judged, alternatives, is_significant, judge};
 use super::model::{Fit, Model, State};
 use super::screen::screened;
-use super::sight::Sight;
+use super::sight::SessionViews;
 use crate::progress::Work;
 
 /// Least views: twelve unknowns, six of a hypothesis, and noise levels to judge them by.
@@ -33,7 +33,7 @@ pub(super) struct Selection<'a> {
 }
 
 /// Judges all hypotheses. `None` when the views leave something open, or when it was cancelled.
-pub(super) fn select<'a>(sight: &'a Sight, start: &Agreement, work: &Work<'_>) -> Option<Selection<'a>> {
+pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work<'_>) -> Option<Selection<'a>> {
     let mut model = Model::new(sight, start.solution);
     let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
     let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;

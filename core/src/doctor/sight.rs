@@ -6,7 +6,7 @@ use crate::board_shape::{BoardPoints, BoardShape};
 use crate::calibrate::{CameraKnowledge, Observations, ObservedView};
 use crate::camera::Intrinsics;
 use crate::frames::{Base, Pose, Tip};
-use crate::handeye::joint::equations::{FreeForm, PoseEquations, Seen};
+use crate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::handeye::{Mode, subset};
 use crate::intrinsics::{self, Options, SeenView};
 use crate::observation::Corner;
@@ -31,7 +31,7 @@ const AMBIGUOUS: f64 = 2.0;
 const NOISY: f64 = 2.0;
 
 /// One view with a robot pose and a pose of the target.
-pub(super) struct SightedView {
+pub(super) struct SessionView {
     pub name: String,
     pub base_from_tip: Pose<Base, Tip>,
     pub camera_from_target: Isometry3<f64>,
@@ -48,9 +48,9 @@ pub(super) struct SightedView {
 }
 
 /// All views as the camera saw them.
-pub(super) struct Sight {
+pub(super) struct SessionViews {
     pub mode: Mode,
-    pub views: Vec<SightedView>,
+    pub views: Vec<SessionView>,
     /// Names of views with numbers that are not finite.
     pub not_finite: Vec<String>,
     /// The camera; `None` for poses measured elsewhere.
@@ -75,7 +75,7 @@ struct Fit {
     pose: PlanarPose,
 }
 
-impl Sight {
+impl SessionViews {
     /// Looks at all views in the fit that have a robot pose and the target. `Err` says why nothing can be tested.
     pub fn new(observations: &Observations) -> Result<Self, String> {
         let Some(mode) = observations.mode else { return Err("there are no robot poses".to_owned()) };
@@ -118,7 +118,7 @@ impl Sight {
     fn take_poses(&mut self, seen: &[&ObservedView]) {
         for view in seen {
             let (Some(base_from_tip), Some(pose)) = (view.base_from_tip, view.camera_from_target) else { continue };
-            self.views.push(SightedView {
+            self.views.push(SessionView {
                 name: view.name.clone(),
                 base_from_tip,
                 camera_from_target: *pose.isometry(),
@@ -143,7 +143,7 @@ impl Sight {
         }
         self.intrinsics = Some(camera);
         let points = BoardPoints::new(&observations.target.points());
-        let free = FreeForm { lens: true, warp: true, scale: false };
+        let free = FreeParameters { lens: true, warp: true, scale: false };
         let count = free.count(&camera);
         let variances = fits.iter().flatten().map(Fit::variance_px2);
         let Some(typical) = median(variances) else {
@@ -157,12 +157,12 @@ impl Sight {
         for (view, fit) in seen.iter().zip(fits) {
             let (Some(fit), Some(base_from_tip)) = (fit, view.base_from_tip) else { continue };
             let pose = *fit.pose.best.camera_from_target.isometry();
-            let seen = Seen {
+            let seen = ViewInput {
                 intrinsics: &camera,
                 board: &points,
                 shape: &BoardShape::FLAT,
                 corners: &fit.corners,
-                whiteners: &[],
+                sqrt_weights: &[],
             };
             let Ok(equations) = PoseEquations::new(&seen, &pose, free) else { continue };
             let Some(inverse) = equations.pose.try_inverse() else { continue };
@@ -175,7 +175,7 @@ impl Sight {
             self.form_gradient +=
                 (equations.form_gradient.rows(0, count) - by_form.transpose() * equations.pose_gradient) / variance;
             let ambiguous = fit.pose.alternative.filter(|a| a.rms_px < AMBIGUOUS * fit.pose.best.rms_px);
-            self.views.push(SightedView {
+            self.views.push(SessionView {
                 name: view.name.clone(),
                 base_from_tip,
                 camera_from_target: pose,

@@ -5,7 +5,7 @@ mod fine;
 pub(super) use fine::{finding_of, fine};
 
 use super::gross::{self, Gross, Tried};
-use super::sight::Sight;
+use super::sight::SessionViews;
 use super::{Estimate, Hypothesis};
 use crate::findings::{Evidence, Finding, FindingCode, Severity, listed};
 use crate::handeye::Mode;
@@ -27,7 +27,7 @@ fn evidence(name: &'static str, value: f64, unit: &'static str) -> Evidence {
     Evidence { name, value, unit }
 }
 
-pub(super) fn not_finite(sight: &Sight) -> Option<Finding> {
+pub(super) fn not_finite(sight: &SessionViews) -> Option<Finding> {
     let names = &sight.not_finite;
     if names.is_empty() {
         return None;
@@ -45,7 +45,7 @@ pub(super) fn not_finite(sight: &Sight) -> Option<Finding> {
     Some(finding.with("views", count as f64, ""))
 }
 
-pub(super) fn wrong_corners(sight: &Sight) -> Option<Finding> {
+pub(super) fn wrong_corners(sight: &SessionViews) -> Option<Finding> {
     let views: Vec<_> = sight.views.iter().filter(|v| !v.wrong_corners.is_empty()).collect();
     if views.is_empty() {
         return None;
@@ -66,7 +66,7 @@ pub(super) fn wrong_corners(sight: &Sight) -> Option<Finding> {
 }
 
 /// What was tried: the best when it is accused, and the best of every single change.
-pub(super) fn gross(sight: &Sight, gross: &Gross) -> Vec<Hypothesis> {
+pub(super) fn gross(sight: &SessionViews, gross: &Gross) -> Vec<Hypothesis> {
     let mut found: Vec<Hypothesis> = Vec::new();
     for (rank, tried) in gross.tried.iter().enumerate() {
         let codes = tried.change.codes();
@@ -100,7 +100,7 @@ pub(super) fn gross(sight: &Sight, gross: &Gross) -> Vec<Hypothesis> {
 
 /// Inverted poses and the other set-up are the same equations. Whether the distances speak for the other set-up: what
 /// is carried by the tip is nearer to it than what stands in the cell.
-fn twin(sight: &Sight, tried: &Tried) -> Option<bool> {
+fn twin(sight: &SessionViews, tried: &Tried) -> Option<bool> {
     let (camera_m, target_m) = distances(tried);
     let stands_elsewhere = match sight.mode {
         Mode::EyeInHand => camera_m > FARTHER * target_m,
@@ -114,7 +114,7 @@ fn distances(tried: &Tried) -> (f64, f64) {
     (solution.mount_from_camera.translation().norm(), solution.anchor_from_target.translation().norm())
 }
 
-fn gross_hypothesis(sight: &Sight, gross: &Gross, tried: &Tried, codes: &[FindingCode]) -> Hypothesis {
+fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &[FindingCode]) -> Hypothesis {
     // Where the poses as they are have no solution at all, the board is as good as nowhere.
     let given_m = gross.as_given.as_ref().map_or(sight.distance_m, |a| a.median_m);
     let so_m = tried.agreement.median_m;
@@ -210,7 +210,7 @@ pub(super) fn gross_findings(hypotheses: &[Hypothesis]) -> Vec<Finding> {
         .collect()
 }
 
-pub(super) fn hopeless(sight: &Sight, misfit_m: f64) -> Finding {
+pub(super) fn hopeless(sight: &SessionViews, misfit_m: f64) -> Finding {
     let text = text!(
         "Robot poses and pictures contradict each other: the board comes together within {misfit} mm only, at a distance of \
          {distance} mm. Inverted poses, the other mode, millimetres, quaternion order and rows out of step do not explain \

@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector,
 use super::{IntrinsicsError, SeenView};
 use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::Intrinsics;
-use crate::handeye::joint::equations::{FreeForm, MAX_FORM, PoseEquations, Seen};
+use crate::handeye::joint::equations::{FreeParameters, MAX_FORM, PoseEquations, ViewInput};
 use crate::planar_pose::PoseError;
 use crate::planar_pose::mirror::mirrored;
 use crate::planar_pose::refine::refine;
@@ -38,7 +38,7 @@ const WORTHWHILE: f64 = 1e-6;
 pub(super) struct Problem<'a> {
     pub views: &'a [SeenView<'a>],
     pub board: &'a BoardPoints,
-    pub free: FreeForm,
+    pub free: FreeParameters,
     pub cancel: &'a CancelToken,
 }
 
@@ -195,8 +195,8 @@ pub(super) fn seen<'a>(
     board: &'a BoardPoints,
     shape: &'a BoardShape,
     intrinsics: &'a Intrinsics,
-) -> Seen<'a> {
-    Seen { intrinsics, board, shape, corners: view.corners, whiteners: view.whiteners }
+) -> ViewInput<'a> {
+    ViewInput { intrinsics, board, shape, corners: view.corners, sqrt_weights: view.sqrt_weights }
 }
 
 /// Minimises the cost from `estimate`, which holds the best point found afterwards. Returns the number of steps; `None`
@@ -250,7 +250,7 @@ pub(super) fn mirror_poses(problem: &Problem<'_>, estimate: &mut Estimate) -> Re
         let sum: Vector3<f64> = view.corners.iter().map(|c| problem.board.point(c.index, shape).coords).sum();
         let Some(start) = mirrored(pose, &(sum / view.corners.len() as f64)) else { continue };
         let Some(other) = refine(&seen, &start, MIRROR_STEPS) else { continue };
-        let Ok(own) = PoseEquations::new(&seen, pose, FreeForm::default()) else { continue };
+        let Ok(own) = PoseEquations::new(&seen, pose, FreeParameters::default()) else { continue };
         if other.squared_px < (1.0 - WORTHWHILE) * own.squared_px {
             *pose = other.pose;
             improved = true;

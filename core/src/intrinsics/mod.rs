@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, Matrix2};
 use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::{CameraError, Distortion, Intrinsics};
 use crate::frames::{Camera, Pose, Target};
-use crate::handeye::joint::equations::FreeForm;
+use crate::handeye::joint::equations::FreeParameters;
 use crate::observation::Corner;
 use crate::planar_pose::{self, PoseError};
 use crate::progress::CancelToken;
@@ -65,13 +65,13 @@ pub struct SeenView<'a> {
     /// At least [`planar_pose::MIN_CORNERS`] that do not lie on one line.
     pub corners: &'a [Corner],
     /// One matrix `W` per corner, whose residual counts as `W r`; empty where all corners count alike.
-    pub whiteners: &'a [Matrix2<f64>],
+    pub sqrt_weights: &'a [Matrix2<f64>],
 }
 
 impl<'a> SeenView<'a> {
     /// A view whose corners all count alike.
     pub fn unweighted(corners: &'a [Corner]) -> Self {
-        Self { corners, whiteners: &[] }
+        Self { corners, sqrt_weights: &[] }
     }
 }
 
@@ -134,12 +134,12 @@ pub enum IntrinsicsError {
     #[error(transparent)]
     Corners(#[from] PoseError),
     /// A list of whiteners of another length than that of the corners.
-    #[error("view {view}: there are {whiteners} weights for {corners} corners")]
+    #[error("view {view}: there are {sqrt_weights} weights for {corners} corners")]
     BadWeights {
         /// Index of the view.
         view: usize,
         /// Whiteners given.
-        whiteners: usize,
+        sqrt_weights: usize,
         /// Corners given.
         corners: usize,
     },
@@ -205,9 +205,9 @@ pub fn solve(
     }
     for (index, view) in views.iter().enumerate() {
         planar_pose::check_corners(view.corners, target, index)?;
-        let (whiteners, corners) = (view.whiteners.len(), view.corners.len());
-        if whiteners > 0 && whiteners != corners {
-            return Err(IntrinsicsError::BadWeights { view: index, whiteners, corners });
+        let (sqrt_weights, corners) = (view.sqrt_weights.len(), view.corners.len());
+        if sqrt_weights > 0 && sqrt_weights != corners {
+            return Err(IntrinsicsError::BadWeights { view: index, sqrt_weights, corners });
         }
     }
     let board = &BoardPoints::new(&target.points());
@@ -219,7 +219,7 @@ pub fn solve(
     if spread_deg < MIN_SPREAD_DEG {
         return Err(IntrinsicsError::ParallelViews { views: views.len(), spread_deg });
     }
-    let free = FreeForm { lens: true, warp: options.free_warp, scale: false };
+    let free = FreeParameters { lens: true, warp: options.free_warp, scale: false };
     let problem = Problem { views, board, free, cancel };
     let (mut estimate, mut steps) = first_optimum(&problem, &planes, &nominal, options)?;
     for _ in 0..MIRROR_ROUNDS {

@@ -160,9 +160,9 @@ fn a_corner_of_little_weight_counts_little_and_one_of_none_not_at_all() {
     for view in &mut views {
         view[0].px += Vector2::new(30.0, -20.0);
     }
-    let mut whiteners = vec![Matrix2::identity(); 70];
-    whiteners[0] = Matrix2::zeros();
-    let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView { corners: v, whiteners: &whiteners }).collect();
+    let mut sqrt_weights = vec![Matrix2::identity(); 70];
+    sqrt_weights[0] = Matrix2::zeros();
+    let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView { corners: v, sqrt_weights: &sqrt_weights }).collect();
     let weighted = solve(&seen, &TARGET, SIZE, &options, &CancelToken::default()).expect("solves");
     let without = solved(&without, &options).expect("solves");
     assert!((weighted.cost / without.cost - 1.0).abs() < 1e-9, "{} {}", weighted.cost, without.cost);
@@ -178,7 +178,7 @@ fn a_pose_that_began_as_its_mirror_image_is_turned_round() {
     let found = solved(&views, &Options::new(Distortion::None)).expect("solves");
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
     let (board, cancel) = (board(), CancelToken::default());
-    let free = FreeForm { lens: true, warp: false, scale: false };
+    let free = FreeParameters { lens: true, warp: false, scale: false };
     let problem = Problem { views: &seen, board: &board, free, cancel: &cancel };
     let poses: Vec<Isometry3<f64>> = found.camera_from_target.iter().map(|p| *p.isometry()).collect();
     let mut estimate = Estimate { intrinsics: found.intrinsics, shape: found.shape, poses: poses.clone() };
@@ -221,8 +221,8 @@ fn unusable_input_is_refused_by_name() {
     cancel.cancel();
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
     assert_eq!(solve(&seen, &TARGET, SIZE, &options, &cancel), Err(IntrinsicsError::Cancelled));
-    let whiteners = [Matrix2::identity()];
-    let uneven = vec![SeenView { corners: &views[0], whiteners: &whiteners }; 3];
+    let sqrt_weights = [Matrix2::identity()];
+    let uneven = vec![SeenView { corners: &views[0], sqrt_weights: &sqrt_weights }; 3];
     let error = solve(&uneven, &TARGET, SIZE, &options, &CancelToken::default());
-    assert_eq!(error, Err(IntrinsicsError::BadWeights { view: 0, whiteners: 1, corners: 70 }));
+    assert_eq!(error, Err(IntrinsicsError::BadWeights { view: 0, sqrt_weights: 1, corners: 70 }));
 }

@@ -28,7 +28,7 @@ use nalgebra::{Matrix2, SymmetricEigen, Vector2};
 use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::{CameraError, Intrinsics};
 use crate::frames::{Camera, Pose, Target};
-use crate::handeye::joint::equations::Seen;
+use crate::handeye::joint::equations::ViewInput;
 use crate::observation::Corner;
 use crate::target::TargetSpec;
 
@@ -151,7 +151,7 @@ pub fn solve(corners: &[Corner], target: &TargetSpec, intrinsics: &Intrinsics) -
     intrinsics.validate()?;
     check_corners(corners, target, 0)?;
     let board = BoardPoints::new(&target.points());
-    let seen = Seen { intrinsics, board: &board, shape: &BoardShape::FLAT, corners, whiteners: &[] };
+    let seen = ViewInput { intrinsics, board: &board, shape: &BoardShape::FLAT, corners, sqrt_weights: &[] };
     let pairs = corners.iter().filter_map(|corner| start::pair(&seen, corner).transpose());
     let mut solutions: Vec<Solution> = start::starts(&pairs.collect::<Result<Vec<_>, _>>()?)
         .iter()

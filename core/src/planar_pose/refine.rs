@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use crate::handeye::joint::equations::{FreeForm, PoseEquations, Seen};
+use crate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::se3;
 
 /// A step whose rotation \[rad\] and translation [part of the distance] are below this ends the descent: rounding.
@@ -28,9 +28,9 @@ pub(crate) struct Minimum {
 ///
 /// `None` when the start has a corner without image, which no later step would mend. Where the corners determine no pose
 /// the descent ends where they no longer tell a direction.
-pub(crate) fn refine(seen: &Seen<'_>, start: &Isometry3<f64>, steps: usize) -> Option<Minimum> {
+pub(crate) fn refine(seen: &ViewInput<'_>, start: &Isometry3<f64>, steps: usize) -> Option<Minimum> {
     let at = |pose: &Isometry3<f64>| {
-        PoseEquations::new(seen, pose, FreeForm::default()).ok().filter(|there| there.squared_px.is_finite())
+        PoseEquations::new(seen, pose, FreeParameters::default()).ok().filter(|there| there.squared_px.is_finite())
     };
     let (mut pose, mut equations) = (*start, at(start)?);
     let mut damping = DAMPING;

@@ -6,7 +6,7 @@ use nalgebra::{
 
 use super::homography::{homography, jacobian, mapped};
 use crate::camera::CameraError;
-use crate::handeye::joint::equations::Seen;
+use crate::handeye::joint::equations::ViewInput;
 use crate::observation::Corner;
 
 /// Smallest cosine to the optical axis of the rays that start a pose: the plane z = 1 has no room for more.
@@ -19,7 +19,7 @@ pub(crate) type Pair = (Vector2<f64>, Vector2<f64>);
 ///
 /// # Errors
 /// [`CameraError::OutsideModel`] for a corner without ray.
-pub(crate) fn pair(seen: &Seen<'_>, corner: &Corner) -> Result<Option<Pair>, CameraError> {
+pub(crate) fn pair(seen: &ViewInput<'_>, corner: &Corner) -> Result<Option<Pair>, CameraError> {
     let ray = seen.intrinsics.unproject(&corner.px)?;
     let point = seen.board.drawn()[corner.index].coords.xy();
     Ok((ray.z > MIN_RAY_Z).then(|| (point, ray.xy() / ray.z)))

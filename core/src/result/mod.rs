@@ -44,9 +44,9 @@ pub struct CalibrationResult {
     /// How good it is.
     pub quality: Quality,
     /// What the closed-form solvers say, for comparison.
-    pub methods: Vec<MethodResult>,
+    pub methods: Vec<MethodRecord>,
     /// What became of every view.
-    pub views: Vec<ViewResult>,
+    pub views: Vec<ViewRecord>,
     /// Details of a joint estimate; `None` for a closed form and a camera alone.
     #[serde(default)]
     pub estimate: Option<EstimateDetails>,
@@ -211,7 +211,7 @@ pub struct Quality {
 
 /// What one closed-form solver says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MethodResult {
+pub struct MethodRecord {
     /// Name of the method, `snake_case`.
     pub name: String,
     /// Origin of the camera on its mount, metres; `None` when the method failed.
@@ -222,7 +222,7 @@ pub struct MethodResult {
     pub status: MethodStatus,
 }
 
-impl MethodResult {
+impl MethodRecord {
     /// A method that found an answer.
     pub fn solved(name: &str, mount_from_camera: &Pose<Mount, Camera>) -> Self {
         Self {
@@ -267,11 +267,11 @@ impl From<MethodStatus> for String {
 
 /// What became of one view.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ViewResult {
+pub struct ViewRecord {
     /// Its name in the data set.
     pub name: String,
     /// What became of it.
-    pub status: ViewStatus,
+    pub status: ViewRecordStatus,
     /// Root mean square reprojection error of its corners, pixels.
     pub rms_px: Option<f64>,
     /// How far the hand-eye translation moves without this view, millimetres.
@@ -290,7 +290,7 @@ pub struct ViewResult {
 /// What became of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum ViewStatus {
+pub enum ViewRecordStatus {
     /// It is part of the fit.
     Used,
     /// A person took it out.

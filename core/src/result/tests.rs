@@ -27,21 +27,22 @@ pub(crate) fn golden() -> CalibrationResult {
     result.intrinsics = Some(IntrinsicsEstimate::new(&golden_intrinsics(), Some([0.4, 0.4, 0.3, 1.0 / 3.0]), false));
     result.quality = Quality { rms_px: Some(0.31), sigma_px: Some(0.2), ..Quality::default() };
     result.methods = vec![
-        MethodResult::solved("park_martin", &golden_pose().relabel()),
-        MethodResult::failed("tsai_lenz", &"3 views are not enough"),
+        MethodRecord::solved("park_martin", &golden_pose().relabel()),
+        MethodRecord::failed("tsai_lenz", &"3 views are not enough"),
     ];
-    let statuses = [ViewStatus::Used, ViewStatus::Excluded, ViewStatus::Outlier, ViewStatus::NoTarget];
+    let statuses =
+        [ViewRecordStatus::Used, ViewRecordStatus::Excluded, ViewRecordStatus::Outlier, ViewRecordStatus::NoTarget];
     result.views = statuses
         .into_iter()
         .enumerate()
-        .map(|(i, status)| ViewResult {
+        .map(|(i, status)| ViewRecord {
             name: format!("images/{i:04}.png"),
             status,
             rms_px: Some(0.3),
             influence_mm: None,
-            distance: (status == ViewStatus::Outlier).then_some(3.5),
+            distance: (status == ViewRecordStatus::Outlier).then_some(3.5),
             corners_aside: vec![4, 17],
-            renumbered: status == ViewStatus::Excluded,
+            renumbered: status == ViewRecordStatus::Excluded,
         })
         .collect();
     result.estimate = Some(EstimateDetails {

@@ -3,14 +3,14 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 
 use super::pose;
-use super::{ByDepth, Picture, Seen};
+use super::{BoardDetection, ByDepth, Picture};
 use crate::depth::{DepthImage, DepthSample};
 use crate::frames::{Base, Camera, PointIn, Pose};
 use crate::observation::Corner;
 use crate::se3;
 use crate::statistics::{SIGMA_PER_MEDIAN_SIZE, median_high};
 use crate::target::TargetSpec;
-use crate::verify::Calibrated;
+use crate::verify::Predictor;
 
 /// Points that fix a board with one to spare, so that a wrong one shows.
 const MIN_POINTS: usize = 4;
@@ -37,8 +37,8 @@ struct Point {
 pub(super) fn by_depth(
     picture: &Picture<'_>,
     depth: &DepthImage,
-    seen: &Seen,
-    calibrated: &Calibrated,
+    seen: &BoardDetection,
+    calibrated: &Predictor,
     target: &TargetSpec,
 ) -> Option<ByDepth> {
     let base_from_camera = calibrated.base_from_camera(&picture.base_from_tip);
@@ -72,7 +72,7 @@ fn in_base(base_from_camera: &Pose<Base, Camera>, point: Point3<f64>) -> Point3<
 }
 
 /// Where the ray through the corner has the corner's depth.
-fn point_at(depth: &DepthImage, corner: &Corner, far_m: f32, calibrated: &Calibrated) -> Option<Point3<f64>> {
+fn point_at(depth: &DepthImage, corner: &Corner, far_m: f32, calibrated: &Predictor) -> Option<Point3<f64>> {
     let depth_m = depth_at(depth, corner.px, far_m)?;
     let ray = calibrated.intrinsics.unproject(&corner.px).ok()?;
     (ray.z > 0.0).then(|| Point3::from(ray.into_inner() * (depth_m / ray.z)))

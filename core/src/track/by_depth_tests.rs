@@ -21,7 +21,7 @@ fn measured(change: impl Fn(u32, u32, &mut f32)) -> Option<ByDepth> {
             Corner::new(index, watch.stage.camera.project(&(in_camera * GRID.point(index))).expect("in front"))
         })
         .collect();
-    let seen = Seen {
+    let seen = BoardDetection {
         corners,
         camera_from_target: Pose::from_isometry(in_camera),
         base_from_target: board(),

@@ -30,14 +30,14 @@ type Matrix12 = SMatrix<f64, 12, 12>;
 
 /// A board located by one picture.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sight {
+pub(super) struct BoardPose {
     centre: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
     /// Of `[δp δθ]`.
     covariance: Matrix6<f64>,
 }
 
-impl Sight {
+impl BoardPose {
     /// `covariance` is of the right perturbation `[t; r]`, `centre` the board's middle in the target frame.
     pub fn new(base_from_target: &Pose<Base, Target>, covariance: &Matrix6<f64>, centre: &Point3<f64>) -> Self {
         let rotation = base_from_target.rotation();
@@ -71,7 +71,7 @@ pub(super) struct Filter {
 
 impl Filter {
     /// Starts with one sight, at rest as far as anyone knows.
-    pub fn new(motion: MotionModel, centre_in_target: Point3<f64>, time_s: f64, sight: &Sight) -> Self {
+    pub fn new(motion: MotionModel, centre_in_target: Point3<f64>, time_s: f64, sight: &BoardPose) -> Self {
         let mut covariance = Matrix12::zeros();
         covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(&sight.covariance);
         for i in 0..3 {
@@ -130,7 +130,7 @@ impl Filter {
     }
 
     /// What `sight` says at the filter's time less what is expected, and the covariance of that difference.
-    fn innovation(&self, sight: &Sight) -> (Vector6<f64>, Matrix6<f64>) {
+    fn innovation(&self, sight: &BoardPose) -> (Vector6<f64>, Matrix6<f64>) {
         let turn = se3::rotation_vector(&(sight.rotation * self.rotation.inverse()));
         let shift = sight.centre - self.centre;
         let difference = Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
@@ -138,14 +138,14 @@ impl Filter {
     }
 
     /// Squared Mahalanobis distance of a sight from what is expected; `None` when it cannot be computed.
-    pub fn distance_squared(&self, sight: &Sight) -> Option<f64> {
+    pub fn distance_squared(&self, sight: &BoardPose) -> Option<f64> {
         let (difference, covariance) = self.innovation(sight);
         let squared = difference.dot(&covariance.cholesky()?.solve(&difference));
         squared.is_finite().then_some(squared)
     }
 
     /// Takes a sight of the filter's time in, if it can be one of the board; `false` and no change otherwise.
-    pub fn update(&mut self, sight: &Sight) -> bool {
+    pub fn update(&mut self, sight: &BoardPose) -> bool {
         if !self.distance_squared(sight).is_some_and(|squared| squared <= GATE) {
             return false;
         }

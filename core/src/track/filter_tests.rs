@@ -43,14 +43,14 @@ impl Board {
     }
 
     /// As a picture would see it: sideways to 0.1 mm, in depth to 0.5 mm, tilted to 2 mrad.
-    fn seen(&self, rng: &mut ChaCha8Rng) -> Sight {
+    fn seen(&self, rng: &mut ChaCha8Rng) -> BoardPose {
         let sigmas = [1e-4, 1e-4, 5e-4, 2e-3, 2e-3, 3e-4];
         let delta = Vector6::from_fn(|i, _| {
             let n: f64 = StandardNormal.sample(rng);
             sigmas[i] * n
         });
         let covariance = Matrix6::from_diagonal(&Vector6::from(sigmas).map(|s| s * s));
-        Sight::new(&self.base_from_target().perturbed(&delta), &covariance, &centre())
+        BoardPose::new(&self.base_from_target().perturbed(&delta), &covariance, &centre())
     }
 }
 

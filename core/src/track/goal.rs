@@ -6,7 +6,7 @@ use super::Estimate;
 use crate::frames::{Base, Camera, Pose, Target, Tip};
 use crate::handeye::HandEye;
 use crate::target::TargetSpec;
-use crate::verify::Calibrated;
+use crate::verify::Predictor;
 
 /// What is kept while the board moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +41,7 @@ impl Keep {
     ///
     /// `None` for a camera beside the robot (the board is then on the tip, or its view does not depend on the tip), for
     /// a corner that the board does not have, and for numbers that are not finite.
-    pub fn tip_goal(&self, estimate: &Estimate, calibrated: &Calibrated, target: &TargetSpec) -> Option<TipGoal> {
+    pub fn tip_goal(&self, estimate: &Estimate, calibrated: &Predictor, target: &TargetSpec) -> Option<TipGoal> {
         let HandEye::EyeInHand { tip_from_camera, .. } = calibrated.hand_eye else { return None };
         let goal = match *self {
             Self::View(camera_from_target) => {

@@ -34,7 +34,7 @@ use crate::frames::{Base, Camera, Pose, Target, Tip};
 use crate::image::GrayImage;
 use crate::observation::Corner;
 use crate::target::TargetSpec;
-use crate::verify::Calibrated;
+use crate::verify::Predictor;
 
 pub use error::TrackError;
 pub use goal::{Keep, TipGoal};
@@ -47,7 +47,7 @@ pub struct Setup {
     /// The board.
     pub target: TargetSpec,
     /// Camera and hand-eye, with their uncertainty where it is known.
-    pub calibrated: Calibrated,
+    pub calibrated: Predictor,
     /// How the board may move.
     pub motion: MotionModel,
 }
@@ -104,7 +104,7 @@ pub enum State {
 
 /// The board in one picture alone.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct BoardDetection {
     /// Corners that are seen; not all of them where the board is partly hidden.
     pub corners: Vec<Corner>,
     /// The board in the camera, by PnP.
@@ -168,7 +168,7 @@ pub struct Update {
     /// Whether the board is followed.
     pub state: State,
     /// This picture alone.
-    pub seen: Option<Seen>,
+    pub seen: Option<BoardDetection>,
     /// The depths of this picture alone.
     pub by_depth: Option<ByDepth>,
     /// All pictures so far; `None` while searching and when lost.

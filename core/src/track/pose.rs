@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix6, Point3, Vector2, Vector6};
 
-use crate::handeye::joint::equations::{FreeForm, PoseEquations, Seen};
+use crate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::observation::Corner;
 use crate::planar_pose::mirror::mirrored;
 use crate::planar_pose::refine::{Minimum, refine};
@@ -42,7 +42,7 @@ impl Fit {
 }
 
 /// How far the corners are from where the pose has them \[px\]; `None` when one has no image there.
-fn lengths(seen: &Seen<'_>, pose: &Isometry3<f64>) -> Option<Vec<f64>> {
+fn lengths(seen: &ViewInput<'_>, pose: &Isometry3<f64>) -> Option<Vec<f64>> {
     let length = |corner: &Corner| {
         let point = pose * seen.board.point(corner.index, seen.shape);
         Some((seen.intrinsics.project(&point).ok()? - corner.px).norm())
@@ -56,16 +56,16 @@ fn sigma_of(lengths: &[f64]) -> f64 {
 
 /// Least squares in which points that do not fit lose their weight, then plain least squares over those that fit.
 /// `floor_px` is a standard deviation that is expected of good points in any case. `None` when it does not converge.
-pub(super) fn robust(seen: &Seen<'_>, start: &Isometry3<f64>, floor_px: f64) -> Option<Fit> {
+pub(super) fn robust(seen: &ViewInput<'_>, start: &Isometry3<f64>, floor_px: f64) -> Option<Fit> {
     let mut pose = *start;
     for _ in 0..ROBUST_STEPS {
         let lengths = lengths(seen, &pose)?;
         let reach = TUKEY * sigma_of(&lengths).max(floor_px);
         // The roots of the weights.
         let tukey = |length: &f64| Matrix2::identity() * (1.0 - (length / reach).powi(2)).max(0.0);
-        let whiteners: Vec<Matrix2<f64>> = lengths.iter().map(tukey).collect();
-        let weighted = Seen { whiteners: &whiteners, ..*seen };
-        let sums = PoseEquations::new(&weighted, &pose, FreeForm::default()).ok()?;
+        let sqrt_weights: Vec<Matrix2<f64>> = lengths.iter().map(tukey).collect();
+        let weighted = ViewInput { sqrt_weights: &sqrt_weights, ..*seen };
+        let sums = PoseEquations::new(&weighted, &pose, FreeParameters::default()).ok()?;
         let step: Vector6<f64> = -sums.pose.cholesky()?.solve(&sums.pose_gradient);
         pose *= se3::exp(&step);
         let (shift, turn) = (step.fixed_rows::<3>(0).norm(), step.fixed_rows::<3>(3).norm());
@@ -80,14 +80,15 @@ pub(super) fn robust(seen: &Seen<'_>, start: &Isometry3<f64>, floor_px: f64) -> 
 }
 
 /// Least squares over some of the corners.
-fn plain(seen: &Seen<'_>, start: &Isometry3<f64>, corners: Vec<Corner>) -> Option<Fit> {
-    let Minimum { pose, squared_px, information } = refine(&Seen { corners: &corners, ..*seen }, start, PLAIN_STEPS)?;
+fn plain(seen: &ViewInput<'_>, start: &Isometry3<f64>, corners: Vec<Corner>) -> Option<Fit> {
+    let Minimum { pose, squared_px, information } =
+        refine(&ViewInput { corners: &corners, ..*seen }, start, PLAIN_STEPS)?;
     Some(Fit { pose, corners, information, cost: squared_px })
 }
 
 /// The other minimum that a flat board has: its normal mirrored at the line of sight to `centre`, refined. `None` when
 /// there is none.
-pub(super) fn other_minimum(seen: &Seen<'_>, fit: &Fit, centre: &Point3<f64>) -> Option<Fit> {
+pub(super) fn other_minimum(seen: &ViewInput<'_>, fit: &Fit, centre: &Point3<f64>) -> Option<Fit> {
     let other = plain(seen, &mirrored(&fit.pose, &centre.coords)?, fit.corners.clone())?;
     (other.pose.rotation.angle_to(&fit.pose.rotation) > SAME_POSE_RAD).then_some(other)
 }

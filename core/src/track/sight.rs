@@ -8,7 +8,7 @@ use super::glance;
 use super::pose::{self, Fit};
 use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::Intrinsics;
-use crate::handeye::joint::equations::Seen;
+use crate::handeye::joint::equations::ViewInput;
 use crate::observation::Corner;
 use crate::planar_pose;
 use crate::statistics::median_high;
@@ -177,12 +177,12 @@ impl Eye<'_> {
         Some(Board { fit: self.better_of_both(&seen, fit), blur_px, first_dark: None })
     }
 
-    fn seen<'b>(&'b self, corners: &'b [Corner]) -> Seen<'b> {
-        Seen { intrinsics: self.camera, board: self.board, shape: &BoardShape::FLAT, corners, whiteners: &[] }
+    fn seen<'b>(&'b self, corners: &'b [Corner]) -> ViewInput<'b> {
+        ViewInput { intrinsics: self.camera, board: self.board, shape: &BoardShape::FLAT, corners, sqrt_weights: &[] }
     }
 
     /// The mirrored pose, when the corners speak clearly for it.
-    fn better_of_both(&self, seen: &Seen<'_>, fit: Fit) -> Fit {
+    fn better_of_both(&self, seen: &ViewInput<'_>, fit: Fit) -> Fit {
         let Some(other) = pose::other_minimum(seen, &fit, &self.target.centre()) else { return fit };
         let freedom = (2 * fit.corners.len()).saturating_sub(6).max(1) as f64;
         let variance = (other.cost / freedom).max(MIN_SIGMA_PX * MIN_SIGMA_PX);

@@ -16,7 +16,7 @@ use crate::frames::{Base, Camera, Pose, Target, Tip};
 use crate::handeye::HandEye;
 use crate::handeye::joint::SmallSample;
 use crate::target::{Grid, TargetSpec};
-use crate::verify::Calibrated;
+use crate::verify::Predictor;
 
 pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 /// Seconds between pictures.
@@ -154,8 +154,8 @@ pub fn tip_from_camera() -> Pose<Tip, Camera> {
     Pose::from_isometry(Isometry3::from_parts(Vector3::new(0.03, -0.05, 0.06).into(), rotation))
 }
 
-pub fn calibrated() -> Calibrated {
-    Calibrated {
+pub fn calibrated() -> Predictor {
+    Predictor {
         shape: BoardShape::default(),
         hand_eye: HandEye::EyeInHand { tip_from_camera: tip_from_camera(), base_from_target: Pose::identity() },
         intrinsics: lens(),

@@ -3,10 +3,10 @@
 use nalgebra::Matrix6;
 
 use super::by_depth::by_depth;
-use super::filter::{Filter, Sight};
+use super::filter::{BoardPose, Filter};
 use super::noise::CornerNoise;
 use super::sight::{Board, Expected, Eye};
-use super::{Estimate, Picture, Seen, Setup, State, TrackError, Update};
+use super::{BoardDetection, Estimate, Picture, Setup, State, TrackError, Update};
 use crate::board_shape::BoardPoints;
 use crate::frames::{Base, Camera, Pose};
 use crate::target::TargetSpec;
@@ -219,13 +219,13 @@ impl Tracker {
     }
 
     /// Pose and covariance of a board in the picture, and what the next picture can use of it.
-    fn seen(&mut self, board: Board, base_from_camera: &Pose<Base, Camera>) -> Option<Seen> {
+    fn seen(&mut self, board: Board, base_from_camera: &Pose<Base, Camera>) -> Option<BoardDetection> {
         let inverse = board.fit.information.cholesky()?.inverse();
         let variance = self.noise.variance(board.fit.cost, board.fit.corners.len());
         self.blur_px = board.blur_px.unwrap_or(self.blur_px);
         self.first_dark = board.first_dark.unwrap_or(self.first_dark);
         let camera_from_target = Pose::from_isometry(board.fit.pose);
-        let seen = Seen {
+        let seen = BoardDetection {
             rms_px: board.fit.rms_px(),
             corners: board.fit.corners,
             camera_from_target,
@@ -237,9 +237,9 @@ impl Tracker {
     }
 
     /// Whether a sight is taken for the board; the filter then has it.
-    fn believe(&mut self, time_s: f64, seen: &Seen) -> bool {
+    fn believe(&mut self, time_s: f64, seen: &BoardDetection) -> bool {
         let centre = self.setup.target.centre();
-        let sight = Sight::new(&seen.base_from_target, &seen.covariance, &centre);
+        let sight = BoardPose::new(&seen.base_from_target, &seen.covariance, &centre);
         let start = || Filter::new(self.setup.motion, centre, time_s, &sight);
         let Some(filter) = &mut self.filter else {
             self.filter = Some(start());
@@ -270,7 +270,7 @@ impl Tracker {
         true
     }
 
-    fn state(&self, believed: Option<&Seen>) -> State {
+    fn state(&self, believed: Option<&BoardDetection>) -> State {
         let of = self.setup.target.len();
         match (believed, self.believed_s) {
             (Some(seen), _) => State::Tracking { corners: seen.corners.len(), of },

@@ -14,7 +14,7 @@ use crate::observation::{Corner, View};
 
 /// What of a calibration is needed to predict.
 #[derive(Debug, Clone)]
-pub struct Calibrated {
+pub struct Predictor {
     /// Both rigid links.
     pub hand_eye: HandEye,
     /// The camera.
@@ -44,7 +44,7 @@ pub struct Uncertainty {
     pub covariance: DMatrix<f64>,
 }
 
-impl Calibrated {
+impl Predictor {
     /// Takes what it needs from a calibration.
     ///
     /// # Errors

@@ -11,10 +11,10 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
-use super::{Calibrated, CaptureCheck, Uncertainty};
+use super::{CaptureCheck, Predictor, Uncertainty};
 use crate::board_shape::BoardPoints;
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::equations::{FreeForm, PoseEquations, Seen};
+use crate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::observation::View;
 use crate::se3;
 
@@ -53,7 +53,7 @@ pub struct Sums {
     /// `L` with `C = L Lᵀ`: in `s = L u` the prior of `u` is the identity, whatever the units.
     root: DMatrix<f64>,
     covariance: DMatrix<f64>,
-    form: FreeForm,
+    form: FreeParameters,
     robot_variance: Vector6<f64>,
     corner_variance: f64,
     captures: usize,
@@ -64,7 +64,7 @@ pub struct Sums {
 
 impl Sums {
     /// `None` when the covariance is not one, or not of what this calibration is of.
-    pub fn new(calibrated: &Calibrated, uncertainty: &Uncertainty) -> Option<Self> {
+    pub fn new(calibrated: &Predictor, uncertainty: &Uncertainty) -> Option<Self> {
         let form = uncertainty.free.form();
         let n = LINKS + form.count(&calibrated.intrinsics) + calibrated.joint_offsets_rad.len();
         if uncertainty.covariance.shape() != (n, n) {
@@ -87,7 +87,7 @@ impl Sums {
     /// Adds a capture and returns its own ratio; `None`, and nothing added, when its corners determine no pose.
     pub fn add(
         &mut self,
-        calibrated: &Calibrated,
+        calibrated: &Predictor,
         board: &BoardPoints,
         view: &View,
         check: &CaptureCheck,
@@ -101,12 +101,12 @@ impl Sums {
             &calibrated.hand_eye.anchor_from_target(),
         );
         let seen = check.seen_camera_from_target.isometry();
-        let seen_through = Seen {
+        let seen_through = ViewInput {
             intrinsics: &calibrated.intrinsics,
             board,
             shape: &calibrated.shape,
             corners: &view.corners,
-            whiteners: &[],
+            sqrt_weights: &[],
         };
         let equations = PoseEquations::new(&seen_through, seen, self.form).ok()?;
         let pose_covariance = Cholesky::new(equations.pose)?.inverse();

@@ -23,7 +23,7 @@ const OFFSETS_DEG: [f64; 6] = [0.0, 0.2, -0.15, 0.1, -0.2, 0.0];
 
 const EXACT: Noise = Noise { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
 
-fn check_all(calibrated: &Calibrated, views: &[View]) -> Verification {
+fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
     let captures: Vec<_> = views.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
     verify(calibrated, &BOARD, &captures, &CancelToken::default()).expect("verifies")
 }
@@ -50,7 +50,7 @@ fn a_board_that_is_larger_than_stated_is_seen_where_it_is() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let mut t = trial(mode, 5, &EXACT, camera(), 81);
         printed_larger(&mut t);
-        let exact = Calibrated {
+        let exact = Predictor {
             shape: BoardShape { scale: SCALE, ..BoardShape::default() },
             hand_eye: HandEye::new(t.mode, t.mount_from_camera, t.anchor_from_target),
             intrinsics: t.intrinsics,
@@ -91,7 +91,7 @@ fn a_found_scale_predicts_as_well_as_it_says() {
         let mut observations = t.observations(false);
         observations.views.truncate(30);
         let calibration = solved(&observations, Options { free_scale: true, ..Options::default() });
-        let v = check_all(&Calibrated::new(&calibration).expect("complete"), &t.views[30..]);
+        let v = check_all(&Predictor::new(&calibration).expect("complete"), &t.views[30..]);
         mean += v.consistency.expect("stated").ratio / 20.0;
         single += v.captures.iter().map(|c| c.ratio.expect("stated")).sum::<f64>() / 200.0;
         stated += usize::from(v.consistency.expect("stated").is_consistent());
@@ -175,11 +175,11 @@ fn accepted_joint_offsets_are_part_of_the_prediction() {
         let observations = observed(&views[..30], camera());
         let calibration = solved(&observations, Options { joint_offsets: true, ..Options::default() });
         assert!(calibration.joint_offsets.as_ref().is_some_and(|joints| joints.accepted), "seed {seed}");
-        let calibrated = Calibrated::new(&calibration).expect("complete");
+        let calibrated = Predictor::new(&calibration).expect("complete");
         let v = check_all(&calibrated, &views[30..]);
         mean += v.consistency.expect("stated").ratio / 10.0;
         centre_m += v.centre_rms_m / 10.0;
-        let forgotten = Calibrated { joint_offsets_rad: Vec::new(), uncertainty: None, ..calibrated };
+        let forgotten = Predictor { joint_offsets_rad: Vec::new(), uncertainty: None, ..calibrated };
         without_m += check_all(&forgotten, &views[30..]).centre_rms_m / 10.0;
     }
     println!(
@@ -196,7 +196,7 @@ fn a_capture_whose_joints_are_unknown_is_not_verified_as_if_they_were_right() {
     let mut views = views_of_an_arm_with_offsets(12, &EXACT, &camera(), 83);
     let observations = observed(&views, camera());
     let calibration = solved(&observations, Options { joint_offsets: true, ..Options::default() });
-    let calibrated = Calibrated::new(&calibration).expect("complete");
+    let calibrated = Predictor::new(&calibration).expect("complete");
     assert_eq!(calibrated.joint_offsets_rad.len(), 6);
     views[1].tip_by_joint.clear();
     let captures: Vec<_> = views.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
@@ -210,7 +210,7 @@ fn the_error_of_a_measured_point_follows_the_law_of_the_calibration() {
     let t = trial(Mode::EyeInHand, 6, &REALISTIC, camera(), 84);
     let calibration = solved(&t.observations(false), Options::default());
     let law = calibration.small_sample.expect("of a joint estimate");
-    let calibrated = Calibrated::new(&calibration).expect("complete");
+    let calibrated = Predictor::new(&calibration).expect("complete");
     // The point for which the result states its expected error.
     let reference = calibration.reference_point.expect("stated");
     let px = t.intrinsics.project(&reference).expect("in front");

@@ -23,7 +23,7 @@ use crate::se3;
 use crate::statistics::median_high;
 use crate::target::TargetSpec;
 
-pub use calibrated::{Calibrated, Uncertainty};
+pub use calibrated::{Predictor, Uncertainty};
 pub use consistency::Consistency;
 pub use points::MeasuredPoint;
 
@@ -165,7 +165,7 @@ pub struct Verification {
 /// # Errors
 /// [`VerifyError`]; the first in the order of the captures.
 pub fn verify<'a>(
-    calibrated: &Calibrated,
+    calibrated: &Predictor,
     target: &TargetSpec,
     captures: &[CheckCapture<'_>],
     work: impl Into<Work<'a>>,
@@ -193,7 +193,7 @@ pub fn verify<'a>(
 }
 
 fn check(
-    calibrated: &Calibrated,
+    calibrated: &Predictor,
     target: &TargetSpec,
     board: &BoardPoints,
     capture: &CheckCapture<'_>,
@@ -236,7 +236,7 @@ fn check(
 
 /// Median over the corners, so that a corner at an edge of the surface does not decide.
 fn depth_error_m(
-    calibrated: &Calibrated,
+    calibrated: &Predictor,
     capture: &CheckCapture<'_>,
     predicted: &Pose<Camera, Target>,
     points: &[Point3<f64>],
@@ -266,7 +266,7 @@ fn rms(squares: impl ExactSizeIterator<Item = f64>) -> f64 {
 }
 
 fn summary(
-    calibrated: &Calibrated,
+    calibrated: &Predictor,
     tips: &[Pose<Base, Tip>],
     checks: Vec<CaptureCheck>,
     consistency: Option<Consistency>,

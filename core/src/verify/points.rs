@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
 
-use super::{Calibrated, VerifyError};
+use super::{Predictor, VerifyError};
 use crate::camera::Intrinsics;
 use crate::frames::{Base, Camera, PointIn, Pose, Target, Tip};
 use crate::handeye::joint::SmallSample;
@@ -35,7 +35,7 @@ impl MeasuredPoint {
     }
 }
 
-impl Calibrated {
+impl Predictor {
     /// The point at `depth_m` along the optical axis on the ray of a pixel.
     ///
     /// # Errors

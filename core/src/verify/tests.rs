@@ -9,24 +9,24 @@ use crate::handeye::{HandEye, Mode};
 use crate::progress::CancelToken;
 
 /// A calibration from the first views of a trial; the others are there to check it.
-fn calibrated(t: &Trial, views: usize, free_intrinsics: bool) -> Calibrated {
+fn calibrated(t: &Trial, views: usize, free_intrinsics: bool) -> Predictor {
     let mut observations = t.observations(free_intrinsics);
     observations.views.truncate(views);
     let calibration = calibrate(&observations, Method::Joint, &CancelToken::default()).expect("solves");
-    Calibrated::new(&calibration).expect("complete")
+    Predictor::new(&calibration).expect("complete")
 }
 
 fn captures(views: &[View]) -> Vec<CheckCapture<'_>> {
     views.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect()
 }
 
-fn check_all(calibrated: &Calibrated, views: &[View]) -> Verification {
+fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
     verify(calibrated, &BOARD, &captures(views), &CancelToken::default()).expect("verifies")
 }
 
 /// The calibration that is exactly true.
-fn truth(t: &Trial) -> Calibrated {
-    Calibrated {
+fn truth(t: &Trial) -> Predictor {
+    Predictor {
         shape: BoardShape::default(),
         hand_eye: HandEye::new(t.mode, t.mount_from_camera, t.anchor_from_target),
         intrinsics: t.intrinsics,

@@ -15,7 +15,7 @@ use rand_distr::StandardNormal;
 use super::bridge_for_tests::{camera_matrix, coefficients, isometry, numbers, to_points2d, to_points3d};
 use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::{Distortion, Intrinsics};
-use crate::handeye::joint::equations::Seen;
+use crate::handeye::joint::equations::ViewInput;
 use crate::observation::Corner;
 use crate::planar_pose::refine::refine;
 use crate::planar_pose::simulated::looking_at;
@@ -113,7 +113,7 @@ impl Case {
     fn minima(&self, starts: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
         let board = BoardPoints::new(&self.target.points());
         let (shape, corners) = (&BoardShape::FLAT, &self.corners);
-        let seen = Seen { intrinsics: &self.lens, board: &board, shape, corners, whiteners: &[] };
+        let seen = ViewInput { intrinsics: &self.lens, board: &board, shape, corners, sqrt_weights: &[] };
         let mut minima: Vec<_> = starts.iter().filter_map(|start| refine(&seen, start, STEPS)).collect();
         minima.sort_by(|a, b| a.squared_px.total_cmp(&b.squared_px));
         minima.dedup_by(|b, a| a.pose.rotation.angle_to(&b.pose.rotation) < SAME_RAD);

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::Command;
 
-use handeye_core::result::{CalibrationResult, ViewStatus};
+use handeye_core::result::{CalibrationResult, ViewRecordStatus};
 use handeye_core::testing::data_folder;
 use handeye_tests::handeye_binary;
 
@@ -34,7 +34,7 @@ fn every_set_is_calibrated_with_every_board_found() {
             .expect("the binary is built");
         assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
         let result = CalibrationResult::from_json(&String::from_utf8_lossy(&output.stdout)).expect("JSON");
-        let found = result.views.iter().filter(|v| v.status != ViewStatus::NoTarget).count();
+        let found = result.views.iter().filter(|v| v.status != ViewRecordStatus::NoTarget).count();
         assert_eq!((found, result.views.len()), (images, images), "{name}");
         let t = result.hand_eye.as_ref().expect("hand-eye").translation_m.map(|v| v * 1e3);
         let camera = result.intrinsics.as_ref().expect("a camera");

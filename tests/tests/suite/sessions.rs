@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use handeye_core::result::{CalibrationResult, ViewStatus};
+use handeye_core::result::{CalibrationResult, ViewRecordStatus};
 use handeye_core::session::{CaptureId, Edit, Role, Store};
 use serde_json::Value;
 
@@ -21,7 +21,7 @@ fn diagnosed(session: &Path) -> Value {
     serde_json::from_slice(&output.stdout).expect("a diagnosis")
 }
 
-fn status(result: &CalibrationResult) -> Vec<(String, ViewStatus)> {
+fn status(result: &CalibrationResult) -> Vec<(String, ViewRecordStatus)> {
     result.views.iter().map(|view| (view.name.clone(), view.status)).collect()
 }
 
@@ -45,7 +45,7 @@ fn captures_that_are_excluded_or_verify_touch_no_number_and_are_named_for_what_t
     assert_eq!((&result.hand_eye, &result.intrinsics), (&reference.hand_eye, &reference.intrinsics));
     assert_eq!(result.provenance.input_sha256, reference.provenance.input_sha256);
     let mut expected = status(&reference);
-    expected.insert(2, ("images/0004.png".to_owned(), ViewStatus::Excluded));
+    expected.insert(2, ("images/0004.png".to_owned(), ViewRecordStatus::Excluded));
     assert_eq!(status(&result), expected);
     assert_eq!(diagnosed(&session)["hypotheses"], diagnosed(&without)["hypotheses"]);
 

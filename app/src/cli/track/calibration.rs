@@ -8,13 +8,13 @@ use handeye_core::handeye::{HandEye, Mode};
 use handeye_core::result::CalibrationResult;
 use handeye_core::session::{RESULT, Session};
 use handeye_core::target::{Grid, TargetSpec};
-use handeye_core::verify::Calibrated;
+use handeye_core::verify::Predictor;
 
 use crate::cli::Failure;
 use crate::session_start::TARGET_OPTION;
 
 /// Reads a result, or that of a session; with the board it was made with, where that is known.
-pub fn read(path: &Path) -> Result<(Calibrated, Option<TargetSpec>), Failure> {
+pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
     let is_session = Session::is_session(path);
     let file = if is_session { path.join(RESULT) } else { path.to_path_buf() };
     let result = CalibrationResult::read(&file).map_err(Failure::unusable)?;
@@ -42,7 +42,7 @@ pub fn read(path: &Path) -> Result<(Calibrated, Option<TargetSpec>), Failure> {
         warp_m: board.warp_mm.map(|mm| mm * 1e-3),
         scale: board.scale,
     });
-    let calibrated = Calibrated {
+    let calibrated = Predictor {
         hand_eye,
         intrinsics,
         shape,

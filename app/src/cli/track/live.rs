@@ -25,7 +25,7 @@ use crate::rerun_log::{Entry, Recorder};
 use crate::session_start::REFERENCE_POSES;
 use crate::shortfall;
 use crate::text::{Language, Text};
-use crate::worker::{FollowLine, Sight, Tracking, end_of_following};
+use crate::worker::{FollowLine, TrackedImage, Tracking, end_of_following};
 
 /// Rest between two looks at the clock of the cell.
 const LOOK: Duration = Duration::from_millis(2);
@@ -225,7 +225,7 @@ impl Live {
             let frame = feed.grab().map_err(Failure::failed)?;
             let received_s = began.elapsed().as_secs_f64();
             seen_s = frame.sim_time_s;
-            let sight = Sight {
+            let sight = TrackedImage {
                 number: summary.frames + 1,
                 received_s,
                 picture: Picture {

@@ -56,7 +56,7 @@ pub const WAY: Color = colour(90, 200, 230);
 /// The colour of what is known in some way.
 pub(super) fn of(role: Role) -> Color {
     match role {
-        Role::Calibrated | Role::Said => ESTIMATED,
+        Role::Predictor | Role::Said => ESTIMATED,
         Role::Tracked => TRACKED,
         Role::True => TRUE,
     }

@@ -15,7 +15,7 @@ use handeye_sim_link::client::cell::{CellClient, CellPaths, GroundTruth};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions};
 
 use super::super::{Clock, Connector, LiveConnector, Waker, Workers};
-use super::{LatestSlot, Outlet, Sights, Tap, Vision, VisionTask};
+use super::{LatestSlot, Outlet, Tap, Vision, VisionSlots, VisionTask};
 use crate::capture::drawn::BOARD;
 use crate::capture::{CaptureRequest, Measured};
 use crate::command::Event;
@@ -70,7 +70,7 @@ impl Table {
             Arc::clone(&tap),
             bell,
             tasks,
-            Sights { detections: Arc::clone(&detections), ..Sights::default() },
+            VisionSlots { detections: Arc::clone(&detections), ..VisionSlots::default() },
             measured_sender,
             outlet,
             shutdown.clone(),

@@ -23,7 +23,7 @@ use search::Search;
 use super::follow_line::FollowLine;
 use super::link::Outlet;
 use super::slot::{LatestSlot, Tap};
-use super::tracking::{Sight, Tracking};
+use super::tracking::{TrackedImage, Tracking};
 use crate::capture::{CaptureRequest, Measured, Sequence, refusal};
 use crate::command::Event;
 use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
@@ -49,7 +49,7 @@ pub enum VisionTask {
 
 /// Where the newest sights of the board are put.
 #[derive(Clone, Default)]
-pub struct Sights {
+pub struct VisionSlots {
     /// For the window: corners and pose in the camera.
     pub detections: Arc<LatestSlot<LiveDetection>>,
     /// For the window: the board in the base.
@@ -73,7 +73,7 @@ pub struct Vision {
     tap: Arc<Tap<LiveFrame>>,
     bell: Receiver<()>,
     tasks: Receiver<VisionTask>,
-    sights: Sights,
+    sights: VisionSlots,
     measured: Sender<Measured>,
     outlet: Outlet,
     shutdown: CancelToken,
@@ -88,7 +88,7 @@ impl Vision {
         tap: Arc<Tap<LiveFrame>>,
         bell: Receiver<()>,
         tasks: Receiver<VisionTask>,
-        sights: Sights,
+        sights: VisionSlots,
         measured: Sender<Measured>,
         outlet: Outlet,
         shutdown: CancelToken,
@@ -200,7 +200,7 @@ impl Vision {
         let Some(tracking) = &mut self.tracking else { return };
         let info = &frame.info;
         let began_s = self.outlet.now_s();
-        let sight = Sight {
+        let sight = TrackedImage {
             number: info.number,
             received_s: info.received_s,
             picture: Picture {

@@ -16,13 +16,13 @@ pub(crate) const MAX_FORM: usize = MAX_PARAMETERS + 3;
 /// Which unknowns of lens and target shape are free. Their columns are, without gaps, the lens parameters in the order of
 /// [`Intrinsics::parameters`], the two warps, and the scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct FreeForm {
+pub(crate) struct FreeParameters {
     pub lens: bool,
     pub warp: bool,
     pub scale: bool,
 }
 
-impl FreeForm {
+impl FreeParameters {
     fn lens_count(self, intrinsics: &Intrinsics) -> usize {
         if self.lens { intrinsics.parameter_count() } else { 0 }
     }
@@ -45,13 +45,13 @@ impl FreeForm {
 
 /// What one view is seen through: lens and target, and the weights of its corners.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Seen<'a> {
+pub(crate) struct ViewInput<'a> {
     pub intrinsics: &'a Intrinsics,
     pub board: &'a BoardPoints,
     pub shape: &'a BoardShape,
     pub corners: &'a [Corner],
     /// One matrix `W` per corner, whose residual counts as `W r`; empty where all corners count alike.
-    pub whiteners: &'a [Matrix2<f64>],
+    pub sqrt_weights: &'a [Matrix2<f64>],
 }
 
 /// Normal equations of one view, with residuals `r = predicted − measured` in pixels (times the whitener of the corner)
@@ -76,7 +76,11 @@ pub(crate) struct PoseEquations {
 
 impl PoseEquations {
     /// Linearises the corners of a view at a pose of the target.
-    pub fn new(seen: &Seen<'_>, camera_from_target: &Isometry3<f64>, free: FreeForm) -> Result<Self, CameraError> {
+    pub fn new(
+        seen: &ViewInput<'_>,
+        camera_from_target: &Isometry3<f64>,
+        free: FreeParameters,
+    ) -> Result<Self, CameraError> {
         // Six columns of the pose, those of the form, and the residual, four at a time.
         match (POSE + free.count(seen.intrinsics) + 1).div_ceil(4) {
             0..=2 => Self::with_quads::<2>(seen, camera_from_target, free),
@@ -88,11 +92,11 @@ impl PoseEquations {
     }
 
     fn with_quads<const QUADS: usize>(
-        seen: &Seen<'_>,
+        seen: &ViewInput<'_>,
         camera_from_target: &Isometry3<f64>,
-        free: FreeForm,
+        free: FreeParameters,
     ) -> Result<Self, CameraError> {
-        let Seen { intrinsics, board, shape, corners, whiteners } = *seen;
+        let ViewInput { intrinsics, board, shape, corners, sqrt_weights } = *seen;
         let rotation: Matrix3<f64> = camera_from_target.rotation.to_rotation_matrix().into_inner();
         let translation = camera_from_target.translation.vector;
         let lens_count = free.lens_count(intrinsics);
@@ -128,7 +132,7 @@ impl PoseEquations {
                 }
             }
             columns[POSE + count] = [projection.px[0] - corner.px.x, projection.px[1] - corner.px.y];
-            if let Some(w) = whiteners.get(i) {
+            if let Some(w) = sqrt_weights.get(i) {
                 for column in &mut columns[..=POSE + count] {
                     let [x, y] = *column;
                     *column = [w.m11 * x + w.m12 * y, w.m21 * x + w.m22 * y];

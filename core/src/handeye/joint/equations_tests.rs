@@ -15,7 +15,7 @@ struct View {
     board: BoardPoints,
     shape: BoardShape,
     corners: Vec<Corner>,
-    whiteners: Vec<Matrix2<f64>>,
+    sqrt_weights: Vec<Matrix2<f64>>,
     pose: Isometry3<f64>,
 }
 
@@ -33,12 +33,12 @@ fn view(distortion: Distortion, weighted: bool) -> View {
         })
         .collect();
     let weight = |i: usize| Matrix2::new(1.0, 0.1 * i as f64, 0.0, 2.0 + (i as f64).sin());
-    let whiteners = if weighted { (0..points.len()).map(weight).collect() } else { Vec::new() };
-    View { intrinsics, board, shape, corners, whiteners, pose }
+    let sqrt_weights = if weighted { (0..points.len()).map(weight).collect() } else { Vec::new() };
+    View { intrinsics, board, shape, corners, sqrt_weights, pose }
 }
 
 /// All residuals after a step of pose and form.
-fn residuals(view: &View, free: FreeForm, step: &[f64]) -> DVector<f64> {
+fn residuals(view: &View, free: FreeParameters, step: &[f64]) -> DVector<f64> {
     let pose = view.pose * crate::se3::exp(&Vector6::from_row_slice(&step[..6]));
     let form = &step[6..];
     let mut intrinsics = view.intrinsics;
@@ -57,8 +57,8 @@ fn residuals(view: &View, free: FreeForm, step: &[f64]) -> DVector<f64> {
     }
     let of = |(i, corner): (usize, &Corner)| {
         let px = intrinsics.project(&(pose * view.board.point(corner.index, &shape))).expect("in front");
-        let whitener = view.whiteners.get(i).copied().unwrap_or_else(Matrix2::identity);
-        let residual = whitener * (px - corner.px);
+        let sqrt_weight = view.sqrt_weights.get(i).copied().unwrap_or_else(Matrix2::identity);
+        let residual = sqrt_weight * (px - corner.px);
         [residual.x, residual.y]
     };
     DVector::from_vec(view.corners.iter().enumerate().flat_map(of).collect())
@@ -76,7 +76,7 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
             (false, true, false, true),
         ] {
             let view = view(distortion, weighted);
-            let free = FreeForm { lens, warp, scale };
+            let free = FreeParameters { lens, warp, scale };
             let n = 6 + free.count(&view.intrinsics);
             let zero = vec![0.0; n];
             let r = residuals(&view, free, &zero);
@@ -92,8 +92,8 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
                 .collect();
             let jacobian = DMatrix::from_columns(&columns);
             let (normal, gradient) = (jacobian.transpose() * &jacobian, jacobian.transpose() * &r);
-            let View { intrinsics, board, shape, corners, whiteners, pose } = &view;
-            let seen = Seen { intrinsics, board, shape, corners, whiteners };
+            let View { intrinsics, board, shape, corners, sqrt_weights, pose } = &view;
+            let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights };
             let found = PoseEquations::new(&seen, pose, free).expect("in front");
             assert_eq!(found.corners, 20);
             assert!((found.squared_px / r.norm_squared() - 1.0).abs() < 1e-12);
@@ -122,8 +122,8 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
 #[test]
 fn a_target_behind_the_camera_has_no_equations() {
     let view = view(LENSES[1], false);
-    let View { intrinsics, board, shape, corners, whiteners, .. } = &view;
-    let seen = Seen { intrinsics, board, shape, corners, whiteners };
+    let View { intrinsics, board, shape, corners, sqrt_weights, .. } = &view;
+    let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights };
     let behind = Isometry3::translation(0.0, 0.0, -1.0);
-    assert!(PoseEquations::new(&seen, &behind, FreeForm { lens: true, ..FreeForm::default() }).is_err());
+    assert!(PoseEquations::new(&seen, &behind, FreeParameters { lens: true, ..FreeParameters::default() }).is_err());
 }

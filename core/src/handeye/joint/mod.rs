@@ -83,8 +83,8 @@ pub struct Free {
 }
 
 impl Free {
-    pub(crate) fn form(self) -> equations::FreeForm {
-        equations::FreeForm { lens: self.intrinsics, warp: self.warp, scale: self.scale }
+    pub(crate) fn form(self) -> equations::FreeParameters {
+        equations::FreeParameters { lens: self.intrinsics, warp: self.warp, scale: self.scale }
     }
 }
 

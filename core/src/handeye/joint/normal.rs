@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, SMatrix, SVector, Vector6};
 
-use super::equations::{PoseEquations, Seen};
+use super::equations::{PoseEquations, ViewInput};
 use super::optimise::State;
 use super::view_block::{
     Layout, Own, PixelWeights, Rest, SharedMatrix, SharedVector, ViewBlock, add_form, add_form_gradient, prior_weight,
@@ -189,13 +189,13 @@ fn priors(problem: &JointProblem<'_>, state: &State, layout: Layout) -> Vec<Shar
 fn linearise(problem: &JointProblem<'_>, state: &State, index: usize) -> Result<ViewBlock, HandEyeError> {
     let view = &problem.views[index];
     let chain = state.chain(problem, view, &state.corrections[index]);
-    let whiteners = problem.weights.map_or_else(Vec::new, |weights| weights.whiteners(&view.corners));
-    let seen = Seen {
+    let sqrt_weights = problem.weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(&view.corners));
+    let seen = ViewInput {
         intrinsics: &state.intrinsics,
         board: problem.board,
         shape: &state.shape,
         corners: &view.corners,
-        whiteners: &whiteners,
+        sqrt_weights: &sqrt_weights,
     };
     let equations = PoseEquations::new(&seen, &chain.camera_from_target, problem.free.form()).map_err(|_behind| {
         HandEyeError::NoSolution {

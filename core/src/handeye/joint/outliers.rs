@@ -21,7 +21,7 @@
 use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, SMatrix, Vector6};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::equations::{FreeForm, PoseEquations, Seen};
+use super::equations::{FreeParameters, PoseEquations, ViewInput};
 use super::normal::System;
 use super::optimise::State;
 use super::view_block::{MAX_SHARED, prior_weight};
@@ -357,17 +357,17 @@ fn own_pose(
 ) -> Option<(Isometry3<f64>, PoseEquations)> {
     // From PnP with a lens that was a little different, two steps are exact to first order in what is left.
     const STEPS: usize = 2;
-    let whiteners = problem.weights.map_or_else(Vec::new, |weights| weights.whiteners(&view.corners));
-    let seen = Seen {
+    let sqrt_weights = problem.weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(&view.corners));
+    let seen = ViewInput {
         intrinsics: &state.intrinsics,
         board: problem.board,
         shape: &state.shape,
         corners: &view.corners,
-        whiteners: &whiteners,
+        sqrt_weights: &sqrt_weights,
     };
     let mut pose = *start.isometry();
     for _ in 0..STEPS {
-        let equations = PoseEquations::new(&seen, &pose, FreeForm::default()).ok()?;
+        let equations = PoseEquations::new(&seen, &pose, FreeParameters::default()).ok()?;
         pose *= se3::exp(&-Cholesky::new(equations.pose)?.solve(&equations.pose_gradient));
     }
     let equations = PoseEquations::new(&seen, &pose, problem.free.form()).ok()?;

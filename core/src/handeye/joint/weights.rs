@@ -30,11 +30,11 @@ impl CornerWeights {
     }
 
     /// One whitener per corner. A corner whose covariance is none, or is not one, counts like the typical corner.
-    pub fn whiteners(self, corners: &[Corner]) -> Vec<Matrix2<f64>> {
-        corners.iter().map(|corner| self.whitener(corner).unwrap_or_else(Matrix2::identity)).collect()
+    pub fn sqrt_weights(self, corners: &[Corner]) -> Vec<Matrix2<f64>> {
+        corners.iter().map(|corner| self.sqrt_weight(corner).unwrap_or_else(Matrix2::identity)).collect()
     }
 
-    fn whitener(self, corner: &Corner) -> Option<Matrix2<f64>> {
+    fn sqrt_weight(self, corner: &Corner) -> Option<Matrix2<f64>> {
         let stated = corner.covariance_px2? / self.mean_px2;
         let covariance = stated * (1.0 - COMMON) + Matrix2::identity() * COMMON;
         Some(Cholesky::new(covariance.try_inverse()?)?.l().transpose())
@@ -56,8 +56,8 @@ mod tests {
         };
         let view = View::new(String::new(), Pose::identity(), vec![corner(0.01), corner(0.04)]);
         let weights = CornerWeights::stated(std::slice::from_ref(&view)).expect("all are stated");
-        let whiteners = weights.whiteners(&view.corners);
-        let ratio = (whiteners[0][(0, 0)] / whiteners[1][(0, 0)]).powi(2);
+        let sqrt_weights = weights.sqrt_weights(&view.corners);
+        let ratio = (sqrt_weights[0][(0, 0)] / sqrt_weights[1][(0, 0)]).powi(2);
         // 0.9 of 0.4 and 1.6 times the mean, and 0.1 for both.
         assert!((ratio - (0.9 * 1.6 + 0.1) / (0.9 * 0.4 + 0.1)).abs() < 1e-12, "{ratio}");
         let plain = View::new(String::new(), Pose::identity(), vec![Corner::new(0, Vector2::zeros())]);

@@ -6,7 +6,7 @@ use crate::board_shape::{BoardPoints, BoardShape};
 use crate::camera::Intrinsics;
 use crate::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::handeye::HandEyeError;
-use crate::handeye::joint::equations::Seen;
+use crate::handeye::joint::equations::ViewInput;
 use crate::handeye::joint::{
     JointProblem, JointSolution, JointStart, base_from_tip_by_joints, camera_from_target, estimate,
 };
@@ -124,6 +124,6 @@ pub fn pose_of_view(
     corners: &[Corner],
     start: &Pose<Camera, Target>,
 ) -> Option<Pose<Camera, Target>> {
-    let seen = Seen { intrinsics, board, shape, corners, whiteners: &[] };
+    let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights: &[] };
     refine(&seen, start.isometry(), STEPS).map(|minimum| Pose::from_isometry(minimum.pose))
 }

@@ -8,7 +8,7 @@ const LEVEL: f64 = 128.0;
 /// A corner seen by one pixel: the corner from the middle of the pixel \[px\], the directions of the edges [°], the blur of
 /// the lens \[px\].
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct Errors {
     corner: Vector2<f64>,
     directions: [f64; 2],
     lens: f64,
@@ -23,7 +23,7 @@ fn corners() -> impl Iterator<Item = Vector2<f64>> {
     (0..19).flat_map(|i| (0..19).map(move |j| Vector2::new(f64::from(i), f64::from(j)) * 0.13 - Vector2::repeat(1.177)))
 }
 
-impl Seen {
+impl Errors {
     fn parameters(&self) -> Parameters {
         let [first, second] = self.directions.map(f64::to_radians);
         let blur = (self.lens * self.lens + PIXEL_AREA).sqrt();
@@ -84,7 +84,7 @@ fn without_blur_a_pixel_sees_the_area_of_the_squares_in_it() {
     let mut worst: f64 = 0.0;
     for directions in DIRECTIONS {
         for corner in corners() {
-            let seen = Seen { corner, directions, lens: 0.0 };
+            let seen = Errors { corner, directions, lens: 0.0 };
             let off = modelled(&seen.parameters()).0 / CONTRAST - seen.area(Vector2::zeros(), 2000);
             worst = worst.max(off.abs());
         }
@@ -100,7 +100,7 @@ fn through_a_lens_a_pixel_sees_the_mean_over_its_area_to_two_parts_in_a_hundred(
         let mut worst: f64 = 0.0;
         for directions in DIRECTIONS {
             for corner in corners().step_by(7) {
-                let seen = Seen { corner, directions, lens };
+                let seen = Errors { corner, directions, lens };
                 let off = modelled(&seen.parameters()).0 / CONTRAST - seen.through_the_lens();
                 worst = worst.max(off.abs());
             }
@@ -117,7 +117,7 @@ fn derivatives_of_a_pixel_are_those_of_its_value() {
     for lens in [0.15, 0.3, 0.6] {
         for directions in DIRECTIONS {
             for corner in corners().step_by(5) {
-                let x = Seen { corner, directions, lens }.parameters();
+                let x = Errors { corner, directions, lens }.parameters();
                 let by = modelled(&x).1;
                 // A degree from the pixels, the narrow box across an edge is of the size of the step.
                 let places: &[usize] = if directions[0] == 1.0 { &[0, 1, BLUR] } else { &[0, 1, 4, 5, BLUR] };

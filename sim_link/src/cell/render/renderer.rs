@@ -6,7 +6,7 @@ use handeye_core::camera::Intrinsics;
 use handeye_core::image::RgbImage;
 
 use super::rays::{Ray, RayTable, Tile};
-use super::stage::{BACKGROUND, Hit, Sight, Stage};
+use super::stage::{BACKGROUND, Hit, Stage, TileContent};
 use super::{Imaging, RenderScene, RenderedFrame, imaging};
 
 /// Rays through a pixel that an edge crosses. Their offsets are distinct in both directions, so that edges along rows
@@ -97,7 +97,7 @@ impl Renderer {
             faces: vec![BACKGROUND; coloured],
             colours: vec![0.0; 3 * coloured],
         };
-        let sights: Vec<Sight> = self
+        let sights: Vec<TileContent> = self
             .table
             .tiles
             .iter()
@@ -115,7 +115,7 @@ impl Renderer {
         traced
     }
 
-    fn trace_tile(&self, stage: &Stage, tile: &Tile, sight: &Sight, with_colour: bool, traced: &mut Traced) {
+    fn trace_tile(&self, stage: &Stage, tile: &Tile, sight: &TileContent, with_colour: bool, traced: &mut Traced) {
         for y in tile.rows.clone() {
             if with_colour && self.trace_run(stage, tile, y, sight, traced) {
                 continue;
@@ -134,7 +134,7 @@ impl Renderer {
     }
 
     /// The short way for one row of a tile; false where there is none.
-    fn trace_run(&self, stage: &Stage, tile: &Tile, y: usize, sight: &Sight, traced: &mut Traced) -> bool {
+    fn trace_run(&self, stage: &Stage, tile: &Tile, y: usize, sight: &TileContent, traced: &mut Traced) -> bool {
         if !tile.is_complete {
             return false;
         }
@@ -158,7 +158,7 @@ impl Renderer {
     }
 
     /// Gives the pixels on the border between two faces the mean colour of their area.
-    fn smooth_edges(&self, stage: &Stage, tile: &Tile, sight: &Sight, traced: &mut Traced) {
+    fn smooth_edges(&self, stage: &Stage, tile: &Tile, sight: &TileContent, traced: &mut Traced) {
         let (width, height) = (self.table.width, self.table.height);
         for y in tile.rows.clone() {
             for x in tile.columns.clone() {
@@ -181,7 +181,7 @@ impl Renderer {
 }
 
 /// The colour of each face that the pixel sees, by the number of rays that end on it.
-fn mean_colour(stage: &Stage, sight: &Sight, ray: &Ray) -> [f32; 3] {
+fn mean_colour(stage: &Stage, sight: &TileContent, ray: &Ray) -> [f32; 3] {
     let mut seen: [Option<(u16, [f32; 3])>; 4] = [None; 4];
     let mut sum = [0.0; 3];
     for i in 0..EDGE_RAYS {
@@ -207,6 +207,6 @@ fn mean_colour(stage: &Stage, sight: &Sight, ray: &Ray) -> [f32; 3] {
 
 /// The print is integrated over the whole pixel, edge or no edge: its visible part then has the value that the
 /// pixel would have if nothing crossed it.
-fn face_colour(stage: &Stage, sight: &Sight, hit: &Hit, pixel: &Ray, sample: &Ray) -> [f32; 3] {
+fn face_colour(stage: &Stage, sight: &TileContent, hit: &Hit, pixel: &Ray, sample: &Ray) -> [f32; 3] {
     stage.colour(sight, hit, if stage.is_print(hit) { pixel } else { sample })
 }

@@ -66,7 +66,7 @@ struct Candidate {
 
 /// What a tile has to do with.
 #[derive(Debug, Default)]
-pub(super) struct Sight {
+pub(super) struct TileContent {
     /// From near to far.
     candidates: Vec<Candidate>,
     /// What may throw a shadow there, as indices.
@@ -133,7 +133,7 @@ impl Stage {
     }
 
     /// What the rays of a tile may hit, without what is hidden behind a face that covers the whole tile.
-    pub fn survey(&self, rays: &Rays, with_shadows: bool) -> Sight {
+    pub fn survey(&self, rays: &Rays, with_shadows: bool) -> TileContent {
         let mut candidates = Vec::new();
         let mut hidden_beyond = self.far_m;
         let mut is_covered = false;
@@ -158,7 +158,7 @@ impl Stage {
         candidates.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
         let casters = if with_shadows { self.casters_for(&candidates, rays) } else { Vec::new() };
         is_covered &= candidates.len() == 1;
-        Sight { candidates, casters, is_covered }
+        TileContent { candidates, casters, is_covered }
     }
 
     fn casters_for(&self, candidates: &[Candidate], rays: &Rays) -> Vec<u16> {
@@ -178,7 +178,7 @@ impl Stage {
     }
 
     /// The first surface between the clipping planes along a ray.
-    pub fn first_hit(&self, sight: &Sight, ray: &Ray) -> Hit {
+    pub fn first_hit(&self, sight: &TileContent, ray: &Ray) -> Hit {
         let direction = ray.direction();
         let mut best = Hit { depth: self.far_m, piece: None };
         let mut bar = self.far_m;
@@ -196,7 +196,7 @@ impl Stage {
         best
     }
 
-    fn sunlit(&self, sight: &Sight, receiver: &Piece, point: &Vec3, towards: &Vec3) -> f32 {
+    fn sunlit(&self, sight: &TileContent, receiver: &Piece, point: &Vec3, towards: &Vec3) -> f32 {
         if sight.casters.is_empty() {
             return 1.0;
         }
@@ -208,7 +208,7 @@ impl Stage {
     /// `put` for each in turn with depth and colour and returns the face, or does nothing and returns `None`.
     pub fn paint_run(
         &self,
-        sight: &Sight,
+        sight: &TileContent,
         count: usize,
         ray_at: impl Fn(usize) -> Ray,
         mut put: impl FnMut(f64, [f32; 3]),
@@ -252,7 +252,7 @@ impl Stage {
     }
 
     /// Colour of what was hit, for the footprint of one pixel around the ray.
-    pub fn colour(&self, sight: &Sight, hit: &Hit, ray: &Ray) -> [f32; 3] {
+    pub fn colour(&self, sight: &TileContent, hit: &Hit, ray: &Ray) -> [f32; 3] {
         let Some(index) = hit.piece else { return self.background };
         let piece = &self.pieces[index as usize];
         let coat = match &piece.paint {

@@ -20,7 +20,7 @@ const AXIS_SQUARES: f64 = 3.0;
 const OLD_SIGHT: f32 = 0.35;
 
 /// The board as it was seen in the picture that is shown, or a little earlier.
-struct Sight<'a> {
+struct ShownDetection<'a> {
     corners: &'a [Corner],
     camera_from_target: Option<Pose<Camera, Target>>,
     /// 1 when it is of this picture, less when it is of an earlier one.
@@ -52,14 +52,14 @@ pub fn paint(ui: &Ui, painter: &Painter, model: &Model, shown: &Shown<'_>, place
     }
 }
 
-fn sight<'a>(model: &'a Model, shown: &Shown<'_>) -> Option<Sight<'a>> {
+fn sight<'a>(model: &'a Model, shown: &Shown<'_>) -> Option<ShownDetection<'a>> {
     if let Some(id) = shown.capture {
         let corners = model.observed(id)?.corners.as_deref()?;
-        return Some(Sight { corners, camera_from_target: recorded_pose(model, shown), strength: 1.0 });
+        return Some(ShownDetection { corners, camera_from_target: recorded_pose(model, shown), strength: 1.0 });
     }
     let detection = model.detection.as_ref()?;
     let frame = model.frame.as_ref()?;
-    Some(Sight {
+    Some(ShownDetection {
         corners: detection.corners.as_deref()?,
         camera_from_target: detection.camera_from_target,
         strength: strength(frame.info.number.saturating_sub(detection.frame)),
@@ -210,7 +210,7 @@ pub fn has_live_residuals(model: &Model) -> bool {
 
 /// Measured minus predicted, exaggerated: a recorded picture has those of its fit or verification, the live one those of
 /// the bare chain, or of the pose of the tracked board.
-fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &Sight<'_>, place: &Place) {
+fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &ShownDetection<'_>, place: &Place) {
     let exaggeration = model.view.overlays.exaggeration;
     let colour = Marks::over_pictures().residual.gamma_multiply(sight.strength);
     let arrow = |px: &Vector2<f64>, residual_px: &Vector2<f64>| {

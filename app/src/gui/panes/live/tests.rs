@@ -5,7 +5,7 @@ use handeye_core::capture::Wait;
 use handeye_core::depth::ColourMap;
 use handeye_core::frames::{Camera, Target};
 use handeye_core::session::CaptureId;
-use handeye_core::verify::Calibrated;
+use handeye_core::verify::Predictor;
 use nalgebra::{Point3, Vector2};
 
 use super::picture::Place;
@@ -303,7 +303,7 @@ fn an_older_sight_of_the_board_is_fainter_but_never_gone() {
 #[test]
 fn the_board_is_predicted_where_its_corners_are_seen() {
     let model = sample::solved();
-    let calibrated: &Calibrated = model.calibrated().expect("calibrated");
+    let calibrated: &Predictor = model.calibrated().expect("calibrated");
     let frame = model.frame.as_ref().expect("live");
     let room = Rect::from_min_size(Pos2::ZERO, vec2(640.0, 480.0));
     let place = Place::new(room, vec2(640.0, 480.0), Viewport::default());

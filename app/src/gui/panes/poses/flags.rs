@@ -2,7 +2,7 @@
 
 use handeye_core::findings::FindingCode;
 
-use crate::gui::captures::{CaptureRow, Seen};
+use crate::gui::captures::{CaptureRow, Detected};
 use crate::gui::theme::Tone;
 use crate::text::Language;
 use crate::{text, tr};
@@ -30,9 +30,9 @@ pub struct Circumstances {
 /// How much a row is worth looking at, for sorting.
 pub fn weight(row: &CaptureRow) -> u8 {
     match row.seen {
-        Seen::Unreadable => return 9,
-        Seen::NoBoard => return 8,
-        Seen::Board | Seen::NotYet => {}
+        Detected::Unreadable => return 9,
+        Detected::NoBoard => return 8,
+        Detected::Board | Detected::NotYet => {}
     }
     if row.is_aside() {
         return 8;
@@ -88,7 +88,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         flag(Some(Tone::Warning), tr!(language, "Robot is here"), why.to_owned());
     }
     match row.seen {
-        Seen::Unreadable => {
+        Detected::Unreadable => {
             let why = tr!(
                 language,
                 "The picture of this capture cannot be read from the disk, so it is not used. Delete it and capture this \
@@ -96,7 +96,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
             );
             flag(Some(Tone::Bad), tr!(language, "Not readable"), why.to_owned());
         }
-        Seen::NoBoard => {
+        Detected::NoBoard => {
             let why = tr!(
                 language,
                 "The board was not found in this picture, so it is not used. Look whether it is wholly in view, sharp and \
@@ -104,11 +104,11 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
             );
             flag(Some(Tone::Warning), tr!(language, "No board"), why.to_owned());
         }
-        Seen::NotYet => {
+        Detected::NotYet => {
             let why = tr!(language, "The board is being looked for in this picture.");
             flag(Some(Tone::Busy), tr!(language, "Looking…"), why.to_owned());
         }
-        Seen::Board => {}
+        Detected::Board => {}
     }
     if let Some(why) = why_aside(row, language) {
         flag(Some(Tone::Warning), tr!(language, "Set aside"), why);

@@ -4,7 +4,7 @@ use egui::epaint::{Mesh, Vertex};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::eye::{Eye, Seen};
+use super::eye::{Eye, ScreenPoint};
 
 /// Sides of what is round.
 const SIDES: usize = 20;
@@ -201,12 +201,12 @@ impl Canvas {
     }
 }
 
-fn mean_depth_m(seen: &[Seen]) -> f64 {
+fn mean_depth_m(seen: &[ScreenPoint]) -> f64 {
     seen.iter().map(|seen| seen.depth_m).sum::<f64>() / seen.len().max(1) as f64
 }
 
 /// A face on the screen, with smooth edges where it is not so slim that they would become spikes.
-fn polygon(seen: &[Seen], fill: Color32) -> Shape {
+fn polygon(seen: &[ScreenPoint], fill: Color32) -> Shape {
     let points: Vec<Pos2> = seen.iter().map(|seen| seen.at).collect();
     if is_blunt(&points) {
         return Shape::convex_polygon(points, fill, Stroke::NONE);
@@ -322,7 +322,7 @@ mod tests {
         assert!(is_blunt(&square));
         let slim = [pos2(0.0, 0.0), pos2(60.0, 0.0), pos2(30.0, 2.0)];
         assert!(!is_blunt(&slim));
-        let seen = slim.map(|at| Seen { at, depth_m: 1.0 });
+        let seen = slim.map(|at| ScreenPoint { at, depth_m: 1.0 });
         assert!(matches!(polygon(&seen, Color32::WHITE), Shape::Mesh(_)));
     }
 

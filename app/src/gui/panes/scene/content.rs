@@ -93,7 +93,7 @@ fn live_camera(canvas: &mut Canvas, known: &Known, language: Language, palette: 
     let frustum = Frustum { base_from_camera, intrinsics: &intrinsics, length_m: CAMERA_LENGTH_M };
     let colour = palette.good;
     frustum.draw(canvas, 1.8, colour, colour.gamma_multiply(0.10));
-    let (name, what) = if role == Role::Calibrated {
+    let (name, what) = if role == Role::Predictor {
         (
             tr!(language, "Camera"),
             tr!(language, "The camera where the calibration has it, and what it sees up to 200 mm in front of it"),
@@ -127,7 +127,7 @@ fn boards(
                 let what = tr!(language, "The board where tracking has it now");
                 (Sign::Board, marks.predicted, tr!(language, "Board, tracked"), what)
             }
-            Role::Calibrated | Role::Said => {
+            Role::Predictor | Role::Said => {
                 let sign = if has_pattern {
                     board::outlined(canvas, &pose, target, (1.2, palette.weak), Line::Solid);
                     Sign::Line

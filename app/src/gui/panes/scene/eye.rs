@@ -33,7 +33,7 @@ pub struct Eye {
 
 /// A point on the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct ScreenPoint {
     /// Where.
     pub at: Pos2,
     /// How far in front of the eye \[m\].
@@ -74,21 +74,21 @@ impl Eye {
     }
 
     /// A point that is known to be in front of the eye.
-    fn seen(&self, point: &Point3<f64>) -> Seen {
+    fn seen(&self, point: &Point3<f64>) -> ScreenPoint {
         let from_eye = point - self.at;
         let depth_m = from_eye.dot(&self.forward);
         let scale = self.focal / depth_m;
         let (x, y) = (from_eye.dot(&self.right) * scale, from_eye.dot(&self.up) * scale);
-        Seen { at: self.middle + Vec2::new(x as f32, -y as f32), depth_m }
+        ScreenPoint { at: self.middle + Vec2::new(x as f32, -y as f32), depth_m }
     }
 
     /// A point on the screen; `None` behind the eye.
-    pub fn point(&self, point: &Point3<f64>) -> Option<Seen> {
+    pub fn point(&self, point: &Point3<f64>) -> Option<ScreenPoint> {
         (self.depth_m(point) >= NEAR_M).then(|| self.seen(point))
     }
 
     /// The part of a straight line that is in front of the eye.
-    pub fn segment(&self, ends: [Point3<f64>; 2]) -> Option<[Seen; 2]> {
+    pub fn segment(&self, ends: [Point3<f64>; 2]) -> Option<[ScreenPoint; 2]> {
         let [from, to] = ends;
         let depths = [self.depth_m(&from), self.depth_m(&to)];
         let [from, to] = match depths.map(|depth_m| depth_m >= NEAR_M) {
@@ -101,7 +101,7 @@ impl Eye {
     }
 
     /// The part of a convex polygon that is in front of the eye; fewer than three corners when there is none.
-    pub fn polygon(&self, corners: &[Point3<f64>]) -> Vec<Seen> {
+    pub fn polygon(&self, corners: &[Point3<f64>]) -> Vec<ScreenPoint> {
         let mut seen = Vec::with_capacity(corners.len() + 1);
         for (index, &corner) in corners.iter().enumerate() {
             let next = corners[(index + 1) % corners.len()];
