@@ -5,14 +5,14 @@ use std::panic::Location;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::dataset::CameraInput;
 use handeye_core::depth::ColourMap;
-use handeye_core::export::ExportNames;
-use handeye_core::handeye::Mode;
-use handeye_core::poses_file::TaughtPose;
+use handeye_core::estimate::handeye::Mode;
 use handeye_core::progress::Stage;
-use handeye_core::session::CaptureId;
-use handeye_core::target::TargetSpec;
+use handeye_core::project::dataset::CameraInput;
+use handeye_core::project::export::ExportNames;
+use handeye_core::project::session::CaptureId;
+use handeye_core::project::taught_poses::TaughtPose;
+use handeye_core::targets::TargetSpec;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,10 @@
 //! How fast the arm moves when nobody says otherwise.
 
-use handeye_core::poses_file;
+use handeye_core::project::taught_poses;
 use handeye_sim_link::client::MotionLimits;
 
 /// Limits of the reference tour: of every motion in the window, and of pose files without their own.
-pub const TOUR: poses_file::MotionLimits = poses_file::MotionLimits {
+pub const TOUR: taught_poses::MotionLimits = taught_poses::MotionLimits {
     joint_velocity: 310.0 * std::f64::consts::PI / 180.0,
     joint_acceleration: 100.0 * std::f64::consts::PI / 180.0,
     joint_jerk: 80.0 * std::f64::consts::PI / 180.0,
@@ -14,14 +14,14 @@ pub const TOUR: poses_file::MotionLimits = poses_file::MotionLimits {
 };
 
 /// For motions of the six joints, at a share of the speed.
-pub fn of_joints(limits: &poses_file::MotionLimits, share: f64) -> MotionLimits {
+pub fn of_joints(limits: &taught_poses::MotionLimits, share: f64) -> MotionLimits {
     let [velocity, acceleration, jerk] =
         slower([limits.joint_velocity, limits.joint_acceleration, limits.joint_jerk], share);
     MotionLimits::uniform(6, velocity, acceleration, jerk)
 }
 
 /// For motions of the tip (x, y, z, angle), at a share of the speed.
-pub fn of_tip(limits: &poses_file::MotionLimits, share: f64) -> MotionLimits {
+pub fn of_tip(limits: &taught_poses::MotionLimits, share: f64) -> MotionLimits {
     let [velocity, acceleration, jerk] = slower([limits.tip_velocity, limits.tip_acceleration, limits.tip_jerk], share);
     MotionLimits::uniform(4, velocity, acceleration, jerk)
 }

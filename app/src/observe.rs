@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use handeye_core::calibrate::Observations;
-use handeye_core::dataset::{Dataset, DatasetError, Entry};
+use handeye_core::detect::{self, VisionError};
+use handeye_core::estimate::Observations;
 use handeye_core::image::GrayImage;
-use handeye_core::image_file::gray_from_rgb;
-use handeye_core::observation::Corner;
 use handeye_core::progress::CancelToken;
-use handeye_core::session::{CaptureId, Session, SessionError, SessionObservations};
-use handeye_core::target::TargetSpec;
-use handeye_core::vision::{self, VisionError};
+use handeye_core::project::dataset::{Dataset, DatasetError, Entry};
+use handeye_core::project::files::image_file::gray_from_rgb;
+use handeye_core::project::session::{CaptureId, Session, SessionError, SessionObservations};
+use handeye_core::targets::TargetSpec;
+use handeye_core::targets::observation::Corner;
 use rayon::prelude::*;
 
 /// Why a data set or a session could not be observed.
@@ -103,5 +103,5 @@ fn corners_of(dataset: &Dataset, entry: &Entry) -> Result<Option<Vec<Corner>>, O
 }
 
 fn detect(image: &GrayImage, target: &TargetSpec, name: &str) -> Result<Option<Vec<Corner>>, ObserveError> {
-    vision::detect(image, target).map_err(|source| ObserveError::Vision { name: name.to_owned(), source })
+    detect::detect(image, target).map_err(|source| ObserveError::Vision { name: name.to_owned(), source })
 }

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use handeye_core::arm::{ArmKind, ArmModel};
-use handeye_core::calibrate::{Method, Options};
-use handeye_core::handeye::{HandEye, Mode};
-use handeye_core::session::{GroundTruth, SessionMeta};
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::estimate::handeye::{HandEye, Mode};
+use handeye_core::estimate::{Method, Options};
+use handeye_core::geometry::arm::{ArmKind, ArmModel};
+use handeye_core::project::session::{GroundTruth, SessionMeta};
+use handeye_core::targets::{Grid, TargetSpec};
 
 use crate::model::Truth;
 

@@ -210,7 +210,7 @@ impl SettingsWrite {
             if let Some(folder) = self.path.parent() {
                 std::fs::create_dir_all(folder)?;
             }
-            handeye_core::atomic_file::write(&self.path, self.content.as_bytes())
+            handeye_core::project::files::atomic_file::write(&self.path, self.content.as_bytes())
         };
         write().map_err(|error: io::Error| {
             Warning(text!(

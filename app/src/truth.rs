@@ -1,9 +1,9 @@
 //! A result beside the truth that a simulated cell publishes. Reports only: nothing here reaches a solver.
 
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Camera, Pose, Tip};
-use handeye_core::handeye::HandEye;
-use handeye_core::result::{CalibrationResult, TruthComparison};
+use handeye_core::estimate::handeye::HandEye;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Camera, Pose, Tip};
+use handeye_core::project::result::{CalibrationResult, TruthComparison};
 
 /// Errors of an eye-in-hand result; `None` for a result of another kind.
 pub fn comparison(

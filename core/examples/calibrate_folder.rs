@@ -16,11 +16,11 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use handeye_core::calibrate::{Method, calibrate};
-use handeye_core::dataset::Dataset;
-use handeye_core::frames::{Camera, Mount};
-use handeye_core::handeye::HandEye;
+use handeye_core::estimate::handeye::HandEye;
+use handeye_core::estimate::{Method, calibrate};
+use handeye_core::geometry::frames::{Camera, Mount};
 use handeye_core::progress::CancelToken;
+use handeye_core::project::dataset::Dataset;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder: PathBuf = std::env::args_os().nth(1).ok_or("usage: calibrate_folder FOLDER")?.into();

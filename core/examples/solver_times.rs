@@ -9,14 +9,14 @@
 
 use std::error::Error;
 
-use handeye_core::calibrate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
-use handeye_core::camera::Distortion;
-use handeye_core::frames::Pose;
-use handeye_core::handeye::Mode;
-use handeye_core::intrinsics::{Options, SeenView, solve};
-use handeye_core::observation::Corner;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::intrinsics::{Options, SeenView, solve};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use handeye_core::geometry::camera::Distortion;
+use handeye_core::geometry::frames::Pose;
 use handeye_core::progress::CancelToken;
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::targets::observation::Corner;
+use handeye_core::targets::{Grid, TargetSpec};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector2};
 
 /// Views above which the whole calibration is not timed: its fits that leave views out take minutes there.

@@ -3,8 +3,8 @@
 use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{CameraError, Intrinsics};
-use crate::frames::{Camera, PointIn};
+use crate::geometry::camera::{CameraError, Intrinsics};
+use crate::geometry::frames::{Camera, PointIn};
 
 /// A depth closer to the far plane than this part of it is the far plane: a renderer's 24-bit depth buffer, near at a
 /// hundredth of far or less, resolves a few parts in a hundred thousand there.

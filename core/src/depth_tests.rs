@@ -1,6 +1,6 @@
 use super::DepthSample::{Far, Invalid, Metres};
 use super::*;
-use crate::camera::Distortion;
+use crate::geometry::camera::Distortion;
 use proptest::prelude::*;
 
 const FAR_M: f32 = 3.5;

@@ -1,6 +1,6 @@
 //! The one place that knows how the axes of a CoppeliaSim vision sensor lie in a camera.
 
-use handeye_core::frames::{Camera, Pose, Sensor};
+use handeye_core::geometry::frames::{Camera, Pose, Sensor};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 /// The camera (x right, y down, z forward) in the axes of a vision sensor (x left, y up, z forward): diag(−1, −1, 1), half

@@ -1,7 +1,7 @@
 //! Captures.
 
 use handeye_core::capture::Wait;
-use handeye_core::session::CaptureId;
+use handeye_core::project::session::CaptureId;
 
 use super::App;
 use crate::capture::CaptureRequest;

@@ -1,6 +1,6 @@
 //! Exports.
 
-use handeye_core::export::ExportView;
+use handeye_core::project::export::ExportView;
 
 use super::App;
 use crate::model::{Pane, Severity, Written, exports_of};

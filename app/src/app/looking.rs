@@ -1,7 +1,7 @@
 //! How the pictures are looked at, and points that are measured in them.
 
-use handeye_core::board_shape::BoardPoints;
 use handeye_core::depth::{ColourMap, DepthSample};
+use handeye_core::targets::bent::BoardPoints;
 use handeye_core::verify::VerifyError;
 use nalgebra::Vector2;
 

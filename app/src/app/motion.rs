@@ -1,7 +1,7 @@
 //! Moving and jogging the arm.
 
-use handeye_core::frames::{Camera, Pose, Tip};
-use handeye_core::session::CaptureId;
+use handeye_core::geometry::frames::{Camera, Pose, Tip};
+use handeye_core::project::session::CaptureId;
 
 use super::App;
 use crate::model::{Jog, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use handeye_core::session::CaptureId;
+use handeye_core::project::session::CaptureId;
 
 use super::App;
 use crate::command::{Event, SolveOutcome};

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::dataset::CameraInput;
-use handeye_core::export::ExportNames;
-use handeye_core::handeye::Mode;
-use handeye_core::session::{CaptureId, Edit, Role};
-use handeye_core::target::TargetSpec;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::project::dataset::CameraInput;
+use handeye_core::project::export::ExportNames;
+use handeye_core::project::session::{CaptureId, Edit, Role};
+use handeye_core::targets::TargetSpec;
 
 use super::App;
 use super::taught::reference_poses;

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use handeye_core::calibrate::{Method, Options};
-use handeye_core::handeye::motion::MIN_VIEWS;
-use handeye_core::observation::Corner;
+use handeye_core::estimate::handeye::motion::MIN_VIEWS;
+use handeye_core::estimate::{Method, Options};
 use handeye_core::progress::Stage;
-use handeye_core::session::{CaptureId, Document, Role, SessionObservations};
+use handeye_core::project::session::{CaptureId, Document, Role, SessionObservations};
+use handeye_core::targets::observation::Corner;
 
 use super::App;
 use crate::command::SolveOutcome;
@@ -18,7 +18,11 @@ use crate::worker::{ArchiveTask, SolveJob};
 /// What a calibration depends on. When it is another, there is something to solve.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Question {
-    meta: (handeye_core::handeye::Mode, handeye_core::target::TargetSpec, Option<handeye_core::dataset::CameraInput>),
+    meta: (
+        handeye_core::estimate::handeye::Mode,
+        handeye_core::targets::TargetSpec,
+        Option<handeye_core::project::dataset::CameraInput>,
+    ),
     captures: Vec<(CaptureId, Role, bool, bool)>,
     folder: Option<std::path::PathBuf>,
     method: String,

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_core::poses_file::{Goal, TaughtPose, TaughtPoses};
-use handeye_core::session::{Edit, TaughtChange};
+use handeye_core::project::session::{Edit, TaughtChange};
+use handeye_core::project::taught_poses::{Goal, TaughtPose, TaughtPoses};
 
 use super::App;
 use crate::model::{MotionGoal, MotionOutcome, Severity};

@@ -1,6 +1,6 @@
 use std::time::{Duration, Instant};
 
-use handeye_core::session::CaptureId;
+use handeye_core::project::session::CaptureId;
 
 use super::*;
 use crate::gui::sample;

@@ -1,6 +1,6 @@
 //! Visiting all taught poses, or poses that are planned to verify at, with a capture at each.
 
-use handeye_core::handeye::HandEye;
+use handeye_core::estimate::handeye::HandEye;
 use handeye_sim_link::client::cell::{BoardInView, JointAngles};
 
 use super::App;

@@ -1,8 +1,8 @@
 //! Why there is no capture: what is wrong and what to do, in words.
 
 use handeye_core::capture::{EdgeBlur, NO_PICTURES_S, Refusal};
-use handeye_core::target::TargetSpec;
-use handeye_core::vision::VisionError;
+use handeye_core::detect::VisionError;
+use handeye_core::targets::TargetSpec;
 
 use crate::model::RefusalKind;
 use crate::text;

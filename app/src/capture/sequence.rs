@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use handeye_core::capture::{self, Machine, Plan, Progress, Shot, Sighting, Taken, Wait};
 use handeye_core::image::GrayImage;
-use handeye_core::observation::Corner;
-use handeye_core::target::TargetSpec;
+use handeye_core::targets::TargetSpec;
+use handeye_core::targets::observation::Corner;
 
 use super::refusal::{self, Why};
 use super::{CaptureRequest, Measured, thumbnail};

@@ -1,8 +1,8 @@
 //! A capture from the request to its end, for a thread that can wait.
 
-use handeye_core::image_file::gray_from_rgb;
-use handeye_core::target::TargetSpec;
-use handeye_core::vision::{DetectOptions, detect_with};
+use handeye_core::detect::{DetectOptions, detect_with};
+use handeye_core::project::files::image_file::gray_from_rgb;
+use handeye_core::targets::TargetSpec;
 
 use super::{CaptureRequest, Measured, Sequence};
 use crate::model::{CaptureRefused, LiveFrame};

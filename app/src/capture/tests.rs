@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::Pose;
+use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 
 use super::drawn::{BOARD, board, brighter_board};

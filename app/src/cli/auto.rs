@@ -6,8 +6,8 @@ mod tour;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use handeye_core::calibrate::{Method, Options};
-use handeye_core::session::{FolderLock, Session, SessionMeta, Store};
+use handeye_core::estimate::{Method, Options};
+use handeye_core::project::session::{FolderLock, Session, SessionMeta, Store};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};

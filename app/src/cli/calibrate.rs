@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::calibrate::{Method, Options};
+use handeye_core::estimate::{Method, Options};
 
 use super::gate::Gate;
 use super::output::Output;

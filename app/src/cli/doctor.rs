@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::calibrate::{CalibrateError, Method, calibrate};
-use handeye_core::doctor::diagnose;
-use handeye_core::findings::FindingOptions;
-use handeye_core::handeye::HandEyeError;
+use handeye_core::diagnose::doctor::diagnose;
+use handeye_core::diagnose::findings::FindingOptions;
+use handeye_core::estimate::handeye::HandEyeError;
+use handeye_core::estimate::{CalibrateError, Method, calibrate};
 
 use super::output::Output;
 use super::{Failure, out, solve};

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
-use handeye_core::dataset::{self, Dataset};
-use handeye_core::export::{self, CameraLink, ExportError, ExportInput, ExportNames, ExportView, Format};
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::{CaptureRecord, Session};
+use handeye_core::project::dataset::{self, Dataset};
+use handeye_core::project::export::{self, CameraLink, ExportError, ExportInput, ExportNames, ExportView, Format};
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::{CaptureRecord, Session};
 
 use super::{Failure, out, solve};
 

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use handeye_core::result::Quality;
+use handeye_core::project::result::Quality;
 
 /// A condition such as `tip_error_95_mm<0.5`.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use handeye_core::image::RgbImage;
-use handeye_core::session::Store;
+use handeye_core::project::session::Store;
 use handeye_sim_link::client::LinkError;
 use handeye_sim_link::client::cell::{Arm, CellInfo, Frame, GroundTruth};
 

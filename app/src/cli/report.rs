@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use handeye_core::handeye::Mode;
-use handeye_core::result::{CalibrationResult, MethodStatus, TransformEstimate, ViewRecordStatus};
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::project::result::{CalibrationResult, MethodStatus, TransformEstimate, ViewRecordStatus};
 
 use crate::model::Solved;
 

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::anyhow;
-use handeye_core::calibrate::{Method, ObservedView, Options};
-use handeye_core::dataset::template::{CHOICE, template};
-use handeye_core::dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
-use handeye_core::export::{self, ExportInput, ExportNames};
-use handeye_core::handeye::Mode;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::{Method, ObservedView, Options};
 use handeye_core::progress::CancelToken;
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::{
+use handeye_core::project::dataset::template::{CHOICE, template};
+use handeye_core::project::dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
+use handeye_core::project::export::{self, ExportInput, ExportNames};
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::{
     self, CaptureId, CaptureRecord, Document, Role, Session, SessionMeta, SessionObservations,
 };
 

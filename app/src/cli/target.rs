@@ -2,9 +2,9 @@
 
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
-use handeye_core::dataset::write::target_table;
-use handeye_core::print::{Page, PrintError, Sheet, pdf};
-use handeye_core::target::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
+use handeye_core::project::dataset::write::target_table;
+use handeye_core::targets::print::{Page, PrintError, Sheet, pdf};
+use handeye_core::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
 
 use super::output::Output;
 use super::{Failure, out};

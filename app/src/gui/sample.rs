@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
-use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{ColourMap, DepthImage};
-use handeye_core::export::{self, ExportInput};
-use handeye_core::findings::{self, FindingOptions};
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::handeye::joint::outliers::Distance;
-use handeye_core::handeye::{HandEye, Mode};
+use handeye_core::diagnose::findings::{self, FindingOptions};
+use handeye_core::estimate::handeye::joint::outliers::Distance;
+use handeye_core::estimate::handeye::{HandEye, Mode};
+use handeye_core::estimate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::observation::{Corner, View};
 use handeye_core::progress::CancelToken;
-use handeye_core::session::{CaptureId, CaptureRecord, Document, Role};
+use handeye_core::project::export::{self, ExportInput};
+use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
+use handeye_core::targets::observation::{Corner, View};
 use handeye_core::track::{BoardDetection, ByDepth, Estimate, State, Update};
 use handeye_core::verify::{self, CheckCapture, Predictor};
 use handeye_sim_link::cell::kinematics::{JointLimits, inverse_nearest};
@@ -204,7 +204,7 @@ pub fn solved() -> Model {
     let mut model = captured();
     let observations = observations();
     let cancel = CancelToken::default();
-    let calibration = calibrate::calibrate(&observations, Method::Joint, &cancel).expect("a calibration");
+    let calibration = estimate::calibrate(&observations, Method::Joint, &cancel).expect("a calibration");
     assert!(matches!(calibration.hand_eye, Some(HandEye::EyeInHand { .. })));
     let mut result = calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
     result.truth = truth::comparison(&result, &tip_from_camera(), &intrinsics());

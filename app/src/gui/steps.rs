@@ -1,8 +1,8 @@
 //! How far the calibration has come: what is done, what can be done now, and what stands in the way.
 
-use handeye_core::calibrate::GOOD_VIEWS;
-use handeye_core::handeye::motion::MIN_VIEWS;
-use handeye_core::session::Role;
+use handeye_core::estimate::GOOD_VIEWS;
+use handeye_core::estimate::handeye::motion::MIN_VIEWS;
+use handeye_core::project::session::Role;
 
 use crate::model::{Model, Step};
 use crate::text;

@@ -7,7 +7,7 @@ use egui::{Vec2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, HarnessBuilder};
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::Pose;
+use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 
 use super::layout::Layout;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use egui::{ColorImage, Context, TextureFilter, TextureHandle, TextureOptions};
 use handeye_core::image::RgbImage;
-use handeye_core::session::CaptureId;
+use handeye_core::project::session::CaptureId;
 
 use crate::depth_view;
 use crate::model::{FrameImages, Model, Observed};

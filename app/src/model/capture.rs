@@ -1,9 +1,9 @@
 //! The newest sight of the board, and the capture that is under way.
 
 use handeye_core::capture::Wait;
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::observation::Corner;
-use handeye_core::vision::VisionError;
+use handeye_core::detect::VisionError;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::targets::observation::Corner;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;

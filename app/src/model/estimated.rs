@@ -1,6 +1,6 @@
 //! What the joint estimate decided and found out besides the answer, in words with units.
 
-use handeye_core::calibrate::{Calibration, JointOffsets, ShapeEstimate, ViewStatus};
+use handeye_core::estimate::{Calibration, JointOffsets, ShapeEstimate, ViewStatus};
 
 use crate::text;
 use crate::text::Text;
@@ -152,8 +152,8 @@ fn joint_offsets(offsets: &JointOffsets) -> EstimatedValue {
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::board_shape::BoardShape;
-    use handeye_core::handeye::widening::{Evidence, Widening};
+    use handeye_core::estimate::uncertainty::widening::{Evidence, Widening};
+    use handeye_core::targets::bent::BoardShape;
 
     use super::*;
     use crate::gui::sample;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use handeye_core::export::ExportNames;
+use handeye_core::project::export::ExportNames;
 use serde::{Deserialize, Serialize};
 
 /// What is exported, and how that went.

@@ -22,13 +22,13 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::calibrate::Method;
-use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{ColourMap, DepthImage, DepthSample};
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::handeye::HandEye;
+use handeye_core::estimate::Method;
+use handeye_core::estimate::handeye::HandEye;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
-use handeye_core::session::{CaptureId, Document};
+use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::verify::Predictor;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! What the arm does and is asked to do.
 
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_sim_link::client::cell::{ArmChain, CellInfo, GroundTruth, JointAngles, Support};
 use serde::{Deserialize, Serialize};
 

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_core::image::RgbImage;
-use handeye_core::observation::Corner;
-use handeye_core::session::{CaptureId, Document, Edit};
+use handeye_core::project::session::{CaptureId, Document, Edit};
+use handeye_core::targets::observation::Corner;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use handeye_core::calibrate::Calibration;
-use handeye_core::findings::Finding;
+use handeye_core::diagnose::findings::Finding;
+use handeye_core::estimate::Calibration;
 use handeye_core::progress::Stage;
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::CaptureId;
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::CaptureId;
 use handeye_core::verify::{Predictor, Verification, VerifyError};
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,10 @@
 //! The expected error over a box of the workspace.
 
-use handeye_core::calibrate::ViewStatus;
-use handeye_core::frames::{Base, Camera, Pose};
-use handeye_core::handeye::HandEye;
-use handeye_core::handeye::quality::{self, BoxError, TipBox};
-use handeye_core::session::Document;
+use handeye_core::estimate::ViewStatus;
+use handeye_core::estimate::handeye::HandEye;
+use handeye_core::estimate::uncertainty::quality::{self, BoxError, TipBox};
+use handeye_core::geometry::frames::{Base, Camera, Pose};
+use handeye_core::project::session::Document;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 

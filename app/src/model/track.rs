@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use handeye_core::frames::{Base, Camera, Pose, Target};
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target};
 use handeye_core::track::Update;
 use handeye_sim_link::client::cell::BoardPath;
 use serde::{Deserialize, Serialize};

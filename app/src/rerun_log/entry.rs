@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::frames::{Base, Pose, Tip};
-use handeye_core::session::{CaptureId, Document};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::project::session::{CaptureId, Document};
 use handeye_sim_link::client::cell::JointAngles;
 
 use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved, Step, Tracked};

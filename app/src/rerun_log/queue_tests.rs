@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::Pose;
+use handeye_core::geometry::frames::Pose;
 use handeye_core::image::RgbImage;
 
 use super::*;

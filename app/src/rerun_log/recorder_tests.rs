@@ -1,6 +1,6 @@
 use std::sync::Condvar;
 
-use handeye_core::session::Document;
+use handeye_core::project::session::Document;
 use rerun::log::LogMsg;
 use rerun::sink::CallbackSink;
 
@@ -33,7 +33,7 @@ fn said(words: &str) -> Entry {
 }
 
 fn robot(sim_time_s: f64) -> Entry {
-    Entry::Robot { sim_time_s, base_from_tip: handeye_core::frames::Pose::identity(), joints_rad: [0.1; 6] }
+    Entry::Robot { sim_time_s, base_from_tip: handeye_core::geometry::frames::Pose::identity(), joints_rad: [0.1; 6] }
 }
 
 /// The entities of a recording, and how many rows each has.

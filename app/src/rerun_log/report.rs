@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use handeye_core::findings::Severity;
-use handeye_core::result::{CalibrationResult, MethodStatus, Quality, TransformEstimate};
+use handeye_core::diagnose::findings::Severity;
+use handeye_core::project::result::{CalibrationResult, MethodStatus, Quality, TransformEstimate};
 
 use crate::cli::report;
 use crate::model::{self, Solved};

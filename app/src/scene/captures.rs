@@ -1,9 +1,9 @@
 //! The captures: where each was taken, what it is for, and what the calibration makes of it.
 
-use handeye_core::calibrate::{CornerResidual, ViewStatus};
-use handeye_core::frames::{Base, Camera, Pose, Target};
-use handeye_core::session::{CaptureId, CaptureRecord, Role};
-use handeye_core::statistics::median_high;
+use handeye_core::estimate::{CornerResidual, ViewStatus};
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target};
+use handeye_core::geometry::statistics::median_high;
+use handeye_core::project::session::{CaptureId, CaptureRecord, Role};
 
 use super::Known;
 use crate::model::Solved;

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::handeye::{HandEye, Mode};
-use handeye_core::target::TargetSpec;
+use handeye_core::estimate::handeye::{HandEye, Mode};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::targets::TargetSpec;
 
 use super::{BoardItem, CameraItem, Fixed, Item, Role};
 use crate::model::{CellFacts, Model, Solved};

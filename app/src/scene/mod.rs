@@ -11,9 +11,9 @@ pub use arm::{PosedArm, posed_arm};
 pub use captures::{BAD_AT_MEDIANS, CaptureItem, Captures, Standing, outcome};
 pub use known::{Known, Truth};
 
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Base, Camera, Frame, Pose, Target, Tip};
-use handeye_core::target::TargetSpec;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Frame, Pose, Target, Tip};
+use handeye_core::targets::TargetSpec;
 use nalgebra::{Isometry3, Point3};
 
 /// Where something is fixed.

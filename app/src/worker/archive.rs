@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crossbeam_channel::{Receiver, select};
-use handeye_core::poses_file::TaughtPose;
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::{Document, Edit, SessionError, SessionMeta, Store};
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::{Document, Edit, SessionError, SessionMeta, Store};
+use handeye_core::project::taught_poses::TaughtPose;
 
 use super::files::kind_of;
 use super::link::Outlet;

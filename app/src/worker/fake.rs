@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::Pose;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{ArmChain, BoardInView, FollowMoment, FollowWish, JointAngles, Support};

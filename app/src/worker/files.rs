@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::Builder;
 
-use handeye_core::dataset;
 use handeye_core::depth::{ColourMap, DepthImage};
-use handeye_core::export::{self, ExportInput, ExportNames, ExportView, Format};
-use handeye_core::poses_file::{TaughtPose, TaughtPoses};
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::{CaptureRecord, Session};
+use handeye_core::project::dataset;
+use handeye_core::project::export::{self, ExportInput, ExportNames, ExportView, Format};
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::{CaptureRecord, Session};
+use handeye_core::project::taught_poses::{TaughtPose, TaughtPoses};
 
 use super::link::Outlet;
 use crate::command::Event;

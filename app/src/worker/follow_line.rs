@@ -3,8 +3,8 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use handeye_core::frames::{Base, Pose, Tip};
-use handeye_core::handeye::HandEye;
+use handeye_core::estimate::handeye::HandEye;
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::track::{Estimate, Keep, Setup, State, TipGoal, Update};
 use handeye_sim_link::client::cell::{BoardInView, FollowGoal, FollowMoment, FollowWish as ArmWish};
 

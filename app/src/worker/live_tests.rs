@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::thread::JoinHandle;
 
-use handeye_core::frames::Base;
-use handeye_core::poses_file::{Goal, TaughtPoses};
+use handeye_core::geometry::frames::Base;
+use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CellPaths, JointAngles};

@@ -41,7 +41,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
-use handeye_core::frames::{Camera as CameraFrame, Pose, Tip};
+use handeye_core::geometry::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
 pub use archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use handeye_core::capture::observe_image;
 use handeye_core::progress::CancelToken;
-use handeye_core::session::{CaptureId, CaptureRecord};
-use handeye_core::target::TargetSpec;
+use handeye_core::project::session::{CaptureId, CaptureRecord};
+use handeye_core::targets::TargetSpec;
 
 use super::link::Outlet;
 use crate::capture::thumbnail;
@@ -45,7 +45,7 @@ fn report(id: CaptureId, target: TargetSpec, observed: Option<Observed>, outlet:
 
 fn look(job: &ObserveJob, capture: &CaptureRecord) -> Result<Observed, String> {
     let path = job.folder.join(&capture.image);
-    let rgb = handeye_core::image_file::load_rgb(&path).map_err(|error| error.to_string())?;
+    let rgb = handeye_core::project::files::image_file::load_rgb(&path).map_err(|error| error.to_string())?;
     let seen = observe_image(&rgb, &job.target).map_err(|error| error.to_string())?;
     Ok(Observed {
         corners: seen.map(|seen| seen.corners),

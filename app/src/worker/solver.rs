@@ -4,14 +4,14 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use handeye_core::calibrate::{self, CalibrateError, Method, Observations, Options};
-use handeye_core::doctor;
-use handeye_core::findings::{Finding, FindingOptions};
-use handeye_core::handeye::HandEyeError;
-use handeye_core::observation::View;
+use handeye_core::diagnose::doctor;
+use handeye_core::diagnose::findings::{Finding, FindingOptions};
+use handeye_core::estimate::handeye::HandEyeError;
+use handeye_core::estimate::{self, CalibrateError, Method, Observations, Options};
 use handeye_core::progress::{CancelToken, Progress, Work};
-use handeye_core::result::VerificationSummary;
-use handeye_core::session::CaptureId;
+use handeye_core::project::result::VerificationSummary;
+use handeye_core::project::session::CaptureId;
+use handeye_core::targets::observation::View;
 use handeye_core::verify::{self, CheckCapture, Predictor, Verification, VerifyError};
 
 use super::link::Outlet;
@@ -78,7 +78,7 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
 /// # Errors
 /// [`CalibrateError`].
 pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> {
-    let calibration = calibrate::calibrate_with(&job.observations, job.method, job.options, work)?;
+    let calibration = estimate::calibrate_with(&job.observations, job.method, job.options, work)?;
     let options = session_start::solve_options(job.method, job.options, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {

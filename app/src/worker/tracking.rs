@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use handeye_core::frames::{Base, Pose, Target};
-use handeye_core::target::TargetSpec;
+use handeye_core::geometry::frames::{Base, Pose, Target};
+use handeye_core::targets::TargetSpec;
 use handeye_core::track::{Picture, Setup, TrackError as CannotTrack, Tracker};
 
 use super::follow_line::FollowLine;

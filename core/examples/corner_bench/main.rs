@@ -10,11 +10,11 @@ mod render;
 
 use std::time::Instant;
 
+use handeye_core::detect::{DetectOptions, detect_with};
+use handeye_core::geometry::statistics::median_high;
 use handeye_core::image::GrayImage;
-use handeye_core::observation::Corner;
-use handeye_core::statistics::median_high;
-use handeye_core::target::{Grid, TargetSpec};
-use handeye_core::vision::{DetectOptions, detect_with};
+use handeye_core::targets::observation::Corner;
+use handeye_core::targets::{Grid, TargetSpec};
 use nalgebra::{Matrix2, Vector2};
 use render::{Look, Picture, view};
 

@@ -1,8 +1,8 @@
 //! OpenCV's two chessboard detectors at their best settings.
 
 use handeye_core::image::GrayImage;
-use handeye_core::observation::Corner;
-use handeye_core::target::Grid;
+use handeye_core::targets::Grid;
+use handeye_core::targets::observation::Corner;
 use nalgebra::Vector2;
 use opencv::calib3d;
 use opencv::core::{Mat, Point2f, Size, TermCriteria, TermCriteria_EPS, TermCriteria_MAX_ITER, Vector};

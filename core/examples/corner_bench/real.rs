@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use handeye_core::geometry::statistics::median_high;
 use handeye_core::image::GrayImage;
-use handeye_core::observation::Corner;
-use handeye_core::statistics::median_high;
-use handeye_core::target::Grid;
+use handeye_core::targets::Grid;
+use handeye_core::targets::observation::Corner;
 use nalgebra::Vector2;
 
 use crate::{Detector, detectors, timed};

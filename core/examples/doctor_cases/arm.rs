@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
 
-use handeye_core::se3;
+use handeye_core::geometry::se3;
 
 /// Denavit-Hartenberg parameters `(a, d, alpha)` of a UR5, metres and radians, from its data sheet.
 const LINKS: [(f64, f64, f64); 6] = [

@@ -1,11 +1,11 @@
 //! Forty sessions that are degenerate or hostile, and the code that each has to get.
 
-use handeye_core::calibrate::Observations;
-use handeye_core::doctor::Diagnosis;
-use handeye_core::findings::FindingCode as Code;
-use handeye_core::findings::Severity;
-use handeye_core::frames::Pose;
-use handeye_core::handeye::Mode;
+use handeye_core::diagnose::doctor::Diagnosis;
+use handeye_core::diagnose::findings::FindingCode as Code;
+use handeye_core::diagnose::findings::Severity;
+use handeye_core::estimate::Observations;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::geometry::frames::Pose;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use super::sim::{Fault, GRID, Setup, changed, session, session_of};

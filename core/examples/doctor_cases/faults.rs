@@ -1,9 +1,9 @@
 //! The six faults that have to be ranked first, and healthy sessions.
 
-use handeye_core::calibrate::{Method, Observations, calibrate};
-use handeye_core::doctor::{Diagnosis, diagnose};
-use handeye_core::findings::{FindingCode, FindingOptions};
-use handeye_core::handeye::Mode;
+use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
+use handeye_core::diagnose::findings::{FindingCode, FindingOptions};
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::{Method, Observations, calibrate};
 use handeye_core::progress::CancelToken;
 use nalgebra::{Isometry3, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};

@@ -8,7 +8,7 @@ mod cases;
 mod faults;
 mod sim;
 
-use handeye_core::findings::Severity;
+use handeye_core::diagnose::findings::Severity;
 use handeye_core::wording::English;
 
 fn number(argument: Option<String>, otherwise: u64) -> u64 {

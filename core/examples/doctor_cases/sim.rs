@@ -1,12 +1,12 @@
 //! Sessions of a simulated cell with known faults: poses and corners, no pictures.
 
-use handeye_core::calibrate::{CameraKnowledge, Observations, ObservedView};
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::frames::{Base, Pose, Tip};
-use handeye_core::handeye::Mode;
-use handeye_core::observation::Corner;
-use handeye_core::se3;
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView};
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::geometry::se3;
+use handeye_core::targets::observation::Corner;
+use handeye_core::targets::{Grid, TargetSpec};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

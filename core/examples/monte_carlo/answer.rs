@@ -1,15 +1,16 @@
 //! What the project says to a trial: the one place where the study touches the estimator.
 
-use handeye_core::board_shape::{BoardPoints, BoardShape};
-use handeye_core::calibrate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::frames::{Camera, Mount, Pose};
-use handeye_core::handeye::closed_form::{self, ClosedFormSolution};
-use handeye_core::handeye::joint::{self, Free, JointProblem, JointStart, Noise, SmallSample};
-use handeye_core::handeye::{PosePair, quality};
-use handeye_core::intrinsics::{self, Options, SeenView};
-use handeye_core::planar_pose;
+use handeye_core::estimate::handeye::PosePair;
+use handeye_core::estimate::handeye::closed_form::{self, ClosedFormSolution};
+use handeye_core::estimate::handeye::joint::{self, Free, JointProblem, JointStart, Noise, SmallSample};
+use handeye_core::estimate::intrinsics::{self, Options, SeenView};
+use handeye_core::estimate::uncertainty::quality;
+use handeye_core::estimate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::frames::{Camera, Mount, Pose};
+use handeye_core::geometry::planar_pose;
 use handeye_core::progress::CancelToken;
+use handeye_core::targets::bent::{BoardPoints, BoardShape};
 use nalgebra::{Matrix6, Point3};
 
 use super::scene::{BOARD, Trial};
@@ -74,14 +75,14 @@ pub fn start(trial: &Trial) -> Result<Start, String> {
 
 /// Sum of squared residuals of the bare chain, capped.
 fn misfit(trial: &Trial, lens: &Intrinsics, solution: &ClosedFormSolution) -> f64 {
-    let of_view = |view: &handeye_core::observation::View| {
+    let of_view = |view: &handeye_core::targets::observation::View| {
         let chain = joint::camera_from_target(
             trial.cell.mode,
             &view.base_from_tip,
             &solution.mount_from_camera,
             &solution.anchor_from_target,
         );
-        let residual = |c: &handeye_core::observation::Corner| {
+        let residual = |c: &handeye_core::targets::observation::Corner| {
             lens.project(&(chain.isometry() * trial.points[c.index])).map_or(CAP_PX, |px| (px - c.px).norm())
         };
         view.corners.iter().map(|c| residual(c).min(CAP_PX).powi(2)).sum::<f64>()
@@ -129,7 +130,7 @@ pub fn product(trial: &Trial) -> Result<Answer, String> {
     } else {
         CameraKnowledge::Fixed(trial.intrinsics)
     };
-    let observed = |view: &handeye_core::observation::View| ObservedView {
+    let observed = |view: &handeye_core::targets::observation::View| ObservedView {
         name: view.name.clone(),
         base_from_tip: Some(view.base_from_tip),
         corners: Some(view.corners.clone()),
@@ -145,7 +146,7 @@ pub fn product(trial: &Trial) -> Result<Answer, String> {
         views: trial.views.iter().map(observed).collect(),
     };
     let found =
-        calibrate::calibrate(&observations, Method::Joint, &CancelToken::default()).map_err(|e| e.to_string())?;
+        estimate::calibrate(&observations, Method::Joint, &CancelToken::default()).map_err(|e| e.to_string())?;
     let missing = || "the calibration has no hand-eye transform".to_owned();
     Ok(Answer {
         mount_from_camera: found.hand_eye.ok_or_else(missing)?.mount_from_camera(),

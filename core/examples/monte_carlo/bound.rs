@@ -3,8 +3,8 @@
 //! It shares nothing with the estimator: the projection, the chain and the rotations are written out here, and every
 //! derivative is a central difference. `docs/maths/uncertainty.md` has the formula.
 
-use handeye_core::handeye::Mode;
-use handeye_core::handeye::joint::Noise;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::handeye::joint::Noise;
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use super::scene::Trial;

@@ -26,8 +26,8 @@ mod tally;
 
 use std::time::Instant;
 
-use handeye_core::handeye::Mode;
-use handeye_core::handeye::joint::Noise;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::handeye::joint::Noise;
 use rayon::prelude::*;
 
 use scene::Cell;

@@ -1,11 +1,11 @@
 //! Views of a known chain: the camera and the board of the reference cell, with the noise of one trial.
 
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
-use handeye_core::handeye::Mode;
-use handeye_core::handeye::joint::Noise;
-use handeye_core::observation::{Corner, View};
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::handeye::joint::Noise;
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use handeye_core::targets::observation::{Corner, View};
+use handeye_core::targets::{Grid, TargetSpec};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector2, Vector3};
 use rand::seq::SliceRandom as _;
 use rand::{Rng, RngExt as _, SeedableRng as _};
@@ -203,7 +203,7 @@ impl Trial {
     fn move_the_board(&mut self, index: usize, rng: &mut impl Rng) {
         let heading = rng.random_range(0.0..std::f64::consts::TAU);
         let shift = Vector3::new(heading.cos(), heading.sin(), 0.0) * rng.random_range(0.005..0.02);
-        let camera_from_target = handeye_core::handeye::joint::camera_from_target(
+        let camera_from_target = handeye_core::estimate::handeye::joint::camera_from_target(
             self.cell.mode,
             &self.true_base_from_tip[index],
             &self.mount_from_camera,

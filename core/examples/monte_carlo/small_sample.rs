@@ -3,7 +3,7 @@
 //! `docs/maths/uncertainty.md` derives them. Like the bound they are computed from the model, with the noise levels that
 //! an estimate found, and not by the estimator.
 
-use handeye_core::handeye::joint::Noise;
+use handeye_core::estimate::handeye::joint::Noise;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, SMatrix, SymmetricEigen, Vector3, Vector6};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use handeye_core::handeye::Mode;
+use handeye_core::estimate::handeye::Mode;
 
 use crate::scene::Cell;
 use crate::tally::{Performance, Ratio, Summary};

@@ -1,7 +1,7 @@
 //! What is counted over the trials of a cell.
 
-use handeye_core::handeye::closed_form;
-use handeye_core::statistics::median_high;
+use handeye_core::estimate::handeye::closed_form;
+use handeye_core::geometry::statistics::median_high;
 use nalgebra::{Isometry3, Matrix6, Vector6};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 

@@ -1,7 +1,7 @@
 //! What the checks of the stated uncertainty say of every set.
 
-use handeye_core::handeye::joint::Free;
-use handeye_core::handeye::{quality, widening};
+use handeye_core::estimate::handeye::joint::Free;
+use handeye_core::estimate::uncertainty::{quality, widening};
 use handeye_core::progress::CancelToken;
 
 use crate::methods::Choice;

@@ -1,6 +1,6 @@
 //! Held-out error of every method over five folds.
 
-use handeye_core::handeye::quality;
+use handeye_core::estimate::uncertainty::quality;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;

@@ -1,9 +1,9 @@
 //! Whether the answers of random halves agree as well as they say.
 
-use handeye_core::handeye::joint::{Free, JointSolution, SmallSample};
-use handeye_core::handeye::{quality, widening};
+use handeye_core::estimate::handeye::joint::{Free, JointSolution, SmallSample};
+use handeye_core::estimate::uncertainty::{quality, widening};
+use handeye_core::geometry::se3;
 use handeye_core::progress::CancelToken;
-use handeye_core::se3;
 use nalgebra::{Matrix6, Point3};
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;

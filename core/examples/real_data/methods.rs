@@ -1,14 +1,14 @@
 //! The methods, each from a choice of views to both links.
 
-use handeye_core::board_shape::BoardShape;
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Anchor, Camera, Mount, Pose, Target};
-use handeye_core::handeye::closed_form::{self, ClosedFormSolution};
-use handeye_core::handeye::joint::outliers::estimate_screened;
-use handeye_core::handeye::joint::{Free, JointProblem, JointSolution, JointStart, Noise, estimate};
-use handeye_core::handeye::{PosePair, pose_graph};
-use handeye_core::observation::View;
+use handeye_core::estimate::handeye::closed_form::{self, ClosedFormSolution};
+use handeye_core::estimate::handeye::joint::outliers::estimate_screened;
+use handeye_core::estimate::handeye::joint::{Free, JointProblem, JointSolution, JointStart, Noise, estimate};
+use handeye_core::estimate::handeye::{PosePair, pose_graph};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_core::progress::CancelToken;
+use handeye_core::targets::bent::BoardShape;
+use handeye_core::targets::observation::View;
 
 use crate::sets::Set;
 

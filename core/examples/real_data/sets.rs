@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use handeye_core::board_shape::BoardPoints;
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::handeye::{Mode, PosePair};
-use handeye_core::observation::{Corner, View};
+use handeye_core::estimate::handeye::{Mode, PosePair};
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::targets::bent::BoardPoints;
+use handeye_core::targets::observation::{Corner, View};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use serde_json::Value;
 

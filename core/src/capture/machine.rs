@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::watch::Reference;
 use super::{Average, Rest, Scatter, Shot, Similar, Watch, nearest_similar};
 use crate::depth::DepthImage;
-use crate::frames::{Base, Pose, Tip};
-use crate::observation::Corner;
+use crate::geometry::frames::{Base, Pose, Tip};
+use crate::targets::observation::Corner;
 
 /// So long \[s\], on the clock of whoever asks, pictures may stay away and simulated time may stand still.
 pub const NO_PICTURES_S: f64 = 2.0;

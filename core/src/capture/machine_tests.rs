@@ -2,8 +2,8 @@ use nalgebra::{Isometry3, Vector2, Vector3};
 
 use super::synthetic::{Board, Instant, picture};
 use super::{Machine, Plan, Progress, Refusal, Wait};
-use crate::frames::Pose;
-use crate::observation::Corner;
+use crate::geometry::frames::Pose;
+use crate::targets::observation::Corner;
 
 /// When the capture is asked for; picture 0 arrives at 100 s and one every 0.05 s after.
 const REQUESTED_S: f64 = 100.0;

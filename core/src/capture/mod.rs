@@ -12,21 +12,21 @@
 //! | [`observe_image`] | corners and blur of a picture, fresh or from a file |
 
 mod average;
+pub(crate) mod cells;
+pub(crate) mod edge_blur;
 mod machine;
 #[cfg(feature = "opencv")]
 mod observe;
-mod picture;
 mod scatter;
-mod sharpness;
 mod similar;
 mod watch;
 
+pub use crate::capture::edge_blur::{EdgeBlur, MAX_BLUR_SHARE};
 pub use average::Average;
 pub use machine::{Machine, NO_PICTURES_S, Plan, Progress, Refusal, Taken, Wait};
 #[cfg(feature = "opencv")]
 pub use observe::{Sighting, observe_gray, observe_image};
 pub use scatter::Scatter;
-pub use sharpness::{EdgeBlur, MAX_BLUR_SHARE};
 pub use similar::{Similar, nearest_similar};
 pub use watch::{Rest, STILL_RATE_RAD_S, Watch};
 
@@ -47,7 +47,7 @@ pub struct Shot<'a> {
     pub joints_rad: &'a [f64],
     /// Colour.
     pub rgb: &'a RgbImage,
-    /// The same in grey, see [`crate::image_file::gray_from_rgb`].
+    /// The same in grey, see [`crate::project::files::image_file::gray_from_rgb`].
     pub grey: &'a GrayImage,
     /// Depth.
     pub depth: &'a DepthImage,

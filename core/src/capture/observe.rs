@@ -3,10 +3,10 @@
 use image::{GrayImage, RgbImage};
 
 use super::EdgeBlur;
-use crate::image_file::gray_from_rgb;
-use crate::observation::Corner;
-use crate::target::TargetSpec;
-use crate::vision::{self, VisionError};
+use crate::detect::{self, VisionError};
+use crate::project::files::image_file::gray_from_rgb;
+use crate::targets::TargetSpec;
+use crate::targets::observation::Corner;
 
 /// The board in a picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,7 @@ pub struct Sighting {
 /// miss may take some seconds per megapixel.
 ///
 /// # Errors
-/// As [`vision::detect`].
+/// As [`detect::detect`].
 pub fn observe_image(rgb: &RgbImage, target: &TargetSpec) -> Result<Option<Sighting>, VisionError> {
     observe_gray(&gray_from_rgb(rgb), target)
 }
@@ -30,9 +30,9 @@ pub fn observe_image(rgb: &RgbImage, target: &TargetSpec) -> Result<Option<Sight
 /// [`observe_image`] of a picture in grey.
 ///
 /// # Errors
-/// As [`vision::detect`].
+/// As [`detect::detect`].
 pub fn observe_gray(grey: &GrayImage, target: &TargetSpec) -> Result<Option<Sighting>, VisionError> {
-    let found = vision::detect(grey, target)?;
+    let found = detect::detect(grey, target)?;
     Ok(found.map(|corners| {
         let blur = match target {
             TargetSpec::Chessboard(grid) => EdgeBlur::measure(grey, &corners, grid),

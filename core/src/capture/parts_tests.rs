@@ -7,7 +7,7 @@ use rand_distr::{Distribution as _, Normal};
 use super::synthetic::{Board, GRID, picture};
 use super::{Average, EdgeBlur, MAX_BLUR_SHARE, Scatter};
 use crate::depth::DepthImage;
-use crate::observation::Corner;
+use crate::targets::observation::Corner;
 
 #[test]
 fn colours_are_averaged_and_rounded_and_depths_leave_holes_out() {

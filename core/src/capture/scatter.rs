@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector2;
 
-use crate::observation::Corner;
+use crate::targets::observation::Corner;
 
 /// Collects the corners of several pictures of a scene at rest.
 #[derive(Debug, Clone, Default)]

@@ -1,6 +1,6 @@
 //! Whether there is a capture from almost the same pose.
 
-use crate::frames::{Base, Pose, Tip};
+use crate::geometry::frames::{Base, Pose, Tip};
 
 /// The capture that is too close.
 #[derive(Debug, Clone, Copy, PartialEq)]

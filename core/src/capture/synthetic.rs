@@ -8,8 +8,8 @@ use rand_distr::{Distribution as _, Normal};
 
 use super::Shot;
 use crate::depth::DepthImage;
-use crate::observation::Corner;
-use crate::target::Grid;
+use crate::targets::Grid;
+use crate::targets::observation::Corner;
 
 pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::Shot;
-use super::picture::Cells;
+use super::cells::Cells;
 
 /// Fastest joint [rad/s] that counts as at rest: an arm of 1 m reach then moves by 0.05 mm in a pass of 50 ms, less than
 /// a tenth of a pixel at 0.4 m. The same as where motions wait for the arm.

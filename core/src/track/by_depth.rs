@@ -5,11 +5,11 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2
 use super::pose;
 use super::{BoardDetection, ByDepth, Picture};
 use crate::depth::{DepthImage, DepthSample};
-use crate::frames::{Base, Camera, PointIn, Pose};
-use crate::observation::Corner;
-use crate::se3;
-use crate::statistics::{SIGMA_PER_MEDIAN_SIZE, median_high};
-use crate::target::TargetSpec;
+use crate::geometry::frames::{Base, Camera, PointIn, Pose};
+use crate::geometry::se3;
+use crate::geometry::statistics::{SIGMA_PER_MEDIAN_SIZE, median_high};
+use crate::targets::TargetSpec;
+use crate::targets::observation::Corner;
 use crate::verify::Predictor;
 
 /// Points that fix a board with one to spare, so that a wrong one shows.

@@ -1,7 +1,7 @@
 use nalgebra::Vector3;
 
 use super::*;
-use crate::frames::Target;
+use crate::geometry::frames::Target;
 use crate::track::stage::{self, FAR_M, GRID, Watch, board_at, error};
 
 fn board() -> Pose<Base, Target> {

@@ -1,7 +1,7 @@
 //! One corner of a chessboard near where it is expected.
 //!
 //! First roughly, by the light and dark squares around it; then by fitting the corner model of
-//! [`crate::vision::subpixel`] with the directions of both edges taken from the expected pose. Half a turn about the
+//! [`crate::detect::checkerboard::subpixel`] with the directions of both edges taken from the expected pose. Half a turn about the
 //! corner changes the picture of a corner only where its place is wrong, and errors in directions, blur and contrast
 //! only where it is right; so directions that are off by a degree do not move the corner, and without them the fit costs
 //! a fraction of the full one.
@@ -9,8 +9,8 @@
 use image::GrayImage;
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use crate::vision::saddle;
-use crate::vision::subpixel::erf_and_slope;
+use crate::detect::checkerboard::saddle;
+use crate::detect::checkerboard::subpixel::erf_and_slope;
 
 /// Where a corner is expected and how the board lies there.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +63,7 @@ const OFF_MIDDLE_PX: f64 = 0.5;
 const MIN_CONTRAST: f64 = 3.0;
 const MAX_MISFIT: f64 = 0.2;
 /// Sharper than this, edges along the rows or columns of pixels (tangent below [`ALIGNED`]) are left to the saddle, which
-/// assumes no profile; see [`crate::vision::subpixel`].
+/// assumes no profile; see [`crate::detect::checkerboard::subpixel`].
 const SHARP_PX: f64 = 0.5;
 const ALIGNED: f64 = 0.1;
 

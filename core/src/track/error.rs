@@ -1,8 +1,8 @@
 //! Why a picture cannot be tracked.
 
-use crate::camera::CameraError;
 #[cfg(feature = "opencv")]
-use crate::vision::VisionError;
+use crate::detect::VisionError;
+use crate::geometry::camera::CameraError;
 
 /// Why there is no tracker, or no update. A board that is not in the picture is not an error.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

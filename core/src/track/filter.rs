@@ -12,8 +12,8 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use super::{Estimate, MotionModel};
-use crate::frames::{Base, Pose, Target};
-use crate::se3;
+use crate::geometry::frames::{Base, Pose, Target};
+use crate::geometry::se3;
 
 /// Errors that a sight may have: 99.99 % of chi-square with six degrees of freedom. At 30 pictures a second one true sight
 /// in five minutes is refused.

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::Estimate;
-use crate::frames::{Base, Camera, Pose, Target, Tip};
-use crate::handeye::HandEye;
-use crate::target::TargetSpec;
+use crate::estimate::handeye::HandEye;
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::targets::TargetSpec;
 use crate::verify::Predictor;
 
 /// What is kept while the board moves.

@@ -12,6 +12,8 @@
 mod by_depth;
 #[cfg(feature = "opencv")]
 mod corner;
+#[cfg(feature = "opencv")]
+pub(crate) mod detection;
 mod error;
 mod filter;
 #[cfg(feature = "opencv")]
@@ -20,8 +22,6 @@ mod goal;
 mod motion;
 mod noise;
 mod pose;
-#[cfg(feature = "opencv")]
-mod sight;
 #[cfg(test)]
 mod stage;
 #[cfg(feature = "opencv")]
@@ -30,10 +30,10 @@ mod tracker;
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::depth::DepthImage;
-use crate::frames::{Base, Camera, Pose, Target, Tip};
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::image::GrayImage;
-use crate::observation::Corner;
-use crate::target::TargetSpec;
+use crate::targets::TargetSpec;
+use crate::targets::observation::Corner;
 use crate::verify::Predictor;
 
 pub use error::TrackError;

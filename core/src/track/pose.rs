@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix6, Point3, Vector2, Vector6};
 
-use crate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
-use crate::observation::Corner;
-use crate::planar_pose::mirror::mirrored;
-use crate::planar_pose::refine::{Minimum, refine};
-use crate::se3;
-use crate::statistics::median_high;
+use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
+use crate::geometry::planar_pose::mirror::mirrored;
+use crate::geometry::planar_pose::refine::{Minimum, refine};
+use crate::geometry::se3;
+use crate::geometry::statistics::median_high;
+use crate::targets::observation::Corner;
 
 /// Residuals beyond this many standard deviations have no weight (Tukey's, 95 % efficient at 4.7).
 const TUKEY: f64 = 4.7;

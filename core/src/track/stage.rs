@@ -9,13 +9,13 @@ use rand_distr::{Distribution as _, StandardNormal};
 use super::{MotionModel, Setup};
 #[cfg(feature = "opencv")]
 use super::{Picture, Tracker, Update};
-use crate::board_shape::BoardShape;
-use crate::camera::{Distortion, Intrinsics};
 use crate::depth::DepthImage;
-use crate::frames::{Base, Camera, Pose, Target, Tip};
-use crate::handeye::HandEye;
-use crate::handeye::joint::SmallSample;
-use crate::target::{Grid, TargetSpec};
+use crate::estimate::handeye::HandEye;
+use crate::estimate::handeye::joint::SmallSample;
+use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::targets::bent::BoardShape;
+use crate::targets::{Grid, TargetSpec};
 use crate::verify::Predictor;
 
 pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };

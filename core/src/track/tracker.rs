@@ -3,13 +3,13 @@
 use nalgebra::Matrix6;
 
 use super::by_depth::by_depth;
+use super::detection::{Board, Expected, Eye};
 use super::filter::{BoardPose, Filter};
 use super::noise::CornerNoise;
-use super::sight::{Board, Expected, Eye};
 use super::{BoardDetection, Estimate, Picture, Setup, State, TrackError, Update};
-use crate::board_shape::BoardPoints;
-use crate::frames::{Base, Camera, Pose};
-use crate::target::TargetSpec;
+use crate::geometry::frames::{Base, Camera, Pose};
+use crate::targets::TargetSpec;
+use crate::targets::bent::BoardPoints;
 
 /// Corners are searched within this many standard deviations of where they are expected.
 const SEARCH: f64 = 2.5;

@@ -2,10 +2,10 @@ use image::GrayImage;
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 
 use super::*;
-use crate::camera::CameraError;
-use crate::frames::Target;
-use crate::handeye::HandEye;
-use crate::target::Grid;
+use crate::estimate::handeye::HandEye;
+use crate::geometry::camera::CameraError;
+use crate::geometry::frames::Target;
+use crate::targets::Grid;
 use crate::track::MotionModel;
 use crate::track::stage::{self, Cover, GRID, PERIOD_S, Watch, board_at, error, rms};
 
@@ -207,7 +207,7 @@ fn the_covariance_of_one_picture_is_that_of_its_errors() {
         );
         watch.tracker.reset();
         let seen = watch.see(Some(&now)).seen.expect("seen");
-        let off = crate::se3::log((seen.base_from_target.inverse() * now).isometry());
+        let off = crate::geometry::se3::log((seen.base_from_target.inverse() * now).isometry());
         total += off.dot(&seen.covariance.cholesky().expect("positive").solve(&off));
     }
     let mean = total / f64::from(count) / 6.0;
@@ -231,7 +231,7 @@ fn the_covariance_of_the_estimate_is_that_of_its_errors_for_boards_that_stand_or
                 let estimate = estimate_of(&watch.see(Some(&now)));
                 // Every third: the errors of neighbours belong together.
                 if picture % 3 == 2 {
-                    let off = crate::se3::log((estimate.base_from_target.inverse() * now).isometry());
+                    let off = crate::geometry::se3::log((estimate.base_from_target.inverse() * now).isometry());
                     total += off.dot(&estimate.covariance.cholesky().expect("positive").solve(&off));
                     count += 6.0;
                 }
@@ -345,8 +345,8 @@ fn a_step_back_in_time_starts_anew_and_a_picture_shown_twice_counts_once() {
 
 #[test]
 fn a_sharp_picture_of_exact_coverage_is_followed() {
-    use crate::camera::Intrinsics;
-    use crate::vision::rendered::Scene;
+    use crate::detect::rendered::Scene;
+    use crate::geometry::camera::Intrinsics;
     let mut setup = stage::setup();
     setup.calibrated.intrinsics = Intrinsics::pinhole(640, 480, 581.0);
     let mut watch = Watch::with(setup);

@@ -3,14 +3,14 @@
 use nalgebra::{DMatrix, Matrix6};
 
 use super::VerifyError;
-use crate::board_shape::{BoardPoints, BoardShape};
-use crate::calibrate::Calibration;
-use crate::camera::Intrinsics;
-use crate::frames::{Base, Camera, Pose, Target, Tip};
-use crate::handeye::HandEye;
-use crate::handeye::joint::{Free, Noise, SmallSample, base_from_tip_by_joints, camera_from_target};
-use crate::handeye::quality;
-use crate::observation::{Corner, View};
+use crate::estimate::Calibration;
+use crate::estimate::handeye::HandEye;
+use crate::estimate::handeye::joint::{Free, Noise, SmallSample, base_from_tip_by_joints, camera_from_target};
+use crate::estimate::uncertainty::quality;
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::targets::bent::{BoardPoints, BoardShape};
+use crate::targets::observation::{Corner, View};
 
 /// What of a calibration is needed to predict.
 #[derive(Debug, Clone)]
@@ -40,7 +40,7 @@ pub struct Uncertainty {
     /// What was estimated besides the links.
     pub free: Free,
     /// Covariance of everything that predictions share, as in
-    /// [`JointSolution::covariance`](crate::handeye::joint::JointSolution::covariance).
+    /// [`JointSolution::covariance`](crate::estimate::handeye::joint::JointSolution::covariance).
     pub covariance: DMatrix<f64>,
 }
 

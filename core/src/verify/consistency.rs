@@ -12,11 +12,11 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
 use super::{CaptureCheck, Predictor, Uncertainty};
-use crate::board_shape::BoardPoints;
-use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
-use crate::observation::View;
-use crate::se3;
+use crate::estimate::handeye::joint::chain::Chain;
+use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
+use crate::geometry::se3;
+use crate::targets::bent::BoardPoints;
+use crate::targets::observation::View;
 
 /// Quantile of the normal distribution at 99 %.
 const Z_99: f64 = 2.326;

@@ -7,14 +7,15 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::*;
-use crate::arm::{ArmKind, ArmModel};
-use crate::board_shape::BoardShape;
-use crate::calibrate::{self, Calibration, CameraKnowledge, Method, Observations, ObservedView, Options};
-use crate::camera::Intrinsics;
-use crate::handeye::joint::simulated::{BOARD, REALISTIC, Trial, camera, trial};
-use crate::handeye::joint::{Noise, SmallSample};
-use crate::handeye::{HandEye, Mode, quality};
+use crate::estimate::handeye::joint::simulated::{BOARD, REALISTIC, Trial, camera, trial};
+use crate::estimate::handeye::joint::{Noise, SmallSample};
+use crate::estimate::handeye::{HandEye, Mode};
+use crate::estimate::uncertainty::quality;
+use crate::estimate::{self, Calibration, CameraKnowledge, Method, Observations, ObservedView, Options};
+use crate::geometry::arm::{ArmKind, ArmModel};
+use crate::geometry::camera::Intrinsics;
 use crate::progress::CancelToken;
+use crate::targets::bent::BoardShape;
 
 /// A print that is so much larger than stated, as one that a printer "fits to the page".
 const SCALE: f64 = 1.024;
@@ -29,7 +30,7 @@ fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
 }
 
 fn solved(observations: &Observations, options: Options) -> Calibration {
-    calibrate::calibrate_with(observations, Method::Joint, options, &CancelToken::default()).expect("solves")
+    estimate::calibrate_with(observations, Method::Joint, options, &CancelToken::default()).expect("solves")
 }
 
 /// The corners of a trial as if its board had been printed larger, with the noise that they had.

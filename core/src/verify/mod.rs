@@ -11,17 +11,17 @@ mod points;
 
 use nalgebra::{Point3, Translation3, Vector3};
 
-use crate::board_shape::BoardPoints;
-use crate::calibrate::CornerResidual;
-use crate::camera::CameraError;
 use crate::depth::{DepthImage, DepthSample};
-use crate::frames::{Anchor, Base, Camera, Pose, Target, Tip};
-use crate::observation::{Corner, View};
-use crate::planar_pose::{self, PoseError};
+use crate::estimate::CornerResidual;
+use crate::geometry::camera::CameraError;
+use crate::geometry::frames::{Anchor, Base, Camera, Pose, Target, Tip};
+use crate::geometry::planar_pose::{self, PoseError};
+use crate::geometry::se3;
+use crate::geometry::statistics::median_high;
 use crate::progress::{Stage, Work};
-use crate::se3;
-use crate::statistics::median_high;
-use crate::target::TargetSpec;
+use crate::targets::TargetSpec;
+use crate::targets::bent::BoardPoints;
+use crate::targets::observation::{Corner, View};
 
 pub use calibrated::{Predictor, Uncertainty};
 pub use consistency::Consistency;

@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
 
 use super::{Predictor, VerifyError};
-use crate::camera::Intrinsics;
-use crate::frames::{Base, Camera, PointIn, Pose, Target, Tip};
-use crate::handeye::joint::SmallSample;
-use crate::handeye::quality;
+use crate::estimate::handeye::joint::SmallSample;
+use crate::estimate::uncertainty::quality;
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
 
 /// A point that the camera measured.
 #[derive(Debug, Clone, Copy)]

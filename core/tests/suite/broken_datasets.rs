@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use handeye_core::dataset::Dataset;
 use handeye_core::image::{ImageFormat, Rgb, RgbImage};
+use handeye_core::project::dataset::Dataset;
 
 const DESCRIPTION: &str = r#"mode = "eye_in_hand"
 [target]

@@ -9,11 +9,11 @@ mod faults;
 #[path = "../../examples/doctor_cases/sim.rs"]
 mod sim;
 
-use handeye_core::doctor::diagnose;
-use handeye_core::findings::{FindingCode, FindingOptions, Severity};
-use handeye_core::handeye::Mode;
-use handeye_core::handeye::closed_form;
-use handeye_core::planar_pose;
+use handeye_core::diagnose::doctor::diagnose;
+use handeye_core::diagnose::findings::{FindingCode, FindingOptions, Severity};
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::handeye::closed_form;
+use handeye_core::geometry::planar_pose;
 use handeye_core::progress::CancelToken;
 use handeye_core::wording::Catalogue;
 

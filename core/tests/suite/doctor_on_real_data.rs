@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use handeye_core::calibrate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
-use handeye_core::camera::Distortion;
-use handeye_core::dataset::Dataset;
-use handeye_core::doctor::{Diagnosis, diagnose};
-use handeye_core::findings::{FindingCode, FindingOptions, Severity};
-use handeye_core::observation::Corner;
+use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
+use handeye_core::diagnose::findings::{FindingCode, FindingOptions, Severity};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use handeye_core::geometry::camera::Distortion;
 use handeye_core::progress::CancelToken;
-use handeye_core::target::TargetSpec;
+use handeye_core::project::dataset::Dataset;
+use handeye_core::targets::TargetSpec;
+use handeye_core::targets::observation::Corner;
 use handeye_core::testing::data_folder;
 use nalgebra::{Point3, Vector2};
 

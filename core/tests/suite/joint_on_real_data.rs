@@ -4,13 +4,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use handeye_core::board_shape::{BoardPoints, BoardShape};
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::frames::{Anchor, Base, Mount, Pose, Target, Tip};
-use handeye_core::handeye::Mode;
-use handeye_core::handeye::joint::{JointProblem, JointSolution, JointStart, estimate};
-use handeye_core::observation::{Corner, View};
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::handeye::joint::{JointProblem, JointSolution, JointStart, estimate};
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::frames::{Anchor, Base, Mount, Pose, Target, Tip};
 use handeye_core::progress::CancelToken;
+use handeye_core::targets::bent::{BoardPoints, BoardShape};
+use handeye_core::targets::observation::{Corner, View};
 use handeye_core::testing::data_folder;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2};
 use serde_json::Value;
@@ -34,7 +34,7 @@ struct Set {
     points: Vec<Point3<f64>>,
     views: Vec<View>,
     start: JointStart,
-    reference: Pose<Mount, handeye_core::frames::Camera>,
+    reference: Pose<Mount, handeye_core::geometry::frames::Camera>,
     reference_sigma_mm: Vec<f64>,
 }
 
@@ -90,7 +90,7 @@ fn load(folder: &Path) -> Set {
     for view in json["views"].as_array().expect("views") {
         let name = view["image"].as_str().expect("image").to_owned();
         let base_from_tip: Pose<Base, Tip> = pose(&view["base_T_gripper"]);
-        let camera_from_target: Pose<handeye_core::frames::Camera, Target> = pose(&view["cam_T_target"]);
+        let camera_from_target: Pose<handeye_core::geometry::frames::Camera, Target> = pose(&view["cam_T_target"]);
         first.get_or_insert((base_from_tip, camera_from_target));
         let found = by_image.remove(&name).expect("corners of every view");
         views.push(View::new(name, base_from_tip, found));

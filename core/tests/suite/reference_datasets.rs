@@ -1,6 +1,6 @@
 //! The reader on recorded data sets, where they are at hand.
 
-use handeye_core::dataset::Dataset;
+use handeye_core::project::dataset::Dataset;
 use handeye_core::testing::data_folder;
 
 #[test]

@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use handeye_core::dataset::Dataset;
+use handeye_core::detect::{charuco_layout, detect};
+use handeye_core::geometry::planar_pose;
+use handeye_core::geometry::statistics::median;
 use handeye_core::image::GrayImage;
-use handeye_core::observation::Corner;
-use handeye_core::planar_pose;
-use handeye_core::statistics::median;
-use handeye_core::target::{AprilGrid, AprilTag, Charuco, IdOrder, Layout, TargetSpec};
+use handeye_core::project::dataset::Dataset;
+use handeye_core::targets::observation::Corner;
+use handeye_core::targets::{AprilGrid, AprilTag, Charuco, IdOrder, Layout, TargetSpec};
 use handeye_core::testing::data_folder;
-use handeye_core::vision::{charuco_layout, detect};
 use nalgebra::Vector2;
 
 fn load(path: &Path) -> GrayImage {
@@ -67,12 +67,12 @@ fn the_tag_of_the_eye_to_hand_set_is_found_in_all_views() {
     let folder = tempfile::tempdir().expect("a folder");
     described(&set, folder.path());
     let dataset = Dataset::read(folder.path()).unwrap_or_else(|e| panic!("{e}"));
-    let camera = handeye_core::camera::Intrinsics {
+    let camera = handeye_core::geometry::camera::Intrinsics {
         fx: 607.5931396484375,
         fy: 607.574951171875,
         cx: 323.46282958984375,
         cy: 243.2552947998047,
-        ..handeye_core::camera::Intrinsics::pinhole(640, 480, 600.0)
+        ..handeye_core::geometry::camera::Intrinsics::pinhole(640, 480, 600.0)
     };
     assert_eq!(dataset.entries.len(), 8);
     let (mut rms, mut apart) = (Vec::new(), Vec::new());
@@ -146,7 +146,7 @@ fn charuco_boards_of_others_are_found_whole() {
         // Both have an odd number of rows of squares, for which the layouts are one.
         assert_eq!(charuco_layout(&image, &board).expect("searches"), Some(Layout::New));
         // A flat board through a good lens: a homography explains its corners to a fraction of a pixel.
-        let camera = handeye_core::camera::Intrinsics::pinhole(640, 480, 600.0);
+        let camera = handeye_core::geometry::camera::Intrinsics::pinhole(640, 480, 600.0);
         let pose = planar_pose::solve(&corners, &TargetSpec::Charuco(board), &camera).expect("a pose");
         println!("{file}: {:.2} px RMS with a guessed camera", pose.best.rms_px);
         assert!(pose.best.rms_px < 3.0, "{file}: {}", pose.best.rms_px);

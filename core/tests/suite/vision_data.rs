@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use handeye_core::camera::Distortion;
+use handeye_core::detect::{DetectOptions, detect_with};
+use handeye_core::estimate::intrinsics::{Options, SeenView, solve};
+use handeye_core::geometry::camera::Distortion;
 use handeye_core::image::GrayImage;
-use handeye_core::intrinsics::{Options, SeenView, solve};
-use handeye_core::observation::Corner;
 use handeye_core::progress::CancelToken;
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::targets::observation::Corner;
+use handeye_core::targets::{Grid, TargetSpec};
 use handeye_core::testing::data_folder;
-use handeye_core::vision::{DetectOptions, detect_with};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
 //! Motions, jogs and stops of the arm against the real cell over a socket.
 
 use ciborium::Value;
-use handeye_core::frames::{Base, Camera, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use handeye_core::result::CalibrationResult;
+use handeye_core::project::result::CalibrationResult;
 use serde_json::Value;
 
 use crate::solved::{copy_of_session, handeye, text, utf8};

@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::dataset::write;
-use handeye_core::export::{self, CameraLink, ExportInput, ExportNames, ExportView};
-use handeye_core::frames::{Base, Pose, Target, Tip};
-use handeye_core::handeye::HandEye;
-use handeye_core::result::{CalibrationResult, IntrinsicsEstimate, Quality};
+use handeye_core::estimate::handeye::HandEye;
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
+use handeye_core::project::dataset::write;
+use handeye_core::project::export::{self, CameraLink, ExportInput, ExportNames, ExportView};
+use handeye_core::project::result::{CalibrationResult, IntrinsicsEstimate, Quality};
 use handeye_core::testing::python;
 use handeye_tests::{handeye_binary, workspace_root};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};

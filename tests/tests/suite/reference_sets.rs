@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::Command;
 
-use handeye_core::result::{CalibrationResult, ViewRecordStatus};
+use handeye_core::project::result::{CalibrationResult, ViewRecordStatus};
 use handeye_core::testing::data_folder;
 use handeye_tests::handeye_binary;
 

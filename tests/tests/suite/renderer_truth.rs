@@ -1,9 +1,9 @@
 //! Pictures of the cell against the analytic projection of what is in them, with the detector that users have.
 
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::image_file::gray_from_rgb;
-use handeye_core::target::{Grid, TargetSpec};
-use handeye_core::vision;
+use handeye_core::detect;
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::project::files::image_file::gray_from_rgb;
+use handeye_core::targets::{Grid, TargetSpec};
 use handeye_sim_link::cell::render::{BoardSurface, Imaging, Light, RenderScene, Renderer};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
@@ -55,7 +55,7 @@ fn measure(renderer: &Renderer, camera: &Intrinsics, view: usize) -> Errors {
         background: [0.4, 0.45, 0.5],
     };
     let frame = renderer.render(&scene, &Imaging::default(), view as u64);
-    let found = vision::detect(&gray_from_rgb(&frame.rgb), &TargetSpec::Chessboard(GRID))
+    let found = detect::detect(&gray_from_rgb(&frame.rgb), &TargetSpec::Chessboard(GRID))
         .expect("a picture")
         .unwrap_or_else(|| panic!("the board of view {view} is not found"));
     let mut worst_depth_m: f64 = 0.0;

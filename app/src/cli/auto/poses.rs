@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use handeye_core::poses_file::{Goal, TaughtPoses};
+use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_sim_link::cell::planning::{ViewOptions, ViewSetup, poses_looking_at};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::MotionLimits;

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use handeye_core::poses_file::Goal;
 use handeye_core::progress::CancelToken;
-use handeye_core::session::Store;
+use handeye_core::project::session::Store;
+use handeye_core::project::taught_poses::Goal;
 use handeye_sim_link::client::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{CallOptions, LinkError};
 

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use handeye_core::board_shape::BoardShape;
-use handeye_core::handeye::joint::SmallSample;
-use handeye_core::handeye::{HandEye, Mode};
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::{RESULT, Session};
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::estimate::handeye::joint::SmallSample;
+use handeye_core::estimate::handeye::{HandEye, Mode};
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::{RESULT, Session};
+use handeye_core::targets::bent::BoardShape;
+use handeye_core::targets::{Grid, TargetSpec};
 use handeye_core::verify::Predictor;
 
 use crate::cli::Failure;
@@ -28,7 +28,7 @@ pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
     let intrinsics = result
         .intrinsics
         .as_ref()
-        .and_then(handeye_core::result::IntrinsicsEstimate::intrinsics)
+        .and_then(handeye_core::project::result::IntrinsicsEstimate::intrinsics)
         .ok_or_else(|| unusable("intrinsics"))?;
     intrinsics.validate().map_err(Failure::unusable)?;
     let target = if is_session {

@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::Path;
 
 use anyhow::anyhow;
-use handeye_core::frames::{Base, Pose, Target};
+use handeye_core::geometry::frames::{Base, Pose, Target};
 use handeye_core::track::State;
 use serde_json::{Value, json};
 

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
-use handeye_core::frames::{Base, Pose, Tip};
-use handeye_core::image_file::gray_from_rgb;
-use handeye_core::poses_file::{Goal, TaughtPoses};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::geometry::statistics::median_high;
 use handeye_core::progress::CancelToken;
-use handeye_core::statistics::median_high;
+use handeye_core::project::files::image_file::gray_from_rgb;
+use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_core::track::{Estimate, Keep, Picture, Setup, State};
 use handeye_sim_link::client::cell::{
     Arm, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment, FollowWish as ArmWish,

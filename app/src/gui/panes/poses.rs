@@ -7,7 +7,7 @@ mod selecting;
 mod table;
 
 use egui::{Align, Button, DragValue, Frame, Layout, Margin, RichText, Spinner, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::session::CaptureId;
+use handeye_core::project::session::CaptureId;
 
 use super::live;
 use crate::command::{Command, Outbox};

@@ -15,7 +15,7 @@ mod legend;
 
 use egui::{Align, CornerRadius, Layout, PointerButton, Pos2, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2};
 use egui::{WidgetInfo, WidgetType};
-use handeye_core::session::CaptureId;
+use handeye_core::project::session::CaptureId;
 
 use super::parts;
 use crate::command::{Command, Outbox};

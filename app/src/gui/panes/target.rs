@@ -1,10 +1,10 @@
 //! What is looked at, where the camera sits, and what is known of it.
 
 use egui::{Align2, CornerRadius, DragValue, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::dataset::CameraInput;
-use handeye_core::handeye::Mode;
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::project::dataset::CameraInput;
+use handeye_core::targets::{Grid, TargetSpec};
 
 use super::{form, parts};
 use crate::command::{Command, Outbox};

@@ -6,7 +6,7 @@ mod planned;
 mod summary;
 
 use egui::{Button, Ui};
-use handeye_core::session::Role;
+use handeye_core::project::session::Role;
 
 use super::parts;
 use crate::command::{Command, Outbox};

@@ -1,12 +1,12 @@
 //! The live camera: where it is, what it sees, and the depths of that as points in the base.
 
-use handeye_core::camera::Intrinsics;
 use handeye_core::depth::{DepthImage, DepthSample};
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::codecs::jpeg::JpegEncoder;
 use handeye_core::image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use handeye_core::image::{ExtendedColorType, ImageEncoder as _, ImageError, RgbImage};
-use handeye_core::target::TargetSpec;
+use handeye_core::targets::TargetSpec;
 use nalgebra::Vector2;
 use rerun::{Color, EncodedDepthImage, EncodedImage, MediaType, Points3D, Radius};
 

@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::calibrate::CornerResidual;
-use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::{Camera, Pose, Target};
+use handeye_core::estimate::CornerResidual;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Camera, Pose, Target};
+use handeye_core::geometry::planar_pose;
 use handeye_core::image::RgbImage;
-use handeye_core::observation::Corner;
-use handeye_core::planar_pose;
-use handeye_core::session::{CaptureId, CaptureRecord, Document, Session, SessionError};
-use handeye_core::target::TargetSpec;
+use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Session, SessionError};
+use handeye_core::targets::TargetSpec;
+use handeye_core::targets::observation::Corner;
 use rerun::{Arrows2D, AsComponents, Color, EncodedImage, Points3D, Radius};
 
 use super::convert::{corner_marks, marks, no_lines, outline, pinhole, pixel, transform};

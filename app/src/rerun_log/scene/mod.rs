@@ -30,8 +30,8 @@ mod track;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::frames::{Base, Pose, Tip};
-use handeye_core::session::{CaptureId, Document};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::project::session::{CaptureId, Document};
 use handeye_sim_link::client::cell::JointAngles;
 use rerun::{RecordingStream, TextLog, TextLogLevel};
 

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use handeye_core::session::{CaptureId, Document};
+use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::track::{Estimate, State, Update};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use rerun::RecordingStreamBuilder;

@@ -1,6 +1,6 @@
 //! The board as it is tracked.
 
-use handeye_core::handeye::quality;
+use handeye_core::estimate::uncertainty::quality;
 use rerun::{Points3D, Radius};
 
 use super::camera::lens;

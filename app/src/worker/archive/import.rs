@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use handeye_core::dataset::{Dataset, DatasetError};
-use handeye_core::session::{Capture, Document, Role, SessionError, Store};
+use handeye_core::project::dataset::{Dataset, DatasetError};
+use handeye_core::project::session::{Capture, Document, Role, SessionError, Store};
 
 use super::{Archive, free_folder, timestamp_rfc3339};
 use crate::command::Event;

@@ -4,11 +4,11 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded, select};
-use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::{Base, Pose, Target, Tip};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
-use handeye_core::observation::Corner;
+use handeye_core::targets::observation::Corner;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths, GroundTruth};

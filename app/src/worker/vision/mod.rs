@@ -11,10 +11,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, SendTimeoutError, Sender, TryRecvError, never, select};
-use handeye_core::camera::Intrinsics;
+use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::image::GrayImage;
-use handeye_core::image_file::gray_from_rgb;
-use handeye_core::target::TargetSpec;
+use handeye_core::project::files::image_file::gray_from_rgb;
+use handeye_core::targets::TargetSpec;
 use handeye_core::track::{Picture, Setup};
 use handeye_sim_link::client::CancelToken;
 

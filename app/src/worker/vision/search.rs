@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use handeye_core::camera::Intrinsics;
+use handeye_core::detect::{DetectOptions, detect_with};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::planar_pose;
 use handeye_core::image::GrayImage;
-use handeye_core::planar_pose;
-use handeye_core::target::TargetSpec;
-use handeye_core::vision::{DetectOptions, detect_with};
+use handeye_core::targets::TargetSpec;
 
 use crate::model::{LiveDetection, LiveFrame};
 

@@ -1,9 +1,9 @@
-use handeye_core::camera::Intrinsics;
 use handeye_core::capture::Wait;
-use handeye_core::frames::Pose;
+use handeye_core::detect::VisionError;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::target::{Grid, TargetSpec};
-use handeye_core::vision::VisionError;
+use handeye_core::targets::{Grid, TargetSpec};
 
 use super::VisionTask;
 use super::bench::{Table, request};

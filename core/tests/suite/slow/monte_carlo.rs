@@ -13,8 +13,8 @@ mod small_sample;
 mod tally;
 
 use bound::Normals;
-use handeye_core::handeye::Mode;
-use handeye_core::handeye::joint::Noise;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::handeye::joint::Noise;
 use nalgebra::{DMatrix, Matrix6};
 use scene::{Cell, Trial};
 use small_sample::Correction;

@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use handeye_core::dataset::Dataset;
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::Pose;
-use handeye_core::handeye::Mode;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::session::{
+use handeye_core::project::dataset::Dataset;
+use handeye_core::project::session::{
     Capture, CaptureId, CaptureRecord, Document, Edit, History, Role, Session, SessionMeta, Store,
 };
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::targets::{Grid, TargetSpec};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -50,7 +50,7 @@ fn depth(id: CaptureId) -> DepthImage {
     DepthImage::new(64, 48, vec![id.0 as f32 / 3.0; 64 * 48]).expect("as many as pixels")
 }
 
-fn base_from_tip(id: CaptureId) -> Pose<handeye_core::frames::Base, handeye_core::frames::Tip> {
+fn base_from_tip(id: CaptureId) -> Pose<handeye_core::geometry::frames::Base, handeye_core::geometry::frames::Tip> {
     Pose::from_translation_xyzw([f64::from(id.0) / 3.0, 0.0, 0.0], [0.1, 0.2, 0.3, 0.9])
 }
 

@@ -321,7 +321,7 @@ fn polish(start: JointAngles, goal: &Isometry3<f64>) -> (JointAngles, f64) {
 /// Displacement and rotation vector from `actual` to `goal`, both in the axes of the arm.
 pub(super) fn pose_error(actual: &Isometry3<f64>, goal: &Isometry3<f64>) -> Vector6<f64> {
     let shift = goal.translation.vector - actual.translation.vector;
-    let turn = handeye_core::se3::rotation_vector(&(goal.rotation * actual.rotation.inverse()));
+    let turn = handeye_core::geometry::se3::rotation_vector(&(goal.rotation * actual.rotation.inverse()));
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 

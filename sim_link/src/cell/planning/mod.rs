@@ -2,9 +2,9 @@
 
 mod clearance;
 
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::target::TargetSpec;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::targets::TargetSpec;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

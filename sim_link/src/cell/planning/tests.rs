@@ -1,7 +1,7 @@
 use super::*;
 use crate::cell::motion::{JointMotion, MotionLimits, MotionState, Sync};
 use crate::cell::scene::Scene;
-use handeye_core::frames::PointIn;
+use handeye_core::geometry::frames::PointIn;
 
 fn setup(scene: &Scene) -> ViewSetup {
     ViewSetup::of(&scene.resolve(scene.seed).unwrap())

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Translation3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

@@ -9,12 +9,12 @@ mod fault;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use handeye_core::arm::{ArmError, ArmKind, ArmModel, JointView, place_checked};
-use handeye_core::dataset::{self, CameraInput, write};
-use handeye_core::frames::{Base, Pose, Tip};
-use handeye_core::handeye::Mode;
-use handeye_core::observation::{Corner, View};
-use handeye_core::target::TargetSpec;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::geometry::arm::{ArmError, ArmKind, ArmModel, JointView, place_checked};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::project::dataset::{self, CameraInput, write};
+use handeye_core::targets::TargetSpec;
+use handeye_core::targets::observation::{Corner, View};
 use nalgebra::{Point3, Vector2};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,7 @@
 use super::*;
-use handeye_core::arm::{ArmError, place};
-use handeye_core::dataset::Dataset;
-use handeye_core::se3;
+use handeye_core::geometry::arm::{ArmError, place};
+use handeye_core::geometry::se3;
+use handeye_core::project::dataset::Dataset;
 use nalgebra::Vector6;
 
 fn session(seed: u64, fault: Option<Fault>) -> RecordedSession {

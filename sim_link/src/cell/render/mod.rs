@@ -1,6 +1,6 @@
 //! Pictures of the cell: RGB and registered depth, computed on one CPU core without a graphics card.
 //!
-//! The lens is exact for every model of [`handeye_core::camera`], and so is the anti-aliasing of the board: a pixel
+//! The lens is exact for every model of [`handeye_core::geometry::camera`], and so is the anti-aliasing of the board: a pixel
 //! holds the integral of the printed pattern over its own area, so that a corner detector meets the truth and not
 //! the artefacts of a sampler. Every picture is a function of its arguments alone, seed included.
 //!

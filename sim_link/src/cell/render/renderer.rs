@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use handeye_core::camera::Intrinsics;
+use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::image::RgbImage;
 
 use super::rays::{Ray, RayTable, Tile};

@@ -1,6 +1,6 @@
 //! Bodies, order of depth, clipping, edges, and pictures as values.
 
-use handeye_core::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

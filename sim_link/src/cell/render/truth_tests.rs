@@ -1,6 +1,6 @@
 //! The picture of the board against the analytic projection, by measurements that share no code with the renderer.
 
-use handeye_core::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::image::RgbImage;
 use nalgebra::{Isometry3, Matrix2, Point3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};

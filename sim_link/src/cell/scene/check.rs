@@ -1,6 +1,6 @@
 //! Ranges of the numbers in a scene file.
 
-use handeye_core::camera::Intrinsics;
+use handeye_core::geometry::camera::Intrinsics;
 use nalgebra::Vector2;
 
 use super::Scene;

@@ -7,7 +7,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 
 use super::RobotSpec;
 use crate::cell::kinematics::{JointAngles, forward};
-use handeye_core::se3;
+use handeye_core::geometry::se3;
 
 /// First stream of random numbers that belongs to settled positions; the ones below are the scene's own.
 const FIRST_STREAM: u64 = 1 << 32;

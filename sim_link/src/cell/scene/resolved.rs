@@ -1,9 +1,9 @@
 //! The truth of one run of the cell.
 
 use crate::axes::sensor_from_camera;
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Base, Camera, Pose, Sensor, Target, Tip};
-use handeye_core::target::{Grid, TargetSpec};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
+use handeye_core::targets::{Grid, TargetSpec};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 use super::Scene;
@@ -108,7 +108,7 @@ pub(super) fn resolve(scene: &Scene, seed: u64) -> ResolvedScene {
     let Scene { seed: _, simulation, robot, camera, board, image, depth, light, solids } = scene;
     let tip_from_camera = camera_on_tip(camera, seed);
     let world_from_plane = board.plane.isometry()
-        * handeye_core::se3::exp(&gaussian(
+        * handeye_core::geometry::se3::exp(&gaussian(
             seed,
             BOARD_STREAM,
             board.random_offset_mm * 1e-3,

@@ -1,6 +1,6 @@
 //! What can be written into a scene file, with the defaults of the reference scene.
 
-use handeye_core::camera::Distortion;
+use handeye_core::geometry::camera::Distortion;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 

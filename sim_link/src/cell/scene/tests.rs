@@ -3,7 +3,7 @@ use crate::axes::sensor_from_camera;
 use crate::cell::kinematics::{forward, inverse_nearest};
 use crate::cell::motion::Course;
 use crate::cell::planning::ViewSetup;
-use handeye_core::frames::{Base, PointIn, Pose, Tip};
+use handeye_core::geometry::frames::{Base, PointIn, Pose, Tip};
 use nalgebra::{Point3, Vector2, Vector3};
 
 /// World poses of the tip that the public script drives to, `[x y z qx qy qz qw]`; it lists one of them twice.
@@ -199,7 +199,7 @@ fn a_seed_decides_everything_and_another_one_changes_everything() {
 fn the_truth_of_a_seed_is_pinned() {
     let camera = Scene::realistic().unwrap().resolve(1).unwrap().tip_from_camera;
     let nominal = reference().tip_from_camera;
-    let delta = handeye_core::se3::log((nominal.inverse() * camera).isometry());
+    let delta = handeye_core::geometry::se3::log((nominal.inverse() * camera).isometry());
     let pinned = [
         0.0007908064455675657,
         -0.004154311114395666,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use handeye_core::camera::Intrinsics;
+use handeye_core::geometry::camera::Intrinsics;
 use nalgebra::{Isometry3, Unit, Vector3};
 
 use super::message;

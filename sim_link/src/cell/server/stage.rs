@@ -207,7 +207,7 @@ impl Faults for CellFaults {
             }
         }
         if let Ok(tip) = tree.get_mut(self.tip) {
-            tip.displacement = handeye_core::se3::exp(&self.errors.settled(self.settled));
+            tip.displacement = handeye_core::geometry::se3::exp(&self.errors.settled(self.settled));
         }
         self.let_slip(tree);
     }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
-use handeye_core::frames::{Base, Pose, Target, Tip};
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 
 use super::hold::Hold;

@@ -5,7 +5,7 @@
 //! passes between; it still moves by one step of one pass then, because the way of several in one would be wild, and
 //! after a longer pause it starts anew from rest.
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Point3, Vector3};
 
 use super::follow_plan::{FollowPlan, moved};

@@ -5,8 +5,8 @@
 //! ranges of the joints and the workspace; otherwise less of the step is taken, in the worst case none, and the arm
 //! brakes. So whatever goals come, the limits hold from the first pass to the last, and the arm can always be stopped.
 
-use handeye_core::frames::{Base, Pose, Tip};
-use handeye_core::se3::rotation_vector;
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::geometry::se3::rotation_vector;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::follow::{FollowEnd, FollowGoal, FollowLimits};

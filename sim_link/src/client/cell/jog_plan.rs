@@ -1,7 +1,7 @@
 //! The points of a jog, one per pass: along a fixed path, within limits of speed and acceleration, to a stop before
 //! whatever is in the way. Nothing here knows a connection or a clock.
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::reach::ArmKinematics;

@@ -31,7 +31,7 @@ mod views;
 
 use std::sync::Arc;
 
-use handeye_core::camera::Intrinsics;
+use handeye_core::geometry::camera::Intrinsics;
 
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use board::{BoardMotion, BoardPath, UnknownPath};

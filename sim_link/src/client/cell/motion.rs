@@ -9,7 +9,7 @@
 
 use std::time::{Duration, Instant};
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
 use super::arm::{MotionTolerance, SettleOptions};

@@ -1,6 +1,6 @@
 //! Whether the arm of a scene is the one whose kinematics is built in, and what it can reach.
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Vector3};
 use serde::{Deserialize, Serialize};
 

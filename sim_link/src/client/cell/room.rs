@@ -5,7 +5,7 @@
 //! ends there. So a place is judged by the worst of all poses of the board within a reach: by the share of its limits that
 //! the tip can have there in every direction at once.
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::JointAngles;

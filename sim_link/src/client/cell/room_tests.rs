@@ -1,7 +1,7 @@
 use std::path::Path;
 
-use handeye_core::frames::Target;
-use handeye_core::poses_file::{Goal, TaughtPoses};
+use handeye_core::geometry::frames::Target;
+use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 
 use super::super::follow::FollowGoal;
 use super::super::follow_plan::FollowPlan;

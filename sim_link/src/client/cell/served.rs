@@ -7,7 +7,7 @@
 
 use std::time::Instant;
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
 use super::Arm;

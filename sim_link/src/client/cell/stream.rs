@@ -9,7 +9,7 @@
 
 use std::time::Instant;
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 
 use super::sentinel::Sentinel;
 use super::{Arm, JOINTS, JointAngles, read_joint_angles};

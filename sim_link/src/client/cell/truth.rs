@@ -1,8 +1,8 @@
 //! What a simulated cell says about itself, for comparison with what a calibration found.
 
 use ciborium::Value;
-use handeye_core::camera::{Distortion, Intrinsics};
-use handeye_core::frames::{Base, Camera, Pose, Sensor, Target, Tip};
+use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 
 use super::{CellInfo, CellObjects, JointAngles};
 use crate::axes::sensor_from_camera;

@@ -1,8 +1,8 @@
 //! Views of a board for the arm of a scene: what the planner of views has to know, from what a client knows.
 
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::target::TargetSpec;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::targets::TargetSpec;
 use nalgebra::{Isometry3, Translation3};
 
 use super::JointAngles;

@@ -1,8 +1,8 @@
 //! Vision sensors.
 
 use ciborium::Value;
-use handeye_core::camera::Intrinsics;
 use handeye_core::depth::DepthImage;
+use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::image::RgbImage;
 
 use super::{ObjectHandle, Sim};

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::Vector3;
 
 use super::*;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::Session;
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::Session;
 use handeye_core::testing::python;
 use handeye_tests::{handeye_binary, workspace_root};
 

@@ -4,8 +4,8 @@ use std::process::Command as Process;
 
 use handeye_app::command::Command;
 use handeye_app::model::{BoardMotion, BoardPath, CellSource, FollowStatus, FollowWish, Model};
-use handeye_core::frames::{Camera, Pose, Target};
-use handeye_core::session::CaptureId;
+use handeye_core::geometry::frames::{Camera, Pose, Target};
+use handeye_core::project::session::CaptureId;
 use handeye_core::track::State;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use handeye_app::command::Command;
 use handeye_app::model::{CellSource, Model, SolveStatus};
-use handeye_core::result::CalibrationResult;
-use handeye_core::session::Store;
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::Store;
 use handeye_sim_link::client::cell::{Arm, CellPaths, JointAngles};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::CellProcess;

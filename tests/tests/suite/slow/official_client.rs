@@ -3,7 +3,7 @@
 
 use std::process::Command;
 
-use handeye_core::result::CalibrationResult;
+use handeye_core::project::result::CalibrationResult;
 use handeye_core::testing::python;
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 

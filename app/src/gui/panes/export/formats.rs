@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use egui::{Align, Layout, Ui, WidgetInfo, WidgetType};
-use handeye_core::export::{self, Format};
+use handeye_core::project::export::{self, Format};
 
 use crate::command::{Command, Outbox};
 use crate::gui::panes::parts;

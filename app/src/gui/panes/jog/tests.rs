@@ -1,6 +1,6 @@
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::frames::Pose;
+use handeye_core::geometry::frames::Pose;
 
 use super::*;
 use crate::command::Command;

@@ -1,7 +1,7 @@
 //! A place to move to, in numbers.
 
 use egui::{Button, DragValue, Grid, Id, RichText, Ui, WidgetInfo, WidgetType};
-use handeye_core::frames::{Base, Pose, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::blocked::Blocked;

@@ -7,7 +7,7 @@ use egui::{
     UiBuilder, Vec2, WidgetInfo, WidgetType,
 };
 use handeye_core::capture::Wait;
-use handeye_core::session::CaptureId;
+use handeye_core::project::session::CaptureId;
 
 use super::{Shown, overlays};
 use crate::command::{Command, Outbox};

@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 use egui::{Align, CornerRadius, Layout, Pos2, Rect, Ui, UiBuilder, Vec2};
 use handeye_core::depth::DepthSample;
-use handeye_core::frames::{Base, Pose, Tip};
-use handeye_core::session::CaptureId;
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::project::session::CaptureId;
 
 use super::{colour_bar, empty};
 use crate::command::Outbox;

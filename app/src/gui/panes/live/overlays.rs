@@ -1,10 +1,10 @@
 //! What is drawn over the colour picture: corners, axes, the predicted board, coverage, residuals.
 
 use egui::{Color32, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
-use handeye_core::board_shape::{BoardPoints, BoardShape};
-use handeye_core::frames::{Camera, Pose, Target};
-use handeye_core::observation::Corner;
-use handeye_core::target::TargetSpec;
+use handeye_core::geometry::frames::{Camera, Pose, Target};
+use handeye_core::targets::TargetSpec;
+use handeye_core::targets::bent::{BoardPoints, BoardShape};
+use handeye_core::targets::observation::Corner;
 use nalgebra::{Point3, Vector2};
 
 use super::Shown;

@@ -1,9 +1,9 @@
 //! Lines in space as lines in the picture, curved where the lens bends them.
 
 use egui::{Pos2, Vec2};
-use handeye_core::camera::Intrinsics;
-use handeye_core::frames::{Camera, Pose, Target};
-use handeye_core::target::TargetSpec;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::frames::{Camera, Pose, Target};
+use handeye_core::targets::TargetSpec;
 use nalgebra::Point3;
 
 use super::picture::Place;

@@ -1,6 +1,6 @@
 //! What is remarkable about a capture, why, and what to do.
 
-use handeye_core::findings::FindingCode;
+use handeye_core::diagnose::findings::FindingCode;
 
 use crate::gui::captures::{CaptureRow, Detected};
 use crate::gui::theme::Tone;

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use handeye_core::session::{CaptureId, CaptureRecord};
+use handeye_core::project::session::{CaptureId, CaptureRecord};
 
 use super::columns::{Column, Sort, sorted};
 use super::*;

@@ -1,6 +1,6 @@
 //! The numbers behind a finding in one line.
 
-use handeye_core::findings::{Evidence, Finding};
+use handeye_core::diagnose::findings::{Evidence, Finding};
 
 use crate::gui::numbers;
 use crate::text::Language;

@@ -1,10 +1,10 @@
 //! Numbers of the pane that the result does not hold itself.
 
-use handeye_core::frames::{Camera, Mount, Pose};
-use handeye_core::handeye::Mode;
-use handeye_core::handeye::joint::SmallSample;
-use handeye_core::handeye::quality;
-use handeye_core::se3;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::handeye::joint::SmallSample;
+use handeye_core::estimate::uncertainty::quality;
+use handeye_core::geometry::frames::{Camera, Mount, Pose};
+use handeye_core::geometry::se3;
 use nalgebra::{Cholesky, Matrix3, Matrix6, Vector3};
 
 use crate::model::{Model, Solved};

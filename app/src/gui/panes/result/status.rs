@@ -1,7 +1,7 @@
 //! What the solver does, and what to do when it has no answer.
 
 use egui::{Button, RichText, Ui};
-use handeye_core::handeye::motion::MIN_VIEWS;
+use handeye_core::estimate::handeye::motion::MIN_VIEWS;
 use handeye_core::progress::Stage;
 
 use crate::command::{Command, Outbox};

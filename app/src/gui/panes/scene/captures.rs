@@ -1,7 +1,7 @@
 //! The captures in three dimensions: from where each was taken, in the colour of its residual.
 
 use egui::{Color32, Pos2, Stroke};
-use handeye_core::session::{CaptureId, CaptureRecord};
+use handeye_core::project::session::{CaptureId, CaptureRecord};
 use nalgebra::Point3;
 
 use super::board::{self, Line};

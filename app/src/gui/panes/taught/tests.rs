@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use egui::Key;
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::frames::Pose;
-use handeye_core::poses_file::{Goal, TaughtPose};
+use handeye_core::geometry::frames::Pose;
+use handeye_core::project::taught_poses::{Goal, TaughtPose};
 
 use super::*;
 use crate::command::Command;

@@ -1,6 +1,6 @@
 //! Why the board cannot be tracked or followed now.
 
-use handeye_core::handeye::Mode;
+use handeye_core::estimate::handeye::Mode;
 use handeye_core::track::State;
 
 use crate::model::{FollowStatus, Model, Motion, Simulation};

@@ -1,7 +1,7 @@
 //! Where the tracked board is in the base, by all pictures and by the newest alone.
 
 use egui::Ui;
-use handeye_core::frames::{Base, Pose, Target};
+use handeye_core::geometry::frames::{Base, Pose, Target};
 use handeye_core::track::{Estimate, Update};
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,8 +1,8 @@
 use std::sync::Arc;
 
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::frames::Pose;
-use handeye_core::handeye::HandEye;
+use handeye_core::estimate::handeye::HandEye;
+use handeye_core::geometry::frames::Pose;
 use handeye_core::track::State;
 
 use super::*;

@@ -1,7 +1,7 @@
 //! Every capture on its own.
 
 use egui::{Grid, RichText, Ui};
-use handeye_core::session::CaptureId;
+use handeye_core::project::session::CaptureId;
 use handeye_core::verify::{CaptureCheck, Verification};
 
 use crate::command::{Command, Outbox};

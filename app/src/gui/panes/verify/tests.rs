@@ -1,5 +1,5 @@
 use handeye_core::capture::Wait;
-use handeye_core::session::{CaptureId, Role};
+use handeye_core::project::session::{CaptureId, Role};
 use handeye_core::verify::VerifyError;
 use nalgebra::Vector2;
 use std::sync::Arc;

@@ -1,0 +1,125 @@
+//! The entry: an image and a target in, corners out.
+
+use image::GrayImage;
+
+use super::circles::asymmetric;
+use super::markers::{april, charuco};
+use super::order::Ordered;
+use super::{VisionError, checkerboard, circles};
+use crate::targets::observation::Corner;
+use crate::targets::{Grid, TargetSpec};
+
+/// An image with fewer pixels than this per point cannot show the target: squares of less than 3 px are not separated.
+const MIN_SQUARE_PX: u32 = 3;
+
+/// How long a detection may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Effort {
+    /// The quick methods, for every frame of a live stream: a miss costs a few times what a hit does.
+    Live,
+    /// Every method, for images that are kept: a miss may take some seconds per megapixel.
+    #[default]
+    Thorough,
+}
+
+/// Options of [`detect_with`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct DetectOptions {
+    /// How long it may take.
+    pub effort: Effort,
+}
+
+impl DetectOptions {
+    /// For every frame of a live stream.
+    pub fn live() -> Self {
+        Self { effort: Effort::Live }
+    }
+
+    /// For images that are kept.
+    pub fn thorough() -> Self {
+        Self { effort: Effort::Thorough }
+    }
+}
+
+/// [`detect_with`] with all effort.
+///
+/// # Errors
+/// As [`detect_with`].
+pub fn detect(image: &GrayImage, target: &TargetSpec) -> Result<Option<Vec<Corner>>, VisionError> {
+    detect_with(image, target, DetectOptions::default())
+}
+
+/// Finds the points of the target, to a few hundredths of a pixel; `None` when it is not in the image.
+///
+/// `Corner::index` is the number of the point in [`TargetSpec::points`], ascending; pixel (0, 0) is the centre of the
+/// top-left pixel. All points of chessboards and grids of dots are found, or none. Of `ChArUco` boards and boards of tags
+/// those in sight are, when they are at least four and not on a line, and the markers that tell them apart are two or
+/// more that lie as the target has them. The order is right-handed in the image, that is, the target's x × y points into
+/// the board, away from the camera, and is the same in every view:
+///
+/// - a chessboard begins at the end where the square between its first four corners is dark;
+/// - a grid of dots begins at the larger dot, where one of its corners has one;
+/// - markers and shifted rows of dots say by themselves where a target begins.
+///
+/// # Symmetric targets
+/// Where that leaves a choice ([`TargetSpec::is_symmetric`]: boards of even sum, plain grids of dots), the end is
+/// taken from which the x axis points most to the right in the image. The same board turned by more than a quarter
+/// turn between two views is then numbered from the other end, and no detector can know; views of such a target must
+/// be kept within a quarter turn around the optical axis. A symmetric board that is printed with light first squares
+/// at all ends is accepted and follows the same rule.
+///
+/// # Errors
+/// [`VisionError::TargetTooSmall`] for a chessboard or a grid of dots below 3 points a side, [`VisionError::BadTarget`]
+/// for markers that cannot be, [`VisionError::OtherLayout`] for a `ChArUco` board of the other layout than stated,
+/// [`VisionError::BadImage`], [`VisionError::OpenCv`].
+pub fn detect_with(
+    image: &GrayImage,
+    target: &TargetSpec,
+    options: DetectOptions,
+) -> Result<Option<Vec<Corner>>, VisionError> {
+    check(image, target)?;
+    let effort = options.effort;
+    match target {
+        TargetSpec::Chessboard(grid) if fits(image, grid) => {
+            Ok(checkerboard::find(image, grid, effort)?.as_ref().map(corners))
+        }
+        TargetSpec::Circles(grid) if fits(image, grid) => Ok(circles::find(image, grid, effort)?.as_ref().map(corners)),
+        TargetSpec::AsymmetricCircles(grid) if fits(image, grid) => asymmetric::find(image, grid, effort),
+        TargetSpec::Chessboard(_) | TargetSpec::Circles(_) | TargetSpec::AsymmetricCircles(_) => Ok(None),
+        TargetSpec::Charuco(board) => charuco::find(image, board, effort),
+        TargetSpec::AprilGrid(board) => april::find(image, board, effort),
+        TargetSpec::AprilTag(tag) => april::find(image, &tag.alone(), effort),
+    }
+}
+
+/// Whether there is something to search, and something to search for.
+pub(super) fn check(image: &GrayImage, target: &TargetSpec) -> Result<(), VisionError> {
+    match target {
+        TargetSpec::Chessboard(grid) | TargetSpec::Circles(grid) | TargetSpec::AsymmetricCircles(grid) => {
+            let Grid { columns, rows, .. } = *grid;
+            if columns < 3 || rows < 3 {
+                return Err(VisionError::TargetTooSmall { columns, rows });
+            }
+        }
+        TargetSpec::Charuco(_) | TargetSpec::AprilGrid(_) | TargetSpec::AprilTag(_) => target.check()?,
+    }
+    let (width, height) = image.dimensions();
+    if width == 0 || height == 0 {
+        return Err(VisionError::BadImage { width, height });
+    }
+    Ok(())
+}
+
+/// Whether the image has room for all points.
+fn fits(image: &GrayImage, grid: &Grid) -> bool {
+    let (width, height) = image.dimensions();
+    let (columns, rows) = (grid.columns, grid.rows);
+    columns.min(rows) < (width.min(height) / MIN_SQUARE_PX) as usize
+        && columns.max(rows) < (width.max(height) / MIN_SQUARE_PX * 2) as usize
+}
+
+fn corners(order: &Ordered) -> Vec<Corner> {
+    let all = order.points.iter().zip(&order.covariances_px2).enumerate();
+    all.map(|(index, (&px, &covariance_px2))| Corner { index, px, covariance_px2 }).collect()
+}

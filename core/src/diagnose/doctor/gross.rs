@@ -1,0 +1,219 @@
+//! Gross hypotheses: poses inverted or in another unit, quaternion order, camera elsewhere, pictures and poses out of step.
+//!
+//! Each is a change of the reported poses. Under each the closed forms are solved anew, and the distance between where
+//! the chain puts the board and where the camera saw it is compared: it is measured on the camera's side, in millimetres,
+//! so it means the same under all of them.
+
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
+
+use super::agreement::{Agreement, agreement, pairs_of};
+use super::views::SessionViews;
+use crate::diagnose::findings::FindingCode;
+use crate::estimate::handeye::{HandEyeError, subset};
+use crate::geometry::frames::{Base, Pose, Tip};
+use crate::progress::Work;
+
+/// Views that are looked at: enough for any gross fault.
+const MOST_VIEWS: usize = 24;
+/// Least views: with three any hypothesis fits half of them.
+pub(super) const NEED: usize = 4;
+/// A misfit below this part of the board's distance is no gross fault.
+const SOUND: f64 = 0.01;
+/// A hypothesis that explains the poses leaves less than this part of the board's distance.
+const EXPLAINED: f64 = 0.05;
+/// And so many times less than the poses as they are.
+pub(super) const TIMES: f64 = 3.0;
+/// Hypotheses within this factor of the best count as equal; the simplest of them is taken.
+const TIE: f64 = 1.5;
+
+/// How the numbers of a quaternion were mixed up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    /// The file has w x y z and was read as x y z w.
+    WFirst,
+    /// The file has x y z w and was read as w x y z.
+    WLast,
+}
+
+/// A change of the reported poses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Change {
+    inverted: bool,
+    order: Option<Order>,
+    /// The quaternion was mixed up before the pose was inverted on reading.
+    order_in_inverse: bool,
+    /// Factor on all lengths.
+    pub unit: f64,
+    /// Every picture belongs to the pose so many rows further.
+    pub shift: isize,
+}
+
+impl Change {
+    pub const NONE: Self = Self { inverted: false, order: None, order_in_inverse: false, unit: 1.0, shift: 0 };
+
+    /// Number of things changed.
+    fn count(&self) -> usize {
+        usize::from(self.inverted)
+            + usize::from(self.order.is_some())
+            + usize::from(self.unit != 1.0)
+            + usize::from(self.shift != 0)
+    }
+
+    /// What is said of the poses, the gravest first.
+    pub fn codes(&self) -> Vec<FindingCode> {
+        let mut codes = Vec::new();
+        if self.inverted {
+            codes.push(FindingCode::InvertedPoses);
+        }
+        if self.order.is_some() {
+            codes.push(FindingCode::WrongQuaternionOrder);
+        }
+        if self.unit != 1.0 {
+            codes.push(FindingCode::WrongLengthUnit);
+        }
+        if self.shift != 0 {
+            codes.push(FindingCode::ShiftedPoses);
+        }
+        codes
+    }
+
+    pub fn w_first(&self) -> bool {
+        self.order == Some(Order::WFirst)
+    }
+
+    fn of_pose(&self, pose: &Pose<Base, Tip>) -> Pose<Base, Tip> {
+        let mut pose = *pose.isometry();
+        if let Some(order) = self.order {
+            if self.order_in_inverse {
+                pose = reordered(&pose.inverse(), order).inverse();
+            } else {
+                pose = reordered(&pose, order);
+            }
+        }
+        pose.translation.vector *= self.unit;
+        Pose::from_isometry(if self.inverted { pose.inverse() } else { pose })
+    }
+}
+
+/// Undoes a wrong order of the quaternion's numbers.
+fn reordered(pose: &Isometry3<f64>, order: Order) -> Isometry3<f64> {
+    let q = pose.rotation.coords;
+    // `coords` are x y z w; `Quaternion::new` takes w first.
+    let q = match order {
+        Order::WFirst => Quaternion::new(q.x, q.y, q.z, q.w),
+        Order::WLast => Quaternion::new(q.z, q.w, q.x, q.y),
+    };
+    Isometry3::from_parts(pose.translation, UnitQuaternion::from_quaternion(q))
+}
+
+/// Every change that is tried.
+pub(super) fn changes() -> Vec<Change> {
+    let mut all = Vec::new();
+    let orders = [
+        (None, false),
+        (Some(Order::WFirst), false),
+        (Some(Order::WLast), false),
+        (Some(Order::WFirst), true),
+        (Some(Order::WLast), true),
+    ];
+    for unit in [1.0, 1e-3, 1e3] {
+        for inverted in [false, true] {
+            for (order, order_in_inverse) in orders {
+                all.push(Change { inverted, order, order_in_inverse, unit, shift: 0 });
+            }
+        }
+    }
+    all.extend([-1, 1].map(|shift| Change { shift, ..Change::NONE }));
+    all.retain(|c| *c != Change::NONE);
+    all.sort_by_key(Change::count);
+    all
+}
+
+/// A change and what it leaves.
+pub(super) struct Tried {
+    pub change: Change,
+    pub agreement: Agreement,
+}
+
+/// What was tried.
+pub(super) struct Gross {
+    /// The poses as they are.
+    pub as_given: Result<Agreement, HandEyeError>,
+    /// The changes, the best first.
+    pub tried: Vec<Tried>,
+    /// Whether the first of them explains the data and the poses as they are do not.
+    pub accused: bool,
+    /// Views looked at.
+    pub views: usize,
+}
+
+/// Tries everything. `None` when it was cancelled.
+pub(super) fn gross(sight: &SessionViews, work: &Work<'_>) -> Option<Gross> {
+    let as_given = solve(sight, &Change::NONE, true);
+    let given_m = as_given.as_ref().map_or(f64::INFINITY, |a| a.median_m);
+    let sound = given_m < SOUND * sight.distance_m;
+    let mut tried = Vec::new();
+    for change in changes() {
+        if work.is_cancelled() {
+            return None;
+        }
+        if let Ok(agreement) = solve(sight, &change, !sound) {
+            tried.push(Tried { change, agreement });
+        }
+    }
+    tried.sort_by(|a, b| a.agreement.median_m.total_cmp(&b.agreement.median_m));
+    if let Some(best_m) = tried.first().map(|t| t.agreement.median_m) {
+        let near = tried.iter().take_while(|t| t.agreement.median_m <= TIE * best_m).count();
+        tried[..near].sort_by_key(|t| t.change.count());
+    }
+    let views = sight.views.len();
+    let accused = views >= NEED
+        && !sound
+        && tried.first().is_some_and(|t| {
+            let best_m = t.agreement.median_m;
+            best_m < EXPLAINED * sight.distance_m && TIMES * best_m < given_m
+        });
+    Some(Gross { as_given, tried, accused, views })
+}
+
+/// The views with a changed robot pose, and what they agree on.
+fn solve(sight: &SessionViews, change: &Change, thorough: bool) -> Result<Agreement, HandEyeError> {
+    let count = sight.views.len();
+    let pose_of = |i: usize| {
+        let from = i.checked_add_signed(change.shift).filter(|j| *j < count)?;
+        Some(change.of_pose(&sight.views[from].base_from_tip))
+    };
+    let all: Vec<Pose<Base, Tip>> = (0..count).map(|i| pose_of(i).unwrap_or_else(Pose::identity)).collect();
+    let pairs = pairs_of(sight, &all);
+    let most = if *change == Change::NONE { usize::MAX } else { MOST_VIEWS };
+    let chosen: Vec<_> = subset::spread(count, most).into_iter().filter(|i| pose_of(*i).is_some()).collect();
+    let chosen: Vec<_> = chosen.into_iter().map(|i| pairs[i]).collect();
+    agreement(sight, &chosen, thorough)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector6;
+
+    use super::*;
+    use crate::geometry::se3;
+
+    #[test]
+    fn a_mixed_up_quaternion_is_put_right_in_both_orders() {
+        let truth = se3::exp(&Vector6::new(0.3, -0.2, 0.5, 0.7, -0.4, 0.2));
+        let q = truth.rotation.coords;
+        let read_w_first = Quaternion::new(q.z, q.w, q.x, q.y);
+        let read_w_last = Quaternion::new(q.x, q.y, q.z, q.w);
+        for (order, read) in [(Order::WFirst, read_w_first), (Order::WLast, read_w_last)] {
+            let wrong = Isometry3::from_parts(truth.translation, UnitQuaternion::from_quaternion(read));
+            assert!(reordered(&wrong, order).rotation.angle_to(&truth.rotation) < 1e-12, "{order:?}");
+        }
+    }
+
+    #[test]
+    fn the_changes_are_all_different_and_the_simple_ones_come_first() {
+        let all = changes();
+        assert_eq!(all.len(), 31);
+        assert!(all.windows(2).all(|w| w[0].count() <= w[1].count()));
+    }
+}

@@ -1,0 +1,235 @@
+//! One hypothesis judged: fitted with noise levels of its own, tested, and asked to predict views left out.
+
+use nalgebra::{DVector, Matrix6, Vector6};
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+
+use super::effect::Effect;
+use super::model::{Fit, Model, State, inverse};
+use super::views::SessionViews;
+
+/// Probability of a false alarm per hypothesis, after allowance for the alternatives among which the best was picked.
+/// One in ten thousand, because noise of real robots has longer tails than a Gaussian.
+const ALPHA: f64 = 1e-4;
+/// Parts that views are left out in, one at a time; as for the held-out error of a calibration.
+const FOLDS: usize = 5;
+/// An offset of a joint must predict held-out views better by this part: an arm has many ways to be wrong, and one more
+/// number always fits a little of them.
+const HELD_OUT_GAIN: f64 = 0.02;
+/// Two explanations count as equally good when the noise that they leave the robot, position times orientation, differs by
+/// less than this factor: it is known to a quarter or so in a session of ten views.
+const AS_GOOD: f64 = 1.5;
+/// Size below which a hypothesis, however certain, is left alone: a print is true to a few parts in a thousand.
+const LEAST_SCALE: f64 = 3e-3;
+/// Deflection over the length of the board: a sheet on a flat plate keeps below it.
+const LEAST_WARP: f64 = 2e-3;
+/// Relative error of a focal length.
+const LEAST_FOCAL: f64 = 3e-3;
+/// Displacement of the board or the camera, metres at the board: as far as a taped sheet creeps.
+const LEAST_MOVED_M: f64 = 2e-4;
+/// Zero of a joint, radians: two hundredths of a degree, about what controllers are calibrated to.
+const LEAST_JOINT_RAD: f64 = 3.5e-4;
+
+/// What is tested.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Candidate {
+    Effect(Effect),
+    /// These views contradict the others.
+    Views(Vec<usize>),
+}
+
+/// A hypothesis and what it does.
+pub(super) struct Judged {
+    pub candidate: Candidate,
+    /// Its numbers, and one standard deviation of each; empty for views.
+    pub numbers: Vec<f64>,
+    pub sigma: Vec<f64>,
+    /// Logarithm of how many times better it explains the data.
+    pub gain: f64,
+    pub score: f64,
+    pub significant: bool,
+    pub matters: bool,
+    /// Whether it stands beside the one that was taken in first: the robot's poses cannot tell the two apart.
+    pub as_good: bool,
+    /// Prediction of held-out views without and with it.
+    pub held_out: Option<(HeldOut, HeldOut)>,
+    /// Noise of the robot without and with it.
+    pub robot: [(f64, f64); 2],
+    pub fit: Fit,
+    pub state: State,
+}
+
+/// How views left out of a fit are predicted.
+#[derive(Clone, Copy)]
+pub(super) struct HeldOut {
+    /// Displacement of the board, RMS, metres.
+    pub rms_m: f64,
+    /// Logarithm of the predictive likelihood, but for a constant.
+    score: f64,
+}
+
+impl Judged {
+    /// Whether it is to be taken in.
+    pub fn holds(&self) -> bool {
+        let held_out = match (&self.candidate, self.held_out) {
+            // Corners say it themselves, each of hundreds; views are left out, not modelled.
+            (Candidate::Effect(Effect::Warp | Effect::Lens) | Candidate::Views(_), _) => true,
+            (Candidate::Effect(_), None) => false,
+            (Candidate::Effect(Effect::Joint(_)), Some((without, with))) => {
+                with.score > without.score && with.rms_m < (1.0 - HELD_OUT_GAIN) * without.rms_m
+            }
+            (Candidate::Effect(_), Some((without, with))) => with.score > without.score,
+        };
+        self.significant && self.matters && held_out
+    }
+
+    /// Whether it leaves the robot about as little noise as another hypothesis of another kind does.
+    pub fn explains_as_much_as(&self, other: &Self) -> bool {
+        let effects = |j: &Self| matches!(j.candidate, Candidate::Effect(_));
+        let left = |j: &Self| j.robot[0].1 * j.robot[1].1;
+        effects(self) && effects(other) && self.significant && self.matters && left(self) < AS_GOOD * left(other)
+    }
+}
+
+/// Logarithm of the number of alternatives among which the best was picked.
+pub(super) fn alternatives(model: &Model<'_>, effect: Effect) -> f64 {
+    let views = model.sight.views.len() as f64;
+    match effect {
+        Effect::BoardMoved(_) | Effect::CameraMoved(_) => views.ln(),
+        Effect::Joint(_) => (joints(model.sight).max(1) as f64).ln(),
+        _ => 0.0,
+    }
+}
+
+/// Joints that are known in every view.
+pub(super) fn joints(sight: &SessionViews) -> usize {
+    sight.views.iter().map(|v| v.tip_by_joint.len()).min().unwrap_or(0)
+}
+
+pub(super) fn is_significant(wald: f64, numbers: usize, freedom: f64, ln_alternatives: f64) -> bool {
+    let Ok(distribution) = FisherSnedecor::new(numbers as f64, freedom) else { return false };
+    let statistic = wald / numbers as f64;
+    statistic.is_finite() && distribution.sf(statistic) * ln_alternatives.exp() < ALPHA
+}
+
+pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: Candidate) -> Option<Judged> {
+    let mut next = state.clone();
+    let lens = model.sight.lens_count();
+    match &candidate {
+        Candidate::Effect(effect) => next.effects.push(*effect),
+        Candidate::Views(views) => next.aside.extend(views),
+    }
+    let fit = model.fit(&next, before.robot)?;
+    let (wald, count, numbers, sigma, ln_alternatives);
+    match &candidate {
+        Candidate::Effect(effect) => {
+            count = effect.numbers(lens);
+            let at = fit.width() - count;
+            wald = fit.wald(at, count)?;
+            numbers = fit.theta.rows(at, count).iter().copied().collect();
+            sigma = (at..at + count).map(|i| fit.covariance[(i, i)].max(0.0).sqrt()).collect();
+            ln_alternatives = alternatives(model, *effect);
+        }
+        Candidate::Views(views) => {
+            count = 6 * views.len();
+            wald = fit.wald_of_views(views)?;
+            (numbers, sigma) = (Vec::new(), Vec::new());
+            ln_alternatives = ln_choose(model.sight.views.len(), views.len());
+        }
+    }
+    let freedom = fit.freedom();
+    let gain = 0.5 * freedom * (wald / freedom).ln_1p();
+    let held_out = match &candidate {
+        Candidate::Effect(_) => predicted(model, &next, before).zip(predicted(model, &next, &fit)),
+        Candidate::Views(_) => None,
+    };
+    let level = |k: usize| (before.robot[k].sqrt(), fit.robot[k].sqrt());
+    let mut judged = Judged {
+        numbers,
+        sigma,
+        gain,
+        // As in the Bayesian information criterion.
+        score: gain - 0.5 * count as f64 * (6.0 * fit.views as f64).ln() - ln_alternatives,
+        significant: is_significant(wald, count, freedom, ln_alternatives),
+        matters: false,
+        as_good: false,
+        held_out,
+        robot: [level(0), level(1)],
+        fit,
+        state: next,
+        candidate,
+    };
+    judged.matters = matters(model, &judged);
+    Some(judged)
+}
+
+fn ln_choose(n: usize, k: usize) -> f64 {
+    (0..k).map(|i| ((n - i) as f64 / (k - i) as f64).ln()).sum()
+}
+
+fn matters(model: &Model<'_>, judged: &Judged) -> bool {
+    let Candidate::Effect(effect) = &judged.candidate else { return true };
+    let size = judged.numbers.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    match effect {
+        Effect::Scale => size >= LEAST_SCALE,
+        Effect::Joint(_) => size >= LEAST_JOINT_RAD,
+        Effect::Warp => {
+            let [a, b, c, _] = model.sight.outer;
+            size >= LEAST_WARP * (b - a).norm().max((c - a).norm())
+        }
+        Effect::Lens => model.sight.intrinsics.is_some_and(|camera| {
+            let off = |k: usize, f: f64| judged.numbers.get(k).is_some_and(|v| v.abs() >= LEAST_FOCAL * f);
+            off(0, camera.fx) || off(1, camera.fy) || off(2, camera.fx) || off(3, camera.fy)
+        }),
+        Effect::BoardMoved(_) | Effect::CameraMoved(_) => moved_m(model, *effect, &judged.numbers) >= LEAST_MOVED_M,
+    }
+}
+
+/// How far a move displaces the board in the picture, RMS over its points and the views after it, metres.
+pub(super) fn moved_m(model: &Model<'_>, effect: Effect, numbers: &[f64]) -> f64 {
+    let numbers = DVector::from_column_slice(numbers);
+    let count = model.rows.len();
+    let from = match effect {
+        Effect::BoardMoved(from) | Effect::CameraMoved(from) => from,
+        _ => 0,
+    };
+    let squares: f64 = (from..count)
+        .map(|i| {
+            let shift = effect.columns(model, i) * &numbers;
+            let shift = Vector6::from_iterator(shift.iter().copied());
+            model.displacement_m(&shift).powi(2)
+        })
+        .sum();
+    (squares / (count - from).max(1) as f64).sqrt()
+}
+
+/// Views left out of the fit, a fifth at a time. The noise levels stay.
+fn predicted(model: &Model<'_>, with: &State, fit: &Fit) -> Option<HeldOut> {
+    let inside: Vec<usize> = (0..model.rows.len()).filter(|i| !with.aside.contains(i)).collect();
+    let normal = inverse(&fit.covariance)?;
+    let right = &normal * &fit.theta;
+    let (mut squares, mut score) = (0.0, 0.0);
+    for fold in 0..FOLDS.min(inside.len()) {
+        let held: Vec<usize> = inside.iter().copied().skip(fold).step_by(FOLDS).collect();
+        let (mut n, mut b) = (normal.clone(), right.clone());
+        for &i in &held {
+            let weighted = fit.weights[i] * &fit.designs[i];
+            n.gemm_tr(-1.0, &fit.designs[i], &weighted, 1.0);
+            b.gemv_tr(1.0, &weighted, &model.rows[i].error, 1.0);
+        }
+        let covariance = inverse(&n)?;
+        let theta = &covariance * b;
+        for &i in &held {
+            let design = &fit.designs[i];
+            let by_unknowns = design * &theta;
+            let residual = model.rows[i].error + Vector6::from_iterator(by_unknowns.iter().copied());
+            squares += model.displacement_m(&residual).powi(2);
+            let shared = design * &covariance * design.transpose();
+            let own = fit.weights[i].try_inverse()? + Matrix6::from_iterator(shared.iter().copied());
+            // Half the logarithm of the determinant is that of the product of the pivots.
+            let cholesky = own.cholesky()?;
+            score -= cholesky.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+            score -= 0.5 * residual.dot(&cholesky.solve(&residual));
+        }
+    }
+    Some(HeldOut { rms_m: (squares / inside.len() as f64).sqrt(), score })
+}

@@ -1,0 +1,335 @@
+//! The linear Gaussian model of pose pairs, and what hypotheses do in it.
+//!
+//! For view `i` let `e_i = log(C_i⁻¹ · chain_i)`, the target's pose by the chain against the one seen, both at a
+//! solution that is nearly right. To first order
+//!
+//! `r_i = e_i + A_i x + y + B_i f + Σ h_i θ_h`,  `r_i ~ N(0, Σ_i + robot_m² Q_i^t + robot_rad² Q_i^r)`
+//!
+//! with `x`, `y` the corrections of hand-eye and target, `f` those of lens and warp (with the information that the
+//! corners hold on them apart from the poses), `Σ_i` the covariance of the seen pose by corner noise, `Q_i = D_i D_iᵀ`
+//! the robot's noise brought into the target's frame, and `h_i` the column of a hypothesis. The noise levels are found
+//! by Fisher scoring on the restricted likelihood, under every hypothesis anew. A hypothesis with `q` numbers is judged
+//! by Wald's statistic `W = θᵀ Cov(θ)⁻¹ θ` against the F distribution.
+//!
+//! Reference: Patterson & Thompson 1971 (restricted likelihood); Cook & Weisberg 1982 (deletion of cases).
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use super::effect::Effect;
+use super::views::SessionViews;
+use crate::estimate::handeye::closed_form::ClosedFormSolution;
+use crate::estimate::handeye::joint::chain::Chain;
+use crate::geometry::se3;
+
+/// Smallest noise level of the robot, m and rad: below it nothing changes any more.
+const LEAST: f64 = 1e-6;
+/// Largest change of a variance in one step, as a logarithm.
+const LARGEST_STEP: f64 = 2.0;
+const MAX_STEPS: usize = 25;
+/// Relative change of both variances that ends the search.
+const SETTLED: f64 = 1e-2;
+
+/// One view in the linear model.
+pub(super) struct Row {
+    pub error: Vector6<f64>,
+    pub by_hand_eye: Matrix6<f64>,
+    pub by_robot: Matrix6<f64>,
+    camera: Matrix6<f64>,
+    robot: [Matrix6<f64>; 2],
+}
+
+/// All views at a solution.
+pub(super) struct Model<'a> {
+    pub sight: &'a SessionViews,
+    pub solution: ClosedFormSolution,
+    pub rows: Vec<Row>,
+}
+
+/// Which views and effects are in a fit.
+#[derive(Clone, Default)]
+pub(super) struct State {
+    pub effects: Vec<Effect>,
+    /// Views set aside.
+    pub aside: Vec<usize>,
+}
+
+/// The result of a fit.
+pub(super) struct Fit {
+    /// `[x (6), y (6), lens if free, numbers of the effects…]`
+    pub theta: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+    /// Variances of the robot's position and orientation per axis.
+    pub robot: [f64; 2],
+    /// Residual of every view, those aside included.
+    pub residuals: Vec<Vector6<f64>>,
+    pub weights: Vec<Matrix6<f64>>,
+    /// Columns per view.
+    pub designs: Vec<DMatrix<f64>>,
+    /// Views in the fit.
+    pub views: usize,
+}
+
+impl<'a> Model<'a> {
+    pub fn new(sight: &'a SessionViews, solution: ClosedFormSolution) -> Self {
+        let rows = sight
+            .views
+            .iter()
+            .map(|view| {
+                let chain = Chain::new(
+                    sight.mode,
+                    &view.base_from_tip,
+                    &Vector6::zeros(),
+                    &solution.mount_from_camera,
+                    &solution.anchor_from_target,
+                );
+                let seen = nearer(sight, view, &chain.camera_from_target);
+                let (t, r) = (chain.by_correction.fixed_columns::<3>(0), chain.by_correction.fixed_columns::<3>(3));
+                Row {
+                    error: se3::log(&(seen.inverse() * chain.camera_from_target)),
+                    by_hand_eye: chain.by_hand_eye,
+                    by_robot: chain.by_correction,
+                    camera: view.covariance,
+                    robot: [t * t.transpose(), r * r.transpose()],
+                }
+            })
+            .collect();
+        Self { sight, solution, rows }
+    }
+
+    /// The same views at the solution that a fit found.
+    pub fn moved(&self, fit: &Fit) -> Self {
+        let step = |at: usize| Vector6::from_iterator(fit.theta.rows(at, 6).iter().copied());
+        let solution = ClosedFormSolution {
+            mount_from_camera: self.solution.mount_from_camera.perturbed(&step(0)),
+            anchor_from_target: self.solution.anchor_from_target.perturbed(&step(6)),
+        };
+        Self::new(self.sight, solution)
+    }
+
+    /// Mean squared displacement of the board by a residual, as a length, metres.
+    pub fn displacement_m(&self, residual: &Vector6<f64>) -> f64 {
+        (residual.transpose() * self.sight.displacement * residual)[0].max(0.0).sqrt()
+    }
+
+    /// First column of the effects.
+    pub fn effects_at(&self) -> usize {
+        12 + if self.sight.lens_free { self.sight.lens_count() } else { 0 }
+    }
+
+    fn design(&self, index: usize, state: &State, width: usize) -> DMatrix<f64> {
+        let (row, view) = (&self.rows[index], &self.sight.views[index]);
+        let mut design = DMatrix::zeros(6, width);
+        design.view_mut((0, 0), (6, 6)).copy_from(&row.by_hand_eye);
+        design.view_mut((0, 6), (6, 6)).fill_with_identity();
+        let mut at = 12;
+        if self.sight.lens_free {
+            let lens = self.sight.lens_count();
+            design.view_mut((0, at), (6, lens)).copy_from(&view.by_form.columns(0, lens));
+            at += lens;
+        }
+        for effect in &state.effects {
+            let columns = effect.columns(self, index);
+            design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
+            at += columns.ncols();
+        }
+        design
+    }
+
+    fn width(&self, state: &State) -> usize {
+        self.effects_at() + state.effects.iter().map(|e| e.numbers(self.sight.lens_count())).sum::<usize>()
+    }
+
+    /// Places of the form's columns among the unknowns.
+    fn form_places(&self, state: &State) -> Vec<(usize, usize)> {
+        let lens = self.sight.lens_count();
+        let mut places: Vec<(usize, usize)> =
+            if self.sight.lens_free { (0..lens).map(|i| (12 + i, i)).collect() } else { Vec::new() };
+        let mut at = self.effects_at();
+        for effect in &state.effects {
+            places.extend(effect.form_columns(lens).into_iter().enumerate().map(|(k, i)| (at + k, i)));
+            at += effect.numbers(lens);
+        }
+        places
+    }
+
+    /// Adds what the corners say of lens and warp apart from the poses.
+    fn add_form(&self, state: &State, normal: &mut DMatrix<f64>, right: &mut DVector<f64>) {
+        let places = self.form_places(state);
+        for &(i, a) in &places {
+            right[i] -= self.sight.form_gradient[a];
+            for &(j, b) in &places {
+                normal[(i, j)] += self.sight.form_information[(a, b)];
+            }
+        }
+    }
+
+    /// Noise levels and unknowns of a state. `None` when the views leave something open.
+    pub fn fit(&self, state: &State, start: [f64; 2]) -> Option<Fit> {
+        let width = self.width(state);
+        let inside: Vec<usize> = (0..self.rows.len()).filter(|i| !state.aside.contains(i)).collect();
+        if 6 * inside.len() <= width {
+            return None;
+        }
+        let designs: Vec<DMatrix<f64>> = (0..self.rows.len()).map(|i| self.design(i, state, width)).collect();
+        let mut robot = start.map(|v| v.max(LEAST * LEAST));
+        for step in 0..=MAX_STEPS {
+            let solved = self.solve(state, &inside, &designs, robot)?;
+            if step == MAX_STEPS {
+                return Some(self.finished(solved, robot, designs, &inside));
+            }
+            let change = self.scoring(&inside, &designs, &solved, robot);
+            if change.iter().zip(&robot).all(|(c, v)| c.abs() < SETTLED || (*c < 0.0 && *v <= LEAST * LEAST)) {
+                return Some(self.finished(solved, robot, designs, &inside));
+            }
+            for (v, c) in robot.iter_mut().zip(change) {
+                *v = (*v * c.exp()).max(LEAST * LEAST);
+            }
+        }
+        None
+    }
+
+    fn weight(&self, index: usize, robot: [f64; 2]) -> Option<Matrix6<f64>> {
+        let row = &self.rows[index];
+        (row.camera + row.robot[0] * robot[0] + row.robot[1] * robot[1]).try_inverse()
+    }
+
+    fn solve(&self, state: &State, inside: &[usize], designs: &[DMatrix<f64>], robot: [f64; 2]) -> Option<Solution> {
+        let width = designs.first()?.ncols();
+        let weights: Vec<Matrix6<f64>> = (0..self.rows.len()).map(|i| self.weight(i, robot)).collect::<Option<_>>()?;
+        let mut normal = DMatrix::zeros(width, width);
+        let mut right = DVector::zeros(width);
+        for &i in inside {
+            let weighted = weights[i] * &designs[i];
+            normal.gemm_tr(1.0, &designs[i], &weighted, 1.0);
+            right.gemv_tr(-1.0, &weighted, &self.rows[i].error, 1.0);
+        }
+        self.add_form(state, &mut normal, &mut right);
+        let covariance = inverse(&normal)?;
+        let theta = &covariance * &right;
+        theta.iter().all(|v| v.is_finite()).then_some(Solution { weights, covariance, theta })
+    }
+
+    fn residual(&self, index: usize, design: &DMatrix<f64>, theta: &DVector<f64>) -> Vector6<f64> {
+        let by_unknowns = design * theta;
+        self.rows[index].error + Vector6::from_iterator(by_unknowns.iter().copied())
+    }
+
+    /// Logarithmic step of both variances.
+    fn scoring(&self, inside: &[usize], designs: &[DMatrix<f64>], solved: &Solution, robot: [f64; 2]) -> [f64; 2] {
+        let mut gradient = [0.0; 2];
+        let mut information = nalgebra::Matrix2::zeros();
+        for &i in inside {
+            let weight = &solved.weights[i];
+            let weighted_residual = weight * self.residual(i, &designs[i], &solved.theta);
+            let weighted = weight * &designs[i];
+            let shared = &weighted * &solved.covariance * weighted.transpose();
+            let by_level = [0, 1].map(|j| weight * self.rows[i].robot[j]);
+            for j in 0..2 {
+                let q = &self.rows[i].robot[j];
+                let squares = (weighted_residual.transpose() * q * weighted_residual)[0];
+                let expected = by_level[j].trace() - (shared * q).trace();
+                gradient[j] += 0.5 * (squares - expected);
+                for k in 0..2 {
+                    information[(j, k)] += 0.5 * (by_level[j] * by_level[k]).trace();
+                }
+            }
+        }
+        let mut scaled = nalgebra::Vector2::zeros();
+        for j in 0..2 {
+            scaled[j] = gradient[j] * robot[j];
+            for k in 0..2 {
+                information[(j, k)] *= robot[j] * robot[k];
+            }
+            // A level that does not show has no information; it then goes down slowly.
+            information[(j, j)] += 1e-6;
+        }
+        let step = information.try_inverse().map_or_else(|| scaled * 0.1, |inverse| inverse * scaled);
+        [0, 1].map(|j: usize| step[j].clamp(-LARGEST_STEP, LARGEST_STEP))
+    }
+
+    fn finished(&self, solved: Solution, robot: [f64; 2], designs: Vec<DMatrix<f64>>, inside: &[usize]) -> Fit {
+        let Solution { weights, covariance, theta } = solved;
+        let residuals = designs.iter().enumerate().map(|(i, design)| self.residual(i, design, &theta)).collect();
+        Fit { theta, covariance, robot, residuals, weights, designs, views: inside.len() }
+    }
+}
+
+struct Solution {
+    weights: Vec<Matrix6<f64>>,
+    covariance: DMatrix<f64>,
+    theta: DVector<f64>,
+}
+
+/// The pose seen, or its mirrored twin where the corners cannot tell and the chain can.
+fn nearer(
+    sight: &SessionViews,
+    view: &super::views::SessionView,
+    chain: &nalgebra::Isometry3<f64>,
+) -> nalgebra::Isometry3<f64> {
+    let off = |pose: &nalgebra::Isometry3<f64>| super::agreement::misfit(sight, chain, pose);
+    match &view.alternative {
+        Some(other) if off(other) < off(&view.camera_from_target) => *other,
+        _ => view.camera_from_target,
+    }
+}
+
+/// Inverse of a positive definite matrix of unlike units; `None` when it is singular.
+pub(super) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { f64::NAN });
+    let n = matrix.nrows();
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    if scaled.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let cholesky = scaled.cholesky()?;
+    // Of unit diagonal, so a pivot near the rounding means that columns depend on each other.
+    if cholesky.l_dirty().diagonal().min() < 1e-7 {
+        return None;
+    }
+    let inverse = cholesky.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+impl Fit {
+    /// Unknowns.
+    pub fn width(&self) -> usize {
+        self.theta.len()
+    }
+
+    /// Degrees of freedom of the noise levels, taken with care: position and orientation share the numbers.
+    pub fn freedom(&self) -> f64 {
+        (0.5 * (6.0 * self.views as f64 - self.width() as f64)).max(1.0)
+    }
+
+    /// Wald's statistic of `count` unknowns from `at`.
+    pub fn wald(&self, at: usize, count: usize) -> Option<f64> {
+        let theta = self.theta.rows(at, count).into_owned();
+        let information = inverse(&self.covariance.view((at, at), (count, count)).into_owned())?;
+        Some(theta.dot(&(information * &theta)))
+    }
+
+    /// Covariance of the residuals of views that are not in the fit.
+    pub fn wald_of_views(&self, views: &[usize]) -> Option<f64> {
+        let n = 6 * views.len();
+        let mut covariance = DMatrix::zeros(n, n);
+        let mut stacked = DVector::zeros(n);
+        for (a, &i) in views.iter().enumerate() {
+            stacked.rows_mut(6 * a, 6).copy_from(&self.residuals[i]);
+            let own = self.weights[i].try_inverse()?;
+            for (b, &j) in views.iter().enumerate() {
+                let shared = &self.designs[i] * &self.covariance * self.designs[j].transpose();
+                let mut block = covariance.view_mut((6 * a, 6 * b), (6, 6));
+                block.copy_from(&shared);
+                if a == b {
+                    block += own;
+                }
+            }
+        }
+        Some(stacked.dot(&(inverse(&covariance)? * &stacked)))
+    }
+
+    /// Noise of the robot per axis, metres and radians.
+    pub fn robot_sigma(&self) -> (f64, f64) {
+        (self.robot[0].sqrt(), self.robot[1].sqrt())
+    }
+}

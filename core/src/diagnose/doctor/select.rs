@@ -1,0 +1,113 @@
+//! Which hypotheses the data support: each is fitted with noise levels of its own, the best is taken in, and the rest are
+//! judged anew beside it.
+
+use super::agreement::Agreement;
+use super::judge::{Candidate, Judged, alternatives, is_significant, judge};
+use super::model::{Fit, Model, State};
+use super::screen::screened;
+use super::views::SessionViews;
+use crate::progress::Work;
+
+/// Least views: twelve unknowns, six of a hypothesis, and noise levels to judge them by.
+pub(super) const NEED: usize = 5;
+/// Views set aside at the most, as a part of all: beyond it the others are no majority to judge by.
+const MOST_ASIDE: f64 = 0.34;
+/// A view whose misfit is so many times the median belongs to the set of views that may be set aside together.
+const FAR: f64 = 5.0;
+/// Rounds of moving the solution to where the majority wants it; the second already changes it by a rounding.
+const ROUNDS: usize = 3;
+/// Hypotheses taken in at the most.
+const MOST_TAKEN: usize = 12;
+/// Views that are tested together at the most.
+const MOST_TOGETHER: usize = 40;
+
+/// Everything judged.
+pub(super) struct Selection<'a> {
+    /// What was taken in, in that order.
+    pub taken: Vec<Judged>,
+    /// The best of every other kind, the best first.
+    pub others: Vec<Judged>,
+    pub model: Model<'a>,
+    /// The last fit.
+    pub fit: Fit,
+}
+
+/// Judges all hypotheses. `None` when the views leave something open, or when it was cancelled.
+pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work<'_>) -> Option<Selection<'a>> {
+    let mut model = Model::new(sight, start.solution);
+    let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
+    let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
+    let mut levels = [(start.median_m / 3.0).powi(2), (start.median_m / 3.0 / sight.distance_m.max(0.01)).powi(2)];
+    // The majority says where the equations are made linear; with many far views there is none, and all are taken.
+    let majority = State { effects: Vec::new(), aside: if far.len() <= most_aside { far.clone() } else { Vec::new() } };
+    for _ in 0..ROUNDS {
+        let fit = model.fit(&majority, levels)?;
+        levels = fit.robot;
+        model = model.moved(&fit);
+    }
+    let mut state = State::default();
+    let mut fit = model.fit(&state, levels)?;
+    let (mut taken, mut others): (Vec<Judged>, Vec<Judged>) = (Vec::new(), Vec::new());
+    loop {
+        if work.is_cancelled() {
+            return None;
+        }
+        let room = most_aside.saturating_sub(state.aside.len());
+        let together: Vec<usize> = far.iter().copied().filter(|i| !state.aside.contains(i)).collect();
+        let mut candidates = screened(&model, &state, &fit, room);
+        if (2..=room.min(MOST_TOGETHER)).contains(&together.len()) {
+            candidates.push(Candidate::Views(together));
+        }
+        let mut judged: Vec<Judged> = candidates.into_iter().filter_map(|c| judge(&model, &state, &fit, c)).collect();
+        judged.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let best = judged.iter().position(Judged::holds).filter(|_| taken.len() < MOST_TAKEN);
+        let mut taken_now = None;
+        for (i, j) in judged.into_iter().enumerate() {
+            if Some(i) == best {
+                taken_now = Some(j);
+            } else if taken.is_empty() {
+                others.push(j);
+            }
+        }
+        let Some(next) = taken_now else { break };
+        state = next.state.clone();
+        fit = model.fit(&state, next.fit.robot)?;
+        taken.push(next);
+    }
+    drop_overtaken(&model, &mut state, &mut fit, &mut taken)?;
+    others.retain(|o| !taken.iter().any(|t| same_kind(&t.candidate, &o.candidate)));
+    if let Some(first) = taken.first() {
+        for other in &mut others {
+            other.as_good = other.explains_as_much_as(first);
+        }
+    }
+    Some(Selection { taken, others, model, fit })
+}
+
+fn same_kind(a: &Candidate, b: &Candidate) -> bool {
+    match (a, b) {
+        (Candidate::Effect(a), Candidate::Effect(b)) => std::mem::discriminant(a) == std::mem::discriminant(b),
+        (Candidate::Views(_), Candidate::Views(_)) => true,
+        _ => false,
+    }
+}
+
+/// An effect that was taken in first may be explained by those that came later.
+fn drop_overtaken(model: &Model<'_>, state: &mut State, fit: &mut Fit, taken: &mut Vec<Judged>) -> Option<()> {
+    loop {
+        let lens = model.sight.lens_count();
+        let mut at = model.effects_at();
+        let mut weak = None;
+        for effect in &state.effects {
+            let count = effect.numbers(lens);
+            if !is_significant(fit.wald(at, count)?, count, fit.freedom(), alternatives(model, *effect)) {
+                weak = Some(*effect);
+            }
+            at += count;
+        }
+        let Some(weak) = weak else { return Some(()) };
+        state.effects.retain(|e| *e != weak);
+        taken.retain(|j| j.candidate != Candidate::Effect(weak));
+        *fit = model.fit(state, fit.robot)?;
+    }
+}

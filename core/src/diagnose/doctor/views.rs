@@ -1,0 +1,301 @@
+//! What the pictures alone say: the target's pose in every view, how precisely, and how lens and target shape turn it.
+
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
+
+use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
+use crate::estimate::handeye::{Mode, subset};
+use crate::estimate::intrinsics::{self, Options, SeenView};
+use crate::estimate::{CameraKnowledge, Observations, ObservedView};
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Base, Pose, Tip};
+use crate::geometry::planar_pose::{self, PlanarPose};
+use crate::geometry::se3::skew;
+use crate::geometry::statistics::median;
+use crate::progress::CancelToken;
+use crate::targets::TargetSpec;
+use crate::targets::bent::{BoardPoints, BoardShape};
+use crate::targets::observation::Corner;
+
+/// A corner this many robust standard deviations from where its view puts it is wrong. Real detectors have long tails,
+/// so the limit is wide.
+const WRONG_SIGMAS: f64 = 10.0;
+/// And at least so far, pixels: less does not move a pose of many corners.
+const WRONG_PX: f64 = 1.0;
+/// At most this part of a view's corners is called wrong; beyond it the view is.
+const WRONG_PART: f64 = 0.2;
+/// Rounds of leaving the worst corners out and fitting again.
+const ROUNDS: usize = 6;
+/// A mirrored pose counts as possible when its residual is less than so many times that of the best.
+const AMBIGUOUS: f64 = 2.0;
+/// A view whose corners are noisier than this many times the typical one is weighted by its own noise.
+const NOISY: f64 = 2.0;
+
+/// One view with a robot pose and a pose of the target.
+pub(super) struct SessionView {
+    pub name: String,
+    pub base_from_tip: Pose<Base, Tip>,
+    pub camera_from_target: Isometry3<f64>,
+    /// The mirrored pose, where the corners hardly tell.
+    pub alternative: Option<Isometry3<f64>>,
+    /// Covariance of the target's pose by corner noise, right perturbation; zero where the pose was given.
+    pub covariance: Matrix6<f64>,
+    /// How the measured pose turns with lens (then warp x, y): the measured pose is off by minus this.
+    pub by_form: DMatrix<f64>,
+    pub tip_by_joint: Vec<Vector6<f64>>,
+    /// Corners that do not belong where they are, by their index in the target.
+    pub wrong_corners: Vec<usize>,
+    pub corners: usize,
+}
+
+/// All views as the camera saw them.
+pub(super) struct SessionViews {
+    pub mode: Mode,
+    pub views: Vec<SessionView>,
+    /// Names of views with numbers that are not finite.
+    pub not_finite: Vec<String>,
+    /// The camera; `None` for poses measured elsewhere.
+    pub intrinsics: Option<Intrinsics>,
+    pub lens_free: bool,
+    /// Noise of a corner per axis, pixels.
+    pub corner_px: Option<f64>,
+    /// What the corners, apart from the poses, say of lens and warp: information and gradient in units of the noise.
+    pub form_information: DMatrix<f64>,
+    pub form_gradient: DVector<f64>,
+    /// Four outer points of the target.
+    pub outer: [Point3<f64>; 4],
+    /// `xiᵀ K xi` is the mean squared displacement of the target's points by a small motion `xi` of it, m².
+    pub displacement: Matrix6<f64>,
+    /// Median distance of the target's middle from the camera, metres.
+    pub distance_m: f64,
+}
+
+struct Fit {
+    corners: Vec<Corner>,
+    wrong: Vec<usize>,
+    pose: PlanarPose,
+}
+
+impl SessionViews {
+    /// Looks at all views in the fit that have a robot pose and the target. `Err` says why nothing can be tested.
+    pub fn new(observations: &Observations) -> Result<Self, String> {
+        let Some(mode) = observations.mode else { return Err("there are no robot poses".to_owned()) };
+        let in_fit: Vec<&ObservedView> = observations.views.iter().filter(|v| v.in_fit).collect();
+        let (finite, broken): (Vec<&ObservedView>, Vec<&ObservedView>) = in_fit.into_iter().partition(|v| is_finite(v));
+        let not_finite = broken.iter().map(|v| v.name.clone()).collect();
+        let seen: Vec<&ObservedView> = finite
+            .into_iter()
+            .filter(|v| v.base_from_tip.is_some() && (v.corners.is_some() || v.camera_from_target.is_some()))
+            .collect();
+        let seen: Vec<&ObservedView> =
+            subset::spread(seen.len(), super::MOST_VIEWS).into_iter().map(|i| seen[i]).collect();
+        let (outer, displacement) = board(&observations.target.points());
+        let mut sight = Self {
+            mode,
+            views: Vec::new(),
+            not_finite,
+            intrinsics: None,
+            lens_free: matches!(observations.camera, CameraKnowledge::Estimate { .. }),
+            corner_px: None,
+            form_information: DMatrix::zeros(0, 0),
+            form_gradient: DVector::zeros(0),
+            outer,
+            displacement,
+            distance_m: 0.0,
+        };
+        if seen.iter().all(|v| v.corners.is_none()) {
+            sight.lens_free = false;
+            sight.take_poses(&seen);
+        } else {
+            let with_corners: Vec<&ObservedView> = seen.into_iter().filter(|v| v.corners.is_some()).collect();
+            sight.take_corners(observations, &with_corners)?;
+        }
+        let middle = Point3::from(outer.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / 4.0);
+        let distances = sight.views.iter().map(|v| (v.camera_from_target * middle).coords.norm());
+        sight.distance_m = median(distances).unwrap_or(0.0);
+        Ok(sight)
+    }
+
+    fn take_poses(&mut self, seen: &[&ObservedView]) {
+        for view in seen {
+            let (Some(base_from_tip), Some(pose)) = (view.base_from_tip, view.camera_from_target) else { continue };
+            self.views.push(SessionView {
+                name: view.name.clone(),
+                base_from_tip,
+                camera_from_target: *pose.isometry(),
+                alternative: None,
+                covariance: Matrix6::zeros(),
+                by_form: DMatrix::zeros(6, 0),
+                tip_by_joint: view.tip_by_joint.clone(),
+                wrong_corners: Vec::new(),
+                corners: 0,
+            });
+        }
+    }
+
+    fn take_corners(&mut self, observations: &Observations, seen: &[&ObservedView]) -> Result<(), String> {
+        let all: Vec<Vec<Corner>> = seen.iter().map(|v| v.corners.clone().unwrap_or_default()).collect();
+        let mut camera = camera_of(observations, &all)?;
+        let mut fits = fit_all(&all, &observations.target, &camera);
+        if self.lens_free && fits.iter().flatten().any(|f| !f.wrong.is_empty()) {
+            let kept: Vec<Vec<Corner>> = fits.iter().flatten().map(|f| f.corners.clone()).collect();
+            camera = camera_of(observations, &kept)?;
+            fits = fit_all(&all, &observations.target, &camera);
+        }
+        self.intrinsics = Some(camera);
+        let points = BoardPoints::new(&observations.target.points());
+        let free = FreeParameters { lens: true, warp: true, scale: false };
+        let count = free.count(&camera);
+        let variances = fits.iter().flatten().map(Fit::variance_px2);
+        let Some(typical) = median(variances) else {
+            return Err("the target's pose could not be found in any view".to_owned());
+        };
+        // Exact corners would have a weight that is not finite.
+        let typical = typical.max(1e-12);
+        self.corner_px = Some(typical.sqrt());
+        self.form_information = DMatrix::zeros(count, count);
+        self.form_gradient = DVector::zeros(count);
+        for (view, fit) in seen.iter().zip(fits) {
+            let (Some(fit), Some(base_from_tip)) = (fit, view.base_from_tip) else { continue };
+            let pose = *fit.pose.best.camera_from_target.isometry();
+            let seen = ViewInput {
+                intrinsics: &camera,
+                board: &points,
+                shape: &BoardShape::FLAT,
+                corners: &fit.corners,
+                sqrt_weights: &[],
+            };
+            let Ok(equations) = PoseEquations::new(&seen, &pose, free) else { continue };
+            let Some(inverse) = equations.pose.try_inverse() else { continue };
+            let own = fit.variance_px2();
+            let variance = if own > NOISY * NOISY * typical { own } else { typical };
+            let by_pose = equations.pose_by_form.columns(0, count).into_owned();
+            let by_form = inverse * &by_pose;
+            self.form_information +=
+                (equations.form.view((0, 0), (count, count)) - by_pose.transpose() * &by_form) / variance;
+            self.form_gradient +=
+                (equations.form_gradient.rows(0, count) - by_form.transpose() * equations.pose_gradient) / variance;
+            let ambiguous = fit.pose.alternative.filter(|a| a.rms_px < AMBIGUOUS * fit.pose.best.rms_px);
+            self.views.push(SessionView {
+                name: view.name.clone(),
+                base_from_tip,
+                camera_from_target: pose,
+                alternative: ambiguous.map(|a| *a.camera_from_target.isometry()),
+                covariance: inverse * variance,
+                by_form: DMatrix::from_iterator(6, count, by_form.iter().copied()),
+                tip_by_joint: view.tip_by_joint.clone(),
+                wrong_corners: fit.wrong,
+                corners: view.corners.as_ref().map_or(0, Vec::len),
+            });
+        }
+        Ok(())
+    }
+
+    /// Number of lens parameters among the form's; the two warps follow.
+    pub fn lens_count(&self) -> usize {
+        self.intrinsics.as_ref().map_or(0, Intrinsics::parameter_count)
+    }
+}
+
+impl Fit {
+    /// Variance of a corner per axis by the residuals of the view.
+    fn variance_px2(&self) -> f64 {
+        let numbers = 2.0 * self.corners.len() as f64;
+        let squared = self.pose.best.rms_px.powi(2) * self.corners.len() as f64;
+        squared / (numbers - 6.0).max(1.0)
+    }
+}
+
+fn is_finite(view: &ObservedView) -> bool {
+    view.base_from_tip.is_none_or(|p| p.is_finite())
+        && view.camera_from_target.is_none_or(|p| p.is_finite())
+        && view.corners.iter().flatten().all(|c| c.px.iter().all(|v| v.is_finite()))
+}
+
+/// Four outer points of a target and how motions displace its points.
+fn board(points: &[Point3<f64>]) -> ([Point3<f64>; 4], Matrix6<f64>) {
+    let range = |axis: usize| {
+        let values = points.iter().map(|p| p[axis]);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+    };
+    let ((x0, x1), (y0, y1)) = if points.is_empty() { ((0.0, 0.0), (0.0, 0.0)) } else { (range(0), range(1)) };
+    let outer = [(x0, y0), (x1, y0), (x0, y1), (x1, y1)].map(|(x, y)| Point3::new(x, y, 0.0));
+    let mut displacement = Matrix6::zeros();
+    for point in points {
+        let mut by_motion = nalgebra::SMatrix::<f64, 3, 6>::zeros();
+        by_motion.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+        by_motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(&point.coords));
+        displacement += by_motion.transpose() * by_motion / points.len() as f64;
+    }
+    (outer, displacement)
+}
+
+/// The camera given, or found from the corners alone: the robot may be what is wrong.
+fn camera_of(observations: &Observations, views: &[Vec<Corner>]) -> Result<Intrinsics, String> {
+    match observations.camera {
+        CameraKnowledge::Fixed(intrinsics) => Ok(intrinsics),
+        CameraKnowledge::Estimate { model, start } => {
+            let chosen = subset::spread(views.len(), subset::MOST_VIEWS);
+            let chosen: Vec<SeenView<'_>> = chosen.into_iter().map(|i| SeenView::unweighted(&views[i])).collect();
+            let options = Options { start, ..Options::new(model) };
+            let (target, size) = (&observations.target, observations.image_size);
+            intrinsics::solve(&chosen, target, size, &options, &CancelToken::default())
+                .map(|found| found.intrinsics)
+                .map_err(|error| format!("the camera could not be calibrated: {error}"))
+        }
+    }
+}
+
+fn fit_all(views: &[Vec<Corner>], target: &TargetSpec, camera: &Intrinsics) -> Vec<Option<Fit>> {
+    let solve = |corners: &[Corner]| planar_pose::solve(corners, target, camera).ok();
+    let mut fits: Vec<Option<Fit>> = views
+        .iter()
+        .map(|corners| Some(Fit { pose: solve(corners)?, corners: corners.clone(), wrong: Vec::new() }))
+        .collect();
+    let Some(typical) = median(fits.iter().flatten().map(|f| f.pose.best.rms_px)) else {
+        return fits;
+    };
+    let limit = (WRONG_SIGMAS * typical / std::f64::consts::SQRT_2).max(WRONG_PX);
+    let points = target.points();
+    for fit in fits.iter_mut().flatten() {
+        set_wrong_aside(fit, limit, &points, camera, &solve);
+    }
+    fits
+}
+
+/// Leaves the worst corners of a view out until none is beyond the limit. A view with too many of them is left whole: it
+/// is wrong as such.
+fn set_wrong_aside(
+    fit: &mut Fit,
+    limit_px: f64,
+    points: &[Point3<f64>],
+    camera: &Intrinsics,
+    solve: &impl Fn(&[Corner]) -> Option<PlanarPose>,
+) {
+    let most = (WRONG_PART * fit.corners.len() as f64) as usize;
+    let (mut corners, mut wrong, mut pose) = (fit.corners.clone(), Vec::new(), fit.pose);
+    for _ in 0..ROUNDS {
+        let chain = pose.best.camera_from_target;
+        let off = |c: &Corner| {
+            points
+                .get(c.index)
+                .and_then(|p| camera.project(&(chain.isometry() * p)).ok())
+                .map_or(f64::INFINITY, |px| (px - c.px).norm())
+        };
+        let worst = corners.iter().map(&off).fold(0.0, f64::max);
+        if worst <= limit_px {
+            if !wrong.is_empty() {
+                *fit = Fit { corners, wrong, pose };
+            }
+            return;
+        }
+        // One wrong corner drags its neighbours: only those near the worst go.
+        let (kept, gone): (Vec<Corner>, Vec<Corner>) =
+            corners.iter().copied().partition(|c| off(c) <= limit_px.max(0.5 * worst));
+        wrong.extend(gone.iter().map(|c| c.index));
+        if wrong.len() > most {
+            return;
+        }
+        let Some(next) = solve(&kept) else { return };
+        (corners, pose) = (kept, next);
+    }
+}

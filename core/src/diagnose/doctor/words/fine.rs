@@ -1,0 +1,249 @@
+//! Hypotheses of the linear model in words.
+
+use nalgebra::Vector6;
+
+use super::super::Hypothesis;
+use super::super::effect::Effect;
+use super::super::judge::{Candidate, Judged, moved_m};
+use super::super::model::Model;
+use super::super::select::Selection;
+use super::{estimate, evidence};
+use crate::diagnose::findings::{Evidence, Finding, FindingCode, Severity, listed};
+use crate::estimate::handeye::Mode;
+use crate::text;
+use crate::wording::Text;
+
+/// A turn from which a view is likelier seen the wrong way round than moved, degrees.
+const TURNED_DEG: f64 = 20.0;
+
+/// Every hypothesis: those taken in, then the best of every other kind. Views that were set aside one after the other are
+/// one hypothesis.
+pub(in super::super) fn fine(selection: &Selection<'_>) -> Vec<Hypothesis> {
+    let mut found: Vec<Hypothesis> = Vec::new();
+    let views: Vec<usize> = selection
+        .taken
+        .iter()
+        .filter_map(|j| match &j.candidate {
+            Candidate::Views(views) => Some(views.clone()),
+            Candidate::Effect(_) => None,
+        })
+        .flatten()
+        .collect();
+    for judged in &selection.taken {
+        let hypothesis = match &judged.candidate {
+            Candidate::Effect(effect) => of_effect(&selection.model, judged, *effect),
+            Candidate::Views(_) if found.iter().any(|h| h.code == FindingCode::OutlierView) => continue,
+            Candidate::Views(_) => of_views(selection, judged, &views),
+        };
+        found.push(Hypothesis { accepted: true, ..hypothesis });
+    }
+    for judged in &selection.others {
+        let hypothesis = match &judged.candidate {
+            Candidate::Effect(effect) => of_effect(&selection.model, judged, *effect),
+            Candidate::Views(views) => of_views(selection, judged, views),
+        };
+        found.push(if judged.as_good { beside(hypothesis) } else { hypothesis });
+    }
+    found
+}
+
+/// A hypothesis that explains as much as the first.
+fn beside(hypothesis: Hypothesis) -> Hypothesis {
+    let both = text!("What else was found explains much the same: check both.");
+    Hypothesis { accepted: true, advice: Text::sentences([hypothesis.advice, both]), ..hypothesis }
+}
+
+/// An accepted hypothesis as a finding.
+pub(in super::super) fn finding_of(hypothesis: &Hypothesis) -> Finding {
+    let finding = Finding::new(hypothesis.code, Severity::Warning, hypothesis.text_with_advice());
+    Finding { evidence: hypothesis.evidence.clone(), views: hypothesis.views.clone(), ..finding }
+}
+
+fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
+    let number = |k: usize| judged.numbers.get(k).copied().unwrap_or_default();
+    let sigma = |k: usize| judged.sigma.get(k).copied().unwrap_or_default();
+    let mut numbers = common(judged);
+    let mut views = Vec::new();
+    let (code, what, to_do, estimate) = match effect {
+        Effect::Scale => {
+            let (percent, sigma) = (100.0 * number(0), 100.0 * sigma(0));
+            let what = if percent < 0.0 {
+                text!("The motion of the robot says that the target is {size} % ± {sigma} % smaller than stated.")
+            } else {
+                text!("The motion of the robot says that the target is {size} % ± {sigma} % larger than stated.")
+            };
+            let size = format!("{:.2}", percent.abs());
+            let what = what.with("size", size).with("sigma", format!("{sigma:.2}"));
+            let scale = estimate("true_over_stated_size", 1.0 + number(0), Some(sigma / 100.0), "");
+            numbers.push(evidence("true_over_stated_size", 1.0 + number(0), ""));
+            numbers.push(evidence("true_over_stated_size_sigma", sigma / 100.0, ""));
+            let to_do = text!("Measure the target with a ruler, over as many squares as it has.");
+            (FindingCode::WrongScale, what, to_do, scale)
+        }
+        Effect::Warp => {
+            let [x_mm, y_mm] = [number(0) * 1e3, number(1) * 1e3];
+            let what = text!(
+                "The target is bent: its middle stands {x} mm (along x) and {y} mm (along y) out.",
+                x = format!("{x_mm:.2}"),
+                y = format!("{y_mm:.2}")
+            );
+            numbers.push(evidence("warp_x", x_mm, "mm"));
+            numbers.push(evidence("warp_y", y_mm, "mm"));
+            let k = usize::from(number(1).abs() > number(0).abs());
+            let warp = estimate("warp", number(k) * 1e3, Some(sigma(k) * 1e3), "mm");
+            (FindingCode::BoardBent, what, text!("Fix it to a flat plate."), warp)
+        }
+        Effect::Lens => {
+            let fx = model.sight.intrinsics.map_or(1.0, |camera| camera.fx);
+            let percent = 100.0 * number(0) / fx;
+            let what = text!(
+                "The intrinsics given do not fit the pictures: the focal length would be {percent} % ± {sigma} % off.",
+                percent = format!("{percent:+.2}"),
+                sigma = format!("{:.2}", 100.0 * sigma(0) / fx)
+            );
+            numbers.push(evidence("focal_change", percent, "%"));
+            let change = estimate("focal_change", percent, Some(100.0 * sigma(0) / fx), "%");
+            let to_do = text!("Let them be estimated, or give those of this camera at this image size and focus.");
+            (FindingCode::WrongIntrinsics, what, to_do, change)
+        }
+        Effect::BoardMoved(from) | Effect::CameraMoved(from) => {
+            let name = model.sight.views[from].name.clone();
+            let (mm, deg) = twist_size(&judged.numbers);
+            let at_board_mm = moved_m(model, effect, &judged.numbers) * 1e3;
+            let board = matches!(effect, Effect::BoardMoved(_));
+            let code = if board { FindingCode::BoardMoved } else { FindingCode::CameraMoved };
+            let who = match (board, model.sight.mode) {
+                (true, Mode::EyeInHand) => text!("The target"),
+                (true, Mode::EyeToHand) => text!("The target on the tip"),
+                (false, Mode::EyeInHand) => text!("The camera on the tip"),
+                (false, Mode::EyeToHand) => text!("The camera"),
+            };
+            let what = text!(
+                "{who} moved before view {view}, by {mm} mm and {deg}°.",
+                who = who,
+                view = &name,
+                mm = format!("{mm:.2}"),
+                deg = format!("{deg:.3}")
+            );
+            numbers.push(evidence("first_view_after", from as f64, ""));
+            numbers.push(evidence("moved", mm, "mm"));
+            numbers.push(evidence("turned", deg, "°"));
+            numbers.push(evidence("moved_at_target", at_board_mm, "mm"));
+            views.push(name);
+            let sigma_mm = judged.sigma.iter().take(3).map(|s| s * s).sum::<f64>().sqrt() * 1e3;
+            let to_do = text!("Fix it and capture again, or keep only the views before or after.");
+            (code, what, to_do, estimate("moved", mm, Some(sigma_mm), "mm"))
+        }
+        Effect::Joint(joint) => {
+            let (deg, sigma) = (number(0).to_degrees(), sigma(0).to_degrees());
+            let what = text!(
+                "The zero of joint {joint} is off by {offset}° ± {sigma}°.",
+                joint = joint + 1,
+                offset = format!("{deg:+.3}"),
+                sigma = format!("{sigma:.3}")
+            );
+            numbers.push(evidence("joint", (joint + 1) as f64, ""));
+            numbers.push(evidence("offset", deg, "°"));
+            numbers.push(evidence("offset_sigma", sigma, "°"));
+            let to_do = text!("Master the arm anew, or let the offset be estimated with the calibration.");
+            (FindingCode::JointOffset, what, to_do, estimate("offset", deg, Some(sigma), "°"))
+        }
+    };
+    Hypothesis {
+        code,
+        with: Vec::new(),
+        text: Text::sentences([what, worth(judged)]),
+        advice: to_do,
+        gain: judged.gain,
+        estimate: Some(estimate),
+        evidence: numbers,
+        views,
+        significant: judged.significant,
+        accepted: false,
+    }
+}
+
+fn of_views(selection: &Selection<'_>, judged: &Judged, views: &[usize]) -> Hypothesis {
+    let model = &selection.model;
+    let names: Vec<String> = views.iter().map(|i| model.sight.views[*i].name.clone()).collect();
+    let mut numbers = common(judged);
+    // The view that is out by most; its displacement is by the fit without those set aside.
+    let size = |i: &usize| model.displacement_m(&selection.fit.residuals[*i]);
+    let worst = views.iter().copied().max_by(|a, b| size(a).total_cmp(&size(b)));
+    let mm = worst.map_or(0.0, |i| size(&i) * 1e3);
+    // The same as a correction of the robot's pose.
+    let by_robot =
+        worst.and_then(|i| model.rows[i].by_robot.try_inverse().map(|inverse| inverse * selection.fit.residuals[i]));
+    let deg = by_robot.map_or(0.0, |c: Vector6<f64>| c.fixed_rows::<3>(3).norm().to_degrees());
+    numbers.push(evidence("displacement", mm, "mm"));
+    numbers.push(evidence("turn", deg, "°"));
+    let what = if views.len() == 1 {
+        text!("View {list} contradicts the others: the board is out by up to {mm} mm and {deg}°.")
+    } else {
+        text!("Views {list} contradict the others: the board is out by up to {mm} mm and {deg}°.")
+    };
+    let what = what.with("list", listed(&names)).with("mm", format!("{mm:.2}")).with("deg", format!("{deg:.2}"));
+    let why = if deg > TURNED_DEG {
+        text!("The board may have been read the wrong way round, or the pose belongs to another picture.")
+    } else {
+        text!("The arm or the board may have been moving, or the pose belongs to another picture.")
+    };
+    Hypothesis {
+        code: FindingCode::OutlierView,
+        with: Vec::new(),
+        text: Text::sentences([what, worth(judged)]),
+        advice: Text::sentences([why, text!("Leave it out and see what changes.")]),
+        gain: judged.gain,
+        estimate: Some(estimate("displacement", mm, None, "mm")),
+        evidence: numbers,
+        views: names,
+        significant: judged.significant,
+        accepted: false,
+    }
+}
+
+/// Length and angle of a twist, millimetres and degrees.
+fn twist_size(numbers: &[f64]) -> (f64, f64) {
+    let norm = |part: &[f64]| part.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let split = numbers.len().min(3);
+    (norm(&numbers[..split]) * 1e3, norm(&numbers[split..]).to_degrees())
+}
+
+/// What every hypothesis has to say for itself.
+fn common(judged: &Judged) -> Vec<Evidence> {
+    let [(without_m, with_m), (without_rad, with_rad)] = judged.robot;
+    let mut numbers = vec![
+        evidence("log_likelihood_gain", judged.gain, ""),
+        evidence("robot_sigma_without", without_m * 1e3, "mm"),
+        evidence("robot_sigma_with", with_m * 1e3, "mm"),
+        evidence("robot_angle_without", without_rad.to_degrees(), "°"),
+        evidence("robot_angle_with", with_rad.to_degrees(), "°"),
+    ];
+    if let Some((without, with)) = judged.held_out {
+        numbers.push(evidence("held_out_without", without.rms_m * 1e3, "mm"));
+        numbers.push(evidence("held_out_with", with.rms_m * 1e3, "mm"));
+    }
+    numbers
+}
+
+/// By how much it explains the data better.
+fn worth(judged: &Judged) -> Text {
+    let [(without_m, with_m), (without_rad, with_rad)] = judged.robot;
+    let held_out = judged.held_out.map(|(without, with)| {
+        text!(
+            "Views left out are predicted to {with} mm instead of {without} mm.",
+            with = format!("{:.2}", with.rms_m * 1e3),
+            without = format!("{:.2}", without.rms_m * 1e3)
+        )
+    });
+    let explained = text!(
+        "This explains the data {times} times better: the robot's noise goes from {mm_before} mm and {deg_before}° to {mm} \
+         mm and {deg}°.",
+        times = super::times(judged.gain),
+        mm_before = format!("{:.3}", without_m * 1e3),
+        deg_before = format!("{:.3}", without_rad.to_degrees()),
+        mm = format!("{:.3}", with_m * 1e3),
+        deg = format!("{:.3}", with_rad.to_degrees())
+    );
+    Text::sentences([explained].into_iter().chain(held_out))
+}

@@ -1,0 +1,244 @@
+//! Findings on a calibration: single views that stand out, the noise, the other methods, the goal.
+
+use nalgebra::{Point3, Vector3};
+
+use super::{Finding, FindingCode, FindingOptions, Severity};
+use crate::estimate::{Calibration, ViewResult, ViewStatus};
+use crate::text;
+use crate::wording::Text;
+
+/// Views below which none can stand out from the others.
+const MIN_FOR_OUTLIERS: usize = 5;
+/// How many robust standard deviations (1.4826 times the median absolute deviation) a view may lie above the median. Five
+/// are reached by chance in one of 3 million views of Gaussian noise; real noise has longer tails.
+const ROBUST_SIGMAS: f64 = 5.0;
+/// And at least so many times the median, because the deviation of a handful of views is itself uncertain.
+const TIMES_MEDIAN: f64 = 3.0;
+/// Length of the six numbers of a correction over the noise levels: passed by chance by one view in 400 000.
+const CORRECTION_SIGMAS: f64 = 6.0;
+/// An influence above this part of the expected error counts: leaving the view out would change what is stated.
+const INFLUENCE: f64 = 0.5;
+/// Prediction error over what the noise levels explain; they are themselves known to a fifth or so.
+const PREDICTION: f64 = 1.5;
+/// Robot noise over corner noise, both in pixels, from which better pictures hardly help: a tenth part in the square.
+const ROBOT_OVER_CORNERS: f64 = 3.0;
+/// Distance from the middle of the closed forms, metres, from which one of them is worth a word.
+const DISAGREE_M: f64 = 5e-3;
+/// More of the same views than this many times those gathered are no advice.
+const MOST_TIMES: usize = 4;
+
+pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Finding> {
+    let used: Vec<&ViewResult> = calibration.views.iter().filter(|v| v.status == ViewStatus::Used).collect();
+    let mut found = Vec::new();
+    found.extend(influence(calibration, &used));
+    found.extend(residuals(&used));
+    found.extend(corrections(calibration, &used));
+    found.extend(prediction(calibration));
+    found.extend(robot_noise(calibration));
+    found.extend(closed_forms(calibration));
+    found.extend(options.goal_mm.and_then(|goal_mm| goal(calibration, goal_mm)));
+    found
+}
+
+/// Median of values that are not all the same length as the views; `None` when there are none.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.retain(|v| v.is_finite());
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    (n > 0).then(|| 0.5 * (values[n / 2] + values[(n - 1) / 2]))
+}
+
+/// The view that stands out most by a value, the value and the median of all; `None` when none does.
+fn stands_out<'a>(
+    views: &[&'a ViewResult],
+    value: impl Fn(&ViewResult) -> Option<f64>,
+) -> Option<(&'a ViewResult, f64, f64)> {
+    let valued: Vec<(&ViewResult, f64)> = views.iter().filter_map(|v| Some((*v, value(v)?))).collect();
+    if valued.len() < MIN_FOR_OUTLIERS {
+        return None;
+    }
+    let middle = median(valued.iter().map(|(_, x)| *x).collect())?;
+    let deviation = 1.4826 * median(valued.iter().map(|(_, x)| (x - middle).abs()).collect())?;
+    let (view, largest) = valued.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let limit = (middle + ROBUST_SIGMAS * deviation).max(TIMES_MEDIAN * middle);
+    (largest > limit).then_some((view, largest, middle))
+}
+
+fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding> {
+    let error_m = calibration.tip_error_95_m?;
+    let (view, largest_m, median_m) = stands_out(used, |v| v.influence_m)?;
+    if largest_m < INFLUENCE * error_m {
+        return None;
+    }
+    let text = text!(
+        "View {view} alone moves the answer by {influence} mm; the median view moves it by {median} mm. Check its picture \
+         and its robot pose, or add views like it so that it does not stand alone.",
+        view = &view.name,
+        influence = format!("{:.2}", largest_m * 1e3),
+        median = format!("{:.2}", median_m * 1e3)
+    );
+    // Where a view stands alone is geometry; one that is wrong is told by what it contradicts.
+    let finding = Finding::new(FindingCode::InfluentialView, Severity::Advice, text).of_view(&view.name);
+    let finding = finding.with("influence", largest_m * 1e3, "mm").with("median_influence", median_m * 1e3, "mm");
+    Some(finding.with("expected_error_95", error_m * 1e3, "mm"))
+}
+
+fn residuals(used: &[&ViewResult]) -> Option<Finding> {
+    let (view, largest, middle) = stands_out(used, |v| v.rms_px)?;
+    let text = text!(
+        "The corners of view {view} fit with {rms} px, those of the median view with {median} px. Look at its picture for \
+         blur, reflections and wrong corners; leave it out if there are any.",
+        view = &view.name,
+        rms = format!("{largest:.2}"),
+        median = format!("{middle:.2}")
+    );
+    let finding = Finding::new(FindingCode::LargeResidual, Severity::Warning, text).of_view(&view.name);
+    Some(finding.with("rms", largest, "px").with("median_rms", middle, "px"))
+}
+
+fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding> {
+    let by_distance = stands_out(used, |v| v.correction_m);
+    let by_angle = stands_out(used, |v| v.correction_rad);
+    // One view is named: that which is out by more of its median.
+    let (view, ..) =
+        [by_distance, by_angle].into_iter().flatten().max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
+    // Views tell their corrections unequally well, so the median alone is no measure: the noise level must be left too.
+    // One view that makes up all of the noise has at most the root of six times the views.
+    let noise = calibration.noise?;
+    let over_noise = (view.correction_m? / noise.robot_m).hypot(view.correction_rad? / noise.robot_rad);
+    if over_noise < CORRECTION_SIGMAS.min(0.75 * (6.0 * used.len() as f64).sqrt()) {
+        return None;
+    }
+    let middle = |value: fn(&ViewResult) -> Option<f64>| median(used.iter().filter_map(|v| value(v)).collect());
+    let (mm, deg) = (view.correction_m? * 1e3, view.correction_rad?.to_degrees());
+    let (median_mm, median_deg) = (middle(|v| v.correction_m)? * 1e3, middle(|v| v.correction_rad)?.to_degrees());
+    let text = text!(
+        "The robot pose of view {view} had to be corrected by {mm} mm and {deg}°, the median by {median_mm} mm and \
+         {median_deg}°. The arm may have moved when the picture was taken, or the board has; leave the view out or capture \
+         it again.",
+        view = &view.name,
+        mm = format!("{mm:.2}"),
+        deg = format!("{deg:.3}"),
+        median_mm = format!("{median_mm:.2}"),
+        median_deg = format!("{median_deg:.3}")
+    );
+    let finding = Finding::new(FindingCode::LargeCorrection, Severity::Warning, text).of_view(&view.name);
+    let finding = finding.with("correction", mm, "mm").with("correction_angle", deg, "°");
+    Some(finding.with("median_correction", median_mm, "mm").with("median_correction_angle", median_deg, "°"))
+}
+
+fn prediction(calibration: &Calibration) -> Option<Finding> {
+    let (heldout, expected) = (calibration.heldout_rms_px?, calibration.expected_heldout_rms_px?);
+    if heldout <= PREDICTION * expected {
+        return None;
+    }
+    let text = text!(
+        "Views left out of the fit are predicted to {heldout} px, where robot and corner noise explain {expected} px. The \
+         model misses something: a wrong view, a board that is bent or not of the stated size, too few views for so many \
+         unknowns, or robot errors that depend on the pose. Capture more views and check those that stand out.",
+        heldout = format!("{heldout:.2}"),
+        expected = format!("{expected:.2}")
+    );
+    let finding = Finding::new(FindingCode::PoorPrediction, Severity::Warning, text);
+    Some(finding.with("heldout_rms", heldout, "px").with("explained_rms", expected, "px"))
+}
+
+fn robot_noise(calibration: &Calibration) -> Option<Finding> {
+    let (noise, robot_px) = (calibration.noise?, calibration.robot_effect_px?);
+    // Both as 2-D distances.
+    let corner_px = noise.corner_px * std::f64::consts::SQRT_2;
+    if robot_px < ROBOT_OVER_CORNERS * corner_px {
+        return None;
+    }
+    let (mm, deg) = (noise.robot_m * 1e3, noise.robot_rad.to_degrees());
+    let text = text!(
+        "The robot limits the answer: its noise of {mm} mm and {deg}° per axis moves corners by {robot} px, their own noise \
+         is {corner} px. Better pictures will not help much; more views, and settling longer before each, will.",
+        mm = format!("{mm:.3}"),
+        deg = format!("{deg:.3}"),
+        robot = format!("{robot_px:.2}"),
+        corner = format!("{corner_px:.2}")
+    );
+    let finding = Finding::new(FindingCode::RobotNoise, Severity::Info, text);
+    let finding = finding.with("robot_effect", robot_px, "px").with("corner_noise", corner_px, "px");
+    Some(finding.with("robot_sigma", mm, "mm").with("robot_sigma_angle", deg, "°"))
+}
+
+/// Compared where the board was seen; without a joint estimate at the camera itself.
+fn closed_forms(calibration: &Calibration) -> Option<Finding> {
+    let point = calibration.reference_point.unwrap_or_else(Point3::origin);
+    let places: Vec<(&'static str, Vector3<f64>)> = calibration
+        .methods
+        .iter()
+        .filter_map(|m| Some((m.name, (m.outcome.as_ref().ok()?.mount_from_camera.isometry() * point).coords)))
+        .collect();
+    if places.len() < 3 {
+        return None;
+    }
+    let component = |i: usize| median(places.iter().map(|(_, p)| p[i]).collect());
+    let middle = Vector3::new(component(0)?, component(1)?, component(2)?);
+    let distances: Vec<(&'static str, f64)> = places.iter().map(|(name, p)| (*name, (p - middle).norm())).collect();
+    let typical_m = median(distances.iter().map(|(_, d)| *d).collect())?;
+    let mut off: Vec<(&'static str, f64)> = distances.into_iter().filter(|(_, d)| *d > DISAGREE_M).collect();
+    if off.is_empty() {
+        return None;
+    }
+    off.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let each = off
+        .iter()
+        .map(|(name, d)| text!("{method} by {distance} mm", method = name, distance = format!("{:.1}", d * 1e3)));
+    let (severity, advice) = if typical_m > DISAGREE_M {
+        (
+            Severity::Warning,
+            text!("Most of them do, so the views determine the answer weakly: add views with more tilt and turn."),
+        )
+    } else {
+        (Severity::Info, text!("The others agree; these weigh noise badly and are for comparison only."))
+    };
+    let list = Text::list(each);
+    let text = text!("Closed forms differ from the middle of all: {list}. {advice}", list = list, advice = advice);
+    let finding = Finding::new(FindingCode::ClosedFormsDisagree, severity, text);
+    let finding = finding.with("median_distance", typical_m * 1e3, "mm");
+    Some(off.iter().fold(finding, |f, (name, d)| f.with(name, d * 1e3, "mm")))
+}
+
+fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
+    let error_mm = calibration.tip_error_95_m? * 1e3;
+    let finding = |code, severity, text| {
+        Finding::new(code, severity, text).with("expected_error_95", error_mm, "mm").with("goal", goal_mm, "mm")
+    };
+    if error_mm <= goal_mm {
+        let text = text!(
+            "Good enough: the expected error of {error} mm (95 %) is below the goal of {goal} mm. Verify with captures that \
+             were not in the fit.",
+            error = format!("{error_mm:.3}"),
+            goal = format!("{goal_mm:.3}")
+        );
+        return Some(finding(FindingCode::GoalReached, Severity::Info, text));
+    }
+    let curve = calibration.error_curve.as_ref()?;
+    let (views, _) = curve.now()?;
+    let needed = curve.views_for(goal_mm * 1e-3);
+    let not_reached = |advice: Text| {
+        let text = text!(
+            "The expected error of {error} mm (95 %) is above the goal of {goal} mm. {advice}",
+            error = format!("{error_mm:.3}"),
+            goal = format!("{goal_mm:.3}"),
+            advice = advice
+        );
+        finding(FindingCode::GoalNotReached, Severity::Advice, text)
+    };
+    let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {
+        return Some(not_reached(text!(
+            "More views like these would take too many: tilt and turn the camera more, come closer, or reduce the noise."
+        )));
+    };
+    // The curve's error equals the stated one but for rounding, so one more is the least that can help.
+    let more = needed.saturating_sub(views).max(1);
+    let advice = if more == 1 {
+        text!("About {more} more view like those gathered will reach it.")
+    } else {
+        text!("About {more} more views like those gathered will reach it.")
+    };
+    Some(not_reached(advice.with("more", more)).with("more_views", more as f64, ""))
+}

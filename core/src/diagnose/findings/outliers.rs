@@ -1,0 +1,150 @@
+//! Findings on what the joint estimate decided by itself: views and corners set aside, views numbered from the other end, a
+//! bent target, a widened uncertainty, noise levels that cannot be told apart.
+
+use super::{Finding, FindingCode, Severity, listed};
+use crate::estimate::{Calibration, ViewResult, ViewStatus};
+use crate::text;
+use crate::wording::Text;
+
+/// Relative standard deviation of a noise level above which it counts as not determined.
+const UNCLEAR: f64 = 0.5;
+/// A level that makes no more than this of what the corners' own noise does to a pose needs no telling apart.
+const NO_MATTER: f64 = 0.5;
+
+pub fn findings(calibration: &Calibration) -> Vec<Finding> {
+    let mut found = Vec::new();
+    found.extend(outliers(calibration));
+    found.extend(corners(calibration));
+    found.extend(renumbered(calibration));
+    found.extend(bent(calibration));
+    found.extend(widened(calibration));
+    found.extend(unclear(calibration));
+    found
+}
+
+fn named<'a>(views: impl Iterator<Item = &'a ViewResult>) -> Vec<String> {
+    views.map(|view| view.name.clone()).collect()
+}
+
+fn with_views(finding: Finding, names: &[String]) -> Finding {
+    names.iter().fold(finding, |finding, name| finding.of_view(name))
+}
+
+fn outliers(calibration: &Calibration) -> Option<Finding> {
+    let aside = || calibration.views.iter().filter(|view| view.status == ViewStatus::Outlier);
+    let names = named(aside());
+    if names.is_empty() {
+        return None;
+    }
+    let worst = aside()
+        .filter_map(|view| view.distance)
+        .filter(|d| d.metres.is_finite())
+        .max_by(|a, b| a.of_limit.total_cmp(&b.of_limit));
+    let how_far = worst.map_or_else(
+        || text!("its corners are no image of the target"),
+        |d| {
+            text!(
+                "the target is up to {mm} mm and {deg}° from where the other views put it",
+                mm = format!("{:.1}", d.metres * 1e3),
+                deg = format!("{:.2}", d.radians.to_degrees())
+            )
+        },
+    );
+    let what = if names.len() == 1 {
+        text!("{count} view set aside, the answer is without: {list} ({how_far}).")
+    } else {
+        text!("{count} views set aside, the answer is without: {list} ({how_far}).")
+    };
+    let what = what.with("count", names.len()).with("list", listed(&names)).with("how_far", how_far);
+    let advice = text!(
+        "The arm may still have moved, the board may have been touched, or another pose was written down; capture again, or \
+         keep all views to see the difference."
+    );
+    let text = Text::sentences([what, advice]);
+    let finding = Finding::new(FindingCode::OutlierView, Severity::Warning, text).with("views", names.len() as f64, "");
+    let finding = match worst {
+        Some(d) => finding.with("distance", d.metres * 1e3, "mm").with("angle", d.radians.to_degrees(), "°"),
+        None => finding,
+    };
+    Some(with_views(finding, &names))
+}
+
+fn corners(calibration: &Calibration) -> Option<Finding> {
+    let names = named(calibration.views.iter().filter(|view| !view.corners_aside.is_empty()));
+    if names.is_empty() {
+        return None;
+    }
+    let count: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
+    let what = if count == 1 {
+        text!("{count} corner set aside, far from where the rest of the view puts them: in {list}.")
+    } else {
+        text!("{count} corners set aside, far from where the rest of the view puts them: in {list}.")
+    };
+    let what = what.with("count", count).with("list", listed(&names));
+    let text = Text::sentences([what, text!("Look for reflections and things in front of the target.")]);
+    let finding = Finding::new(FindingCode::OutlierCorners, Severity::Info, text).with("corners", count as f64, "");
+    Some(with_views(finding, &names))
+}
+
+fn renumbered(calibration: &Calibration) -> Option<Finding> {
+    let names = named(calibration.views.iter().filter(|view| view.renumbered));
+    if names.is_empty() {
+        return None;
+    }
+    let text = text!(
+        "The target looks the same from both ends, and was counted from the other end in {list} to agree with the rest. A \
+         target with an odd sum of inner corners, or a ChArUco board, has no such choice.",
+        list = listed(&names)
+    );
+    let finding = Finding::new(FindingCode::Renumbered, Severity::Info, text).with("views", names.len() as f64, "");
+    Some(with_views(finding, &names))
+}
+
+fn bent(calibration: &Calibration) -> Option<Finding> {
+    let estimate = calibration.shape?;
+    let sigma = estimate.warp_sigma_m?.map(|m| m * 1e3);
+    let [x, y] = estimate.shape.warp_m.map(|m| m * 1e3);
+    let text = text!(
+        "The target is bent by {x} ± {x_sigma} mm along x and {y} ± {y_sigma} mm along y (middle against edges, one standard \
+         deviation). The answer allows for it; fix the target to a flat plate for a better one.",
+        x = format!("{x:.2}"),
+        x_sigma = format!("{:.2}", sigma[0]),
+        y = format!("{y:.2}"),
+        y_sigma = format!("{:.2}", sigma[1])
+    );
+    let finding = Finding::new(FindingCode::BoardBent, Severity::Advice, text);
+    Some(finding.with("warp_x", x, "mm").with("warp_y", y, "mm"))
+}
+
+fn widened(calibration: &Calibration) -> Option<Finding> {
+    let widening = calibration.widening.as_ref()?;
+    let by = widening.by?;
+    let times = widening.factor.sqrt();
+    let text = text!(
+        "The stated uncertainty is {times} times what independent noise explains, because {why}. It counts what the data \
+         show; more poses in other places of the workspace help more than many in one.",
+        times = format!("{times:.1}"),
+        why = by.reason()
+    );
+    Some(Finding::new(FindingCode::UncertaintyWidened, Severity::Info, text).with("times", times, ""))
+}
+
+/// When robot and corner noise cannot be told apart, the robot's level is a guess between zero and what is stated.
+fn unclear(calibration: &Calibration) -> Option<Finding> {
+    let (sample, noise, robot_px) = (calibration.small_sample?, calibration.noise?, calibration.robot_effect_px?);
+    let [_, position, orientation] = sample.level_sigma;
+    let unclear = position.max(orientation);
+    if unclear < UNCLEAR || robot_px < NO_MATTER * noise.corner_px {
+        return None;
+    }
+    let text = text!(
+        "Robot and corner noise can hardly be told apart: the robot's {mm} mm is known to ± {mm_percent} % and its {deg}° to \
+         ± {deg_percent} %. The expected error allows for it. More views, or better pictures, tell them apart.",
+        mm = format!("{:.3}", noise.robot_m * 1e3),
+        mm_percent = format!("{:.0}", position * 100.0),
+        deg = format!("{:.3}", noise.robot_rad.to_degrees()),
+        deg_percent = format!("{:.0}", orientation * 100.0)
+    );
+    let finding = Finding::new(FindingCode::NoiseUnclear, Severity::Info, text);
+    Some(finding.with("position", position * 100.0, "%").with("orientation", orientation * 100.0, "%"))
+}

@@ -1,0 +1,6 @@
+//! What is weak or wrong in a set of views and its calibration, as codes and values.
+
+pub mod coverage;
+pub mod doctor;
+pub mod findings;
+pub mod record;

@@ -1,0 +1,295 @@
+//! Calibration from corners.
+
+use nalgebra::Point3;
+
+use super::lens::Lens;
+use super::refine::{self, Refined};
+use super::{
+    CalibrateError, Calibration, CornerResidual, Method, Observations, Options, ShapeEstimate, SharedCovariance,
+    ViewResult, ViewStatus, check_motion, chosen, closed_forms,
+};
+use crate::estimate::handeye::closed_form::ClosedFormSolution;
+use crate::estimate::handeye::joint::{self, JointProblem, camera_from_target};
+use crate::estimate::handeye::motion::MIN_VIEWS;
+use crate::estimate::handeye::{HandEye, Mode, PosePair};
+use crate::estimate::uncertainty::quality;
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Camera, Pose, Target};
+use crate::geometry::statistics::median_high;
+use crate::progress::Work;
+use crate::targets::bent::BoardPoints;
+use crate::targets::observation::{Corner, View};
+
+pub fn calibrate(
+    observations: &Observations,
+    method: Method,
+    options: Options,
+    work: &Work<'_>,
+) -> Result<Calibration, CalibrateError> {
+    let seen: Vec<DetectedView<'_>> = observations.views.iter().enumerate().filter_map(DetectedView::new).collect();
+    if seen.len() < MIN_VIEWS {
+        return Err(too_few(observations, seen.len()));
+    }
+    let (seen, wrong, lens) = believable(observations, seen, options, work)?;
+    let mut calibration = without_hand_eye(observations, &seen, &lens);
+    for index in wrong {
+        calibration.views[index].status = ViewStatus::Outlier;
+    }
+    let Some(mode) = observations.mode else { return Ok(calibration) };
+
+    let (mut views, pairs) = with_robot(mode, &seen, &lens)?;
+    check_motion(&pairs)?;
+    calibration.methods = closed_forms(&pairs, work)?;
+    let board = BoardPoints::new(&observations.target.points());
+    let problem = JointProblem::new(mode, &board, &views);
+    match method {
+        Method::ClosedForm(name) => {
+            let solution = chosen(&calibration.methods, name)?;
+            take_closed_form(&mut calibration, &solution, &problem, &seen, &lens);
+        }
+        Method::Joint => {
+            let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods)?;
+            let mut own = lens.camera_from_target.clone();
+            refine::renumber(&mut views, &mut own, &begin.turned, &observations.target);
+            let mut refined =
+                refine::refine(&JointProblem::new(mode, &board, &views), &own, &lens, &begin, options, work)?;
+            let kept = refined.screened.kept_views();
+            let problem = JointProblem { weights: refined.weights, ..JointProblem::new(mode, &board, &kept) };
+            let problem = refine::kept_problem(&problem, &kept, &refined.screened.solution);
+            refine::judge(&mut calibration, &problem, &mut refined.screened.solution, work)?;
+            take_joint(&mut calibration, &problem, &refined, &seen);
+        }
+    }
+    Ok(calibration)
+}
+
+/// How many times the typical residual of a view's own pose a view may have before its corners are taken as wrong: a target
+/// numbered wrongly or found in something else misses by whole squares.
+const WRONG_CORNERS: f64 = 8.0;
+/// Residuals below this, in pixels, are no sign of wrong corners however good the others are.
+const FINE_PX: f64 = 1.0;
+
+/// The views whose corners make sense as an image of the target, those whose do not, and the camera by the former.
+fn believable<'a>(
+    observations: &Observations,
+    seen: Vec<DetectedView<'a>>,
+    options: Options,
+    work: &Work<'_>,
+) -> Result<(Vec<DetectedView<'a>>, Vec<usize>, Lens), CalibrateError> {
+    let lens = Lens::find(observations, &seen, work)?;
+    let usual = median_high(lens.rms_px.iter().copied()).unwrap_or(0.0);
+    let limit = (WRONG_CORNERS * usual).max(FINE_PX);
+    let good = lens.rms_px.iter().filter(|rms| **rms <= limit).count();
+    if options.keep_outliers || good == seen.len() || good < MIN_VIEWS {
+        return Ok((seen, Vec::new(), lens));
+    }
+    let (kept, wrong): (Vec<_>, Vec<_>) = seen.into_iter().zip(&lens.rms_px).partition(|(_, rms)| **rms <= limit);
+    let kept: Vec<DetectedView<'a>> = kept.into_iter().map(|(s, _)| s).collect();
+    let wrong = wrong.into_iter().map(|(s, _)| s.index).collect();
+    let lens = Lens::find(observations, &kept, work)?;
+    Ok((kept, wrong, lens))
+}
+
+/// Whether it is the target that is missing, or views that were left out.
+fn too_few(observations: &Observations, found: usize) -> CalibrateError {
+    let excluded = observations.views.iter().filter(|v| !v.in_fit).count();
+    let with_excluded = observations.views.iter().filter(|v| v.corners.is_some()).count();
+    if with_excluded >= MIN_VIEWS {
+        return CalibrateError::TooFewLeft { left: found, excluded, need: MIN_VIEWS };
+    }
+    CalibrateError::TargetNotFound {
+        found,
+        images: observations.views.len() - excluded,
+        need: MIN_VIEWS,
+        target: observations.target.to_string(),
+    }
+}
+
+/// A view in the fit in which the target was found.
+pub(super) struct DetectedView<'a> {
+    /// Its index among all views.
+    index: usize,
+    view: &'a super::ObservedView,
+    pub(super) corners: &'a [Corner],
+}
+
+impl<'a> DetectedView<'a> {
+    fn new((index, view): (usize, &'a super::ObservedView)) -> Option<Self> {
+        Some(Self { index, view, corners: view.corners.as_deref().filter(|_| view.in_fit)? })
+    }
+}
+
+/// RMS over all corners from the RMS of each view.
+fn total_rms(per_view: impl Iterator<Item = (f64, usize)>) -> f64 {
+    let (squared, corners) = per_view.fold((0.0, 0usize), |(s, n), (rms, k)| (s + rms * rms * k as f64, n + k));
+    (squared / corners.max(1) as f64).sqrt()
+}
+
+fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens: &Lens) -> Calibration {
+    let mut views: Vec<ViewResult> =
+        observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::NoTarget)).collect();
+    let points = observations.target.points();
+    for ((s, rms), pose) in seen.iter().zip(&lens.rms_px).zip(&lens.camera_from_target) {
+        let view = &mut views[s.index];
+        view.status = ViewStatus::Used;
+        view.rms_px = Some(*rms);
+        view.residuals = residuals(&lens.intrinsics, pose, &points, s.corners);
+        view.camera_from_target = Some(*pose);
+    }
+    Calibration {
+        intrinsics: Some(lens.intrinsics),
+        intrinsics_fixed: !lens.free,
+        intrinsics_sigma: lens.sigma,
+        rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(seen.iter().map(|s| s.corners.len())))),
+        views,
+        ..Calibration::default()
+    }
+}
+
+/// Views and pose pairs of the robot; a view without a robot pose cannot stand in a set with a mode.
+fn with_robot(
+    mode: Mode,
+    seen: &[DetectedView<'_>],
+    lens: &Lens,
+) -> Result<(Vec<View>, Vec<PosePair>), CalibrateError> {
+    let mut views = Vec::with_capacity(seen.len());
+    let mut pairs = Vec::with_capacity(seen.len());
+    for (s, camera_from_target) in seen.iter().zip(&lens.camera_from_target) {
+        let Some(base_from_tip) = s.view.base_from_tip else {
+            return Err(CalibrateError::NoRobotPose { name: s.view.name.clone() });
+        };
+        views.push(View {
+            tip_by_joint: s.view.tip_by_joint.clone(),
+            ..View::new(s.view.name.clone(), base_from_tip, s.corners.to_vec())
+        });
+        pairs.push(PosePair {
+            anchor_from_mount: mode.anchor_from_mount(&base_from_tip),
+            camera_from_target: *camera_from_target,
+        });
+    }
+    Ok((views, pairs))
+}
+
+fn take_joint(calibration: &mut Calibration, problem: &JointProblem<'_>, refined: &Refined, seen: &[DetectedView<'_>]) {
+    let screened = &refined.screened;
+    let solution = &screened.solution;
+    calibration.shared = Some(SharedCovariance { free: solution.free, covariance: solution.covariance.clone() });
+    calibration.hand_eye_covariance = Some(solution.hand_eye_covariance());
+    calibration.target_covariance = Some(solution.target_covariance());
+    calibration.small_sample = Some(solution.small_sample);
+    if let Some(sigma) = solution.intrinsics_sigma().first_chunk::<4>() {
+        calibration.intrinsics_sigma = Some(*sigma);
+    }
+    let estimated = solution.free.warp || solution.free.scale;
+    calibration.shape = estimated.then(|| ShapeEstimate {
+        shape: solution.shape,
+        warp_sigma_m: solution.warp_covariance().map(|c| [c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
+        scale_sigma: solution.scale_sigma(),
+    });
+    calibration.joint_offsets.clone_from(&refined.joints);
+    calibration.tip_error_95_m = Some(quality::tip_error_95_m(solution));
+    calibration.reference_point = Some(solution.reference_point);
+    calibration.noise = Some(solution.noise);
+    calibration.rms_px = Some(solution.rms_px);
+    calibration.intrinsics = Some(solution.intrinsics);
+    calibration.hand_eye = Some(solution.hand_eye);
+    let points = problem.board.points(&solution.shape);
+    for (i, s) in seen.iter().enumerate() {
+        let view = &mut calibration.views[s.index];
+        view.distance = screened.distances.get(i).copied();
+        view.renumbered = refined.turned.contains(&i);
+        view.corners_aside = screened.corners.iter().filter(|(v, _)| *v == i).map(|(_, index)| *index).collect();
+        let corners = &screened.views[i].corners;
+        let fit = screened.kept.binary_search(&i).ok().map(|place| &solution.views[place]);
+        let pose = match fit {
+            Some(fit) => fit.camera_from_target,
+            // Where the others expect it: that is what it does not fit.
+            None => camera_from_target(
+                problem.mode,
+                &joint::base_from_tip_by_joints(&screened.views[i], &solution.joint_offsets_rad),
+                &solution.hand_eye.mount_from_camera(),
+                &solution.hand_eye.anchor_from_target(),
+            ),
+        };
+        view.residuals = residuals(&solution.intrinsics, &pose, &points, corners);
+        view.camera_from_target = Some(pose);
+        if let Some(fit) = fit {
+            view.rms_px = Some(fit.rms_px);
+            view.influence_m = fit.influence_m;
+            view.correction_m = Some(fit.correction.fixed_rows::<3>(0).norm());
+            view.correction_rad = Some(fit.correction.fixed_rows::<3>(3).norm());
+        } else {
+            view.status = ViewStatus::Outlier;
+            let squares: f64 = view.residuals.iter().map(|r| r.residual_px.norm_squared()).sum();
+            view.rms_px = (!view.residuals.is_empty()).then(|| (squares / view.residuals.len() as f64).sqrt());
+        }
+    }
+}
+
+/// A closed form has no correction of robot poses: its residuals are those of the bare chain.
+fn take_closed_form(
+    calibration: &mut Calibration,
+    solution: &ClosedFormSolution,
+    problem: &JointProblem<'_>,
+    seen: &[DetectedView<'_>],
+    lens: &Lens,
+) {
+    let mut rms = Vec::with_capacity(seen.len());
+    for (s, view) in seen.iter().zip(problem.views) {
+        let squared = squared_residuals(problem, &lens.intrinsics, solution, view, f64::INFINITY);
+        let view_rms = (squared / view.corners.len() as f64).sqrt();
+        let result = &mut calibration.views[s.index];
+        let pose = camera_from_target(
+            problem.mode,
+            &view.base_from_tip,
+            &solution.mount_from_camera,
+            &solution.anchor_from_target,
+        );
+        result.rms_px = view_rms.is_finite().then_some(view_rms);
+        result.residuals = residuals(&lens.intrinsics, &pose, problem.board.drawn(), s.corners);
+        result.camera_from_target = Some(pose);
+        rms.push((view_rms, view.corners.len()));
+    }
+    let all = total_rms(rms.into_iter());
+    calibration.rms_px = all.is_finite().then_some(all);
+    calibration.hand_eye = Some(HandEye::new(problem.mode, solution.mount_from_camera, solution.anchor_from_target));
+}
+
+/// Residuals of a view at a pose of the target; none at all when a corner has no image there.
+fn residuals(
+    intrinsics: &Intrinsics,
+    camera_from_target: &Pose<Camera, Target>,
+    points: &[Point3<f64>],
+    corners: &[Corner],
+) -> Vec<CornerResidual> {
+    let residual = |corner: &Corner| {
+        let predicted = intrinsics.project(&(camera_from_target.isometry() * points[corner.index])).ok()?;
+        Some(CornerResidual { index: corner.index, px: corner.px, residual_px: corner.px - predicted })
+    };
+    corners.iter().map(residual).collect::<Option<_>>().unwrap_or_default()
+}
+
+/// Sum of squared residuals of one view by the bare chain; a point without an image counts as the cap.
+pub(super) fn squared_residuals(
+    problem: &JointProblem<'_>,
+    intrinsics: &Intrinsics,
+    solution: &ClosedFormSolution,
+    view: &View,
+    cap_px: f64,
+) -> f64 {
+    let chain = camera_from_target(
+        problem.mode,
+        &view.base_from_tip,
+        &solution.mount_from_camera,
+        &solution.anchor_from_target,
+    );
+    view.corners
+        .iter()
+        .map(|corner| {
+            let residual = intrinsics
+                .project(&(chain.isometry() * problem.board.drawn()[corner.index]))
+                .map_or(cap_px, |px| (px - corner.px).norm());
+            residual.min(cap_px).powi(2)
+        })
+        .sum()
+}

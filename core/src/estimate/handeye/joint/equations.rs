@@ -1,0 +1,174 @@
+//! The least-squares equations of one view in the target's pose, the lens and the shape of the target.
+
+use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
+
+use super::gram::{Gram, Pair, Products};
+use crate::geometry::camera::{CameraError, Intrinsics, MAX_PARAMETERS};
+use crate::targets::bent::{BoardPoints, BoardShape};
+use crate::targets::observation::Corner;
+
+/// Unknowns of a pose.
+const POSE: usize = 6;
+
+/// Most unknowns of lens and target shape.
+pub(crate) const MAX_FORM: usize = MAX_PARAMETERS + 3;
+
+/// Which unknowns of lens and target shape are free. Their columns are, without gaps, the lens parameters in the order of
+/// [`Intrinsics::parameters`], the two warps, and the scale.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct FreeParameters {
+    pub lens: bool,
+    pub warp: bool,
+    pub scale: bool,
+}
+
+impl FreeParameters {
+    fn lens_count(self, intrinsics: &Intrinsics) -> usize {
+        if self.lens { intrinsics.parameter_count() } else { 0 }
+    }
+
+    /// First of the two columns of the warp.
+    pub fn warp_at(self, intrinsics: &Intrinsics) -> usize {
+        self.lens_count(intrinsics)
+    }
+
+    /// Column of the scale.
+    pub fn scale_at(self, intrinsics: &Intrinsics) -> usize {
+        self.warp_at(intrinsics) + if self.warp { 2 } else { 0 }
+    }
+
+    /// Number of columns.
+    pub fn count(self, intrinsics: &Intrinsics) -> usize {
+        self.scale_at(intrinsics) + usize::from(self.scale)
+    }
+}
+
+/// What one view is seen through: lens and target, and the weights of its corners.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ViewInput<'a> {
+    pub intrinsics: &'a Intrinsics,
+    pub board: &'a BoardPoints,
+    pub shape: &'a BoardShape,
+    pub corners: &'a [Corner],
+    /// One matrix `W` per corner, whose residual counts as `W r`; empty where all corners count alike.
+    pub sqrt_weights: &'a [Matrix2<f64>],
+}
+
+/// Normal equations of one view, with residuals `r = predicted − measured` in pixels (times the whitener of the corner)
+/// and the pose perturbed as `camera_from_target * exp(xi)`. Columns of the form beyond its count are zero.
+#[derive(Debug, Clone)]
+pub(crate) struct PoseEquations {
+    /// `Jpᵀ Jp`
+    pub pose: Matrix6<f64>,
+    /// `Jpᵀ Jf`
+    pub pose_by_form: SMatrix<f64, 6, MAX_FORM>,
+    /// `Jfᵀ Jf`
+    pub form: SMatrix<f64, MAX_FORM, MAX_FORM>,
+    /// `Jpᵀ r`
+    pub pose_gradient: Vector6<f64>,
+    /// `Jfᵀ r`
+    pub form_gradient: SVector<f64, MAX_FORM>,
+    /// `rᵀ r`, squared pixels.
+    pub squared_px: f64,
+    /// Number of corners.
+    pub corners: usize,
+}
+
+impl PoseEquations {
+    /// Linearises the corners of a view at a pose of the target.
+    pub fn new(
+        seen: &ViewInput<'_>,
+        camera_from_target: &Isometry3<f64>,
+        free: FreeParameters,
+    ) -> Result<Self, CameraError> {
+        // Six columns of the pose, those of the form, and the residual, four at a time.
+        match (POSE + free.count(seen.intrinsics) + 1).div_ceil(4) {
+            0..=2 => Self::with_quads::<2>(seen, camera_from_target, free),
+            3 => Self::with_quads::<3>(seen, camera_from_target, free),
+            4 => Self::with_quads::<4>(seen, camera_from_target, free),
+            5 => Self::with_quads::<5>(seen, camera_from_target, free),
+            _ => Self::with_quads::<6>(seen, camera_from_target, free),
+        }
+    }
+
+    fn with_quads<const QUADS: usize>(
+        seen: &ViewInput<'_>,
+        camera_from_target: &Isometry3<f64>,
+        free: FreeParameters,
+    ) -> Result<Self, CameraError> {
+        let ViewInput { intrinsics, board, shape, corners, sqrt_weights } = *seen;
+        let rotation: Matrix3<f64> = camera_from_target.rotation.to_rotation_matrix().into_inner();
+        let translation = camera_from_target.translation.vector;
+        let lens_count = free.lens_count(intrinsics);
+        let count = free.count(intrinsics);
+        let mut gram = Gram::<QUADS>::new();
+        for (i, corner) in corners.iter().enumerate() {
+            let point = board.point(corner.index, shape);
+            let projection = intrinsics.linearise(&(rotation * point.coords + translation))?;
+            let [a, b, c] = projection.by_point;
+            let by_target_point: [Pair; 3] = std::array::from_fn(|k| {
+                let axis = rotation.column(k);
+                [0, 1].map(|row| a[row] * axis[0] + b[row] * axis[1] + c[row] * axis[2])
+            });
+            let [bx, by, bz] = by_target_point;
+            let Point3 { coords: p } = point;
+            let columns = gram.next();
+            columns[..3].copy_from_slice(&by_target_point);
+            // Rows of `-by_target_point [p]×` are `p × row`.
+            columns[3] = [0, 1].map(|row| p.y * bz[row] - p.z * by[row]);
+            columns[4] = [0, 1].map(|row| p.z * bx[row] - p.x * bz[row]);
+            columns[5] = [0, 1].map(|row| p.x * by[row] - p.y * bx[row]);
+            columns[POSE..POSE + lens_count].copy_from_slice(&projection.by_parameters[..lens_count]);
+            if free.warp || free.scale {
+                let (by_warp, by_scale) = board.derivatives(corner.index, shape);
+                if free.warp {
+                    let at = POSE + free.warp_at(intrinsics);
+                    columns[at] = bz.map(|d| d * by_warp[0]);
+                    columns[at + 1] = bz.map(|d| d * by_warp[1]);
+                }
+                if free.scale {
+                    columns[POSE + free.scale_at(intrinsics)] =
+                        [0, 1].map(|row| bx[row] * by_scale.x + by[row] * by_scale.y + bz[row] * by_scale.z);
+                }
+            }
+            columns[POSE + count] = [projection.px[0] - corner.px.x, projection.px[1] - corner.px.y];
+            if let Some(w) = sqrt_weights.get(i) {
+                for column in &mut columns[..=POSE + count] {
+                    let [x, y] = *column;
+                    *column = [w.m11 * x + w.m12 * y, w.m21 * x + w.m22 * y];
+                }
+            }
+        }
+        Ok(Self::from_products(&gram.finish(), count, corners.len()))
+    }
+
+    fn from_products<const QUADS: usize>(products: &Products<QUADS>, count: usize, corners: usize) -> Self {
+        let residual = POSE + count;
+        let mut pose_by_form = SMatrix::zeros();
+        let mut form = SMatrix::zeros();
+        let mut form_gradient = SVector::zeros();
+        for j in 0..count {
+            for i in 0..POSE {
+                pose_by_form[(i, j)] = products.at(i, POSE + j);
+            }
+            for i in 0..=j {
+                form[(i, j)] = products.at(POSE + i, POSE + j);
+                form[(j, i)] = form[(i, j)];
+            }
+            form_gradient[j] = products.at(POSE + j, residual);
+        }
+        Self {
+            pose: Matrix6::from_fn(|i, j| products.at(i, j)),
+            pose_by_form,
+            form,
+            pose_gradient: Vector6::from_fn(|i, _| products.at(i, residual)),
+            form_gradient,
+            squared_px: products.at(residual, residual),
+            corners,
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "equations_tests.rs"]
+mod tests;

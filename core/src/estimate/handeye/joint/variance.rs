@@ -1,0 +1,230 @@
+//! Noise levels from the data: restricted maximum likelihood of the linearised model.
+//!
+//! With all unknowns integrated out, minus twice the log-likelihood of the noise levels is
+//! `(n − 6 N) ln corner² + 6 N ln (corner² + view²) + 3 N ln robot_m² + 3 N ln robot_rad² + ln det H + Q` for `n` residuals of
+//! `N` views, where `H` is the normal matrix and `Q` the least weighted cost. Its derivative by the log of each variance is
+//! the familiar `count - expected sum of squares`, the fixed point of the EM iteration; Newton on the logs gets there in a
+//! few steps where EM crawls when the robot is nearly exact.
+
+use nalgebra::{Matrix4, Vector4, Vector6};
+
+use super::normal::System;
+use super::optimise::State;
+use super::view_block::prior_weight;
+use super::{JointProblem, Noise};
+use crate::estimate::handeye::HandEyeError;
+
+/// Lowest levels: a nanometre, a nanoradian and a millionth of a pixel are exact for every purpose here.
+const LOWEST: Noise = Noise { corner_px: 1e-6, view_px: 0.0, robot_m: 1e-9, robot_rad: 1e-9 };
+/// Highest levels: beyond them the robot pose says nothing.
+const HIGHEST: Noise = Noise { corner_px: 1e4, view_px: 1e4, robot_m: 1.0, robot_rad: 1.0 };
+/// Newton steps.
+const MAX_STEPS: usize = 60;
+/// Largest change of a log-variance in one step.
+const LARGEST_STEP: f64 = 3.0;
+/// Ends when the likelihood would gain less than this: a unit of `-2 ln L` is one standard deviation.
+const GAIN_TOLERANCE: f64 = 1e-6;
+
+/// Which levels are estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Levels {
+    /// Corners and robot.
+    Three,
+    /// And what the corners of a view have in common.
+    WithView,
+}
+
+impl Levels {
+    /// Number of levels.
+    pub fn count(self) -> usize {
+        match self {
+            Self::Three => 3,
+            Self::WithView => 4,
+        }
+    }
+}
+
+/// Logs of the variances of a corner, of the robot's position and orientation, and of the part of a view that looks like a
+/// pose; the last follows the first where it is not estimated.
+type Logs = Vector4<f64>;
+
+/// Rough levels for the first round: the robot is taken to explain the start's misfit with generous room.
+pub fn starting_noise(problem: &JointProblem<'_>, state: &State) -> Noise {
+    let mut squared = 0.0;
+    let mut count = 0.0;
+    for view in problem.views {
+        let chain = state.chain(problem, view, &Vector6::zeros());
+        for corner in &view.corners {
+            let point = chain.camera_from_target * problem.board.point(corner.index, &state.shape);
+            if let Ok(px) = state.intrinsics.project(&point) {
+                squared += (px - corner.px).norm_squared();
+                count += 2.0;
+            }
+        }
+    }
+    // Corners are good to a fraction of a pixel on any working camera; the rest of the misfit is the robot's to take.
+    let misfit_px = if count > 0.0 { f64::sqrt(squared / count) } else { 1.0 };
+    Noise { corner_px: misfit_px.clamp(1e-3, 0.3), view_px: 0.0, robot_m: 1e-3, robot_rad: 2e-3 }
+}
+
+/// Largest relative change of any level, ignoring what happens at the floor.
+pub fn change(a: &Noise, b: &Noise) -> f64 {
+    let relative = |a: f64, b: f64, floor: f64| (b.max(10.0 * floor) / a.max(10.0 * floor)).ln().abs();
+    relative(a.corner_px, b.corner_px, LOWEST.corner_px)
+        .max(relative(a.corner_px + a.view_px, b.corner_px + b.view_px, LOWEST.corner_px))
+        .max(relative(a.robot_m, b.robot_m, LOWEST.robot_m))
+        .max(relative(a.robot_rad, b.robot_rad, LOWEST.robot_rad))
+}
+
+/// Minus twice the restricted log-likelihood and its gradient by the log-variances.
+struct Likelihood {
+    value: f64,
+    gradient: Logs,
+}
+
+fn to_noise(logs: &Logs) -> Noise {
+    let level = |i: usize, low: f64, high: f64| (0.5 * logs[i]).exp().clamp(low, high);
+    let corner_px = level(0, LOWEST.corner_px, HIGHEST.corner_px);
+    Noise {
+        corner_px,
+        view_px: (logs[3].exp() - corner_px.powi(2)).clamp(0.0, HIGHEST.view_px.powi(2)).sqrt(),
+        robot_m: level(1, LOWEST.robot_m, HIGHEST.robot_m),
+        robot_rad: level(2, LOWEST.robot_rad, HIGHEST.robot_rad),
+    }
+}
+
+fn to_logs(noise: &Noise) -> Logs {
+    let together = noise.corner_px.powi(2) + noise.view_px.powi(2);
+    Logs::new(2.0 * noise.corner_px.ln(), 2.0 * noise.robot_m.ln(), 2.0 * noise.robot_rad.ln(), together.ln())
+}
+
+/// Keeps the logs in their range, and the pose's part no smaller than what independent corners make of it.
+fn kept(mut logs: Logs, levels: Levels) -> Logs {
+    let (low, high) = (to_logs(&LOWEST), to_logs(&HIGHEST));
+    for i in 0..3 {
+        logs[i] = logs[i].clamp(low[i], high[i]);
+    }
+    logs[3] = match levels {
+        Levels::Three => logs[0],
+        Levels::WithView => logs[3].clamp(logs[0], high[3]),
+    };
+    logs
+}
+
+fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, HandEyeError> {
+    let noise = to_noise(logs);
+    let reduced = system.reduce(&noise)?;
+    let prior = prior_weight(&noise);
+    let views = system.blocks.len() as f64;
+    let in_poses = 6.0 * views;
+    let in_rest = system.residual_count() as f64 - in_poses;
+    let least_cost = system.cost(&noise) - reduced.decrease();
+
+    let shared_covariance = reduced.inverse();
+    let n = shared_covariance.nrows();
+    let shared_step = reduced.shared_step();
+    let steps = reduced.own_steps(&shared_step);
+
+    // Expected sums of squares of the corrections: estimate plus posterior variance.
+    let mut squares = Vector6::zeros();
+    let mut variances = Vector6::zeros();
+    for ((own, step), correction) in reduced.own.iter().zip(&steps).zip(&system.corrections) {
+        if system.cancel.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        let estimate = correction + step;
+        squares += estimate.component_mul(&estimate);
+        variances += own.variances(&shared_covariance);
+    }
+    let prior_cost = squares.dot(&prior);
+    let prior_trace = variances.dot(&prior);
+    let unknowns = n as f64 + 6.0 * views;
+    // tr(H H⁻¹) counts the unknowns; what the priors do not take of it is the corners' share.
+    let known_cost = system.prior_cost(Some(&shared_step));
+    let known_trace = system.prior_trace(&shared_covariance);
+    let corner_squares = (least_cost - prior_cost - known_cost) + (unknowns - prior_trace - known_trace);
+    let (rest, rest_expected) = system.rest_squares(&shared_step, &shared_covariance);
+    let rest_squares = (rest + rest_expected) / noise.corner_px.powi(2);
+    let expected = squares + variances;
+    let robot_m = expected.fixed_rows::<3>(0).sum() * prior[0];
+    let robot_rad = expected.fixed_rows::<3>(3).sum() * prior[3];
+    let value = in_rest * logs[0]
+        + in_poses * logs[3]
+        + 3.0 * views * (logs[1] + logs[2])
+        + reduced.log_determinant()
+        + least_cost;
+    let by_rest = in_rest - rest_squares;
+    let by_poses = in_poses - (corner_squares - rest_squares);
+    let (by_rest, by_poses) = match levels {
+        Levels::Three => (by_rest + by_poses, 0.0),
+        Levels::WithView => (by_rest, by_poses),
+    };
+    let gradient = Logs::new(by_rest, 3.0 * views - robot_m, 3.0 * views - robot_rad, by_poses);
+    Ok(Likelihood { value, gradient })
+}
+
+/// Second derivatives of minus twice the restricted log-likelihood by the log-variances; those of a level that is not
+/// estimated are zero.
+pub fn curvature(system: &System, noise: &Noise, levels: Levels) -> Result<Matrix4<f64>, HandEyeError> {
+    let logs = kept(to_logs(noise), levels);
+    let at = evaluate(system, &logs, levels)?;
+    hessian(system, &logs, &at, levels)
+}
+
+fn hessian(system: &System, logs: &Logs, at: &Likelihood, levels: Levels) -> Result<Matrix4<f64>, HandEyeError> {
+    const DIFFERENCE: f64 = 1e-4;
+    let high = to_logs(&HIGHEST);
+    let mut hessian = Matrix4::zeros();
+    for i in 0..levels.count() {
+        let mut shifted = *logs;
+        // Towards the inside, so that the clamp in `to_noise` cannot flatten the difference.
+        let h = if shifted[i] + DIFFERENCE > high[i] { -DIFFERENCE } else { DIFFERENCE };
+        shifted[i] += h;
+        if i == 0 && levels == Levels::Three {
+            shifted[3] += h;
+        }
+        hessian.set_column(i, &((evaluate(system, &shifted, levels)?.gradient - at.gradient) / h));
+    }
+    Ok(0.5 * (hessian + hessian.transpose()))
+}
+
+/// The noise levels that maximise the restricted likelihood of a linearised system, from `start`, and minus twice its log.
+pub fn restricted_likelihood(system: &System, start: &Noise, levels: Levels) -> Result<(Noise, f64), HandEyeError> {
+    let mut logs = kept(to_logs(start), levels);
+    let mut at = evaluate(system, &logs, levels)?;
+    let mut damping = 1e-3;
+    for _ in 0..MAX_STEPS {
+        let hessian = hessian(system, &logs, &at, levels)?;
+        let mut improved = false;
+        while damping < 1e9 {
+            let step = newton_step(&hessian, &at.gradient, damping);
+            let next_logs = kept(logs + step, levels);
+            let next = evaluate(system, &next_logs, levels)?;
+            if next.value < at.value {
+                let gain = at.value - next.value;
+                (logs, at) = (next_logs, next);
+                damping = (damping * 0.2).max(1e-9);
+                improved = gain > GAIN_TOLERANCE;
+                break;
+            }
+            damping = (damping * 5.0).max(1e-6);
+        }
+        if !improved {
+            break;
+        }
+    }
+    Ok((to_noise(&logs), at.value))
+}
+
+/// A step down even where the likelihood is not convex in the logs: eigenvalues are taken by their absolute value.
+fn newton_step(hessian: &Matrix4<f64>, gradient: &Logs, damping: f64) -> Logs {
+    let eigen = hessian.symmetric_eigen();
+    let mut step = Logs::zeros();
+    for i in 0..4 {
+        let direction = eigen.eigenvectors.column(i);
+        let curvature = eigen.eigenvalues[i].abs() + damping * (1.0 + eigen.eigenvalues[i].abs());
+        step -= direction * (direction.dot(gradient) / curvature);
+    }
+    let largest = step.amax();
+    if largest > LARGEST_STEP { step * (LARGEST_STEP / largest) } else { step }
+}

@@ -1,0 +1,270 @@
+//! Levenberg–Marquardt on lens, shape and all poses, the poses eliminated view by view.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector3, Vector6};
+
+use super::{IntrinsicsError, SeenView};
+use crate::estimate::handeye::joint::equations::{FreeParameters, MAX_FORM, PoseEquations, ViewInput};
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::planar_pose::PoseError;
+use crate::geometry::planar_pose::mirror::mirrored;
+use crate::geometry::planar_pose::refine::refine;
+use crate::geometry::se3;
+use crate::progress::CancelToken;
+use crate::targets::bent::{BoardPoints, BoardShape};
+
+/// Steps of one minimisation; a handful is usual, but the rational model walks along a valley.
+const MAX_STEPS: usize = 100;
+/// Ends when the quadratic model promises less than this part of the cost.
+const COST_TOLERANCE: f64 = 1e-13;
+/// Squared pixels per corner that are rounding: corners without noise end here.
+const ROUNDING_PX2: f64 = 1e-20;
+/// First damping relative to the diagonal.
+const FIRST_DAMPING: f64 = 1e-3;
+/// By how much the damping falls after a step that kept its promise. It has to fall fast: what the poses take from the
+/// information of the lens is all but a thousandth, so that a small damping still shortens the step.
+const EASE: f64 = 1e-3;
+/// By how much it rises after a step that was no good.
+const TIGHTEN: f64 = 10.0;
+/// From where it rises.
+const LEAST_RISE: f64 = 1e-8;
+/// Past this damping a step is too small to matter.
+const LARGEST_DAMPING: f64 = 1e10;
+/// Steps of a mirrored pose.
+const MIRROR_STEPS: usize = 10;
+/// A mirrored pose is taken when it lowers the cost of its view by more than this part: less is rounding.
+const WORTHWHILE: f64 = 1e-6;
+
+/// What is given.
+pub(super) struct Problem<'a> {
+    pub views: &'a [SeenView<'a>],
+    pub board: &'a BoardPoints,
+    pub free: FreeParameters,
+    pub cancel: &'a CancelToken,
+}
+
+impl Problem<'_> {
+    fn check_cancel(&self) -> Result<(), IntrinsicsError> {
+        if self.cancel.is_cancelled() { Err(IntrinsicsError::Cancelled) } else { Ok(()) }
+    }
+}
+
+/// The current values of all unknowns.
+#[derive(Debug, Clone)]
+pub(super) struct Estimate {
+    pub intrinsics: Intrinsics,
+    pub shape: BoardShape,
+    pub poses: Vec<Isometry3<f64>>,
+}
+
+/// The equations of one view's pose.
+struct Block {
+    pose: Matrix6<f64>,
+    pose_by_form: SMatrix<f64, 6, MAX_FORM>,
+    gradient: Vector6<f64>,
+}
+
+impl Block {
+    fn factor(&self, damping: f64) -> Option<Cholesky<f64, nalgebra::Const<6>>> {
+        let mut damped = self.pose;
+        for i in 0..6 {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        Cholesky::new(damped)
+    }
+}
+
+type FormMatrix = SMatrix<f64, MAX_FORM, MAX_FORM>;
+type FormVector = SVector<f64, MAX_FORM>;
+
+/// All views linearised at one estimate.
+pub(super) struct Linear {
+    blocks: Vec<Block>,
+    form: FormMatrix,
+    form_gradient: FormVector,
+    /// `Σ ‖W r‖²`
+    pub cost: f64,
+}
+
+impl Linear {
+    /// `None` where a corner has no image.
+    pub fn new(problem: &Problem<'_>, estimate: &Estimate) -> Result<Option<Self>, IntrinsicsError> {
+        let mut all = Self {
+            blocks: Vec::with_capacity(problem.views.len()),
+            form: FormMatrix::zeros(),
+            form_gradient: FormVector::zeros(),
+            cost: 0.0,
+        };
+        for (view, pose) in problem.views.iter().zip(&estimate.poses) {
+            problem.check_cancel()?;
+            let seen = seen(view, problem.board, &estimate.shape, &estimate.intrinsics);
+            let Ok(equations) = PoseEquations::new(&seen, pose, problem.free) else { return Ok(None) };
+            all.form += equations.form;
+            all.form_gradient += equations.form_gradient;
+            all.cost += equations.squared_px;
+            all.blocks.push(Block {
+                pose: equations.pose,
+                pose_by_form: equations.pose_by_form,
+                gradient: equations.pose_gradient,
+            });
+        }
+        Ok(all.cost.is_finite().then_some(all))
+    }
+
+    /// Normal equations of the first `n` columns of the form without the poses: their matrix and gradient, and what the
+    /// poses alone can take from the cost. `None` where a view leaves its pose undetermined.
+    fn eliminate(&self, n: usize, damping: f64) -> Option<(FormMatrix, FormVector, f64)> {
+        let (mut matrix, mut gradient, mut decrease) = (self.form, self.form_gradient, 0.0);
+        for i in 0..n {
+            matrix[(i, i)] *= 1.0 + damping;
+        }
+        for block in &self.blocks {
+            let factor = block.factor(damping)?;
+            let lower = factor.l_dirty();
+            let forward = |column: [f64; 6]| {
+                let mut out = [0.0; 6];
+                for (i, value) in column.into_iter().enumerate() {
+                    let known: f64 = out[..i].iter().enumerate().map(|(j, done)| lower[(i, j)] * done).sum();
+                    out[i] = (value - known) / lower[(i, i)];
+                }
+                out
+            };
+            let dot = |a: &[f64; 6], b: &[f64; 6]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+            let mut gains = [[0.0; 6]; MAX_FORM];
+            for (k, gain) in gains[..n].iter_mut().enumerate() {
+                *gain = forward(block.pose_by_form.column(k).into_owned().data.0[0]);
+            }
+            let own = forward(block.gradient.data.0[0]);
+            decrease += dot(&own, &own);
+            for (j, gain) in gains[..n].iter().enumerate() {
+                for (i, other) in gains[..=j].iter().enumerate() {
+                    matrix[(i, j)] -= dot(gain, other);
+                }
+                gradient[j] -= dot(gain, &own);
+            }
+        }
+        for j in 0..n {
+            for i in 0..j {
+                matrix[(j, i)] = matrix[(i, j)];
+            }
+        }
+        Some((matrix, gradient, decrease))
+    }
+
+    /// What the views say about the columns of the form, the poses eliminated, for residuals of standard deviation 1.
+    pub fn information(&self, problem: &Problem<'_>, estimate: &Estimate) -> Result<DMatrix<f64>, IntrinsicsError> {
+        let n = problem.free.count(&estimate.intrinsics);
+        let Some((matrix, _, _)) = self.eliminate(n, 0.0) else {
+            let view = self.blocks.iter().position(|b| b.factor(0.0).is_none()).unwrap_or(0);
+            return Err(PoseError::CollinearCorners { view }.into());
+        };
+        Ok(DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]))
+    }
+
+    /// The damped step from `estimate` and the decrease of the cost that it promises.
+    fn step(&self, problem: &Problem<'_>, estimate: &Estimate, damping: f64) -> Option<(Estimate, f64)> {
+        let n = problem.free.count(&estimate.intrinsics);
+        let (matrix, gradient, by_poses) = self.eliminate(n, damping)?;
+        // Columns differ by many orders (pixels, lens coefficients, metres).
+        let scale = DVector::from_fn(n, |i, _| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
+        let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+        let gradient = DVector::from_fn(n, |i, _| gradient[i] * scale[i]);
+        let solved = Cholesky::new(scaled)?.solve(&gradient);
+        let promised = by_poses + gradient.dot(&solved);
+        let mut form = FormVector::zeros();
+        form.rows_mut(0, n).copy_from(&-solved.component_mul(&scale));
+        let mut poses = Vec::with_capacity(self.blocks.len());
+        for (block, pose) in self.blocks.iter().zip(&estimate.poses) {
+            let own = -block.factor(damping)?.solve(&(block.gradient + block.pose_by_form * form));
+            poses.push(pose * se3::exp(&own));
+        }
+        let lens: Vec<f64> = estimate.intrinsics.parameters().iter().zip(form.iter()).map(|(p, d)| p + d).collect();
+        let mut shape = estimate.shape;
+        if problem.free.warp {
+            let at = problem.free.warp_at(&estimate.intrinsics);
+            shape.warp_m[0] += form[at];
+            shape.warp_m[1] += form[at + 1];
+        }
+        let intrinsics = estimate.intrinsics.with_parameters(&lens);
+        (promised.is_finite() && intrinsics.validate().is_ok())
+            .then_some((Estimate { intrinsics, shape, poses }, promised))
+    }
+}
+
+pub(super) fn seen<'a>(
+    view: &SeenView<'a>,
+    board: &'a BoardPoints,
+    shape: &'a BoardShape,
+    intrinsics: &'a Intrinsics,
+) -> ViewInput<'a> {
+    ViewInput { intrinsics, board, shape, corners: view.corners, sqrt_weights: view.sqrt_weights }
+}
+
+/// Minimises the cost from `estimate`, which holds the best point found afterwards. Returns the number of steps; `None`
+/// where the start has a corner without image or no step is possible.
+pub(super) fn minimise(problem: &Problem<'_>, estimate: &mut Estimate) -> Result<Option<usize>, IntrinsicsError> {
+    let Some(mut linear) = Linear::new(problem, estimate)? else { return Ok(None) };
+    let corners: usize = problem.views.iter().map(|v| v.corners.len()).sum();
+    let rounding = ROUNDING_PX2 * corners as f64;
+    let mut damping = FIRST_DAMPING;
+    for step in 0..MAX_STEPS {
+        loop {
+            problem.check_cancel()?;
+            if damping > LARGEST_DAMPING {
+                return Ok((step > 0).then_some(step));
+            }
+            let Some((next, promised)) = linear.step(problem, estimate, damping) else {
+                damping = (damping * TIGHTEN).max(LEAST_RISE);
+                continue;
+            };
+            let negligible = COST_TOLERANCE * linear.cost + rounding;
+            // A damped step promises little because it is short.
+            if promised <= negligible && damping < 1e-6 {
+                return Ok(Some(step));
+            }
+            // A step that puts the target behind the camera is as bad as one that raises the cost.
+            if let Some(next_linear) = Linear::new(problem, &next)?
+                && next_linear.cost < linear.cost
+            {
+                let kept = (linear.cost - next_linear.cost) / promised;
+                damping *= if kept > 0.5 { EASE } else { 1.0 };
+                (*estimate, linear) = (next, next_linear);
+                break;
+            }
+            if promised <= negligible {
+                return Ok(Some(step));
+            }
+            damping = (damping * TIGHTEN).max(LEAST_RISE);
+        }
+    }
+    Ok(Some(MAX_STEPS))
+}
+
+/// Tries the mirror image of every pose and keeps what fits better; whether any did. Both are minima of the cost, and the
+/// descent ends in the one nearer to its start.
+pub(super) fn mirror_poses(problem: &Problem<'_>, estimate: &mut Estimate) -> Result<bool, IntrinsicsError> {
+    let mut improved = false;
+    let Estimate { intrinsics, shape, poses } = estimate;
+    for (view, pose) in problem.views.iter().zip(poses.iter_mut()) {
+        problem.check_cancel()?;
+        let seen = seen(view, problem.board, shape, intrinsics);
+        let sum: Vector3<f64> = view.corners.iter().map(|c| problem.board.point(c.index, shape).coords).sum();
+        let Some(start) = mirrored(pose, &(sum / view.corners.len() as f64)) else { continue };
+        let Some(other) = refine(&seen, &start, MIRROR_STEPS) else { continue };
+        let Ok(own) = PoseEquations::new(&seen, pose, FreeParameters::default()) else { continue };
+        if other.squared_px < (1.0 - WORTHWHILE) * own.squared_px {
+            *pose = other.pose;
+            improved = true;
+        }
+    }
+    Ok(improved)
+}
+
+/// Root mean square of the 2-D residuals of one view, pixels.
+pub(super) fn rms_px(problem: &Problem<'_>, estimate: &Estimate, view: usize) -> f64 {
+    let (corners, pose) = (problem.views[view].corners, &estimate.poses[view]);
+    let squared = |corner: &crate::targets::observation::Corner| {
+        let point = problem.board.point(corner.index, &estimate.shape);
+        estimate.intrinsics.project(&(pose * point)).map_or(f64::NAN, |px| (px - corner.px).norm_squared())
+    };
+    (corners.iter().map(squared).sum::<f64>() / corners.len() as f64).sqrt()
+}

@@ -1,0 +1,459 @@
+//! From observations to a calibration: intrinsics, closed forms, the joint estimate, and what it is worth.
+//!
+//! One path for the window, the command line and the tests.
+
+mod corners;
+pub mod handeye;
+pub mod intrinsics;
+mod lens;
+mod pairs;
+mod refine;
+mod to_result;
+pub mod uncertainty;
+
+use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
+
+use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
+use crate::estimate::handeye::joint::outliers::Distance;
+use crate::estimate::handeye::joint::prediction::ErrorCurve;
+use crate::estimate::handeye::joint::{Free, Noise, SmallSample};
+use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, subset};
+use crate::estimate::intrinsics::IntrinsicsError;
+use crate::estimate::uncertainty::widening::Widening;
+use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::geometry::planar_pose::PoseError;
+use crate::progress::{Stage, Work};
+use crate::project::dataset::CameraInput;
+use crate::targets::TargetSpec;
+use crate::targets::bent::BoardShape;
+use crate::targets::observation::Corner;
+
+/// What was observed, from a dataset folder, a session or a live capture.
+#[derive(Debug, Clone)]
+pub struct Observations {
+    /// Where the camera sits; `None` when there is no robot and only the camera is calibrated.
+    pub mode: Option<Mode>,
+    /// The target.
+    pub target: TargetSpec,
+    /// Width and height of the images in pixels.
+    pub image_size: (u32, u32),
+    /// What is known about the camera.
+    pub camera: CameraKnowledge,
+    /// One entry per image, in the order of the pose table.
+    pub views: Vec<ObservedView>,
+}
+
+/// One image.
+#[derive(Debug, Clone)]
+pub struct ObservedView {
+    /// Its name in reports.
+    pub name: String,
+    /// The reported robot pose; `None` when there is no robot.
+    pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// The corners; `None` when the target was not found.
+    pub corners: Option<Vec<Corner>>,
+    /// How the tip turns with each joint, as in [`crate::targets::observation::View::tip_by_joint`]; empty where it is not known.
+    pub tip_by_joint: Vec<Vector6<f64>>,
+    /// A target pose measured elsewhere, used when there are no corners.
+    pub camera_from_target: Option<Pose<Camera, Target>>,
+    /// Whether the view takes part; one that does not is listed as [`ViewStatus::Excluded`] and touches no number.
+    pub in_fit: bool,
+}
+
+/// What is known about the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraKnowledge {
+    /// These intrinsics, taken as exact.
+    Fixed(Intrinsics),
+    /// Intrinsics are estimated.
+    Estimate {
+        /// The lens model; its coefficients do not matter.
+        model: Distortion,
+        /// Where to start; `None` finds a start from the views.
+        start: Option<Intrinsics>,
+    },
+}
+
+impl CameraKnowledge {
+    /// What is known when nothing is stated: intrinsics are estimated with [`DEFAULT_MODEL`].
+    pub const NOTHING: Self = Self::Estimate { model: DEFAULT_MODEL, start: None };
+
+    /// What a data set or a session says of its camera.
+    pub fn of(camera: Option<&CameraInput>) -> Self {
+        match camera {
+            None => Self::NOTHING,
+            Some(input) => match input.intrinsics {
+                Some(intrinsics) if input.fixed => Self::Fixed(intrinsics),
+                start => Self::Estimate { model: input.model, start },
+            },
+        }
+    }
+}
+
+/// Views of a good session: the noise levels rest on as many numbers, and with ten they are known to a fifth.
+pub const GOOD_VIEWS: usize = 10;
+
+/// Lens model that is estimated when none is named: what OpenCV estimates by default.
+pub const DEFAULT_MODEL: Distortion = Distortion::BrownConrady([0.0; 5]);
+
+/// Which answer is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// The joint estimate; from pose pairs alone the pose graph.
+    #[default]
+    Joint,
+    /// A closed form, by its name in [`closed_form::all`].
+    ClosedForm(&'static str),
+}
+
+impl Method {
+    /// Names on the command line: `joint` and those of the closed forms.
+    pub fn names() -> Vec<&'static str> {
+        std::iter::once("joint").chain(closed_form::all().iter().map(|m| m.name())).collect()
+    }
+
+    /// Its name on the command line and in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::ClosedForm(name) => name,
+        }
+    }
+
+    /// The method of that name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        if name == "joint" {
+            return Some(Self::Joint);
+        }
+        closed_form::by_name(name).map(|m| Self::ClosedForm(m.name()))
+    }
+}
+
+/// What may be changed about a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Options {
+    /// Keep views and corners that do not fit the others; without it they are set aside and named.
+    pub keep_outliers: bool,
+    /// Estimate the true size of the target, which the robot's translations tell.
+    pub free_scale: bool,
+    /// Try constant offsets of the robot's joints, and take them when held-out views say so.
+    pub joint_offsets: bool,
+}
+
+/// Offsets of the robot's joints as the data see them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointOffsets {
+    /// To be added to the reported angles, radians.
+    pub offsets_rad: Vec<f64>,
+    /// Their standard deviations, radians.
+    pub sigma_rad: Vec<f64>,
+    /// Error on held-out views without them, pixels.
+    pub heldout_before_px: f64,
+    /// And with them.
+    pub heldout_after_px: f64,
+    /// Whether the answer uses them.
+    pub accepted: bool,
+}
+
+/// The shape of the target where it is not the one drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeEstimate {
+    /// The shape.
+    pub shape: BoardShape,
+    /// Standard deviations of the two warps, metres; `None` when the target is taken as flat.
+    pub warp_sigma_m: Option<[f64; 2]>,
+    /// Standard deviation of the scale; `None` when the stated size is taken as exact.
+    pub scale_sigma: Option<f64>,
+}
+
+/// Why there is no calibration.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// The target was not found in enough images.
+    #[error(
+        "the target ({target}) was found in {found} of {images} images, at least {need} are needed: check its kind, its \
+         number of columns and rows, and that it is wholly in view"
+    )]
+    TargetNotFound {
+        /// In how many.
+        found: usize,
+        /// Of how many.
+        images: usize,
+        /// Least number.
+        need: usize,
+        /// What was looked for.
+        target: String,
+    },
+    /// Views were left out of the fit by the caller, and the rest is too few.
+    #[error(
+        "{left} views with the target in sight are left in the fit and {excluded} are excluded, at least {need} are \
+         needed: take views back in or capture more"
+    )]
+    TooFewLeft {
+        /// Views with the target that take part.
+        left: usize,
+        /// Views that were left out.
+        excluded: usize,
+        /// Least number.
+        need: usize,
+    },
+    /// The camera could not be calibrated.
+    #[error(transparent)]
+    Intrinsics(#[from] IntrinsicsError),
+    /// The target has no pose in a view.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// The hand-eye solve failed.
+    #[error(transparent)]
+    HandEye(#[from] HandEyeError),
+    /// A view of a hand-eye set has no robot pose.
+    #[error("view {name:?} has no robot pose")]
+    NoRobotPose {
+        /// Which view.
+        name: String,
+    },
+    /// Neither corners nor target poses.
+    #[error("view {name:?} has neither corners nor a target pose")]
+    NothingObserved {
+        /// Which view.
+        name: String,
+    },
+}
+
+/// A finished calibration.
+#[derive(Debug, Clone, Default)]
+pub struct Calibration {
+    /// Both rigid links; `None` without a robot.
+    pub hand_eye: Option<HandEye>,
+    /// Covariance of the hand-eye transform, right perturbation `[t; r]`; `None` for a closed form.
+    pub hand_eye_covariance: Option<Matrix6<f64>>,
+    /// Covariance of the target's place.
+    pub target_covariance: Option<Matrix6<f64>>,
+    /// How well everything is known that the views share; of the joint estimate only.
+    pub shared: Option<SharedCovariance>,
+    /// Intrinsics; `None` when only pose pairs were given.
+    pub intrinsics: Option<Intrinsics>,
+    /// Whether they were given and kept.
+    pub intrinsics_fixed: bool,
+    /// Standard deviations of fx, fy, cx, cy in pixels, when they were estimated.
+    pub intrinsics_sigma: Option<[f64; 4]>,
+    /// Noise levels of the joint estimate.
+    pub noise: Option<Noise>,
+    /// RMS of 2-D corner residuals, pixels.
+    pub rms_px: Option<f64>,
+    /// The same on views held out of the fit, each predicted from its reported robot pose.
+    pub heldout_rms_px: Option<f64>,
+    /// What [`heldout_rms_px`](Self::heldout_rms_px) should be if the model and its noise levels are true, pixels.
+    pub expected_heldout_rms_px: Option<f64>,
+    /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow
+    /// stays in the answer.
+    pub robot_effect_px: Option<f64>,
+    /// How the error of the hand-eye transform is distributed in units of its covariance; of the joint estimate only.
+    pub small_sample: Option<SmallSample>,
+    /// Whether the covariances are true to the data, and by how much they were widened; of the joint estimate only.
+    pub widening: Option<Widening>,
+    /// The shape of the target when it was estimated.
+    pub shape: Option<ShapeEstimate>,
+    /// What an attempt at joint offsets gave; `None` when there was none.
+    pub joint_offsets: Option<JointOffsets>,
+    /// Expected error of a measured point where the camera saw the target, 95 %, metres.
+    pub tip_error_95_m: Option<f64>,
+    /// Where that error is stated: camera coordinates, metres.
+    pub reference_point: Option<Point3<f64>>,
+    /// That error by number of views; of the joint estimate only.
+    pub error_curve: Option<ErrorCurve>,
+    /// Every closed form and what it said.
+    pub methods: Vec<MethodResult>,
+    /// One entry per view, in the order of the observations.
+    pub views: Vec<ViewResult>,
+}
+
+/// How well everything is known that predicts a view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SharedCovariance {
+    /// What was estimated besides the links.
+    pub free: Free,
+    /// As in [`crate::estimate::handeye::joint::JointSolution::covariance`].
+    pub covariance: DMatrix<f64>,
+}
+
+/// What one closed form said.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodResult {
+    /// Its name.
+    pub name: &'static str,
+    /// Its answer, or why it has none.
+    pub outcome: Result<ClosedFormSolution, HandEyeError>,
+}
+
+/// What became of one view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewResult {
+    /// Its name.
+    pub name: String,
+    /// How it was used.
+    pub status: ViewStatus,
+    /// RMS of its 2-D corner residuals, pixels.
+    pub rms_px: Option<f64>,
+    /// How far the answer moves without it, metres at the reference point.
+    pub influence_m: Option<f64>,
+    /// Length of the correction that the joint estimate gave its reported tip position, metres.
+    pub correction_m: Option<f64>,
+    /// Angle of the correction of its reported tip orientation, radians.
+    pub correction_rad: Option<f64>,
+    /// Residuals of its corners, in the order observed. Those of the joint estimate are with the robot pose corrected,
+    /// those of a closed form of the bare chain, those without a robot of the target's own pose. Empty where no
+    /// residual is known: no target, excluded, poses alone, or a chain that puts a corner behind the camera.
+    pub residuals: Vec<CornerResidual>,
+    /// The target's pose as fitted, by the same chain as the residuals.
+    pub camera_from_target: Option<Pose<Camera, Target>>,
+    /// How far the view is from what the others expect of it; of the joint estimate only.
+    pub distance: Option<Distance>,
+    /// Corners of it that were set aside, by their index.
+    pub corners_aside: Vec<usize>,
+    /// Whether its target was numbered from the other end than detected, to agree with the others.
+    pub renumbered: bool,
+}
+
+impl ViewResult {
+    /// A view of which nothing is known yet.
+    fn new(view: &ObservedView, status: ViewStatus) -> Self {
+        Self {
+            name: view.name.clone(),
+            status: if view.in_fit { status } else { ViewStatus::Excluded },
+            rms_px: None,
+            influence_m: None,
+            correction_m: None,
+            correction_rad: None,
+            residuals: Vec::new(),
+            camera_from_target: None,
+            distance: None,
+            corners_aside: Vec::new(),
+            renumbered: false,
+        }
+    }
+}
+
+/// One corner and how well the model explains it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CornerResidual {
+    /// Which point of the target.
+    pub index: usize,
+    /// Where it was measured, pixels.
+    pub px: Vector2<f64>,
+    /// Measured minus predicted, pixels.
+    pub residual_px: Vector2<f64>,
+}
+
+/// How a view was used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ViewStatus {
+    /// It took part.
+    Used,
+    /// The caller left it out.
+    Excluded,
+    /// It does not fit the others and was set aside; it takes part again with [`Options::keep_outliers`].
+    Outlier,
+    /// The target was not found in it.
+    NoTarget,
+}
+
+/// Calibrates from observations.
+///
+/// `work` is a `&CancelToken`, or a [`Work`] to follow the progress too.
+///
+/// # Needs
+/// Three views with the target in sight; for a hand-eye, robot rotations about two axes.
+///
+/// # Many views
+/// Work that grows faster than the number of views is done on a choice of them, the same every time. Of more than
+/// [`subset::MOST_VIEWS`] views so many go into the closed forms, and the fits that leave views out keep the noise levels
+/// of the whole. The intrinsics and the joint estimate take all views.
+///
+/// # Errors
+/// [`CalibrateError`] says what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
+pub fn calibrate<'a>(
+    observations: &Observations,
+    method: Method,
+    work: impl Into<Work<'a>>,
+) -> Result<Calibration, CalibrateError> {
+    calibrate_with(observations, method, Options::default(), work)
+}
+
+/// As [`calibrate`], with options.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_with<'a>(
+    observations: &Observations,
+    method: Method,
+    options: Options,
+    work: impl Into<Work<'a>>,
+) -> Result<Calibration, CalibrateError> {
+    let work = work.into();
+    let used = || observations.views.iter().filter(|v| v.in_fit);
+    let only_poses = used().all(|v| v.corners.is_none()) && used().any(|v| v.camera_from_target.is_some());
+    if only_poses {
+        pairs::calibrate(observations, method, &work)
+    } else {
+        corners::calibrate(observations, method, options, &work)
+    }
+}
+
+/// A robot that never turned is better named than a singular matrix. Works on the same choice of views as
+/// [`closed_forms`].
+fn check_motion(pairs: &[PosePair]) -> Result<(), HandEyeError> {
+    let poses: Vec<_> = pairs.iter().map(|pair| pair.anchor_from_mount).collect();
+    motion::analyse(&poses).map(drop)
+}
+
+/// Runs every closed form, on [`subset::MOST_VIEWS`] views at most.
+fn closed_forms(pairs: &[PosePair], work: &Work<'_>) -> Result<Vec<MethodResult>, HandEyeError> {
+    let chosen: Vec<PosePair> = subset::spread(pairs.len(), subset::MOST_VIEWS).into_iter().map(|i| pairs[i]).collect();
+    let methods = closed_form::all();
+    let mut results = Vec::with_capacity(methods.len());
+    for (done, method) in methods.iter().enumerate() {
+        if work.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        work.report(Stage::ClosedForms, done, methods.len());
+        results.push(MethodResult { name: method.name(), outcome: method.solve(&chosen) });
+    }
+    Ok(results)
+}
+
+/// The answer of one closed form, or its error.
+fn chosen(methods: &[MethodResult], name: &str) -> Result<ClosedFormSolution, HandEyeError> {
+    methods.iter().find(|m| m.name == name).map_or_else(
+        || Err(HandEyeError::NoSolution { method: "closed form", views: 0, reason: "no method of that name" }),
+        |m| m.outcome.clone(),
+    )
+}
+
+/// The closed form whose chain fits best by `misfit`; ties go to the first.
+fn best_start(
+    methods: &[MethodResult],
+    misfit: impl Fn(&ClosedFormSolution) -> f64,
+) -> Result<ClosedFormSolution, HandEyeError> {
+    let best = methods
+        .iter()
+        .filter_map(|m| m.outcome.as_ref().ok())
+        .map(|s| (misfit(s), s))
+        .filter(|(m, _)| m.is_finite())
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    match best {
+        Some((_, solution)) => Ok(*solution),
+        None => Err(methods.iter().find_map(|m| m.outcome.clone().err()).unwrap_or(HandEyeError::NoSolution {
+            method: "the closed forms",
+            views: 0,
+            reason: "none gave a finite answer",
+        })),
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod simulated;
+#[cfg(test)]
+mod tests;

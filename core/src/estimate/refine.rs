@@ -1,0 +1,230 @@
+//! The joint estimate within a calibration: its start, what is set aside, and which unknowns the data support.
+
+use nalgebra::Isometry3;
+
+use super::corners::squared_residuals;
+use super::lens::Lens;
+use super::{CalibrateError, Calibration, JointOffsets, MethodResult, Options};
+use crate::estimate::handeye::closed_form::ClosedFormSolution;
+use crate::estimate::handeye::consensus::{Consensus, consensus, half_turn_about};
+use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
+use crate::estimate::handeye::joint::{self, CornerWeights, Free, JointProblem, JointSolution, JointStart};
+use crate::estimate::handeye::{HandEyeError, PosePair, subset};
+use crate::estimate::uncertainty::{quality, widening};
+use crate::geometry::frames::{Camera, Pose, Target};
+use crate::progress::Work;
+use crate::targets::TargetSpec;
+use crate::targets::bent::BoardShape;
+use crate::targets::observation::View;
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+
+/// Significance from which a bent target is taken into the model: by chance one flat target in a thousand.
+const WARP_LEVEL: f64 = 1e-3;
+/// And the deflection has to matter: a tenth of what the corners' noise is at the target, so that a fit of thousands of
+/// corners does not chase a micrometre.
+const WARP_MATTERS: f64 = 0.1;
+/// Joint offsets are taken when they lower the error on held-out views by so much of it.
+const JOINTS_GAIN: f64 = 0.05;
+
+/// A joint estimate and what was decided on the way.
+pub struct Refined {
+    pub screened: Screened,
+    pub weights: Option<CornerWeights>,
+    /// Views whose target was numbered from its other end.
+    pub turned: Vec<usize>,
+    /// What an attempt at joint offsets gave; `None` when there was none.
+    pub joints: Option<JointOffsets>,
+}
+
+/// The start that most views agree with, and the views numbered from the other end.
+pub fn start(
+    problem: &JointProblem<'_>,
+    target: &TargetSpec,
+    lens: &Lens,
+    pairs: &[PosePair],
+    methods: &[MethodResult],
+) -> Result<Consensus, HandEyeError> {
+    let candidates: Vec<ClosedFormSolution> = methods.iter().filter_map(|m| m.outcome.clone().ok()).collect();
+    let sampled: Vec<View> = problem.views.iter().map(sampled).collect();
+    let problem = &JointProblem { views: &sampled, ..*problem };
+    let half_turn: Option<Isometry3<f64>> = target.is_symmetric().then(|| half_turn_about(&target.centre()));
+    let misfit = |solution: &ClosedFormSolution, view: usize, turned: bool| {
+        let mut solution = *solution;
+        if let (true, Some(half_turn)) = (turned, &half_turn) {
+            solution.anchor_from_target = Pose::from_isometry(solution.anchor_from_target.isometry() * half_turn);
+        }
+        squared_residuals(problem, &lens.intrinsics, &solution, &problem.views[view], CAP_PX).sqrt()
+    };
+    consensus(pairs, &candidates, half_turn.as_ref(), misfit).ok_or_else(|| {
+        methods.iter().find_map(|m| m.outcome.clone().err()).unwrap_or(HandEyeError::NoSolution {
+            method: "the closed forms",
+            views: pairs.len(),
+            reason: "none gave a finite answer",
+        })
+    })
+}
+
+/// The view with a handful of corners spread over the target: enough to tell a good start from a bad one.
+fn sampled(view: &View) -> View {
+    const CORNERS: usize = 6;
+    let count = view.corners.len();
+    let taken = CORNERS.min(count);
+    let corners = (0..taken).map(|k| view.corners[k * (count - 1) / (taken - 1).max(1)]).collect();
+    View::new(view.name.clone(), view.base_from_tip, corners)
+}
+
+/// Residual \[px\] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.
+const CAP_PX: f64 = 50.0;
+
+/// Numbers the corners of some views from the other end of the target.
+pub fn renumber(views: &mut [View], own: &mut [Pose<Camera, Target>], turned: &[usize], target: &TargetSpec) {
+    let count = target.points().len();
+    let half_turn = half_turn_about(&target.centre());
+    for &i in turned {
+        for corner in &mut views[i].corners {
+            corner.index = count - 1 - corner.index;
+        }
+        views[i].corners.sort_by_key(|c| c.index);
+        own[i] = Pose::from_isometry(own[i].isometry() * half_turn);
+    }
+}
+
+/// The joint estimate from a start.
+pub fn refine(
+    problem: &JointProblem<'_>,
+    own: &[Pose<Camera, Target>],
+    lens: &Lens,
+    begin: &Consensus,
+    options: Options,
+    work: &Work<'_>,
+) -> Result<Refined, CalibrateError> {
+    let weights = CornerWeights::stated(problem.views);
+    let free = Free { intrinsics: lens.free, scale: options.free_scale, ..Free::default() };
+    let problem = JointProblem { free, weights, ..*problem };
+    let start = JointStart {
+        mount_from_camera: begin.solution.mount_from_camera,
+        anchor_from_target: begin.solution.anchor_from_target,
+        intrinsics: lens.intrinsics,
+        shape: BoardShape::default(),
+        noise: None,
+    };
+    let mut screened = if options.keep_outliers {
+        keep_all(&problem, &start, *work)?
+    } else {
+        estimate_screened(&problem, &start, own, *work)?
+    };
+    if let Some(bent) = bent(&problem, &screened, work)? {
+        // A bent target looks like wrong views to a flat model, so they are judged again.
+        let problem = JointProblem { free: Free { warp: true, ..free }, ..problem };
+        screened = if options.keep_outliers {
+            Screened { solution: bent, ..screened }
+        } else {
+            estimate_screened(&problem, &bent.as_start(), own, work.cancel)?
+        };
+    }
+    let joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };
+    Ok(Refined { screened, weights, turned: begin.turned.clone(), joints })
+}
+
+fn keep_all(problem: &JointProblem<'_>, start: &JointStart, work: Work<'_>) -> Result<Screened, HandEyeError> {
+    let solution = joint::estimate(problem, start, work)?;
+    Ok(Screened {
+        solution,
+        kept: (0..problem.views.len()).collect(),
+        views: problem.views.to_vec(),
+        distances: Vec::new(),
+        corners: Vec::new(),
+    })
+}
+
+/// The problem of the views that a screened estimate kept.
+pub fn kept_problem<'a>(problem: &JointProblem<'a>, views: &'a [View], solution: &JointSolution) -> JointProblem<'a> {
+    JointProblem { views, free: solution.free, ..*problem }
+}
+
+/// The estimate with a bent target, when the data support one.
+fn bent(
+    problem: &JointProblem<'_>,
+    screened: &Screened,
+    work: &Work<'_>,
+) -> Result<Option<JointSolution>, HandEyeError> {
+    let views = screened.kept_views();
+    let free = Free { warp: true, ..screened.solution.free };
+    let with_warp = JointProblem { free, views: &views, ..*problem };
+    let solution = match joint::estimate(&with_warp, &screened.solution.as_start(), work.cancel) {
+        Ok(solution) => solution,
+        Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
+        // A target seen square on says nothing of its shape.
+        Err(_) => return Ok(None),
+    };
+    let (Some(covariance), warp) = (solution.warp_covariance(), nalgebra::Vector2::from(solution.shape.warp_m)) else {
+        return Ok(None);
+    };
+    let Some(inverse) = covariance.try_inverse() else { return Ok(None) };
+    let ratio = warp.dot(&(inverse * warp)) / 2.0;
+    let freedom = solution.small_sample.degrees_of_freedom.min(1e6);
+    let limit = FisherSnedecor::new(2.0, freedom).map_or(f64::INFINITY, |f| f.inverse_cdf(1.0 - WARP_LEVEL));
+    let metres_per_px = solution.reference_point.coords.norm() / solution.intrinsics.fx;
+    let matters = warp.norm() > WARP_MATTERS * solution.noise.corner_px * metres_per_px;
+    Ok((ratio > limit && matters).then_some(solution))
+}
+
+/// Tries joint offsets and takes them when held-out views say so.
+fn offsets(
+    problem: &JointProblem<'_>,
+    screened: &mut Screened,
+    work: &Work<'_>,
+) -> Result<Option<JointOffsets>, HandEyeError> {
+    let views = screened.kept_views();
+    if views.iter().any(|view| view.tip_by_joint.is_empty()) {
+        return Ok(None);
+    }
+    let without = kept_problem(problem, &views, &screened.solution);
+    let with = JointProblem { free: Free { joints: true, ..without.free }, ..without };
+    let solution = match joint::estimate(&with, &screened.solution.as_start(), work.cancel) {
+        Ok(solution) => solution,
+        Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
+        Err(_) => return Ok(None),
+    };
+    let held_out = |problem: &JointProblem<'_>, solution: &JointSolution| {
+        quality::held_out_rms_px(problem, &solution.as_start(), work.cancel)
+    };
+    let before = held_out(&without, &screened.solution)?;
+    let after = held_out(&with, &solution)?;
+    let (Some(before_px), Some(after_px)) = (before, after) else { return Ok(None) };
+    let accepted = after_px < before_px * (1.0 - JOINTS_GAIN);
+    let found = JointOffsets {
+        offsets_rad: solution.joint_offsets_rad.clone(),
+        sigma_rad: solution.joint_offsets_sigma(),
+        heldout_before_px: before_px,
+        heldout_after_px: after_px,
+        accepted,
+    };
+    if accepted {
+        screened.solution = solution;
+    }
+    Ok(Some(found))
+}
+
+/// Numbers of a calibration that need the whole problem: error on held-out views, whether the covariance is true to the
+/// data, error by number of views. The covariance is widened where it is not.
+pub fn judge(
+    calibration: &mut Calibration,
+    problem: &JointProblem<'_>,
+    solution: &mut JointSolution,
+    work: &Work<'_>,
+) -> Result<(), HandEyeError> {
+    // Leaving out a fifth of so many views changes their noise levels by a few percent, and finding them again would
+    // take longer than everything else.
+    let known = (problem.views.len() > subset::MOST_VIEWS).then_some(solution.noise);
+    let folds = JointProblem { noise: known, ..*problem };
+    calibration.heldout_rms_px = quality::held_out_rms_px(&folds, &solution.as_start(), *work)?;
+    let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
+    calibration.expected_heldout_rms_px = Some(expected.prediction_px);
+    calibration.robot_effect_px = Some(expected.robot_px);
+    let widening = widening::check(problem, solution, work.cancel)?;
+    solution.widen(widening.factor);
+    calibration.widening = Some(widening);
+    calibration.error_curve = Some(joint::prediction::error_by_views(problem, solution, *work)?);
+    Ok(())
+}

@@ -1,0 +1,98 @@
+//! A calibration as the document that others read.
+
+use std::collections::BTreeMap;
+
+use super::{Calibration, ViewStatus};
+use crate::estimate::handeye::joint::SmallSample;
+use crate::project::result::{
+    self, BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, Provenance,
+    Quality, WideningRecord,
+};
+
+impl Calibration {
+    /// The result document. `options` are what the answer depends on besides the input.
+    pub fn to_result(
+        &self,
+        tool_version: &str,
+        input_sha256: Option<String>,
+        options: BTreeMap<String, serde_json::Value>,
+    ) -> CalibrationResult {
+        let mut result = CalibrationResult {
+            intrinsics: self
+                .intrinsics
+                .as_ref()
+                .map(|i| IntrinsicsEstimate::new(i, self.intrinsics_sigma, self.intrinsics_fixed)),
+            quality: Quality {
+                rms_px: self.rms_px,
+                sigma_px: self.noise.map(|n| n.corner_px),
+                heldout_rms_px: self.heldout_rms_px,
+                tip_error_95_mm: self.tip_error_95_m.map(|m| m * 1e3),
+                robot_sigma_mm: self.noise.map(|n| n.robot_m * 1e3),
+                robot_sigma_deg: self.noise.map(|n| n.robot_rad.to_degrees()),
+            },
+            methods: self.methods.iter().map(method).collect(),
+            views: self.views.iter().map(view).collect(),
+            estimate: self.small_sample.map(|sample| self.details(&sample)),
+            provenance: Provenance {
+                tool_version: tool_version.to_owned(),
+                input_sha256,
+                options: options.into_iter().collect(),
+            },
+            ..CalibrationResult::default()
+        };
+        if let Some(links) = &self.hand_eye {
+            result.set_links(links, self.hand_eye_covariance.as_ref(), self.target_covariance.as_ref());
+        }
+        result
+    }
+
+    fn details(&self, sample: &SmallSample) -> EstimateDetails {
+        EstimateDetails {
+            reference_point_m: self.reference_point.map(|p| p.coords.into()),
+            degrees_of_freedom: Some(sample.degrees_of_freedom).filter(|v| v.is_finite()),
+            region_scale: Some(sample.scale),
+            view_sigma_px: self.noise.map(|n| n.view_px),
+            widening: self.widening.as_ref().map(|w| WideningRecord {
+                factor: w.factor.sqrt(),
+                by: w.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
+            }),
+            board: self.shape.map(|s| BoardEstimate {
+                warp_mm: s.shape.warp_m.map(|m| m * 1e3),
+                warp_sigma_mm: s.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
+                scale: s.shape.scale,
+                scale_sigma: s.scale_sigma,
+            }),
+            joint_offsets: self.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
+                offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
+                sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),
+                heldout_before_px: j.heldout_before_px,
+                heldout_after_px: j.heldout_after_px,
+                accepted: j.accepted,
+            }),
+        }
+    }
+}
+
+fn method(method: &super::MethodResult) -> result::MethodRecord {
+    match &method.outcome {
+        Ok(solution) => result::MethodRecord::solved(method.name, &solution.mount_from_camera),
+        Err(error) => result::MethodRecord::failed(method.name, error),
+    }
+}
+
+fn view(view: &super::ViewResult) -> result::ViewRecord {
+    result::ViewRecord {
+        name: view.name.clone(),
+        status: match view.status {
+            ViewStatus::Used => result::ViewRecordStatus::Used,
+            ViewStatus::Excluded => result::ViewRecordStatus::Excluded,
+            ViewStatus::Outlier => result::ViewRecordStatus::Outlier,
+            ViewStatus::NoTarget => result::ViewRecordStatus::NoTarget,
+        },
+        rms_px: view.rms_px,
+        influence_mm: view.influence_m.map(|m| m * 1e3),
+        distance: view.distance.map(|d| d.of_limit).filter(|d| d.is_finite()),
+        corners_aside: view.corners_aside.clone(),
+        renumbered: view.renumbered,
+    }
+}

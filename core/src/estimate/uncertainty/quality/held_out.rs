@@ -1,0 +1,129 @@
+//! Error on views that the fit has not seen.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::joint::equations::ViewInput;
+use crate::estimate::handeye::joint::{
+    JointProblem, JointSolution, JointStart, base_from_tip_by_joints, camera_from_target, estimate,
+};
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use crate::geometry::planar_pose::refine::refine;
+use crate::progress::{Stage, Work};
+use crate::targets::bent::{BoardPoints, BoardShape};
+use crate::targets::observation::{Corner, View};
+
+/// Most folds of the cross-validation.
+const FOLDS: usize = 5;
+
+/// Errors on views that were not in the fit, each predicted from its reported robot pose alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldOut {
+    /// RMS of 2-D corner residuals, pixels.
+    pub rms_px: f64,
+    /// RMS over the views of [`board_error_m`], metres.
+    pub rms_m: f64,
+}
+
+/// How far the middle of the target, as a view puts it, lies from where the fit puts it: the distance in the anchor frame
+/// between `anchor_from_mount * mount_from_camera * camera_from_target * centre` and `anchor_from_target * centre`, metres,
+/// with the target's pose in the camera found from the corners of the view alone.
+pub fn board_error_m(
+    anchor_from_mount: &Pose<Anchor, Mount>,
+    mount_from_camera: &Pose<Mount, Camera>,
+    camera_from_target: &Pose<Camera, Target>,
+    anchor_from_target: &Pose<Anchor, Target>,
+    centre: &Point3<f64>,
+) -> f64 {
+    let seen = *anchor_from_mount * *mount_from_camera * *camera_from_target;
+    (seen.isometry() * centre - anchor_from_target.isometry() * centre).norm()
+}
+
+/// [`HeldOut`] over five folds (or one view at a time when there are fewer than ten). View `i` is in fold `i mod folds`.
+///
+/// `None` when a fold leaves too few views for a fit, or puts a held-out target behind the camera. `work` is a
+/// `&CancelToken`, or a [`Work`] to follow the progress.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`].
+pub fn held_out<'a>(
+    problem: &JointProblem<'_>,
+    start: &JointStart,
+    work: impl Into<Work<'a>>,
+) -> Result<Option<HeldOut>, HandEyeError> {
+    let work = work.into();
+    let count = problem.views.len();
+    let folds = if count < 2 * FOLDS { count } else { FOLDS };
+    let (mut squared_px, mut squared_m) = (0.0, 0.0);
+    let (mut corners, mut views) = (0usize, 0usize);
+    for fold in 0..folds {
+        work.report(Stage::HeldOut, fold, folds);
+        let (held, used): (Vec<_>, Vec<_>) =
+            problem.views.iter().cloned().enumerate().partition(|(i, _)| i % folds == fold);
+        let used: Vec<View> = used.into_iter().map(|(_, view)| view).collect();
+        let fit = match estimate(&JointProblem { views: &used, ..*problem }, start, work.cancel) {
+            Ok(fit) => fit,
+            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
+            Err(_) => return Ok(None),
+        };
+        for (_, view) in &held {
+            let Some((px, m)) = prediction_squares(problem, &fit, view) else { return Ok(None) };
+            squared_px += px;
+            squared_m += m;
+            corners += view.corners.len();
+            views += 1;
+        }
+    }
+    let rms = |squares: f64, count: usize| (squares / count as f64).sqrt();
+    Ok((corners > 0).then(|| HeldOut { rms_px: rms(squared_px, corners), rms_m: rms(squared_m, views) }))
+}
+
+/// [`HeldOut::rms_px`] of [`held_out`].
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`].
+pub fn held_out_rms_px<'a>(
+    problem: &JointProblem<'_>,
+    start: &JointStart,
+    work: impl Into<Work<'a>>,
+) -> Result<Option<f64>, HandEyeError> {
+    Ok(held_out(problem, start, work)?.map(|held| held.rms_px))
+}
+
+/// Sum of squared 2-D residuals of one view predicted from its reported robot pose, and the squared error at the board;
+/// `None` when a point falls behind the camera.
+fn prediction_squares(problem: &JointProblem<'_>, fit: &JointSolution, view: &View) -> Option<(f64, f64)> {
+    let (x, y) = (fit.hand_eye.mount_from_camera(), fit.hand_eye.anchor_from_target());
+    let base_from_tip = base_from_tip_by_joints(view, &fit.joint_offsets_rad);
+    let predicted = camera_from_target(problem.mode, &base_from_tip, &x, &y);
+    let seen = pose_of_view(&fit.intrinsics, problem.board, &fit.shape, &view.corners, &predicted)?;
+    let points = problem.board.points(&fit.shape);
+    let centre = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64);
+    let squared_px: f64 = view
+        .corners
+        .iter()
+        .map(|corner| {
+            let px = fit.intrinsics.project(&(predicted.isometry() * points[corner.index])).ok()?;
+            Some((px - corner.px).norm_squared())
+        })
+        .sum::<Option<f64>>()?;
+    let anchor_from_mount = problem.mode.anchor_from_mount(&base_from_tip);
+    Some((squared_px, board_error_m(&anchor_from_mount, &x, &seen, &y, &centre).powi(2)))
+}
+
+/// Steps from a pose nearby: Gauss–Newton from a few pixels off needs three or four.
+const STEPS: usize = 10;
+
+/// The target's pose from the corners of one view alone, from one nearby; `None` when that puts a corner behind the
+/// camera. Where the corners determine no pose the start is returned.
+pub fn pose_of_view(
+    intrinsics: &Intrinsics,
+    board: &BoardPoints,
+    shape: &BoardShape,
+    corners: &[Corner],
+    start: &Pose<Camera, Target>,
+) -> Option<Pose<Camera, Target>> {
+    let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights: &[] };
+    refine(&seen, start.isometry(), STEPS).map(|minimum| Pose::from_isometry(minimum.pose))
+}

@@ -1,0 +1,202 @@
+use std::f64::consts::PI;
+
+use nalgebra::Matrix3;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+use crate::estimate::handeye::HandEyeError;
+use crate::geometry::se3;
+
+fn model_ur5() -> Arm {
+    ArmModel::Kind(ArmKind::Ur5Coppeliasim).arm().expect("built in")
+}
+
+/// An arm on a table with a tool, neither of which is at the origin of anything.
+fn mounted() -> Arm {
+    let foot = se3::exp(&Vector6::new(0.4, -0.2, 0.7, 0.3, -0.2, 1.1));
+    let tool = se3::exp(&Vector6::new(0.01, 0.03, 0.12, -0.4, 0.2, 0.5));
+    let arm = model_ur5();
+    let (first, flange) = (foot * arm.base_from_first, arm.flange_from_tip * tool);
+    arm.mounted(first, flange)
+}
+
+fn configurations(count: usize) -> Vec<Vec<f64>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    (0..count).map(|_| (0..6).map(|_| rng.random_range(-1.5..1.5)).collect()).collect()
+}
+
+fn views<'a>(arm: &Arm, joints: &'a [Vec<f64>]) -> Vec<JointView<'a>> {
+    joints.iter().map(|q| JointView { base_from_tip: arm.forward(q).expect("six joints"), joints_rad: q }).collect()
+}
+
+#[test]
+fn at_zero_the_modelled_ur5_stands_straight_up_with_its_flange_towards_minus_x() {
+    let tip = model_ur5().forward(&[0.0; 6]).expect("six joints");
+    assert!((tip.translation() - Vector3::new(-0.184_95, 0.0, 0.986_55)).norm() < 1e-14);
+    let axes = tip.rotation().to_rotation_matrix();
+    let expected = Matrix3::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
+    assert!((axes.matrix() - expected).norm() < 1e-14);
+}
+
+#[test]
+fn the_ur5_of_the_manufacturer_is_where_its_table_puts_it() {
+    let arm = ArmModel::Kind(ArmKind::Ur5).arm().expect("built in");
+    // At zero the arm is stretched along −x; the wrist goes down by d5 and to −y by d4 + d6.
+    let tip = arm.forward(&[0.0; 6]).expect("six joints");
+    let expected = Vector3::new(-0.425 - 0.392_25, -0.109_15 - 0.0823, 0.089_159 - 0.094_65);
+    assert!((tip.translation() - expected).norm() < 1e-14, "{tip:?}");
+    // Upright: the links and d5 add up over the shoulder, the wrist stays beside.
+    let up = arm.forward(&[0.0, -PI / 2.0, 0.0, -PI / 2.0, 0.0, 0.0]).expect("six joints");
+    let expected = Vector3::new(0.0, -0.191_45, 0.089_159 + 0.425 + 0.392_25 + 0.094_65);
+    assert!((up.translation() - expected).norm() < 1e-12, "{up:?}");
+}
+
+#[test]
+fn twists_are_the_central_differences_of_the_forward_kinematics() {
+    // The error of a central difference is h²/6 times a third derivative of order one, and rounding over h.
+    const STEP: f64 = 1e-5;
+    let arm = mounted();
+    for q in configurations(20) {
+        let tip = arm.forward(&q).expect("six joints");
+        let twists = arm.tip_by_joint(&q).expect("six joints");
+        assert_eq!(twists.len(), 6);
+        for (j, twist) in twists.iter().enumerate() {
+            let moved = |step: f64| {
+                let mut q = q.clone();
+                q[j] += step;
+                se3::log((tip.inverse() * arm.forward(&q).expect("six joints")).isometry())
+            };
+            let difference = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
+            assert!((difference - twist).norm() < 1e-9, "joint {}: {difference} is not {twist}", j + 1);
+        }
+    }
+}
+
+#[test]
+fn at_the_reported_tip_the_tool_of_the_arm_does_not_matter() {
+    let arm = mounted();
+    let other_tool = arm.clone().mounted(arm.base_from_first, Isometry3::translation(0.0, 5.0, 0.0));
+    for q in configurations(5) {
+        let tip = arm.forward(&q).expect("six joints");
+        let at_tip = other_tool.tip_by_joint_at(&tip, &q).expect("six joints");
+        for (a, b) in at_tip.iter().zip(arm.tip_by_joint(&q).expect("six joints")) {
+            assert!((a - b).norm() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn poses_and_joint_angles_tell_where_the_arm_stands_and_what_its_tool_is() {
+    let arm = mounted();
+    let joints = configurations(8);
+    let placement = place(&model_ur5(), &views(&arm, &joints)).expect("placed");
+    let apart = |a: &Isometry3<f64>, b: &Isometry3<f64>| se3::log(&a.inv_mul(b)).norm();
+    assert!(apart(&placement.arm.base_from_first, &arm.base_from_first) < 1e-9);
+    assert!(apart(&placement.arm.flange_from_tip, &arm.flange_from_tip) < 1e-9);
+    assert!(placement.rms_m() < 1e-9 && placement.rms_rad() < 1e-7, "acos near 1 has half the digits");
+    placement.check().expect("they belong together");
+
+    let (_, twists) = place_checked(&model_ur5(), &views(&arm, &joints)).expect("they belong together");
+    for (q, found) in joints.iter().zip(&twists) {
+        for (a, b) in found.iter().zip(arm.tip_by_joint(q).expect("six joints")) {
+            assert!((a - b).norm() < 1e-8);
+        }
+    }
+}
+
+#[test]
+fn the_nominal_arm_passes_for_one_with_its_own_calibration() {
+    // Half a millimetre and a tenth of a degree in every row is more than a factory's calibration changes.
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut off = |size: f64| rng.random_range(-size..size);
+    let nominal = model_ur5();
+    let rows = nominal.rows().iter().map(|row| DhRow {
+        a_m: row.a_m + off(0.5e-3),
+        alpha_rad: row.alpha_rad + off(0.0017),
+        d_m: row.d_m + off(0.5e-3),
+        theta_offset_rad: row.theta_offset_rad + off(0.0017),
+    });
+    let real = Arm::new(rows.collect()).expect("an arm");
+    let joints = configurations(15);
+    let placement = place(&nominal, &views(&real, &joints)).expect("placed");
+    assert!(placement.rms_m() > 1e-4, "the arms differ");
+    placement.check().expect("close enough for derivatives");
+}
+
+#[test]
+fn angles_in_another_order_unit_or_sense_and_poses_turned_over_are_not_taken() {
+    type Edit = fn(&mut [f64]);
+    let arm = mounted();
+    let joints = configurations(12);
+    let edits: [(&str, Edit); 4] = [
+        ("degrees", |q| q.iter_mut().for_each(|v| *v = v.to_degrees())),
+        ("reversed", |q| q.reverse()),
+        ("the third joint turns the other way", |q| q[2] = -q[2]),
+        ("the zero of the second joint is elsewhere", |q| q[1] += PI / 2.0),
+    ];
+    for (what, edit) in edits {
+        let mut wrong = joints.clone();
+        for q in &mut wrong {
+            edit(q);
+        }
+        let mixed: Vec<JointView<'_>> =
+            views(&arm, &joints).iter().zip(&wrong).map(|(view, q)| JointView { joints_rad: q, ..*view }).collect();
+        let error = place_checked(&model_ur5(), &mixed).expect_err(what);
+        assert!(matches!(error, ArmError::Foreign { .. }), "{what}: {error}");
+    }
+    let inverted: Vec<JointView<'_>> = views(&arm, &joints)
+        .iter()
+        .map(|view| JointView { base_from_tip: view.base_from_tip.inverse().relabel(), ..*view })
+        .collect();
+    assert!(matches!(place_checked(&model_ur5(), &inverted), Err(ArmError::Foreign { .. })));
+}
+
+#[test]
+fn the_view_whose_angles_are_of_another_one_is_named() {
+    let arm = mounted();
+    let joints = configurations(12);
+    let mut rows = views(&arm, &joints);
+    rows[7].joints_rad = &joints[2];
+    match place_checked(&model_ur5(), &rows) {
+        Err(ArmError::Foreign { view: 8, views: 12, .. }) => {}
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn poses_that_do_not_determine_where_the_arm_stands_are_not_used() {
+    let arm = mounted();
+    let joints: Vec<Vec<f64>> = (0..6).map(|i| vec![0.2 * f64::from(i), 0.5, -1.0, 0.2, 1.4, 0.3]).collect();
+    let error = place(&arm, &views(&arm, &joints)).expect_err("one axis alone");
+    assert!(matches!(error, ArmError::NotPlaced(HandEyeError::ParallelAxes { .. })), "{error}");
+    let error = place(&arm, &views(&arm, &joints[..2])).expect_err("two views");
+    assert!(matches!(error, ArmError::NotPlaced(HandEyeError::TooFewViews { .. })), "{error}");
+}
+
+#[test]
+fn rows_and_angles_that_no_arm_has_are_refused() {
+    let row = |numbers| ArmModel::Dh(vec![numbers]).arm();
+    assert!(row([0.4, PI / 2.0, 0.1, 0.0]).is_ok());
+    assert!(matches!(row([425.0, 0.0, 0.0, 0.0]), Err(ArmError::BadRow { joint: 1, name: "a", .. })));
+    assert!(matches!(row([0.0, 90.0, 0.0, 0.0]), Err(ArmError::BadRow { name: "alpha", .. })));
+    assert!(matches!(row([0.0, 0.0, f64::NAN, 0.0]), Err(ArmError::BadRow { name: "d", .. })));
+    assert_eq!(ArmModel::Dh(Vec::new()).arm(), Err(ArmError::JointCount { got: 0 }));
+    assert_eq!(ArmModel::Dh(vec![[0.0; 4]; 13]).arm(), Err(ArmError::JointCount { got: 13 }));
+    let arm = model_ur5();
+    assert_eq!(arm.forward(&[0.0; 5]), Err(ArmError::WrongCount { got: 5, need: 6 }));
+    assert_eq!(arm.tip_by_joint(&[0.0, 0.0, f64::NAN, 0.0, 0.0, 0.0]), Err(ArmError::NotFinite { joint: 3 }));
+}
+
+#[test]
+fn files_name_an_arm_by_its_kind_or_its_rows() {
+    for kind in ArmKind::ALL {
+        let text = serde_json::to_string(&ArmModel::Kind(kind)).expect("text");
+        assert_eq!(text, format!("{{\"kind\":\"{}\"}}", kind.name()));
+        assert_eq!(serde_json::from_str::<ArmModel>(&text).expect("read"), ArmModel::Kind(kind));
+    }
+    let rows = ArmModel::Dh(vec![[0.1, 0.0, 0.2, 1.0 / 3.0]]);
+    let text = serde_json::to_string(&rows).expect("text");
+    assert_eq!(text, "{\"dh\":[[0.1,0.0,0.2,0.3333333333333333]]}");
+    assert_eq!(serde_json::from_str::<ArmModel>(&text).expect("read"), rows);
+}

@@ -1,0 +1,31 @@
+//! The one way from a dataset folder to what a calibration is made from.
+
+use super::Dataset;
+use crate::estimate::{CameraKnowledge, Observations, ObservedView};
+use crate::targets::observation::Corner;
+
+impl Dataset {
+    /// What was observed. Where the data set has a corner table, its corners count; elsewhere `detected` gives those of
+    /// an entry by its index, `None` when the target was not found in its image.
+    pub fn observations(&self, mut detected: impl FnMut(usize) -> Option<Vec<Corner>>) -> Observations {
+        let views = self.entries.iter().enumerate().map(|(index, entry)| ObservedView {
+            name: entry.name.clone(),
+            base_from_tip: entry.base_from_tip,
+            corners: match &entry.corners {
+                Some(listed) => Some(listed.clone()).filter(|corners| !corners.is_empty()),
+                None => detected(index),
+            },
+            tip_by_joint: entry.tip_by_joint.clone(),
+            camera_from_target: entry.camera_from_target,
+            in_fit: true,
+        });
+        Observations {
+            mode: self.mode,
+            target: self.target,
+            // Only pose pairs come without a size, and they need none.
+            image_size: self.image_size.unwrap_or_default(),
+            camera: CameraKnowledge::of(self.camera.as_ref()),
+            views: views.collect(),
+        }
+    }
+}

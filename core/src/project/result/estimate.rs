@@ -1,0 +1,64 @@
+//! What a joint estimate says beyond the answer: how sure it is and why, the target as it found it, the robot's joints.
+
+use serde::{Deserialize, Serialize};
+
+use crate::diagnose::record::FindingRecord;
+
+/// Details of a joint estimate.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct EstimateDetails {
+    /// Where the expected error is stated: camera coordinates, metres.
+    pub reference_point_m: Option<[f64; 3]>,
+    /// Degrees of freedom of the noise levels; `None` when they were given, and the errors are Gaussian.
+    pub degrees_of_freedom: Option<f64>,
+    /// The squared distance `eᵀ C⁻¹ e` of the hand-eye's error times this follows `6 F(6, degrees_of_freedom)`.
+    pub region_scale: Option<f64>,
+    /// Noise that all corners of a view share, pixels; zero where the data ask for none.
+    pub view_sigma_px: Option<f64>,
+    /// By how much the covariances were widened, because the data scatter more than the noise levels say.
+    pub widening: Option<WideningRecord>,
+    /// The target where it was found not to be the one drawn.
+    pub board: Option<BoardEstimate>,
+    /// Offsets of the robot's joints, when they were asked for.
+    pub joint_offsets: Option<JointOffsetsEstimate>,
+}
+
+/// A widened covariance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WideningRecord {
+    /// By how much standard deviations were widened, at least 1.
+    pub factor: f64,
+    /// Which evidence asked for it, or which was looked at in vain.
+    pub by: String,
+}
+
+/// The target as found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BoardEstimate {
+    /// Deflection of the middle against the edges along x and y, millimetres, positive into the board.
+    pub warp_mm: [f64; 2],
+    /// Their standard deviations; `None` when the target is taken as flat.
+    pub warp_sigma_mm: Option<[f64; 2]>,
+    /// True size over stated size.
+    pub scale: f64,
+    /// Its standard deviation; `None` when the stated size is taken as exact.
+    pub scale_sigma: Option<f64>,
+}
+
+/// The joints as found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointOffsetsEstimate {
+    /// To be added to the reported angles, degrees.
+    pub offsets_deg: Vec<f64>,
+    /// Their standard deviations, degrees.
+    pub sigma_deg: Vec<f64>,
+    /// Error on held-out views without them, pixels.
+    pub heldout_before_px: f64,
+    /// And with them, pixels.
+    pub heldout_after_px: f64,
+    /// Whether the answer uses them.
+    pub accepted: bool,
+}
+
+/// Findings as they stand in the document.
+pub type Findings = Vec<FindingRecord>;

@@ -1,0 +1,61 @@
+//! What the arm of a session tells about its captures.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector6;
+
+use super::document::{CaptureId, CaptureRecord, Document};
+use crate::geometry::arm::{self, ArmError, ArmModel, JointView};
+use crate::project::dataset;
+
+impl Document {
+    /// How the tip moves with each joint in the captures, see [`crate::geometry::arm::Arm::tip_by_joint_at`].
+    ///
+    /// The captures in use tell where the arm stands, as they do in the session's data set. Another one, excluded or
+    /// kept for verification, is there when its joint angles belong to its pose. Nothing is there when the session
+    /// names no arm, or one of the captures in use has no joint angles: the others alone would mislead.
+    ///
+    /// # Errors
+    /// [`ArmError`] when the joint angles are of no use: they do not fit the poses with this arm, or the captures do
+    /// not determine where it stands.
+    pub fn tip_by_joint(&self) -> Result<BTreeMap<CaptureId, Vec<Vector6<f64>>>, ArmError> {
+        let in_use: Option<Vec<JointView<'_>>> = self.in_use().map(joint_view).collect();
+        let (Some(model), Some(in_use)) = (&self.meta.arm, in_use) else { return Ok(BTreeMap::new()) };
+        let (placement, _) = arm::place_checked(&model.arm()?, &in_use)?;
+        let twists = |capture| placement.tip_by_joint(&joint_view(capture)?).ok();
+        Ok(self.captures.iter().filter_map(|capture| Some((capture.id, twists(capture)?))).collect())
+    }
+
+    /// The session's `dataset.toml` and `poses.csv`: the captures in use and no others, so that the command line solves
+    /// what the window solves. Joint angles are there when the arm is known and every one of these captures has them.
+    pub(super) fn as_dataset(&self) -> (String, String) {
+        let meta = &self.meta;
+        let describe = |arm| dataset::write::description(meta.mode, &meta.target, meta.camera.as_ref(), arm);
+        let with_joints = meta.arm.as_ref().and_then(|model| Some((model, self.table_with_joints(model)?)));
+        if let Some((model, table)) = with_joints {
+            return (describe(Some(model)), table);
+        }
+        let views = self.in_use().map(|capture| (capture.image.as_str(), &capture.base_from_tip));
+        (describe(None), dataset::write::pose_table(views))
+    }
+
+    fn table_with_joints(&self, model: &ArmModel) -> Option<String> {
+        let joints = model.arm().ok()?.joint_count();
+        let rows = self
+            .in_use()
+            .map(|capture| {
+                let joints_rad = capture.joints_rad.as_deref().filter(|values| values.len() == joints)?;
+                Some((capture.image.as_str(), &capture.base_from_tip, joints_rad))
+            })
+            .collect::<Option<Vec<_>>>()?;
+        Some(dataset::write::pose_table_with_joints(joints, rows))
+    }
+}
+
+fn joint_view(capture: &CaptureRecord) -> Option<JointView<'_>> {
+    Some(JointView { base_from_tip: capture.base_from_tip, joints_rad: capture.joints_rad.as_deref()? })
+}
+
+#[cfg(test)]
+#[path = "arm_use_tests.rs"]
+mod tests;

@@ -1,0 +1,277 @@
+//! What a session says: plain data, without files and without history.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Component, Path};
+
+use serde::{Deserialize, Serialize};
+
+use super::edit::EditError;
+use super::pose_record;
+use crate::estimate::handeye::{HandEye, Mode};
+use crate::geometry::arm::ArmModel;
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Base, Pose, Tip};
+use crate::project::dataset::CameraInput;
+use crate::project::files::image_file::one_line;
+use crate::project::result::{CalibrationResult, TransformEstimate};
+use crate::project::taught_poses::{Goal, TaughtPose};
+use crate::targets::TargetSpec;
+
+/// The state of a session. It changes by [`super::Edit`] alone, see [`Document::apply`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Document {
+    /// What was known when it began, and what was changed since.
+    #[serde(flatten)]
+    pub meta: SessionMeta,
+    /// The captures in the order in which they were taken; a deleted one is not among them.
+    pub captures: Vec<CaptureRecord>,
+    /// The taught poses in the order in which they are visited. No two have the same name.
+    #[serde(default)]
+    pub taught: Vec<TaughtPose>,
+    /// The names that exports use for frames and cameras, as the exporter understands them.
+    #[serde(default)]
+    pub export_names: Option<serde_json::Value>,
+}
+
+/// What is known when a session begins.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SessionMeta {
+    /// When it began, as text; RFC 3339 by custom. Passed in, since nothing here reads a clock.
+    pub created: String,
+    /// Version of the program.
+    pub tool_version: String,
+    /// Where the camera sits.
+    pub mode: Mode,
+    /// What is looked at.
+    pub target: TargetSpec,
+    /// What is known of the camera beforehand.
+    pub camera: Option<CameraInput>,
+    /// Seeds by what they are for, so that a simulated session can be made again.
+    pub seeds: BTreeMap<String, u64>,
+    /// The truth that a simulated cell publishes; for reports, never for a solver.
+    pub ground_truth: Option<GroundTruth>,
+    /// The arm, where it is known: what the joint angles of the captures belong to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arm: Option<ArmModel>,
+}
+
+/// What a simulated cell knows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GroundTruth {
+    /// The camera on its mount.
+    pub hand_eye: TransformEstimate,
+    /// The target on its anchor.
+    pub target: TransformEstimate,
+    /// The camera.
+    pub intrinsics: Option<Intrinsics>,
+}
+
+impl GroundTruth {
+    /// States the truth.
+    pub fn new(links: &HandEye, intrinsics: Option<Intrinsics>) -> Self {
+        let (hand_eye, target) = TransformEstimate::of_links(links, None, None);
+        Self { hand_eye, target, intrinsics }
+    }
+
+    /// Both links in typed frames; `None` when the names of the frames are not those of `mode`.
+    pub fn links(&self, mode: Mode) -> Option<HandEye> {
+        let mut result = CalibrationResult { mode: Some(mode), ..CalibrationResult::default() };
+        result.hand_eye = Some(self.hand_eye.clone());
+        result.target = Some(self.target.clone());
+        result.links()
+    }
+}
+
+/// Names a capture for as long as the session lives: the number in its file name, from 1. It is never used again in
+/// the same session, also not after the capture was deleted or its making undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct CaptureId(pub u32);
+
+impl fmt::Display for CaptureId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// What a capture is for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// It is part of the fit.
+    #[default]
+    Calibration,
+    /// It is kept out of the fit, to check the result.
+    Verification,
+}
+
+/// One capture as it is recorded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaptureRecord {
+    /// Which one.
+    // Sessions of version 1.0 have none; their reader fills it in, see `session_file`.
+    #[serde(default = "CaptureId::none")]
+    pub id: CaptureId,
+    /// The image, relative to the session: also the name of the view.
+    pub image: String,
+    /// The depth image, relative to the session.
+    pub depth: Option<String>,
+    /// Tip pose as the controller reported it.
+    #[serde(with = "pose_record")]
+    pub base_from_tip: Pose<Base, Tip>,
+    /// Joint angles as the controller reported them, radians.
+    pub joints_rad: Option<Vec<f64>>,
+    /// Simulation time of the image, seconds.
+    pub sim_time_s: Option<f64>,
+    /// What it is for.
+    #[serde(default)]
+    pub role: Role,
+    /// Whether a person took it out.
+    #[serde(default)]
+    pub excluded: bool,
+    /// How many frames the image is the mean of.
+    #[serde(default = "one")]
+    pub frames: u32,
+    /// Noise of a corner of this image along one axis, pixels (one sigma), where it was measured.
+    #[serde(default)]
+    pub corner_noise_px: Option<f64>,
+    /// How long the arm had stood when the image was taken, seconds.
+    #[serde(default)]
+    pub settled_s: Option<f64>,
+    /// The taught pose at which it was taken.
+    #[serde(default)]
+    pub pose_name: Option<String>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+impl CaptureId {
+    /// Stands for a capture without a number while an old session is read.
+    pub(super) fn none() -> Self {
+        Self(0)
+    }
+}
+
+impl Document {
+    /// A session without captures.
+    pub fn new(meta: SessionMeta) -> Self {
+        Self { meta, captures: Vec::new(), taught: Vec::new(), export_names: None }
+    }
+
+    /// A capture by its number.
+    pub fn capture(&self, id: CaptureId) -> Option<&CaptureRecord> {
+        self.captures.iter().find(|capture| capture.id == id)
+    }
+
+    /// The captures that a calibration is fitted to: neither excluded nor kept for verification.
+    pub fn in_use(&self) -> impl Iterator<Item = &CaptureRecord> {
+        self.captures.iter().filter(|capture| capture.is_in_use())
+    }
+
+    /// Checks everything that the types do not say.
+    ///
+    /// # Errors
+    /// [`EditError`] names the first value that a session must not have.
+    pub(super) fn check(&self) -> Result<(), EditError> {
+        self.meta.check()?;
+        for (i, capture) in self.captures.iter().enumerate() {
+            capture.check()?;
+            if self.captures[..i].iter().any(|other| other.id == capture.id) {
+                return Err(EditError::UsedNumber(capture.id));
+            }
+            if self.captures[..i].iter().any(|other| other.image == capture.image) {
+                return Err(bad(format!("the image {:?}", capture.image), "is there twice"));
+            }
+        }
+        check_taught(&self.taught)
+    }
+}
+
+impl SessionMeta {
+    /// Checks what the types do not say.
+    pub(super) fn check(&self) -> Result<(), EditError> {
+        self.target.check().map_err(|why| bad("target", &format!("cannot be: {why}")))?;
+        if let Some(Err(e)) = self.arm.as_ref().map(ArmModel::arm) {
+            return Err(bad("arm", &format!("is of no use: {}", one_line(&e))));
+        }
+        let Some(camera) = &self.camera else { return Ok(()) };
+        if camera.fixed && camera.intrinsics.is_none() {
+            return Err(bad("camera", "is fixed and has no intrinsics"));
+        }
+        match camera.intrinsics.map(|k| k.validate()) {
+            Some(Err(e)) => Err(bad("camera.intrinsics", &one_line(&e))),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl CaptureRecord {
+    /// Whether a calibration is fitted to it.
+    pub fn is_in_use(&self) -> bool {
+        !self.excluded && self.role == Role::Calibration
+    }
+
+    /// Its files, relative to the session.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.image.as_str()).chain(self.depth.as_deref())
+    }
+
+    pub(super) fn check(&self) -> Result<(), EditError> {
+        let refuse = |what: &str| Err(bad(format!("capture {} ({})", self.id, self.image), what));
+        if self.id == CaptureId::none() {
+            return refuse("has no number: numbers begin at 1");
+        }
+        if !self.files().all(stays_inside) {
+            return refuse("names a file that is not inside of the session");
+        }
+        if !self.base_from_tip.is_finite() {
+            return refuse("has a tip pose that is not finite");
+        }
+        let measured = [self.corner_noise_px, self.settled_s];
+        if !measured.iter().flatten().all(|v| v.is_finite() && *v >= 0.0) {
+            return refuse("has a corner_noise_px or settled_s that is negative or not finite");
+        }
+        if !self.joints_rad.iter().flatten().chain(&self.sim_time_s).all(|v| v.is_finite()) {
+            return refuse("has a joint angle or a time that is not finite");
+        }
+        if self.frames == 0 {
+            return refuse("is the mean of no frames");
+        }
+        Ok(())
+    }
+}
+
+/// What a file of taught poses asks for as well, so that the poses of every session can be written to one.
+pub(super) fn check_taught(poses: &[TaughtPose]) -> Result<(), EditError> {
+    let mut joint_count = None;
+    for (i, pose) in poses.iter().enumerate() {
+        let refuse = |what: &str| Err(bad(format!("taught pose {:?}", pose.name), what));
+        if pose.name.trim().is_empty() {
+            return refuse("has an empty name");
+        }
+        if poses[..i].iter().any(|other| other.name == pose.name) {
+            return Err(EditError::SamePoseName(pose.name.clone()));
+        }
+        match &pose.goal {
+            Goal::Tip(base_from_tip) if !base_from_tip.is_finite() => return refuse("is not finite"),
+            Goal::Joints(joints) if !joints.iter().all(|v| v.is_finite()) => return refuse("is not finite"),
+            Goal::Joints(joints) if joints.is_empty() || *joint_count.get_or_insert(joints.len()) != joints.len() => {
+                return refuse("has another number of joint angles than the poses before, or none");
+            }
+            Goal::Tip(_) | Goal::Joints(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// Files of a session are written and copied by the names in its document, which others may have written.
+fn stays_inside(name: &str) -> bool {
+    !name.is_empty() && Path::new(name).components().all(|c| matches!(c, Component::Normal(_)))
+}
+
+fn bad(at: impl Into<String>, what: &str) -> EditError {
+    EditError::Bad { at: at.into(), what: what.to_owned() }
+}

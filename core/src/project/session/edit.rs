@@ -1,0 +1,234 @@
+//! What a person does to a session, as data: recorded in the journal, undone and redone as a whole.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::document::{CaptureId, CaptureRecord, Document, Role, check_taught};
+use crate::estimate::handeye::Mode;
+use crate::project::dataset::CameraInput;
+use crate::project::taught_poses::TaughtPose;
+use crate::targets::TargetSpec;
+
+/// One change. Its text ([`fmt::Display`]) finishes the sentence “Undo …”.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Edit {
+    /// A capture was taken.
+    AddCapture(Box<CaptureRecord>),
+    /// Captures are gone from the session; their files stay, for undo.
+    DeleteCaptures(Vec<CaptureId>),
+    /// Captures are taken out of the fit, or back in.
+    SetExcluded {
+        /// Which captures.
+        ids: Vec<CaptureId>,
+        /// Out of the fit.
+        excluded: bool,
+    },
+    /// Captures are for something else.
+    SetRole {
+        /// Which captures.
+        ids: Vec<CaptureId>,
+        /// What they are for.
+        role: Role,
+    },
+    /// Another target.
+    SetTarget(TargetSpec),
+    /// The camera sits elsewhere.
+    SetMode(Mode),
+    /// Something else is known of the camera beforehand.
+    SetCamera(Option<CameraInput>),
+    /// Other taught poses.
+    SetTaught {
+        /// What was done to them.
+        change: TaughtChange,
+        /// All of them afterwards.
+        poses: Vec<TaughtPose>,
+    },
+    /// Other names for exports; `null` for none.
+    SetExportNames(serde_json::Value),
+}
+
+/// What was done to the taught poses.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TaughtChange {
+    /// A pose of this name is new.
+    Add(String),
+    /// The pose of this name is gone.
+    Remove(String),
+    /// A pose has another name.
+    Rename {
+        /// Its name before.
+        from: String,
+        /// Its name now.
+        to: String,
+    },
+    /// The pose of this name is visited earlier or later.
+    Reorder(String),
+    /// So many poses came from a file.
+    Import(u32),
+    /// All poses are others.
+    Replace,
+}
+
+/// Why a change is refused. The document is then as before.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EditError {
+    /// There is no such capture, or no longer.
+    #[error("capture {0} is not in this session: choose one of the captures in the list")]
+    UnknownCapture(CaptureId),
+    /// The change names no capture at all.
+    #[error("no capture is named: choose at least one")]
+    NoCapture,
+    /// The number of a new capture was used before.
+    #[error("the number {0} was used by another capture of this session: take the next free one")]
+    UsedNumber(CaptureId),
+    /// All numbers are used.
+    #[error("the session has used all capture numbers: begin a new session")]
+    NoNumberLeft,
+    /// Two taught poses of one name.
+    #[error("two taught poses have the name {0:?}: names tell poses apart, so give one of them another")]
+    SamePoseName(String),
+    /// What is said to be done to the taught poses is not what the poses say.
+    #[error("the taught poses do not show what was done to them ({0}): send all poses as they are afterwards")]
+    TaughtChange(TaughtChange),
+    /// A value that a session must not have.
+    #[error("{at}: {what}")]
+    Bad {
+        /// Which value.
+        at: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The document already is as the change would make it; an undo step would show nothing.
+    #[error("nothing changes: the session is like this already")]
+    NoChange,
+    /// There is no change before this one, or none that is still remembered.
+    #[error("there is nothing to undo")]
+    NothingToUndo,
+    /// The last thing done was not an undo.
+    #[error("there is nothing to redo")]
+    NothingToRedo,
+}
+
+impl Document {
+    /// The document after a change.
+    ///
+    /// # Errors
+    /// [`EditError`] when the change does not fit the document, makes it something that cannot be read again, or
+    /// leaves it as it is ([`EditError::NoChange`]). Whether a number was used by a capture that is gone is not known
+    /// here; [`super::History`] knows.
+    pub fn apply(&self, edit: &Edit) -> Result<Self, EditError> {
+        let mut next = self.clone();
+        match edit {
+            Edit::AddCapture(record) => {
+                record.check()?;
+                if self.capture(record.id).is_some() || self.captures.iter().any(|c| c.image == record.image) {
+                    return Err(EditError::UsedNumber(record.id));
+                }
+                next.captures.push((**record).clone());
+            }
+            Edit::DeleteCaptures(ids) => {
+                self.check_ids(ids)?;
+                next.captures.retain(|capture| !ids.contains(&capture.id));
+            }
+            Edit::SetExcluded { ids, excluded } => next.change_captures(ids, |capture| capture.excluded = *excluded)?,
+            Edit::SetRole { ids, role } => next.change_captures(ids, |capture| capture.role = *role)?,
+            Edit::SetTarget(target) => next.meta.target = *target,
+            Edit::SetMode(mode) => next.meta.mode = *mode,
+            Edit::SetCamera(camera) => next.meta.camera = *camera,
+            Edit::SetTaught { change, poses } => {
+                check_taught(poses)?;
+                if !change.fits(&self.taught, poses) {
+                    return Err(EditError::TaughtChange(change.clone()));
+                }
+                next.taught.clone_from(poses);
+            }
+            Edit::SetExportNames(names) => next.export_names = Some(names.clone()).filter(|names| !names.is_null()),
+        }
+        next.meta.check()?;
+        if next == *self { Err(EditError::NoChange) } else { Ok(next) }
+    }
+
+    fn check_ids(&self, ids: &[CaptureId]) -> Result<(), EditError> {
+        if ids.is_empty() {
+            return Err(EditError::NoCapture);
+        }
+        ids.iter().find(|id| self.capture(**id).is_none()).map_or(Ok(()), |id| Err(EditError::UnknownCapture(*id)))
+    }
+
+    fn change_captures(&mut self, ids: &[CaptureId], change: impl Fn(&mut CaptureRecord)) -> Result<(), EditError> {
+        self.check_ids(ids)?;
+        self.captures.iter_mut().filter(|capture| ids.contains(&capture.id)).for_each(change);
+        Ok(())
+    }
+}
+
+impl TaughtChange {
+    /// Whether the poses before and after show it.
+    fn fits(&self, before: &[TaughtPose], after: &[TaughtPose]) -> bool {
+        let had = |name: &String| before.iter().any(|pose| pose.name == *name);
+        let has = |name: &String| after.iter().any(|pose| pose.name == *name);
+        match self {
+            Self::Add(name) => !had(name) && has(name),
+            Self::Remove(name) => had(name) && !has(name),
+            Self::Rename { from, to } => had(from) && !has(from) && !had(to) && has(to),
+            Self::Reorder(name) => had(name) && has(name),
+            Self::Import(_) | Self::Replace => true,
+        }
+    }
+}
+
+impl fmt::Display for Edit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mode = |mode: &Mode| match mode {
+            Mode::EyeInHand => "eye in hand",
+            Mode::EyeToHand => "eye to hand",
+        };
+        match self {
+            Self::AddCapture(record) => write!(f, "capture {}", record.id),
+            Self::DeleteCaptures(ids) => write!(f, "delete {}", Captures(ids)),
+            Self::SetExcluded { ids, excluded: true } => write!(f, "exclude {}", Captures(ids)),
+            Self::SetExcluded { ids, excluded: false } => write!(f, "include {}", Captures(ids)),
+            Self::SetRole { ids, role: Role::Calibration } => write!(f, "use {} for calibration", Captures(ids)),
+            Self::SetRole { ids, role: Role::Verification } => write!(f, "use {} for verification", Captures(ids)),
+            Self::SetTarget(_) => f.write_str("change of target"),
+            Self::SetMode(to) => write!(f, "change to {}", mode(to)),
+            Self::SetCamera(_) => f.write_str("change of camera"),
+            Self::SetTaught { change, .. } => change.fmt(f),
+            Self::SetExportNames(_) => f.write_str("change of export names"),
+        }
+    }
+}
+
+impl fmt::Display for TaughtChange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Add(name) => write!(f, "teach pose {name}"),
+            Self::Remove(name) => write!(f, "remove pose {name}"),
+            Self::Rename { from, to } => write!(f, "rename pose {from} to {to}"),
+            Self::Reorder(name) => write!(f, "move pose {name} in the order"),
+            Self::Import(1) => f.write_str("import 1 pose"),
+            Self::Import(count) => write!(f, "import {count} poses"),
+            Self::Replace => f.write_str("replace taught poses"),
+        }
+    }
+}
+
+/// “capture 3” or “2 captures”.
+struct Captures<'a>(&'a [CaptureId]);
+
+impl fmt::Display for Captures<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            [id] => write!(f, "capture {id}"),
+            ids => write!(f, "{} captures", ids.len()),
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "edit_tests.rs"]
+mod tests;

@@ -1,0 +1,85 @@
+//! The one way from the captures of a session to what a calibration is made from.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector6;
+
+use super::document::{CaptureId, Document, Role};
+use crate::estimate::{CameraKnowledge, Observations, ObservedView};
+use crate::geometry::arm::ArmError;
+use crate::targets::observation::{Corner, View};
+
+/// What was observed in a session.
+#[derive(Debug, Clone)]
+pub struct SessionObservations {
+    /// What goes into the fit. Captures that were taken out of it stand in their place, as views that are not in the fit;
+    /// those kept for verification are not there.
+    pub observations: Observations,
+    /// The captures of these views, in the same order.
+    pub captures: Vec<CaptureId>,
+    /// What verifies: the captures kept for it that were not taken out and in which the target was found.
+    pub verification: Vec<(CaptureId, View)>,
+}
+
+impl Document {
+    /// What was observed in the captures. `corners` gives those of a capture, `None` when the target was not found in it;
+    /// `image_size` is width and height of the images in pixels.
+    ///
+    /// Joint angles are used where they belong to the poses, see [`Document::tip_by_joint`]; otherwise a line in the log
+    /// says why not.
+    pub fn observations(
+        &self,
+        image_size: (u32, u32),
+        corners: impl Fn(CaptureId) -> Option<Vec<Corner>>,
+    ) -> SessionObservations {
+        let mut tip_by_joint = self.tip_by_joint_or_none();
+        let mut seen = SessionObservations {
+            observations: Observations {
+                mode: Some(self.meta.mode),
+                target: self.meta.target,
+                image_size,
+                camera: CameraKnowledge::of(self.meta.camera.as_ref()),
+                views: Vec::new(),
+            },
+            captures: Vec::new(),
+            verification: Vec::new(),
+        };
+        for capture in &self.captures {
+            let corners = corners(capture.id);
+            let tip_by_joint = tip_by_joint.remove(&capture.id).unwrap_or_default();
+            match (capture.role, corners) {
+                (Role::Calibration, corners) => {
+                    seen.captures.push(capture.id);
+                    seen.observations.views.push(ObservedView {
+                        name: capture.image.clone(),
+                        base_from_tip: Some(capture.base_from_tip),
+                        corners,
+                        tip_by_joint,
+                        camera_from_target: None,
+                        in_fit: capture.is_in_use(),
+                    });
+                }
+                (Role::Verification, Some(corners)) if !capture.excluded => {
+                    let view = View::new(capture.image.clone(), capture.base_from_tip, corners);
+                    seen.verification.push((capture.id, View { tip_by_joint, ..view }));
+                }
+                (Role::Verification, _) => {}
+            }
+        }
+        seen
+    }
+
+    fn tip_by_joint_or_none(&self) -> BTreeMap<CaptureId, Vec<Vector6<f64>>> {
+        self.tip_by_joint().unwrap_or_else(|why| {
+            // Too few poses to tell where the arm stands are too few for an answer, which says so itself.
+            if !matches!(why, ArmError::NotPlaced(_)) {
+                tracing::warn!("the joint angles are not used: {why}");
+            }
+            BTreeMap::new()
+        })
+    }
+}
+
+#[cfg(test)]
+#[path = "observations_tests.rs"]
+mod tests;

@@ -1,0 +1,31 @@
+//! A pose with named keys, for `#[serde(with = "…")]`; the quaternion is kept bit for bit when it has unit length.
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::geometry::frames::Pose;
+
+/// How far from 1 the length of a quaternion may be.
+const UNIT_TOLERANCE: f64 = 1e-6;
+
+#[derive(Serialize, Deserialize)]
+struct Record {
+    translation_m: [f64; 3],
+    rotation_xyzw: [f64; 4],
+}
+
+pub fn serialize<Dst, Src, S: Serializer>(pose: &Pose<Dst, Src>, serializer: S) -> Result<S::Ok, S::Error> {
+    Record { translation_m: pose.translation().into(), rotation_xyzw: pose.xyzw() }.serialize(serializer)
+}
+
+pub fn deserialize<'de, Dst, Src, D: Deserializer<'de>>(deserializer: D) -> Result<Pose<Dst, Src>, D::Error> {
+    let Record { translation_m, rotation_xyzw: [x, y, z, w] } = Record::deserialize(deserializer)?;
+    let q = Quaternion::new(w, x, y, z);
+    // Written so that NaN is refused as well.
+    if (q.norm() - 1.0).abs() <= UNIT_TOLERANCE {
+        let rotation = UnitQuaternion::new_unchecked(q);
+        return Ok(Pose::from_isometry(Isometry3::from_parts(Translation3::from(translation_m), rotation)));
+    }
+    Err(D::Error::custom(format!("rotation_xyzw has length {} and is not a unit quaternion", q.norm())))
+}
