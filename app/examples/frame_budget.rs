@@ -21,7 +21,7 @@ use handeye_app::command::{Command, Event};
 use handeye_app::gui::{Layout, Window};
 use handeye_app::model::{CellSource, MotionGoal, Observed, SessionState, ViewSettings, ViewerState};
 use handeye_app::rerun_log::RerunChoice;
-use handeye_app::session_start::{self, BOARD};
+use handeye_app::session::start::{self, BOARD};
 use handeye_app::settings::SettingsFile;
 use handeye_app::text::Text;
 use handeye_app::worker::{Clock, LiveConnector, Waker};
@@ -227,7 +227,7 @@ fn thousand_views(app: &mut App) {
     let camera = Intrinsics::pinhole(640, 480, 589.37);
     let tip_from_camera: Pose<Tip, Camera> = Pose::from_translation_xyzw([0.05, 0.0, 0.0], [0.0, 0.0, 0.7, 0.7]);
     let base_from_target: Pose<Base, Target> = Pose::from_translation_xyzw([0.4, 0.1, 0.02], [1.0, 0.0, 0.0, 0.0]);
-    let mut document = Document::new(session_start::meta(None, String::new()));
+    let mut document = Document::new(start::meta(None, String::new()));
     let mut seen = Vec::new();
     for n in 1..=1000_u32 {
         let s = f64::from(n);

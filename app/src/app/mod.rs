@@ -3,19 +3,7 @@
 //! [`App::apply`] does what the user wants, [`App::absorb`] takes in what happened. Each part of the work has a file of
 //! its own here; all of them change the model of the one [`App`] and hand work to threads, and none waits.
 
-mod capture;
-mod connection;
-mod export;
 mod leave;
-mod looking;
-mod messages;
-mod motion;
-mod recording;
-mod session;
-mod solve;
-mod taught;
-mod tour;
-mod track;
 
 use std::io;
 use std::path::PathBuf;
@@ -50,32 +38,32 @@ pub struct Start {
 
 /// Model and workers.
 pub struct App {
-    model: Model,
+    pub(crate) model: Model,
     /// The threads that talk to the cell; others take their place when another cell is chosen.
-    workers: Workers,
-    desk: SessionThreads,
-    connect: Connect,
-    clock: Clock,
-    waker: Waker,
-    numbers: Numbers,
+    pub(crate) workers: Workers,
+    pub(crate) desk: SessionThreads,
+    pub(crate) connect: Connect,
+    pub(crate) clock: Clock,
+    pub(crate) waker: Waker,
+    pub(crate) numbers: Numbers,
     /// The question that the solver was asked last.
-    asked: Option<solve::Question>,
-    recorder: Recorder,
-    recorded: recording::Recorded,
+    pub(crate) asked: Option<crate::solve::update::Question>,
+    pub(crate) recorder: Recorder,
+    pub(crate) recorded: crate::rerun_log::update::Recorded,
     /// Until when everything has to be over, once the application ends.
-    leave_by: Option<Instant>,
+    pub(crate) leave_by: Option<Instant>,
 }
 
 /// The last numbers that were given to requests.
 #[derive(Debug, Default)]
-struct Numbers {
-    capture: u64,
-    job: JobId,
-    motion: MotionId,
+pub(crate) struct Numbers {
+    pub(crate) capture: u64,
+    pub(crate) job: JobId,
+    pub(crate) motion: MotionId,
     /// The motion that follows the board.
-    follow: Option<MotionId>,
+    pub(crate) follow: Option<MotionId>,
     /// The request for poses to verify at that is not answered yet.
-    plan: Option<MotionId>,
+    pub(crate) plan: Option<MotionId>,
 }
 
 impl App {
@@ -96,7 +84,7 @@ impl App {
         let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
         let model = Model { addresses, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
         let numbers = Numbers::default();
-        let recorded = recording::Recorded::default();
+        let recorded = crate::rerun_log::update::Recorded::default();
         let mut app = Self {
             model,
             workers,
@@ -288,7 +276,7 @@ impl App {
     }
 
     /// Tells the user when a worker did not take a request.
-    fn expect<Refused>(&mut self, failure: text::Text, asked: Result<(), Refused>) {
+    pub(crate) fn expect<Refused>(&mut self, failure: text::Text, asked: Result<(), Refused>) {
         if let Err(_refused) = asked {
             let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);
             self.say(Severity::Warning, text);

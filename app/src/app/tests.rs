@@ -3,7 +3,7 @@ use std::time::{Duration, Instant};
 use handeye_core::project::session::CaptureId;
 
 use super::*;
-use crate::gui::sample;
+use crate::gui::testing::sample;
 use crate::model::{
     CapturePurpose, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState, Motion, MotionGoal,
     MotionOutcome, Pane, SolveStatus, StopOutcome, ThemeChoice, Tour,

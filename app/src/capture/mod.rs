@@ -11,10 +11,14 @@
 //! What is decided on the way (at rest, sharp, too similar) is decided in [`handeye_core::capture`].
 
 mod measured;
+pub(crate) mod pane;
 pub mod refusal;
 mod request;
+pub(crate) mod rows;
 mod sequence;
+pub(crate) mod state;
 mod take;
+pub(crate) mod update;
 
 pub use measured::{Measured, thumbnail};
 pub use request::CaptureRequest;

@@ -20,7 +20,7 @@ use super::{Failure, out, report};
 use crate::model::{Goal, JobId, Observed, Solved, Step, Truth};
 use crate::observe::{ObserveError, observe, observe_session};
 use crate::rerun_log::{Entry, Recorder};
-use crate::session_start;
+use crate::session::start;
 use crate::worker::{self, SolveJob};
 
 /// Name of the result in a session.
@@ -185,7 +185,7 @@ fn as_document(dataset: &Dataset) -> Document {
         mode: dataset.mode.unwrap_or(Mode::EyeInHand),
         target: dataset.target,
         camera: dataset.camera,
-        ..session_start::meta(None, String::new())
+        ..start::meta(None, String::new())
     });
     for (entry, number) in dataset.entries.iter().zip(1..) {
         let Some(base_from_tip) = entry.base_from_tip else { continue };

@@ -8,7 +8,7 @@ use crate::model::{CapturePurpose, Dialog, Model, Pane, Step, ThemeChoice};
 use crate::text::Language;
 use crate::tr;
 
-use super::panes;
+use super::shell;
 
 /// Headings of the help about the keyboard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,7 +88,7 @@ const STEPS: [&[KeyboardShortcut]; 7] = [
 pub fn all(model: &Model, language: Language) -> Vec<Action> {
     let action = |name, group, keys, command| Action { name, group, keys, command: Some(command) };
     let dialog = |name, keys, dialog| action(name, Group::Session, keys, Command::SetDialog(Some(dialog)));
-    let session = super::session::of(model);
+    let session = crate::session::facts::of(model);
     let connected = model.control.is_connected() && model.camera.is_connected();
     let mut all = vec![
         action(tr!(language, "Stop the arm"), Group::Work, STOP, Command::Stop),
@@ -136,7 +136,7 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
         dialog(tr!(language, "Save session…"), SAVE, Dialog::SaveAs),
     ];
     for (step, keys) in Step::ALL.into_iter().zip(STEPS) {
-        all.push(action(panes::step_name(step, language), Group::Steps, keys, Command::GoToStep(step)));
+        all.push(action(shell::step_name(step, language), Group::Steps, keys, Command::GoToStep(step)));
     }
     let open = |dialog| Command::SetDialog(Some(dialog));
     all.extend([
@@ -157,7 +157,7 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
         all.push(action(other.own_name(), Group::Window, &[], Command::SetLanguage(other)));
     }
     for pane in Pane::ALL {
-        all.push(action(panes::title(pane, language), Group::Panes, &[], Command::ShowPane(pane)));
+        all.push(action(shell::title(pane, language), Group::Panes, &[], Command::ShowPane(pane)));
     }
     all
 }

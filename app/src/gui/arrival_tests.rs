@@ -3,8 +3,8 @@ use std::sync::Arc;
 use egui_kittest::kittest::Queryable as _;
 
 use super::*;
-use crate::gui::sample;
 use crate::gui::testing::Silent;
+use crate::gui::testing::sample;
 use crate::model::{CellSource, Pane, Solved, StopOutcome, Tour};
 
 /// With a sequence under way that has `done` of its ten poses.

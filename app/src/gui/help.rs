@@ -3,7 +3,7 @@
 use egui::{CornerRadius, Frame, Grid, Label, Margin, RichText, ScrollArea, Stroke, Ui};
 
 use super::actions::{self, Action, Group};
-use super::theme::{self, Palette, TITLE};
+use super::style::theme::{self, Palette, TITLE};
 use crate::model::Model;
 use crate::tr;
 

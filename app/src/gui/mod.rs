@@ -5,32 +5,18 @@
 
 mod actions;
 mod arrival;
-mod captures;
 mod dialogs;
-mod fonts;
 mod help;
-mod icons;
-mod layout;
-mod marks;
-mod numbers;
 mod palette;
-#[cfg(test)]
-mod pane_harness;
-mod panes;
-mod rail;
-#[cfg(test)]
-pub mod sample;
-mod session;
+pub(crate) mod shell;
 mod signals;
 #[cfg(test)]
 mod snapshot_tests;
-mod status;
+pub(crate) mod status;
 mod steps;
+pub mod style;
 #[cfg(test)]
-mod testing;
-mod textures;
-mod theme;
-mod toasts;
+pub(crate) mod testing;
 mod widget_list;
 mod window;
 
@@ -44,11 +30,11 @@ use egui::ViewportBuilder;
 use crate::app::{App, Connect, Start};
 use crate::cli::GuiArgs;
 use crate::command::Event;
+pub use crate::gui::shell::layout::Layout;
 use crate::model::CellSource;
 use crate::rerun_log::RerunChoice;
 use crate::settings::{self, SettingsFile};
 use crate::worker::{Clock, LiveConnector, Waker};
-pub use layout::Layout;
 use signals::Signals;
 use window::Remembered;
 pub use window::Window;
@@ -112,6 +98,6 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
 /// The layout of the last time; the first one when there is none that can be read.
 fn stored_layout(storage: Option<&dyn eframe::Storage>) -> Layout {
     storage
-        .and_then(|storage| eframe::get_value::<Layout>(storage, layout::STORAGE_KEY))
+        .and_then(|storage| eframe::get_value::<Layout>(storage, crate::gui::shell::layout::STORAGE_KEY))
         .map_or_else(Layout::default, Layout::brought_up_to_date)
 }

@@ -7,7 +7,7 @@ use egui::{
 
 use super::actions::{self, Action};
 use super::dialogs;
-use super::theme::{CAPTION, Palette};
+use super::style::theme::{CAPTION, Palette};
 use crate::command::{Command, Outbox};
 use crate::model::Model;
 use crate::text::Language;

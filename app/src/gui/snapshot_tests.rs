@@ -12,8 +12,8 @@ use egui_kittest::wgpu::WgpuTestRenderer;
 use egui_wgpu::{RenderState, RendererOptions, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew, wgpu};
 use handeye_core::testing::{Need, skip};
 
-use super::sample;
 use super::testing::Silent;
+use super::testing::sample;
 use crate::model::{CellSource, LinkState, Model, Pane, Step, ThemeChoice, ViewSettings};
 use crate::text::Language;
 

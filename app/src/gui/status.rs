@@ -1,6 +1,6 @@
 //! The state of the connections in words.
 
-use super::theme::Tone;
+use super::style::theme::Tone;
 use crate::model::{CellSource, Link, LinkState, Model, Simulation};
 use crate::text;
 use crate::text::Text;

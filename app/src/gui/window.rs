@@ -9,15 +9,15 @@ use serde::{Deserialize, Serialize};
 use super::actions;
 use super::arrival::{Arrival, Busy};
 use super::dialogs;
-use super::fonts;
-use super::layout::{self, Layout};
 use super::palette::CommandPalette;
-use super::panes;
+use super::shell;
+use super::shell::layout::{self, Layout};
 use super::signals::Signals;
-use super::textures::Textures;
-use super::theme;
+use super::style::fonts;
+use super::style::theme;
 use crate::app::App;
 use crate::command::{Command, Outbox};
+use crate::live::textures::Textures;
 use crate::model::{
     CaptureOptions, Dialog, Goal, JogSettings, Model, Overlays, RecentSession, ThemeChoice, ViewSettings,
 };
@@ -135,7 +135,7 @@ impl Window {
         let model = app.model();
         textures.live.update(ui.ctx(), model);
         let in_front = layout.in_front();
-        panes::all_ui(ui, model, textures, layout, outbox);
+        shell::all_ui(ui, model, textures, layout, outbox);
         if layout.in_front() != in_front {
             arrival.chosen();
         }

@@ -167,7 +167,7 @@ fn nothing_is_cut_off_at_the_smallest_size() {
             .map(tr)
             .collect();
         labels.push(format!("{}: 7", tr("Dropped")));
-        labels.extend(Pane::ALL.map(|pane| panes::title(pane, language).to_owned()));
+        labels.extend(Pane::ALL.map(|pane| shell::title(pane, language).to_owned()));
         for label in labels {
             let nodes: Vec<_> = silent.harness.query_all_by_label(&label).collect();
             assert!(!nodes.is_empty(), "{label} is not there");
@@ -375,7 +375,7 @@ fn missing(alphabet: &BTreeSet<char>, text: &str) -> String {
 #[test]
 fn the_same_warning_is_on_the_screen_once() {
     let mut silent = Silent::live();
-    silent.show_model(crate::gui::sample::tracking());
+    silent.show_model(crate::gui::testing::sample::tracking());
     silent.show(Pane::Track);
     let why = "joint 3 is at its limit";
     let text = crate::text::Text::verbatim(why);
@@ -398,7 +398,7 @@ fn why_there_is_no_capture_is_on_the_screen_once_and_the_table_keeps_it() {
     let mut silent = Silent::live();
     silent.show(Pane::Poses);
     let why = crate::text::Text::verbatim("the board is not in view");
-    let mut model = crate::gui::sample::captured();
+    let mut model = crate::gui::testing::sample::captured();
     let said = crate::text!("No capture: {why}", why = why.clone());
     let at_s = model.now_s;
     let home = crate::model::Home::Pane(Pane::Colour);

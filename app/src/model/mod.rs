@@ -3,18 +3,6 @@
 //! Only [`crate::app::App::apply`] and [`crate::app::App::absorb`] change a [`Model`]; panes read it. Times are seconds
 //! on the clock that the application was started with.
 
-mod capture;
-mod estimated;
-mod export;
-mod messages;
-mod motion;
-mod rerun;
-mod session;
-mod solve;
-mod tip_box;
-mod track;
-mod trail;
-mod view;
 mod workflow;
 
 use std::collections::BTreeMap;
@@ -33,29 +21,31 @@ use handeye_core::verify::Predictor;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 
-pub use capture::{
+pub use crate::capture::state::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
-pub use estimated::{EstimatedValue, estimated};
-pub use export::{ExportState, Preview, PreviewFile, Written};
-pub use handeye_sim_link::client::cell::BoardPath;
-pub use messages::{Home, Message, Messages};
-pub use motion::{
+pub use crate::export::state::{ExportState, Preview, PreviewFile, Written};
+pub use crate::live::state::{Overlays, PickedPoint, SceneView, Viewport, exports_of};
+pub use crate::messages::state::{Home, Message, Messages};
+pub use crate::motion::state::{
     Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
 };
-pub use rerun::{RerunState, ViewerState};
-pub use session::{
+pub use crate::rerun_log::state::{RerunState, ViewerState};
+pub use crate::session::state::{
     FolderEntry, FolderKind, FolderListing, Observed, RecentSession, Review, SessionState, StopOutcome, Tour,
 };
-pub use solve::{JobId, SolveState, SolveStatus, Solved};
-pub use tip_box::{BoxState, WorkBox, judge_box};
-pub use track::{BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked};
-pub use trail::{MAX_TRAIL_POINTS, Trail};
-pub use view::{Overlays, PickedPoint, SceneView, Viewport, exports_of};
+pub use crate::solve::estimated::{EstimatedValue, estimated};
+pub use crate::solve::state::{JobId, SolveState, SolveStatus, Solved};
+pub use crate::solve::tip_box::{BoxState, WorkBox, judge_box};
+pub use crate::track::state::{
+    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
+};
+pub use crate::track::trail::{MAX_TRAIL_POINTS, Trail};
+pub use handeye_sim_link::client::cell::BoardPath;
 pub use workflow::{Dialog, Pane, Step};
 
-use crate::session_start;
+use crate::session::start;
 use crate::text::Language;
 
 /// Which cell the window works with.
@@ -450,7 +440,7 @@ impl Model {
             planning: false,
             session: SessionState {
                 folder: None,
-                document: Arc::new(Document::new(session_start::meta(None, String::new()))),
+                document: Arc::new(Document::new(start::meta(None, String::new()))),
                 undo: None,
                 redo: None,
             },

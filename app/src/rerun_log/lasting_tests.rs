@@ -5,16 +5,16 @@ use handeye_core::project::session::{CaptureId, Document};
 
 use super::*;
 use crate::model::{Observed, Severity, Step};
-use crate::session_start;
+use crate::session::start;
 
 fn said(words: &str) -> Entry {
     Entry::Said { severity: Severity::Info, words: words.to_owned() }
 }
 
 fn document(captures: &[u32]) -> Entry {
-    let mut document = Document::new(session_start::meta(None, String::new()));
+    let mut document = Document::new(start::meta(None, String::new()));
     for id in captures {
-        let record = crate::gui::sample::captured().session.document.captures[0].clone();
+        let record = crate::gui::testing::sample::captured().session.document.captures[0].clone();
         document.captures.push(handeye_core::project::session::CaptureRecord { id: CaptureId(*id), ..record });
     }
     Entry::Document { folder: None, document: Arc::new(document) }

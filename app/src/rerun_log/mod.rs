@@ -14,6 +14,7 @@
 
 pub mod blueprint;
 mod browser;
+pub(crate) mod button;
 mod choice;
 mod entry;
 mod file;
@@ -26,7 +27,9 @@ mod report;
 mod reports;
 pub mod scene;
 mod serving;
+pub(crate) mod state;
 mod stream;
+pub(crate) mod update;
 mod viewer;
 
 pub use choice::{ChoiceError, RerunChoice};

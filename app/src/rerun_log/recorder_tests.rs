@@ -7,7 +7,7 @@ use rerun::sink::CallbackSink;
 use super::super::stream::SharedSink;
 use super::*;
 use crate::model::ViewerState;
-use crate::session_start;
+use crate::session::start;
 use crate::text::Language;
 
 const SOON: Duration = Duration::from_secs(30);
@@ -24,7 +24,7 @@ fn start(choice: RerunChoice) -> Recorder {
 }
 
 fn document(folder: &Path) -> Entry {
-    let document = Document::new(session_start::meta(None, String::new()));
+    let document = Document::new(start::meta(None, String::new()));
     Entry::Document { folder: Some(folder.to_path_buf()), document: Arc::new(document) }
 }
 

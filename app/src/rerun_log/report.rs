@@ -208,7 +208,7 @@ fn cell(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::sample;
+    use crate::gui::testing::sample;
 
     #[test]
     fn the_report_says_what_to_expect_and_lists_every_view() {

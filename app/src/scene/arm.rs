@@ -55,7 +55,7 @@ mod tests {
     use nalgebra::{Point3, Translation3};
 
     use super::*;
-    use crate::gui::sample;
+    use crate::gui::testing::sample;
 
     const JOINTS_RAD: [JointAngles; 3] =
         [[0.0; JOINTS], [0.3, 0.8, -1.0, 0.2, 1.5, 2.0], [-2.0, 0.5, -1.5, 0.4, -1.2, 0.1]];

@@ -120,7 +120,7 @@ fn median(residuals_px: impl Iterator<Item = f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::sample;
+    use crate::gui::testing::sample;
 
     #[test]
     fn a_capture_is_aside_when_the_estimate_left_it_out_and_excluded_when_a_person_did() {

@@ -174,7 +174,7 @@ impl Known {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::sample;
+    use crate::gui::testing::sample;
 
     #[test]
     fn before_a_calibration_the_camera_is_where_the_cell_says_unless_the_session_has_it_elsewhere() {

@@ -6,6 +6,7 @@
 mod arm;
 mod captures;
 mod known;
+pub(crate) mod pane;
 
 pub use arm::{PosedArm, posed_arm};
 pub use captures::{BAD_AT_MEDIANS, CaptureItem, Captures, Standing, outcome};

@@ -14,7 +14,7 @@ use handeye_core::project::taught_poses::{TaughtPose, TaughtPoses};
 
 use super::link::Outlet;
 use crate::command::Event;
-use crate::depth_view;
+use crate::live::depth;
 use crate::model::{FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written};
 use crate::settings::SettingsWrite;
 use crate::text;
@@ -126,7 +126,7 @@ fn pictures(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Resul
         depth.unwrap_or_else(|| DepthImage { width, height, metres: vec![f32::NAN; width as usize * height as usize] });
     // A recorded depth has its far plane in it: nothing lies behind.
     let far_plane_m = depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
-    let [near_m, far_m] = depth_view::range_of(&depth, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
+    let [near_m, far_m] = depth::range_of(&depth, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
     let depth_coloured = depth.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
     Ok(FrameImages { rgb, depth, depth_coloured })
 }

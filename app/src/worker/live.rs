@@ -8,9 +8,9 @@ use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState};
 
-use super::live_motion::LiveMotion;
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
 use crate::model::{BoardMotion, CellFacts, CellSource, RobotState, Simulation};
+use crate::motion::live::LiveMotion;
 
 /// Why nothing answers any more.
 const CLOSED: &str = "the server closed the connection; start it again if it has ended";
@@ -115,7 +115,7 @@ struct LiveControl {
 
 /// Whether the cell is there, as far as is known without asking: a call to a server that has gone would wait for one to
 /// come back.
-pub(super) fn check_arm(arm: &mut Arm) -> Result<(), PortError> {
+pub(crate) fn check_arm(arm: &mut Arm) -> Result<(), PortError> {
     check(arm.sim().connection().is_connected())
 }
 
@@ -208,7 +208,7 @@ fn start_built_in() -> Result<CellServer, PortError> {
     CellServer::start(CellConfig::new(scene)).map_err(|error| hopeless(&error))
 }
 
-pub(super) fn port_error(error: LinkError) -> PortError {
+pub(crate) fn port_error(error: LinkError) -> PortError {
     let text = match &error {
         // Which call found out is of no interest when nobody is there for any call.
         LinkError::Unreachable { endpoint, .. } => format!(

@@ -10,27 +10,15 @@
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
 
-mod archive;
-mod camera;
-mod control;
-mod desk;
-mod files;
-mod follow_line;
-mod jog_line;
-mod link;
-mod live;
-mod live_motion;
-mod motion;
-mod motion_desk;
-mod newest;
-mod observer;
-mod port;
-mod rate;
-mod reconnect;
-mod slot;
-mod solver;
-mod started;
-mod tracking;
+pub(crate) mod files;
+pub(crate) mod link;
+pub(crate) mod live;
+pub(crate) mod newest;
+pub(crate) mod port;
+pub(crate) mod rate;
+pub(crate) mod reconnect;
+pub(crate) mod slot;
+pub(crate) mod started;
 mod vision;
 
 #[cfg(test)]
@@ -44,37 +32,37 @@ use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use handeye_core::geometry::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
-pub use archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};
-pub use camera::CameraTask;
-pub use control::{ControlTask, StopLine};
-pub use desk::SessionThreads;
+pub use crate::connect::worker::{ControlTask, StopLine};
+pub use crate::live::worker::CameraTask;
+pub use crate::motion::desk::{MotionQueue, MotionTask};
+pub use crate::motion::jog_line::HELD_S;
+pub use crate::motion::live::end_of_following;
+pub use crate::motion::worker::MotionLook;
+pub use crate::session::archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};
+pub use crate::session::desk::SessionThreads;
+pub use crate::solve::observer::ObserveJob;
+pub use crate::solve::worker::{SolveJob, answer};
+pub use crate::track::follow_line::FollowLine;
+pub use crate::track::worker::{TrackedImage, Tracking};
 pub use files::{ExportJob, FileTask};
-pub use follow_line::FollowLine;
-pub use jog_line::HELD_S;
 pub use link::Request;
 pub use live::LiveConnector;
-pub use live_motion::end_of_following;
-pub use motion::MotionLook;
-pub use motion_desk::{MotionQueue, MotionTask};
-pub use observer::ObserveJob;
 pub use port::{
     CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
 };
 pub use slot::LatestSlot;
-pub use solver::{SolveJob, answer};
 pub use started::Started;
-pub use tracking::{TrackedImage, Tracking};
 pub use vision::VisionTask;
 
 use crate::capture::Measured;
 use crate::command::Event;
+use crate::connect::worker::Control;
+use crate::live::worker::Camera;
 use crate::model::{
     CellSource, FollowWish, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, Tracked, ViewSettings,
 };
-use camera::Camera;
-use control::Control;
+use crate::motion::worker::Motions;
 use link::{Duty, LinkLoop, Outlet};
-use motion::Motions;
 use reconnect::Reconnect;
 use slot::Tap;
 use vision::{Vision, VisionSlots};
@@ -86,16 +74,16 @@ pub type Waker = Arc<dyn Fn() + Send + Sync>;
 pub type Clock = Arc<dyn Fn() -> f64 + Send + Sync>;
 
 /// Requests that may wait for a worker. A person cannot click faster than it answers, unless it hangs.
-const MAX_REQUESTS: usize = 32;
+pub(crate) const MAX_REQUESTS: usize = 32;
 
 /// Events that may wait for the window.
-const MAX_EVENTS: usize = 256;
+pub(crate) const MAX_EVENTS: usize = 256;
 
 /// How long the end of the program waits for the workers. Calls under way return within a fraction of it.
 pub const JOIN_DEADLINE: Duration = Duration::from_secs(2);
 
 /// How long the end of the program waits for one report of a worker before it looks again.
-const POLL: Duration = Duration::from_millis(5);
+pub(crate) const POLL: Duration = Duration::from_millis(5);
 
 /// A worker cannot take the request now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -7,7 +7,7 @@ use crossbeam_channel::Receiver;
 
 use super::fake::{FakeCell, FakeMotions};
 use super::*;
-use crate::gui::sample;
+use crate::gui::testing::sample;
 use crate::model::{CellFacts, FollowStatus, FollowWish, Link, LinkState, MotionGoal, MotionOutcome};
 use crate::text::{Language, Text};
 

@@ -9,7 +9,7 @@ use handeye_sim_link::client::MotionLimits;
 
 use super::super::Failure;
 use crate::limits;
-use crate::session_start::REFERENCE_POSES;
+use crate::session::start::REFERENCE_POSES;
 
 /// How many views `--poses auto` plans.
 const PLANNED_VIEWS: usize = 20;

@@ -11,7 +11,7 @@ use handeye_core::targets::{Grid, TargetSpec};
 use handeye_core::verify::Predictor;
 
 use crate::cli::Failure;
-use crate::session_start::TARGET_OPTION;
+use crate::session::start::TARGET_OPTION;
 
 /// Reads a result, or that of a session; with the board it was made with, where that is known.
 pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {

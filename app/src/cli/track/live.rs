@@ -22,7 +22,7 @@ use crate::cli::{Failure, record};
 use crate::limits;
 use crate::model::{FollowStatus, FollowWish, Step, Tracked};
 use crate::rerun_log::{Entry, Recorder};
-use crate::session_start::REFERENCE_POSES;
+use crate::session::start::REFERENCE_POSES;
 use crate::shortfall;
 use crate::text::{Language, Text};
 use crate::worker::{FollowLine, TrackedImage, Tracking, end_of_following};

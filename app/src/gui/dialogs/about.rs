@@ -3,8 +3,8 @@
 use egui::{RichText, Ui};
 
 use crate::command::{Command, Outbox};
-use crate::gui::panes::parts;
-use crate::gui::theme::{Palette, TITLE};
+use crate::gui::style::parts;
+use crate::gui::style::theme::{Palette, TITLE};
 use crate::model::Model;
 use crate::{text, tr};
 

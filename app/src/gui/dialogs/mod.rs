@@ -2,8 +2,6 @@
 //! beside them.
 
 mod about;
-mod address;
-mod folders;
 
 use egui::{Align, Align2, Area, Context, Frame, Id, Key, Layout, Margin, Order, Rect, Ui};
 
@@ -20,7 +18,7 @@ const WIDE: f32 = 680.0;
 /// The dialog that is open; the command palette is drawn elsewhere.
 pub fn dialogs_ui(ctx: &Context, model: &Model, outbox: &mut Outbox) {
     match model.dialog {
-        None | Some(Dialog::Palette) => folders::forget(ctx),
+        None | Some(Dialog::Palette) => crate::session::dialog::forget(ctx),
         Some(Dialog::Help) => {
             over_ui(ctx, WIDE, outbox, |ui, outbox| {
                 help::keys_ui(ui, model);
@@ -33,10 +31,10 @@ pub fn dialogs_ui(ctx: &Context, model: &Model, outbox: &mut Outbox) {
         }
         Some(Dialog::About) => over_ui(ctx, NARROW, outbox, |ui, outbox| about::about_ui(ui, model, outbox)),
         Some(Dialog::RerunAddress) => {
-            over_ui(ctx, NARROW, outbox, |ui, outbox| address::address_ui(ui, model, outbox));
+            over_ui(ctx, NARROW, outbox, |ui, outbox| crate::connect::dialog::address_ui(ui, model, outbox));
         }
         Some(dialog) => {
-            over_ui(ctx, NARROW, outbox, |ui, outbox| folders::folders_ui(ui, model, dialog, outbox));
+            over_ui(ctx, NARROW, outbox, |ui, outbox| crate::session::dialog::folders_ui(ui, model, dialog, outbox));
         }
     }
 }

@@ -4,8 +4,8 @@ use egui::{Key, Ui};
 use egui_kittest::kittest::Queryable as _;
 
 use super::*;
-use crate::gui::panes::driven::Driven;
-use crate::gui::sample;
+use crate::gui::testing::driven::Driven;
+use crate::gui::testing::sample;
 use crate::model::{FolderEntry, FolderKind, FolderListing, Messages, RecentSession, Severity, ViewerState};
 use crate::text::{Language, Text};
 

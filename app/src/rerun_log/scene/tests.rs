@@ -9,7 +9,7 @@ use rerun::RecordingStreamBuilder;
 use rerun::log::{Chunk, LogMsg};
 
 use super::*;
-use crate::gui::sample;
+use crate::gui::testing::sample;
 use crate::model::{Model, Tracked};
 
 /// What is in a recording, by entity.

@@ -20,14 +20,14 @@ use handeye_sim_link::client::CancelToken;
 
 use search::Search;
 
-use super::follow_line::FollowLine;
 use super::link::Outlet;
 use super::slot::{LatestSlot, Tap};
-use super::tracking::{TrackedImage, Tracking};
 use crate::capture::{CaptureRequest, Measured, Sequence, refusal};
 use crate::command::Event;
 use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
 use crate::text::Text;
+use crate::track::follow_line::FollowLine;
+use crate::track::worker::{TrackedImage, Tracking};
 
 /// How often the clock is looked at while a capture waits for pictures that do not come.
 const CLOCK_PERIOD: Duration = Duration::from_millis(100);

@@ -1,0 +1,228 @@
+//! The captures of the session: take, judge, leave out.
+
+mod columns;
+mod flags;
+mod row;
+mod selecting;
+mod table;
+
+use egui::{Align, Button, DragValue, Frame, Layout, Margin, RichText, Spinner, Ui, Vec2, WidgetInfo, WidgetType};
+use handeye_core::project::session::CaptureId;
+
+use crate::capture::rows::{self, CaptureTable};
+use crate::command::{Command, Outbox};
+use crate::gui::style::marks::{self, Marks};
+use crate::gui::style::theme::{Palette, Tone};
+use crate::live::pane::stands_over_picture;
+use crate::live::pane::waiting;
+use crate::live::textures::Thumbnails;
+use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model};
+use crate::{text, tr};
+
+/// Most pictures that are averaged: more take longer than they help.
+const MOST_FRAMES: u32 = 64;
+/// Height of the line at the bottom that says how captures go.
+const STATUS: f32 = 36.0;
+
+/// The pane.
+pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let table = rows::table(ui.ctx(), model);
+    Frame::new().inner_margin(Margin { left: 10, right: 10, top: 8, bottom: 4 }).show(ui, |ui| {
+        actions_ui(ui, model, &table, outbox);
+    });
+    let room = ui.available_rect_before_wrap();
+    let has_status = model.capture.is_some() || kept_refusal(model).is_some();
+    let (mut above, mut below) = (room, room);
+    if has_status {
+        above.max.y -= STATUS;
+        below.min.y = above.max.y;
+    }
+    ui.advance_cursor_after_rect(room);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(above), |ui| {
+        if table.rows.is_empty() {
+            let detail = tr!(
+                language,
+                "Move the arm to where the camera sees the whole board, then press Space. Ten poses with the board \
+                 tilted and turned to all sides make a good calibration."
+            );
+            marks::nothing_yet_ui(ui, tr!(language, "No captures yet"), detail);
+        } else {
+            table::table_ui(ui, model, &table, thumbnails, outbox);
+        }
+    });
+    if has_status {
+        ui.scope_builder(egui::UiBuilder::new().max_rect(below).id_salt("status"), |ui| status_ui(ui, model, outbox));
+    }
+}
+
+/// Buttons that take captures, and those for the selected ones.
+fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let hindrance = hindrance(model);
+    ui.horizontal_wrapped(|ui| {
+        let mut capture_ui = |ui: &mut Ui, button: Button<'_>, name: &str, what: &str, purpose| {
+            let response = ui.add_enabled(hindrance.is_none(), button).on_hover_text(what);
+            let response = match hindrance {
+                Some(why) => response.on_disabled_hover_text(why),
+                None => response,
+            };
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, hindrance.is_none(), name));
+            if response.clicked() {
+                outbox.send(Command::Capture(purpose));
+            }
+        };
+        let name = tr!(language, "Capture");
+        let words = RichText::new(name).strong().size(15.0).color(Marks::of(ui).on_accent);
+        let key = RichText::new(tr!(language, "Space")).size(11.0).color(Marks::of(ui).on_accent.gamma_multiply(0.75));
+        let big = Button::new(words).fill(Palette::of(ui).accent).min_size(Vec2::new(130.0, 32.0)).shortcut_text(key);
+        let what = tr!(language, "Waits until robot and picture stand still, then keeps picture, depth and robot pose");
+        capture_ui(ui, big, name, what, CapturePurpose::Calibrate);
+        let name = tr!(language, "Capture for verification");
+        let what = tr!(language, "This capture never enters the fit and tells how good the calibration is");
+        capture_ui(ui, Button::new(name).min_size(Vec2::new(0.0, 32.0)), name, what, CapturePurpose::Verify);
+        frames_ui(ui, model.view.capture, language, outbox);
+        tour_ui(ui, model, hindrance, outbox);
+        selected_ui(ui, model, table, outbox);
+    });
+}
+
+/// The whole set from one click: what somebody wants who has never calibrated anything.
+fn tour_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outbox: &mut Outbox) {
+    let language = model.view.language;
+    if model.touring {
+        if ui.button(tr!(language, "Stop the tour")).clicked() {
+            outbox.send(Command::StopTour);
+        }
+        return;
+    }
+    let count = model.document().taught.len();
+    // With captures in the table the tour is in the pane of the taught poses.
+    if count == 0 || !model.document().captures.is_empty() {
+        return;
+    }
+    let name = text!("Run the {count} taught poses", count = count).say(language);
+    let what = tr!(language, "Moves to one taught pose after the other and captures at each");
+    let button = ui.add_enabled(hindrance.is_none(), Button::new(name).min_size(Vec2::new(0.0, 32.0)));
+    let button = match hindrance {
+        Some(why) => button.on_disabled_hover_text(why),
+        None => button.on_hover_text(what),
+    };
+    if button.clicked() {
+        outbox.send(Command::RunTour { purpose: Some(CapturePurpose::Calibrate) });
+    }
+}
+
+/// Why no capture can be taken now.
+fn hindrance(model: &Model) -> Option<&'static str> {
+    let language = model.view.language;
+    if model.capture.is_some() {
+        Some(tr!(language, "A capture is under way"))
+    } else if model.touring {
+        Some(tr!(language, "The tour takes the captures now"))
+    } else if !model.camera.is_connected() || model.frame.is_none() {
+        Some(tr!(language, "There are no pictures: connect a cell first"))
+    } else if !model.control.is_connected() {
+        Some(tr!(language, "The robot is not connected"))
+    } else {
+        None
+    }
+}
+
+fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: crate::text::Language, outbox: &mut Outbox) {
+    let name = tr!(language, "Pictures to average");
+    let mut frames = options.frames;
+    let suffix = if frames == 1 { tr!(language, " picture") } else { tr!(language, " pictures") };
+    let prefix = tr!(language, "mean of ");
+    let drag = DragValue::new(&mut frames).range(1..=MOST_FRAMES).speed(0.1).prefix(prefix).suffix(suffix);
+    let what = tr!(language, "The mean of several pictures has less noise: four pictures halve it");
+    let response = ui.add(drag).on_hover_text(what);
+    response.widget_info(|| WidgetInfo {
+        value: Some(f64::from(frames)),
+        ..WidgetInfo::labeled(WidgetType::DragValue, true, name)
+    });
+    if frames != options.frames {
+        outbox.send(Command::SetCaptureOptions(CaptureOptions { frames, ..options }));
+    }
+}
+
+/// What can be done with the selected captures.
+fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let ids: Vec<CaptureId> = model.selection.iter().copied().filter(|&id| table.row(id).is_some()).collect();
+    if ids.is_empty() {
+        let (fit, verify) = table
+            .rows
+            .iter()
+            .filter(|row| !row.excluded)
+            .fold((0, 0), |(fit, verify), row| if row.verifies() { (fit, verify + 1) } else { (fit + 1, verify) });
+        let out = table.rows.len() - fit - verify;
+        let aside = table.rows.iter().filter(|row| row.is_aside()).count();
+        let words = if aside == 0 {
+            text!("{fit} in the fit · {verify} verify · {out} excluded", fit = fit, verify = verify, out = out)
+        } else {
+            text!(
+                "{fit} in the fit · {aside} set aside · {verify} verify · {out} excluded",
+                fit = fit - aside,
+                aside = aside,
+                verify = verify,
+                out = out
+            )
+        };
+        if !table.rows.is_empty() {
+            // As a whole on the next line when there is no room.
+            ui.add(egui::Label::new(RichText::new(words.say(language)).color(Palette::of(ui).weak)).extend());
+        }
+        return;
+    }
+    let count = ids.len();
+    let all_out = ids.iter().all(|&id| table.row(id).is_some_and(|row| row.excluded));
+    let (name, what) = if all_out {
+        let what = tr!(language, "Puts the selected captures back to what they were for");
+        (text!("Include {count}", count = count), what)
+    } else {
+        let what = tr!(language, "Takes the selected captures out of fit and verification; they stay in the session");
+        (text!("Exclude {count}", count = count), what)
+    };
+    if ui.button(name.say(language)).on_hover_text(what).clicked() {
+        outbox.send(Command::SetExcluded { ids: ids.clone(), excluded: !all_out });
+    }
+    let what = tr!(language, "Deletes the selected captures; undo brings them back");
+    if ui.button(text!("Delete {count}", count = count).say(language)).on_hover_text(what).clicked() {
+        outbox.send(Command::Delete(ids));
+    }
+}
+
+/// Why the last capture was refused, once the picture no longer says so.
+fn kept_refusal(model: &Model) -> Option<&CaptureRefused> {
+    model.refused.as_ref().filter(|_| !stands_over_picture(model))
+}
+
+/// How the capture goes, or why the last one was refused.
+fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let palette = Palette::of(ui);
+    let language = model.view.language;
+    let rect = ui.max_rect();
+    let (tone, words) = match (&model.capture, kept_refusal(model)) {
+        (Some(capture), _) => (Tone::Busy, waiting(capture).say(language)),
+        (None, Some(refused)) => (Tone::Warning, text!("No capture: {why}", why = refused.why.clone()).say(language)),
+        (None, None) => return,
+    };
+    ui.painter().rect_filled(rect, 0.0, palette.tinted(tone));
+    let inner = rect.shrink2(Vec2::new(10.0, 0.0));
+    let layout = Layout::right_to_left(Align::Center);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(inner).layout(layout), |ui| {
+        if model.capture.is_some() && ui.button(tr!(language, "Cancel capture")).clicked() {
+            outbox.send(Command::CancelCapture);
+        }
+        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+            if tone == Tone::Busy {
+                ui.add(Spinner::new().size(15.0).color(palette.busy));
+            }
+            ui.add(egui::Label::new(&words).truncate()).on_hover_text(&words);
+        });
+    });
+}
+
+#[cfg(test)]
+mod tests;

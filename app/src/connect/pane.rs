@@ -1,0 +1,181 @@
+//! Which cell the window works with, and how the connection is doing.
+
+use egui::{Button, ComboBox, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
+use handeye_sim_link::client::{Endpoint, LinkError};
+
+use crate::command::{Command, Outbox};
+use crate::gui::status;
+use crate::gui::style::theme::{Palette, Tone};
+use crate::gui::style::{form, parts};
+use crate::model::{CellSource, Link, LinkState, Model};
+use crate::text::Text;
+use crate::{text, tr};
+
+/// What the user is about to connect to; it belongs to nothing but the window.
+#[derive(Debug, Clone, Default)]
+struct Draft {
+    /// Whether an address is wanted; `None` while the user has chosen nothing.
+    remote: Option<bool>,
+    /// The address; `None` while nothing was typed.
+    address: Option<String>,
+}
+
+/// The pane.
+pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let id = Id::new("connect draft");
+    let mut draft: Draft = ui.data(|data| data.get_temp(id)).unwrap_or_default();
+    form::body_ui(ui, |ui| {
+        form::heading_ui(ui, tr!(language, "Cell"));
+        let remote = draft.remote.unwrap_or(matches!(model.source, CellSource::Address(_)));
+        let choices = [
+            (false, tr!(language, "Built-in"), tr!(language, "A simulated UR5 cell inside this program")),
+            (true, tr!(language, "Address"), tr!(language, "A CoppeliaSim or a cell that is running")),
+        ];
+        if let Some(choice) = form::choice_ui(ui, remote, &choices) {
+            draft.remote = Some(choice);
+        }
+        let wanted = ui.horizontal(|ui| {
+            let wanted = if remote { address_ui(ui, model, &mut draft) } else { Ok(CellSource::BuiltIn) };
+            if connect_button_ui(ui, model, wanted.as_ref().ok(), outbox) {
+                draft = Draft::default();
+            }
+            wanted
+        });
+        if let Err(error) = wanted.inner {
+            let colour = Palette::of(ui).bad;
+            ui.add(Label::new(RichText::new(error.to_string()).color(colour)).wrap());
+        }
+        ui.add_space(4.0);
+        state_ui(ui, model);
+        session_ui(ui, model, outbox);
+    });
+    ui.data_mut(|data| data.insert_temp(id, draft));
+}
+
+/// Where what is captured is kept.
+fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    form::heading_ui(ui, tr!(language, "Session"));
+    let folder = model.session.folder.as_ref().unwrap_or(&model.sessions);
+    let said = if model.session.folder.is_some() {
+        text!("Captures and results are kept in {folder}", folder = folder.display())
+    } else {
+        text!(
+            "From the first capture on, captures and results are kept in a folder of {folder}",
+            folder = folder.display()
+        )
+    };
+    parts::hint_ui(ui, &said.say(language));
+    ui.horizontal(|ui| {
+        if ui.button(tr!(language, "Open the folder")).clicked() {
+            outbox.send(Command::OpenFolder(folder.clone()));
+        }
+        parts::copy_ui(ui, language, tr!(language, "the path of the folder"), || folder.display().to_string());
+    });
+}
+
+/// How each connection is doing.
+fn state_ui(ui: &mut Ui, model: &Model) {
+    let language = model.view.language;
+    let status = status::connection(model);
+    form::note_ui(ui, status.tone, &status.title.say(language), &status.detail.say(language));
+    ui.horizontal_wrapped(|ui| {
+        for (link, name) in [
+            (Link::Control, tr!(language, "Robot")),
+            (Link::Camera, tr!(language, "Camera")),
+            (Link::Motion, tr!(language, "Motions")),
+        ] {
+            let (tone, words) = words(model, model.link(link));
+            let palette = Palette::of(ui);
+            ui.label(RichText::new(name).color(palette.weak));
+            ui.label(RichText::new(words.say(language)).color(palette.tone(tone)));
+            ui.add_space(10.0);
+        }
+    });
+}
+
+/// A connection in a few words.
+fn words(model: &Model, state: &LinkState) -> (Tone, Text) {
+    match state {
+        LinkState::StartingCell { .. } => (Tone::Busy, text!("starting")),
+        LinkState::Searching { attempt, .. } => (Tone::Busy, text!("searching, try {attempt}", attempt = attempt)),
+        LinkState::Connected { server, .. } => (Tone::Good, Text::verbatim(server.clone())),
+        LinkState::Lost { since_s, .. } => {
+            (Tone::Warning, text!("lost {ago} ago", ago = status::duration(model.now_s - since_s)))
+        }
+        LinkState::Retrying { since_s, attempt, .. } => {
+            let ago = status::duration(model.now_s - since_s);
+            (Tone::Warning, text!("lost {ago} ago, try {attempt}", ago = ago, attempt = attempt))
+        }
+        LinkState::Failed { .. } => (Tone::Bad, text!("failed")),
+    }
+}
+
+/// The button; whether it was pressed.
+fn connect_button_ui(ui: &mut Ui, model: &Model, wanted: Option<&CellSource>, outbox: &mut Outbox) -> bool {
+    let language = model.view.language;
+    let palette = Palette::of(ui);
+    let same = wanted.is_some_and(|wanted| *wanted == model.source);
+    let button = if same {
+        Button::new(tr!(language, "Connect again"))
+    } else {
+        Button::new(RichText::new(tr!(language, "Connect now")).color(palette.on_accent)).fill(palette.accent)
+    };
+    let pressed = ui.add_enabled(wanted.is_some(), button).clicked();
+    if let Some(source) = wanted.filter(|_| pressed) {
+        outbox.send(if same { Command::Reconnect } else { Command::Connect(source.clone()) });
+    }
+    pressed
+}
+
+/// The field for the address; the cell when it is a good one.
+fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Result<CellSource, LinkError> {
+    let language = model.view.language;
+    let mut address = draft.address.clone().unwrap_or_else(|| match (&model.source, model.addresses.first()) {
+        (CellSource::Address(address), _) | (CellSource::BuiltIn, Some(address)) => address.clone(),
+        (CellSource::BuiltIn, None) => Endpoint::default().to_string(),
+    });
+    let before = address.clone();
+    let name = tr!(language, "Address of the cell");
+    let width = (ui.available_width() - 170.0).clamp(80.0, 260.0);
+    let field = ui.add(TextEdit::singleline(&mut address).desired_width(width).hint_text("tcp://host:port"));
+    field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, name));
+    if !model.addresses.is_empty() {
+        let history = ComboBox::from_id_salt("addresses").selected_text("").width(20.0).show_ui(ui, |ui| {
+            for earlier in &model.addresses {
+                ui.selectable_value(&mut address, earlier.clone(), earlier);
+            }
+        });
+        history.response.on_hover_text(tr!(language, "Earlier addresses"));
+    }
+    if address != before {
+        draft.address = Some(address.clone());
+    }
+    address.parse::<Endpoint>().map(|endpoint| CellSource::Address(endpoint.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::gui::testing::driven::Driven;
+    use crate::gui::testing::sample;
+
+    #[test]
+    fn it_is_said_where_captures_are_kept_and_the_folder_is_opened() {
+        let mut model = sample::connected();
+        model.sessions = PathBuf::from("/home/me/handeye-sessions");
+        let mut pane = Driven::new(connect_ui, model);
+        assert!(pane.sees("are kept in a folder of /home/me/handeye-sessions"));
+        let sessions = PathBuf::from("/home/me/handeye-sessions");
+        assert_eq!(pane.click("Open the folder"), [Command::OpenFolder(sessions.clone())]);
+        let session = sessions.join("2026-11-22");
+        pane.model().session.folder = Some(session.clone());
+        pane.steps();
+        assert!(pane.sees("Captures and results are kept in /home/me/handeye-sessions/2026-11-22"));
+        assert_eq!(pane.click("Open the folder"), [Command::OpenFolder(session)]);
+        assert!(pane.nothing_is_cut_off());
+    }
+}

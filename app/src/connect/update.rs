@@ -1,0 +1,147 @@
+//! The connections to the cell.
+
+use std::thread::Builder;
+
+use crate::app::App;
+use crate::model::{BoardMotion, CellFacts, CellSource, Link, LinkState, Motion, Severity, Trail};
+use crate::worker::{CameraTask, ControlTask, Request, Workers};
+use crate::{shortfall, text};
+
+/// Earlier addresses that are offered again.
+pub const ADDRESSES: usize = 8;
+
+impl App {
+    pub(crate) fn stop(&mut self) {
+        self.workers.press_stop();
+        self.model.touring = false;
+        self.model.planning = false;
+        self.cancel_capture();
+        self.model.stop_pending = true;
+        if self.model.control.is_connected() {
+            self.say(Severity::Info, text!("Stopping the arm…"));
+        } else {
+            self.say(
+                Severity::Error,
+                text!(
+                    "The arm cannot be reached: use its own emergency stop. It is stopped as soon as the connection is \
+                     back"
+                ),
+            );
+        }
+    }
+
+    pub(crate) fn stopped(&mut self) {
+        self.model.stop_pending = false;
+        self.model.motion = Motion::Idle;
+        self.say(Severity::Info, text!("Arm stopped: every joint stays where it is"));
+    }
+
+    pub(crate) fn start_simulation(&mut self) {
+        let asked = self.workers.ask_control(Request::Do(ControlTask::StartSimulation));
+        self.expect(text!("The simulation was not started"), asked);
+    }
+
+    pub(crate) fn reconnect(&mut self) {
+        let asked = self.workers.reconnect();
+        self.expect(text!("The connection was not tried again"), asked);
+    }
+
+    /// Works with another cell. What is open stays open: a session belongs to its captures, not to a connection.
+    pub(crate) fn connect(&mut self, source: CellSource) {
+        if let CellSource::Address(address) = &source {
+            let addresses = &mut self.model.addresses;
+            addresses.retain(|other| other != address);
+            addresses.insert(0, address.clone());
+            addresses.truncate(ADDRESSES);
+        }
+        self.model.robot = None;
+        self.model.frame = None;
+        self.model.cell = None;
+        self.model.detection = None;
+        self.model.touring = false;
+        self.model.planning = false;
+        self.model.motion = Motion::Idle;
+        let first = LinkState::first(&source);
+        self.model.control = first.clone();
+        self.model.camera = first.clone();
+        self.model.mover = first;
+        let connector = (self.connect)(&source);
+        let captures = self.desk.captures();
+        match Workers::start(&source, &self.model.view, &connector, captures, &self.clock, &self.waker) {
+            Ok(workers) => {
+                let before = std::mem::replace(&mut self.workers, workers);
+                // It waits for calls under way, which the window must not.
+                let farewell = Builder::new().name("farewell".to_owned()).spawn(move || drop(before));
+                if let Err(error) = farewell {
+                    tracing::warn!(%error, "the connection before was left alone");
+                }
+            }
+            Err(error) => self.say(Severity::Error, text!("The connection was not begun: {error}", error = error)),
+        }
+        self.model.source = source;
+        self.model.capture = None;
+        self.model.track.board = BoardMotion::default();
+        self.model.track.board_hidden = false;
+        self.model.trail = Trail::default();
+        self.send_target();
+        self.send_tracking();
+    }
+
+    pub(crate) fn cell_found(&mut self, facts: CellFacts) {
+        if let Some(shortfall) = shortfall::of(facts.support, facts.arm.is_some()) {
+            self.say(Severity::Warning, shortfall);
+        }
+        self.model.cell = Some(facts);
+        self.prepare_session();
+        self.send_intrinsics();
+    }
+
+    pub(crate) fn link_changed(&mut self, link: Link, state: LinkState) {
+        let before = match link {
+            Link::Control => std::mem::replace(&mut self.model.control, state),
+            Link::Camera => std::mem::replace(&mut self.model.camera, state),
+            Link::Motion => std::mem::replace(&mut self.model.mover, state),
+        };
+        if link == Link::Motion && before.is_connected() {
+            self.motion_lost();
+        }
+        match (self.model.link(link).clone(), before.is_connected()) {
+            (LinkState::Connected { server, address }, false) => {
+                let text = match link {
+                    Link::Control => {
+                        text!("Robot connected to {server} at {address}", server = server, address = address)
+                    }
+                    Link::Camera => {
+                        text!("Camera connected to {server} at {address}", server = server, address = address)
+                    }
+                    Link::Motion => return,
+                };
+                self.say(Severity::Info, text);
+            }
+            (LinkState::Lost { why, .. }, true) => {
+                let text = match link {
+                    Link::Control => text!("Robot connection lost: {why}", why = why),
+                    Link::Camera => text!("Camera connection lost: {why}", why = why),
+                    // Pictures and joints go on, so no strip reports it.
+                    Link::Motion => {
+                        let said = text!("Connection for motions lost: {why}", why = why);
+                        return self.say(Severity::Warning, said);
+                    }
+                };
+                self.say_of_connection(Severity::Warning, text);
+            }
+            (LinkState::Failed { why }, _) if link != Link::Motion => {
+                self.say_of_connection(Severity::Error, text::Text::verbatim(why));
+            }
+            _ => {}
+        }
+    }
+
+    /// Has a worker of the camera do something.
+    pub(crate) fn ask_camera(&mut self, task: CameraTask, failure: text::Text) -> bool {
+        let asked = self.workers.ask_camera(Request::Do(task));
+        let taken = asked.is_ok();
+        self.expect(failure, asked);
+        taken
+    }
+}

@@ -1,0 +1,160 @@
+//! The control worker: reads the robot, starts the simulation, stops the arm.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use handeye_sim_link::client::CancelToken;
+
+use crate::command::Event;
+use crate::model::{BoardMotion, CellSource, Link, RobotState, Severity, Simulation};
+use crate::text;
+use crate::worker::link::{Duty, Outlet};
+use crate::worker::port::{Connected, Connector, ControlPort, PortError};
+use crate::worker::slot::LatestSlot;
+
+/// Rest between two readings: numbers that change faster cannot be read, and each reading draws the window.
+const PERIOD: Duration = Duration::from_millis(100);
+
+/// The way of a stop to the arm. It is not a message in a queue that may be full, but a count that the worker looks at
+/// before anything else, and it stays ahead until the arm has been stopped.
+#[derive(Debug, Default)]
+pub struct StopLine {
+    pressed: AtomicU64,
+    done: AtomicU64,
+}
+
+impl StopLine {
+    /// Asks for a stop.
+    pub fn press(&self) {
+        self.pressed.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// Whether a stop is asked for and not done.
+    pub fn is_pressed(&self) -> bool {
+        self.wanted().is_some()
+    }
+
+    /// The number of the newest stop that is not done.
+    fn wanted(&self) -> Option<u64> {
+        let pressed = self.pressed.load(Ordering::Acquire);
+        (pressed > self.done.load(Ordering::Acquire)).then_some(pressed)
+    }
+
+    /// Stops up to this one are done. One that was pressed meanwhile is not.
+    fn finish(&self, number: u64) {
+        self.done.fetch_max(number, Ordering::AcqRel);
+    }
+}
+
+/// What the control worker can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ControlTask {
+    /// Look at the [`StopLine`] now.
+    CheckStop,
+    /// Let simulated time advance.
+    StartSimulation,
+    /// Move the board of a simulated cell.
+    MoveBoard(BoardMotion),
+    /// Hide it, or show it again.
+    HideBoard(bool),
+}
+
+/// The duty of the control worker.
+pub struct Control {
+    stop: Arc<StopLine>,
+    robot: Arc<LatestSlot<RobotState>>,
+    /// The built-in cell belongs to this program, which starts its simulation; on somebody's CoppeliaSim that is for
+    /// the user to decide.
+    start_by_itself: bool,
+    /// The connection is new.
+    owes_facts: bool,
+}
+
+impl Control {
+    /// For a cell, with the places that it shares with the application.
+    pub fn new(source: &CellSource, stop: Arc<StopLine>, robot: Arc<LatestSlot<RobotState>>) -> Self {
+        Self { stop, robot, start_by_itself: *source == CellSource::BuiltIn, owes_facts: true }
+    }
+
+    fn stop_if_pressed(&self, port: &mut dyn ControlPort, outlet: &Outlet) -> Result<(), PortError> {
+        let Some(number) = self.stop.wanted() else { return Ok(()) };
+        match port.stop() {
+            Ok(()) => {
+                self.stop.finish(number);
+                outlet.report(Event::Stopped);
+                Ok(())
+            }
+            Err(error) => {
+                let text = text!("The arm may still move, the stop failed: {error}", error = &error);
+                outlet.notice(Severity::Error, text);
+                Err(error)
+            }
+        }
+    }
+}
+
+impl Duty for Control {
+    type Port = Box<dyn ControlPort>;
+    type Task = ControlTask;
+    const LINK: Link = Link::Control;
+
+    fn connect(
+        &mut self,
+        connector: &dyn Connector,
+        shutdown: &CancelToken,
+    ) -> Result<Connected<Self::Port>, PortError> {
+        let mut connected = connector.connect_control(shutdown)?;
+        self.owes_facts = true;
+        if self.start_by_itself && connected.port.state()?.simulation == Simulation::Stopped {
+            connected.port.start_simulation()?;
+        }
+        Ok(connected)
+    }
+
+    fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
+        self.stop_if_pressed(port.as_mut(), outlet)?;
+        if std::mem::take(&mut self.owes_facts) {
+            outlet.report(Event::Cell(Box::new(port.facts()?)));
+        }
+        self.robot.put(port.state()?);
+        (outlet.waker)();
+        Ok(PERIOD)
+    }
+
+    fn perform(&mut self, port: Option<&mut Self::Port>, task: Self::Task, outlet: &Outlet) -> Result<(), PortError> {
+        let Some(port) = port else {
+            if matches!(task, ControlTask::StartSimulation) {
+                let text = text!("The simulation cannot be started: there is no connection to the cell");
+                outlet.notice(Severity::Warning, text);
+            }
+            return Ok(());
+        };
+        match task {
+            ControlTask::CheckStop => self.stop_if_pressed(port.as_mut(), outlet),
+            ControlTask::StartSimulation => match port.start_simulation() {
+                Ok(()) => {
+                    outlet.notice(Severity::Info, text!("Simulation started"));
+                    Ok(())
+                }
+                Err(PortError::Refused(why)) => {
+                    outlet.notice(Severity::Error, text!("The simulation did not start: {why}", why = why));
+                    Ok(())
+                }
+                Err(error) => Err(error),
+            },
+            ControlTask::MoveBoard(motion) => board_answer(port.move_board(&motion), outlet),
+            ControlTask::HideBoard(hidden) => board_answer(port.hide_board(hidden), outlet),
+        }
+    }
+}
+
+fn board_answer(answer: Result<(), PortError>, outlet: &Outlet) -> Result<(), PortError> {
+    match answer {
+        Err(PortError::Refused(why)) => {
+            outlet.notice(Severity::Warning, text!("The board stays as it is: {why}", why = why));
+            Ok(())
+        }
+        answer => answer,
+    }
+}

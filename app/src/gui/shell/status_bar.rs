@@ -1,0 +1,133 @@
+//! The bar at the bottom: the robot in numbers, the age of the pictures, the last thing that went as asked.
+
+use egui::{Button, Label, RichText, Sense, Ui, Vec2};
+
+use crate::command::{Command, Outbox};
+use crate::gui::status::STALE_AFTER_S;
+use crate::gui::style::numbers;
+use crate::gui::style::theme::{CAPTION, Palette};
+use crate::model::{Model, RobotState, RotationFormat, Severity};
+use crate::tr;
+
+/// Shown where a number is not known.
+const UNKNOWN: &str = "–";
+
+/// The bar.
+pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let palette = Palette::of(ui);
+    // What is on the screen after a loss is history, and looks like it.
+    let language = model.view.language;
+    let live = model.control.is_connected();
+    let robot = model.robot.as_ref();
+    ui.spacing_mut().item_spacing.x = 18.0;
+    ui.horizontal(|ui| {
+        let colour = if live { palette.text } else { palette.weak };
+        let text = |number: fn(&RobotState) -> String| robot.map_or_else(|| UNKNOWN.to_owned(), number);
+        field_ui(
+            ui,
+            tr!(language, "Tip in base, x y z [mm]"),
+            &text(|robot| numbers::translation_mm(&robot.base_from_tip)),
+            "−888.8 −888.8 −888.8",
+            colour,
+        );
+        rotation_ui(ui, model, colour, outbox);
+        field_ui(
+            ui,
+            tr!(language, "Joints 1 to 6 [deg]"),
+            &text(joints_deg),
+            "−888.8 −888.8 −888.8 −888.8 −888.8 −888.8",
+            colour,
+        );
+        field_ui(
+            ui,
+            tr!(language, "Simulation"),
+            &text(|robot| format!("{:.2} s", robot.sim_time_s)),
+            "8888.88 s",
+            colour,
+        );
+        let stale = model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S);
+        let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
+        field_ui(ui, tr!(language, "Image age"), &age, "88.8 s", if stale { palette.warning } else { palette.text });
+        field_ui(ui, tr!(language, "Dropped"), &model.dropped_frames.to_string(), "88888", palette.text).on_hover_text(
+            tr!(language, "Pictures that arrived but were replaced by newer ones before the window could show them"),
+        );
+    });
+    ui.add_space(2.0);
+    message_ui(ui, model);
+}
+
+/// A caption over a value with room for `sample`, read together by a screen reader.
+fn field_ui(ui: &mut Ui, caption: &str, value: &str, sample: &str, colour: egui::Color32) -> egui::Response {
+    let weak = Palette::of(ui).weak;
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    let room = ui.painter().layout_no_wrap(sample.to_owned(), font, colour).size().x;
+    ui.vertical(|ui| {
+        ui.spacing_mut().item_spacing.y = 1.0;
+        // Nothing moves sideways when a number grows or is not known.
+        ui.set_min_width(room);
+        ui.label(RichText::new(caption).size(CAPTION).color(weak));
+        let label = ui.add(Label::new(RichText::new(value).color(colour)).extend().sense(Sense::hover()));
+        label.widget_info(|| {
+            let spoken = value.split_whitespace().collect::<Vec<_>>().join(" ");
+            egui::WidgetInfo::labeled(egui::WidgetType::Label, true, format!("{caption}: {spoken}"))
+        });
+    })
+    .response
+}
+
+fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let (caption, sample, next, name) = match model.view.rotation {
+        RotationFormat::RollPitchYaw => (
+            tr!(language, "Tip in base, roll pitch yaw [deg]"),
+            "−888.88 −888.88 −888.88",
+            RotationFormat::Quaternion,
+            "quat",
+        ),
+        RotationFormat::Quaternion => (
+            tr!(language, "Tip in base, quaternion x y z w"),
+            "−8.8888 −8.8888 −8.8888 −8.8888",
+            RotationFormat::RollPitchYaw,
+            "rpy",
+        ),
+    };
+    let value = model.robot.as_ref().map_or_else(
+        || UNKNOWN.to_owned(),
+        |robot| match model.view.rotation {
+            RotationFormat::RollPitchYaw => numbers::rpy_deg(&robot.base_from_tip),
+            RotationFormat::Quaternion => numbers::quaternion(&robot.base_from_tip),
+        },
+    );
+    ui.horizontal_top(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        field_ui(ui, caption, &value, sample, colour);
+        let button = ui
+            .vertical(|ui| {
+                ui.add_space(6.0);
+                ui.add(Button::new(RichText::new(name).size(CAPTION)).min_size(Vec2::new(34.0, 22.0)).small())
+            })
+            .inner
+            .on_hover_text(match next {
+                RotationFormat::Quaternion => tr!(language, "Write the rotation as a quaternion"),
+                RotationFormat::RollPitchYaw => tr!(language, "Write the rotation as roll, pitch and yaw"),
+            });
+        if button.clicked() {
+            outbox.send(Command::SetRotationFormat(next));
+        }
+    });
+}
+
+fn message_ui(ui: &mut Ui, model: &Model) {
+    let palette = Palette::of(ui);
+    let said = model.messages.status_line().map(|message| message.text.say(model.view.language)).unwrap_or_default();
+    ui.add(Label::new(RichText::new(said).color(palette.severity(Severity::Info))).truncate());
+}
+
+fn joints_deg(robot: &RobotState) -> String {
+    numbers::row(&robot.joints_rad.map(f64::to_degrees), 1, 6)
+}
+
+/// Tenths while it is young, so that it does not flicker.
+fn age_text(age_s: f64) -> String {
+    if age_s < 60.0 { format!("{age_s:.1} s") } else { format!("{:.0} min", age_s / 60.0) }
+}

@@ -1,0 +1,196 @@
+//! The pictures, colour and depth: live, or recorded with a capture.
+
+mod feedback;
+mod overlays;
+mod project;
+mod readout;
+mod toolbar;
+pub(crate) mod view;
+
+pub use feedback::{stands_over_picture, waiting};
+
+use std::sync::Arc;
+
+use egui::{Align, CornerRadius, Layout, Pos2, Rect, Ui, UiBuilder, Vec2};
+use handeye_core::depth::DepthSample;
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::project::session::CaptureId;
+
+use super::colour_bar;
+use crate::command::Outbox;
+use crate::gui::status;
+use crate::gui::style::empty;
+use crate::gui::style::marks;
+use crate::gui::style::theme::Palette;
+use crate::live::textures::LiveTextures;
+use crate::model::{FrameImages, ImagePoint, Model};
+use crate::tr;
+
+/// Height of the line over a picture.
+const HEADER: f32 = 34.0;
+/// Height of what is under a picture, the same for both so that they stay of one size.
+const FOOTER: f32 = 46.0;
+/// Distance of text to the edge of a pane.
+const INSET: f32 = 10.0;
+
+/// The pictures that are shown.
+#[derive(Clone, Copy)]
+pub struct Shown<'a> {
+    /// The pixels.
+    pub images: &'a Arc<FrameImages>,
+    /// The capture they were recorded with; `None` for the live ones.
+    pub capture: Option<CaptureId>,
+    /// Where the robot reported its tip then.
+    pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// The sensor's far plane \[m\].
+    pub far_plane_m: f32,
+    /// Depths \[m\] at the ends of the colours.
+    pub depth_range_m: Option<[f32; 2]>,
+}
+
+impl<'a> Shown<'a> {
+    /// Those of the model; `None` while there are none.
+    fn of(model: &'a Model, textures: &LiveTextures) -> Option<Self> {
+        let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
+        if let Some(review) = &model.review {
+            return Some(Self {
+                images: review.images.as_ref()?,
+                capture: Some(review.id),
+                base_from_tip: model.document().capture(review.id).map(|record| record.base_from_tip),
+                far_plane_m,
+                depth_range_m: textures.review_range_m(),
+            });
+        }
+        let frame = model.frame.as_ref()?;
+        Some(Self {
+            images: &frame.images,
+            capture: None,
+            base_from_tip: Some(frame.info.base_from_tip),
+            far_plane_m,
+            depth_range_m: Some(frame.info.depth_range_m),
+        })
+    }
+
+    /// Depth \[m\] at a pixel of the colour picture; `None` without a surface.
+    fn depth_m(&self, point: ImagePoint) -> Option<f32> {
+        match self.images.depth_at(point, self.far_plane_m) {
+            DepthSample::Metres(depth_m) => Some(depth_m),
+            DepthSample::Far | DepthSample::Invalid => None,
+        }
+    }
+}
+
+/// The colour picture with everything drawn over it. Gives the pixel under the pointer: of both pictures one at most
+/// has one, and whoever draws both tells the model with `Command::PointAt`.
+pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
+    let language = model.view.language;
+    let shown = match content(model, textures) {
+        Content::Pictures(shown) => shown,
+        Content::Reading(id) => {
+            feedback::reading_ui(ui, model, id, outbox);
+            return None;
+        }
+        Content::Nothing => {
+            empty::status_ui(ui, &status::before_first_picture(model), language, outbox);
+            return None;
+        }
+    };
+    let picture = crate::live::pane::view::Picture {
+        texture: textures.rgb.as_ref(),
+        name: tr!(language, "Colour picture"),
+        model,
+        shown,
+        with_overlays: true,
+    };
+    tile_ui(
+        ui,
+        model,
+        outbox,
+        |ui, outbox| toolbar::overlays_ui(ui, model, outbox),
+        |ui, outbox| picture.picture_ui(ui, outbox),
+        |ui, _| readout::readout_ui(ui, model, &shown),
+    )
+}
+
+/// The depth picture. Gives the pixel of the colour picture under the pointer, as [`colour_ui`] does.
+pub fn depth_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
+    let language = model.view.language;
+    let Content::Pictures(shown) = content(model, textures) else {
+        let detail = tr!(language, "It comes together with the colour picture.");
+        marks::nothing_yet_ui(ui, tr!(language, "No depth picture yet"), detail);
+        return None;
+    };
+    let picture = crate::live::pane::view::Picture {
+        texture: textures.depth.as_ref(),
+        name: tr!(language, "Depth picture"),
+        model,
+        shown,
+        with_overlays: false,
+    };
+    tile_ui(
+        ui,
+        model,
+        outbox,
+        |ui, outbox| toolbar::depth_ui(ui, model, outbox),
+        |ui, outbox| picture.picture_ui(ui, outbox),
+        |ui, _| match shown.depth_range_m {
+            Some(range_m) => {
+                let depth_m = model.cursor.and_then(|point| shown.depth_m(point));
+                colour_bar::colour_bar_ui(ui, model.view.depth_colours, range_m, depth_m, language);
+            }
+            None => {
+                ui.label(tr!(language, "There is no depth in this picture"));
+            }
+        },
+    )
+}
+
+enum Content<'a> {
+    Pictures(Shown<'a>),
+    /// The pictures of this capture are on their way from the disk.
+    Reading(CaptureId),
+    Nothing,
+}
+
+fn content<'a>(model: &'a Model, textures: &LiveTextures) -> Content<'a> {
+    match (Shown::of(model, textures), &model.review) {
+        (Some(shown), _) => Content::Pictures(shown),
+        (None, Some(review)) => Content::Reading(review.id),
+        (None, None) => Content::Nothing,
+    }
+}
+
+/// A line at the top, a picture, and a line at the bottom. Gives what the picture gives.
+fn tile_ui<R>(
+    ui: &mut Ui,
+    model: &Model,
+    outbox: &mut Outbox,
+    header_ui: impl FnOnce(&mut Ui, &mut Outbox),
+    picture_ui: impl FnOnce(&mut Ui, &mut Outbox) -> R,
+    footer_ui: impl FnOnce(&mut Ui, &mut Outbox),
+) -> R {
+    let palette = Palette::of(ui);
+    let rect = ui.available_rect_before_wrap();
+    ui.advance_cursor_after_rect(rect);
+    let header = Rect::from_min_max(rect.min, Pos2::new(rect.max.x, rect.min.y + HEADER));
+    let footer = Rect::from_min_max(Pos2::new(rect.min.x, rect.max.y - FOOTER), rect.max);
+    let row = |rect: Rect| {
+        UiBuilder::new().max_rect(rect.shrink2(Vec2::new(INSET, 0.0))).layout(Layout::left_to_right(Align::Center))
+    };
+    ui.scope_builder(row(header), |ui| header_ui(ui, outbox));
+    let mut well = Rect::from_min_max(header.left_bottom(), footer.right_top());
+    if let Some(review) = &model.review {
+        let strip = Rect::from_min_size(well.min, Vec2::new(well.width(), feedback::STRIP));
+        ui.scope_builder(UiBuilder::new().max_rect(strip).id_salt("review"), |ui| {
+            feedback::review_ui(ui, model, review.id, outbox);
+        });
+        well.min.y = strip.max.y;
+    }
+    ui.painter().rect_filled(well, CornerRadius::ZERO, palette.well);
+    let result = ui.scope_builder(UiBuilder::new().max_rect(well), |ui| picture_ui(ui, outbox)).inner;
+    ui.scope_builder(row(footer), |ui| footer_ui(ui, outbox));
+    result
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,195 @@
+//! One picture: where it is on the screen, how it is zoomed and moved, and what is drawn over it.
+
+use egui::{Color32, PointerButton, Pos2, Rect, Response, Sense, Stroke, StrokeKind, TextureHandle, Ui, Vec2};
+use egui::{WidgetInfo, WidgetType};
+
+use super::{Shown, feedback, overlays};
+use crate::command::{Command, Outbox};
+use crate::gui::status::STALE_AFTER_S;
+use crate::gui::style::marks::{self, Marks};
+use crate::gui::style::theme::{self, Palette};
+use crate::model::{ImagePoint, Model, Step, Viewport};
+
+/// A pixel is then as large as a thumb nail.
+pub const LARGEST_ZOOM: f32 = 60.0;
+/// Zoom per point of wheel movement; a notch of a wheel is about 50 points.
+const ZOOM_PER_POINT: f32 = 0.004;
+
+/// Where a picture is on the screen.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// All of the picture, which may be larger than the room.
+    pub picture: Rect,
+    /// What can be seen of it.
+    pub visible: Rect,
+    /// Width and height in pixels of the colour picture.
+    pub size_px: Vec2,
+}
+
+impl Place {
+    /// A picture in a room.
+    pub fn new(room: Rect, size_px: Vec2, viewport: Viewport) -> Self {
+        let size_px = size_px.max(Vec2::splat(1.0));
+        let zoom = viewport.zoom.clamp(1.0, LARGEST_ZOOM);
+        // A window can be dragged smaller than all its bars together.
+        let scale = (room.width() / size_px.x).min(room.height() / size_px.y).max(0.0) * zoom;
+        let size = size_px * scale;
+        let centre = held(Vec2::from(viewport.centre), room.size(), size);
+        let picture = Rect::from_min_size(room.center() - centre * size, size);
+        Self { picture, visible: picture.intersect(room), size_px }
+    }
+
+    /// A place in pixels, whose whole numbers are the middles of pixels, on the screen.
+    pub fn screen(&self, px: Vec2) -> Pos2 {
+        self.picture.min + (px + Vec2::splat(0.5)) / self.size_px * self.picture.size()
+    }
+
+    /// How many points on the screen a pixel takes.
+    pub fn points_per_px(&self) -> f32 {
+        self.picture.width() / self.size_px.x
+    }
+
+    /// The pixel at a place on the screen.
+    fn pixel(&self, at: Pos2) -> ImagePoint {
+        let part = (at - self.picture.min) / self.picture.size();
+        let index = |part: f32, count: f32| ((part * count).max(0.0) as u32).min((count as u32).saturating_sub(1));
+        ImagePoint { column: index(part.x, self.size_px.x), row: index(part.y, self.size_px.y) }
+    }
+}
+
+/// The middle of the room as part of the picture, held so that no room is empty while there is picture to fill it.
+fn held(centre: Vec2, room: Vec2, picture: Vec2) -> Vec2 {
+    let hold = |centre: f32, room: f32, picture: f32| {
+        if picture <= room || !centre.is_finite() {
+            return 0.5;
+        }
+        let half = room / picture / 2.0;
+        centre.clamp(half, 1.0 - half)
+    };
+    Vec2::new(hold(centre.x, room.x, picture.x), hold(centre.y, room.y, picture.y))
+}
+
+/// One picture.
+pub struct Picture<'a> {
+    /// Its pixels.
+    pub texture: Option<&'a TextureHandle>,
+    /// Its name.
+    pub name: &'static str,
+    /// Everything.
+    pub model: &'a Model,
+    /// What it is.
+    pub shown: Shown<'a>,
+    /// Whether corners and the like are drawn over it.
+    pub with_overlays: bool,
+}
+
+impl Picture<'_> {
+    /// Draws it in the middle of the room; gives the pixel of the colour picture under the pointer.
+    pub fn picture_ui(&self, ui: &mut Ui, outbox: &mut Outbox) -> Option<ImagePoint> {
+        let texture = self.texture?;
+        let room = ui.max_rect();
+        let (columns, rows) = self.shown.images.rgb.dimensions();
+        let place = Place::new(room, Vec2::new(columns as f32, rows as f32), self.model.viewport);
+        let response = ui.interact(place.visible, ui.id().with("picture"), Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, self.name));
+
+        let tint = if self.is_stale() { theme::stale_tint() } else { Color32::WHITE };
+        let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+        let painter = ui.painter().with_clip_rect(place.visible.intersect(ui.clip_rect()));
+        painter.image(texture.id(), place.picture, uv, tint);
+        if self.with_overlays {
+            overlays::paint(ui, &painter, self.model, &self.shown, &place);
+        }
+        if let Some(picked) = self.model.picked.as_ref().filter(|_| self.shown.capture.is_none()) {
+            ring(&painter, &place, picked.pixel);
+        }
+        if let Some(point) = self.model.cursor {
+            cross(ui, &painter, &place, point);
+        }
+        if self.shown.capture.is_some() {
+            let stroke = Stroke::new(3.0, Marks::of(ui).review);
+            ui.painter().rect_stroke(room.shrink(1.5), 0.0, stroke, StrokeKind::Middle);
+        }
+        if self.with_overlays {
+            feedback::badges_ui(ui, self.model, room, &self.shown, place.points_per_px());
+        }
+        feedback::capture_ui(ui, self.model, room, self.with_overlays, outbox);
+        self.navigate(ui, &response, room, &place, outbox);
+        self.pick(&response, &place, outbox);
+        response.hover_pos().filter(|at| place.visible.contains(*at)).map(|at| place.pixel(at))
+    }
+
+    fn is_stale(&self) -> bool {
+        self.shown.capture.is_none() && self.model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S)
+    }
+
+    /// Wheel, drag and double click.
+    fn navigate(&self, ui: &Ui, response: &Response, room: Rect, place: &Place, outbox: &mut Outbox) {
+        let now = self.model.viewport;
+        let mut next = now;
+        if let Some(at) = response.hover_pos() {
+            let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
+            let factor = (scroll * ZOOM_PER_POINT).exp() * pinch;
+            if (factor - 1.0).abs() > 1e-4 {
+                next = zoomed(now, factor, at, room, place);
+            }
+        }
+        let pans = response.dragged_by(PointerButton::Middle)
+            || response.dragged_by(PointerButton::Secondary)
+            || (response.dragged_by(PointerButton::Primary) && now.zoom > 1.0);
+        if pans && response.drag_delta() != Vec2::ZERO {
+            let centre = (room.center() - response.drag_delta() - place.picture.min) / place.picture.size();
+            next.centre = held(centre, room.size(), place.picture.size()).into();
+        }
+        if response.double_clicked() {
+            next = Viewport::default();
+        }
+        if next != now {
+            outbox.send(Command::SetViewport(next));
+        }
+    }
+
+    /// In the step that verifies, a click measures the point.
+    fn pick(&self, response: &Response, place: &Place, outbox: &mut Outbox) {
+        if self.model.step != Step::Verify || self.shown.capture.is_some() || !response.clicked() {
+            return;
+        }
+        if let Some(at) = response.interact_pointer_pos().filter(|at| place.visible.contains(*at)) {
+            outbox.send(Command::Pick(Some(place.pixel(at))));
+        }
+    }
+}
+
+/// Larger by a factor, with what is under the pointer staying there.
+fn zoomed(now: Viewport, factor: f32, at: Pos2, room: Rect, place: &Place) -> Viewport {
+    let zoom = (now.zoom * factor).clamp(1.0, LARGEST_ZOOM);
+    // A hair above 1 cannot be told from 1, and would make a drag pan.
+    let zoom = if zoom < 1.01 { 1.0 } else { zoom };
+    let size = place.picture.size() * (zoom / now.zoom.clamp(1.0, LARGEST_ZOOM));
+    let under = (at - place.picture.min) / place.picture.size();
+    let centre = under + (room.center() - at) / size;
+    Viewport { centre: held(centre, room.size(), size).into(), zoom }
+}
+
+/// An open cross at a pixel, which leaves the pixel itself visible.
+fn cross(ui: &Ui, painter: &egui::Painter, place: &Place, point: ImagePoint) {
+    let palette = Palette::of(ui);
+    let centre = place.screen(Vec2::new(point.column as f32, point.row as f32));
+    let from = 5.0_f32.max(place.points_per_px() * 0.5 + 2.0);
+    for stroke in [Stroke::new(3.5, palette.mark_outline.gamma_multiply(0.6)), Stroke::new(1.5, palette.mark)] {
+        for direction in [Vec2::RIGHT, Vec2::LEFT, Vec2::UP, Vec2::DOWN] {
+            painter.line_segment([centre + direction * from, centre + direction * (from + 8.0)], stroke);
+        }
+    }
+}
+
+/// The point that was picked.
+fn ring(painter: &egui::Painter, place: &Place, point: ImagePoint) {
+    let centre = place.screen(Vec2::new(point.column as f32, point.row as f32));
+    let colour = Marks::over_pictures().picked;
+    painter.circle_stroke(centre, 8.0, Stroke::new(4.0, Color32::from_black_alpha(150)));
+    painter.circle_stroke(centre, 8.0, Stroke::new(2.0, colour));
+    for direction in [Vec2::RIGHT, Vec2::LEFT, Vec2::UP, Vec2::DOWN] {
+        marks::outlined_line(painter, &[centre + direction * 8.0, centre + direction * 14.0], 2.0, colour);
+    }
+}

@@ -1,0 +1,159 @@
+//! What was said to the user, newest last.
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::{Pane, Severity};
+use crate::text::Text;
+
+/// Messages that are kept: a long day of work, and not a leak.
+const KEPT: usize = 2000;
+
+/// Where a message stands. The log has all of them; besides that each stands in one place, so that nothing is said twice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Home {
+    /// The line at the bottom: it went as asked.
+    StatusLine,
+    /// Below the steps, for a while or until it is put aside.
+    Toast,
+    /// A pane, which says it for as long as it is so. Below the steps only while that pane is not in front.
+    Pane(Pane),
+    /// The strip over the panes, or the place of the picture, until the connection is there.
+    Connection,
+}
+
+impl Home {
+    /// Of what has no other place.
+    pub fn of(severity: Severity) -> Self {
+        match severity {
+            Severity::Info => Self::StatusLine,
+            Severity::Warning | Severity::Error => Self::Toast,
+        }
+    }
+}
+
+/// Something that happened, in words.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Message {
+    /// Counts the messages since the start of the program.
+    pub number: u64,
+    /// How much it matters.
+    pub severity: Severity,
+    /// The words.
+    pub text: Text,
+    /// Where it stands besides the log.
+    pub home: Home,
+    /// When it happened, for the last time.
+    pub at_s: f64,
+    /// How often it was said in a row.
+    pub times: u32,
+    /// Whether the user has put it aside.
+    pub dismissed: bool,
+}
+
+/// All messages.
+#[derive(Debug, Clone, Default)]
+pub struct Messages {
+    kept: VecDeque<Message>,
+    next: u64,
+}
+
+impl Messages {
+    /// Says something where messages of its kind stand. The same words twice in a row are one message that was said
+    /// twice.
+    pub fn say(&mut self, severity: Severity, text: Text, at_s: f64) {
+        self.say_at(Home::of(severity), severity, text, at_s);
+    }
+
+    /// The same in a place of its own.
+    pub fn say_at(&mut self, home: Home, severity: Severity, text: Text, at_s: f64) {
+        if let Some(last) = self.kept.back_mut().filter(|last| last.severity == severity && last.text == text) {
+            last.times += 1;
+            last.at_s = at_s;
+            (last.home, last.dismissed) = (home, false);
+            return;
+        }
+        if self.kept.len() == KEPT {
+            self.kept.pop_front();
+        }
+        self.kept.push_back(Message { number: self.next, severity, text, home, at_s, times: 1, dismissed: false });
+        self.next += 1;
+    }
+
+    /// The last thing that happened.
+    pub fn newest(&self) -> Option<&Message> {
+        self.kept.back()
+    }
+
+    /// What the status line says: the last thing that went as asked.
+    pub fn status_line(&self) -> Option<&Message> {
+        self.kept.iter().rev().find(|message| message.home == Home::StatusLine)
+    }
+
+    /// What a pane has to say that is still so: the last warning or error that has its place there.
+    pub fn standing_in(&self, pane: Pane) -> Option<&Message> {
+        let last = self.kept.iter().rev().find(|message| message.home == Home::Pane(pane))?;
+        (last.severity != Severity::Info && !last.dismissed).then_some(last)
+    }
+
+    /// What stands in a pane is no longer so.
+    pub fn is_over_in(&mut self, pane: Pane) {
+        for message in self.kept.iter_mut().filter(|message| message.home == Home::Pane(pane)) {
+            message.dismissed = true;
+        }
+    }
+
+    /// Oldest first.
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = &Message> + ExactSizeIterator {
+        self.kept.iter()
+    }
+
+    /// Puts one aside; it stays in the log.
+    pub fn dismiss(&mut self, number: u64) {
+        if let Some(message) = self.kept.iter_mut().find(|message| message.number == number) {
+            message.dismissed = true;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_words_in_a_row_are_one_message_and_come_back_when_said_again() {
+        let mut messages = Messages::default();
+        messages.say(Severity::Error, Text::verbatim("no"), 1.0);
+        messages.dismiss(0);
+        messages.say(Severity::Error, Text::verbatim("no"), 2.0);
+        let newest = messages.newest().expect("one");
+        assert_eq!((newest.times, newest.at_s, newest.dismissed), (2, 2.0, false));
+        messages.say(Severity::Warning, Text::verbatim("no"), 3.0);
+        assert_eq!(messages.iter().len(), 2);
+    }
+
+    #[test]
+    fn a_pane_says_its_last_warning_until_it_is_over() {
+        let mut messages = Messages::default();
+        messages.say_at(Home::Pane(Pane::Jog), Severity::Warning, Text::verbatim("no way"), 1.0);
+        messages.say(Severity::Error, Text::verbatim("elsewhere"), 2.0);
+        messages.say(Severity::Info, Text::verbatim("done"), 3.0);
+        let said = |message: Option<&Message>| message.map(|message| message.number);
+        assert_eq!(said(messages.standing_in(Pane::Jog)), Some(0));
+        assert_eq!(said(messages.standing_in(Pane::Track)), None);
+        assert_eq!(said(messages.status_line()), Some(2));
+        messages.is_over_in(Pane::Jog);
+        assert_eq!(said(messages.standing_in(Pane::Jog)), None);
+    }
+
+    #[test]
+    fn old_messages_make_room() {
+        let mut messages = Messages::default();
+        for count in 0..KEPT + 5 {
+            messages.say(Severity::Info, Text::verbatim(format!("message {count}")), 0.0);
+        }
+        assert_eq!(messages.iter().len(), KEPT);
+        assert_eq!(messages.iter().next().map(|message| message.number), Some(5));
+    }
+}

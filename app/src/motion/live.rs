@@ -1,0 +1,290 @@
+//! The arm of a cell over the remote API, as the motion worker drives it.
+
+use handeye_sim_link::cell::planning::PlanError;
+use handeye_sim_link::client::cell::{
+    Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes,
+    JogEnd, JogObstacle, JointAngles, MotionTolerance, SettleOptions, UnknownKinematics,
+};
+use handeye_sim_link::client::{CancelToken, LinkError};
+use nalgebra::Vector3;
+
+use crate::limits;
+use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
+use crate::text;
+use crate::text::Text;
+use crate::worker::live::{check_arm, port_error};
+use crate::worker::port::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
+
+/// A connection that moves the arm.
+pub(crate) struct LiveMotion {
+    arm: Arm,
+    kinematics: Result<ArmKinematics, UnknownKinematics>,
+}
+
+impl LiveMotion {
+    /// Over an arm whose kinematics is looked at once.
+    pub fn new(mut arm: Arm) -> Result<Self, LinkError> {
+        let kinematics = arm.kinematics()?;
+        if let Err(why) = &kinematics {
+            tracing::warn!(%why, "the kinematics of the arm is not known: goals are not checked beforehand");
+        }
+        Ok(Self { arm, kinematics })
+    }
+
+    /// Whether there is a way, before anything moves. What the arm cannot do is `Some` reason.
+    fn obstacle(&mut self, goal: &MotionGoal) -> Result<Option<Text>, LinkError> {
+        let (MotionGoal::Tip(goal), Ok(kinematics)) = (goal, &self.kinematics) else { return Ok(None) };
+        let joints = self.arm.joint_angles()?;
+        Ok(kinematics.reach(goal, &joints).err().map(|why| text!("The arm cannot go there: {why}", why = why)))
+    }
+
+    fn drive(&mut self, goal: &MotionGoal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, LinkError> {
+        if let Some(why) = bad_speed(speed) {
+            return Ok(MotionOutcome::Refused(why));
+        }
+        if let Some(why) = self.obstacle(goal)? {
+            return Ok(MotionOutcome::Refused(why));
+        }
+        match goal {
+            MotionGoal::Joints(joints) => {
+                self.arm.move_to_joints(joints, &limits::of_joints(&limits::TOUR, speed), cancel)?;
+                self.arm.settle(&SettleOptions::default(), cancel)?;
+            }
+            MotionGoal::Tip(pose) => {
+                let limits = limits::of_tip(&limits::TOUR, speed);
+                self.arm.move_to_pose(pose, &limits, &MotionTolerance::default(), cancel)?;
+            }
+        }
+        Ok(MotionOutcome::Arrived)
+    }
+
+    fn jog_by(
+        &mut self,
+        request: &JogRequest,
+        length: Option<f64>,
+        held: &mut dyn FnMut() -> Option<f64>,
+    ) -> Result<Result<JogEnd, Text>, LinkError> {
+        if let Some(why) = bad_speed(request.speed) {
+            return Ok(Err(why));
+        }
+        let jog = match arm_jog(request, self.kinematics.as_ref()) {
+            Ok(jog) => jog,
+            Err(why) => return Ok(Err(why)),
+        };
+        self.arm.jog(&jog, length, held).map(Ok)
+    }
+}
+
+impl MotionPort for LiveMotion {
+    fn check(&mut self) -> Result<(), PortError> {
+        check_arm(&mut self.arm)
+    }
+
+    fn move_to(&mut self, goal: &MotionGoal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
+        let outcome = self.drive(goal, speed, cancel);
+        outcome.or_else(|error| outcome_of(error, cancel))
+    }
+
+    fn jog_step(
+        &mut self,
+        request: &JogRequest,
+        length: f64,
+        cancel: &CancelToken,
+    ) -> Result<MotionOutcome, PortError> {
+        let speed = request.speed;
+        let mut held = || (!cancel.is_cancelled()).then_some(speed);
+        match self.jog_by(request, Some(length), &mut held) {
+            Ok(Ok(JogEnd::Arrived)) => Ok(MotionOutcome::Arrived),
+            Ok(Ok(JogEnd::Released | JogEnd::Stopped)) => Ok(MotionOutcome::Stopped),
+            Ok(Ok(JogEnd::NotFollowing { joint })) => Ok(MotionOutcome::Failed(not_following(joint))),
+            Ok(Ok(JogEnd::Obstacle(obstacle))) => Ok(MotionOutcome::Refused(obstacle_text(&obstacle))),
+            Ok(Ok(JogEnd::OtherTip)) => Ok(MotionOutcome::Refused(other_tip())),
+            Ok(Err(why)) => Ok(MotionOutcome::Refused(why)),
+            Err(error) => outcome_of(error, cancel),
+        }
+    }
+
+    fn jog(&mut self, request: &JogRequest, held: &mut dyn FnMut() -> Option<f64>) -> Result<Option<Text>, PortError> {
+        match self.jog_by(request, None, held) {
+            Ok(Ok(JogEnd::Arrived | JogEnd::Released)) => Ok(None),
+            Ok(Ok(JogEnd::Stopped)) => Ok(Some(text!("The arm was stopped"))),
+            Ok(Ok(JogEnd::NotFollowing { joint })) => Ok(Some(not_following(joint))),
+            Ok(Ok(JogEnd::Obstacle(obstacle))) => Ok(Some(obstacle_text(&obstacle))),
+            Ok(Ok(JogEnd::OtherTip)) => Ok(Some(other_tip())),
+            Ok(Err(why)) => Ok(Some(why)),
+            Err(error) if error.is_connection_loss() => Err(port_error(error)),
+            Err(error) => Ok(Some(Text::verbatim(error.to_string()))),
+        }
+    }
+
+    fn room(&mut self, board: &BoardInView) -> Result<Room, PortError> {
+        // Following says what is wrong with an arm of unknown kinematics.
+        let Ok(kinematics) = &self.kinematics else { return Ok(Room::Enough) };
+        let joints = self.arm.joint_angles().map_err(port_error)?;
+        let (limits, reach) = (FollowLimits::default(), BoardReach::default());
+        if kinematics.has_room_to_follow(&limits, board, &reach, &joints) {
+            return Ok(Room::Enough);
+        }
+        Ok(match kinematics.place_to_follow(&limits, board, &reach, &joints) {
+            Ok(place) => Room::At(place.joints),
+            Err(none) => Room::Nowhere(text!(
+                "Of {tried} places that show the whole board none has room for the arm to go along with it: move the board \
+                 away from the column of the arm, and not to the end of its reach",
+                tried = none.tried
+            )),
+        })
+    }
+
+    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointAngles>, Text>, PortError> {
+        let ViewsRequest { board, taken, count } = request;
+        let kinematics = match &self.kinematics {
+            Ok(kinematics) => kinematics,
+            Err(why) => {
+                return Ok(Err(text!("The kinematics of the arm is not known: {why}", why = why)));
+            }
+        };
+        let start = self.arm.joint_angles().map_err(port_error)?;
+        Ok(kinematics.views_unlike(board, taken, &start, *count).map_err(|why| no_views(&why)))
+    }
+
+    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
+        let kinematics = match &self.kinematics {
+            Ok(kinematics) => kinematics,
+            Err(why) => {
+                return Ok(MotionOutcome::Refused(text!(
+                    "The arm cannot follow, because its kinematics is not known: {why}",
+                    why = why
+                )));
+            }
+        };
+        match self.arm.follow(kinematics, &FollowLimits::default(), wish) {
+            Ok(end) => Ok(outcome_of_following(end)),
+            Err(error) => outcome_of(error, &CancelToken::default()),
+        }
+    }
+}
+
+/// Why no poses can be planned.
+fn no_views(why: &PlanError) -> Text {
+    match why {
+        PlanError::StartBlocked => {
+            text!("Where the arm is now it touches the board, its table or itself: move it into free space first")
+        }
+        PlanError::TooFewViews { candidates, not_in_view, unreachable, in_the_way, no_path, .. } => text!(
+            "Of {tried} views that were tried, {not_in_view} would not show the whole board, {unreachable} are out of \
+             reach, {in_the_way} would touch something, and {no_path} cannot be driven to safely: move the board towards \
+             the middle of the workspace",
+            tried = candidates,
+            not_in_view = not_in_view,
+            unreachable = unreachable,
+            in_the_way = in_the_way,
+            no_path = no_path
+        ),
+        other => Text::verbatim(other.to_string()),
+    }
+}
+
+fn outcome_of_following(end: FollowEnd) -> MotionOutcome {
+    match end {
+        FollowEnd::Released | FollowEnd::Stopped => MotionOutcome::Stopped,
+        obstacle => MotionOutcome::Failed(end_of_following(obstacle)),
+    }
+}
+
+/// Why the arm came to rest.
+pub fn end_of_following(end: FollowEnd) -> Text {
+    match end {
+        FollowEnd::Released => text!("it was released"),
+        FollowEnd::Stopped => text!("The arm was stopped"),
+        FollowEnd::Workspace => text!("The goal is outside the box in which the tip may follow"),
+        FollowEnd::JointLimit { joint } => text!("Joint {joint} is at the end of its range", joint = joint),
+        FollowEnd::Singular => {
+            text!(
+                "The arm is nearly stretched, close to its column, or two of its axes are in line: it cannot follow there. \
+                 Jog it to where it has more room and start again"
+            )
+        }
+        FollowEnd::NotFollowing { joint } => not_following(joint),
+        FollowEnd::OtherTip => other_tip(),
+    }
+}
+
+/// Why a share of the fastest speed is none.
+fn bad_speed(speed: f64) -> Option<Text> {
+    let is_good = speed > 0.0 && speed <= 1.0;
+    let percent = speed * 100.0;
+    (!is_good).then(|| text!("{percent} % is not a speed: choose one over 0 % and up to 100 %", percent = percent))
+}
+
+/// What an error of the arm means for the motion; only a lost connection is an error here.
+fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
+    match error {
+        LinkError::MotionStopped { .. } => Ok(MotionOutcome::Stopped),
+        LinkError::Cancelled { .. } if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
+        error if error.is_connection_loss() => Err(port_error(error)),
+        // These are found out before anything moves.
+        error @ (LinkError::NotRunning { .. }
+        | LinkError::JointOutOfRange { .. }
+        | LinkError::BadMotion { .. }
+        | LinkError::NoSuchObject { .. }
+        | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(Text::verbatim(error.to_string()))),
+        error => Ok(MotionOutcome::Failed(Text::verbatim(error.to_string()))),
+    }
+}
+
+fn arm_jog<'a>(
+    request: &JogRequest,
+    kinematics: Result<&'a ArmKinematics, &UnknownKinematics>,
+) -> Result<ArmJog<'a>, Text> {
+    let (frame, axis, forward) = match request.jog {
+        Jog::Joint { index, forward } => return Ok(ArmJog::Joint { index, forward }),
+        Jog::Translate { frame, axis, forward } | Jog::Rotate { frame, axis, forward } => (frame, axis, forward),
+    };
+    let kinematics = kinematics.map_err(|why| {
+        text!("Only single joints can be jogged, because the kinematics of the arm is not known: {why}", why = why)
+    })?;
+    let axes = match frame {
+        JogFrame::Base => JogAxes::Base,
+        JogFrame::Tip => JogAxes::Tip,
+        JogFrame::Camera => JogAxes::Camera(request.tip_from_camera.ok_or_else(|| {
+            text!("Where the camera is on the tip is not known yet: calibrate first, or jog along other axes")
+        })?),
+    };
+    let forwards = match axis {
+        Axis::X => Vector3::x(),
+        Axis::Y => Vector3::y(),
+        Axis::Z => Vector3::z(),
+    };
+    let direction = if forward { forwards } else { -forwards };
+    Ok(match request.jog {
+        Jog::Rotate { .. } => ArmJog::Turn { kinematics, axes, about: direction },
+        Jog::Translate { .. } | Jog::Joint { .. } => ArmJog::Line { kinematics, axes, along: direction },
+    })
+}
+
+fn obstacle_text(obstacle: &JogObstacle) -> Text {
+    match obstacle {
+        JogObstacle::JointRange { joint, limit_deg } => {
+            text!(
+                "Joint {joint} is at the end of its range, {limit}°",
+                joint = joint,
+                limit = format!("{limit_deg:.1}")
+            )
+        }
+        JogObstacle::Reach(why) => text!("The arm reaches no further: {why}", why = why),
+        JogObstacle::Singular { joint } => text!(
+            "The arm is stretched, or two of its axes are in line: joint {joint} would turn too fast. Go another way or \
+             move single joints",
+            joint = joint
+        ),
+        other => Text::verbatim(other.to_string()),
+    }
+}
+
+fn not_following(joint: usize) -> Text {
+    text!("Joint {joint} is not where it was sent: something else moves or holds the arm", joint = joint)
+}
+
+fn other_tip() -> Text {
+    text!("The tip is not where the arm's kinematics has it: it was moved. Connect again, or move single joints")
+}

@@ -1,0 +1,56 @@
+//! Why the arm cannot be moved now.
+
+use egui::Ui;
+
+use crate::command::{Command, Outbox};
+use crate::gui::style::parts;
+use crate::gui::style::theme::Tone;
+use crate::model::{Model, Simulation};
+use crate::tr;
+
+/// Reasons in the language of the window.
+pub struct Blocked {
+    /// For every motion.
+    pub arm: Option<&'static str>,
+    /// For motions of the tip, which need the kinematics.
+    pub tip: Option<&'static str>,
+    can_start: bool,
+}
+
+impl Blocked {
+    /// What stands in the way now.
+    pub fn of(model: &Model) -> Self {
+        let language = model.view.language;
+        let resting = model.resting_simulation();
+        let arm = if !model.control.is_connected() || !model.mover.is_connected() {
+            Some(tr!(language, "Not connected: the arm cannot be moved until the connection is there"))
+        } else if let Some(simulation) = resting {
+            Some(match simulation {
+                Simulation::Paused => tr!(language, "The simulation is paused: the arm moves only while it runs"),
+                _ => tr!(language, "The simulation is stopped: the arm moves only while it runs"),
+            })
+        } else if model.robot.is_none() || model.cell.is_none() {
+            Some(tr!(language, "Waiting until the robot has been read"))
+        } else if model.touring {
+            Some(tr!(language, "A tour is under way: stop it to move the arm yourself"))
+        } else {
+            None
+        };
+        let knows_kinematics = model.cell.as_ref().is_none_or(|cell| cell.arm.is_some());
+        let tip = arm.or_else(|| {
+            (!knows_kinematics)
+                .then(|| tr!(language, "This arm's kinematics is not known, so only its joints can be moved"))
+        });
+        Self { arm, tip, can_start: resting.is_some() }
+    }
+
+    /// The reason for everything, and what helps.
+    pub fn arm_ui(&self, ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+        let Some(reason) = self.arm else { return };
+        parts::notice_ui(ui, Tone::Warning, reason, |ui| {
+            if self.can_start && ui.button(tr!(model.view.language, "Run the simulation")).clicked() {
+                outbox.send(Command::StartSimulation);
+            }
+        });
+    }
+}

@@ -1,0 +1,94 @@
+//! How the tip is jogged: whose axes, how far, how fast.
+
+use egui::{RichText, Slider, Ui, WidgetInfo, WidgetType};
+use handeye_sim_link::client::cell::{JOG_JOINT_SPEED_RAD_S, JOG_LINE_SPEED_M_S, JOG_TURN_SPEED_RAD_S};
+
+use crate::command::{Command, Outbox};
+use crate::gui::style::parts;
+use crate::gui::style::theme::Palette;
+use crate::model::{JogFrame, JogSettings, JogStep, Model};
+use crate::text::Language;
+use crate::{text, tr};
+
+/// Steps in millimetres, and in degrees for what turns: 50° at once would be a surprise.
+const STEPS: [(f64, f64); 5] = [(0.1, 0.1), (1.0, 1.0), (5.0, 5.0), (10.0, 10.0), (50.0, 30.0)];
+
+/// The three rows.
+pub fn settings_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let settings = model.view.jog;
+    frame_ui(ui, settings, language, outbox);
+    step_ui(ui, settings, language, outbox);
+    speed_ui(ui, settings, language, outbox);
+}
+
+/// A frame in words.
+pub fn frame_name(frame: JogFrame, language: Language) -> &'static str {
+    match frame {
+        JogFrame::Base => tr!(language, "Base"),
+        JogFrame::Tip => tr!(language, "Tip"),
+        JogFrame::Camera => tr!(language, "Camera"),
+    }
+}
+
+fn frame_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut Outbox) {
+    parts::row_ui(ui, tr!(language, "Along the axes of"), |ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for (frame, what) in [
+            (JogFrame::Base, tr!(language, "The axes of the robot's base")),
+            (JogFrame::Tip, tr!(language, "The axes of the tip, as it is now")),
+            (JogFrame::Camera, tr!(language, "The axes of the camera: x right, y down, z forward; turns are about it")),
+        ] {
+            let chosen = settings.frame == frame;
+            let response = ui.selectable_label(chosen, frame_name(frame, language)).on_hover_text(what);
+            if response.clicked() && !chosen {
+                outbox.send(Command::SetJog(JogSettings { frame, ..settings }));
+            }
+        }
+    });
+}
+
+fn step_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut Outbox) {
+    parts::row_ui(ui, tr!(language, "Step [mm, °]"), |ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 7.0;
+        let hold =
+            (JogStep::Hold, tr!(language, "Hold").to_owned(), tr!(language, "Moves as long as it is held").to_owned());
+        let steps = STEPS.map(|(mm, deg)| {
+            let step = JogStep::Step { metres: mm * 1e-3, radians: deg.to_radians() };
+            (step, format!("{mm}"), text!("Step {mm} mm, {deg}°", mm = mm, deg = deg).say(language))
+        });
+        for (step, name, what) in std::iter::once(hold).chain(steps) {
+            let chosen = settings.step == step;
+            let response = ui.selectable_label(chosen, &name);
+            let label = if step == JogStep::Hold { &name } else { &what };
+            response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, chosen, label));
+            if response.on_hover_text(&what).clicked() && !chosen {
+                outbox.send(Command::SetJog(JogSettings { step, ..settings }));
+            }
+        }
+    });
+}
+
+fn speed_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut Outbox) {
+    parts::row_ui(ui, tr!(language, "Speed"), |ui| {
+        let mut percent = settings.speed * 100.0;
+        ui.spacing_mut().slider_width = 90.0;
+        let slider = Slider::new(&mut percent, 1.0..=100.0).step_by(1.0).show_value(false);
+        let response = ui.add(slider);
+        response.widget_info(|| WidgetInfo::slider(true, percent, tr!(language, "Speed in percent")));
+        if response.changed() {
+            outbox.send(Command::SetJog(JogSettings { speed: percent / 100.0, ..settings }));
+        }
+        let share = percent / 100.0;
+        let text = format!("{percent:.0} % · {:.0} mm/s", JOG_LINE_SPEED_M_S * 1e3 * share);
+        let more = text!(
+            "At the most {line} mm/s along a line, {turn}°/s about an axis, {joint}°/s for a joint",
+            line = format!("{:.0}", JOG_LINE_SPEED_M_S * 1e3 * share),
+            turn = format!("{:.1}", JOG_TURN_SPEED_RAD_S.to_degrees() * share),
+            joint = format!("{:.1}", JOG_JOINT_SPEED_RAD_S.to_degrees() * share)
+        );
+        let colour = Palette::of(ui).text;
+        ui.label(RichText::new(text).color(colour)).on_hover_text(more.say(language));
+    });
+}

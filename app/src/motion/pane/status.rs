@@ -1,0 +1,76 @@
+//! What the arm does now, why it did not do what was asked, and where its tip is.
+
+use egui::{Align, Button, Layout, RichText, Ui};
+
+use crate::command::{Command, Outbox};
+use crate::gui::style::numbers;
+use crate::gui::style::parts::{self, Sign};
+use crate::gui::style::theme::{Palette, Tone};
+use crate::model::{Model, Motion, Pane, RotationFormat, Severity};
+use crate::{text, tr};
+
+/// The motion with a button that ends it, and the last refusal.
+pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let palette = Palette::of(ui);
+    let (colour, what) = match &model.motion {
+        _ if model.stop_pending => (palette.warning, tr!(language, "Stopping").to_owned()),
+        Motion::Idle => (palette.good, tr!(language, "The arm is at rest").to_owned()),
+        Motion::Moving { what, since_s, .. } => {
+            let seconds = format!("{:.0}", (model.now_s - since_s).max(0.0));
+            (palette.busy, text!("Moving: {what} ({seconds} s)", what = what.clone(), seconds = seconds).say(language))
+        }
+        Motion::Jogging(_) => (palette.busy, tr!(language, "Jogging").to_owned()),
+    };
+    ui.horizontal(|ui| {
+        parts::dot_ui(ui, colour);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let stop = Button::new(RichText::new(tr!(language, "Stop")).color(palette.on_bad)).fill(palette.bad);
+            if ui.add(stop).on_hover_text(tr!(language, "Have the arm stay where it is")).clicked() {
+                outbox.send(Command::Stop);
+            }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add(egui::Label::new(RichText::new(what).color(palette.text)).truncate());
+            });
+        });
+    });
+    refusal_ui(ui, model, outbox);
+}
+
+fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let Some(message) = model.messages.standing_in(Pane::Jog) else { return };
+    let tone = if message.severity == Severity::Error { Tone::Bad } else { Tone::Warning };
+    let said = message.text.say(language);
+    let close = tr!(language, "Dismiss the message");
+    ui.horizontal_top(|ui| {
+        let width = ui.available_width() - 32.0;
+        ui.allocate_ui(egui::vec2(width, 0.0), |ui| parts::notice_ui(ui, tone, &said, |_| ()));
+        if parts::sign_ui(ui, Sign::Cross, close, true).clicked() {
+            outbox.send(Command::DismissMessage(message.number));
+        }
+    });
+}
+
+/// The tip in the base.
+pub fn tip_ui(ui: &mut Ui, model: &Model) {
+    let language = model.view.language;
+    let Some(robot) = &model.robot else { return };
+    let pose = &robot.base_from_tip;
+    parts::section_with_ui(ui, tr!(language, "Tip in base"), |ui| {
+        parts::copy_ui(ui, language, tr!(language, "the tip pose"), || {
+            let [x, y, z]: [f64; 3] = pose.translation().into();
+            let [qx, qy, qz, qw] = pose.xyzw();
+            format!("base_from_tip: translation_m = [{x}, {y}, {z}], rotation_xyzw = [{qx}, {qy}, {qz}, {qw}]")
+        });
+    });
+    parts::stated_ui(ui, "x y z [mm]", &numbers::translation_mm(pose));
+    match model.view.rotation {
+        RotationFormat::RollPitchYaw => {
+            parts::stated_ui(ui, tr!(language, "roll pitch yaw [°]"), &numbers::rpy_deg(pose))
+        }
+        RotationFormat::Quaternion => {
+            parts::stated_ui(ui, tr!(language, "quaternion x y z w"), &numbers::quaternion(pose))
+        }
+    };
+}

@@ -1,0 +1,241 @@
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable as _;
+use handeye_core::geometry::frames::Pose;
+
+use super::*;
+use crate::command::Command;
+use crate::gui::testing::driven::Driven;
+use crate::gui::testing::sample;
+use crate::model::{
+    Axis, Home, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Pane, Severity, Simulation,
+};
+use crate::text::Text;
+
+fn driven(model: Model) -> Driven {
+    Driven::new(jog_ui, model)
+}
+
+fn forward_x() -> Jog {
+    Jog::Translate { frame: JogFrame::Base, axis: Axis::X, forward: true }
+}
+
+/// Presses a button and holds it for longer than any click takes, with a hand that is not quite still.
+fn hold(pane: &mut Driven, label: &str) -> Vec<Command> {
+    pane.commands();
+    let at = pane.harness.get_by_label(label).rect().center();
+    pane.harness.hover_at(at);
+    pane.harness.step();
+    pane.harness.drag_at(at);
+    for n in 0..20 {
+        pane.harness.step();
+        pane.harness.hover_at(at + egui::vec2(0.5 * n as f32, 0.0));
+    }
+    pane.harness.step();
+    pane.commands()
+}
+
+#[test]
+fn a_button_moves_from_the_press_to_the_release() {
+    let mut pane = driven(sample::connected());
+    let held = hold(&mut pane, "Move +X");
+    assert_eq!(held.first(), Some(&Command::Jog(forward_x())), "{held:?}");
+    assert!(held.len() >= 20 && held[1..].iter().all(|command| *command == Command::JogHeld(forward_x())), "{held:?}");
+    let at = pane.harness.get_by_label("Move +X").rect().center();
+    pane.harness.drop_at(at);
+    pane.steps();
+    assert_eq!(pane.commands(), [Command::JogReleased]);
+    pane.steps();
+    assert!(pane.commands().is_empty(), "nothing is held any more");
+}
+
+#[test]
+fn a_button_is_let_go_when_the_pointer_leaves_it_and_not_taken_up_when_it_comes_back() {
+    let mut pane = driven(sample::connected());
+    hold(&mut pane, "Move +X");
+    pane.harness.hover_at(egui::pos2(200.0, 2.0));
+    pane.steps();
+    assert_eq!(pane.commands(), [Command::JogReleased]);
+    let at = pane.harness.get_by_label("Move +X").rect().center();
+    pane.harness.hover_at(at);
+    pane.steps();
+    assert!(pane.commands().is_empty());
+}
+
+#[test]
+fn the_arm_is_let_go_when_the_window_loses_the_focus() {
+    let mut pane = driven(sample::connected());
+    hold(&mut pane, "Jog joint 2 −");
+    pane.harness.input_mut().focused = false;
+    pane.steps();
+    assert_eq!(pane.commands(), [Command::JogReleased]);
+}
+
+#[test]
+fn the_arm_is_let_go_when_the_connection_is_lost() {
+    let mut pane = driven(sample::connected());
+    hold(&mut pane, "Turn −Z");
+    pane.model().mover = LinkState::Failed { why: "gone".to_owned() };
+    pane.steps();
+    assert_eq!(pane.commands(), [Command::JogReleased]);
+}
+
+#[test]
+fn every_direction_of_the_pad_and_every_joint_jogs_what_it_says() {
+    let mut model = sample::connected();
+    model.view.jog.frame = JogFrame::Camera;
+    let mut pane = driven(model);
+    for (letter, axis) in [("X", Axis::X), ("Y", Axis::Y), ("Z", Axis::Z)] {
+        for (sign, forward) in [("−", false), ("+", true)] {
+            let frame = JogFrame::Camera;
+            let sent = pane.click(&format!("Move {sign}{letter}"));
+            assert_eq!(sent.first(), Some(&Command::Jog(Jog::Translate { frame, axis, forward })));
+            assert_eq!(sent.last(), Some(&Command::JogReleased));
+            let sent = pane.click(&format!("Turn {sign}{letter}"));
+            assert_eq!(sent.first(), Some(&Command::Jog(Jog::Rotate { frame, axis, forward })));
+        }
+    }
+    for index in 0..6 {
+        let sent = pane.click(&format!("Jog joint {} +", index + 1));
+        assert_eq!(sent.first(), Some(&Command::Jog(Jog::Joint { index, forward: true })));
+    }
+}
+
+#[test]
+fn keys_jog_only_when_they_are_switched_on_and_no_field_is_edited() {
+    let mut pane = driven(sample::connected());
+    pane.harness.key_down(Key::ArrowRight);
+    pane.steps();
+    assert!(pane.commands().is_empty(), "keys are off at first");
+    pane.harness.key_up(Key::ArrowRight);
+    pane.click("Jog with keys");
+    pane.harness.key_down(Key::ArrowRight);
+    pane.steps();
+    let sent = pane.commands();
+    assert_eq!(sent.first(), Some(&Command::Jog(forward_x())), "{sent:?}");
+    assert!(sent.contains(&Command::JogHeld(forward_x())));
+    pane.harness.key_up(Key::ArrowRight);
+    pane.steps();
+    assert_eq!(pane.commands().last(), Some(&Command::JogReleased));
+
+    pane.harness.key_down_modifiers(Modifiers::SHIFT, Key::PageDown);
+    pane.steps();
+    let turn = Jog::Rotate { frame: JogFrame::Base, axis: Axis::Z, forward: false };
+    assert_eq!(pane.commands().first(), Some(&Command::Jog(turn)));
+    pane.harness.key_up(Key::PageDown);
+    pane.steps();
+
+    pane.harness.get_by_label("J1 of the goal").click();
+    pane.steps();
+    pane.commands();
+    pane.harness.key_down(Key::ArrowRight);
+    pane.steps();
+    assert!(pane.commands().is_empty(), "a field is being edited");
+}
+
+#[test]
+fn frame_step_and_speed_are_chosen() {
+    let mut pane = driven(sample::connected());
+    let before = pane.model().view.jog;
+    let sent = pane.click("Camera");
+    assert!(matches!(sent[..], [Command::SetJog(jog)] if jog.frame == JogFrame::Camera && jog.step == before.step));
+    let sent = pane.click("Step 10 mm, 10°");
+    let [Command::SetJog(jog)] = sent[..] else { panic!("{sent:?}") };
+    assert_eq!(jog.step, JogStep::Step { metres: 0.01, radians: 10.0_f64.to_radians() });
+    assert!(pane.sees("25 % · 62 mm/s"));
+}
+
+#[test]
+fn a_slider_moves_its_joint_when_it_is_let_go_and_not_before() {
+    let mut pane = driven(sample::connected());
+    let rect = pane.harness.get_by_label("Goal of joint 1 in degrees").rect();
+    pane.harness.hover_at(rect.center());
+    pane.harness.step();
+    pane.harness.drag_at(rect.center());
+    pane.steps();
+    let to = rect.center() + egui::vec2(0.25 * rect.width(), 0.0);
+    pane.harness.hover_at(to);
+    pane.steps();
+    assert!(pane.commands().is_empty(), "it is still dragged");
+    assert!(pane.sees("Joint 1 goes to"), "the goal is shown beside the place");
+    assert!(pane.sees("Joint 1 is at: 5.7°"));
+    pane.harness.drop_at(to);
+    pane.steps();
+    let sent = pane.commands();
+    let [Command::Move { goal: MotionGoal::Joints(joints_rad), .. }] = &sent[..] else { panic!("{sent:?}") };
+    assert!((1.0..6.0).contains(&joints_rad[0]), "{joints_rad:?}");
+    assert_eq!(joints_rad[1..], [0.5, -1.0, 0.0, 1.5, 0.0], "the others stay");
+    pane.model().now_s += 10.0;
+    pane.steps();
+    assert!(!pane.sees("Joint 1 goes to"), "no motion came of it");
+}
+
+#[test]
+fn numbers_are_moved_to() {
+    let mut pane = driven(sample::connected());
+    pane.type_into("J3 of the goal", "-45");
+    pane.press(Key::Enter);
+    let sent = pane.click("Move there");
+    let [Command::Move { goal: MotionGoal::Joints(joints_rad), .. }] = &sent[..] else { panic!("{sent:?}") };
+    assert!((joints_rad[2] + std::f64::consts::FRAC_PI_4).abs() < 1e-9, "{joints_rad:?}");
+    assert!((joints_rad[0] - 0.1).abs() < 1e-4, "the rest is where the arm is");
+}
+
+#[test]
+fn a_typed_tip_pose_is_millimetres_and_degrees_in_the_base() {
+    let mut model = sample::connected();
+    if let Some(robot) = &mut model.robot {
+        let quarter = std::f64::consts::FRAC_PI_4;
+        robot.base_from_tip =
+            Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
+    }
+    let expected = model.robot.as_ref().map(|robot| robot.base_from_tip).expect("a robot");
+    let mut pane = driven(model);
+    pane.click("Tip pose in base");
+    let sent = pane.click("Move there");
+    let [Command::Move { goal: MotionGoal::Tip(base_from_tip), .. }] = &sent[..] else { panic!("{sent:?}") };
+    let (metres, radians) = base_from_tip.distance_to(&expected);
+    // Numbers are filled in to a hundredth of a millimetre and of a degree.
+    assert!(metres < 1e-5 && radians < 2e-4, "{metres} m, {radians} rad");
+}
+
+#[test]
+fn a_simulation_that_rests_is_said_and_can_be_started() {
+    let mut model = sample::connected();
+    if let Some(robot) = &mut model.robot {
+        robot.simulation = Simulation::Stopped;
+    }
+    let mut pane = driven(model);
+    assert!(pane.sees("The simulation is stopped"));
+    assert!(!pane.is_enabled("Move +X") && !pane.is_enabled("Jog joint 1 +") && !pane.is_enabled("Move there"));
+    assert_eq!(pane.click("Run the simulation"), [Command::StartSimulation]);
+}
+
+#[test]
+fn an_arm_of_unknown_kinematics_has_its_joints_jogged_only() {
+    let mut model = sample::connected();
+    if let Some(cell) = &mut model.cell {
+        cell.arm = None;
+    }
+    let pane = driven(model);
+    assert!(pane.sees("kinematics is not known"));
+    assert!(!pane.is_enabled("Turn +X"));
+    assert!(pane.is_enabled("Jog joint 1 +"));
+}
+
+#[test]
+fn what_the_arm_does_can_be_stopped_and_a_refusal_is_read() {
+    let mut model = sample::connected();
+    model.motion = Motion::Moving { id: MotionId(1), what: Text::verbatim("pose 3"), since_s: 96.0 };
+    let why = Text::verbatim("Joint 2 would leave its range");
+    model.messages.say_at(Home::Pane(Pane::Jog), Severity::Warning, why, 99.0);
+    let mut pane = driven(model);
+    assert!(pane.sees("Moving: pose 3 (4 s)"));
+    assert_eq!(pane.click("Stop"), [Command::Stop]);
+    assert!(pane.sees("Joint 2 would leave its range"));
+    assert_eq!(pane.click("Dismiss the message"), [Command::DismissMessage(0)]);
+}
+
+#[test]
+fn nothing_is_wider_than_the_tile() {
+    assert!(driven(sample::connected()).nothing_is_cut_off());
+}

@@ -1,0 +1,123 @@
+//! A place to move to, in numbers.
+
+use egui::{Button, DragValue, Grid, Id, RichText, Ui, WidgetInfo, WidgetType};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+use super::blocked::Blocked;
+use super::joints::range_rad;
+use crate::command::{Command, Outbox};
+use crate::gui::style::parts;
+use crate::gui::style::theme::Palette;
+use crate::model::{Model, MotionGoal, RobotState};
+use crate::{text, tr};
+
+/// Width of a field.
+const FIELD: f32 = 84.0;
+/// No arm on a table reaches further \[mm\].
+const FARTHEST_MM: f64 = 10_000.0;
+
+/// What is being typed.
+#[derive(Debug, Clone, Copy, Default)]
+struct Typed {
+    is_tip: bool,
+    /// Joints [°].
+    joints_deg: [f64; 6],
+    /// x, y, z \[mm\]; roll, pitch, yaw [°].
+    tip: [f64; 6],
+    /// Whether it was filled with where the arm is.
+    is_filled: bool,
+}
+
+impl Typed {
+    fn fill(&mut self, robot: &RobotState) {
+        let rounded = |value: f64| (value * 100.0).round() / 100.0;
+        self.joints_deg = robot.joints_rad.map(|radians| rounded(radians.to_degrees()));
+        let [x, y, z]: [f64; 3] = robot.base_from_tip.translation().into();
+        let (roll, pitch, yaw) = robot.base_from_tip.rotation().euler_angles();
+        let mm = [x, y, z].map(|metres| rounded(metres * 1e3));
+        let deg = [roll, pitch, yaw].map(|radians| rounded(radians.to_degrees()));
+        self.tip = [mm[0], mm[1], mm[2], deg[0], deg[1], deg[2]];
+        self.is_filled = true;
+    }
+
+    fn base_from_tip(&self) -> Pose<Base, Tip> {
+        let [x, y, z, roll, pitch, yaw] = self.tip;
+        let turn = UnitQuaternion::from_euler_angles(roll.to_radians(), pitch.to_radians(), yaw.to_radians());
+        Pose::from_isometry(Isometry3::from_parts(Translation3::new(x * 1e-3, y * 1e-3, z * 1e-3), turn))
+    }
+}
+
+/// The form.
+pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let id = Id::new("typed goal");
+    let mut typed: Typed = parts::remembered(ui, id);
+    if let Some(robot) = model.robot.as_ref().filter(|_| !typed.is_filled) {
+        typed.fill(robot);
+    }
+    parts::section_ui(ui, tr!(language, "Move to numbers"));
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for (is_tip, name) in [(false, tr!(language, "Joint angles")), (true, tr!(language, "Tip pose in base"))] {
+            if ui.selectable_label(typed.is_tip == is_tip, name).clicked() {
+                typed.is_tip = is_tip;
+            }
+        }
+    });
+    fields_ui(ui, model, &mut typed);
+    if typed.is_tip {
+        parts::hint_ui(ui, tr!(language, "Rotation: R = Rz(yaw) · Ry(pitch) · Rx(roll), as in URDF"));
+    }
+    ui.horizontal(|ui| {
+        let reason = if typed.is_tip { blocked.tip } else { blocked.arm };
+        if parts::gated_ui(ui, reason, Button::new(tr!(language, "Move there"))).clicked() {
+            let (goal, what) = if typed.is_tip {
+                (MotionGoal::Tip(typed.base_from_tip()), text!("typed tip pose"))
+            } else {
+                (MotionGoal::Joints(typed.joints_deg.map(f64::to_radians)), text!("typed joint angles"))
+            };
+            outbox.send(Command::Move { goal, what });
+        }
+        let is_read = model.robot.is_some();
+        if ui.add_enabled(is_read, Button::new(tr!(language, "Take where it is"))).clicked()
+            && let Some(robot) = &model.robot
+        {
+            typed.fill(robot);
+        }
+    });
+    parts::remember(ui, id, typed);
+}
+
+fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
+    let weak = Palette::of(ui).weak;
+    let is_tip = typed.is_tip;
+    let names = if is_tip { ["x", "y", "z", "roll", "pitch", "yaw"] } else { ["J1", "J2", "J3", "J4", "J5", "J6"] };
+    let values = if is_tip { &mut typed.tip } else { &mut typed.joints_deg };
+    Grid::new("typed goal").num_columns(6).spacing([6.0, 4.0]).min_col_width(0.0).show(ui, |ui| {
+        for (index, (name, value)) in names.into_iter().zip(values).enumerate() {
+            let is_length = is_tip && index < 3;
+            let range = if is_length {
+                -FARTHEST_MM..=FARTHEST_MM
+            } else if is_tip {
+                -360.0..=360.0
+            } else {
+                let [low, high] = range_rad(model, index).map(f64::to_degrees);
+                low..=high
+            };
+            ui.label(RichText::new(name).small().color(weak));
+            let field = DragValue::new(value)
+                .range(range)
+                .clamp_existing_to_range(false)
+                .speed(0.1)
+                .max_decimals(2)
+                .suffix(if is_length { " mm" } else { "°" });
+            let response = ui.add_sized([FIELD, ui.spacing().interact_size.y], field);
+            let said = text!("{name} of the goal", name = name).say(model.view.language);
+            response.widget_info(|| WidgetInfo { label: Some(said.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
+            if index % 3 == 2 {
+                ui.end_row();
+            }
+        }
+    });
+}

@@ -1,0 +1,129 @@
+//! Moving and jogging the arm.
+
+use handeye_core::geometry::frames::{Camera, Pose, Tip};
+use handeye_core::project::session::CaptureId;
+
+use crate::app::App;
+use crate::model::{Jog, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};
+use crate::text;
+use crate::text::Text;
+
+impl App {
+    /// Moves the arm to a place that the words name.
+    pub(crate) fn start_motion(&mut self, goal: MotionGoal, what: Text) {
+        self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
+        let id = self.numbers.motion;
+        let request = MotionRequest { id, goal, speed: self.model.view.jog.speed };
+        self.model.messages.is_over_in(Pane::Jog);
+        match self.workers.move_to(request) {
+            Ok(()) => {
+                self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
+            }
+            Err(busy) => {
+                let why = Text::verbatim(busy.to_string());
+                self.moved(id, MotionOutcome::Failed(why));
+            }
+        }
+    }
+
+    pub(crate) fn go_to_capture(&mut self, id: CaptureId) {
+        let Some(capture) = self.model.document().capture(id) else { return };
+        let joints = capture.joints_rad.as_deref().and_then(|joints| joints.try_into().ok());
+        // Joints bring the arm back exactly; a recorded session may have the pose alone.
+        let goal = joints.map_or(MotionGoal::Tip(capture.base_from_tip), MotionGoal::Joints);
+        self.start_motion(goal, text!("pose of capture {id}", id = id));
+    }
+
+    pub(crate) fn moved(&mut self, id: MotionId, outcome: MotionOutcome) {
+        let what = match &self.model.motion {
+            Motion::Moving { id: moving, what, .. } if *moving == id => Some(what.clone()),
+            _ => None,
+        };
+        if what.is_some() {
+            self.model.motion = Motion::Idle;
+        }
+        let what = what.unwrap_or_else(|| text!("the goal"));
+        // What an earlier motion still has to say does not move a tour on.
+        if self.model.touring && id == self.numbers.motion {
+            self.tour_moved(&outcome);
+        }
+        if self.model.planning && self.numbers.plan == Some(id) {
+            return self.plan_refused(&outcome);
+        }
+        if self.numbers.follow == Some(id) {
+            return self.follow_ended(outcome);
+        }
+        match outcome {
+            MotionOutcome::Arrived => {}
+            MotionOutcome::Stopped => {
+                self.say_in(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
+            }
+            MotionOutcome::Refused(why) => {
+                let said = text!("The arm does not move to {what}: {why}", what = what, why = why);
+                self.say_in(Pane::Jog, Severity::Warning, said);
+            }
+            MotionOutcome::Failed(why) => {
+                let said = text!("The arm did not get to {what}: {why}", what = what, why = why);
+                self.say_in(Pane::Jog, Severity::Error, said);
+            }
+        }
+    }
+
+    /// A press of a jog button: one step, or the beginning of holding it.
+    pub(crate) fn jog(&mut self, jog: Jog) {
+        self.model.messages.is_over_in(Pane::Jog);
+        match self.model.view.jog.step {
+            JogStep::Hold => {
+                self.hold_jog(jog);
+                self.model.motion = Motion::Jogging(jog);
+            }
+            JogStep::Step { metres, radians } => {
+                self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
+                let id = self.numbers.motion;
+                let speed = self.model.view.jog.speed;
+                match self.workers.jog_step(id, jog, [metres, radians], speed, self.camera_on_tip()) {
+                    Ok(()) => {
+                        let (what, since_s) = (text!("the next step"), self.model.now_s);
+                        self.model.motion = Motion::Moving { id, what, since_s };
+                    }
+                    Err(busy) => self.say_in(Pane::Jog, Severity::Warning, Text::verbatim(busy.to_string())),
+                }
+            }
+        }
+    }
+
+    /// The button is still held. A jog that has ended by itself does not begin anew before the next press.
+    pub(crate) fn hold_jog(&mut self, jog: Jog) {
+        if self.model.view.jog.step != JogStep::Hold {
+            return;
+        }
+        self.workers.hold_jog(jog, self.model.view.jog.speed, self.camera_on_tip());
+    }
+
+    pub(crate) fn release_jog(&mut self) {
+        self.workers.release_jog();
+    }
+
+    pub(crate) fn jog_ended(&mut self, why: Option<Text>) {
+        if matches!(self.model.motion, Motion::Jogging(_)) {
+            self.model.motion = Motion::Idle;
+        }
+        if let Some(why) = why {
+            self.say_in(Pane::Jog, Severity::Warning, text!("Jogging has ended: {why}", why = why));
+        }
+    }
+
+    /// A motion whose connection broke ended with it.
+    pub(crate) fn motion_lost(&mut self) {
+        if let Motion::Moving { id, .. } = self.model.motion {
+            self.moved(id, MotionOutcome::Failed(text!("the connection broke on the way")));
+        }
+        self.model.motion = Motion::Idle;
+    }
+
+    /// The camera on the tip as calibrated, or else as the scene says: only to choose the axes that a person jogs along.
+    fn camera_on_tip(&self) -> Option<Pose<Tip, Camera>> {
+        let said = || Some(self.model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
+        self.model.tip_from_camera().or_else(said)
+    }
+}

@@ -1,0 +1,88 @@
+//! The recording for Rerun: what happens is noted, and looking at it.
+
+use std::sync::Arc;
+
+use handeye_core::project::session::CaptureId;
+
+use crate::app::App;
+use crate::command::{Event, SolveOutcome};
+use crate::model::{Dialog, Step};
+use crate::rerun_log::{Entry, ViewerWish};
+use crate::text::Language;
+
+/// What of the model was noted already.
+#[derive(Debug, Default)]
+pub(crate) struct Recorded {
+    step: Option<Step>,
+    selection: Vec<CaptureId>,
+    /// Messages with smaller numbers.
+    said: u64,
+}
+
+impl App {
+    pub(crate) fn open_rerun(&mut self) {
+        self.recorder.open(ViewerWish::Best);
+    }
+
+    /// Shows where the web viewer is, to copy it. A dialog that somebody uses stays: the address is also behind the button.
+    pub(crate) fn show_rerun_address(&mut self) {
+        if self.model.dialog.is_none() {
+            self.set_dialog(Some(Dialog::RerunAddress));
+        }
+    }
+
+    /// Notes what was reported. Without a recording this is a single comparison.
+    pub(crate) fn record(&self, event: &Event) {
+        if !self.recorder.is_on() {
+            return;
+        }
+        let entry = match event {
+            Event::Robot(robot) => Entry::Robot {
+                sim_time_s: robot.sim_time_s,
+                base_from_tip: robot.base_from_tip,
+                joints_rad: robot.joints_rad,
+            },
+            Event::Frame { info, images: Some(images), .. } => {
+                Entry::Picture { info: info.clone(), images: Arc::clone(images) }
+            }
+            Event::Detection(detection) => Entry::Detection(Arc::new((**detection).clone())),
+            Event::Cell(facts) => Entry::Cell(Arc::new((**facts).clone())),
+            Event::Document(state) => {
+                Entry::Document { folder: state.folder.clone(), document: Arc::clone(&state.document) }
+            }
+            // What was seen for another target is of no interest any more.
+            Event::Observed { id, target, observed: Some(observed) }
+                if *target == self.model.document().meta.target =>
+            {
+                Entry::Observed { id: *id, observed: Arc::clone(observed) }
+            }
+            Event::SolveEnded { job, outcome: SolveOutcome::Solved(solved) } if *job == self.numbers.job => {
+                Entry::Solved(Arc::clone(solved))
+            }
+            Event::Tracked(tracked) => Entry::Tracked(Arc::clone(tracked)),
+            _ => return,
+        };
+        self.recorder.note(entry);
+    }
+
+    /// Notes what the user has changed, and what was said.
+    pub(crate) fn record_changes(&mut self) {
+        if !self.recorder.is_on() {
+            return;
+        }
+        let Self { model, recorder, recorded, .. } = self;
+        if recorded.step != Some(model.step) {
+            recorded.step = Some(model.step);
+            recorder.note(Entry::Step(model.step));
+        }
+        if recorded.selection != model.selection {
+            recorded.selection.clone_from(&model.selection);
+            recorder.note(Entry::Selected(model.selection.clone()));
+        }
+        let unsaid: Vec<_> = model.messages.iter().rev().take_while(|it| it.number >= recorded.said).collect();
+        for message in unsaid.into_iter().rev() {
+            recorded.said = message.number + 1;
+            recorder.note(Entry::Said { severity: message.severity, words: message.text.say(Language::English) });
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! The bodies of the arm.
+
+use egui::Color32;
+use handeye_sim_link::cell::render::{Shape, props};
+use nalgebra::Point3;
+
+use super::canvas::{Canvas, Cylinder};
+use crate::gui::style::theme::Palette;
+use crate::scene::PosedArm;
+
+/// Draws them.
+pub fn arm(canvas: &mut Canvas, arm: &PosedArm, palette: &Palette) {
+    for (link, solid) in props::ur5_parts() {
+        let base_from_shape = arm.base_from_arm * arm.links[link] * solid.world_from_shape;
+        let (ends, radius_m, closed) = match solid.shape {
+            Shape::Capsule { a, b, radius } => ([a, b], radius, false),
+            Shape::Cylinder { radius, half_height } => {
+                ([-half_height, half_height].map(|z| Point3::new(0.0, 0.0, z)), radius, true)
+            }
+            // The arm has no others.
+            Shape::Sphere { .. } | Shape::Box { .. } | Shape::Plane => continue,
+        };
+        let body = Cylinder { ends: ends.map(|end| base_from_shape * end), radius_m, closed };
+        canvas.cylinder(&body, tone(solid.colour, palette));
+    }
+}
+
+/// A body in the theme of the window: bright, dark or of a cover.
+fn tone(colour: [f32; 3], palette: &Palette) -> Color32 {
+    match colour {
+        props::COVER_BLUE => palette.accent,
+        props::GRAPHITE => palette.paper.lerp_to_gamma(palette.ink, 0.55),
+        _ => palette.paper,
+    }
+}

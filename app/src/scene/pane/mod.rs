@@ -1,0 +1,177 @@
+//! Arm, cameras and board in three dimensions, for a look without a viewer of its own.
+//!
+//! The pane is drawn with the painter of the window, from back to front: `eye` brings points onto the screen, `canvas`
+//! sorts what is drawn, and each of the other files draws one kind of thing.
+
+mod arm;
+mod board;
+mod camera;
+mod canvas;
+mod captures;
+mod content;
+mod eye;
+mod ground;
+mod legend;
+
+use egui::{Align, CornerRadius, Layout, PointerButton, Pos2, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2};
+use egui::{WidgetInfo, WidgetType};
+use handeye_core::project::session::CaptureId;
+
+use crate::capture::rows as tables;
+use crate::capture::rows::CaptureTable;
+use crate::command::{Command, Outbox};
+use crate::gui::style::marks;
+use crate::gui::style::parts;
+use crate::gui::style::theme::Palette;
+use crate::model::{Model, SceneView};
+use crate::text::Language;
+use crate::{text, tr};
+use canvas::Canvas;
+use captures::Spot;
+use eye::{Eye, Side};
+
+/// Height of the line over the scene.
+const HEADER: f32 = 34.0;
+/// Distance of text to the edge of the pane.
+const INSET: f32 = 10.0;
+/// Zoom per point of wheel movement, as in the pictures.
+const ZOOM_PER_POINT: f64 = 0.004;
+/// A capture is pointed at this near to its middle, in points on the screen.
+const GRASP: f32 = 9.0;
+
+/// The pane.
+pub fn scene_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    if content::is_empty(model) {
+        let detail = tr!(language, "Arm, camera and board appear with the connection, captures with a session.");
+        marks::nothing_yet_ui(ui, tr!(language, "Nothing to show in 3D yet"), detail);
+        return;
+    }
+    let rect = ui.available_rect_before_wrap();
+    ui.advance_cursor_after_rect(rect);
+    let header = Rect::from_min_max(rect.min, Pos2::new(rect.max.x, rect.min.y + HEADER));
+    let room = Rect::from_min_max(header.left_bottom(), rect.max);
+    ui.painter().rect_filled(room, CornerRadius::ZERO, Palette::of(ui).well);
+    let table = tables::table(ui.ctx(), model);
+    ui.scope_builder(UiBuilder::new().max_rect(room).id_salt("scene"), |ui| {
+        ui.set_clip_rect(ui.clip_rect().intersect(room));
+        room_ui(ui, room, model, &table, outbox);
+    });
+    let row =
+        UiBuilder::new().max_rect(header.shrink2(Vec2::new(INSET, 0.0))).layout(Layout::left_to_right(Align::Center));
+    ui.scope_builder(row, |ui| header_ui(ui, model, outbox));
+}
+
+/// Views from the sides, and back to the first one.
+fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    ui.spacing_mut().item_spacing.x = 4.0;
+    let what = tr!(language, "Show the cell as at first; so does a double click");
+    if ui.button(tr!(language, "Reset view")).on_hover_text(what).clicked() {
+        outbox.send(Command::SetSceneView(SceneView::default()));
+    }
+    for side in Side::ALL {
+        let (name, what) = words(side, language);
+        let view = side.view(model.scene);
+        if ui.selectable_label(view == model.scene, name).on_hover_text(what).clicked() && view != model.scene {
+            outbox.send(Command::SetSceneView(view));
+        }
+    }
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        let hint = tr!(language, "Drag to turn, Shift-drag to shift, wheel to zoom");
+        let hint = RichText::new(hint).size(crate::gui::style::theme::CAPTION).color(Palette::of(ui).weak);
+        ui.add(egui::Label::new(hint).truncate());
+    });
+}
+
+fn words(side: Side, language: Language) -> (&'static str, &'static str) {
+    match side {
+        Side::Top => (tr!(language, "Top"), tr!(language, "From above: x of the base to the right, y up")),
+        Side::Front => (tr!(language, "Front"), tr!(language, "Along y of the base: x to the right, z up")),
+        Side::Right => (tr!(language, "Side"), tr!(language, "Against x of the base: y to the right, z up")),
+    }
+}
+
+fn room_ui(ui: &mut Ui, room: Rect, model: &Model, table: &CaptureTable, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let response = ui.interact(room, ui.id().with("view"), Sense::click_and_drag());
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, tr!(language, "The cell in 3D")));
+    let key = ui.id().with("pointed at");
+    let pointed: Option<CaptureId> = parts::remembered(ui, key);
+    let mut canvas = Canvas::new(Eye::new(&model.scene, room), Palette::of(ui).ink);
+    let drawn = content::draw(&mut canvas, ui, model, table, pointed);
+    canvas.paint(ui.painter());
+    legend::legend_ui(ui, room, &drawn.entries);
+    let now = spots_ui(ui, room, model, table, &drawn.spots, outbox);
+    if now != pointed {
+        parts::remember(ui, key, now);
+    }
+    navigate(ui, &response, room, model, outbox);
+}
+
+/// What the pointer does to captures; gives the one that it is over.
+fn spots_ui(
+    ui: &mut Ui,
+    room: Rect,
+    model: &Model,
+    table: &CaptureTable,
+    spots: &[Spot],
+    outbox: &mut Outbox,
+) -> Option<CaptureId> {
+    let language = model.view.language;
+    let mut pointed = None;
+    for spot in spots.iter().filter(|spot| room.contains(spot.at)) {
+        let Some(row) = table.row(spot.id) else { continue };
+        let place = Rect::from_center_size(spot.at, Vec2::splat(2.0 * GRASP)).intersect(room);
+        let response = ui.interact(place, ui.id().with(("capture", spot.id)), Sense::CLICK);
+        let selected = model.selection.contains(&spot.id);
+        let name = text!("Capture {name}", name = row.title()).say(language);
+        response.widget_info(|| {
+            let label = text!("{capture} in 3D", capture = &name).say(language);
+            WidgetInfo::selected(WidgetType::SelectableLabel, true, selected, label)
+        });
+        if response.hovered() {
+            pointed = Some(spot.id);
+        }
+        if response.clicked() {
+            outbox.send(Command::Select(vec![spot.id]));
+        }
+        response.on_hover_ui_at_pointer(|ui| {
+            ui.label(RichText::new(&name).strong());
+            ui.label(match row.rms_px {
+                Some(rms_px) => text!("residual {rms} px", rms = format!("{rms_px:.3}")).say(language),
+                None => tr!(language, "not in a calibration yet").to_owned(),
+            });
+            let mm = crate::gui::style::numbers::row((spot.taken_m.coords * 1e3).as_slice(), 1, 0);
+            ui.label(text!("taken from {mm} mm in the base", mm = mm).say(language));
+        });
+    }
+    pointed
+}
+
+/// Wheel, drag and double click.
+fn navigate(ui: &Ui, response: &Response, room: Rect, model: &Model, outbox: &mut Outbox) {
+    let now = model.scene;
+    let mut next = now;
+    if ui.rect_contains_pointer(room) {
+        let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
+        let factor = (f64::from(scroll) * ZOOM_PER_POINT).exp() * f64::from(pinch);
+        if (factor - 1.0).abs() > 1e-4 {
+            next = eye::zoomed(next, factor);
+        }
+    }
+    let drag = response.drag_delta();
+    if response.dragged() && drag != Vec2::ZERO {
+        let shifts = ui.input(|input| input.modifiers.shift) || !response.dragged_by(PointerButton::Primary);
+        next = if shifts { eye::panned(next, drag, room) } else { eye::orbited(next, drag) };
+    }
+    if response.double_clicked() {
+        next = SceneView::default();
+    }
+    if next != now {
+        outbox.send(Command::SetSceneView(next));
+    }
+}
+
+#[cfg(test)]
+mod tests;

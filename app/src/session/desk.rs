@@ -1,0 +1,153 @@
+//! The threads that need no cell: archive, solver, observer and files. They live as long as the application, whatever
+//! it is connected to.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+
+use super::archive::{Archive, ArchiveTask};
+use crate::capture::Measured;
+use crate::command::Event;
+use crate::solve::observer::{self, ObserveJob};
+use crate::solve::worker::SolveJob;
+use crate::solve::worker::solve;
+use crate::worker::files::{self, FileTask};
+use crate::worker::link::Outlet;
+use crate::worker::newest::NewestWins;
+use crate::worker::started::Started;
+use crate::worker::{Busy, Clock, JOIN_DEADLINE, MAX_EVENTS, MAX_REQUESTS, POLL, Waker};
+
+/// Captures that may wait for the disk. The vision thread waits when there are more, and the next capture with it.
+const MAX_CAPTURES: usize = 4;
+
+/// The application's end of these threads.
+pub struct SessionThreads {
+    archive: Option<Sender<ArchiveTask>>,
+    captures: Sender<Measured>,
+    files: Option<Sender<FileTask>>,
+    observer: NewestWins<ObserveJob>,
+    solver: NewestWins<SolveJob>,
+    events: Receiver<Event>,
+    sessions: PathBuf,
+    threads: Vec<Started>,
+}
+
+impl SessionThreads {
+    /// Starts the threads. New sessions go under `sessions`.
+    ///
+    /// # Errors
+    /// When the system has no more threads.
+    pub fn start(sessions: PathBuf, clock: &Clock, waker: &Waker) -> io::Result<Self> {
+        let (event_sender, events) = bounded(MAX_EVENTS);
+        let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
+        let (archive, archive_tasks) = bounded(MAX_REQUESTS);
+        let (captures, measured) = bounded(MAX_CAPTURES);
+        let keeper = Archive::new(sessions.clone(), outlet());
+        let archiving = Started::spawn("archive", move || keeper.run(&archive_tasks, &measured))?;
+        let (files, file_tasks) = bounded::<FileTask>(MAX_REQUESTS);
+        let out = outlet();
+        let filing = Started::spawn("files", move || {
+            for task in &file_tasks {
+                files::perform(task, &out);
+            }
+        })?;
+        let out = outlet();
+        let (observer, observing) =
+            NewestWins::start("observer", move |job, cancel| observer::observe(&job, cancel, &out))?;
+        let out = outlet();
+        let (solver, solving) = NewestWins::start("solver", move |job, cancel| solve(&job, cancel, &out))?;
+        Ok(Self {
+            archive: Some(archive),
+            captures,
+            files: Some(files),
+            observer,
+            solver,
+            events,
+            sessions,
+            threads: vec![archiving, filing, observing, solving],
+        })
+    }
+
+    /// Hands over what was reported since the last time. Never waits.
+    pub fn drain(&self, mut absorb: impl FnMut(Event)) {
+        for event in self.events.try_iter().take(MAX_EVENTS) {
+            absorb(event);
+        }
+    }
+
+    /// Where captures are handed in.
+    pub fn captures(&self) -> Sender<Measured> {
+        self.captures.clone()
+    }
+
+    /// Where new sessions go.
+    pub fn sessions(&self) -> &Path {
+        &self.sessions
+    }
+
+    /// Asks the archive for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when the disk does not keep up.
+    pub fn archive(&self, task: ArchiveTask) -> Result<(), Busy> {
+        hand_in(self.archive.as_ref(), task)
+    }
+
+    /// Asks for reading or writing.
+    ///
+    /// # Errors
+    /// [`Busy`] when the disk does not keep up.
+    pub fn files(&self, task: FileTask) -> Result<(), Busy> {
+        hand_in(self.files.as_ref(), task)
+    }
+
+    /// Has captures looked at, these alone.
+    pub fn observe(&mut self, job: ObserveJob) {
+        self.observer.submit(job);
+    }
+
+    /// Has a set solved, this one alone.
+    pub fn solve(&mut self, job: SolveJob) {
+        self.solver.submit(job);
+    }
+
+    /// Cancels the solve.
+    pub fn cancel_solve(&self) {
+        self.solver.cancel();
+    }
+
+    /// Cancels what only computes.
+    pub fn cancel_all(&self) {
+        self.observer.cancel();
+        self.solver.cancel();
+    }
+
+    /// Ends the threads, and waits for them no longer than until `end`. What was handed to the archive is still written;
+    /// everything else is cancelled. Called again it does nothing.
+    pub fn end(&mut self, end: Instant) {
+        self.observer.end();
+        self.solver.end();
+        self.archive = None;
+        self.files = None;
+        for thread in self.threads.drain(..) {
+            // A thread whose report nobody takes would wait for ever.
+            while thread.is_running() && Instant::now() < end {
+                let _dropped = self.events.recv_timeout(POLL).is_ok();
+            }
+            thread.join_until(end);
+        }
+    }
+}
+
+impl Drop for SessionThreads {
+    fn drop(&mut self) {
+        self.end(Instant::now() + JOIN_DEADLINE);
+    }
+}
+
+fn hand_in<Task>(worker: Option<&Sender<Task>>, task: Task) -> Result<(), Busy> {
+    worker.map_or(Err(Busy), |worker| worker.try_send(task).map_err(|_full| Busy))
+}

@@ -1,0 +1,54 @@
+//! What a new session begins with.
+
+use std::collections::BTreeMap;
+
+use handeye_core::estimate::handeye::{HandEye, Mode};
+use handeye_core::estimate::{Method, Options};
+use handeye_core::geometry::arm::{ArmKind, ArmModel};
+use handeye_core::project::session::{GroundTruth, SessionMeta};
+use handeye_core::targets::{Grid, TargetSpec};
+
+use crate::model::Truth;
+
+/// The board of the reference scene.
+pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
+
+/// The arm whose kinematics is built in, of which a cell tells whether it is its own.
+pub const BUILT_IN_ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
+
+/// The ten reference poses, so that they are there wherever the binary is.
+pub const REFERENCE_POSES: &str = include_str!("../../../assets/poses/seed10.toml");
+
+/// Where a result says which board it was made with, among the options that it depends on.
+pub const TARGET_OPTION: &str = "target";
+
+/// What a result depends on besides its data.
+pub fn solve_options(method: Method, options: Options, target: &TargetSpec) -> BTreeMap<String, serde_json::Value> {
+    let target = serde_json::to_value(target).unwrap_or_default();
+    BTreeMap::from([
+        ("method".to_owned(), method.name().into()),
+        ("keep_outliers".to_owned(), options.keep_outliers.into()),
+        ("free_scale".to_owned(), options.free_scale.into()),
+        ("joint_offsets".to_owned(), options.joint_offsets.into()),
+        (TARGET_OPTION.to_owned(), target),
+    ])
+}
+
+/// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.
+pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
+    let ground_truth = truth.and_then(|truth| {
+        let links =
+            HandEye::EyeInHand { tip_from_camera: truth.tip_from_camera, base_from_target: truth.base_from_target? };
+        Some(GroundTruth::new(&links, Some(truth.intrinsics)))
+    });
+    SessionMeta {
+        created,
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        mode: Mode::EyeInHand,
+        target: BOARD,
+        camera: None,
+        seeds: BTreeMap::new(),
+        ground_truth,
+        arm: None,
+    }
+}

@@ -1,0 +1,129 @@
+//! The session that is open, and what was seen in its captures.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use handeye_core::image::RgbImage;
+use handeye_core::project::session::{CaptureId, Document, Edit};
+use handeye_core::targets::observation::Corner;
+use handeye_sim_link::client::cell::JointAngles;
+use serde::{Deserialize, Serialize};
+
+use crate::model::{CapturePurpose, FrameImages};
+use crate::text::Text;
+
+/// A document as it is on the disk, and what undo and redo would do.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SessionState {
+    /// The folder; `None` before there is anything to keep.
+    pub folder: Option<PathBuf>,
+    /// Mode, target, captures, taught poses.
+    pub document: Arc<Document>,
+    /// The change that undo takes back.
+    pub undo: Option<Edit>,
+    /// The change that redo makes again.
+    pub redo: Option<Edit>,
+}
+
+impl SessionState {
+    /// Name for people: that of its folder.
+    pub fn name(&self) -> Option<String> {
+        Some(self.folder.as_ref()?.file_name()?.to_string_lossy().into_owned())
+    }
+}
+
+/// A session that was open before.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RecentSession {
+    /// Where it is.
+    pub folder: PathBuf,
+    /// How many captures it had when it was last open.
+    pub captures: usize,
+}
+
+/// What is in the picture of a capture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observed {
+    /// The corners; `None` when the board is not found.
+    pub corners: Option<Vec<Corner>>,
+    /// Width and height of the picture in pixels.
+    pub image_size: (u32, u32),
+    /// A small copy of the picture.
+    pub thumbnail: Arc<RgbImage>,
+}
+
+/// The capture whose picture is looked at instead of the live one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Review {
+    /// Which capture.
+    pub id: CaptureId,
+    /// Its pictures, once they are read from the disk.
+    pub images: Option<Arc<FrameImages>>,
+}
+
+/// How the tour of a pose went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum StopOutcome {
+    /// The arm was there, and a capture was taken where one was asked for.
+    Done,
+    /// It was left out, and this is why.
+    Skipped(Text),
+}
+
+/// A tour of the taught poses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Tour {
+    /// The poses in their order.
+    pub names: Vec<String>,
+    /// The joints at each \[rad\], of poses that were planned; `None` for taught ones, which the session has.
+    pub planned: Option<Vec<JointAngles>>,
+    /// What is captured at each; `None` only moves.
+    pub purpose: Option<CapturePurpose>,
+    /// How the poses up to now went; the next one is under way.
+    pub outcomes: Vec<StopOutcome>,
+    /// When it began.
+    pub began_s: f64,
+}
+
+impl Tour {
+    /// The pose that is under way.
+    pub fn current(&self) -> Option<&str> {
+        self.names.get(self.outcomes.len()).map(String::as_str)
+    }
+
+    /// Whether it leads to poses that were planned to verify at.
+    pub fn is_planned(&self) -> bool {
+        self.planned.is_some()
+    }
+}
+
+/// An entry of a folder, for the dialogs that open and save.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FolderEntry {
+    /// Its name.
+    pub name: String,
+    /// What it is.
+    pub kind: FolderKind,
+}
+
+/// What an entry of a folder is to this program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum FolderKind {
+    /// A session.
+    Session,
+    /// Recorded images and poses.
+    Dataset,
+    /// Something else.
+    Plain,
+    /// No folder but a file of taught poses.
+    File,
+}
+
+/// The content of a folder.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FolderListing {
+    /// Which folder.
+    pub folder: PathBuf,
+    /// Its folders and files of poses by name; or why it cannot be read.
+    pub entries: Result<Vec<FolderEntry>, String>,
+}

@@ -1,0 +1,227 @@
+//! What the joint estimate decided and found out besides the answer, in words with units.
+
+use handeye_core::estimate::{Calibration, JointOffsets, ShapeEstimate, ViewStatus};
+
+use crate::text;
+use crate::text::Text;
+
+/// From so many degrees of freedom on the noise levels count as known: the normal law is as good.
+const KNOWN: f64 = 1e5;
+
+/// One thing to say.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EstimatedValue {
+    /// What it is.
+    pub what: Text,
+    /// How much, with its unit.
+    pub value: Text,
+    /// What that means.
+    pub meaning: Text,
+    /// Why, where there is a reason.
+    pub why: Option<Text>,
+}
+
+/// All of it, one line each; nothing is said of what is as usual.
+pub fn estimated(calibration: &Calibration) -> Vec<EstimatedValue> {
+    let mut lines = Vec::new();
+    lines.extend(views_aside(calibration));
+    lines.extend(corners_aside(calibration));
+    if let Some(shape) = &calibration.shape {
+        lines.extend(bend(shape));
+        lines.extend(size(shape));
+    }
+    lines.extend(view_noise(calibration));
+    lines.extend(widening(calibration));
+    lines.extend(freedom(calibration));
+    lines.extend(calibration.joint_offsets.as_ref().map(joint_offsets));
+    lines
+}
+
+fn views_aside(calibration: &Calibration) -> Option<EstimatedValue> {
+    let count = calibration.views.iter().filter(|view| view.status == ViewStatus::Outlier).count();
+    let taken = calibration.views.iter().filter(|view| view.status == ViewStatus::Used).count();
+    (count > 0).then(|| EstimatedValue {
+        what: text!("Views set aside"),
+        value: text!("{count} of {of}", count = count, of = count + taken),
+        meaning: text!("They do not fit the others, and the answer is without them; the table of captures says which"),
+        why: None,
+    })
+}
+
+fn corners_aside(calibration: &Calibration) -> Option<EstimatedValue> {
+    let views = calibration.views.iter().filter(|view| !view.corners_aside.is_empty()).count();
+    let count: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
+    (count > 0).then(|| EstimatedValue {
+        what: text!("Corners set aside"),
+        value: text!("{count}, in {views} of {of} views", count = count, views = views, of = calibration.views.len()),
+        meaning: text!("They are far from where the rest of their view puts them, and the answer is without them"),
+        why: None,
+    })
+}
+
+fn bend(shape: &ShapeEstimate) -> Option<EstimatedValue> {
+    let [x_sigma, y_sigma] = shape.warp_sigma_m?.map(|metres| format!("{:.3}", metres * 1e3));
+    let [x, y] = shape.shape.warp_m.map(|metres| format!("{:.3}", metres * 1e3));
+    Some(EstimatedValue {
+        what: text!("Bend of the board"),
+        value: text!("x {x} ± {x_sigma} mm, y {y} ± {y_sigma} mm", x = x, x_sigma = x_sigma, y = y, y_sigma = y_sigma),
+        meaning: text!(
+            "By so much the middle of the board stands out against its edges, along its x and y; ± is one standard \
+             deviation. The answer allows for it"
+        ),
+        why: None,
+    })
+}
+
+fn size(shape: &ShapeEstimate) -> Option<EstimatedValue> {
+    let (percent, sigma) = (shape.shape.scale * 100.0, shape.scale_sigma? * 100.0);
+    Some(EstimatedValue {
+        what: text!("Size of the board"),
+        value: Text::verbatim(format!("{percent:.3} ± {sigma:.3} %")),
+        meaning: text!("Its true size over the stated one, by the motion of the robot; ± is one standard deviation"),
+        why: None,
+    })
+}
+
+fn view_noise(calibration: &Calibration) -> Option<EstimatedValue> {
+    let view_px = calibration.noise?.view_px;
+    (view_px > 0.0).then(|| EstimatedValue {
+        what: text!("Noise of views"),
+        value: Text::verbatim(format!("{view_px:.3} px")),
+        meaning: text!(
+            "What all corners of a picture are off by together, beyond their own noise: lens, board and picture are not \
+             quite as modelled"
+        ),
+        why: None,
+    })
+}
+
+fn widening(calibration: &Calibration) -> Option<EstimatedValue> {
+    let widening = calibration.widening.as_ref()?;
+    let by = widening.by?;
+    Some(EstimatedValue {
+        what: text!("Uncertainty widened"),
+        value: text!("{times} times", times = format!("{:.1}", widening.factor.sqrt())),
+        meaning: text!(
+            "The stated errors are so many times what independent noise explains, because the data show more than that"
+        ),
+        why: Some(by.reason()),
+    })
+}
+
+fn freedom(calibration: &Calibration) -> Option<EstimatedValue> {
+    let degrees = calibration.small_sample?.degrees_of_freedom;
+    let value =
+        if degrees > KNOWN { text!("known") } else { text!("{n} degrees of freedom", n = format!("{degrees:.1}")) };
+    Some(EstimatedValue {
+        what: text!("Noise levels"),
+        value,
+        meaning: text!(
+            "The fewer degrees of freedom the noise levels have, the wider the stated error is for the same noise"
+        ),
+        why: None,
+    })
+}
+
+fn joint_offsets(offsets: &JointOffsets) -> EstimatedValue {
+    let each = offsets.offsets_rad.iter().zip(&offsets.sigma_rad).enumerate().map(|(index, (offset, sigma))| {
+        format!("{}: {:+.3} ± {:.3}°", index + 1, offset.to_degrees(), sigma.to_degrees())
+    });
+    let before = format!("{:.3}", offsets.heldout_before_px);
+    let after = format!("{:.3}", offsets.heldout_after_px);
+    let why = if offsets.accepted {
+        text!(
+            "The answer uses them: views left out are predicted to {after} px instead of {before} px",
+            after = after,
+            before = before
+        )
+    } else {
+        text!(
+            "The answer does not use them: views left out are predicted to {after} px with them and {before} px without",
+            after = after,
+            before = before
+        )
+    };
+    EstimatedValue {
+        what: text!("Offsets of the joints"),
+        value: Text::verbatim(each.collect::<Vec<_>>().join(", ")),
+        meaning: text!("To be added to the angles that the robot reports, joint by joint; ± is one standard deviation"),
+        why: Some(why),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use handeye_core::estimate::uncertainty::widening::{Evidence, Widening};
+    use handeye_core::targets::bent::BoardShape;
+
+    use super::*;
+    use crate::gui::testing::sample;
+    use crate::text::Language;
+
+    fn said(change: impl FnOnce(&mut Calibration)) -> Vec<(String, String)> {
+        let model = sample::solved();
+        let mut calibration = model.solve.current().expect("solved").calibration.clone();
+        calibration.shape = None;
+        calibration.widening = None;
+        calibration.joint_offsets = None;
+        if let Some(noise) = &mut calibration.noise {
+            noise.view_px = 0.0;
+        }
+        change(&mut calibration);
+        let lines = estimated(&calibration);
+        lines.iter().map(|it| (it.what.say(Language::English), it.value.say(Language::English))).collect()
+    }
+
+    fn has(lines: &[(String, String)], what: &str, value: &str) -> bool {
+        lines.iter().any(|(a, b)| a == what && b == value)
+    }
+
+    #[test]
+    fn nothing_is_said_of_what_is_as_usual() {
+        let lines = said(|_| ());
+        assert_eq!(lines.len(), 1, "{lines:?}");
+        assert_eq!(lines[0].0, "Noise levels");
+        assert!(lines[0].1.ends_with(" degrees of freedom"), "{lines:?}");
+    }
+
+    #[test]
+    fn everything_is_said_with_its_unit() {
+        let lines = said(|c| {
+            c.views[0].status = ViewStatus::Outlier;
+            c.views[1].corners_aside = vec![3, 4];
+            c.views[2].corners_aside = vec![5];
+            c.shape = Some(ShapeEstimate {
+                shape: BoardShape { warp_m: [4e-4, -1e-4], scale: 1.001 },
+                warp_sigma_m: Some([3e-5, 2e-5]),
+                scale_sigma: Some(2e-4),
+            });
+            if let Some(noise) = &mut c.noise {
+                noise.view_px = 0.12;
+            }
+            c.widening = Some(Widening { factor: 4.0, by: Some(Evidence::Neighbours), checks: Vec::new() });
+            if let Some(sample) = &mut c.small_sample {
+                sample.degrees_of_freedom = f64::INFINITY;
+            }
+            c.joint_offsets = Some(JointOffsets {
+                offsets_rad: vec![1.0_f64.to_radians(), (-0.5_f64).to_radians()],
+                sigma_rad: vec![0.01_f64.to_radians(); 2],
+                heldout_before_px: 0.5,
+                heldout_after_px: 0.3,
+                accepted: true,
+            });
+        });
+        for (what, value) in [
+            ("Views set aside", "1 of 10"),
+            ("Corners set aside", "3, in 2 of 10 views"),
+            ("Bend of the board", "x 0.400 ± 0.030 mm, y -0.100 ± 0.020 mm"),
+            ("Size of the board", "100.100 ± 0.020 %"),
+            ("Noise of views", "0.120 px"),
+            ("Uncertainty widened", "2.0 times"),
+            ("Noise levels", "known"),
+            ("Offsets of the joints", "1: +1.000 ± 0.010°, 2: -0.500 ± 0.010°"),
+        ] {
+            assert!(has(&lines, what, value), "{what}: {value} in {lines:?}");
+        }
+    }
+}

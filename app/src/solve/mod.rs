@@ -1,0 +1,10 @@
+//! The calibration: solving in the background, the answer with its error, charts.
+
+pub(crate) mod charts;
+pub(crate) mod estimated;
+pub(crate) mod observer;
+pub(crate) mod pane;
+pub(crate) mod state;
+pub(crate) mod tip_box;
+pub(crate) mod update;
+pub(crate) mod worker;

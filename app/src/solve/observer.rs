@@ -1,0 +1,55 @@
+//! The observer: looks for the board in captures that were opened from the disk, or anew when the target is another.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use handeye_core::capture::observe_image;
+use handeye_core::progress::CancelToken;
+use handeye_core::project::session::{CaptureId, CaptureRecord};
+use handeye_core::targets::TargetSpec;
+
+use crate::capture::thumbnail;
+use crate::command::Event;
+use crate::model::{Observed, Severity};
+use crate::text;
+use crate::worker::link::Outlet;
+
+/// Captures to look at.
+pub struct ObserveJob {
+    /// The session.
+    pub folder: PathBuf,
+    /// What to look for.
+    pub target: TargetSpec,
+    /// Where.
+    pub captures: Vec<CaptureRecord>,
+}
+
+/// Looks at one capture after the other and reports each.
+pub fn observe(job: &ObserveJob, cancel: &CancelToken, outlet: &Outlet) {
+    for capture in &job.captures {
+        if cancel.is_cancelled() {
+            return;
+        }
+        let observed = look(job, capture);
+        if let Err(why) = &observed {
+            let text = text!("Capture {id} cannot be read: {why}", id = capture.id, why = why);
+            outlet.notice(Severity::Error, text);
+        }
+        report(capture.id, job.target, observed.ok(), outlet);
+    }
+}
+
+fn report(id: CaptureId, target: TargetSpec, observed: Option<Observed>, outlet: &Outlet) {
+    outlet.report(Event::Observed { id, target, observed: observed.map(Arc::new) });
+}
+
+fn look(job: &ObserveJob, capture: &CaptureRecord) -> Result<Observed, String> {
+    let path = job.folder.join(&capture.image);
+    let rgb = handeye_core::project::files::image_file::load_rgb(&path).map_err(|error| error.to_string())?;
+    let seen = observe_image(&rgb, &job.target).map_err(|error| error.to_string())?;
+    Ok(Observed {
+        corners: seen.map(|seen| seen.corners),
+        image_size: rgb.dimensions(),
+        thumbnail: Arc::new(thumbnail(&rgb)),
+    })
+}

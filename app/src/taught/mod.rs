@@ -1,0 +1,5 @@
+//! Taught poses, and the sequence that visits them.
+
+pub(crate) mod pane;
+pub(crate) mod sequence;
+pub(crate) mod update;

@@ -1,0 +1,78 @@
+//! Visiting all poses, and how that goes.
+
+use egui::{Button, Ui};
+
+use super::immovable;
+use crate::command::{Command, Outbox};
+use crate::gui::style::parts;
+use crate::model::{CapturePurpose, Model, StopOutcome, Tour};
+use crate::{text, tr};
+
+/// Buttons that begin a tour, or its progress.
+pub fn tour_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    match &model.tour {
+        Some(tour) if model.touring => progress_ui(ui, model, tour, outbox),
+        tour => {
+            begin_ui(ui, model, outbox);
+            if let Some(tour) = tour.as_ref().filter(|tour| !tour.is_planned()) {
+                summary_ui(ui, model, tour);
+            }
+        }
+    }
+}
+
+fn begin_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let is_empty = model.document().taught.is_empty();
+    let reason = immovable(model).or_else(|| is_empty.then(|| tr!(language, "Teach poses first")));
+    parts::caption_ui(ui, tr!(language, "Run all poses"));
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().button_padding.x = 7.0;
+        for (purpose, name, what) in [
+            (
+                Some(CapturePurpose::Calibrate),
+                tr!(language, "Capture at each"),
+                tr!(language, "Visits every pose and captures the board for the calibration"),
+            ),
+            (
+                Some(CapturePurpose::Verify),
+                tr!(language, "Verify at each"),
+                tr!(language, "Visits every pose and captures the board for verification: it never enters the fit"),
+            ),
+            (None, tr!(language, "Move only"), tr!(language, "Visits every pose and captures nothing")),
+        ] {
+            if parts::gated_ui(ui, reason, Button::new(name)).on_hover_text(what).clicked() {
+                outbox.send(Command::RunTour { purpose });
+            }
+        }
+    });
+}
+
+/// How far it is, and the button that ends it.
+pub fn progress_ui(ui: &mut Ui, model: &Model, tour: &Tour, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let (done, of) = (tour.outcomes.len(), tour.names.len());
+    let said = match tour.current() {
+        Some(name) => text!("Pose {n} of {of}: {name}", n = done + 1, of = of, name = name),
+        None => text!("All {of} poses were visited", of = of),
+    }
+    .say(language);
+    if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop tour")) {
+        outbox.send(Command::StopTour);
+    }
+}
+
+/// How the last one went.
+pub fn summary_ui(ui: &mut Ui, model: &Model, tour: &Tour) {
+    let done = tour.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
+    let skipped = tour.outcomes.len() - done;
+    let left = tour.names.len() - tour.outcomes.len();
+    let said = text!(
+        "Last tour: {done} of {of} done, {skipped} skipped, {left} not visited",
+        done = done,
+        of = tour.names.len(),
+        skipped = skipped,
+        left = left
+    );
+    parts::hint_ui(ui, &said.say(model.view.language));
+}

@@ -1,0 +1,178 @@
+//! Visiting all taught poses, or poses that are planned to verify at, with a capture at each.
+
+use handeye_core::estimate::handeye::HandEye;
+use handeye_sim_link::client::cell::{BoardInView, JointAngles};
+
+use crate::app::App;
+use crate::model::{
+    CapturePurpose, CaptureRefused, MotionGoal, MotionId, MotionOutcome, Pane, Severity, StopOutcome, Tour,
+};
+use crate::text;
+use crate::text::Text;
+use crate::worker::ViewsRequest;
+
+/// Poses that are planned to verify at: enough for an average and a scatter, and over within a minute or two.
+const VERIFYING: usize = 5;
+
+impl App {
+    pub(crate) fn run_tour(&mut self, purpose: Option<CapturePurpose>) {
+        let names: Vec<String> = self.model.document().taught.iter().map(|pose| pose.name.clone()).collect();
+        if names.is_empty() {
+            self.say(Severity::Warning, text!("There are no taught poses: teach some, or take the reference poses"));
+            return;
+        }
+        self.begin_tour(Tour { names, planned: None, purpose, outcomes: Vec::new(), began_s: self.model.now_s });
+    }
+
+    fn begin_tour(&mut self, tour: Tour) {
+        self.model.tour = Some(tour);
+        self.model.touring = true;
+        self.next_stop();
+    }
+
+    /// Has poses planned that differ from all captures, to verify at.
+    pub(crate) fn plan_verification(&mut self) {
+        if self.model.touring || self.model.planning {
+            return;
+        }
+        let board = self.model.calibrated().and_then(|calibrated| match calibrated.hand_eye {
+            HandEye::EyeInHand { tip_from_camera, base_from_target } => Some(BoardInView {
+                base_from_target,
+                target: self.model.document().meta.target,
+                intrinsics: calibrated.intrinsics,
+                tip_from_camera,
+            }),
+            HandEye::EyeToHand { .. } => None,
+        });
+        let Some(board) = board else {
+            let why = text!("Poses to verify at are planned with a calibration of a camera on the tip only");
+            return self.say_in(Pane::Verify, Severity::Warning, why);
+        };
+        let taken =
+            self.model.document().captures.iter().filter(|it| !it.excluded).map(|it| it.base_from_tip).collect();
+        self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
+        self.model.messages.is_over_in(Pane::Verify);
+        let request = ViewsRequest { board, taken, count: VERIFYING };
+        let asked = self.workers.plan_views(self.numbers.motion, request);
+        self.model.planning = asked.is_ok();
+        self.numbers.plan = asked.is_ok().then_some(self.numbers.motion);
+        self.expect(text!("No poses are planned"), asked);
+    }
+
+    /// The poses are planned, or cannot be.
+    pub(crate) fn planned(&mut self, id: MotionId, views: Result<Vec<JointAngles>, Text>) {
+        // After a stop nothing begins by itself any more.
+        if self.numbers.plan != Some(id) || !self.model.planning {
+            return;
+        }
+        self.model.planning = false;
+        match views {
+            Ok(joints) => self.begin_tour(Tour {
+                names: (1..=joints.len()).map(|number| format!("check {number}")).collect(),
+                planned: Some(joints),
+                purpose: Some(CapturePurpose::Verify),
+                outcomes: Vec::new(),
+                began_s: self.model.now_s,
+            }),
+            Err(why) => {
+                let said = text!("There are no poses to verify at: {why}", why = why);
+                self.say_in(Pane::Verify, Severity::Warning, said);
+            }
+        }
+    }
+
+    /// Nothing is planned after all: the arm does something else, or was stopped.
+    pub(crate) fn plan_refused(&mut self, outcome: &MotionOutcome) {
+        self.model.planning = false;
+        if let MotionOutcome::Refused(why) | MotionOutcome::Failed(why) = outcome {
+            let said = text!("There are no poses to verify at: {why}", why = why.clone());
+            self.say_in(Pane::Verify, Severity::Warning, said);
+        }
+    }
+
+    pub(crate) fn stop_tour(&mut self) {
+        if self.model.touring {
+            self.stop();
+        }
+    }
+
+    /// Sets out for the next pose, or ends the tour.
+    fn next_stop(&mut self) {
+        let Some(tour) = self.model.tour.as_ref().filter(|_| self.model.touring) else { return };
+        if let Some(name) = tour.current() {
+            let name = name.to_owned();
+            let planned = tour.planned.as_ref().and_then(|joints| joints.get(tour.outcomes.len()));
+            match planned.copied() {
+                Some(joints) => self.start_motion(MotionGoal::Joints(joints), text!("pose {name}", name = name)),
+                None => self.go_to_taught(&name),
+            }
+            return;
+        }
+        let pane = pane_of(tour);
+        let of = tour.names.len();
+        let done = tour.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
+        let took_s = self.model.now_s - tour.began_s;
+        self.model.touring = false;
+        let severity = if done == of { Severity::Info } else { Severity::Warning };
+        let took = format!("{took_s:.0}");
+        let said = text!("Tour ended: {done} of {of} poses in {took} s", done = done, of = of, took = took);
+        match severity {
+            Severity::Info => self.say(severity, said),
+            _ => self.say_in(pane, severity, said),
+        }
+    }
+
+    fn end_stop(&mut self, outcome: StopOutcome) {
+        if let Some(tour) = &mut self.model.tour {
+            tour.outcomes.push(outcome);
+        }
+        self.next_stop();
+    }
+
+    /// The motion of the tour has ended.
+    pub(crate) fn tour_moved(&mut self, outcome: &MotionOutcome) {
+        let Some(tour) = &self.model.tour else { return };
+        match outcome {
+            MotionOutcome::Arrived => match tour.purpose {
+                Some(purpose) => {
+                    let name = tour.current().map(str::to_owned);
+                    self.capture(purpose, name);
+                }
+                None => self.end_stop(StopOutcome::Done),
+            },
+            // A pose that cannot be reached is left out; the others can still be visited.
+            MotionOutcome::Refused(why) => self.end_stop(StopOutcome::Skipped(why.clone())),
+            MotionOutcome::Stopped | MotionOutcome::Failed(_) => self.break_off(),
+        }
+    }
+
+    /// The capture of the tour is on the disk.
+    pub(crate) fn tour_captured(&mut self) {
+        if self.model.touring {
+            self.end_stop(StopOutcome::Done);
+        }
+    }
+
+    /// There is no capture at this pose.
+    pub(crate) fn tour_refused(&mut self, refused: &CaptureRefused) {
+        if !self.model.touring {
+            return;
+        }
+        if refused.kind.concerns_the_pose() {
+            self.end_stop(StopOutcome::Skipped(refused.why.clone()));
+        } else {
+            self.break_off();
+        }
+    }
+
+    fn break_off(&mut self) {
+        self.model.touring = false;
+        let pane = self.model.tour.as_ref().map_or(Pane::Taught, pane_of);
+        self.say_in(pane, Severity::Warning, text!("The tour was broken off; what was captured is kept"));
+    }
+}
+
+/// Where it says how it went.
+fn pane_of(tour: &Tour) -> Pane {
+    if tour.is_planned() { Pane::Verify } else { Pane::Taught }
+}

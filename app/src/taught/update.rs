@@ -1,0 +1,140 @@
+//! Taught poses.
+
+use std::path::{Path, PathBuf};
+
+use handeye_core::project::session::{Edit, TaughtChange};
+use handeye_core::project::taught_poses::{Goal, TaughtPose, TaughtPoses};
+
+use crate::app::App;
+use crate::model::{MotionGoal, MotionOutcome, Severity};
+use crate::session::start::REFERENCE_POSES;
+use crate::text;
+use crate::worker::FileTask;
+
+/// The reference poses.
+pub fn reference_poses() -> Vec<TaughtPose> {
+    match TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES) {
+        Ok(taught) => taught.poses,
+        // It is part of the program and a test reads it.
+        Err(error) => {
+            tracing::error!(%error, "the reference poses cannot be read");
+            Vec::new()
+        }
+    }
+}
+
+impl App {
+    fn edit_taught(&mut self, change: TaughtChange, poses: Vec<TaughtPose>) {
+        self.edit(Edit::SetTaught { change, poses });
+    }
+
+    fn taught(&self) -> Vec<TaughtPose> {
+        self.model.document().taught.clone()
+    }
+
+    /// Joints are remembered and not the tip, because they bring the arm back on the same way.
+    pub(crate) fn teach(&mut self, name: Option<String>) {
+        let Some(robot) = &self.model.robot else {
+            self.say(Severity::Warning, text!("The place of the arm is not known: connect first"));
+            return;
+        };
+        let goal = Goal::Joints(robot.joints_rad.to_vec());
+        let mut poses = self.taught();
+        let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
+        let name = name.unwrap_or_else(|| free_name(&poses));
+        poses.push(TaughtPose { name: name.clone(), goal });
+        self.edit_taught(TaughtChange::Add(name), poses);
+    }
+
+    pub(crate) fn remove_taught(&mut self, name: &str) {
+        let mut poses = self.taught();
+        poses.retain(|pose| pose.name != name);
+        self.edit_taught(TaughtChange::Remove(name.to_owned()), poses);
+    }
+
+    pub(crate) fn rename_taught(&mut self, from: &str, to: &str) {
+        let to = to.trim();
+        if from == to {
+            return;
+        }
+        let mut poses = self.taught();
+        for pose in poses.iter_mut().filter(|pose| pose.name == from) {
+            to.clone_into(&mut pose.name);
+        }
+        self.edit_taught(TaughtChange::Rename { from: from.to_owned(), to: to.to_owned() }, poses);
+    }
+
+    pub(crate) fn reorder_taught(&mut self, name: &str, to: usize) {
+        let mut poses = self.taught();
+        let Some(from) = poses.iter().position(|pose| pose.name == name) else { return };
+        let pose = poses.remove(from);
+        poses.insert(to.min(poses.len()), pose);
+        self.edit_taught(TaughtChange::Reorder(name.to_owned()), poses);
+    }
+
+    pub(crate) fn teach_reference(&mut self) {
+        self.edit_taught(TaughtChange::Replace, reference_poses());
+    }
+
+    pub(crate) fn import_taught(&mut self, file: PathBuf) {
+        let asked = self.desk.files(FileTask::ReadPoses(file));
+        self.expect(text!("The poses were not read"), asked);
+    }
+
+    pub(crate) fn poses_read(&mut self, read: Vec<TaughtPose>) {
+        let count = read.len() as u32;
+        let mut poses = self.taught();
+        for mut pose in read {
+            let base = pose.name.clone();
+            let mut copy = 2;
+            while poses.iter().any(|other| other.name == pose.name) {
+                pose.name = format!("{base} ({copy})");
+                copy += 1;
+            }
+            poses.push(pose);
+        }
+        self.edit_taught(TaughtChange::Import(count), poses);
+    }
+
+    pub(crate) fn export_taught(&mut self, file: PathBuf) {
+        let asked = self.desk.files(FileTask::WritePoses { file, poses: self.taught() });
+        self.expect(text!("The poses were not written"), asked);
+    }
+
+    pub(crate) fn go_to_taught(&mut self, name: &str) {
+        let what = text!("pose {name}", name = name);
+        let goal = self.model.document().taught.iter().find(|pose| pose.name == name).map(|pose| match &pose.goal {
+            Goal::Tip(base_from_tip) => Some(MotionGoal::Tip(*base_from_tip)),
+            Goal::Joints(joints) => joints.as_slice().try_into().ok().map(MotionGoal::Joints),
+        });
+        match goal {
+            Some(Some(goal)) => self.start_motion(goal, what),
+            Some(None) => {
+                let why = text!("this arm has six joints and the pose another number");
+                self.moved(self.numbers.motion, MotionOutcome::Refused(why));
+            }
+            None => {
+                let why = text!("it is not taught any more");
+                self.moved(self.numbers.motion, MotionOutcome::Refused(why));
+            }
+        }
+    }
+}
+
+/// A name that no pose has.
+fn free_name(poses: &[TaughtPose]) -> String {
+    let is_free = |name: &String| poses.iter().all(|pose| pose.name != *name);
+    // One of them is free: there are more numbers than poses.
+    let numbers = poses.len() + 1..=2 * poses.len() + 1;
+    numbers.map(|number| format!("pose {number}")).find(is_free).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reference_poses_come_with_the_program() {
+        assert_eq!(reference_poses().len(), 10);
+    }
+}

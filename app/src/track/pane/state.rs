@@ -1,0 +1,55 @@
+//! Whether the board is followed, in a colour and in words.
+
+use egui::{RichText, Ui};
+use handeye_core::track::State;
+
+use crate::gui::style::parts;
+use crate::gui::style::theme::{Palette, Tone};
+use crate::model::Model;
+use crate::text;
+use crate::text::Text;
+
+/// How tracking goes; no tone while it is off.
+pub fn state(model: &Model) -> (Option<Tone>, Text) {
+    if !model.track.on {
+        return (None, text!("The board is not tracked"));
+    }
+    let Some(newest) = &model.track.newest else {
+        return (Some(Tone::Busy), text!("Waiting for the first picture…"));
+    };
+    let update = &newest.update;
+    let ago = |since_s: f64| format!("{:.1}", (update.time_s - since_s).max(0.0));
+    match update.state {
+        State::Searching => (Some(Tone::Busy), text!("Searching for the board")),
+        State::Tracking { corners, of } => {
+            (Some(Tone::Good), text!("Tracking {corners} of {of} corners", corners = corners, of = of))
+        }
+        State::Coasting { since_s } => {
+            let words = text!("Not seen for {time} s: assumed to go on as it went", time = ago(since_s));
+            (Some(Tone::Warning), words)
+        }
+        State::Lost { since_s } => (Some(Tone::Bad), text!("Lost {time} s ago: searching", time = ago(since_s))),
+    }
+}
+
+/// The state, and how many poses come and how late.
+pub fn state_ui(ui: &mut Ui, model: &Model) {
+    let language = model.view.language;
+    let palette = Palette::of(ui);
+    let (tone, words) = state(model);
+    let colour = tone.map_or(palette.weak, |tone| palette.tone(tone));
+    // The words break with the dot, not behind it.
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        parts::dot_ui(ui, colour);
+        ui.label(RichText::new(words.say(language)).strong().color(if tone.is_some() { colour } else { palette.text }));
+    });
+    let Some(newest) = model.track.newest.as_ref().filter(|_| model.track.on) else { return };
+    let (rate, latency) = (format!("{:.1}", newest.rate_hz), format!("{:.0}", newest.latency_s * 1e3));
+    let words = text!("{rate} Hz · {latency} ms", rate = rate, latency = latency).say(language);
+    let what = crate::tr!(
+        language,
+        "Poses per second, and the time from the arrival of a picture to the pose that comes of it"
+    );
+    ui.label(RichText::new(words).color(palette.weak)).on_hover_text(what);
+}

@@ -1,0 +1,120 @@
+//! The board as it is tracked, and the arm that follows it.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target};
+use handeye_core::track::Update;
+use handeye_sim_link::client::cell::BoardPath;
+use serde::{Deserialize, Serialize};
+
+use crate::text::Text;
+
+/// Points of the history that is shown: half a minute at the usual rates.
+pub const MAX_TRACK_POINTS: usize = 900;
+
+/// What tracking has brought for one picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracked {
+    /// Number of the picture, see [`crate::model::FrameInfo::number`].
+    pub frame: u64,
+    /// The board.
+    pub update: Update,
+    /// From the arrival of the picture to the published pose \[s\].
+    pub latency_s: f64,
+    /// Poses per second.
+    pub rate_hz: f64,
+    /// Against where a simulated cell says the board was at the time of the picture.
+    pub error: Option<TrackError>,
+    /// The true pose, where the cell publishes it.
+    pub truth: Option<Pose<Base, Target>>,
+}
+
+/// An estimate against the truth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackError {
+    /// Distance of the board's centre from where it is \[m\].
+    pub position_m: f64,
+    /// Angle between the axes \[rad\].
+    pub rotation_rad: f64,
+}
+
+/// One point of the plots.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackPoint {
+    /// Time of the picture \[s\].
+    pub time_s: f64,
+    /// Origin of the board in the base \[m\]; `None` while it is not known.
+    pub position_m: Option<[f64; 3]>,
+    /// 95 % of the position: radius \[m\].
+    pub position_95_m: Option<f64>,
+    /// Against the truth.
+    pub error: Option<TrackError>,
+    /// From picture to pose \[s\].
+    pub latency_s: f64,
+}
+
+/// What the arm is to do about the board.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum FollowWish {
+    /// Keep the camera where it is relative to the board now.
+    KeepView,
+    /// The same; where the arm has no room to go along with the board from there, from the nearest place where it has.
+    KeepViewWithRoom,
+    /// Keep the camera at this pose relative to the board.
+    KeepPose(Pose<Camera, Target>),
+    /// Bring the tip to a corner of the board, this far off along its normal \[m\].
+    Corner {
+        /// Index of the corner.
+        index: usize,
+        /// Distance of the tip from it \[m\].
+        stand_off_m: f64,
+    },
+}
+
+/// What the arm does about the board.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum FollowStatus {
+    /// Nothing.
+    #[default]
+    Off,
+    /// It moves to a place from which it has room to follow.
+    MakingRoom,
+    /// It follows.
+    Following {
+        /// Distance of the tip from its goal \[m\].
+        distance_m: f64,
+        /// Angle between tip and goal \[rad\].
+        angle_rad: f64,
+    },
+    /// It came to rest by itself, and this is why.
+    Ended(Text),
+}
+
+/// Tracking as the window shows it.
+#[derive(Debug, Clone, Default)]
+pub struct TrackState {
+    /// Whether pictures are tracked.
+    pub on: bool,
+    /// What the arm was asked for.
+    pub wish: Option<FollowWish>,
+    /// What the arm does.
+    pub follow: FollowStatus,
+    /// The newest picture.
+    pub newest: Option<Arc<Tracked>>,
+    /// The last pictures, oldest first.
+    pub history: VecDeque<TrackPoint>,
+    /// How the built-in cell moves its board, as far as this program asked for it.
+    pub board: BoardMotion,
+    /// Whether this program asked the cell to hide its board.
+    pub board_hidden: bool,
+}
+
+/// How a simulated cell moves its board.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct BoardMotion {
+    /// Along which path.
+    pub path: BoardPath,
+    /// How fast [m/s].
+    pub speed_m_s: f64,
+}

@@ -1,0 +1,59 @@
+//! All captures together.
+
+use egui::{Label, RichText, Ui};
+use handeye_core::verify::Verification;
+
+use crate::gui::style::parts;
+use crate::gui::style::theme::Palette;
+use crate::model::Model;
+use crate::{text, tr};
+
+/// Errors of prediction, and whether they are as large as stated.
+pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
+    let language = model.view.language;
+    let count = verification.captures.len();
+    let title = text!("Errors of prediction over {count} captures, RMS", count = count);
+    parts::section_ui(ui, &title.say(language));
+    let mm = |metres: f64| format!("{:.3} mm", metres * 1e3);
+    parts::stated_ui(ui, tr!(language, "Middle of the board"), &mm(verification.centre_rms_m))
+        .on_hover_text(tr!(language, "Distance between the middle of the board as seen and as predicted"));
+    let deg = verification.orientation_rms_rad.to_degrees();
+    parts::stated_ui(ui, tr!(language, "Its orientation"), &format!("{deg:.3}°"));
+    parts::stated_ui(ui, tr!(language, "Its corners"), &format!("{:.3} px", verification.rms_px));
+    let scatter = verification.origin_scatter_m.map_or_else(|| "–".to_owned(), mm);
+    parts::stated_ui(ui, tr!(language, "Scatter of its place"), &scatter).on_hover_text(tr!(
+        language,
+        "How much the place of the board differs from capture to capture. A board that was moved leaves it small while \
+         every prediction is wrong"
+    ));
+    let palette = Palette::of(ui);
+    let (colour, verdict) = match &verification.consistency {
+        None => (palette.weak, text!("The calibration states no uncertainty to compare these errors with")),
+        Some(consistency) => {
+            let ratio = format!("{:.2}", consistency.ratio);
+            let limit = format!("{:.2}", consistency.limit);
+            if consistency.is_consistent() {
+                let text = text!(
+                    "The errors are of the size that the calibration states: {ratio} times in the square, up to {limit} \
+                     is expected in 99 of 100 cases",
+                    ratio = ratio,
+                    limit = limit
+                );
+                (palette.good, text)
+            } else {
+                let text = text!(
+                    "The errors are larger than the calibration states: {ratio} times in the square, where {limit} is \
+                     the most in 99 of 100 cases. The board may have been moved, or the arm is less exact here than \
+                     where the calibration was made",
+                    ratio = ratio,
+                    limit = limit
+                );
+                (palette.warning, text)
+            }
+        }
+    };
+    ui.horizontal_top(|ui| {
+        parts::dot_ui(ui, colour);
+        ui.add(Label::new(RichText::new(verdict.say(language)).color(palette.text)).wrap());
+    });
+}
