@@ -28,7 +28,7 @@ PACKAGES
   [ "${HANDEYE_SETUP_FOR:-run}" = test ] && cat <<'PACKAGES'
 python3 : the official CoppeliaSim client is tested against the cell
 python3-venv : the official CoppeliaSim client is tested against the cell
-mesa-vulkan-drivers : pictures of the window in the tests
+mesa-vulkan-drivers : images of the window in the tests
 xvfb : the window is driven by a real mouse in the tests
 xdotool : the window is driven by a real mouse in the tests
 imagemagick : the window is driven by a real mouse in the tests

@@ -3,7 +3,7 @@
 //!     cargo run --release -p handeye_app --example frame_budget [SECONDS]
 //!
 //! The first two lines are the same work without and with a recording for Rerun, and the last two with a viewer as well:
-//! one that reads, and one that is stopped (`rerun` on the `PATH`; left out without). `pictures/s` counts those that the
+//! one that reads, and one that is stopped (`rerun` on the `PATH`; left out without). `images/s` counts those that the
 //! window got, `MB` is the memory of the program.
 //!
 //! Draws the whole window 60 times a second without a graphics card: events, panes, tessellation. Prints for each
@@ -47,18 +47,18 @@ fn main() -> anyhow::Result<()> {
     let duration = Duration::from_secs(seconds);
     println!(
         "{:<30} {:>7} {:>9} {:>26} {:>10} {:>6}",
-        "", "frames", "shapes", "ms: median, 99 %, worst", "pictures/s", "MB"
+        "", "frames", "shapes", "ms: median, 99 %, worst", "images/s", "MB"
     );
 
     let cell = CellServer::start(CellConfig::new(Scene::reference()?))?;
-    // A cell at an address starts its simulation when it is told to; without passes there are no new pictures.
+    // A cell at an address starts its simulation when it is told to; without passes there are no new images.
     let endpoint = cell.endpoint().parse()?;
     let mut starter = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())?;
     starter.arm().sim().start_simulation()?;
     let live = || CellSource::Address(cell.endpoint());
     // In turns, so that what else the machine does falls on both.
     for round in 1..=2 {
-        measure(&format!("live pictures, round {round}"), live(), duration, |_| {})?;
+        measure(&format!("live images, round {round}"), live(), duration, |_| {})?;
         recorded(&format!("the same, recorded, round {round}"), live(), duration, RerunChoice::Record, |_| {})?;
     }
     recorded("a viewer that reads", live(), duration, RerunChoice::Web, |app| read(app, false))?;
@@ -150,7 +150,7 @@ fn recorded(
     let mut window = Window::new(app, Layout::default(), SettingsFile::default(), &ctx);
     let mut begin = Some(begin);
     let (mut times_ms, mut shapes) = (Vec::new(), 0);
-    let mut first_picture = None;
+    let mut first_image = None;
     let warm_up = Duration::from_secs(3);
     while began.elapsed() < duration + warm_up {
         let frame = Instant::now();
@@ -168,8 +168,8 @@ fn recorded(
         // The first frames make fonts and connections; they are not what a user waits for.
         if began.elapsed() > warm_up {
             times_ms.push(frame.elapsed().as_secs_f64() * 1e3);
-            if let (None, Some(picture)) = (first_picture, &window.app_mut().model().frame) {
-                first_picture = Some((picture.info.number, Instant::now()));
+            if let (None, Some(image)) = (first_image, &window.app_mut().model().frame) {
+                first_image = Some((image.info.number, Instant::now()));
             }
             if let Some(begin) = begin.take() {
                 begin(window.app_mut());
@@ -177,8 +177,8 @@ fn recorded(
         }
         thread::sleep(PERIOD.saturating_sub(frame.elapsed()));
     }
-    let newest = window.app_mut().model().frame.as_ref().map_or(0, |picture| picture.info.number);
-    let rate_hz = first_picture.map_or(0.0, |(first, at)| (newest - first) as f64 / at.elapsed().as_secs_f64());
+    let newest = window.app_mut().model().frame.as_ref().map_or(0, |image| image.info.number);
+    let rate_hz = first_image.map_or(0.0, |(first, at)| (newest - first) as f64 / at.elapsed().as_secs_f64());
     println!(
         "{what:<30} {:>7} {shapes:>9} {:>26} {rate_hz:>10.1} {:>6}",
         times_ms.len(),

@@ -42,7 +42,7 @@ pub enum Command {
     SetDepthScale(DepthScale),
     /// Of all words.
     SetLanguage(Language),
-    /// The pointer is over a pixel of the pictures, or over none.
+    /// The pointer is over a pixel of the images, or over none.
     PointAt(Option<ImagePoint>),
     /// Move the arm to a place, which the words name.
     Move {
@@ -59,9 +59,9 @@ pub enum Command {
     JogReleased,
     /// How the tip is jogged.
     SetJog(JogSettings),
-    /// Take a capture as soon as robot and picture have settled.
+    /// Take a capture as soon as robot and image have settled.
     Capture(CapturePurpose),
-    /// Not any more.
+    /// Not now.
     CancelCapture,
     /// How captures are taken.
     SetCaptureOptions(CaptureOptions),
@@ -73,9 +73,9 @@ pub enum Command {
     SetDialog(Option<Dialog>),
     /// A message needs no more attention.
     DismissMessage(u64),
-    /// What is drawn over the pictures.
+    /// What is drawn over the images.
     SetOverlays(Overlays),
-    /// Which part of the pictures is shown, and how large.
+    /// Which part of the images is shown, and how large.
     SetViewport(Viewport),
     /// From where the 3D pane looks.
     SetSceneView(SceneView),
@@ -113,17 +113,17 @@ pub enum Command {
     /// Move to where a capture was taken.
     GoToCapture(CaptureId),
     /// Visit all taught poses.
-    RunTour {
+    RunSequence {
         /// What is captured at each; `None` only moves.
         purpose: Option<CapturePurpose>,
     },
     /// Have poses planned that are not in the fit, visit them, and capture for verification at each.
     VerifyAtPlanned,
     /// No more poses.
-    StopTour,
-    /// Which captures are selected; the last one's picture is shown.
+    StopSequence,
+    /// Which captures are selected; the last one's image is shown.
     Select(Vec<CaptureId>),
-    /// Show the live picture again.
+    /// Show the live image again.
     BackToLive,
     /// Take captures out of the fit, or back in.
     SetExcluded {
@@ -165,7 +165,7 @@ pub enum Command {
     SetGoal(f64),
     /// Where the line between good and bad residuals is \[px\]; `None` takes it away.
     SetOutlierLine(Option<f64>),
-    /// Measure the point at a pixel of the picture in base coordinates.
+    /// Measure the point at a pixel of the image in base coordinates.
     Pick(Option<ImagePoint>),
     /// Which formats are exported.
     ChooseFormats(BTreeSet<String>),
@@ -187,7 +187,7 @@ pub enum Command {
     ListFolder(PathBuf),
     /// Show a folder in the file manager of the system.
     OpenFolder(PathBuf),
-    /// Track the board in every picture, or no more.
+    /// Track the board in every image, or no more.
     SetTracking(bool),
     /// Have the arm follow the board; `None` has it come to rest.
     SetFollow(Option<FollowWish>),
@@ -220,7 +220,7 @@ pub enum Event {
     },
     /// The robot was read.
     Robot(RobotState),
-    /// New pictures.
+    /// New images.
     Frame {
         /// Their circumstances.
         info: FrameInfo,
@@ -253,7 +253,7 @@ pub enum Event {
         /// Why, when it was not released.
         why: Option<Text>,
     },
-    /// The newest picture was searched for the board.
+    /// The newest image was searched for the board.
     #[serde(skip)]
     Detection(Box<LiveDetection>),
     /// The capture that is under way waits for something else.
@@ -292,11 +292,11 @@ pub enum Event {
         id: CaptureId,
         /// What was looked for.
         target: TargetSpec,
-        /// What was seen; `None` when the picture cannot be read.
+        /// What was seen; `None` when the image cannot be read.
         #[serde(skip)]
         observed: Option<Arc<Observed>>,
     },
-    /// The pictures of a capture were read.
+    /// The images of a capture were read.
     Review {
         /// Which capture.
         id: CaptureId,
@@ -334,7 +334,7 @@ pub enum Event {
     },
     /// Sessions that were open before.
     Recent(Vec<RecentSession>),
-    /// The board in the newest picture that was tracked.
+    /// The board in the newest image that was tracked.
     #[serde(skip)]
     Tracked(Arc<Tracked>),
     /// The board is tracked no more.

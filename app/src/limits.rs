@@ -3,8 +3,8 @@
 use handeye_core::project::taught_poses;
 use handeye_sim_link::client::MotionLimits;
 
-/// Limits of the reference tour: of every motion in the window, and of pose files without their own.
-pub const TOUR: taught_poses::MotionLimits = taught_poses::MotionLimits {
+/// Limits of the reference sequence: of every motion in the window, and of pose files without their own.
+pub const SEQUENCE: taught_poses::MotionLimits = taught_poses::MotionLimits {
     joint_velocity: 310.0 * std::f64::consts::PI / 180.0,
     joint_acceleration: 100.0 * std::f64::consts::PI / 180.0,
     joint_jerk: 80.0 * std::f64::consts::PI / 180.0,
@@ -40,7 +40,7 @@ mod tests {
 
     /// How long the cell's generator of motions takes for joint 1 to turn by an angle.
     fn duration_s(share: f64, angle_rad: f64) -> f64 {
-        let MotionLimits { velocity, acceleration, jerk } = of_joints(&TOUR, share);
+        let MotionLimits { velocity, acceleration, jerk } = of_joints(&SEQUENCE, share);
         let limits = motion::MotionLimits::uniform(1, velocity[0], acceleration[0], jerk[0]);
         let start = MotionState::at_rest(vec![0.0]);
         let motion = JointMotion::new(start, &[angle_rad], &[0.0], Some(&limits), Sync::Phase).expect("a motion");

@@ -124,7 +124,7 @@ impl DepthImage {
         Ok((ray.z > 0.0).then(|| PointIn::new((ray.into_inner() * scale).into())))
     }
 
-    /// A picture of the depths: `near_m` is the map's first colour and `far_m` its last; depths outside are clipped.
+    /// An image of the depths: `near_m` is the map's first colour and `far_m` its last; depths outside are clipped.
     /// Pixels without measurement are [`INVALID_COLOUR`] and those at the sensor's far plane `far_plane_m` are
     /// [`FAR_COLOUR`], neither of which is in any map.
     ///
@@ -135,7 +135,7 @@ impl DepthImage {
             return Err(DepthError::BadRange { what: "the colour range", low: near_m.into(), high: far_m.into() });
         }
         let table: Vec<[u8; 3]> = (0..=255).map(|i| map.colour(f64::from(i) / 255.0)).collect();
-        self.picture(|depth| match classify(depth, far_plane_m) {
+        self.image(|depth| match classify(depth, far_plane_m) {
             DepthSample::Metres(m) => {
                 // In 0 ..= 255 by the clamp.
                 table[(((m - near_m) / (far_m - near_m)).clamp(0.0, 1.0) * 255.0).round() as usize]
@@ -151,7 +151,7 @@ impl DepthImage {
     /// [`DepthError::BadRange`] for a scale that is not positive, [`DepthError::WrongLength`].
     pub fn to_rgb(&self, encoding: RgbDepth) -> Result<RgbImage, DepthError> {
         encoding.check()?;
-        self.picture(|depth| encoding.encode(depth))
+        self.image(|depth| encoding.encode(depth))
     }
 
     /// Unpacks what [`Self::to_rgb`] made. Black is [`DepthSample::Invalid`].
@@ -164,7 +164,7 @@ impl DepthImage {
         Self::new(image.width(), image.height(), metres)
     }
 
-    fn picture(&self, colour: impl Fn(f32) -> [u8; 3]) -> Result<RgbImage, DepthError> {
+    fn image(&self, colour: impl Fn(f32) -> [u8; 3]) -> Result<RgbImage, DepthError> {
         let (width, height) = (self.width, self.height);
         let need = width as usize * height as usize;
         if self.metres.len() != need {

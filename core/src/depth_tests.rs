@@ -81,7 +81,7 @@ fn the_colours_of_missing_and_far_pixels_are_in_no_map() {
 }
 
 #[test]
-fn a_picture_spans_the_range_and_marks_what_is_no_depth() {
+fn an_image_spans_the_range_and_marks_what_is_no_depth() {
     let image = row(&[0.1, 0.2, 1.85, 3.4, f32::NAN, 3.5]);
     let picture = image.colours(ColourMap::Grey, 0.2, 3.4, FAR_M).expect("a range");
     let colours: Vec<[u8; 3]> = picture.pixels().map(|p| p.0).collect();

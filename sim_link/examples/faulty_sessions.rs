@@ -1,4 +1,4 @@
-//! A session of the cell with one thing wrong, as a dataset folder without pictures:
+//! A session of the cell with one thing wrong, as a dataset folder without images:
 //! `cargo run --example faulty_sessions -- --fault joint4 --seed 7 --out DIR`.
 //!
 //! Faults are `none`, `slip`, `square`, `joint1` to `joint6`, `motion`, `inverted` and `millimetres`. With `--seeds N`

@@ -1,4 +1,4 @@
-//! Writes pictures of the cell: `cargo run --release -p handeye_sim_link --example render_views -- FOLDER`.
+//! Writes images of the cell: `cargo run --release -p handeye_sim_link --example render_views -- FOLDER`.
 
 use std::path::PathBuf;
 

@@ -4,7 +4,7 @@
     python reference_viewer.py PORT SECONDS
 
 Does what a script for CoppeliaSim does step by step, one Python float per pixel of depth included, and prints one line
-of JSON: pictures shown, seconds, and CPU seconds of this process.
+of JSON: images shown, seconds, and CPU seconds of this process.
 """
 
 import json
@@ -61,17 +61,17 @@ def main():
 
     frames, began, cpu_before = 0, time.monotonic(), cpu()
     while time.monotonic() - began < seconds:
-        picture = colour(sim, camera)
+        image = colour(sim, camera)
         metres = depth(sim, depth_camera)
         as_colours(metres)
-        shown_colour.set_data(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
+        shown_colour.set_data(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
         shown_depth.set_data(metres)
         figure.canvas.flush_events()
         plt.pause(0.01)
         frames += 1
     took = time.monotonic() - began
     assert not math.isnan(took)
-    print(json.dumps({'pictures': frames, 'seconds': took, 'cpu_seconds': cpu() - cpu_before}))
+    print(json.dumps({'images': frames, 'seconds': took, 'cpu_seconds': cpu() - cpu_before}))
 
 
 if __name__ == '__main__':

@@ -4,8 +4,8 @@
     python viewers.py HANDEYE [SECONDS]
 
 HANDEYE is the release binary. Needs Xvfb. The two run one after the other on one cell that the script starts; each is
-warmed up first. Prints pictures per second and processor time per picture of both, and their ratios. The workbench also
-looks for the board in every picture and draws its whole window; the line "same work" counts only the threads that
+warmed up first. Prints images per second and processor time per image of both, and their ratios. The workbench also
+looks for the board in every image and draws its whole window; the line "same work" counts only the threads that
 fetch, convert and draw.
 """
 
@@ -45,7 +45,7 @@ def workbench(binary, port, seconds, environment):
         window = subprocess.Popen([binary, 'gui', '--connect', f'tcp://127.0.0.1:{port}'], env=environment, stderr=log)
         try:
             time.sleep(WARM_UP)
-            count = lambda: open(log.name).read().count('picture shown')
+            count = lambda: open(log.name).read().count('image shown')
             shown, before, began = count(), processor_seconds(window.pid), time.monotonic()
             time.sleep(seconds)
             shown, after, took = count() - shown, processor_seconds(window.pid), time.monotonic() - began
@@ -54,7 +54,7 @@ def workbench(binary, port, seconds, environment):
             window.wait()
         spent = {name: after[name] - before.get(name, 0.0) for name in after}
         same = sum(value for name, value in spent.items() if SAME_WORK.match(name))
-        return {'pictures': shown, 'seconds': took, 'cpu_seconds': sum(spent.values()), 'same_work_seconds': same,
+        return {'images': shown, 'seconds': took, 'cpu_seconds': sum(spent.values()), 'same_work_seconds': same,
                 'threads': {name: round(value, 2) for name, value in sorted(spent.items()) if value > 0.05}}
 
 
@@ -75,13 +75,13 @@ def main():
     finally:
         cell.kill()
         screen.kill()
-    rate = lambda run: run['pictures'] / run['seconds']
-    cost = lambda run, key='cpu_seconds': 1e3 * run[key] / max(run['pictures'], 1)
-    print(f'{"":<28}{"pictures/s":>12}{"processor ms/picture":>24}')
+    rate = lambda run: run['images'] / run['seconds']
+    cost = lambda run, key='cpu_seconds': 1e3 * run[key] / max(run['images'], 1)
+    print(f'{"":<28}{"images/s":>12}{"processor ms/image":>24}')
     print(f'{"reference viewer":<28}{rate(reference):>12.2f}{cost(reference):>24.1f}')
     print(f'{"workbench, everything":<28}{rate(ours):>12.2f}{cost(ours):>24.1f}')
     print(f'{"workbench, same work":<28}{"":>12}{cost(ours, "same_work_seconds"):>24.1f}')
-    print(f'rate: {rate(ours) / rate(reference):.1f} times; processor time per picture: '
+    print(f'rate: {rate(ours) / rate(reference):.1f} times; processor time per image: '
           f'1/{cost(reference) / cost(ours):.1f} of it for everything, '
           f'1/{cost(reference) / cost(ours, "same_work_seconds"):.1f} for the same work')
     print('threads of the workbench, seconds:', ours['threads'])

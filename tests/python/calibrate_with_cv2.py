@@ -19,21 +19,21 @@ COLUMNS, ROWS, SQUARE_M = 10, 7, 0.015
 
 def rgb_image(sim, camera):
     data, (width, height) = sim.getVisionSensorImg(camera)
-    picture = np.frombuffer(data, np.uint8).reshape(height, width, 3)
-    return cv2.cvtColor(np.flipud(picture).copy(), cv2.COLOR_RGB2GRAY)
+    image = np.frombuffer(data, np.uint8).reshape(height, width, 3)
+    return cv2.cvtColor(np.flipud(image).copy(), cv2.COLOR_RGB2GRAY)
 
 
-def corners_in(picture):
-    found, corners = cv2.findChessboardCorners(picture, (COLUMNS, ROWS))
+def corners_in(image):
+    found, corners = cv2.findChessboardCorners(image, (COLUMNS, ROWS))
     if not found:
         return None
     criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-6)
-    corners = cv2.cornerSubPix(picture, corners, (5, 5), (-1, -1), criteria).reshape(-1, 2)
+    corners = cv2.cornerSubPix(image, corners, (5, 5), (-1, -1), criteria).reshape(-1, 2)
     # The same end of the board in every view: the square behind the first corner's diagonal neighbour is dark.
     grid = corners.reshape(ROWS, COLUMNS, 2)
     inside = grid[:2, :2].reshape(4, 2).mean(axis=0)
     beside = grid[:2, 1:3].reshape(4, 2).mean(axis=0)
-    brightness = [float(picture[int(round(p[1])), int(round(p[0]))]) for p in (inside, beside)]
+    brightness = [float(image[int(round(p[1])), int(round(p[0]))]) for p in (inside, beside)]
     return corners if brightness[0] < brightness[1] else corners[::-1].copy()
 
 
@@ -71,9 +71,9 @@ def main():
             "maxAccel": 4 * [1.0],
             "maxJerk": 4 * [1.0],
         })
-        picture = rgb_image(sim, camera)
-        size = picture.shape[::-1]
-        corners = corners_in(picture)
+        image = rgb_image(sim, camera)
+        size = image.shape[::-1]
+        corners = corners_in(image)
         if corners is None:
             raise SystemExit(f"no board at pose {pose['name']}")
         image_points.append(corners.astype(np.float32))

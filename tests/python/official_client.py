@@ -65,7 +65,7 @@ def fails(text, call, *args):
     raise AssertionError(f'no error, wanted {text!r}')
 
 
-def picture(sim, handle):
+def image(sim, handle):
     """The image as people look at it: top row first."""
     pixels, (width, height) = sim.getVisionSensorImg(handle)
     assert isinstance(pixels, bytes) and len(pixels) == width * height * 3
@@ -192,7 +192,7 @@ def test_image_is_the_projection_of_the_board(client, sim):
         for joint, angle in zip(joints, q):
             sim.setJointPosition(joint, angle)
         sim.step()
-        grey = picture(sim, camera).mean(axis=2)
+        grey = image(sim, camera).mean(axis=2)
         pixels = project(corners_in_camera(sim, truth), truth['intrinsics'])
         height, width = grey.shape
         inside = [p for p in pixels if 10 < p[0] < width - 10 and 10 < p[1] < height - 10]
@@ -226,14 +226,14 @@ def test_a_moving_board_is_where_the_moment_has_it(client, sim):
             moment = handeye.moment()
             near([moment['sim_time'], moment['joints'][0]],
                  [sim.getSimulationTime(), START[0] + 0.03 * math.sin(0.4 * number)])
-            grey = picture(sim, camera).mean(axis=2)
+            grey = image(sim, camera).mean(axis=2)
             pixels = project(corners_in_camera(sim, truth, moment), truth['intrinsics'])
             errors = np.array([refine(grey, p) - p for p in pixels])
             assert np.abs(errors).max() < 0.1, f'corners are off by up to {np.abs(errors).max():.3f} px'
     handeye.showBoard(False)
     sim.step()
     x, y = pixels.mean(axis=0).round().astype(int)
-    assert np.ptp(picture(sim, camera)[y - 20:y + 20, x - 20:x + 20]) < 60, 'no print is seen'
+    assert np.ptp(image(sim, camera)[y - 20:y + 20, x - 20:x + 20]) < 60, 'no print is seen'
     fails("missing 'path' field", handeye.moveBoard, {})
     fails('there is no path "spiral"', handeye.moveBoard, {'path': 'spiral'})
     fails('speed_m_s is 5, it must be', handeye.moveBoard, {'path': 'circle', 'speed_m_s': 5})
@@ -285,17 +285,17 @@ def test_buffers_follow_passes_and_not_calls(client, sim):
     camera, joint = sim.getObject('/UR5/3D_camera'), sim.getObject('/UR5/joint')
     sim.setStepping(True)
     sim.startSimulation()
-    background = picture(sim, camera)
+    background = image(sim, camera)
     assert (background == background[0, 0]).all(), 'before the first pass there is nothing to see'
     sim.step()
-    first = picture(sim, camera)
+    first = image(sim, camera)
     assert not (first == background).all()
     sim.setJointPosition(joint, 0.1)
-    assert (picture(sim, camera) == first).all()
+    assert (image(sim, camera) == first).all()
     sim.step()
-    assert not (picture(sim, camera) == first).all()
+    assert not (image(sim, camera) == first).all()
     sim.stopSimulation(True)
-    assert (picture(sim, camera) == background).all()
+    assert (image(sim, camera) == background).all()
     near([sim.getJointPosition(joint)], [0])
 
 

@@ -19,7 +19,7 @@ from rerun.experimental import RrdReader
 # Millionths of a metre and of a radian: what is left of a chain of three transforms in 32 bits.
 TRANSFORM_TOLERANCE = 1e-6
 PIXEL_TOLERANCE = 0.01
-# Rerun's pixel (0, 0) is the corner of the picture, ours the middle of its first pixel.
+# Rerun's pixel (0, 0) is the corner of the image, ours the middle of its first pixel.
 PIXEL_SHIFT = 0.5
 RESIDUAL_FACTOR = 50.0
 UNCERTAINTY_FACTOR = 100.0
@@ -171,7 +171,7 @@ class Check:
     def entities_and_timelines(self):
         there = self.recording.entities()
         expected = {
-            "/base", "/base/tip", CAMERA, f"{CAMERA}/lens", f"{CAMERA}/lens/picture", f"{CAMERA}/lens/depth",
+            "/base", "/base/tip", CAMERA, f"{CAMERA}/lens", f"{CAMERA}/lens/image", f"{CAMERA}/lens/depth",
             f"{CAMERA}/lens/corners", f"{CAMERA}/uncertainty_95_x100", BOARD, f"{BOARD}/outline", f"{BOARD}/corners",
             f"{BOARD}/uncertainty_95_x100", "/base/points", "/base/arm", "/truth/camera", "/truth/camera/lens",
             "/truth/board", "/truth/board/outline", "/plots/residual/fit", "/plots/expected_error", "/plots/joints",
@@ -179,7 +179,7 @@ class Check:
         }
         expected |= {f"/base/arm/link_{n}" for n in range(7)}
         expected |= {f"/base/trajectory/{which}/0" for which in ("session", "since_connect")}
-        below = ("lens", "lens/picture", "lens/corners", "lens/predicted", "lens/residuals_x50", "seen_board",
+        below = ("lens", "lens/image", "lens/corners", "lens/predicted", "lens/residuals_x50", "seen_board",
                  "predicted_board")
         for capture in self.captures:
             expected |= {self.entity(capture)} | {f"{self.entity(capture)}/{child}" for child in below}
@@ -199,14 +199,14 @@ class Check:
             first = min(at["capture"] for at, _, _ in self.recording.all(entity, "Pinhole:image_from_camera"))
             assert first == number, f"capture {capture['id']} appears at {first}, not {number}"
             colours[number] = self.recording.at(entity, "Pinhole:color", self.last)[0]
-            picture = self.recording.at(f"{entity}/picture", "EncodedImage:blob", number)[0]
-            assert bytes(picture) == (self.folder / capture["image"]).read_bytes(), f"picture of {capture['id']}"
+            image = self.recording.at(f"{entity}/image", "EncodedImage:blob", number)[0]
+            assert bytes(image) == (self.folder / capture["image"]).read_bytes(), f"image of {capture['id']}"
         residuals = [view["rms_px"] for view in self.result["views"]]
         # Red is the high byte: the view that fits worst is redder than the one that fits best.
         worst, best = np.argmax(residuals) + 1, np.argmin(residuals) + 1
         if max(residuals) > 1.05 * min(residuals):
             assert colours[worst] >> 24 > colours[best] >> 24, "colours do not follow the residuals"
-        return f"{len(frusta)} frusta with their pictures"
+        return f"{len(frusta)} frusta with their images"
 
     def transforms(self):
         close("tip_from_camera", self.recording.transform(CAMERA, self.last), of_estimate(self.result["hand_eye"]),
@@ -261,7 +261,7 @@ class Check:
         return f"residuals are those of the result to {worst:.1e} px"
 
     def seen_boards(self):
-        """Robot, camera and what the picture alone says put the board where the calibration has it, to its noise."""
+        """Robot, camera and what the image alone says put the board where the calibration has it, to its noise."""
         worst = 0.0
         centre = self.points[:, :4].mean(axis=0)
         board = self.recording.transform(BOARD, self.last) @ centre
@@ -324,8 +324,8 @@ class Check:
         for number in range(1, self.last):
             assert self.recording.at(BOARD, "Transform3D:translation", number) is None, f"a board at capture {number}"
             assert self.recording.text("/report", number) is None, f"a report at capture {number}"
-            picture = bytes(self.recording.at(f"{CAMERA}/lens/picture", "EncodedImage:blob", number)[0])
-            assert picture == (self.folder / self.captures[number - 1]["image"]).read_bytes(), f"picture at {number}"
+            image = bytes(self.recording.at(f"{CAMERA}/lens/image", "EncodedImage:blob", number)[0])
+            assert image == (self.folder / self.captures[number - 1]["image"]).read_bytes(), f"image at {number}"
             later = self.entity(self.captures[number])
             assert self.recording.at(later, "Transform3D:translation", number) is None, f"{later} at {number}"
         times = [at["sim_time"] * 1e-9 for at, _, _ in self.recording.all("/base/tip", "Transform3D:translation")

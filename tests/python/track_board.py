@@ -41,14 +41,14 @@ def main():
 
     data, (width, height) = sim.getVisionSensorImg(camera)
     colour = np.flipud(np.frombuffer(data, np.uint8).reshape(height, width, 3))
-    picture = cv2.cvtColor(colour.copy(), cv2.COLOR_RGB2GRAY)
+    image = cv2.cvtColor(colour.copy(), cv2.COLOR_RGB2GRAY)
     data, (width, height) = sim.getVisionSensorDepth(depth_camera, 1)
     depth = np.flipud(np.frombuffer(data, np.float32).reshape(height, width))
 
-    found, corners = cv2.findChessboardCorners(picture, (COLUMNS, ROWS))
-    assert found, "the board is not in the picture"
+    found, corners = cv2.findChessboardCorners(image, (COLUMNS, ROWS))
+    assert found, "the board is not in the image"
     criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-6)
-    corners = cv2.cornerSubPix(picture, corners, (5, 5), (-1, -1), criteria).reshape(-1, 2)
+    corners = cv2.cornerSubPix(image, corners, (5, 5), (-1, -1), criteria).reshape(-1, 2)
 
     u, v = corners[0]
     ray = cv2.undistortPoints(np.array([[[u, v]]]), camera_matrix, distortion).reshape(2)

@@ -24,7 +24,7 @@ impl App {
             return;
         }
         self.leave_by = Some(Instant::now() + ALL);
-        self.model.touring = false;
+        self.model.sequence_runs = false;
         // Another client's motions are none of our business.
         if self.workers.is_moving() {
             self.workers.press_stop();

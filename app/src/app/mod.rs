@@ -176,9 +176,9 @@ impl App {
             Command::ExportTaught(file) => self.export_taught(file),
             Command::GoToTaught(name) => self.go_to_taught(&name),
             Command::GoToCapture(id) => self.go_to_capture(id),
-            Command::RunTour { purpose } => self.run_tour(purpose),
+            Command::RunSequence { purpose } => self.run_sequence(purpose),
             Command::VerifyAtPlanned => self.plan_verification(),
-            Command::StopTour => self.stop_tour(),
+            Command::StopSequence => self.stop_sequence(),
 
             Command::Capture(purpose) => self.capture(purpose, None),
             Command::CancelCapture => self.cancel_capture(),

@@ -6,7 +6,7 @@ use super::*;
 use crate::gui::testing::sample;
 use crate::model::{
     CapturePurpose, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState, Motion, MotionGoal,
-    MotionOutcome, Pane, SolveStatus, StopOutcome, ThemeChoice, Tour,
+    MotionOutcome, Pane, PoseSequence, SolveStatus, StopOutcome, ThemeChoice,
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
@@ -147,7 +147,7 @@ fn commands_and_events_survive_being_written_down() {
         Command::PointAt(None),
         Command::SetTheme(ThemeChoice::Light),
         Command::Delete(vec![CaptureId(3)]),
-        Command::RunTour { purpose: Some(CapturePurpose::Verify) },
+        Command::RunSequence { purpose: Some(CapturePurpose::Verify) },
         Command::SetFollow(Some(FollowWish::KeepViewWithRoom)),
         Command::VerifyAtPlanned,
     ];
@@ -162,20 +162,21 @@ fn commands_and_events_survive_being_written_down() {
 }
 
 #[test]
-fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_tour() {
+fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_sequence() {
     let mut bench = bench(&FakeCell::new(0));
-    bench.app.model.touring = true;
+    bench.app.model.sequence_runs = true;
     let names = vec!["a".to_owned(), "b".to_owned()];
-    bench.app.model.tour = Some(Tour { names, planned: None, purpose: None, outcomes: Vec::new(), began_s: 0.0 });
+    bench.app.model.sequence =
+        Some(PoseSequence { names, planned: None, purpose: None, outcomes: Vec::new(), began_s: 0.0 });
     let id = bench.app.numbers.motion;
     bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Refused(Text::verbatim("too far")) });
-    let tour = bench.app.model().tour.clone().expect("the tour");
-    assert!(matches!(tour.outcomes.as_slice(), [StopOutcome::Skipped(_), ..]), "{tour:?}");
+    let sequence = bench.app.model().sequence.clone().expect("the sequence");
+    assert!(matches!(sequence.outcomes.as_slice(), [StopOutcome::Skipped(_), ..]), "{sequence:?}");
 
-    bench.app.model.touring = true;
+    bench.app.model.sequence_runs = true;
     let id = bench.app.numbers.motion;
     bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Stopped });
-    assert!(!bench.app.model().touring);
+    assert!(!bench.app.model().sequence_runs);
     assert_eq!(bench.app.model().motion, Motion::Idle);
 }
 
@@ -231,18 +232,18 @@ fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_lea
     bench.app.apply(Command::Stop);
     assert!(!bench.app.model().planning);
     bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
-    assert!(!bench.app.model().touring, "it was stopped");
+    assert!(!bench.app.model().sequence_runs, "it was stopped");
 
     bench.app.apply(Command::VerifyAtPlanned);
     let id = bench.app.numbers.motion;
     bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
-    let tour = bench.app.model().tour.clone().expect("a tour");
-    assert!(bench.app.model().touring && !bench.app.model().planning);
-    assert_eq!(tour.names, ["check 1", "check 2", "check 3"]);
-    assert_eq!(tour.purpose, Some(CapturePurpose::Verify));
+    let sequence = bench.app.model().sequence.clone().expect("a sequence");
+    assert!(bench.app.model().sequence_runs && !bench.app.model().planning);
+    assert_eq!(sequence.names, ["check 1", "check 2", "check 3"]);
+    assert_eq!(sequence.purpose, Some(CapturePurpose::Verify));
     assert!(matches!(bench.app.model().motion, Motion::Moving { .. }), "it is on its way to the first");
-    bench.app.apply(Command::StopTour);
-    assert!(!bench.app.model().touring);
+    bench.app.apply(Command::StopSequence);
+    assert!(!bench.app.model().sequence_runs);
 
     bench.app.apply(Command::VerifyAtPlanned);
     let id = bench.app.numbers.motion;
@@ -252,7 +253,7 @@ fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_lea
     bench.app.absorb(Event::Moved { id: other, outcome: MotionOutcome::Refused(Text::verbatim("busy")) });
     assert!(bench.app.model().planning);
     bench.app.absorb(Event::Planned { id, views: Err(Text::verbatim("the board is too far")) });
-    assert!(!bench.app.model().planning && !bench.app.model().touring);
+    assert!(!bench.app.model().planning && !bench.app.model().sequence_runs);
     assert_eq!(said(&bench.app), "There are no poses to verify at: the board is too far");
 }
 

@@ -25,28 +25,28 @@ pub struct Measured {
     pub purpose: CapturePurpose,
     /// What was looked for.
     pub target: TargetSpec,
-    /// Mean of the pictures.
+    /// Mean of the images.
     pub rgb: Arc<RgbImage>,
     /// Mean of the depths \[m\].
     pub depth: DepthImage,
-    /// The tip as the controller reported it with the last of the pictures.
+    /// The tip as the controller reported it with the last of the images.
     pub base_from_tip: Pose<Base, Tip>,
     /// The joints at the same instant \[rad\].
     pub joints_rad: JointAngles,
-    /// Simulated time of the last picture \[s\].
+    /// Simulated time of the last image \[s\].
     pub sim_time_s: f64,
-    /// How many pictures there were.
+    /// How many images there were.
     pub frames: u32,
-    /// Simulated time \[s\] until robot and picture had come to rest.
+    /// Simulated time \[s\] until robot and image had come to rest.
     pub settled_s: f64,
-    /// Standard deviation of a corner in *one* of the pictures \[px\], see [`handeye_core::capture::Scatter::sigma_px`];
-    /// `None` below three pictures in which the quick search found the board.
+    /// Standard deviation of a corner in *one* of the images \[px\], see [`handeye_core::capture::Scatter::sigma_px`];
+    /// `None` below three images in which the quick search found the board.
     pub corner_noise_px: Option<f64>,
-    /// The board's points in the mean picture.
+    /// The board's points in the mean image.
     pub corners: Vec<Corner>,
     /// Name of the pose, from the request.
     pub pose_name: Option<String>,
-    /// The mean picture, small, with nothing drawn on it.
+    /// The mean image, small, with nothing drawn on it.
     pub thumbnail: RgbImage,
 }
 

@@ -3,7 +3,7 @@
 //! | part | is |
 //! | --- | --- |
 //! | [`CaptureRequest`] | what is asked for |
-//! | [`Sequence`] | the capture under way: takes in pictures one by one and says what it waits for, until robot and image are at rest, the average is complete and the board in it is measured |
+//! | [`Sequence`] | the capture under way: takes in images one by one and says what it waits for, until robot and image are at rest, the average is complete and the board in it is measured |
 //! | [`take`] | drives a sequence for a thread that has a camera of its own and can wait for it |
 //! | [`Measured`] | a capture that is good, to be recorded in a session |
 //! | [`refusal`] | why there is none, in words |
@@ -23,7 +23,7 @@ pub(crate) mod update;
 pub use measured::{Measured, thumbnail};
 pub use request::CaptureRequest;
 pub use sequence::Sequence;
-pub use take::{CaptureEnd, Pictures, take};
+pub use take::{CaptureEnd, Images, take};
 
 #[cfg(test)]
 pub mod drawn;

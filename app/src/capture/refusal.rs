@@ -1,6 +1,6 @@
 //! Why there is no capture: what is wrong and what to do, in words.
 
-use handeye_core::capture::{EdgeBlur, NO_PICTURES_S, Refusal};
+use handeye_core::capture::{EdgeBlur, NO_IMAGES_S, Refusal};
 use handeye_core::detect::VisionError;
 use handeye_core::targets::TargetSpec;
 
@@ -11,7 +11,7 @@ use crate::text::Text;
 /// Kind and words.
 pub type Why = (RefusalKind, Text);
 
-/// Why no pictures came together.
+/// Why no images came together.
 pub fn of_machine(refusal: &Refusal) -> Why {
     match refusal {
         Refusal::RobotMoves { after_s, rate_rad_s } => {
@@ -23,9 +23,9 @@ pub fn of_machine(refusal: &Refusal) -> Why {
             );
             (RefusalKind::NotSettled, why)
         }
-        Refusal::PictureChanges { after_s } => {
+        Refusal::ImageChanges { after_s } => {
             let why = text!(
-                "The robot stands, but the picture still changes after {seconds} s: keep moving things and flickering light \
+                "The robot stands, but the image still changes after {seconds} s: keep moving things and flickering light \
                  out of view and capture again",
                 seconds = format!("{after_s:.0}")
             );
@@ -34,16 +34,16 @@ pub fn of_machine(refusal: &Refusal) -> Why {
         Refusal::Paused => {
             let why = text!(
                 "The simulation is paused: no simulated time has passed for {seconds} s. Start it and capture again",
-                seconds = NO_PICTURES_S
+                seconds = NO_IMAGES_S
             );
             (RefusalKind::NotSettled, why)
         }
-        Refusal::NoPictures => {
+        Refusal::NoImages => {
             let why = text!(
-                "No pictures have come for {seconds} s: check the connection to the camera and capture again",
-                seconds = NO_PICTURES_S
+                "No images have come for {seconds} s: check the connection to the camera and capture again",
+                seconds = NO_IMAGES_S
             );
-            (RefusalKind::NoPictures, why)
+            (RefusalKind::NoImages, why)
         }
         Refusal::TooSimilar(similar) => {
             let why = text!(
@@ -58,11 +58,11 @@ pub fn of_machine(refusal: &Refusal) -> Why {
     }
 }
 
-/// The board is not in the picture.
+/// The board is not in the image.
 pub fn no_board(target: &TargetSpec) -> Why {
     let grid = target.grid();
     let why = text!(
-        "The board was not found: bring all its {columns}×{rows} points into the picture, without reflections, and check \
+        "The board was not found: bring all its {columns}×{rows} points into the image, without reflections, and check \
          that the target is set to the board that is there",
         columns = grid.columns,
         rows = grid.rows
@@ -70,7 +70,7 @@ pub fn no_board(target: &TargetSpec) -> Why {
     (RefusalKind::NoBoard, why)
 }
 
-/// The picture could not be searched at all.
+/// The image could not be searched at all.
 pub fn not_searched(error: &VisionError) -> Why {
     (RefusalKind::NoBoard, text!("The board cannot be looked for: {why}", why = error))
 }
@@ -80,10 +80,10 @@ pub fn no_target() -> Why {
     (RefusalKind::NoBoard, text!("No board is chosen: choose the target and capture again"))
 }
 
-/// The picture is not sharp enough.
+/// The image is not sharp enough.
 pub fn blurred(blur: &EdgeBlur) -> Why {
     let why = text!(
-        "The picture is blurred: the board's edges are {edge} px wide, its squares {square} px. Focus the camera, or go \
+        "The image is blurred: the board's edges are {edge} px wide, its squares {square} px. Focus the camera, or go \
          closer if the squares are small, and capture again",
         edge = format!("{:.1}", blur.edge_width_px()),
         square = format!("{:.0}", blur.square_px)
@@ -91,7 +91,7 @@ pub fn blurred(blur: &EdgeBlur) -> Why {
     (RefusalKind::Blurred, why)
 }
 
-/// The user does not want it any more.
+/// The user no longer wants it.
 pub fn cancelled() -> Why {
     (RefusalKind::Cancelled, text!("The capture was cancelled"))
 }

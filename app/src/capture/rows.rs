@@ -15,7 +15,7 @@ use crate::scene;
 /// Cells of the image on which coverage is shown: as the findings judge it.
 pub const CELLS: (usize, usize) = (8, 6);
 
-/// What was seen in the picture of a capture.
+/// What was seen in the image of a capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Detected {
     /// It is being looked at.
@@ -24,15 +24,15 @@ pub enum Detected {
     Board,
     /// No board.
     NoBoard,
-    /// The picture cannot be read.
+    /// The image cannot be read.
     Unreadable,
 }
 
-/// A capture that the estimate set aside, because it does not fit the others.
+/// A capture that the estimate left out as an outlier, because it does not fit the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aside {
     /// How far its board is from where the others put it \[mm\] and by how much it is turned \[deg\]; `None` where its corners
-    /// are no picture of the board.
+    /// are no image of the board.
     pub board_off: Option<(f64, f64)>,
 }
 
@@ -57,11 +57,11 @@ pub struct CaptureRow {
     pub correction_deg: Option<f64>,
     /// How far the answer moves without it \[mm\].
     pub influence_mm: Option<f64>,
-    /// Noise of a corner of its picture \[px\].
+    /// Noise of a corner of its image \[px\].
     pub corner_noise_px: Option<f64>,
     /// How far it is from the others, where the estimate set it aside.
     pub aside: Option<Aside>,
-    /// How many of its corners the estimate set aside.
+    /// How many of its corners the estimate left out as an outlier.
     pub corners_aside: usize,
     /// What the calibration finds remarkable about it.
     pub found: Vec<FindingCode>,
@@ -96,7 +96,7 @@ pub struct CaptureTable {
     pub coverage: Option<Coverage>,
     /// The captures of the outlines of `coverage`, as indices into `rows`.
     pub outlined: Vec<usize>,
-    /// Width and height of the pictures \[px\].
+    /// Width and height of the images \[px\].
     pub image_size: (u32, u32),
     /// What all this was made from; kept so that it can be told from anything else.
     made_from: Sources,

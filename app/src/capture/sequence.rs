@@ -11,19 +11,19 @@ use super::refusal::{self, Why};
 use super::{CaptureRequest, Measured, thumbnail};
 use crate::model::{CaptureOptions, CaptureWait, FrameInfo, LiveFrame};
 
-/// The capture that is under way: takes in pictures one by one, from the request on, and says what it waits for. Never
+/// The capture that is under way: takes in images one by one, from the request on, and says what it waits for. Never
 /// waits itself.
 #[derive(Debug)]
 pub struct Sequence {
     request: CaptureRequest,
     target: TargetSpec,
     machine: Machine,
-    /// What belongs to the last picture that was taken in.
+    /// What belongs to the last image that was taken in.
     last: Option<FrameInfo>,
 }
 
 impl Sequence {
-    /// A request at a time on the clock that pictures arrive by, for the board that is looked for.
+    /// A request at a time on the clock that images arrive by, for the board that is looked for.
     pub fn new(request: CaptureRequest, target: TargetSpec, now_s: f64) -> Self {
         let CaptureOptions { frames, least_distance_m, least_angle_rad, settle_limit_s } = request.options;
         let others = request.others.clone();
@@ -36,7 +36,7 @@ impl Sequence {
         self.request.number
     }
 
-    /// Takes in a picture; whether it was the last that is needed.
+    /// Takes in an image; whether it was the last that is needed.
     pub fn see(&mut self, frame: &LiveFrame, grey: &GrayImage) -> bool {
         let LiveFrame { info, images } = frame;
         let shot = Shot {
@@ -65,10 +65,10 @@ impl Sequence {
     /// the image belongs to the average.
     pub fn compares_corners(&self) -> bool {
         let averages = matches!(self.machine.progress(), Progress::Waits(Wait::Averaging { .. }) | Progress::Complete);
-        averages && self.request.options.frames >= capture::Scatter::LEAST_PICTURES
+        averages && self.request.options.frames >= capture::Scatter::LEAST_IMAGES
     }
 
-    /// Tells where the board was in the last picture that was taken in.
+    /// Tells where the board was in the last image that was taken in.
     pub fn saw_board(&mut self, number: u64, corners: &[Corner]) {
         self.machine.saw_board(number, corners);
     }
@@ -81,7 +81,7 @@ impl Sequence {
     /// What it waits for, or why it has ended.
     pub fn state(&self) -> Result<CaptureWait, Why> {
         match self.machine.progress() {
-            Progress::Waits(wait) => Ok(CaptureWait::Pictures(wait)),
+            Progress::Waits(wait) => Ok(CaptureWait::Images(wait)),
             Progress::Complete => Ok(CaptureWait::Measuring),
             Progress::Refused(why) => Err(refusal::of_machine(&why)),
         }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
 
-/// The board in the newest picture that was searched.
+/// The board in the newest image that was searched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveDetection {
     /// Which frame.
@@ -21,7 +21,7 @@ pub struct LiveDetection {
     pub base_from_tip: Pose<Base, Tip>,
     /// How long the search took \[s\].
     pub took_s: f64,
-    /// Why the picture could not be searched at all, which is another thing than a board that is not in it.
+    /// Why the image could not be searched at all, which is another thing than a board that is not in it.
     pub problem: Option<VisionError>,
     /// Frames so far that were never searched, because newer ones came first.
     pub dropped: u64,
@@ -41,7 +41,7 @@ pub enum CapturePurpose {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CaptureOptions {
-    /// Pictures that are averaged.
+    /// Images that are averaged.
     pub frames: u32,
     /// Captures closer than this to an earlier one in both distance \[m\] and angle are refused.
     pub least_distance_m: f64,
@@ -60,8 +60,8 @@ impl Default for CaptureOptions {
 /// Why a capture is not there yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CaptureWait {
-    /// More pictures are needed.
-    Pictures(Wait),
+    /// More images are needed.
+    Images(Wait),
     /// The board is looked for and measured.
     Measuring,
     /// It is being written to the disk.
@@ -97,14 +97,14 @@ pub struct CaptureRefused {
 pub enum RefusalKind {
     /// The board was not found.
     NoBoard,
-    /// Robot or picture did not come to rest.
+    /// Robot or image did not come to rest.
     NotSettled,
-    /// The picture is blurred.
+    /// The image is blurred.
     Blurred,
     /// There is a capture from almost the same pose.
     TooSimilar,
-    /// No pictures come.
-    NoPictures,
+    /// No images come.
+    NoImages,
     /// It was cancelled.
     Cancelled,
     /// The disk did not take it.
@@ -112,11 +112,11 @@ pub enum RefusalKind {
 }
 
 impl RefusalKind {
-    /// Whether other poses may give a capture all the same: then a tour leaves this one out and goes on.
+    /// Whether other poses may give a capture all the same: then a sequence leaves this one out and goes on.
     pub fn concerns_the_pose(self) -> bool {
         match self {
             Self::NoBoard | Self::NotSettled | Self::Blurred | Self::TooSimilar => true,
-            Self::NoPictures | Self::Cancelled | Self::NotSaved => false,
+            Self::NoImages | Self::Cancelled | Self::NotSaved => false,
         }
     }
 }

@@ -7,15 +7,15 @@ use handeye_core::targets::TargetSpec;
 use super::{CaptureRequest, Measured, Sequence};
 use crate::model::{CaptureRefused, LiveFrame};
 
-/// Where the pictures of a capture come from.
-pub trait Pictures {
+/// Where the images of a capture come from.
+pub trait Images {
     /// Why there are none.
     type Error;
 
-    /// The clock that pictures arrive by \[s\].
+    /// The clock that images arrive by \[s\].
     fn now_s(&self) -> f64;
 
-    /// Waits for the pictures of a later instant than those before. Gives those of the same instant again where simulated
+    /// Waits for the images of a later instant than those before. Gives those of the same instant again where simulated
     /// time stands still, so that it is noticed.
     ///
     /// # Errors
@@ -26,28 +26,24 @@ pub trait Pictures {
 /// What came of a capture.
 #[derive(Debug)]
 pub enum CaptureEnd {
-    /// It is good; with the last of its pictures.
+    /// It is good; with the last of its images.
     Good(Box<Measured>, LiveFrame),
     /// There is none.
     Refused(CaptureRefused),
 }
 
-/// Takes a capture. Ends, whatever the pictures are: see [`handeye_core::capture::Machine`].
+/// Takes a capture. Ends, whatever the images are: see [`handeye_core::capture::Machine`].
 ///
 /// # Errors
-/// Those of the pictures.
-pub fn take<P: Pictures>(
-    request: CaptureRequest,
-    target: &TargetSpec,
-    pictures: &mut P,
-) -> Result<CaptureEnd, P::Error> {
-    let mut sequence = Sequence::new(request, *target, pictures.now_s());
+/// Those of the images.
+pub fn take<P: Images>(request: CaptureRequest, target: &TargetSpec, images: &mut P) -> Result<CaptureEnd, P::Error> {
+    let mut sequence = Sequence::new(request, *target, images.now_s());
     loop {
-        let frame = pictures.next()?;
+        let frame = images.next()?;
         let (number, received_s) = (frame.info.number, frame.info.received_s);
         let grey = gray_from_rgb(&frame.images.rgb);
         sequence.see(&frame, &grey);
-        // A picture in which the quick search does not find the board tells nothing of its corners; whether it is there is
+        // An image in which the quick search does not find the board tells nothing of its corners; whether it is there is
         // decided in the average.
         if sequence.compares_corners()
             && let Ok(Some(corners)) = detect_with(&grey, target, DetectOptions::live())

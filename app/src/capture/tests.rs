@@ -1,4 +1,4 @@
-//! The blocking way through a capture, with pictures that a test makes up.
+//! The blocking way through a capture, with images that a test makes up.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -8,11 +8,11 @@ use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 
 use super::drawn::{BOARD, board, brighter_board};
-use super::{CaptureEnd, CaptureRequest, Pictures, take};
+use super::{CaptureEnd, CaptureRequest, Images, take};
 use crate::model::{CaptureOptions, CapturePurpose, FrameImages, FrameInfo, LiveFrame, RefusalKind};
 use crate::text::Language;
 
-/// One picture after the other, a pass apart.
+/// One image after the other, a pass apart.
 struct Reel<F> {
     rgb: F,
     number: u64,
@@ -26,7 +26,7 @@ impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Reel<F> {
     }
 }
 
-impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Pictures for Reel<F> {
+impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Images for Reel<F> {
     type Error = &'static str;
 
     fn now_s(&self) -> f64 {
@@ -66,19 +66,19 @@ fn request(frames: u32) -> CaptureRequest {
 }
 
 fn refused(end: Result<CaptureEnd, &'static str>) -> (RefusalKind, String) {
-    match end.expect("pictures came") {
+    match end.expect("images came") {
         CaptureEnd::Refused(refused) => (refused.kind, refused.why.say(Language::English)),
         CaptureEnd::Good(measured, _) => panic!("{measured:?}"),
     }
 }
 
 #[test]
-fn four_pictures_show_that_everything_is_at_rest_and_the_next_ones_are_averaged() {
+fn four_images_show_that_everything_is_at_rest_and_the_next_ones_are_averaged() {
     let mut reel = Reel::new(|number| Ok(brighter_board(1, number as f64)));
-    let CaptureEnd::Good(measured, last) = take(request(3), &BOARD, &mut reel).expect("pictures") else {
+    let CaptureEnd::Good(measured, last) = take(request(3), &BOARD, &mut reel).expect("images") else {
         panic!("a capture")
     };
-    assert_eq!((measured.frames, reel.number, last.info.number), (3, 6, 6), "pictures 4, 5 and 6");
+    assert_eq!((measured.frames, reel.number, last.info.number), (3, 6, 6), "images 4, 5 and 6");
     assert_eq!(*measured.rgb, brighter_board(1, 5.0), "their mean");
     assert_eq!(measured.sim_time_s, last.info.sim_time_s);
     // Three intervals, whose sum is rounded.
@@ -118,12 +118,12 @@ fn a_simulation_without_time_ends_the_capture() {
         let (kind, why) = refused(take(request(1), &BOARD, &mut reel));
         assert_eq!(kind, RefusalKind::NotSettled);
         assert!(why.contains("paused"), "{why}");
-        assert!(reel.number < 40, "{} pictures in {} s", reel.number, reel.now_s.get() - 100.0);
+        assert!(reel.number < 40, "{} images in {} s", reel.number, reel.now_s.get() - 100.0);
     }
 }
 
 #[test]
 fn the_error_of_a_camera_ends_the_capture() {
     let end = take(request(1), &BOARD, &mut Reel::new(|number| if number < 3 { Ok(board(0)) } else { Err("gone") }));
-    assert_eq!(end.expect_err("no third picture"), "gone");
+    assert_eq!(end.expect_err("no third image"), "gone");
 }

@@ -10,7 +10,7 @@ use crate::text;
 use crate::worker::VisionTask;
 
 impl App {
-    /// Takes a capture as soon as robot and picture have settled.
+    /// Takes a capture as soon as robot and image have settled.
     pub(crate) fn capture(&mut self, purpose: CapturePurpose, pose_name: Option<String>) {
         if self.model.capture.is_some() {
             // Pressing twice must not take two.
@@ -24,7 +24,7 @@ impl App {
         if asked.is_ok() {
             let since_s = self.model.now_s;
             self.model.capture =
-                Some(CaptureUnderWay { number, purpose, wait: CaptureWait::Pictures(Wait::ForPicture), since_s });
+                Some(CaptureUnderWay { number, purpose, wait: CaptureWait::Images(Wait::ForImage), since_s });
             self.model.refused = None;
         }
         self.expect(text!("There is no capture"), asked);
@@ -50,7 +50,7 @@ impl App {
         self.model.capture = None;
         let said = text!("No capture: {why}", why = refused.why.clone());
         self.say_in(Pane::Colour, Severity::Warning, said);
-        self.tour_refused(&refused);
+        self.sequence_refused(&refused);
         self.model.refused = Some(refused);
     }
 
@@ -72,6 +72,6 @@ impl App {
             (None, _) => text!("Capture {id} is kept", id = id),
         };
         self.say(Severity::Info, text);
-        self.tour_captured();
+        self.sequence_captured();
     }
 }

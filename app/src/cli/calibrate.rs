@@ -24,7 +24,7 @@ pub struct CalibrateArgs {
     /// Write the result and its exports into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Keep views and corners that do not fit the others; without it they are set aside and named.
+    /// Keep views and corners that do not fit the others; without it they are left out as outliers and named.
     #[arg(long)]
     keep_outliers: bool,
     /// Estimate the true size of the target, which the robot's translations tell.

@@ -38,7 +38,7 @@ pub struct CellArgs {
     /// Largest angle in degrees by which the board is turned on its way; as the scene says if not given.
     #[arg(long, value_name = "ANGLE")]
     board_tilt: Option<f64>,
-    /// Simulated time from picture to picture in s; as the scene says if not given.
+    /// Simulated time from image to image in s; as the scene says if not given.
     #[arg(long, value_name = "SECONDS")]
     time_step: Option<f64>,
 }

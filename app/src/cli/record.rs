@@ -19,7 +19,7 @@ pub fn cell(recorder: &Recorder, arm: &mut Arm, truth: &GroundTruth) -> Result<(
     Ok(())
 }
 
-/// A capture: the robot, the last of its pictures, and the session with it.
+/// A capture: the robot, the last of its images, and the session with it.
 pub fn capture(recorder: &Recorder, last: LiveFrame, session: &Store) {
     if recorder.is_on() {
         note(recorder, last);
@@ -27,8 +27,8 @@ pub fn capture(recorder: &Recorder, last: LiveFrame, session: &Store) {
     }
 }
 
-/// The robot and the picture.
-pub fn picture(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame) {
+/// The robot and the image.
+pub fn image(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame) {
     // There is no clock of a window here.
     let received_s = frame.sim_time_s;
     note(recorder, live_frame(info, number, received_s, frame));
@@ -37,10 +37,10 @@ pub fn picture(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame) 
 fn note(recorder: &Recorder, LiveFrame { info, images }: LiveFrame) {
     let FrameInfo { sim_time_s, base_from_tip, joints_rad, .. } = info;
     recorder.note(Entry::Robot { sim_time_s, base_from_tip, joints_rad });
-    recorder.note(Entry::Picture { info, images });
+    recorder.note(Entry::Image { info, images });
 }
 
-/// Pictures as the window has them, without colours of depths: those are the window's, and a viewer has its own.
+/// Images as the window has them, without colours of depths: those are the window's, and a viewer has its own.
 pub fn live_frame(info: &CellInfo, number: u64, received_s: f64, frame: Frame) -> LiveFrame {
     let Frame { rgb, depth, sim_time_s, image_age_s, base_from_tip, joints, base_from_target_true } = frame;
     let depth_range_m = [info.depth_optics.near_m as f32, info.depth_optics.far_m as f32];

@@ -13,7 +13,7 @@ pub const ADDRESSES: usize = 8;
 impl App {
     pub(crate) fn stop(&mut self) {
         self.workers.press_stop();
-        self.model.touring = false;
+        self.model.sequence_runs = false;
         self.model.planning = false;
         self.cancel_capture();
         self.model.stop_pending = true;
@@ -58,7 +58,7 @@ impl App {
         self.model.frame = None;
         self.model.cell = None;
         self.model.detection = None;
-        self.model.touring = false;
+        self.model.sequence_runs = false;
         self.model.planning = false;
         self.model.motion = Motion::Idle;
         let first = LinkState::first(&source);
@@ -122,7 +122,7 @@ impl App {
                 let text = match link {
                     Link::Control => text!("Robot connection lost: {why}", why = why),
                     Link::Camera => text!("Camera connection lost: {why}", why = why),
-                    // Pictures and joints go on, so no strip reports it.
+                    // Images and joints go on, so no strip reports it.
                     Link::Motion => {
                         let said = text!("Connection for motions lost: {why}", why = why);
                         return self.say(Severity::Warning, said);

@@ -42,11 +42,11 @@ impl Arrival {
     /// The step whose pane comes to the front now, if one does.
     pub fn look(&mut self, model: &Model, busy: Busy) -> Option<Step> {
         let is_new = !self.waits.as_ref().is_some_and(|waits| waits.under_way);
-        if model.touring && is_new {
+        if model.sequence_runs && is_new {
             self.waits = step_of(model).map(|step| Waits { step, under_way: true, chosen: false });
         }
         let waits = self.waits.as_mut()?;
-        if model.touring {
+        if model.sequence_runs {
             return None;
         }
         if std::mem::take(&mut waits.under_way) && !is_complete(model) {
@@ -67,9 +67,9 @@ impl Arrival {
     }
 }
 
-/// What the tour leads to.
+/// What the sequence leads to.
 fn step_of(model: &Model) -> Option<Step> {
-    Some(match model.tour.as_ref()?.purpose? {
+    Some(match model.sequence.as_ref()?.purpose? {
         CapturePurpose::Calibrate => Step::Solve,
         CapturePurpose::Verify => Step::Verify,
     })
@@ -77,7 +77,7 @@ fn step_of(model: &Model) -> Option<Step> {
 
 /// Whether every pose was visited.
 fn is_complete(model: &Model) -> bool {
-    model.tour.as_ref().is_some_and(|tour| tour.current().is_none())
+    model.sequence.as_ref().is_some_and(|sequence| sequence.current().is_none())
 }
 
 /// Whether the answer is there, and counts the last captures.

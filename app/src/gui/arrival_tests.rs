@@ -5,18 +5,18 @@ use egui_kittest::kittest::Queryable as _;
 use super::*;
 use crate::gui::testing::Silent;
 use crate::gui::testing::sample;
-use crate::model::{CellSource, Pane, Solved, StopOutcome, Tour};
+use crate::model::{CellSource, Pane, PoseSequence, Solved, StopOutcome};
 
 /// With a sequence under way that has `done` of its ten poses.
-fn touring(mut model: Model, purpose: CapturePurpose, done: usize) -> Model {
-    model.tour = Some(Tour {
+fn sequence_runs(mut model: Model, purpose: CapturePurpose, done: usize) -> Model {
+    model.sequence = Some(PoseSequence {
         names: (1..=10).map(|number| format!("pose {number}")).collect(),
         planned: None,
         purpose: Some(purpose),
         outcomes: vec![StopOutcome::Done; done],
         began_s: 90.0,
     });
-    model.touring = done < 10;
+    model.sequence_runs = done < 10;
     model
 }
 
@@ -24,7 +24,7 @@ fn touring(mut model: Model, purpose: CapturePurpose, done: usize) -> Model {
 fn under_way(purpose: CapturePurpose) -> Silent {
     let mut silent = Silent::new(CellSource::BuiltIn);
     silent.show(Pane::Taught);
-    silent.show_model(touring(sample::captured(), purpose, 9));
+    silent.show_model(sequence_runs(sample::captured(), purpose, 9));
     silent
 }
 
@@ -37,9 +37,9 @@ fn when_a_sequence_has_ended_and_the_answer_is_there_its_pane_comes_to_the_front
     for (purpose, pane) in [(CapturePurpose::Calibrate, Pane::Result), (CapturePurpose::Verify, Pane::Verify)] {
         let mut silent = under_way(purpose);
         assert!(is_in_front(&mut silent, Pane::Taught), "not before it has ended");
-        silent.show_model(touring(sample::captured(), purpose, 10));
+        silent.show_model(sequence_runs(sample::captured(), purpose, 10));
         assert!(is_in_front(&mut silent, Pane::Taught), "not before the answer is there");
-        silent.show_model(touring(sample::solved(), purpose, 10));
+        silent.show_model(sequence_runs(sample::solved(), purpose, 10));
         assert!(is_in_front(&mut silent, pane), "{pane:?}");
         assert!(is_in_front(&mut silent, Pane::Poses), "and nothing else moves");
         // Once.
@@ -52,7 +52,7 @@ fn when_a_sequence_has_ended_and_the_answer_is_there_its_pane_comes_to_the_front
 #[test]
 fn an_answer_without_the_last_captures_is_not_the_one_that_is_waited_for() {
     let mut silent = under_way(CapturePurpose::Calibrate);
-    let mut model = touring(sample::solved(), CapturePurpose::Calibrate, 10);
+    let mut model = sequence_runs(sample::solved(), CapturePurpose::Calibrate, 10);
     let mut early = Solved::clone(model.solve.current().expect("solved"));
     early.captures.pop();
     model.solve.solved = Some(Arc::new(early));
@@ -64,12 +64,12 @@ fn an_answer_without_the_last_captures_is_not_the_one_that_is_waited_for() {
 fn a_tab_that_was_chosen_since_the_sequence_began_stays_in_front() {
     let mut silent = under_way(CapturePurpose::Calibrate);
     silent.click("Jog");
-    silent.show_model(touring(sample::solved(), CapturePurpose::Calibrate, 10));
+    silent.show_model(sequence_runs(sample::solved(), CapturePurpose::Calibrate, 10));
     assert!(is_in_front(&mut silent, Pane::Jog));
     // Also by a key, and also another one than that which would be covered.
     let mut silent = under_way(CapturePurpose::Calibrate);
     silent.press(egui::Modifiers::NONE, egui::Key::Num6);
-    silent.show_model(touring(sample::solved(), CapturePurpose::Calibrate, 10));
+    silent.show_model(sequence_runs(sample::solved(), CapturePurpose::Calibrate, 10));
     assert!(is_in_front(&mut silent, Pane::Export));
 }
 
@@ -79,7 +79,7 @@ fn a_field_that_is_typed_into_stays_in_front_and_nothing_comes_later() {
     silent.harness.get_by_label("Name of the new pose").focus();
     silent.steps();
     assert!(silent.harness.ctx.text_edit_focused());
-    silent.show_model(touring(sample::solved(), CapturePurpose::Calibrate, 10));
+    silent.show_model(sequence_runs(sample::solved(), CapturePurpose::Calibrate, 10));
     assert!(is_in_front(&mut silent, Pane::Taught));
     silent.harness.ctx.memory_mut(egui::Memory::stop_text_input);
     silent.steps();
@@ -89,8 +89,8 @@ fn a_field_that_is_typed_into_stays_in_front_and_nothing_comes_later() {
 #[test]
 fn a_sequence_that_was_stopped_shows_nothing() {
     let mut silent = under_way(CapturePurpose::Calibrate);
-    let mut model = touring(sample::solved(), CapturePurpose::Calibrate, 9);
-    model.touring = false;
+    let mut model = sequence_runs(sample::solved(), CapturePurpose::Calibrate, 9);
+    model.sequence_runs = false;
     silent.show_model(model);
     assert!(is_in_front(&mut silent, Pane::Taught));
 }
@@ -99,8 +99,8 @@ fn a_sequence_that_was_stopped_shows_nothing() {
 fn while_a_button_of_the_pointer_is_down_it_waits_for_its_release() {
     let mut arrival = Arrival::default();
     let busy = |pointing| Busy { elsewhere: false, pointing };
-    assert_eq!(arrival.look(&touring(sample::captured(), CapturePurpose::Calibrate, 9), busy(false)), None);
-    let solved = touring(sample::solved(), CapturePurpose::Calibrate, 10);
+    assert_eq!(arrival.look(&sequence_runs(sample::captured(), CapturePurpose::Calibrate, 9), busy(false)), None);
+    let solved = sequence_runs(sample::solved(), CapturePurpose::Calibrate, 10);
     assert_eq!(arrival.look(&solved, busy(true)), None);
     assert_eq!(arrival.look(&solved, busy(false)), Some(Step::Solve));
     assert_eq!(arrival.look(&solved, busy(false)), None);

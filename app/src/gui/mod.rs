@@ -39,7 +39,7 @@ use signals::Signals;
 use window::Remembered;
 pub use window::Window;
 
-/// What the workers report within this time is drawn at once: a picture and the board in it, the robot's state.
+/// What the workers report within this time is drawn at once: an image and the board in it, the robot's state.
 const GATHER: Duration = Duration::from_millis(20);
 
 /// Opens the window and returns when it is closed, by a person or by a signal that asks for the end.

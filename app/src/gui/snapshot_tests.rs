@@ -1,8 +1,8 @@
-//! Pictures of the whole window in its main states, compared with those in `tests/snapshots`.
+//! Images of the whole window in its main states, compared with those in `tests/snapshots`.
 //!
 //! They are drawn on the processor, by Mesa's llvmpipe through Vulkan, so that every machine draws the same. How much may
 //! differ stands in `kittest.toml`. After a change that is meant: `UPDATE_SNAPSHOTS=1 ./test -p handeye_app --lib
-//! snapshot`, and look at each picture before it is committed.
+//! snapshot`, and look at each image before it is committed.
 
 use std::sync::Arc;
 
@@ -62,7 +62,7 @@ impl State {
     }
 }
 
-/// Draws it and compares it with the picture of that name.
+/// Draws it and compares it with the image of that name.
 fn looks_like(name: &str, theme: ThemeChoice, language: Language, state: State) {
     let renderer = match renderer() {
         Ok(renderer) => renderer,
@@ -104,7 +104,7 @@ fn searching() -> Model {
     model
 }
 
-/// Solved, and then the cable was pulled: the pictures are as old as the loss.
+/// Solved, and then the cable was pulled: the images are as old as the loss.
 fn lost() -> Model {
     let since_s = 88.0;
     let lost = LinkState::Lost { since_s, why: "the cell closed the connection".to_owned(), attempt: 2 };
@@ -129,7 +129,7 @@ fn snapshot_of_the_start_without_a_connection() {
 }
 
 #[test]
-fn snapshot_of_live_pictures_with_nothing_captured() {
+fn snapshot_of_live_images_with_nothing_captured() {
     looks_like("live_dark_en", DARK, ENGLISH, State::new(sample::connected()).at(Step::Target));
 }
 

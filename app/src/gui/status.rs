@@ -5,7 +5,7 @@ use crate::model::{CellSource, Link, LinkState, Model, Simulation};
 use crate::text;
 use crate::text::Text;
 
-/// Old enough \[s\] to say so: a picture that should come many times a second.
+/// Old enough \[s\] to say so: an image that should come many times a second.
 pub const STALE_AFTER_S: f64 = 1.0;
 
 /// A state for the user.
@@ -44,7 +44,7 @@ pub fn connection(model: &Model) -> Status {
     of_link(model, model.link(worse), half)
 }
 
-/// What the pictures need, when they are not live: a connection, or a simulation that runs.
+/// What the images need, when they are not live: a connection, or a simulation that runs.
 pub fn hindrance(model: &Model) -> Option<Status> {
     let connection = connection(model);
     if connection.tone != Tone::Good {
@@ -52,20 +52,20 @@ pub fn hindrance(model: &Model) -> Option<Status> {
     }
     let (title, detail) = match model.resting_simulation()? {
         Simulation::Paused => {
-            (text!("The simulation is paused"), text!("Pictures and joints stand still until it goes on."))
+            (text!("The simulation is paused"), text!("Images and joints stand still until it goes on."))
         }
         Simulation::Stopped | Simulation::Running => {
-            (text!("The simulation is stopped"), text!("Pictures are renewed only while it runs."))
+            (text!("The simulation is stopped"), text!("Images are renewed only while it runs."))
         }
     };
     Some(Status { tone: Tone::Warning, title, detail, action: Some(Action::StartSimulation) })
 }
 
-/// What is between the start and the first picture.
-pub fn before_first_picture(model: &Model) -> Status {
+/// What is between the start and the first image.
+pub fn before_first_image(model: &Model) -> Status {
     hindrance(model).unwrap_or_else(|| Status {
         tone: Tone::Busy,
-        title: text!("Waiting for the first picture…"),
+        title: text!("Waiting for the first image…"),
         detail: text!("The cell is connected; its camera delivers within a moment."),
         action: None,
     })

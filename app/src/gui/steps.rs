@@ -38,9 +38,9 @@ pub struct Facts {
     pub connected: bool,
     /// A connection was there and is gone.
     pub lost: bool,
-    /// A picture has come.
+    /// An image has come.
     pub frame_seen: bool,
-    /// The board was found in the newest picture, or in a capture.
+    /// The board was found in the newest image, or in a capture.
     pub board_seen: bool,
     /// Captures that enter the fit.
     pub captures_in_use: usize,
@@ -118,7 +118,7 @@ pub fn next(steps: &[StepStatus]) -> Option<Step> {
 fn connect(facts: &Facts) -> (StepState, Text) {
     match (facts.connected, facts.frame_seen) {
         (true, true) => (StepState::Done, text!("Robot and camera")),
-        (true, false) => (StepState::Now, text!("No picture yet")),
+        (true, false) => (StepState::Now, text!("No image yet")),
         (false, _) if facts.lost => (StepState::Now, text!("Connection lost")),
         (false, _) => (StepState::Now, text!("No connection")),
     }
@@ -130,7 +130,7 @@ fn target(facts: &Facts) -> (StepState, Text) {
     } else if facts.frame_seen {
         (StepState::Now, text!("Board not seen yet"))
     } else {
-        (StepState::Blocked, text!("Needs a picture"))
+        (StepState::Blocked, text!("Needs an image"))
     }
 }
 

@@ -21,7 +21,7 @@ fn every_state_of_the_connection_says_what_goes_on() {
     assert!(built_in.sees("No scene."));
     built_in.links(&connected());
     assert!(built_in.sees("Connected to the built-in cell"));
-    assert!(built_in.sees("Waiting for the first picture…"));
+    assert!(built_in.sees("Waiting for the first image…"));
 
     let mut remote = Silent::new(CellSource::Address("tcp://sim:23000".to_owned()));
     let why = Some("nothing answers".to_owned());
@@ -31,14 +31,14 @@ fn every_state_of_the_connection_says_what_goes_on() {
 }
 
 #[test]
-fn a_lost_connection_says_since_when_and_why_and_keeps_the_last_picture() {
+fn a_lost_connection_says_since_when_and_why_and_keeps_the_last_image() {
     let mut silent = Silent::live();
     let why = "the cable is out".to_owned();
     let lost = LinkState::Lost { since_s: 88.0, why: why.clone(), attempt: 0 };
     silent.absorb(Event::Link { link: Link::Camera, state: lost });
     assert!(silent.sees("Camera connection lost 12 s ago"));
     assert!(silent.sees("The cable is out."));
-    assert!(silent.harness.query_by_label("Colour picture").is_some());
+    assert!(silent.harness.query_by_label("Colour image").is_some());
     let retrying = LinkState::Retrying { since_s: 88.0, why: why.clone(), attempt: 2 };
     silent.absorb(Event::Link { link: Link::Camera, state: retrying });
     assert!(silent.sees("retrying"));
@@ -48,14 +48,14 @@ fn a_lost_connection_says_since_when_and_why_and_keeps_the_last_picture() {
 }
 
 #[test]
-fn the_pixel_under_the_pointer_is_read_from_both_pictures() {
-    for name in ["Colour picture", "Depth picture"] {
+fn the_pixel_under_the_pointer_is_read_from_both_images() {
+    for name in ["Colour image", "Depth image"] {
         let mut silent = Silent::live();
-        assert!(silent.sees("Point at a picture"));
+        assert!(silent.sees("Point at an image"));
         // In the middle of pixel (20, 30): a swap of the axes or an offset of half a pixel shows.
-        let picture = silent.harness.get_by_label(name).rect();
+        let image = silent.harness.get_by_label(name).rect();
         let part = vec2(20.5 / 64.0, 30.5 / 48.0);
-        silent.harness.hover_at(picture.min + part * picture.size());
+        silent.harness.hover_at(image.min + part * image.size());
         silent.steps();
         let point = silent.app().model().cursor.expect("a pixel is pointed at");
         assert_eq!(point, ImagePoint { column: 20, row: 30 });
@@ -132,7 +132,7 @@ fn a_simulation_that_rests_can_be_started() {
 }
 
 #[test]
-fn a_picture_is_uploaded_once_however_often_the_window_is_drawn() {
+fn an_image_is_uploaded_once_however_often_the_window_is_drawn() {
     let mut silent = Silent::live();
     silent.harness.run_steps(10);
     assert_eq!(silent.harness.state().uploads(), 1);
@@ -141,13 +141,13 @@ fn a_picture_is_uploaded_once_however_often_the_window_is_drawn() {
 }
 
 #[test]
-fn pictures_that_no_longer_come_are_not_counted_as_a_frame_rate() {
+fn images_that_no_longer_come_are_not_counted_as_a_frame_rate() {
     let mut silent = Silent::live();
     assert!(silent.sees("20 fps"));
     let Event::Frame { mut info, dropped, images } = frame(2) else { unreachable!() };
     info.received_s = 95.0;
     silent.absorb(Event::Frame { info, dropped, images });
-    assert!(silent.sees("no new pictures"));
+    assert!(silent.sees("no new images"));
     assert!(silent.sees("Image age: 5.0 s"));
 }
 
@@ -162,10 +162,8 @@ fn nothing_is_cut_off_at_the_smallest_size() {
         silent.command(Command::SetLanguage(language));
         silent.command(Command::SetRotationFormat(RotationFormat::Quaternion));
         let tr = |english| crate::text::Catalogue::translation(language, english).unwrap_or(english).to_owned();
-        let mut labels: Vec<_> = ["STOP", "Menu", "Undo", "Redo", "Full range", "Colour picture", "Depth picture"]
-            .into_iter()
-            .map(tr)
-            .collect();
+        let mut labels: Vec<_> =
+            ["STOP", "Menu", "Undo", "Redo", "Full range", "Colour image", "Depth image"].into_iter().map(tr).collect();
         labels.push(format!("{}: 7", tr("Dropped")));
         labels.extend(Pane::ALL.map(|pane| shell::title(pane, language).to_owned()));
         for label in labels {
@@ -407,7 +405,7 @@ fn why_there_is_no_capture_is_on_the_screen_once_and_the_table_keeps_it() {
     model.refused = Some(crate::model::CaptureRefused { kind, why, at_s });
     silent.show_model(model.clone());
     let count = |silent: &Silent| silent.harness.query_all_by_label_contains("the board is not in view").count();
-    assert_eq!(count(&silent), 1, "over the picture");
+    assert_eq!(count(&silent), 1, "over the image");
     if let Some(refused) = &mut model.refused {
         refused.at_s = at_s - 60.0;
     }

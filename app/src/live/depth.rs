@@ -1,4 +1,4 @@
-//! Which depths the colours of a live depth picture cover. Runs on the camera worker.
+//! Which depths the colours of a live depth image cover. Runs on the camera worker.
 
 use handeye_core::depth::{DepthImage, DepthSample};
 
@@ -18,10 +18,10 @@ const RANGE_MARGIN: f32 = 0.08;
 /// The shortest range [m]: a flat wall is not stretched over the whole map.
 const SHORTEST_RANGE_M: f32 = 0.10;
 
-/// A range that covers the picture may be so many times as long as it needs to be before it is made shorter.
+/// A range that covers the image may be so many times as long as it needs to be before it is made shorter.
 const LARGEST_EXCESS: f32 = 1.5;
 
-/// The depths \[m\] that a picture has, rounded outwards. `previous` is kept while it still fits, because a colour map
+/// The depths \[m\] that an image has, rounded outwards. `previous` is kept while it still fits, because a colour map
 /// that changes with every frame cannot be read. `None` when there is nothing to see and there was no range.
 pub fn range_of(depth: &DepthImage, far_plane_m: f32, previous: Option<[f32; 2]>) -> Option<[f32; 2]> {
     let mut seen: Vec<f32> = samples(depth, far_plane_m).collect();
@@ -63,12 +63,12 @@ fn still_fits(previous: [f32; 2], range: [f32; 2]) -> bool {
 mod tests {
     use super::*;
 
-    fn picture(metres: Vec<f32>) -> DepthImage {
+    fn image(metres: Vec<f32>) -> DepthImage {
         DepthImage { width: metres.len() as u32, height: 1, metres }
     }
 
     fn ramp(from: f32, to: f32) -> DepthImage {
-        picture((0..700).map(|i| from + (to - from) * i as f32 / 700.0).collect())
+        image((0..700).map(|i| from + (to - from) * i as f32 / 700.0).collect())
     }
 
     #[test]
@@ -77,7 +77,7 @@ mod tests {
         for (index, value) in [0.02, 3.5, f32::NAN, -1.0, f32::INFINITY].into_iter().enumerate() {
             metres[index * RANGE_STRIDE] = value;
         }
-        let [near, far] = range_of(&picture(metres), 3.5, None).expect("a range");
+        let [near, far] = range_of(&image(metres), 3.5, None).expect("a range");
         assert!((near - 0.35).abs() < 1e-4 && (far - 0.75).abs() < 1e-4, "{near} {far}");
     }
 
@@ -92,12 +92,12 @@ mod tests {
 
     #[test]
     fn a_flat_wall_is_not_stretched_over_the_whole_map() {
-        let [near, far] = range_of(&picture(vec![0.62; 700]), 3.5, None).expect("a range");
+        let [near, far] = range_of(&image(vec![0.62; 700]), 3.5, None).expect("a range");
         assert!(far - near >= SHORTEST_RANGE_M - 1e-6);
     }
 
     #[test]
-    fn an_empty_picture_has_no_range() {
-        assert_eq!(range_of(&picture(Vec::new()), 3.5, None), None);
+    fn an_empty_image_has_no_range() {
+        assert_eq!(range_of(&image(Vec::new()), 3.5, None), None);
     }
 }

@@ -1,4 +1,4 @@
-//! How the pictures are looked at.
+//! How the images are looked at.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::ImagePoint;
 use crate::text::Text;
 
-/// What is drawn over the pictures.
+/// What is drawn over the images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, and all combinations make sense")]
@@ -23,7 +23,7 @@ pub struct Overlays {
     pub coverage: bool,
     /// Residuals as arrows.
     pub residuals: bool,
-    /// By so much residuals are exaggerated.
+    /// Factor by which residuals are exaggerated.
     pub exaggeration: f64,
 }
 
@@ -33,7 +33,7 @@ impl Default for Overlays {
     }
 }
 
-/// The part of the pictures that is shown, the same in both.
+/// The part of the images that is shown, the same in both.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Viewport {
     /// Its middle as parts of width and height.
@@ -73,7 +73,7 @@ impl Default for SceneView {
     }
 }
 
-/// A point that was picked in the live picture.
+/// A point that was picked in the live image.
 #[derive(Debug, Clone)]
 pub struct PickedPoint {
     /// The pixel.

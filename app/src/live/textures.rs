@@ -1,4 +1,4 @@
-//! The pictures on the graphics card.
+//! The images on the graphics card.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ pub const CRISP_FROM: f32 = 4.0;
 /// Thumbnails that are kept; those that were not seen for longest go first.
 const MOST_THUMBNAILS: usize = 256;
 
-/// Textures of the pictures that are shown, live or recorded.
+/// Textures of the images that are shown, live or recorded.
 #[derive(Default)]
 pub struct LiveTextures {
     /// Colour.
@@ -24,14 +24,14 @@ pub struct LiveTextures {
     /// Depth in colours.
     pub depth: Option<TextureHandle>,
     review_range_m: Option<[f32; 2]>,
-    /// What was uploaded, and whether crisp; kept, so that no other pictures can be taken for them.
+    /// What was uploaded, and whether crisp; kept, so that no other images can be taken for them.
     shown: Option<(Arc<FrameImages>, bool)>,
     #[cfg(test)]
     uploads: u64,
 }
 
 impl LiveTextures {
-    /// Uploads the pictures that are to be shown, unless they are there already.
+    /// Uploads the images that are to be shown, unless they are there already.
     pub fn update(&mut self, ctx: &Context, model: &Model) {
         let images = match &model.review {
             Some(review) => review.images.as_ref(),
@@ -48,7 +48,7 @@ impl LiveTextures {
             let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
             depth::range_of(&images.depth, far_plane_m, None)
         });
-        tracing::trace!("picture shown");
+        tracing::trace!("image shown");
         self.shown = Some((images.clone(), crisp));
         #[cfg(test)]
         {
@@ -56,7 +56,7 @@ impl LiveTextures {
         }
     }
 
-    /// Depths \[m\] at the ends of the colours of a recorded picture; `None` without any depth in it.
+    /// Depths \[m\] at the ends of the colours of a recorded image; `None` without any depth in it.
     pub fn review_range_m(&self) -> Option<[f32; 2]> {
         self.review_range_m
     }
@@ -68,21 +68,21 @@ impl LiveTextures {
     }
 }
 
-fn upload(ctx: &Context, texture: &mut Option<TextureHandle>, name: &str, picture: &RgbImage, crisp: bool) {
+fn upload(ctx: &Context, texture: &mut Option<TextureHandle>, name: &str, image: &RgbImage, crisp: bool) {
     match texture {
-        Some(texture) if texture.size() == [picture.width() as usize, picture.height() as usize] => {
-            texture.set(pixels(picture), options(crisp));
+        Some(texture) if texture.size() == [image.width() as usize, image.height() as usize] => {
+            texture.set(pixels(image), options(crisp));
         }
-        slot => *slot = Some(load(ctx, name, picture, crisp)),
+        slot => *slot = Some(load(ctx, name, image, crisp)),
     }
 }
 
-fn load(ctx: &Context, name: &str, picture: &RgbImage, crisp: bool) -> TextureHandle {
-    ctx.load_texture(name, pixels(picture), options(crisp))
+fn load(ctx: &Context, name: &str, image: &RgbImage, crisp: bool) -> TextureHandle {
+    ctx.load_texture(name, pixels(image), options(crisp))
 }
 
-fn pixels(picture: &RgbImage) -> Arc<ColorImage> {
-    Arc::new(ColorImage::from_rgb([picture.width() as usize, picture.height() as usize], picture.as_raw()))
+fn pixels(image: &RgbImage) -> Arc<ColorImage> {
+    Arc::new(ColorImage::from_rgb([image.width() as usize, image.height() as usize], image.as_raw()))
 }
 
 fn options(crisp: bool) -> TextureOptions {
@@ -93,13 +93,13 @@ fn options(crisp: bool) -> TextureOptions {
 /// Everything that the window keeps on the graphics card.
 #[derive(Default)]
 pub struct Textures {
-    /// The large pictures.
+    /// The large images.
     pub live: LiveTextures,
     /// The small ones.
     pub thumbnails: Thumbnails,
 }
 
-/// Small pictures of captures; each is uploaded when it is first seen on the screen.
+/// Small images of captures; each is uploaded when it is first seen on the screen.
 #[derive(Default)]
 pub struct Thumbnails {
     textures: HashMap<CaptureId, Thumbnail>,
@@ -109,8 +109,8 @@ pub struct Thumbnails {
 
 struct Thumbnail {
     texture: TextureHandle,
-    /// What it shows: kept, so that another picture of the same capture can be told from it.
-    picture: Arc<RgbImage>,
+    /// What it shows: kept, so that another image of the same capture can be told from it.
+    image: Arc<RgbImage>,
     /// Frame of the window in which it was last drawn.
     last_seen: u64,
 }
@@ -118,22 +118,19 @@ struct Thumbnail {
 impl Thumbnails {
     /// The thumbnail of a capture.
     pub fn of(&mut self, ctx: &Context, id: CaptureId, observed: &Observed) -> &TextureHandle {
-        let is_new = self.textures.get(&id).is_none_or(|kept| !Arc::ptr_eq(&kept.picture, &observed.thumbnail));
+        let is_new = self.textures.get(&id).is_none_or(|kept| !Arc::ptr_eq(&kept.image, &observed.thumbnail));
         if is_new && self.textures.len() >= MOST_THUMBNAILS {
             self.forget_oldest();
         }
-        let (frame, picture) = (ctx.cumulative_frame_nr(), &observed.thumbnail);
+        let (frame, image) = (ctx.cumulative_frame_nr(), &observed.thumbnail);
         #[cfg(test)]
         {
             self.uploads += u64::from(is_new);
         }
-        let new = || Thumbnail {
-            texture: load(ctx, "thumbnail", picture, false),
-            picture: picture.clone(),
-            last_seen: frame,
-        };
+        let new =
+            || Thumbnail { texture: load(ctx, "thumbnail", image, false), image: image.clone(), last_seen: frame };
         let kept = self.textures.entry(id).or_insert_with(new);
-        if !Arc::ptr_eq(&kept.picture, picture) {
+        if !Arc::ptr_eq(&kept.image, image) {
             *kept = new();
         }
         kept.last_seen = frame;

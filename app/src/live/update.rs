@@ -1,4 +1,4 @@
-//! How the pictures are looked at, and points that are measured in them.
+//! How the images are looked at, and points that are measured in them.
 
 use handeye_core::depth::{ColourMap, DepthSample};
 use handeye_core::targets::bent::BoardPoints;
@@ -43,7 +43,7 @@ impl App {
         }
     }
 
-    /// Measures the point at a pixel of the live picture.
+    /// Measures the point at a pixel of the live image.
     pub(crate) fn pick(&mut self, pixel: Option<ImagePoint>) {
         self.model.picked = pixel.and_then(|pixel| self.measure(pixel));
     }
@@ -62,7 +62,7 @@ impl App {
             }
             DepthSample::Far | DepthSample::Invalid => Err(text!("there is no depth at this pixel")),
         };
-        // The board and the tip of the same picture: the newest frame may be a later one. The board is as large and as
+        // The board and the tip of the same image: the newest frame may be a later one. The board is as large and as
         // bent as the calibration found it.
         let seen = self.model.detection.as_ref().and_then(|it| {
             let board = BoardPoints::new(&self.model.document().meta.target.points());
@@ -73,7 +73,7 @@ impl App {
             Some((camera_from_target, base_from_tip)) => {
                 calibrated.point_on_board(&base_from_tip, &px, &camera_from_target).map_err(words)
             }
-            None => Err(text!("the board is not in the picture")),
+            None => Err(text!("the board is not in the image")),
         };
         Some(PickedPoint { pixel, from_depth, from_board })
     }

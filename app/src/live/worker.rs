@@ -1,4 +1,4 @@
-//! The camera worker: fetches pictures, colours the depth, and puts the newest pair where window and vision find it.
+//! The camera worker: fetches images, colours the depth, and puts the newest pair where window and vision find it.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,9 +19,9 @@ const PERIOD: Duration = Duration::from_millis(15);
 /// What the camera worker can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraTask {
-    /// Which depths the colour map covers, from the next picture on.
+    /// Which depths the colour map covers, from the next image on.
     SetDepthScale(DepthScale),
-    /// The colours of depths, from the next picture on.
+    /// The colours of depths, from the next image on.
     SetDepthColours(ColourMap),
 }
 
@@ -52,7 +52,7 @@ impl Camera {
         }
     }
 
-    /// Prepares the newest pictures for the window.
+    /// Prepares the newest images for the window.
     fn prepare(&mut self, raw: RawFrame, limits_m: [f32; 2], received_s: f64) -> Result<LiveFrame, PortError> {
         let [_, far_plane_m] = limits_m;
         self.auto_range_m = depth::range_of(&raw.depth, far_plane_m, self.auto_range_m);
@@ -64,7 +64,7 @@ impl Camera {
         let depth_coloured = raw
             .depth
             .colours(self.colours, near_m, far_m, far_plane_m)
-            .map_err(|error| PortError::Refused(format!("the depth picture cannot be shown: {error}")))?;
+            .map_err(|error| PortError::Refused(format!("the depth image cannot be shown: {error}")))?;
         self.number += 1;
         let info = FrameInfo {
             number: self.number,

@@ -1,4 +1,4 @@
-//! A strip over the pictures that says why they are not live.
+//! A strip over the images that says why they are not live.
 
 use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, Rect, RichText, Stroke, Ui, UiBuilder};
 

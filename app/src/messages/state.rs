@@ -19,7 +19,7 @@ pub enum Home {
     Toast,
     /// A pane, which says it for as long as it is so. Below the steps only while that pane is not in front.
     Pane(Pane),
-    /// The strip over the panes, or the place of the picture, until the connection is there.
+    /// The strip over the panes, or the place of the image, until the connection is there.
     Connection,
 }
 

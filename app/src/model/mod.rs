@@ -1,4 +1,4 @@
-//! What the window shows: state of the connections, of the robot, the newest pictures, and how they are looked at.
+//! What the window shows: state of the connections, of the robot, the newest images, and how they are looked at.
 //!
 //! Only [`crate::app::App::apply`] and [`crate::app::App::absorb`] change a [`Model`]; panes read it. Times are seconds
 //! on the clock that the application was started with.
@@ -33,7 +33,7 @@ pub use crate::motion::state::{
 };
 pub use crate::rerun_log::state::{RerunState, ViewerState};
 pub use crate::session::state::{
-    FolderEntry, FolderKind, FolderListing, Observed, RecentSession, Review, SessionState, StopOutcome, Tour,
+    FolderEntry, FolderKind, FolderListing, Observed, PoseSequence, RecentSession, Review, SessionState, StopOutcome,
 };
 pub use crate::solve::estimated::{EstimatedValue, estimated};
 pub use crate::solve::state::{JobId, SolveState, SolveStatus, Solved};
@@ -62,7 +62,7 @@ pub enum CellSource {
 pub enum Link {
     /// Joints, tip, simulation, stop.
     Control,
-    /// Pictures.
+    /// Images.
     Camera,
     /// Motions.
     Motion,
@@ -127,7 +127,7 @@ impl LinkState {
 /// Whether simulated time advances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Simulation {
-    /// It does not; pictures are not renewed.
+    /// It does not; images are not renewed.
     Stopped,
     /// It does not for now.
     Paused,
@@ -153,7 +153,7 @@ pub struct RobotState {
 pub struct FrameInfo {
     /// Counts the frames since the start of the program; grows with every frame that the camera worker takes.
     pub number: u64,
-    /// Simulated time of the pictures \[s\].
+    /// Simulated time of the images \[s\].
     pub sim_time_s: f64,
     /// How much older than pose and joints they may be \[s\] of simulated time: nothing where all is of one instant.
     pub image_age_s: f64,
@@ -165,7 +165,7 @@ pub struct FrameInfo {
     pub depth_range_m: [f32; 2],
     /// The sensor's far plane \[m\]: depths there are no surface.
     pub far_plane_m: f32,
-    /// The tip as the controller reported it at the instant of the pictures.
+    /// The tip as the controller reported it at the instant of the images.
     pub base_from_tip: Pose<Base, Tip>,
     /// The joints at the same instant \[rad\].
     pub joints_rad: JointAngles,
@@ -212,7 +212,7 @@ impl FrameImages {
     }
 }
 
-/// A pair of pictures with its circumstances.
+/// A pair of images with its circumstances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveFrame {
     /// When, how often, which range.
@@ -234,7 +234,7 @@ pub struct ImagePoint {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DepthScale {
-    /// Those that are in the picture.
+    /// Those that are in the image.
     #[default]
     Auto,
     /// Those that the sensor can measure.
@@ -280,7 +280,7 @@ pub enum RotationFormat {
 pub struct ViewSettings {
     /// The colours of depths.
     pub depth_colours: ColourMap,
-    /// What is drawn over the pictures.
+    /// What is drawn over the images.
     pub overlays: Overlays,
     /// How the tip is jogged.
     pub jog: JogSettings,
@@ -330,7 +330,7 @@ pub struct Model {
     pub now_s: f64,
     /// The connection for joints, tip, simulation and stop.
     pub control: LinkState,
-    /// The connection for pictures.
+    /// The connection for images.
     pub camera: LinkState,
     /// The connection for motions.
     pub mover: LinkState,
@@ -340,13 +340,13 @@ pub struct Model {
     pub motion: Motion,
     /// The robot, as it was when it was last heard of.
     pub robot: Option<RobotState>,
-    /// The newest pictures.
+    /// The newest images.
     pub frame: Option<LiveFrame>,
     /// Frames that arrived but were never shown, because newer ones came first.
     pub dropped_frames: u64,
     /// A stop was pressed and the robot has not confirmed it yet.
     pub stop_pending: bool,
-    /// The pixel under the pointer, in both pictures.
+    /// The pixel under the pointer, in both images.
     pub cursor: Option<ImagePoint>,
     /// What is remembered from one start to the next.
     pub view: ViewSettings,
@@ -354,17 +354,17 @@ pub struct Model {
     pub messages: Messages,
     /// Addresses that were connected to before, newest first.
     pub addresses: Vec<String>,
-    /// The board in the newest picture that was searched.
+    /// The board in the newest image that was searched.
     pub detection: Option<LiveDetection>,
     /// The capture that is under way.
     pub capture: Option<CaptureUnderWay>,
     /// Why there was no capture the last time.
     pub refused: Option<CaptureRefused>,
-    /// The tour that is under way, or the last one.
-    pub tour: Option<Tour>,
-    /// Whether that tour is still under way.
-    pub touring: bool,
-    /// The poses of a tour are being planned.
+    /// The sequence that is under way, or the last one.
+    pub sequence: Option<PoseSequence>,
+    /// Whether that sequence is still under way.
+    pub sequence_runs: bool,
+    /// The poses of a sequence are being planned.
     pub planning: bool,
     /// The session.
     pub session: SessionState,
@@ -372,11 +372,11 @@ pub struct Model {
     pub opening: bool,
     /// Where new sessions go.
     pub sessions: PathBuf,
-    /// What was seen in its captures; `None` for a picture that cannot be read. One that is not here is being looked at.
+    /// What was seen in its captures; `None` for an image that cannot be read. One that is not here is being looked at.
     pub observed: BTreeMap<CaptureId, Option<Arc<Observed>>>,
     /// Captures that are selected, the last one last.
     pub selection: Vec<CaptureId>,
-    /// The capture whose picture is shown instead of the live one.
+    /// The capture whose image is shown instead of the live one.
     pub review: Option<Review>,
     /// The solver and its newest answer.
     pub solve: SolveState,
@@ -400,7 +400,7 @@ pub struct Model {
     pub folder: Option<FolderListing>,
     /// Sessions that were open before.
     pub recent: Vec<RecentSession>,
-    /// The part of the pictures that is shown.
+    /// The part of the images that is shown.
     pub viewport: Viewport,
     /// From where the 3D pane looks.
     pub scene: SceneView,
@@ -435,8 +435,8 @@ impl Model {
             detection: None,
             capture: None,
             refused: None,
-            tour: None,
-            touring: false,
+            sequence: None,
+            sequence_runs: false,
             planning: false,
             session: SessionState {
                 folder: None,
@@ -477,7 +477,7 @@ impl Model {
         }
     }
 
-    /// Age of the newest pictures \[s\].
+    /// Age of the newest images \[s\].
     pub fn frame_age_s(&self) -> Option<f64> {
         self.frame.as_ref().map(|frame| (self.now_s - frame.info.received_s).max(0.0))
     }
@@ -487,7 +487,7 @@ impl Model {
         &self.session.document
     }
 
-    /// What was seen in a capture; `None` while it is not known, or when the picture cannot be read.
+    /// What was seen in a capture; `None` while it is not known, or when the image cannot be read.
     pub fn observed(&self, id: CaptureId) -> Option<&Observed> {
         self.observed.get(&id)?.as_deref()
     }

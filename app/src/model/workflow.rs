@@ -10,7 +10,7 @@ pub enum Step {
     Connect,
     /// Say what is looked at.
     Target,
-    /// Take pictures from many poses.
+    /// Take images from many poses.
     Capture,
     /// Calibrate.
     Solve,
@@ -31,9 +31,9 @@ impl Step {
 /// Parts of the window that can be moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Pane {
-    /// The colour picture.
+    /// The colour image.
     Colour,
-    /// The depth picture.
+    /// The depth image.
     Depth,
     /// The captures.
     Poses,

@@ -145,7 +145,7 @@ impl MotionQueue {
         begins
     }
 
-    /// No jog button is held any more.
+    /// No jog button is held now.
     pub fn release(&self) {
         let mut inner = self.inner();
         inner.line.release();
@@ -188,7 +188,7 @@ impl MotionQueue {
         self.inner().connected = true;
     }
 
-    /// The worker has none any more. What it had not begun is refused.
+    /// The worker has none now. What it had not begun is refused.
     pub fn disconnected(&self, now_s: f64) {
         let mut inner = self.inner();
         inner.connected = false;

@@ -47,11 +47,11 @@ impl LiveMotion {
         }
         match goal {
             MotionGoal::Joints(joints) => {
-                self.arm.move_to_joints(joints, &limits::of_joints(&limits::TOUR, speed), cancel)?;
+                self.arm.move_to_joints(joints, &limits::of_joints(&limits::SEQUENCE, speed), cancel)?;
                 self.arm.settle(&SettleOptions::default(), cancel)?;
             }
             MotionGoal::Tip(pose) => {
-                let limits = limits::of_tip(&limits::TOUR, speed);
+                let limits = limits::of_tip(&limits::SEQUENCE, speed);
                 self.arm.move_to_pose(pose, &limits, &MotionTolerance::default(), cancel)?;
             }
         }

@@ -43,9 +43,9 @@ impl App {
             self.model.motion = Motion::Idle;
         }
         let what = what.unwrap_or_else(|| text!("the goal"));
-        // What an earlier motion still has to say does not move a tour on.
-        if self.model.touring && id == self.numbers.motion {
-            self.tour_moved(&outcome);
+        // What an earlier motion still has to say does not move a sequence on.
+        if self.model.sequence_runs && id == self.numbers.motion {
+            self.sequence_moved(&outcome);
         }
         if self.model.planning && self.numbers.plan == Some(id) {
             return self.plan_refused(&outcome);

@@ -23,7 +23,7 @@ pub fn of(step: Step) -> Blueprint {
 /// Live: what robot and camera do now.
 fn capture() -> Blueprint {
     let right = Vertical::new([
-        Tabs::new(live_pictures("Camera")).into(),
+        Tabs::new(live_images("Camera")).into(),
         Tabs::new([plot("Joints", paths::PLOT_JOINTS), log()]).into(),
     ])
     .with_row_shares(vec![2.0, 1.0]);
@@ -32,9 +32,9 @@ fn capture() -> Blueprint {
 
 /// Capture by capture: how the answer came about.
 fn solve() -> Blueprint {
-    let pictures = live_pictures("Picture of the capture").into_iter().chain([selected_picture()]);
+    let images = live_images("Image of the capture").into_iter().chain([selected_image()]);
     let right = Vertical::new([
-        Tabs::new(pictures).into(),
+        Tabs::new(images).into(),
         Tabs::new([
             report(),
             plot("Residuals [px]", "plots/residual"),
@@ -48,9 +48,9 @@ fn solve() -> Blueprint {
 
 /// Where the calibration puts the board, against where it is seen.
 fn verify() -> Blueprint {
-    let pictures = live_pictures("Prediction in the live picture").into_iter().chain([selected_picture()]);
+    let images = live_images("Prediction in the live image").into_iter().chain([selected_image()]);
     let right = Vertical::new([
-        Tabs::new(pictures).into(),
+        Tabs::new(images).into(),
         Tabs::new([plot("Residuals [px]", "plots/residual"), report(), log()]).into(),
     ]);
     let cell = cell("Cell and predicted boards", &["- /base/track/**", "- /base/points"]);
@@ -60,9 +60,9 @@ fn verify() -> Blueprint {
 /// The board as it moves.
 fn track() -> Blueprint {
     let right = Vertical::new([
-        Tabs::new(live_pictures("Camera")).into(),
+        Tabs::new(live_images("Camera")).into(),
         plots("Position [mm]", &[paths::PLOT_TRACK_ERROR, paths::PLOT_TRACK_SIGMA]),
-        plots("From picture to pose [ms]", &[paths::PLOT_LATENCY]),
+        plots("From image to pose [ms]", &[paths::PLOT_LATENCY]),
         Tabs::new([plot("Joints", paths::PLOT_JOINTS), log()]).into(),
     ]);
     arranged(cell("Tracking", &["- /base/captures/**"]), right.into(), paths::SIM_TIMELINE)
@@ -92,8 +92,8 @@ fn lens(mode: Mode) -> String {
     paths::below(paths::camera(mode), paths::LENS)
 }
 
-/// The live picture, of a camera on the tip or beside the robot: whichever there is. The one on the tip is in front.
-fn live_pictures(name: &str) -> [ContainerLike; 2] {
+/// The live image, of a camera on the tip or beside the robot: whichever there is. The one on the tip is in front.
+fn live_images(name: &str) -> [ContainerLike; 2] {
     LENSES.map(|mode| {
         let name = match mode {
             Mode::EyeInHand => name,
@@ -104,7 +104,7 @@ fn live_pictures(name: &str) -> [ContainerLike; 2] {
     })
 }
 
-fn selected_picture() -> ContainerLike {
+fn selected_image() -> ContainerLike {
     Spatial2DView::new("Selected capture").with_origin(paths::SELECTED).into()
 }
 

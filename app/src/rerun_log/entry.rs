@@ -23,14 +23,14 @@ pub enum Entry {
         /// Joints \[rad\].
         joints_rad: JointAngles,
     },
-    /// A live picture.
-    Picture {
+    /// A live image.
+    Image {
         /// When and from where.
         info: FrameInfo,
         /// The pixels.
         images: Arc<FrameImages>,
     },
-    /// The board in a live picture.
+    /// The board in a live image.
     Detection(Arc<LiveDetection>),
     /// The session is now like this; its images are below the folder.
     Document {
@@ -48,7 +48,7 @@ pub enum Entry {
     },
     /// A calibration.
     Solved(Arc<Solved>),
-    /// A picture in which the board was tracked.
+    /// An image in which the board was tracked.
     Tracked(Arc<Tracked>),
     /// Captures that are selected in the window.
     Selected(Vec<CaptureId>),

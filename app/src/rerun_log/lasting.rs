@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use super::Entry;
 
-/// Calibrations that are kept. Each may hold residuals of a thousand pictures.
+/// Calibrations that are kept. Each may hold residuals of a thousand images.
 const MAX_SOLVED: usize = 64;
 
 /// Messages that are kept.
@@ -42,7 +42,7 @@ pub enum Item {
 
 /// Whether an entry is only of interest while it is new.
 pub fn is_live(entry: &Entry) -> bool {
-    matches!(entry, Entry::Robot { .. } | Entry::Picture { .. } | Entry::Detection(_) | Entry::Tracked(_))
+    matches!(entry, Entry::Robot { .. } | Entry::Image { .. } | Entry::Detection(_) | Entry::Tracked(_))
 }
 
 /// Entries that last. The list stays short whatever comes: a newer document, selection or step takes the place of the

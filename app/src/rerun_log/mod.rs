@@ -8,7 +8,7 @@
 //! | `rerun-file` | a file, as a rule beside the session | what lasts, and a little of what is live |
 //! | `rerun-viewer` | a server of ours for viewers, or a viewer elsewhere | everything, as fast as the viewer reads |
 //!
-//! What lasts (captures, calibrations, messages) is kept for a viewer that is opened later. What is live (pictures, the
+//! What lasts (captures, calibrations, messages) is kept for a viewer that is opened later. What is live (images, the
 //! robot) is only of interest while it is new: what cannot be written in time is left out and counted.
 //! `docs/rerun_viewers.md` has the bounds.
 

@@ -102,7 +102,7 @@ fn command(program: &Path) -> Command {
     command
 }
 
-/// Waits until a program ends, for so long, or until there is no reason to wait any more; `None` when it still runs.
+/// Waits until a program ends, for so long, or until there is no reason to wait now; `None` when it still runs.
 ///
 /// # Errors
 /// When the system does not know.

@@ -54,9 +54,8 @@ impl Pump {
                 Next::Lasting(Item::Entry(entry)) => self.write(|stream| stream.write_lasting(&entry)),
                 Next::Live(entry) => {
                     self.write(|stream| stream.write_live(&entry));
-                    if matches!(entry, Entry::Picture { .. }) && matches!(self.route, Route::To(Target::Viewers { .. }))
-                    {
-                        // Waiting here, and not in buffers of the library, keeps memory short and pictures new.
+                    if matches!(entry, Entry::Image { .. }) && matches!(self.route, Route::To(Target::Viewers { .. })) {
+                        // Waiting here, and not in buffers of the library, keeps memory short and images new.
                         self.flush();
                     }
                 }
@@ -147,7 +146,7 @@ impl Pump {
         {
             stream.lasting_only = true;
             let text = text!(
-                "The recording {file} has reached {size} MB: from here on it has no live pictures and no robot motion",
+                "The recording {file} has reached {size} MB: from here on it has no live images and no robot motion",
                 file = path.display(),
                 size = file::MAX_LIVE_BYTES / (1024 * 1024)
             );

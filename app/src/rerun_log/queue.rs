@@ -39,9 +39,9 @@ impl Rate {
 pub struct Rates {
     /// States of the robot.
     pub robot: Rate,
-    /// Live pictures.
-    pub picture: Rate,
-    /// The board in live pictures.
+    /// Live images.
+    pub image: Rate,
+    /// The board in live images.
     pub detection: Rate,
     /// The board as it is tracked.
     pub tracked: Rate,
@@ -93,8 +93,8 @@ impl Queue {
     /// With nothing to do yet.
     pub fn new(rates: &Rates) -> Self {
         let now = Instant::now();
-        let Rates { robot, picture, detection, tracked, waits } = *rates;
-        let lanes = [robot, picture, detection, tracked].map(|rate| Lane { rate, waiting: VecDeque::new(), due: now });
+        let Rates { robot, image, detection, tracked, waits } = *rates;
+        let lanes = [robot, image, detection, tracked].map(|rate| Lane { rate, waiting: VecDeque::new(), due: now });
         let state = State { lasting: Lasting::default(), lanes, arrivals: 0, left_out: 0, ended: false };
         Self { state: Mutex::new(state), bell: Condvar::new(), taken: Condvar::new(), waits }
     }
@@ -120,7 +120,7 @@ impl Queue {
         };
         drop(state);
         self.bell.notify_one();
-        // A picture is megabytes: it is freed without the lock.
+        // An image is megabytes: it is freed without the lock.
         drop(left_out);
     }
 
@@ -216,7 +216,7 @@ impl Lane {
 fn lane_of(entry: &Entry) -> Option<usize> {
     match entry {
         Entry::Robot { .. } => Some(0),
-        Entry::Picture { .. } => Some(1),
+        Entry::Image { .. } => Some(1),
         Entry::Detection(_) => Some(2),
         Entry::Tracked(_) => Some(3),
         _ => None,

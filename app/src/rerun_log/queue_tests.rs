@@ -11,14 +11,14 @@ const SOON: Duration = Duration::from_secs(20);
 const AT_ONCE: Duration = Duration::from_millis(1);
 
 fn rates(rate: Rate) -> Rates {
-    Rates { robot: rate, picture: rate, detection: rate, tracked: rate, waits: false }
+    Rates { robot: rate, image: rate, detection: rate, tracked: rate, waits: false }
 }
 
 fn robot(sim_time_s: f64) -> Entry {
     Entry::Robot { sim_time_s, base_from_tip: Pose::identity(), joints_rad: [0.0; 6] }
 }
 
-fn picture(number: u64) -> Entry {
+fn image(number: u64) -> Entry {
     let info = FrameInfo {
         number,
         sim_time_s: 0.0,
@@ -31,9 +31,9 @@ fn picture(number: u64) -> Entry {
         joints_rad: [0.0; 6],
         base_from_target_true: None,
     };
-    let depth = DepthImage::new(1, 1, vec![1.0]).expect("a picture");
+    let depth = DepthImage::new(1, 1, vec![1.0]).expect("an image");
     let images = FrameImages { rgb: RgbImage::new(1, 1), depth, depth_coloured: RgbImage::new(1, 1) };
-    Entry::Picture { info, images: Arc::new(images) }
+    Entry::Image { info, images: Arc::new(images) }
 }
 
 fn said(words: &str) -> Entry {
@@ -42,8 +42,8 @@ fn said(words: &str) -> Entry {
 
 fn number(next: Next) -> u64 {
     match next {
-        Next::Live(Entry::Picture { info, .. }) => info.number,
-        other => panic!("no picture but {other:?}"),
+        Next::Live(Entry::Image { info, .. }) => info.number,
+        other => panic!("no image but {other:?}"),
     }
 }
 
@@ -51,22 +51,22 @@ fn number(next: Next) -> u64 {
 fn a_writer_that_never_writes_leaves_a_short_queue_with_everything_that_lasts() {
     let queue = Queue::new(&rates(Rate::newest_every(Duration::ZERO)));
     for round in 0..2000 {
-        queue.put(picture(round));
+        queue.put(image(round));
         queue.put(robot(round as f64));
         queue.put(Entry::Selected(Vec::new()));
     }
     queue.put(said("the last words"));
-    assert_eq!(queue.len(), 4, "a picture, a state, a selection and a message");
+    assert_eq!(queue.len(), 4, "an image, a state, a selection and a message");
     assert!(matches!(queue.next(SOON), Next::Lasting(Item::Entry(Entry::Selected(_)))));
     assert!(matches!(queue.next(SOON), Next::Lasting(Item::Entry(Entry::Said { .. }))));
-    assert_eq!(number(queue.next(SOON)), 1999, "the newest picture");
+    assert_eq!(number(queue.next(SOON)), 1999, "the newest image");
 }
 
 #[test]
-fn a_command_that_ends_has_every_picture_written_as_long_as_the_writer_keeps_up() {
+fn a_command_that_ends_has_every_image_written_as_long_as_the_writer_keeps_up() {
     let queue = Queue::new(&rates(Rate::all(3)));
     for round in 0..5 {
-        queue.put(picture(round));
+        queue.put(image(round));
     }
     queue.end();
     assert_eq!([2, 3, 4].map(|_| number(queue.next(SOON))), [2, 3, 4]);
@@ -74,12 +74,12 @@ fn a_command_that_ends_has_every_picture_written_as_long_as_the_writer_keeps_up(
 }
 
 #[test]
-fn pictures_that_come_too_often_are_thinned_and_not_counted_as_lost() {
+fn images_that_come_too_often_are_thinned_and_not_counted_as_lost() {
     let queue = Queue::new(&rates(Rate::newest_every(Duration::from_hours(1))));
-    queue.put(picture(1));
+    queue.put(image(1));
     assert_eq!(number(queue.next(SOON)), 1);
-    queue.put(picture(2));
-    queue.put(picture(3));
+    queue.put(image(2));
+    queue.put(image(3));
     assert!(matches!(queue.next(AT_ONCE), Next::Idle), "it is not time yet");
     assert_eq!(queue.left_out(), 0);
     queue.end();
@@ -87,12 +87,12 @@ fn pictures_that_come_too_often_are_thinned_and_not_counted_as_lost() {
 }
 
 #[test]
-fn pictures_that_a_slow_writer_did_not_take_are_counted() {
+fn images_that_a_slow_writer_did_not_take_are_counted() {
     let queue = Queue::new(&rates(Rate::newest_every(Duration::ZERO)));
     let began = Instant::now();
     let mut put = 0;
     while queue.left_out() < 3 {
-        queue.put(picture(put));
+        queue.put(image(put));
         put += 1;
         std::thread::yield_now();
         assert!(began.elapsed() < SOON);
@@ -103,7 +103,7 @@ fn pictures_that_a_slow_writer_did_not_take_are_counted() {
 #[test]
 fn what_lasts_goes_before_what_is_live_and_a_waiting_writer_is_woken() {
     let queue = Arc::new(Queue::new(&rates(Rate::newest_every(Duration::ZERO))));
-    queue.put(picture(1));
+    queue.put(image(1));
     queue.put(said("hello"));
     assert!(matches!(queue.next(SOON), Next::Lasting(_)));
     assert_eq!(number(queue.next(SOON)), 1);

@@ -36,7 +36,7 @@ impl Pace {
         match self {
             Self::Live => Rates {
                 robot: every(200),
-                picture: every(1000),
+                image: every(1000),
                 detection: every(1000),
                 tracked: every(50),
                 waits: false,
@@ -49,16 +49,16 @@ impl Pace {
         let every = |millis| Rate::newest_every(Duration::from_millis(millis));
         match self {
             Self::Live => {
-                Rates { robot: every(50), picture: every(100), detection: every(100), tracked: every(33), waits: false }
+                Rates { robot: every(50), image: every(100), detection: every(100), tracked: every(33), waits: false }
             }
             Self::Everything => Self::everything(),
         }
     }
 
-    /// Pictures are megabytes, so that few may wait.
+    /// Images are megabytes, so that few may wait.
     fn everything() -> Rates {
         let (small, images) = (Rate::all(4096), Rate::all(8));
-        Rates { robot: small, picture: images, detection: Rate::all(64), tracked: small, waits: false }
+        Rates { robot: small, image: images, detection: Rate::all(64), tracked: small, waits: false }
     }
 }
 

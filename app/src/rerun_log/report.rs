@@ -227,9 +227,9 @@ mod tests {
     fn the_report_says_what_was_set_aside_and_what_the_estimate_found_out() {
         let model = sample::with_an_outlier();
         let text = markdown(model.solve.current().expect("solved"));
-        assert!(text.contains("| Views set aside | 1 of 10 |"), "{text}");
+        assert!(text.contains("| Outlier views | 1 of 10 |"), "{text}");
         assert!(text.contains("| Noise levels | "), "{text}");
-        assert!(text.contains("- *Warning:* 1 view set aside"), "{text}");
+        assert!(text.contains("- *Warning:* 1 outlier view"), "{text}");
         assert!(text.contains("| images/0003.png | outlier | 18.0000 |"), "{text}");
     }
 

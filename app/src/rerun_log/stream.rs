@@ -72,7 +72,7 @@ pub struct Stream {
     writer: SceneWriter,
     /// The file, if it is one.
     pub file: Option<PathBuf>,
-    /// Whether nothing live is written any more.
+    /// Whether nothing live is written now.
     pub lasting_only: bool,
     step: Option<Step>,
 }

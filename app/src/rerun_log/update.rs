@@ -43,14 +43,14 @@ impl App {
                 joints_rad: robot.joints_rad,
             },
             Event::Frame { info, images: Some(images), .. } => {
-                Entry::Picture { info: info.clone(), images: Arc::clone(images) }
+                Entry::Image { info: info.clone(), images: Arc::clone(images) }
             }
             Event::Detection(detection) => Entry::Detection(Arc::new((**detection).clone())),
             Event::Cell(facts) => Entry::Cell(Arc::new((**facts).clone())),
             Event::Document(state) => {
                 Entry::Document { folder: state.folder.clone(), document: Arc::clone(&state.document) }
             }
-            // What was seen for another target is of no interest any more.
+            // What was seen for another target is no longer of interest.
             Event::Observed { id, target, observed: Some(observed) }
                 if *target == self.model.document().meta.target =>
             {

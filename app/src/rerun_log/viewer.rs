@@ -137,7 +137,7 @@ impl Shared {
     /// Waits until the user closes the viewer.
     fn watch(&self, mut child: Child) {
         let ended = native::wait(&mut child, Duration::MAX, || self.has_ended());
-        tracing::debug!(?ended, "the native viewer is not looked after any more");
+        tracing::debug!(?ended, "the native viewer is no longer looked after");
         if self.has_ended() {
             return;
         }

@@ -41,27 +41,27 @@ pub struct RecentSession {
     pub captures: usize,
 }
 
-/// What is in the picture of a capture.
+/// What is in the image of a capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observed {
     /// The corners; `None` when the board is not found.
     pub corners: Option<Vec<Corner>>,
-    /// Width and height of the picture in pixels.
+    /// Width and height of the image in pixels.
     pub image_size: (u32, u32),
-    /// A small copy of the picture.
+    /// A small copy of the image.
     pub thumbnail: Arc<RgbImage>,
 }
 
-/// The capture whose picture is looked at instead of the live one.
+/// The capture whose image is looked at instead of the live one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Review {
     /// Which capture.
     pub id: CaptureId,
-    /// Its pictures, once they are read from the disk.
+    /// Its images, once they are read from the disk.
     pub images: Option<Arc<FrameImages>>,
 }
 
-/// How the tour of a pose went.
+/// How the sequence of a pose went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum StopOutcome {
     /// The arm was there, and a capture was taken where one was asked for.
@@ -70,9 +70,9 @@ pub enum StopOutcome {
     Skipped(Text),
 }
 
-/// A tour of the taught poses.
+/// A sequence of the taught poses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Tour {
+pub struct PoseSequence {
     /// The poses in their order.
     pub names: Vec<String>,
     /// The joints at each \[rad\], of poses that were planned; `None` for taught ones, which the session has.
@@ -85,7 +85,7 @@ pub struct Tour {
     pub began_s: f64,
 }
 
-impl Tour {
+impl PoseSequence {
     /// The pose that is under way.
     pub fn current(&self) -> Option<&str> {
         self.names.get(self.outcomes.len()).map(String::as_str)

@@ -41,7 +41,7 @@ fn views_aside(calibration: &Calibration) -> Option<EstimatedValue> {
     let count = calibration.views.iter().filter(|view| view.status == ViewStatus::Outlier).count();
     let taken = calibration.views.iter().filter(|view| view.status == ViewStatus::Used).count();
     (count > 0).then(|| EstimatedValue {
-        what: text!("Views set aside"),
+        what: text!("Outlier views"),
         value: text!("{count} of {of}", count = count, of = count + taken),
         meaning: text!("They do not fit the others, and the answer is without them; the table of captures says which"),
         why: None,
@@ -52,7 +52,7 @@ fn corners_aside(calibration: &Calibration) -> Option<EstimatedValue> {
     let views = calibration.views.iter().filter(|view| !view.corners_aside.is_empty()).count();
     let count: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
     (count > 0).then(|| EstimatedValue {
-        what: text!("Corners set aside"),
+        what: text!("Outlier corners"),
         value: text!("{count}, in {views} of {of} views", count = count, views = views, of = calibration.views.len()),
         meaning: text!("They are far from where the rest of their view puts them, and the answer is without them"),
         why: None,
@@ -66,7 +66,7 @@ fn bend(shape: &ShapeEstimate) -> Option<EstimatedValue> {
         what: text!("Bend of the board"),
         value: text!("x {x} ± {x_sigma} mm, y {y} ± {y_sigma} mm", x = x, x_sigma = x_sigma, y = y, y_sigma = y_sigma),
         meaning: text!(
-            "By so much the middle of the board stands out against its edges, along its x and y; ± is one standard \
+            "How far the middle of the board stands out against its edges, along its x and y; ± is one standard \
              deviation. The answer allows for it"
         ),
         why: None,
@@ -89,7 +89,7 @@ fn view_noise(calibration: &Calibration) -> Option<EstimatedValue> {
         what: text!("Noise of views"),
         value: Text::verbatim(format!("{view_px:.3} px")),
         meaning: text!(
-            "What all corners of a picture are off by together, beyond their own noise: lens, board and picture are not \
+            "What all corners of an image are off by together, beyond their own noise: lens, board and image are not \
              quite as modelled"
         ),
         why: None,
@@ -212,8 +212,8 @@ mod tests {
             });
         });
         for (what, value) in [
-            ("Views set aside", "1 of 10"),
-            ("Corners set aside", "3, in 2 of 10 views"),
+            ("Outlier views", "1 of 10"),
+            ("Outlier corners", "3, in 2 of 10 views"),
             ("Bend of the board", "x 0.400 ± 0.030 mm, y -0.100 ± 0.020 mm"),
             ("Size of the board", "100.100 ± 0.020 %"),
             ("Noise of views", "0.120 px"),

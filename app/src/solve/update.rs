@@ -113,7 +113,7 @@ impl App {
         }
     }
 
-    /// Width and height of the pictures in pixels: all captures of a session have the same.
+    /// Width and height of the images in pixels: all captures of a session have the same.
     fn image_size(&self) -> (u32, u32) {
         self.model.observed.values().flatten().map(|observed| observed.image_size).next().unwrap_or_default()
     }
@@ -175,7 +175,7 @@ impl App {
     }
 
     pub(crate) fn solve_ended(&mut self, job: JobId, outcome: SolveOutcome) {
-        // An answer to an earlier question is of no interest any more.
+        // An answer to an earlier question is no longer of interest.
         if job != self.numbers.job {
             return;
         }

@@ -5,7 +5,7 @@ use handeye_sim_link::client::cell::{BoardInView, JointAngles};
 
 use crate::app::App;
 use crate::model::{
-    CapturePurpose, CaptureRefused, MotionGoal, MotionId, MotionOutcome, Pane, Severity, StopOutcome, Tour,
+    CapturePurpose, CaptureRefused, MotionGoal, MotionId, MotionOutcome, Pane, PoseSequence, Severity, StopOutcome,
 };
 use crate::text;
 use crate::text::Text;
@@ -15,24 +15,30 @@ use crate::worker::ViewsRequest;
 const VERIFYING: usize = 5;
 
 impl App {
-    pub(crate) fn run_tour(&mut self, purpose: Option<CapturePurpose>) {
+    pub(crate) fn run_sequence(&mut self, purpose: Option<CapturePurpose>) {
         let names: Vec<String> = self.model.document().taught.iter().map(|pose| pose.name.clone()).collect();
         if names.is_empty() {
             self.say(Severity::Warning, text!("There are no taught poses: teach some, or take the reference poses"));
             return;
         }
-        self.begin_tour(Tour { names, planned: None, purpose, outcomes: Vec::new(), began_s: self.model.now_s });
+        self.begin_sequence(PoseSequence {
+            names,
+            planned: None,
+            purpose,
+            outcomes: Vec::new(),
+            began_s: self.model.now_s,
+        });
     }
 
-    fn begin_tour(&mut self, tour: Tour) {
-        self.model.tour = Some(tour);
-        self.model.touring = true;
+    fn begin_sequence(&mut self, sequence: PoseSequence) {
+        self.model.sequence = Some(sequence);
+        self.model.sequence_runs = true;
         self.next_stop();
     }
 
     /// Has poses planned that differ from all captures, to verify at.
     pub(crate) fn plan_verification(&mut self) {
-        if self.model.touring || self.model.planning {
+        if self.model.sequence_runs || self.model.planning {
             return;
         }
         let board = self.model.calibrated().and_then(|calibrated| match calibrated.hand_eye {
@@ -61,13 +67,13 @@ impl App {
 
     /// The poses are planned, or cannot be.
     pub(crate) fn planned(&mut self, id: MotionId, views: Result<Vec<JointAngles>, Text>) {
-        // After a stop nothing begins by itself any more.
+        // After a stop nothing begins by itself now.
         if self.numbers.plan != Some(id) || !self.model.planning {
             return;
         }
         self.model.planning = false;
         match views {
-            Ok(joints) => self.begin_tour(Tour {
+            Ok(joints) => self.begin_sequence(PoseSequence {
                 names: (1..=joints.len()).map(|number| format!("check {number}")).collect(),
                 planned: Some(joints),
                 purpose: Some(CapturePurpose::Verify),
@@ -90,32 +96,32 @@ impl App {
         }
     }
 
-    pub(crate) fn stop_tour(&mut self) {
-        if self.model.touring {
+    pub(crate) fn stop_sequence(&mut self) {
+        if self.model.sequence_runs {
             self.stop();
         }
     }
 
-    /// Sets out for the next pose, or ends the tour.
+    /// Sets out for the next pose, or ends the sequence.
     fn next_stop(&mut self) {
-        let Some(tour) = self.model.tour.as_ref().filter(|_| self.model.touring) else { return };
-        if let Some(name) = tour.current() {
+        let Some(sequence) = self.model.sequence.as_ref().filter(|_| self.model.sequence_runs) else { return };
+        if let Some(name) = sequence.current() {
             let name = name.to_owned();
-            let planned = tour.planned.as_ref().and_then(|joints| joints.get(tour.outcomes.len()));
+            let planned = sequence.planned.as_ref().and_then(|joints| joints.get(sequence.outcomes.len()));
             match planned.copied() {
                 Some(joints) => self.start_motion(MotionGoal::Joints(joints), text!("pose {name}", name = name)),
                 None => self.go_to_taught(&name),
             }
             return;
         }
-        let pane = pane_of(tour);
-        let of = tour.names.len();
-        let done = tour.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
-        let took_s = self.model.now_s - tour.began_s;
-        self.model.touring = false;
+        let pane = pane_of(sequence);
+        let of = sequence.names.len();
+        let done = sequence.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
+        let took_s = self.model.now_s - sequence.began_s;
+        self.model.sequence_runs = false;
         let severity = if done == of { Severity::Info } else { Severity::Warning };
         let took = format!("{took_s:.0}");
-        let said = text!("Tour ended: {done} of {of} poses in {took} s", done = done, of = of, took = took);
+        let said = text!("Sequence ended: {done} of {of} poses in {took} s", done = done, of = of, took = took);
         match severity {
             Severity::Info => self.say(severity, said),
             _ => self.say_in(pane, severity, said),
@@ -123,19 +129,19 @@ impl App {
     }
 
     fn end_stop(&mut self, outcome: StopOutcome) {
-        if let Some(tour) = &mut self.model.tour {
-            tour.outcomes.push(outcome);
+        if let Some(sequence) = &mut self.model.sequence {
+            sequence.outcomes.push(outcome);
         }
         self.next_stop();
     }
 
-    /// The motion of the tour has ended.
-    pub(crate) fn tour_moved(&mut self, outcome: &MotionOutcome) {
-        let Some(tour) = &self.model.tour else { return };
+    /// The motion of the sequence has ended.
+    pub(crate) fn sequence_moved(&mut self, outcome: &MotionOutcome) {
+        let Some(sequence) = &self.model.sequence else { return };
         match outcome {
-            MotionOutcome::Arrived => match tour.purpose {
+            MotionOutcome::Arrived => match sequence.purpose {
                 Some(purpose) => {
-                    let name = tour.current().map(str::to_owned);
+                    let name = sequence.current().map(str::to_owned);
                     self.capture(purpose, name);
                 }
                 None => self.end_stop(StopOutcome::Done),
@@ -146,16 +152,16 @@ impl App {
         }
     }
 
-    /// The capture of the tour is on the disk.
-    pub(crate) fn tour_captured(&mut self) {
-        if self.model.touring {
+    /// The capture of the sequence is on the disk.
+    pub(crate) fn sequence_captured(&mut self) {
+        if self.model.sequence_runs {
             self.end_stop(StopOutcome::Done);
         }
     }
 
     /// There is no capture at this pose.
-    pub(crate) fn tour_refused(&mut self, refused: &CaptureRefused) {
-        if !self.model.touring {
+    pub(crate) fn sequence_refused(&mut self, refused: &CaptureRefused) {
+        if !self.model.sequence_runs {
             return;
         }
         if refused.kind.concerns_the_pose() {
@@ -166,13 +172,13 @@ impl App {
     }
 
     fn break_off(&mut self) {
-        self.model.touring = false;
-        let pane = self.model.tour.as_ref().map_or(Pane::Taught, pane_of);
-        self.say_in(pane, Severity::Warning, text!("The tour was broken off; what was captured is kept"));
+        self.model.sequence_runs = false;
+        let pane = self.model.sequence.as_ref().map_or(Pane::Taught, pane_of);
+        self.say_in(pane, Severity::Warning, text!("The sequence was broken off; what was captured is kept"));
     }
 }
 
 /// Where it says how it went.
-fn pane_of(tour: &Tour) -> Pane {
-    if tour.is_planned() { Pane::Verify } else { Pane::Taught }
+fn pane_of(sequence: &PoseSequence) -> Pane {
+    if sequence.is_planned() { Pane::Verify } else { Pane::Taught }
 }

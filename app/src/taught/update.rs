@@ -114,7 +114,7 @@ impl App {
                 self.moved(self.numbers.motion, MotionOutcome::Refused(why));
             }
             None => {
-                let why = text!("it is not taught any more");
+                let why = text!("it is no longer taught");
                 self.moved(self.numbers.motion, MotionOutcome::Refused(why));
             }
         }

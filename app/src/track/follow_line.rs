@@ -12,12 +12,12 @@ use crate::model::{FollowStatus, FollowWish};
 use crate::text;
 use crate::text::Text;
 
-/// How far \[s\] the motion of the board is thought on from the newest picture: a few pictures, so that one that comes late
+/// How far \[s\] the motion of the board is thought on from the newest image: a few images, so that one that comes late
 /// does not end everything, and less than what an arm at its speed limit makes of a wrong guess.
 const LONGEST_GUESS_S: f64 = 0.4;
 
-/// How long \[s\] an arm that was moved to another place waits there for the board to be seen again: the whole picture is
-/// searched within a few pictures.
+/// How long \[s\] an arm that was moved to another place waits there for the board to be seen again: the whole image is
+/// searched within a few images.
 const PATIENCE_S: f64 = 3.0;
 
 /// What the arm is to do about the board.
@@ -57,7 +57,7 @@ impl FollowLine {
         inner.newest = None;
     }
 
-    /// A picture was tracked.
+    /// An image was tracked.
     pub fn see(&self, update: &Update) {
         self.inner().newest = Some(update.clone());
     }
@@ -147,7 +147,7 @@ impl Inner {
         // The clock of a simulation that is started anew goes back.
         if !(-LONGEST_GUESS_S..=LONGEST_GUESS_S).contains(&ahead_s) {
             return Err(text!(
-                "The newest picture is {age} s old: the camera fell silent",
+                "The newest image is {age} s old: the camera fell silent",
                 age = format!("{ahead_s:.1}")
             ));
         }

@@ -13,18 +13,18 @@ use crate::text::Text;
 /// Points of the history that is shown: half a minute at the usual rates.
 pub const MAX_TRACK_POINTS: usize = 900;
 
-/// What tracking has brought for one picture.
+/// What tracking has brought for one image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracked {
-    /// Number of the picture, see [`crate::model::FrameInfo::number`].
+    /// Number of the image, see [`crate::model::FrameInfo::number`].
     pub frame: u64,
     /// The board.
     pub update: Update,
-    /// From the arrival of the picture to the published pose \[s\].
+    /// From the arrival of the image to the published pose \[s\].
     pub latency_s: f64,
     /// Poses per second.
     pub rate_hz: f64,
-    /// Against where a simulated cell says the board was at the time of the picture.
+    /// Against where a simulated cell says the board was at the time of the image.
     pub error: Option<TrackError>,
     /// The true pose, where the cell publishes it.
     pub truth: Option<Pose<Base, Target>>,
@@ -42,7 +42,7 @@ pub struct TrackError {
 /// One point of the plots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackPoint {
-    /// Time of the picture \[s\].
+    /// Time of the image \[s\].
     pub time_s: f64,
     /// Origin of the board in the base \[m\]; `None` while it is not known.
     pub position_m: Option<[f64; 3]>,
@@ -50,7 +50,7 @@ pub struct TrackPoint {
     pub position_95_m: Option<f64>,
     /// Against the truth.
     pub error: Option<TrackError>,
-    /// From picture to pose \[s\].
+    /// From image to pose \[s\].
     pub latency_s: f64,
 }
 
@@ -94,15 +94,15 @@ pub enum FollowStatus {
 /// Tracking as the window shows it.
 #[derive(Debug, Clone, Default)]
 pub struct TrackState {
-    /// Whether pictures are tracked.
+    /// Whether images are tracked.
     pub on: bool,
     /// What the arm was asked for.
     pub wish: Option<FollowWish>,
     /// What the arm does.
     pub follow: FollowStatus,
-    /// The newest picture.
+    /// The newest image.
     pub newest: Option<Arc<Tracked>>,
-    /// The last pictures, oldest first.
+    /// The last images, oldest first.
     pub history: VecDeque<TrackPoint>,
     /// How the built-in cell moves its board, as far as this program asked for it.
     pub board: BoardMotion,

@@ -101,7 +101,7 @@ impl App {
         }
     }
 
-    /// Following goes on. What was on its way when it ended says nothing any more.
+    /// Following goes on. What was on its way when it ended says nothing now.
     pub(crate) fn follow_goes(&mut self, status: FollowStatus) {
         if self.numbers.follow.is_some() {
             self.model.track.follow = status;

@@ -1,23 +1,23 @@
-//! Tracking the board in live pictures: every picture becomes a pose of the board, for who watches and for the arm.
+//! Tracking the board in live images: every image becomes a pose of the board, for who watches and for the arm.
 
 use std::sync::Arc;
 
 use handeye_core::geometry::frames::{Base, Pose, Target};
 use handeye_core::targets::TargetSpec;
-use handeye_core::track::{Picture, Setup, TrackError as CannotTrack, Tracker};
+use handeye_core::track::{Image, Setup, TrackError as CannotTrack, Tracker};
 
 use super::follow_line::FollowLine;
 use crate::model::{TrackError, Tracked};
 use crate::worker::rate::RateMeter;
 
-/// A picture with what is known of it.
+/// An image with what is known of it.
 pub struct TrackedImage<'a> {
-    /// Counts pictures.
+    /// Counts images.
     pub number: u64,
     /// When it arrived.
     pub received_s: f64,
-    /// The picture.
-    pub picture: Picture<'a>,
+    /// The image.
+    pub image: Image<'a>,
     /// Where the board was, if the cell publishes it; only ever compared with.
     pub base_from_target_true: Option<Pose<Base, Target>>,
 }
@@ -41,12 +41,12 @@ impl Tracking {
         Ok(Self { tracker: Tracker::new(setup)?, target, line, rate: RateMeter::default() })
     }
 
-    /// The board in a picture; `now_s` is on the clock of its arrival.
+    /// The board in an image; `now_s` is on the clock of its arrival.
     ///
     /// # Errors
     /// As [`Tracker::see`].
     pub fn see(&mut self, sight: &TrackedImage<'_>, now_s: &dyn Fn() -> f64) -> Result<Tracked, CannotTrack> {
-        let update = self.tracker.see(&sight.picture)?;
+        let update = self.tracker.see(&sight.image)?;
         self.line.see(&update);
         let published_s = now_s();
         self.rate.arrived(published_s);

@@ -17,7 +17,7 @@ use super::port::{
 use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, RobotState, Simulation};
 use crate::text::Text;
 
-/// Width and height of the fake pictures in pixels.
+/// Width and height of the fake images in pixels.
 pub const SIZE: (u32, u32) = (64, 48);
 
 /// What becomes of the motions of the fake cell.
@@ -34,13 +34,13 @@ pub enum FakeMotions {
 /// What the fake cell does.
 #[derive(Debug)]
 pub struct Script {
-    /// Answers to the next attempts to connect for control or pictures; after the last one they succeed.
+    /// Answers to the next attempts to connect for control or images; after the last one they succeed.
     pub refusals: Vec<PortError>,
     /// Connections break at the next call while this is set.
     pub broken: bool,
-    /// Number of pictures to deliver before time stands still.
+    /// Number of images to deliver before time stands still.
     pub frames_left: u64,
-    /// Pictures delivered.
+    /// Images delivered.
     pub frames: u64,
     /// Whether time advances.
     pub simulation: Simulation,
@@ -72,7 +72,7 @@ pub struct FakeCell {
 }
 
 impl FakeCell {
-    /// Connects at once, delivers `frames` pictures.
+    /// Connects at once, delivers `frames` images.
     pub fn new(frames: u64) -> Self {
         let script = Script {
             refusals: Vec::new(),
@@ -109,7 +109,7 @@ impl FakeCell {
         Arc::strong_count(&self.script)
     }
 
-    /// The colour picture of a number.
+    /// The colour image of a number.
     pub fn rgb(number: u64) -> RgbImage {
         RgbImage::from_fn(SIZE.0, SIZE.1, |column, row| Rgb([column as u8, row as u8, number as u8]))
     }

@@ -1,4 +1,4 @@
-//! Reading and writing that has to do with one click: pictures of a capture, folders, exports, pose files.
+//! Reading and writing that has to do with one click: images of a capture, folders, exports, pose files.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use crate::text;
 
 /// What can be asked for.
 pub enum FileTask {
-    /// The pictures of a capture.
+    /// The images of a capture.
     Review {
         /// The session.
         folder: PathBuf,
@@ -108,7 +108,7 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
 }
 
 fn review(folder: &Path, capture: &CaptureRecord, colours: ColourMap, outlet: &Outlet) {
-    match pictures(folder, capture, colours) {
+    match images(folder, capture, colours) {
         Ok(images) => outlet.report(Event::Review { id: capture.id, images: Some(Arc::new(images)) }),
         Err(why) => {
             let text = text!("Capture {id} cannot be read: {why}", id = capture.id, why = why);
@@ -117,7 +117,7 @@ fn review(folder: &Path, capture: &CaptureRecord, colours: ColourMap, outlet: &O
     }
 }
 
-fn pictures(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<FrameImages, String> {
+fn images(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<FrameImages, String> {
     let session = Session::open(folder).map_err(|error| error.to_string())?;
     let rgb = session.load_rgb(capture).map_err(|error| error.to_string())?;
     let depth = session.load_depth_m(capture).map_err(|error| error.to_string())?;

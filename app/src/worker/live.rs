@@ -12,7 +12,7 @@ use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, Por
 use crate::model::{BoardMotion, CellFacts, CellSource, RobotState, Simulation};
 use crate::motion::live::LiveMotion;
 
-/// Why nothing answers any more.
+/// Why nothing answers now.
 const CLOSED: &str = "the server closed the connection; start it again if it has ended";
 
 /// Connects to the cell that the window was started for.

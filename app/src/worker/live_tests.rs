@@ -113,14 +113,14 @@ fn a_cell_of_this_project_is_called_so_and_its_facts_are_known() {
 }
 
 #[test]
-fn every_pose_of_the_reference_tour_is_reached_at_full_and_at_a_quarter_of_the_speed() {
+fn every_pose_of_the_reference_sequence_is_reached_at_full_and_at_a_quarter_of_the_speed() {
     let mut live = Live::new(false);
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/poses/seed10.toml");
-    let tour = TaughtPoses::read(Path::new(file)).expect("the taught poses");
-    let start: JointAngles = tour.start_joints_rad.expect("a start").try_into().expect("six joints");
+    let sequence = TaughtPoses::read(Path::new(file)).expect("the taught poses");
+    let start: JointAngles = sequence.start_joints_rad.expect("a start").try_into().expect("six joints");
     let mut id = 0;
     for speed in [1.0, 0.25] {
-        let goals = tour.poses.iter().map(|pose| match &pose.goal {
+        let goals = sequence.poses.iter().map(|pose| match &pose.goal {
             Goal::Tip(pose) => MotionGoal::Tip(*pose),
             Goal::Joints(joints) => MotionGoal::Joints(joints.clone().try_into().expect("six joints")),
         });

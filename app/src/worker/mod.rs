@@ -3,11 +3,11 @@
 //! | thread | does | reports through |
 //! | --- | --- | --- |
 //! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
-//! | `camera` | pictures, colours of the depth | events; newest [`LiveFrame`] |
+//! | `camera` | images, colours of the depth | events; newest [`LiveFrame`] |
 //! | `motion` | motions and jogs, one at a time | events; refusals through the [`MotionQueue`] |
-//! | `vision` | board in the newest picture, captures | events; newest [`LiveDetection`]; [`Measured`] |
+//! | `vision` | board in the newest image, captures | events; newest [`LiveDetection`]; [`Measured`] |
 //!
-//! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (pictures,
+//! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (images,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
 
 pub(crate) mod files;
@@ -283,7 +283,7 @@ impl Workers {
         }
     }
 
-    /// No jog button is held any more.
+    /// No jog button is held now.
     pub fn release_jog(&self) {
         self.desk.release();
     }

@@ -42,7 +42,7 @@ pub trait Connector: Send + Sync {
     /// [`PortError`]; within a second after `shutdown` is raised.
     fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError>;
 
-    /// A connection for pictures.
+    /// A connection for images.
     ///
     /// # Errors
     /// As [`Self::connect_control`].
@@ -176,7 +176,7 @@ pub trait MotionPort: Send {
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError>;
 }
 
-/// Pictures as they come from the cell.
+/// Images as they come from the cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawFrame {
     /// Colour, row 0 on top.
@@ -197,13 +197,13 @@ pub struct RawFrame {
 
 /// The camera.
 pub trait CameraPort: Send {
-    /// Simulated time \[s\]: cheap to ask for, and pictures of a time that has been seen are not fetched again.
+    /// Simulated time \[s\]: cheap to ask for, and images of a time that has been seen are not fetched again.
     ///
     /// # Errors
     /// [`PortError`].
     fn sim_time_s(&mut self) -> Result<f64, PortError>;
 
-    /// Fetches the pictures of the present instant.
+    /// Fetches the images of the present instant.
     ///
     /// # Errors
     /// [`PortError`].

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use crossbeam_channel::{Receiver, Sender, bounded};
 
 /// Holds the newest value only. A value that nobody took before the next one came is dropped and counted: a slow
-/// window shows fewer pictures, never old ones, and the one who puts never waits.
+/// window shows fewer images, never old ones, and the one who puts never waits.
 #[derive(Debug)]
 pub struct LatestSlot<T> {
     inner: Mutex<Inner<T>>,

@@ -60,14 +60,14 @@ impl Bench {
 }
 
 #[test]
-fn both_connections_are_made_and_pictures_and_robot_arrive() {
+fn both_connections_are_made_and_images_and_robot_arrive() {
     let cell = FakeCell::new(u64::MAX);
     let mut bench = Bench::built_in(&cell);
     bench.until_link(Link::Control, "control", LinkState::is_connected);
     let Event::Frame { info, images: Some(images), .. } =
-        bench.until("a picture", |event| matches!(event, Event::Frame { .. }))
+        bench.until("an image", |event| matches!(event, Event::Frame { .. }))
     else {
-        panic!("not a picture")
+        panic!("not an image")
     };
     assert_eq!(info.received_s, 7.0);
     assert_eq!(images.depth_coloured.dimensions(), images.rgb.dimensions());
@@ -114,7 +114,7 @@ fn a_connection_that_breaks_is_reported_and_made_again() {
 }
 
 #[test]
-fn the_newest_picture_wins_and_the_others_are_counted() {
+fn the_newest_image_wins_and_the_others_are_counted() {
     let cell = FakeCell::new(5);
     let (wake, woken) = bounded(64);
     let waker: Waker = wakes(wake);
@@ -123,11 +123,11 @@ fn the_newest_picture_wins_and_the_others_are_counted() {
     let workers =
         Workers::start(&CellSource::BuiltIn, &ViewSettings::default(), &connector, bounded(1).0, &clock, &waker)
             .expect("threads");
-    // Nobody drains until the fifth picture has been put; each put wakes.
-    let mut robot_or_picture = 0;
-    while cell.script().frames < 5 || robot_or_picture < 12 {
+    // Nobody drains until the fifth image has been put; each put wakes.
+    let mut robot_or_image = 0;
+    while cell.script().frames < 5 || robot_or_image < 12 {
         woken.recv_timeout(PATIENCE).expect("the workers go on");
-        robot_or_picture += 1;
+        robot_or_image += 1;
     }
     let mut frames = Vec::new();
     workers.drain(|event| {
@@ -135,17 +135,17 @@ fn the_newest_picture_wins_and_the_others_are_counted() {
             frames.push((info.number, dropped, images));
         }
     });
-    let (number, dropped, images) = frames.pop().expect("a picture");
-    assert!(frames.is_empty(), "one picture only");
+    let (number, dropped, images) = frames.pop().expect("an image");
+    assert!(frames.is_empty(), "one image only");
     assert_eq!((number, dropped), (5, 4));
     assert_eq!(images.expect("pixels").rgb, FakeCell::rgb(5));
 }
 
 #[test]
-fn pictures_of_an_instant_that_was_seen_are_not_fetched_again() {
+fn images_of_an_instant_that_was_seen_are_not_fetched_again() {
     let cell = FakeCell::new(2);
     let mut bench = Bench::built_in(&cell);
-    bench.until("the second picture", |event| matches!(event, Event::Frame { info, .. } if info.number == 2));
+    bench.until("the second image", |event| matches!(event, Event::Frame { info, .. } if info.number == 2));
     for _ in 0..5 {
         bench.until("the robot", |event| matches!(event, Event::Robot(_)));
     }

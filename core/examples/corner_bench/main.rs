@@ -16,7 +16,7 @@ use handeye_core::image::GrayImage;
 use handeye_core::targets::observation::Corner;
 use handeye_core::targets::{Grid, TargetSpec};
 use nalgebra::{Matrix2, Vector2};
-use render::{Look, Picture, view};
+use render::{Image, Look, view};
 
 /// A detector by name: the corners in any order, `None` when the board is not found.
 pub struct Detector {
@@ -62,28 +62,28 @@ fn main() {
     ]);
     for (name, look) in cases {
         println!("{name}");
-        let pictures: Vec<Picture> = (0..views).map(|seed| view(&look, seed)).collect();
+        let images: Vec<Image> = (0..views).map(|seed| view(&look, seed)).collect();
         for detector in detectors() {
-            rendered(detector, &look, &pictures);
+            rendered(detector, &look, &images);
         }
     }
     real::all();
 }
 
-fn rendered(detector: &Detector, look: &Look, pictures: &[Picture]) {
+fn rendered(detector: &Detector, look: &Look, images: &[Image]) {
     let grid = Grid { columns: look.columns, rows: look.rows, square_m: 1.0 };
     // Of an odd size it does not have, the board is not there: as much texture, but nothing to find.
     let other = Grid { columns: look.columns + 1, ..grid };
     let (mut found, mut hit_ms, mut miss_ms) = (0, Vec::new(), Vec::new());
     let (mut errors, mut normalised): (Vec<Vector2<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
-    for picture in pictures {
-        miss_ms.push(timed(detector, &picture.image, &other).1);
-        let (corners, ms) = timed(detector, &picture.image, &grid);
+    for image in images {
+        miss_ms.push(timed(detector, &image.image, &other).1);
+        let (corners, ms) = timed(detector, &image.image, &grid);
         let Some(corners) = corners else { continue };
         found += 1;
         hit_ms.push(ms);
         for corner in corners {
-            let nearest = picture.truth.iter().map(|t| corner.px - t).min_by(|a, b| a.norm().total_cmp(&b.norm()));
+            let nearest = image.truth.iter().map(|t| corner.px - t).min_by(|a, b| a.norm().total_cmp(&b.norm()));
             let Some(error) = nearest else { continue };
             errors.push(error);
             if let Some(inverse) = corner.covariance_px2.and_then(Matrix2::try_inverse) {
@@ -100,7 +100,7 @@ fn rendered(detector: &Detector, look: &Look, pictures: &[Picture]) {
         "  {:37} found {found}/{}, RMS per axis {rms:.4} px, worst {worst:.3} px, normalised {unit:.2}, \
          {:.2} ms/MP found, {:.2} ms/MP not found",
         detector.name,
-        pictures.len(),
+        images.len(),
         median_high(hit_ms).unwrap_or(f64::NAN) / megapixels,
         median_high(miss_ms).unwrap_or(f64::NAN) / megapixels
     );

@@ -1,6 +1,6 @@
 //! Chessboards as a camera sees them, with the exact area of every pixel and known corners.
 //!
-//! Pixels are cut along the lines between squares in the undistorted picture; the lens blur is a Gaussian on top.
+//! Pixels are cut along the lines between squares in the undistorted image; the lens blur is a Gaussian on top.
 
 use handeye_core::image::{GrayImage, Luma};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
@@ -48,13 +48,13 @@ impl Look {
     }
 }
 
-pub struct Picture {
+pub struct Image {
     pub image: GrayImage,
     pub truth: Vec<Vector2<f64>>,
 }
 
 /// A view of the board from a random side; squares vary by a fifth either way.
-pub fn view(look: &Look, seed: u64) -> Picture {
+pub fn view(look: &Look, seed: u64) -> Image {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let distance = look.focal_px / look.square_px * rng.random_range(0.8..1.2);
     let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
@@ -73,7 +73,7 @@ pub fn view(look: &Look, seed: u64) -> Picture {
             project(look, &(camera_from_board * Point3::new((i % look.columns) as f64, (i / look.columns) as f64, 0.0)))
         })
         .collect();
-    Picture { image: render(look, &camera_from_board, &mut rng), truth }
+    Image { image: render(look, &camera_from_board, &mut rng), truth }
 }
 
 fn project(look: &Look, p: &Point3<f64>) -> Vector2<f64> {

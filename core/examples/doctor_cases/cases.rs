@@ -210,7 +210,7 @@ fn gross() -> Vec<Case> {
         case("quaternion w last", &order, changed(healthy(TO_HAND, 29), w_last)),
         case("inverted and in millimetres", &unit, changed(healthy(IN_HAND, 30), |p| millimetres(p).inverse())),
         case("w first and in millimetres", &order, changed(healthy(IN_HAND, 31), |p| w_first(millimetres(p)))),
-        case("poses and pictures out of step", &[Code::ShiftedPoses], out_of_step(healthy(IN_HAND, 32))),
+        case("poses and images out of step", &[Code::ShiftedPoses], out_of_step(healthy(IN_HAND, 32))),
     ]
 }
 
@@ -233,7 +233,7 @@ fn hostile() -> Vec<Case> {
         case("one view in motion", &outlier, in_motion(46, &[7], [3e-3, -2e-3, 1e-3, 0.005, 0.004, 0.0])),
         case("three views in motion", &outlier, in_motion(47, &[2, 9, 15], [-3e-3, 2e-3, 4e-3, 0.0, 0.02, 0.01])),
         case(
-            "a pose repeated for two pictures",
+            "a pose repeated for two images",
             &outlier,
             edited(healthy(IN_HAND, 48), |o| o.views[11].base_from_tip = o.views[10].base_from_tip),
         ),

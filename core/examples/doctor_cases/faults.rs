@@ -74,7 +74,7 @@ pub fn faulty(fault: usize, seed: u64) -> (Observations, FindingCode) {
             (session(&setup.with(Fault { joint: Some((3, offset)), ..Fault::default() })), FindingCode::JointOffset)
         }
         3 => {
-            // A picture one frame of 30 Hz late, of an arm at 0.1 m/s and 10°/s.
+            // An image one frame of 30 Hz late, of an arm at 0.1 m/s and 10°/s.
             let motion = twist(direction(&mut rng) * 3.3e-3, direction(&mut rng) * 0.33f64.to_radians());
             let moving = vec![(rng.random_range(0..20), motion)];
             (session(&setup.with(Fault { moving, ..Fault::default() })), FindingCode::OutlierView)

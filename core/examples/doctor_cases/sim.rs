@@ -1,4 +1,4 @@
-//! Sessions of a simulated cell with known faults: poses and corners, no pictures.
+//! Sessions of a simulated cell with known faults: poses and corners, no images.
 
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView};

@@ -28,7 +28,7 @@ pub struct Answer {
     /// How the error is distributed in units of the covariance.
     pub small_sample: SmallSample,
     pub noise: Noise,
-    /// Views that were set aside.
+    /// Views that were left out as outliers.
     pub aside: usize,
     pub tip_error_95_m: f64,
     /// Where that error is stated, camera coordinates.

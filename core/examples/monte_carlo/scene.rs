@@ -199,7 +199,7 @@ impl Trial {
         }
     }
 
-    /// The board slides in its plane while this picture is taken. Corners that leave the image are lost.
+    /// The board slides in its plane while this image is taken. Corners that leave the image are lost.
     fn move_the_board(&mut self, index: usize, rng: &mut impl Rng) {
         let heading = rng.random_range(0.0..std::f64::consts::TAU);
         let shift = Vector3::new(heading.cos(), heading.sin(), 0.0) * rng.random_range(0.005..0.02);

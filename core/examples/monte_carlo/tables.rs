@@ -70,7 +70,7 @@ pub fn errors(summaries: &[Summary]) -> String {
 /// Coverage of the stated regions.
 pub fn coverage(summaries: &[Summary]) -> String {
     let mut out = format!(
-        "{LEAD} given: region % | tip % | mean m²/6 | estimated: region % | tip % | mean m²/6 | set aside too many | trials | failed | ms a trial |\n{LEAD_RULE}{}\n",
+        "{LEAD} given: region % | tip % | mean m²/6 | estimated: region % | tip % | mean m²/6 | outliers too many | trials | failed | ms a trial |\n{LEAD_RULE}{}\n",
         " --- |".repeat(10)
     );
     for s in summaries {

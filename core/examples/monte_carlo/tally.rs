@@ -42,7 +42,7 @@ pub struct Judged {
     pub covered: bool,
     /// Whether the stated tip error is not exceeded.
     pub tip_covered: bool,
-    /// Views set aside, less those that are wrong.
+    /// Outlier views, less those that are wrong.
     pub aside: f64,
     /// What the recipes of [`Correction`] make of the estimated noise levels; `None` where they are given or no recipe
     /// has an answer.
@@ -201,7 +201,7 @@ pub struct Performance {
     pub covered: f64,
     pub tip_covered: f64,
     pub mean_mahalanobis2: f64,
-    /// Mean number of views set aside, less those that are wrong.
+    /// Mean number of views left out as an outlier, less those that are wrong.
     pub aside: f64,
     /// Shares of [`Recipes`] in its order: four regions and three tip errors.
     pub recipes: [f64; 7],

@@ -20,7 +20,7 @@ pub struct Answer {
     pub shape: BoardShape,
 }
 
-/// Name of our estimator in tables: wrong views set aside, camera as given, target flat and of the stated size.
+/// Name of our estimator in tables: outlier views left out, camera as given, target flat and of the stated size.
 pub const OURS: &str = "joint";
 
 /// Variants of it that free more.
@@ -80,7 +80,7 @@ impl Choice {
         Self { views, pairs }
     }
 
-    /// The joint estimate from the first closed form that has an answer, wrong views set aside.
+    /// The joint estimate from the first closed form that has an answer, outlier views left out.
     pub fn joint(&self, set: &Set, free: Free) -> Option<Kept> {
         let problem = JointProblem { free, ..JointProblem::new(set.mode, &set.board, &self.views) };
         let own: Vec<_> = self.pairs.iter().map(|pair| pair.camera_from_target).collect();

@@ -1,10 +1,10 @@
-//! The mean of pictures and depths.
+//! The mean of images and depths.
 
 use image::RgbImage;
 
 use crate::depth::{DepthImage, DepthSample};
 
-/// The mean of pictures of one size.
+/// The mean of images of one size.
 ///
 /// Colours are the mean of each channel, rounded to the nearest level (halves up). A depth is the mean of those that
 /// are one; a pixel that never had one stays what the sensor says for no measurement, and is far away when it was far
@@ -28,7 +28,7 @@ struct DepthSum {
 }
 
 impl Average {
-    /// Begins with a pair of pictures; `far_plane_m` as in [`DepthImage::sample`].
+    /// Begins with a pair of images; `far_plane_m` as in [`DepthImage::sample`].
     pub fn begin(rgb: &RgbImage, depth: &DepthImage, far_plane_m: f32) -> Self {
         let depth_size = (depth.width, depth.height);
         let none = DepthSum { metres: 0.0, count: 0, hole: f32::NAN, hole_is_far: false };
@@ -43,12 +43,12 @@ impl Average {
         average
     }
 
-    /// Pictures in it.
+    /// Images in it.
     pub fn frames(&self) -> u32 {
         self.frames
     }
 
-    /// Adds a pair of pictures; `false`, and nothing happens, when their sizes are others.
+    /// Adds a pair of images; `false`, and nothing happens, when their sizes are others.
     pub fn add(&mut self, rgb: &RgbImage, depth: &DepthImage, far_plane_m: f32) -> bool {
         let sizes = (rgb.dimensions(), (depth.width, depth.height), depth.metres.len());
         if sizes != (self.size, self.depth_size, self.depths.len()) {
@@ -77,7 +77,7 @@ impl Average {
     pub fn finish(&self) -> (RgbImage, DepthImage) {
         let frames = self.frames.max(1);
         let levels = self.colours.iter().map(|sum| (sum.saturating_add(frames / 2) / frames) as u8).collect();
-        // The length is that of a picture of this size; an empty picture stands for none.
+        // The length is that of an image of this size; an empty image stands for none.
         let rgb = RgbImage::from_raw(self.size.0, self.size.1, levels).unwrap_or_default();
         let mean = |sum: &DepthSum| {
             if sum.count > 0 { (sum.metres / f64::from(sum.count)) as f32 } else { sum.hole }

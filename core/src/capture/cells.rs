@@ -1,4 +1,4 @@
-//! A picture in a few thousand cells, to see whether it changes.
+//! An image in a few thousand cells, to see whether it changes.
 
 use image::GrayImage;
 
@@ -6,10 +6,10 @@ use image::GrayImage;
 /// changes its cells by more than the noise of their mean.
 const COLUMNS: u32 = 80;
 
-/// Brightness may change by this factor from one picture to another, as lamps and exposure make it; more is a change.
+/// Brightness may change by this factor from one image to another, as lamps and exposure make it; more is a change.
 const GAIN: (f64, f64) = (0.5, 2.0);
 
-/// Means of square cells of a grey picture.
+/// Means of square cells of a grey image.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Cells {
     size: (u32, u32),
@@ -43,12 +43,12 @@ impl Cells {
         self.means.len()
     }
 
-    /// Whether both are of pictures of one size.
+    /// Whether both are of images of one size.
     pub fn fits(&self, other: &Self) -> bool {
         self.size == other.size
     }
 
-    /// Mean absolute difference in grey levels, apart from a change of brightness and contrast of the whole picture:
+    /// Mean absolute difference in grey levels, apart from a change of brightness and contrast of the whole image:
     /// of `other − (gain · self + offset)` with gain and offset by least squares, over `√((1 + gain²) / 2)`, so that
     /// the same noise in both makes the same difference whatever the gain.
     pub fn difference(&self, other: &Self) -> f64 {

@@ -20,7 +20,7 @@ const MIN_EDGES: usize = 3;
 
 /// Largest blur (1σ) as a part of a square's side. The corner fit sees 0.42 of a square to either side of an edge; at
 /// this blur that is 2.8σ, just enough for both levels to be seen, so that contrast and blur can be told apart. By then
-/// noise moves a corner twice as far as in a sharp picture.
+/// noise moves a corner twice as far as in a sharp image.
 pub const MAX_BLUR_SHARE: f64 = 0.15;
 
 /// Blur of the board's edges.

@@ -1,4 +1,4 @@
-//! From the request for a capture to the average of its pictures.
+//! From the request for a capture to the average of its images.
 
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
@@ -9,19 +9,19 @@ use crate::depth::DepthImage;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::targets::observation::Corner;
 
-/// So long \[s\], on the clock of whoever asks, pictures may stay away and simulated time may stand still.
-pub const NO_PICTURES_S: f64 = 2.0;
+/// So long \[s\], on the clock of whoever asks, images may stay away and simulated time may stand still.
+pub const NO_IMAGES_S: f64 = 2.0;
 
-/// Pictures that must have come before robot or picture are said not to come to rest: twice as many as show that they
+/// Images that must have come before robot or image are said not to come to rest: twice as many as show that they
 /// are. A simulation that runs as fast as it can may pass the limit of time between two.
-const FAIR_PICTURES: u32 = 8;
+const FAIR_IMAGES: u32 = 8;
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Pictures to average; 0 counts as 1.
+    /// Images to average; 0 counts as 1.
     pub frames: u32,
-    /// Longest wait for robot and picture to come to rest \[s\], simulated.
+    /// Longest wait for robot and image to come to rest \[s\], simulated.
     pub settle_limit_s: f64,
     /// See [`nearest_similar`] \[m\].
     pub least_distance_m: f64,
@@ -34,13 +34,13 @@ pub struct Plan {
 /// What a capture waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Wait {
-    /// Pictures from after the request.
-    ForPicture,
+    /// Images from after the request.
+    ForImage,
     /// The joints to come to rest.
     RobotMoves,
-    /// The picture to come to rest.
-    PictureChanges,
-    /// More pictures to average.
+    /// The image to come to rest.
+    ImageChanges,
+    /// More images to average.
     Averaging {
         /// So many are there.
         done: u32,
@@ -49,7 +49,7 @@ pub enum Wait {
     },
 }
 
-/// Why there are no pictures to measure.
+/// Why there are no images to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refusal {
     /// The joints did not come to rest.
@@ -59,15 +59,15 @@ pub enum Refusal {
         /// How fast the fastest joint still moves [rad/s].
         rate_rad_s: f64,
     },
-    /// The joints are at rest and the picture is not.
-    PictureChanges {
+    /// The joints are at rest and the image is not.
+    ImageChanges {
         /// How long was waited \[s\], simulated.
         after_s: f64,
     },
     /// Simulated time stands still.
     Paused,
-    /// No pictures come.
-    NoPictures,
+    /// No images come.
+    NoImages,
     /// There is a capture from almost the same pose.
     TooSimilar(Similar),
 }
@@ -75,48 +75,48 @@ pub enum Refusal {
 /// What comes next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress {
-    /// More pictures.
+    /// More images.
     Waits(Wait),
-    /// All pictures are there: [`Machine::finish`].
+    /// All images are there: [`Machine::finish`].
     Complete,
     /// Nothing; it has ended.
     Refused(Refusal),
 }
 
-/// The average of the pictures of a capture.
+/// The average of the images of a capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Taken {
     /// Colour, see [`Average`].
     pub rgb: RgbImage,
     /// Depth.
     pub depth: DepthImage,
-    /// Pictures in the average.
+    /// Images in the average.
     pub frames: u32,
-    /// Simulated time \[s\] from the first picture until everything was at rest.
+    /// Simulated time \[s\] from the first image until everything was at rest.
     pub settled_s: f64,
     /// See [`Scatter::sigma_px`].
     pub corner_noise_px: Option<f64>,
 }
 
-/// Takes in pictures one by one, from the request on, and says what comes next.
+/// Takes in images one by one, from the request on, and says what comes next.
 ///
-/// 1. Pictures that arrived before the request do not count.
-/// 2. [`Watch`] must find joints and picture still over four pictures that do.
+/// 1. Images that arrived before the request do not count.
+/// 2. [`Watch`] must find joints and image still over four images that do.
 /// 3. The last of these is the first of the average. Each further one is held against it: when a joint has turned or the
-///    picture has changed since, all of them are dropped and it goes back to waiting.
+///    image has changed since, all of them are dropped and it goes back to waiting.
 ///
-/// A picture may show the pass before the joints of its instant were read; as nothing moved over three intervals, it
+/// An image may show the pass before the joints of its instant were read; as nothing moved over three intervals, it
 /// shows the arm where the joints say.
 #[derive(Debug)]
 pub struct Machine {
     plan: Plan,
     requested_s: f64,
-    /// When the last picture arrived, and when the last one with a later simulated time did.
+    /// When the last image arrived, and when the last one with a later simulated time did.
     arrived_s: f64,
     advanced_s: f64,
     sim_time_s: Option<f64>,
     settling_s: f64,
-    settling_pictures: u32,
+    settling_images: u32,
     wait: Wait,
     watch: Watch,
     collected: Option<Collected>,
@@ -133,7 +133,7 @@ struct Collected {
 }
 
 impl Machine {
-    /// A request at a time on the clock that pictures arrive by.
+    /// A request at a time on the clock that images arrive by.
     pub fn new(plan: Plan, requested_s: f64) -> Self {
         Self {
             plan,
@@ -142,22 +142,22 @@ impl Machine {
             advanced_s: requested_s,
             sim_time_s: None,
             settling_s: 0.0,
-            settling_pictures: 0,
-            wait: Wait::ForPicture,
+            settling_images: 0,
+            wait: Wait::ForImage,
             watch: Watch::default(),
             collected: None,
             ended: None,
         }
     }
 
-    /// Takes in a picture.
+    /// Takes in an image.
     pub fn see(&mut self, base_from_tip: &Pose<Base, Tip>, shot: &Shot<'_>) -> Progress {
         if self.ended.is_some() || self.is_complete() || shot.received_s < self.requested_s {
             return self.progress();
         }
         self.arrived_s = shot.received_s;
         let passed_s = self.sim_time_s.map(|before_s| shot.sim_time_s - before_s);
-        // A simulation that was started anew counts from its own beginning. Pictures of an instant that was seen, or of
+        // A simulation that was started anew counts from its own beginning. Images of an instant that was seen, or of
         // none, say nothing.
         if passed_s == Some(0.0) || !shot.sim_time_s.is_finite() {
             return self.progress();
@@ -170,7 +170,7 @@ impl Machine {
         self.progress()
     }
 
-    /// Adds a picture to the average. `false` when there is none yet or any more.
+    /// Adds an image to the average. `false` when there is none yet or now.
     fn collect(&mut self, shot: &Shot<'_>) -> bool {
         let Some(collected) = &mut self.collected else { return false };
         let since_s = shot.sim_time_s - collected.reference_s;
@@ -192,7 +192,7 @@ impl Machine {
 
     fn settle(&mut self, base_from_tip: &Pose<Base, Tip>, shot: &Shot<'_>, passed_s: f64) {
         self.settling_s += passed_s;
-        self.settling_pictures = self.settling_pictures.saturating_add(1);
+        self.settling_images = self.settling_images.saturating_add(1);
         let rest = self.watch.see(shot);
         self.waits_for(rest);
         if let Rest::Still { noise } = rest {
@@ -211,12 +211,12 @@ impl Machine {
             self.wait = Wait::Averaging { done: 1, of: self.frames() };
             return;
         }
-        if self.settling_s > self.plan.settle_limit_s && self.settling_pictures >= FAIR_PICTURES {
+        if self.settling_s > self.plan.settle_limit_s && self.settling_images >= FAIR_IMAGES {
             let after_s = self.settling_s;
             self.ended = match rest {
                 Rest::RobotMoves { rate_rad_s } => Some(Refusal::RobotMoves { after_s, rate_rad_s }),
-                Rest::PictureChanges => Some(Refusal::PictureChanges { after_s }),
-                // Nothing moved last; a picture or two more tell.
+                Rest::ImageChanges => Some(Refusal::ImageChanges { after_s }),
+                // Nothing moved last; an image or two more tell.
                 Rest::Unknown | Rest::Still { .. } => None,
             };
         }
@@ -226,23 +226,23 @@ impl Machine {
     fn waits_for(&mut self, rest: Rest) {
         match rest {
             Rest::RobotMoves { .. } => self.wait = Wait::RobotMoves,
-            Rest::PictureChanges => self.wait = Wait::PictureChanges,
+            Rest::ImageChanges => self.wait = Wait::ImageChanges,
             Rest::Unknown | Rest::Still { .. } => {}
         }
     }
 
-    /// Takes in that time has passed: `now_s` on the clock that pictures arrive by. `camera_heard_s` is when the camera
+    /// Takes in that time has passed: `now_s` on the clock that images arrive by. `camera_heard_s` is when the camera
     /// last answered in any way, which tells a simulation that rests from a camera that is gone.
     pub fn pass_time(&mut self, now_s: f64, camera_heard_s: Option<f64>) -> Progress {
-        if self.ended.is_none() && !self.is_complete() && now_s - self.advanced_s > NO_PICTURES_S {
+        if self.ended.is_none() && !self.is_complete() && now_s - self.advanced_s > NO_IMAGES_S {
             let heard_s = camera_heard_s.map_or(self.arrived_s, |heard_s| heard_s.max(self.arrived_s));
-            let answers = heard_s > self.requested_s && now_s - heard_s <= NO_PICTURES_S;
-            self.ended = Some(if answers { Refusal::Paused } else { Refusal::NoPictures });
+            let answers = heard_s > self.requested_s && now_s - heard_s <= NO_IMAGES_S;
+            self.ended = Some(if answers { Refusal::Paused } else { Refusal::NoImages });
         }
         self.progress()
     }
 
-    /// Tells where the board was in the last picture that was taken in. Counts when that picture is in the average.
+    /// Tells where the board was in the last image that was taken in. Counts when that image is in the average.
     pub fn saw_board(&mut self, number: u64, corners: &[Corner]) {
         if let Some(collected) = self.collected.as_mut().filter(|collected| collected.newest == number) {
             collected.scatter.add(corners);

@@ -1,11 +1,11 @@
 use nalgebra::{Isometry3, Vector2, Vector3};
 
-use super::synthetic::{Board, Instant, picture};
+use super::synthetic::{Board, Instant, image};
 use super::{Machine, Plan, Progress, Refusal, Wait};
 use crate::geometry::frames::Pose;
 use crate::targets::observation::Corner;
 
-/// When the capture is asked for; picture 0 arrives at 100 s and one every 0.05 s after.
+/// When the capture is asked for; image 0 arrives at 100 s and one every 0.05 s after.
 const REQUESTED_S: f64 = 100.0;
 const JOINTS: [f64; 6] = [0.1, 0.5, -1.0, 0.0, 1.5, -3.1];
 
@@ -19,7 +19,7 @@ fn plan(frames: u32) -> Plan {
     }
 }
 
-/// Feeds picture after picture until it ends; the progress after each.
+/// Feeds image after image until it ends; the progress after each.
 fn run(machine: &mut Machine, instants: impl Iterator<Item = Instant>) -> Vec<Progress> {
     let mut all = Vec::new();
     for instant in instants {
@@ -32,32 +32,32 @@ fn run(machine: &mut Machine, instants: impl Iterator<Item = Instant>) -> Vec<Pr
     all
 }
 
-/// Pictures of a board at rest, or wherever `shift_px` puts it, with noise.
-fn pictures(noise: f64, shift_px: impl Fn(u64) -> f64) -> impl Iterator<Item = Instant> {
+/// Images of a board at rest, or wherever `shift_px` puts it, with noise.
+fn images(noise: f64, shift_px: impl Fn(u64) -> f64) -> impl Iterator<Item = Instant> {
     (0..100).map(move |number| {
         let board = Board { origin: Board::new().origin + Vector2::new(shift_px(number), 0.0), ..Board::new() };
-        Instant::new(number, &JOINTS, picture(board.size, &board.levels(), noise, number))
+        Instant::new(number, &JOINTS, image(board.size, &board.levels(), noise, number))
     })
 }
 
 #[test]
-fn a_robot_at_rest_is_captured_in_the_fourth_picture_after_the_request() {
+fn a_robot_at_rest_is_captured_in_the_fourth_image_after_the_request() {
     for noise in [0.0, 2.0, 10.0] {
         let mut machine = Machine::new(plan(1), REQUESTED_S);
-        let progress = run(&mut machine, pictures(noise, |_| 0.0));
-        let waiting = Progress::Waits(Wait::ForPicture);
+        let progress = run(&mut machine, images(noise, |_| 0.0));
+        let waiting = Progress::Waits(Wait::ForImage);
         assert_eq!(progress, [waiting, waiting, waiting, Progress::Complete], "noise of {noise} levels");
         let taken = machine.finish().expect("complete");
         assert_eq!(taken.frames, 1);
         assert!((taken.settled_s - 0.15).abs() < 1e-9, "{} s", taken.settled_s);
-        assert_eq!(taken.corner_noise_px, None, "one picture has no scatter");
+        assert_eq!(taken.corner_noise_px, None, "one image has no scatter");
     }
 }
 
 #[test]
-fn pictures_from_before_the_request_do_not_count() {
+fn images_from_before_the_request_do_not_count() {
     let mut machine = Machine::new(plan(1), REQUESTED_S + 10.0 * 0.05 - 0.01);
-    let progress = run(&mut machine, pictures(1.0, |_| 0.0));
+    let progress = run(&mut machine, images(1.0, |_| 0.0));
     assert_eq!(progress.len(), 14, "ten that were there, four that were not");
 }
 
@@ -73,7 +73,7 @@ fn nothing_is_captured_while_a_joint_moves() {
     };
     let feed = |joints: &dyn Fn(u64) -> [f64; 6]| {
         let mut machine = Machine::new(plan(1), REQUESTED_S);
-        let moving: Vec<Instant> = pictures(1.0, |_| 0.0)
+        let moving: Vec<Instant> = images(1.0, |_| 0.0)
             .map(|instant| Instant { joints_rad: joints(instant.number).to_vec(), ..instant })
             .collect();
         run(&mut machine, moving.into_iter())
@@ -88,35 +88,35 @@ fn nothing_is_captured_while_a_joint_moves() {
     // The joint turns through half a turn on its way, which is no jump.
     let settles = feed(&at(0.2, 20));
     assert_eq!(settles.last(), Some(&Progress::Complete));
-    assert_eq!(settles.len(), 24, "picture 20 is where it stands, and three more");
+    assert_eq!(settles.len(), 24, "image 20 is where it stands, and three more");
 }
 
 #[test]
 fn a_joint_that_is_no_number_never_rests() {
     let mut machine = Machine::new(plan(1), REQUESTED_S);
-    let broken = pictures(1.0, |_| 0.0).map(|instant| Instant { joints_rad: vec![f64::NAN; 6], ..instant });
+    let broken = images(1.0, |_| 0.0).map(|instant| Instant { joints_rad: vec![f64::NAN; 6], ..instant });
     let progress = run(&mut machine, broken);
     assert!(matches!(progress.last(), Some(Progress::Refused(Refusal::RobotMoves { .. }))), "{progress:?}");
 }
 
 #[test]
-fn a_picture_that_comes_late_is_waited_for() {
-    // The joints stand, the picture follows: it drifts, then jumps once more, then rests from picture 12 on.
+fn an_image_that_comes_late_is_waited_for() {
+    // The joints stand, the image follows: it drifts, then jumps once more, then rests from image 12 on.
     for noise in [0.0, 2.0] {
         let drift = |number: u64| if number < 12 { 0.1 * number as f64 } else { 2.0 };
         let mut machine = Machine::new(plan(1), REQUESTED_S);
-        let progress = run(&mut machine, pictures(noise, drift));
-        assert!(progress.contains(&Progress::Waits(Wait::PictureChanges)), "{progress:?}");
+        let progress = run(&mut machine, images(noise, drift));
+        assert!(progress.contains(&Progress::Waits(Wait::ImageChanges)), "{progress:?}");
         assert_eq!(progress.last(), Some(&Progress::Complete));
-        assert_eq!(progress.len(), 16, "noise {noise}: pictures 12 to 15 are alike");
+        assert_eq!(progress.len(), 16, "noise {noise}: images 12 to 15 are alike");
     }
 }
 
 #[test]
-fn a_picture_that_never_rests_is_refused_after_the_limit_and_noise_or_flicker_are_no_change() {
+fn an_image_that_never_rests_is_refused_after_the_limit_and_noise_or_flicker_are_no_change() {
     let mut machine = Machine::new(plan(1), REQUESTED_S);
-    let progress = run(&mut machine, pictures(2.0, |number| 0.05 * number as f64));
-    assert!(matches!(progress.last(), Some(Progress::Refused(Refusal::PictureChanges { .. }))), "{progress:?}");
+    let progress = run(&mut machine, images(2.0, |number| 0.05 * number as f64));
+    assert!(matches!(progress.last(), Some(Progress::Refused(Refusal::ImageChanges { .. }))), "{progress:?}");
 
     let board = Board::new();
     let levels = board.levels();
@@ -124,7 +124,7 @@ fn a_picture_that_never_rests_is_refused_after_the_limit_and_noise_or_flicker_ar
     let flickering = (0..100).map(|number| {
         let gain = 1.0 + 0.2 * (2.1 * number as f64).sin();
         let levels: Vec<f64> = levels.iter().map(|level| level * gain).collect();
-        Instant::new(number, &JOINTS, picture(board.size, &levels, 1.5, number))
+        Instant::new(number, &JOINTS, image(board.size, &levels, 1.5, number))
     });
     let mut machine = Machine::new(plan(8), REQUESTED_S);
     let progress = run(&mut machine, flickering);
@@ -132,12 +132,12 @@ fn a_picture_that_never_rests_is_refused_after_the_limit_and_noise_or_flicker_ar
 }
 
 #[test]
-fn what_moves_while_pictures_are_averaged_starts_it_anew() {
+fn what_moves_while_images_are_averaged_starts_it_anew() {
     for by_joint in [true, false] {
-        // At rest, then elsewhere from picture 8 on: a joint by 0.01°, or the picture by a third of a pixel.
+        // At rest, then elsewhere from image 8 on: a joint by 0.01°, or the image by a third of a pixel.
         let mut machine = Machine::new(plan(10), REQUESTED_S);
         let shift = move |number: u64| if number >= 8 && !by_joint { 0.3 } else { 0.0 };
-        let moved = pictures(1.0, shift).map(move |mut instant| {
+        let moved = images(1.0, shift).map(move |mut instant| {
             if by_joint && instant.number >= 8 {
                 instant.joints_rad[2] += 0.01_f64.to_radians();
             }
@@ -146,19 +146,19 @@ fn what_moves_while_pictures_are_averaged_starts_it_anew() {
         let progress = run(&mut machine, moved);
         let averaging = |done| Progress::Waits(Wait::Averaging { done, of: 10 });
         assert_eq!(progress[7], averaging(5));
-        let wait = if by_joint { Wait::RobotMoves } else { Wait::PictureChanges };
+        let wait = if by_joint { Wait::RobotMoves } else { Wait::ImageChanges };
         assert_eq!(progress[8], Progress::Waits(wait));
         assert_eq!(progress.last(), Some(&Progress::Complete));
-        // Pictures 8 to 11 show that it rests, 11 to 20 are the ten.
+        // Images 8 to 11 show that it rests, 11 to 20 are the ten.
         assert_eq!(progress.len(), 21, "{progress:?}");
     }
 }
 
 #[test]
 fn a_slow_creep_is_no_rest_however_slow() {
-    // 0.2 mrad/s is below the limit between two pictures and 0.2 mm at 1 m over a second.
+    // 0.2 mrad/s is below the limit between two images and 0.2 mm at 1 m over a second.
     let mut machine = Machine::new(plan(30), REQUESTED_S);
-    let creeping = pictures(1.0, |_| 0.0).map(|mut instant| {
+    let creeping = images(1.0, |_| 0.0).map(|mut instant| {
         instant.joints_rad[1] += 0.2e-3 * instant.sim_time_s;
         instant
     });
@@ -168,19 +168,19 @@ fn a_slow_creep_is_no_rest_however_slow() {
 
 #[test]
 fn a_simulation_that_rests_is_told_from_a_camera_that_is_gone() {
-    let still = || pictures(1.0, |_| 0.0);
-    // No picture at all.
+    let still = || images(1.0, |_| 0.0);
+    // No image at all.
     let mut machine = Machine::new(plan(1), REQUESTED_S);
-    assert_eq!(machine.pass_time(REQUESTED_S + 1.9, None), Progress::Waits(Wait::ForPicture));
-    assert_eq!(machine.pass_time(REQUESTED_S + 2.1, None), Progress::Refused(Refusal::NoPictures));
-    // The camera answers, and has no new picture.
+    assert_eq!(machine.pass_time(REQUESTED_S + 1.9, None), Progress::Waits(Wait::ForImage));
+    assert_eq!(machine.pass_time(REQUESTED_S + 2.1, None), Progress::Refused(Refusal::NoImages));
+    // The camera answers, and has no new image.
     let mut machine = Machine::new(plan(1), REQUESTED_S);
     assert_eq!(
         machine.pass_time(REQUESTED_S + 2.1, Some(REQUESTED_S + 2.0)),
         Progress::Refused(Refusal::Paused),
         "it was heard after the request"
     );
-    // Pictures come, all of the same instant.
+    // Images come, all of the same instant.
     let mut machine = Machine::new(plan(1), REQUESTED_S);
     for instant in still().map(|instant| Instant { sim_time_s: 7.0, ..instant }).take(60) {
         machine.see(&Pose::identity(), &instant.shot());
@@ -191,13 +191,13 @@ fn a_simulation_that_rests_is_told_from_a_camera_that_is_gone() {
     let mut machine = Machine::new(plan(10), REQUESTED_S);
     let progress = run(&mut machine, still().take(6));
     assert_eq!(progress.last(), Some(&Progress::Waits(Wait::Averaging { done: 3, of: 10 })));
-    assert_eq!(machine.pass_time(REQUESTED_S + 2.4, None), Progress::Refused(Refusal::NoPictures));
+    assert_eq!(machine.pass_time(REQUESTED_S + 2.4, None), Progress::Refused(Refusal::NoImages));
 }
 
 #[test]
 fn a_simulation_started_anew_in_between_is_waited_for() {
     let mut machine = Machine::new(plan(1), REQUESTED_S);
-    let restarted = pictures(1.0, |_| 0.0).map(|instant| match instant.number {
+    let restarted = images(1.0, |_| 0.0).map(|instant| match instant.number {
         0..=2 => Instant { sim_time_s: 50.0 + instant.sim_time_s, ..instant },
         _ => instant,
     });
@@ -207,10 +207,9 @@ fn a_simulation_started_anew_in_between_is_waited_for() {
 }
 
 #[test]
-fn a_simulation_that_races_is_given_enough_pictures() {
-    // 4 s pass from picture to picture, more than the limit.
-    let racing =
-        || pictures(1.0, |_| 0.0).map(|instant| Instant { sim_time_s: 4.0 * instant.number as f64, ..instant });
+fn a_simulation_that_races_is_given_enough_images() {
+    // 4 s pass from image to image, more than the limit.
+    let racing = || images(1.0, |_| 0.0).map(|instant| Instant { sim_time_s: 4.0 * instant.number as f64, ..instant });
     let mut machine = Machine::new(plan(1), REQUESTED_S);
     assert_eq!(run(&mut machine, racing()).len(), 4);
     let mut machine = Machine::new(plan(1), REQUESTED_S);
@@ -232,7 +231,7 @@ fn a_pose_that_there_is_already_is_named_with_its_distance() {
     };
     let refused = |others: Vec<(u32, _)>| {
         let mut machine = Machine::new(Plan { others, ..plan(1) }, REQUESTED_S);
-        match run(&mut machine, pictures(1.0, |_| 0.0)).last() {
+        match run(&mut machine, images(1.0, |_| 0.0)).last() {
             Some(Progress::Refused(Refusal::TooSimilar(similar))) => Some(*similar),
             _ => None,
         }
@@ -244,14 +243,14 @@ fn a_pose_that_there_is_already_is_named_with_its_distance() {
 }
 
 #[test]
-fn the_average_has_its_pictures_and_their_scatter_and_no_others() {
+fn the_average_has_its_images_and_their_scatter_and_no_others() {
     let mut machine = Machine::new(plan(16), REQUESTED_S);
     let corner = |number: u64| Corner::new(0, Vector2::new(if number.is_multiple_of(2) { 1.0 } else { -1.0 }, 5.0));
     let mut sum = 0.0;
-    for instant in pictures(3.0, |_| 0.0) {
+    for instant in images(3.0, |_| 0.0) {
         let progress = machine.see(&Pose::identity(), &instant.shot());
         machine.saw_board(instant.number, &[corner(instant.number)]);
-        // A second look at a picture that is not in the average does not count.
+        // A second look at an image that is not in the average does not count.
         machine.saw_board(instant.number + 1, &[corner(7), Corner::new(0, Vector2::new(900.0, 0.0))]);
         if instant.number >= 3 {
             sum += f64::from(instant.grey.get_pixel(5, 5).0[0]);
@@ -265,7 +264,7 @@ fn the_average_has_its_pictures_and_their_scatter_and_no_others() {
     let mean = f64::from(taken.rgb.get_pixel(5, 5).0[0]);
     assert!((mean - sum / 16.0).abs() <= 0.5, "{mean}, {sum}");
     // ±1 in u with 15 degrees of freedom, nothing in v: σ² = 16 / 30.
-    assert!((taken.corner_noise_px.expect("16 pictures") - (16.0_f64 / 30.0).sqrt()).abs() < 1e-12);
+    assert!((taken.corner_noise_px.expect("16 images") - (16.0_f64 / 30.0).sqrt()).abs() < 1e-12);
     assert_eq!(taken.depth.metres[0], 0.5);
     assert!(taken.depth.metres[1].is_nan(), "a hole stays one");
 }

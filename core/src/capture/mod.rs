@@ -1,15 +1,15 @@
-//! Taking a capture: when robot and picture have come to rest, what the average of some pictures is, and whether it is
-//! any good. Decisions only: pictures come in with their times, nothing here waits, reads a clock or knows a thread.
+//! Taking a capture: when robot and image have come to rest, what the average of some images is, and whether it is
+//! any good. Decisions only: images come in with their times, nothing here waits, reads a clock or knows a thread.
 //!
 //! | part | decides |
 //! | --- | --- |
-//! | [`Watch`] | whether joints and picture are at rest |
-//! | [`Average`] | the mean of pictures and depths |
-//! | [`Scatter`] | how much corners differ from picture to picture |
+//! | [`Watch`] | whether joints and image are at rest |
+//! | [`Average`] | the mean of images and depths |
+//! | [`Scatter`] | how much corners differ from image to image |
 //! | [`EdgeBlur`] | how blurred the board's edges are |
 //! | [`nearest_similar`] | whether there is a capture from almost the same pose |
 //! | [`Machine`] | what comes next, from the request to the average |
-//! | [`observe_image`] | corners and blur of a picture, fresh or from a file |
+//! | [`observe_image`] | corners and blur of an image, fresh or from a file |
 
 mod average;
 pub(crate) mod cells;
@@ -23,7 +23,7 @@ mod watch;
 
 pub use crate::capture::edge_blur::{EdgeBlur, MAX_BLUR_SHARE};
 pub use average::Average;
-pub use machine::{Machine, NO_PICTURES_S, Plan, Progress, Refusal, Taken, Wait};
+pub use machine::{Machine, NO_IMAGES_S, Plan, Progress, Refusal, Taken, Wait};
 #[cfg(feature = "opencv")]
 pub use observe::{Sighting, observe_gray, observe_image};
 pub use scatter::Scatter;
@@ -34,10 +34,10 @@ use image::{GrayImage, RgbImage};
 
 use crate::depth::DepthImage;
 
-/// A pair of pictures with what is known of its instant.
+/// A pair of images with what is known of its instant.
 #[derive(Debug, Clone, Copy)]
 pub struct Shot<'a> {
-    /// Counts pictures.
+    /// Counts images.
     pub number: u64,
     /// Simulated time \[s\].
     pub sim_time_s: f64,

@@ -1,4 +1,4 @@
-//! What a kept picture is worth: the board's corners and how blurred its edges are.
+//! What a kept image is worth: the board's corners and how blurred its edges are.
 
 use image::{GrayImage, RgbImage};
 
@@ -8,7 +8,7 @@ use crate::project::files::image_file::gray_from_rgb;
 use crate::targets::TargetSpec;
 use crate::targets::observation::Corner;
 
-/// The board in a picture.
+/// The board in an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
     /// Its points in sight.
@@ -17,8 +17,8 @@ pub struct Sighting {
     pub blur: Option<EdgeBlur>,
 }
 
-/// Finds the board with all effort and measures its blur. A capture and a picture read from a file go through here, so
-/// that a session that is opened again gives the numbers that it had. `None` when the board is not in the picture; a
+/// Finds the board with all effort and measures its blur. A capture and an image read from a file go through here, so
+/// that a session that is opened again gives the numbers that it had. `None` when the board is not in the image; a
 /// miss may take some seconds per megapixel.
 ///
 /// # Errors
@@ -27,7 +27,7 @@ pub fn observe_image(rgb: &RgbImage, target: &TargetSpec) -> Result<Option<Sight
     observe_gray(&gray_from_rgb(rgb), target)
 }
 
-/// [`observe_image`] of a picture in grey.
+/// [`observe_image`] of an image in grey.
 ///
 /// # Errors
 /// As [`detect::detect`].

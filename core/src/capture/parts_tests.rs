@@ -4,7 +4,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 
-use super::synthetic::{Board, GRID, picture};
+use super::synthetic::{Board, GRID, image};
 use super::{Average, EdgeBlur, MAX_BLUR_SHARE, Scatter};
 use crate::depth::DepthImage;
 use crate::targets::observation::Corner;
@@ -33,38 +33,38 @@ fn colours_are_averaged_and_rounded_and_depths_leave_holes_out() {
 }
 
 #[test]
-fn the_scatter_is_that_of_one_picture_whatever_the_places_of_the_corners() {
+fn the_scatter_is_that_of_one_image_whatever_the_places_of_the_corners() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let noise = Normal::new(0.0, 0.03).expect("a deviation");
-    for (pictures, tolerance) in [(3, 0.15), (16, 0.06)] {
+    for (images, tolerance) in [(3, 0.15), (16, 0.06)] {
         let mut scatter = Scatter::default();
-        for picture in 0..pictures {
-            // Every third corner is missing from every other picture.
+        for image in 0..images {
+            // Every third corner is missing from every other image.
             let corners: Vec<Corner> = (0..70)
-                .filter(|i| i % 3 > 0 || picture % 2 == 0)
+                .filter(|i| i % 3 > 0 || image % 2 == 0)
                 .map(|index| {
                     let at = Vector2::new(index as f64 * 9.0, 100.0 - index as f64);
                     Corner::new(index, at + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)))
                 })
                 .collect();
-            if picture < 2 {
+            if image < 2 {
                 assert_eq!(scatter.sigma_px(), None);
             }
             scatter.add(&corners);
         }
-        let sigma = scatter.sigma_px().expect("three pictures");
+        let sigma = scatter.sigma_px().expect("three images");
         // Three standard deviations of the estimate.
-        assert!((sigma / 0.03 - 1.0).abs() < tolerance, "{pictures} pictures: {sigma} px");
+        assert!((sigma / 0.03 - 1.0).abs() < tolerance, "{images} images: {sigma} px");
     }
 }
 
 fn measured(board: &Board, noise: f64) -> EdgeBlur {
-    let grey = picture(board.size, &board.levels(), noise, 5);
+    let grey = image(board.size, &board.levels(), noise, 5);
     EdgeBlur::measure(&grey, &board.corners(), &GRID).expect("a board of good size")
 }
 
 #[test]
-fn the_blur_of_edges_is_that_of_the_picture_up_to_the_limit() {
+fn the_blur_of_edges_is_that_of_the_image_up_to_the_limit() {
     for turn_rad in [0.05, 0.4, 0.785, -1.3] {
         for (square_px, sigma_px) in [(20.0, 0.5), (20.0, 1.0), (20.0, 2.0), (20.0, 3.0), (12.0, 1.5), (30.0, 4.0)] {
             for noise in [0.0, 5.0] {
@@ -82,7 +82,7 @@ fn the_blur_of_edges_is_that_of_the_picture_up_to_the_limit() {
 }
 
 #[test]
-fn a_picture_beyond_the_limit_is_too_blurred_and_one_moved_along_rows_as_well() {
+fn an_image_beyond_the_limit_is_too_blurred_and_one_moved_along_rows_as_well() {
     let sharp = Board::new();
     assert!(!measured(&sharp, 2.0).is_too_blurred());
     for sigma_px in [1.15 * MAX_BLUR_SHARE * 20.0, 6.0] {
@@ -97,10 +97,10 @@ fn a_picture_beyond_the_limit_is_too_blurred_and_one_moved_along_rows_as_well() 
 #[test]
 fn a_board_too_small_or_without_contrast_has_no_blur() {
     let tiny = Board { square_px: 4.0, ..Board::new() };
-    let grey = picture(tiny.size, &tiny.levels(), 0.0, 1);
+    let grey = image(tiny.size, &tiny.levels(), 0.0, 1);
     assert_eq!(EdgeBlur::measure(&grey, &tiny.corners(), &GRID), None);
     let board = Board::new();
-    let flat = picture(board.size, &vec![100.0; 320 * 240], 3.0, 1);
+    let flat = image(board.size, &vec![100.0; 320 * 240], 3.0, 1);
     assert_eq!(EdgeBlur::measure(&flat, &board.corners(), &GRID), None);
     let stray = [Corner::new(999, Vector2::new(f64::NAN, 0.0))];
     assert_eq!(EdgeBlur::measure(&flat, &stray, &GRID), None);

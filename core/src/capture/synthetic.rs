@@ -1,4 +1,4 @@
-//! Pictures of a board whose edges are blurred by a Gaussian, and a camera in front of it, for tests.
+//! Images of a board whose edges are blurred by a Gaussian, and a camera in front of it, for tests.
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use nalgebra::{Rotation2, Vector2};
@@ -84,7 +84,7 @@ fn wave(x: f64, sigma: f64, corners: usize) -> f64 {
 }
 
 /// Adds noise and rounds.
-pub fn picture(size: (u32, u32), levels: &[f64], noise: f64, seed: u64) -> GrayImage {
+pub fn image(size: (u32, u32), levels: &[f64], noise: f64, seed: u64) -> GrayImage {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let noise = Normal::new(0.0, noise).expect("a deviation");
     GrayImage::from_fn(size.0, size.1, |u, v| {
@@ -93,7 +93,7 @@ pub fn picture(size: (u32, u32), levels: &[f64], noise: f64, seed: u64) -> GrayI
     })
 }
 
-/// One instant with pictures of its own.
+/// One instant with images of its own.
 #[derive(Debug, Clone)]
 pub struct Instant {
     pub number: u64,

@@ -1,4 +1,4 @@
-//! Whether the robot stands still and the picture has stopped changing.
+//! Whether the robot stands still and the image has stopped changing.
 
 use std::collections::VecDeque;
 
@@ -10,17 +10,17 @@ use super::cells::Cells;
 pub const STILL_RATE_RAD_S: f64 = 1e-3;
 
 /// Over longer intervals \[s\] a joint may not travel further than in this one: what moved and stopped between two
-/// pictures has moved.
+/// images has moved.
 const LONGEST_INTERVAL_S: f64 = 0.05;
 
-/// Pictures closer in simulated time \[s\] than this are one: what settles slowly looks still from one to the next.
+/// Images closer in simulated time \[s\] than this are one: what settles slowly looks still from one to the next.
 const SHORTEST_INTERVAL_S: f64 = 0.03;
 
-/// Pictures that must agree: three intervals. One interval may be the turning point of an oscillation, and a picture
+/// Images that must agree: three intervals. One interval may be the turning point of an oscillation, and an image
 /// may be from the pass before the joints were read.
-const PICTURES: usize = 4;
+const IMAGES: usize = 4;
 
-/// Differences between pictures at rest vary by this part as noise is not quite the same in all of them.
+/// Differences between images at rest vary by this part as noise is not quite the same in all of them.
 const UNEVEN_NOISE: f64 = 0.1;
 
 /// Standard deviation of the absolute value of a normal number as a part of its mean: √(π/2 − 1).
@@ -29,43 +29,43 @@ const SPREAD_OF_ABSOLUTE: f64 = 0.756;
 /// Standard deviations of the mean difference that chance is given.
 const CHANCE: f64 = 5.0;
 
-/// Difference \[grey levels\] that is none: one level in half a percent of the cells, which is how a picture rounds that
+/// Difference \[grey levels\] that is none: one level in half a percent of the cells, which is how an image rounds that
 /// moves by a hundredth of a pixel.
 const NO_DIFFERENCE: f64 = 0.005;
 
-/// How things are after a picture.
+/// How things are after an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rest {
-    /// Too few pictures to tell, and nothing moved in those.
+    /// Too few images to tell, and nothing moved in those.
     Unknown,
     /// A joint moves, the fastest so fast [rad/s].
     RobotMoves {
         /// Its rate.
         rate_rad_s: f64,
     },
-    /// The joints are at rest, the picture is not yet.
-    PictureChanges,
+    /// The joints are at rest, the image is not yet.
+    ImageChanges,
     /// Nothing moves.
     Still {
-        /// Mean absolute difference of two pictures at rest [grey levels]: their noise.
+        /// Mean absolute difference of two images at rest [grey levels]: their noise.
         noise: f64,
     },
 }
 
-/// Watches the last few pictures.
+/// Watches the last few images.
 ///
 /// # Joints
-/// They are at rest when from picture to picture none turns faster than [`STILL_RATE_RAD_S`].
+/// They are at rest when from image to image none turns faster than [`STILL_RATE_RAD_S`].
 ///
-/// # Picture
+/// # Image
 /// Differences (mean absolute, of cells of about 1/80 of the width, apart from brightness) are taken between all pairs
-/// of the last four pictures. Pictures of a scene at rest differ by their noise, and every pair by the same amount,
-/// whatever the noise is like. What moves differs more the further apart two pictures are, and what jumps differs across
-/// the jump only. So the picture is at rest when the largest of the six differences is not larger than the smallest by
+/// of the last four images. Images of a scene at rest differ by their noise, and every pair by the same amount,
+/// whatever the noise is like. What moves differs more the further apart two images are, and what jumps differs across
+/// the jump only. So the image is at rest when the largest of the six differences is not larger than the smallest by
 /// more than chance allows. No level of noise has to be known.
 ///
-/// A motion of the whole picture by a tenth of a pixel between the first and the last of the four is seen at 2 grey
-/// levels of noise. Light that flickers all over the picture is no change; light that flickers in stripes is one.
+/// A motion of the whole image by a tenth of a pixel between the first and the last of the four is seen at 2 grey
+/// levels of noise. Light that flickers all over the image is no change; light that flickers in stripes is one.
 #[derive(Debug, Clone, Default)]
 pub struct Watch {
     seen: VecDeque<Sample>,
@@ -80,7 +80,7 @@ struct Sample {
 }
 
 impl Watch {
-    /// Takes in a picture. One that is not later than the last by enough changes nothing; one that is earlier begins
+    /// Takes in an image. One that is not later than the last by enough changes nothing; one that is earlier begins
     /// anew, as the simulation has.
     pub fn see(&mut self, shot: &Shot<'_>) -> Rest {
         if !shot.sim_time_s.is_finite() {
@@ -100,7 +100,7 @@ impl Watch {
         if matches!(rest, Rest::RobotMoves { .. }) {
             self.seen.clear();
         }
-        if self.seen.len() == PICTURES {
+        if self.seen.len() == IMAGES {
             self.seen.pop_front();
         }
         self.seen.push_back(seen);
@@ -115,20 +115,20 @@ impl Watch {
         if !at_rest(travel_rad, interval_s) {
             return Rest::RobotMoves { rate_rad_s: travel_rad / interval_s };
         }
-        let mut pictures: Vec<&Cells> = self.seen.iter().rev().take(PICTURES - 1).map(|seen| &seen.cells).collect();
-        if pictures.len() + 1 < PICTURES {
+        let mut images: Vec<&Cells> = self.seen.iter().rev().take(IMAGES - 1).map(|seen| &seen.cells).collect();
+        if images.len() + 1 < IMAGES {
             return Rest::Unknown;
         }
-        pictures.push(&new.cells);
+        images.push(&new.cells);
         let differences =
-            (0..PICTURES).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| pictures[i].difference(pictures[j]));
+            (0..IMAGES).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| images[i].difference(images[j]));
         let (least, most) =
             differences.fold((f64::INFINITY, 0.0), |(least, most), d| (f64::min(least, d), f64::max(most, d)));
-        if most <= limit(least, new.cells.count()) { Rest::Still { noise: least } } else { Rest::PictureChanges }
+        if most <= limit(least, new.cells.count()) { Rest::Still { noise: least } } else { Rest::ImageChanges }
     }
 }
 
-/// Largest difference of pictures whose noise makes `noise` of difference.
+/// Largest difference of images whose noise makes `noise` of difference.
 fn limit(noise: f64, cells: usize) -> f64 {
     let chance = CHANCE * SPREAD_OF_ABSOLUTE / (cells.max(1) as f64).sqrt();
     noise * (1.0 + UNEVEN_NOISE + chance) + NO_DIFFERENCE
@@ -149,7 +149,7 @@ fn travel_rad(from: &[f64], to: &[f64]) -> f64 {
     from.iter().zip(to).map(turn).fold(0.0, |most, turn| if turn > most || turn.is_nan() { turn } else { most })
 }
 
-/// What pictures of an average are held against: joints and picture as they were when everything was at rest.
+/// What images of an average are held against: joints and image as they were when everything was at rest.
 #[derive(Debug, Clone)]
 pub(super) struct Reference {
     joints_rad: Vec<f64>,
@@ -158,12 +158,12 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Of the picture after which [`Watch`] found everything still, with the noise it found.
+    /// Of the image after which [`Watch`] found everything still, with the noise it found.
     pub fn new(shot: &Shot<'_>, noise: f64) -> Self {
         Self { joints_rad: shot.joints_rad.to_vec(), cells: Cells::of(shot.grey), noise }
     }
 
-    /// How a later picture differs from it. The joints may have turned by as much as in one interval at rest, however
+    /// How a later image differs from it. The joints may have turned by as much as in one interval at rest, however
     /// long ago it was.
     pub fn compare(&self, shot: &Shot<'_>, interval_s: f64) -> Rest {
         let travel_rad = travel_rad(&self.joints_rad, shot.joints_rad);
@@ -175,6 +175,6 @@ impl Reference {
             let difference = self.cells.difference(&cells);
             difference <= limit(self.noise, cells.count())
         };
-        if same { Rest::Still { noise: self.noise } } else { Rest::PictureChanges }
+        if same { Rest::Still { noise: self.noise } } else { Rest::ImageChanges }
     }
 }

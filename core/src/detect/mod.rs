@@ -16,7 +16,7 @@ pub use crate::detect::markers::charuco::charuco_layout;
 
 /// Why there is no detection.
 ///
-/// A board that is simply not in the picture is not an error: [`detect`] returns `None`.
+/// A board that is simply not in the image is not an error: [`detect`] returns `None`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VisionError {
@@ -35,9 +35,9 @@ pub enum VisionError {
         #[from]
         source: crate::targets::BadTarget,
     },
-    /// The board in the picture has its markers in the other squares.
+    /// The board in the image has its markers in the other squares.
     #[error(
-        "the target is said to have the {stated} layout, the ChArUco board in the picture has the {seen} one: write \
+        "the target is said to have the {stated} layout, the ChArUco board in the image has the {seen} one: write \
          layout = \"{seen}\", or leave it out"
     )]
     OtherLayout {

@@ -10,7 +10,7 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::planar_pose::simulated::looking_at;
 use crate::targets::Grid;
 
-/// A picture of a chessboard by a pinhole camera.
+/// An image of a chessboard by a pinhole camera.
 pub(crate) struct Scene {
     pub camera: Intrinsics,
     pub grid: Grid,

@@ -109,7 +109,7 @@ fn a_lens_that_bends_the_board_does_not_move_its_corners() {
     }
 }
 
-/// Corners that are at least so far inside of what is left of the picture must be found: their tags or markers are wholly
+/// Corners that are at least so far inside of what is left of the image must be found: their tags or markers are wholly
 /// in sight.
 const CLEAR_PX: f64 = 80.0;
 

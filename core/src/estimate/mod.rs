@@ -133,7 +133,7 @@ impl Method {
 /// What may be changed about a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Options {
-    /// Keep views and corners that do not fit the others; without it they are set aside and named.
+    /// Keep views and corners that do not fit the others; without it they are left out as outliers and named.
     pub keep_outliers: bool,
     /// Estimate the true size of the target, which the robot's translations tell.
     pub free_scale: bool,
@@ -311,7 +311,7 @@ pub struct ViewResult {
     pub camera_from_target: Option<Pose<Camera, Target>>,
     /// How far the view is from what the others expect of it; of the joint estimate only.
     pub distance: Option<Distance>,
-    /// Corners of it that were set aside, by their index.
+    /// Corners of it that were left out as outliers, by their index.
     pub corners_aside: Vec<usize>,
     /// Whether its target was numbered from the other end than detected, to agree with the others.
     pub renumbered: bool,
@@ -354,7 +354,7 @@ pub enum ViewStatus {
     Used,
     /// The caller left it out.
     Excluded,
-    /// It does not fit the others and was set aside; it takes part again with [`Options::keep_outliers`].
+    /// It does not fit the others and was left out as an outlier; it takes part again with [`Options::keep_outliers`].
     Outlier,
     /// The target was not found in it.
     NoTarget,

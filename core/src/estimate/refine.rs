@@ -1,4 +1,4 @@
-//! The joint estimate within a calibration: its start, what is set aside, and which unknowns the data support.
+//! The joint estimate within a calibration: its start, outliers, and which unknowns the data support.
 
 use nalgebra::Isometry3;
 

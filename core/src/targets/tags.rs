@@ -45,7 +45,7 @@ pub struct Charuco {
     pub marker_m: f64,
     /// Family of the markers.
     pub dictionary: Dictionary,
-    /// Which squares have the markers; told apart from each picture where it is not said.
+    /// Which squares have the markers; told apart from each image where it is not said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layout: Option<Layout>,
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 
 use super::pose;
-use super::{BoardDetection, ByDepth, Picture};
+use super::{BoardDetection, ByDepth, Image};
 use crate::depth::{DepthImage, DepthSample};
 use crate::geometry::frames::{Base, Camera, PointIn, Pose};
 use crate::geometry::se3;
@@ -35,16 +35,16 @@ struct Point {
 /// The board by the depths at the corners `seen`; `None` when fewer than four corners, or corners on one line only, have
 /// one. The pose by corners serves to tell depths of the board from depths of something else, no more.
 pub(super) fn by_depth(
-    picture: &Picture<'_>,
+    image: &Image<'_>,
     depth: &DepthImage,
     seen: &BoardDetection,
     calibrated: &Predictor,
     target: &TargetSpec,
 ) -> Option<ByDepth> {
-    let base_from_camera = calibrated.base_from_camera(&picture.base_from_tip);
+    let base_from_camera = calibrated.base_from_camera(&image.base_from_tip);
     let mut points: Vec<Point> = Vec::with_capacity(seen.corners.len());
     for corner in &seen.corners {
-        if let Some(in_camera) = point_at(depth, corner, picture.far_plane_m, calibrated) {
+        if let Some(in_camera) = point_at(depth, corner, image.far_plane_m, calibrated) {
             points.push(Point { index: corner.index, on_board: target.point(corner.index), in_camera });
         }
     }

@@ -30,8 +30,8 @@ fn measured(change: impl Fn(u32, u32, &mut f32)) -> Option<ByDepth> {
     };
     let grey = image::GrayImage::new(640, 480);
     let base_from_tip = stage::base_from_tip();
-    let picture = Picture { time_s: 0.0, grey: &grey, depth: Some(&depth), far_plane_m: FAR_M, base_from_tip };
-    by_depth(&picture, &depth, &seen, &stage::calibrated(), &TargetSpec::Chessboard(GRID))
+    let image = Image { time_s: 0.0, grey: &grey, depth: Some(&depth), far_plane_m: FAR_M, base_from_tip };
+    by_depth(&image, &depth, &seen, &stage::calibrated(), &TargetSpec::Chessboard(GRID))
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //!
 //! First roughly, by the light and dark squares around it; then by fitting the corner model of
 //! [`crate::detect::checkerboard::subpixel`] with the directions of both edges taken from the expected pose. Half a turn about the
-//! corner changes the picture of a corner only where its place is wrong, and errors in directions, blur and contrast
+//! corner changes the image of a corner only where its place is wrong, and errors in directions, blur and contrast
 //! only where it is right; so directions that are off by a degree do not move the corner, and without them the fit costs
 //! a fraction of the full one.
 
@@ -36,14 +36,14 @@ pub(super) struct Found {
 /// next corners.
 const SAMPLES: [f64; 3] = [0.14, 0.22, 0.30];
 /// Least difference \[grey levels\] between the darkest light and the lightest dark square: three deviations of the noise
-/// of a grainy picture.
+/// of a grainy image.
 const MIN_STEP: f64 = 10.0;
 /// Places with more than this part of the best difference make up the middle that counts.
 const PLATEAU: f64 = 0.75;
 /// Largest search step as a part of a square: a third of the plateau of the difference.
 const STEP_PER_SQUARE: f64 = 0.08;
 
-/// As in the full fit: part of a grid step up to which a pixel counts, and the part where the border of the picture
+/// As in the full fit: part of a grid step up to which a pixel counts, and the part where the border of the image
 /// cuts that.
 const CELL_PARTS: [f64; 2] = [0.42, 0.24];
 /// Pixels further from the corner do not count \[px\].

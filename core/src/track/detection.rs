@@ -1,4 +1,4 @@
-//! The board in one picture: corners near where they are expected, or a search of the whole picture.
+//! The board in one image: corners near where they are expected, or a search of the whole image.
 
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3, Vector2};
@@ -27,19 +27,19 @@ const MIN_RADIUS_PX: f64 = 2.0;
 const MAX_RADIUS: f64 = 0.45;
 /// Accuracy of the rough search, 1σ: a part of a square, at least that many pixels.
 const ROUGH: (f64, f64) = (0.03, 0.5);
-/// Accuracy that a corner is not asked to exceed, 1σ [px]: blur and lens change over the picture.
+/// Accuracy that a corner is not asked to exceed, 1σ [px]: blur and lens change over the image.
 const EXACT_PX: f64 = 0.05;
 /// Corners just outside of the board that may be seen by chance. A board shifted by whole squares shows five or more.
 const MAX_BEYOND: usize = 2;
 /// Corners with less than this part of the usual contrast are something else.
 const MIN_CONTRAST_PART: f64 = 0.3;
 /// Reduction of the cost, in variances of a corner, from which the mirrored pose is believed against the expected one: by
-/// chance it happens less than once in a million pictures.
+/// chance it happens less than once in a million images.
 const MIRRORED_BETTER: f64 = 30.0;
 /// Smallest standard deviation of a corner \[px\] that costs are compared with: the grey levels are whole numbers.
 const MIN_SIGMA_PX: f64 = 0.01;
 
-/// The board in a picture.
+/// The board in an image.
 #[derive(Debug, Clone)]
 pub(super) struct Board {
     pub fit: Fit,
@@ -49,7 +49,7 @@ pub(super) struct Board {
     pub first_dark: Option<bool>,
 }
 
-/// What is expected of a picture.
+/// What is expected of an image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Expected {
     pub camera_from_target: Isometry3<f64>,
@@ -210,7 +210,7 @@ impl Eye<'_> {
         }
     }
 
-    /// Searches the whole picture for the whole board. Where the pattern leaves a choice, the numbering nearer to
+    /// Searches the whole image for the whole board. Where the pattern leaves a choice, the numbering nearer to
     /// `expected` counts.
     pub fn anywhere(&self, expected: Option<&Isometry3<f64>>) -> Result<Option<Board>, VisionError> {
         let Some(mut corners) = detect_with(self.image, self.target, DetectOptions::live())? else { return Ok(None) };

@@ -1,10 +1,10 @@
-//! Why a picture cannot be tracked.
+//! Why an image cannot be tracked.
 
 #[cfg(feature = "opencv")]
 use crate::detect::VisionError;
 use crate::geometry::camera::CameraError;
 
-/// Why there is no tracker, or no update. A board that is not in the picture is not an error.
+/// Why there is no tracker, or no update. A board that is not in the image is not an error.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackError {
@@ -39,25 +39,25 @@ pub enum TrackError {
         /// Its value.
         value: f64,
     },
-    /// The time of a picture is not a number.
-    #[error("the time of the picture is {time_s} s, which is no time")]
+    /// The time of an image is not a number.
+    #[error("the time of the image is {time_s} s, which is no time")]
     BadTime {
         /// Its value \[s\].
         time_s: f64,
     },
     /// The pose of the tip is not finite.
-    #[error("the robot pose of the picture at {time_s} s is not finite: read it again with the next picture")]
+    #[error("the robot pose of the image at {time_s} s is not finite: read it again with the next image")]
     NotFinite {
-        /// Time of the picture \[s\].
+        /// Time of the image \[s\].
         time_s: f64,
     },
-    /// Picture and intrinsics are of different sizes.
+    /// Image and intrinsics are of different sizes.
     #[error(
         "the {what} is {width}×{height} and the calibration is for {camera_width}×{camera_height}: choose the camera's \
          resolution of the calibration, or calibrate with this one"
     )]
     OtherSize {
-        /// The picture or its depth image.
+        /// The image or its depth image.
         what: &'static str,
         /// Width \[px\].
         width: u32,

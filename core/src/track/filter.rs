@@ -15,7 +15,7 @@ use super::{Estimate, MotionModel};
 use crate::geometry::frames::{Base, Pose, Target};
 use crate::geometry::se3;
 
-/// Errors that a sight may have: 99.99 % of chi-square with six degrees of freedom. At 30 pictures a second one true sight
+/// Errors that a sight may have: 99.99 % of chi-square with six degrees of freedom. At 30 images a second one true sight
 /// in five minutes is refused.
 const GATE: f64 = 27.86;
 /// Standard deviation of a board's velocity [m/s] and angular velocity [rad/s] before any motion is seen: a brisk hand.
@@ -28,7 +28,7 @@ const MAX_STEPS: f64 = 1000.0;
 
 type Matrix12 = SMatrix<f64, 12, 12>;
 
-/// A board located by one picture.
+/// A board located by one image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BoardPose {
     centre: Vector3<f64>,

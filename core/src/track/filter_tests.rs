@@ -15,7 +15,7 @@ fn centre() -> Point3<f64> {
     Point3::new(0.0675, 0.045, 0.0)
 }
 
-/// A board that moves as the model says, in steps much finer than the pictures.
+/// A board that moves as the model says, in steps much finer than the images.
 struct Board {
     at: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
@@ -42,7 +42,7 @@ impl Board {
         Pose::from_isometry(Isometry3::from_parts(origin.into(), self.rotation))
     }
 
-    /// As a picture would see it: sideways to 0.1 mm, in depth to 0.5 mm, tilted to 2 mrad.
+    /// As an image would see it: sideways to 0.1 mm, in depth to 0.5 mm, tilted to 2 mrad.
     fn seen(&self, rng: &mut ChaCha8Rng) -> BoardPose {
         let sigmas = [1e-4, 1e-4, 5e-4, 2e-3, 2e-3, 3e-4];
         let delta = Vector6::from_fn(|i, _| {
@@ -79,7 +79,7 @@ fn errors_are_of_the_size_that_the_filter_states_for_a_board_that_moves_as_model
             off.dot(&estimate.covariance.cholesky().expect("positive").solve(&off))
         };
         now += squared(&filter, &board);
-        // A quarter of a second without pictures.
+        // A quarter of a second without images.
         board.go_on(&mut rng, 0.25);
         filter.predict(filter.time_s() + 0.25);
         ahead += squared(&filter, &board);
@@ -87,7 +87,7 @@ fn errors_are_of_the_size_that_the_filter_states_for_a_board_that_moves_as_model
     // 6 degrees of freedom a run; 99.9 % of such means lie within this.
     let bound = 3.29 * (2.0 / (6.0 * f64::from(runs))).sqrt();
     let (now, ahead) = (now / 6.0 / f64::from(runs), ahead / 6.0 / f64::from(runs));
-    println!("squared errors over expected: {now:.3} at a picture, {ahead:.3} a quarter second on; bound ±{bound:.3}");
+    println!("squared errors over expected: {now:.3} at an image, {ahead:.3} a quarter second on; bound ±{bound:.3}");
     assert!((now - 1.0).abs() < bound && (ahead - 1.0).abs() < bound);
     assert!(refused <= taken / 1000, "{refused} of {taken} refused");
 }

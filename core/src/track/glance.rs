@@ -1,4 +1,4 @@
-//! Whether a whole chessboard can be in a picture at all, before a search that takes tens of times as long.
+//! Whether a whole chessboard can be in an image at all, before a search that takes tens of times as long.
 //!
 //! On a ring around a chessboard's corner light and dark change four times, so that opposite samples are alike and
 //! samples a quarter turn apart are not. Reference: Bennett & Lasenby 2014, "ChESS — Quick and robust detection of
@@ -18,7 +18,7 @@ const OPPOSITE_PER_NOISE: f64 = 9.0;
 /// Part of the board's corners that must be there: a search needs all, a ring misses some at steep angles.
 const PART: f64 = 0.75;
 
-/// `false` when the picture has clearly fewer corners than a board with `corners`.
+/// `false` when the image has clearly fewer corners than a board with `corners`.
 pub(super) fn may_show(image: &GrayImage, corners: usize) -> bool {
     let need = (PART * corners as f64).ceil() as usize;
     RADII.into_iter().any(|radius| Ring::new(image, radius).is_some_and(|ring| ring.count() >= need))
@@ -107,23 +107,23 @@ mod tests {
     use crate::track::stage::{GRID, Stage, Watch, board_at};
 
     #[test]
-    fn a_picture_without_board_shows_none_and_one_with_a_board_may() {
+    fn an_image_without_board_shows_none_and_one_with_a_board_may() {
         let mut stage = Stage::new();
         let watch = Watch::new();
         for noise in [0.0, 2.0, 5.0, 10.0] {
             stage.noise = noise;
-            assert!(!may_show(&stage.picture(None, 1), GRID.len()), "noise {noise}");
+            assert!(!may_show(&stage.image(None, 1), GRID.len()), "noise {noise}");
             for (distance, blur) in [(-0.2, 2.0), (0.0, 0.3), (0.0, 1.5), (0.4, 0.7)] {
                 stage.blur_px = blur;
                 let board = board_at(Vector3::new(0.0, 0.0, distance), Vector3::new(0.5, 0.2, 0.4));
-                let picture = stage.picture(Some(&watch.camera_from_target(&board)), 2);
-                assert!(may_show(&picture, GRID.len()), "noise {noise}, {distance} m further, blur {blur} px");
+                let image = stage.image(Some(&watch.camera_from_target(&board)), 2);
+                assert!(may_show(&image, GRID.len()), "noise {noise}, {distance} m further, blur {blur} px");
             }
         }
     }
 
     #[test]
-    fn a_picture_smaller_than_the_ring_shows_none() {
+    fn an_image_smaller_than_the_ring_shows_none() {
         assert!(!may_show(&GrayImage::new(5, 5), 9));
         assert!(!may_show(&GrayImage::new(0, 0), 9));
     }

@@ -1,12 +1,12 @@
-//! Following the board from picture to picture: where it is in the base frame, how fast it moves, and how sure that is.
+//! Following the board from image to image: where it is in the base frame, how fast it moves, and how sure that is.
 //!
 //! | part | does |
 //! | --- | --- |
 //! | [`Tracker`] | corners near where they are expected, pose, filter; lost and found |
 //! | [`Keep`] | where the tip has to be, so that the camera keeps its view of the board |
 //!
-//! Nothing here reads a clock or knows a thread: time is the simulated (or recorded) time of the pictures. The tracker
-//! searches pictures, which needs the feature `opencv`; the mathematics that it is made of does not.
+//! Nothing here reads a clock or knows a thread: time is the simulated (or recorded) time of the images. The tracker
+//! searches images, which needs the feature `opencv`; the mathematics that it is made of does not.
 #![cfg_attr(not(feature = "opencv"), expect(dead_code, reason = "the tracker, which uses it, searches with OpenCV"))]
 
 mod by_depth;
@@ -63,12 +63,12 @@ pub struct MotionModel {
     pub coast_s: f64,
 }
 
-/// A picture with its circumstances.
+/// An image with its circumstances.
 #[derive(Debug, Clone, Copy)]
-pub struct Picture<'a> {
-    /// Its time \[s\]; must grow from picture to picture, a step back starts the tracker anew.
+pub struct Image<'a> {
+    /// Its time \[s\]; must grow from image to image, a step back starts the tracker anew.
     pub time_s: f64,
-    /// The picture.
+    /// The image.
     pub grey: &'a GrayImage,
     /// Depth of the same instant and the same camera, where there is one.
     pub depth: Option<&'a DepthImage>,
@@ -90,19 +90,19 @@ pub enum State {
         /// Corners that there are.
         of: usize,
     },
-    /// It is not seen in this picture, and is assumed to go on as it went.
+    /// It is not seen in this image, and is assumed to go on as it went.
     Coasting {
-        /// Time of the last picture in which it was seen \[s\].
+        /// Time of the last image in which it was seen \[s\].
         since_s: f64,
     },
     /// It has not been seen for too long; nothing is known of where it is.
     Lost {
-        /// Time of the last picture in which it was seen \[s\].
+        /// Time of the last image in which it was seen \[s\].
         since_s: f64,
     },
 }
 
-/// The board in one picture alone.
+/// The board in one image alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardDetection {
     /// Corners that are seen; not all of them where the board is partly hidden.
@@ -131,7 +131,7 @@ pub struct ByDepth {
     pub rms_m: f64,
 }
 
-/// Where the board is by all pictures so far.
+/// Where the board is by all images so far.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// For this time \[s\].
@@ -160,17 +160,17 @@ impl Estimate {
     }
 }
 
-/// What a picture has brought.
+/// What an image has brought.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
-    /// Time of the picture \[s\].
+    /// Time of the image \[s\].
     pub time_s: f64,
     /// Whether the board is followed.
     pub state: State,
-    /// This picture alone.
+    /// This image alone.
     pub seen: Option<BoardDetection>,
-    /// The depths of this picture alone.
+    /// The depths of this image alone.
     pub by_depth: Option<ByDepth>,
-    /// All pictures so far; `None` while searching and when lost.
+    /// All images so far; `None` while searching and when lost.
     pub estimate: Option<Estimate>,
 }

@@ -7,7 +7,7 @@ impl Default for MotionModel {
     /// within a time `t`.
     ///
     /// - 0.3 m/s²/√Hz: 1 m/s² that lasts a tenth of a second, which is how a hand starts, stops and turns; some m/s² for
-    ///   a few pictures still pass the gate at 20 pictures a second or more. At 30 pictures a second the board is then
+    ///   a few images still pass the gate at 20 images a second or more. At 30 images a second the board is then
     ///   expected within 1.5 mm (1σ), a tenth of a usual square.
     /// - 1.5 rad/s²/√Hz: 5 rad/s² that last a tenth of a second, the same for a turn.
     /// - 0.5 s: the place expected is then uncertain by 6 cm (1σ), half of a usual board.

@@ -1,15 +1,15 @@
-//! How far corners are off, as far as the pictures tell.
+//! How far corners are off, as far as the images tell.
 
-/// Part of what is known that the next picture leaves: some ten pictures count.
+/// Part of what is known that the next image leaves: some ten images count.
 const FORGET: f64 = 0.9;
 /// Least noise of a corner [px]: the grey levels are whole numbers.
 const MIN_SIGMA_PX: f64 = 0.005;
-/// A picture whose corners are off by more than the calibration states is believed, when chance would do so less than
-/// once in ten thousand pictures.
+/// An image whose corners are off by more than the calibration states is believed, when chance would do so less than
+/// once in ten thousand images.
 const QUANTILE: f64 = 3.72;
 
 /// The variance of one coordinate of a corner: as the calibration states it, or else from the residuals of the last
-/// pictures.
+/// images.
 #[derive(Debug, Clone)]
 pub(super) struct CornerNoise {
     stated_px2: Option<f64>,
@@ -27,7 +27,7 @@ impl CornerNoise {
         (self.cost_px2, self.freedom) = (0.0, 0.0);
     }
 
-    /// Takes the residuals of a picture in (`cost_px2` the sum of their squares over `corners`), and says what variance
+    /// Takes the residuals of an image in (`cost_px2` the sum of their squares over `corners`), and says what variance
     /// \[px²\] its corners have.
     pub fn variance(&mut self, cost_px2: f64, corners: usize) -> f64 {
         let freedom = (2.0 * corners as f64 - 6.0).max(1.0);
@@ -51,20 +51,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_stated_noise_counts_until_a_picture_contradicts_it() {
+    fn the_stated_noise_counts_until_an_image_contradicts_it() {
         let mut noise = CornerNoise::new(Some(0.1));
         assert_eq!(noise.variance(134.0 * 0.01 * 1.2, 70), 0.1 * 0.1);
         assert_eq!(noise.variance(134.0 * 0.04, 70), 134.0 * 0.04 / 134.0);
     }
 
     #[test]
-    fn without_a_stated_noise_the_residuals_of_many_pictures_count() {
+    fn without_a_stated_noise_the_residuals_of_many_images_count() {
         let mut noise = CornerNoise::new(None);
         for _ in 0..100 {
             noise.variance(134.0 * 0.01, 70);
         }
-        let after_one_odd_picture = noise.variance(2.0 * 0.25, 4);
-        assert!((after_one_odd_picture - 0.01).abs() < 0.001, "{after_one_odd_picture}");
+        let after_one_odd_image = noise.variance(2.0 * 0.25, 4);
+        assert!((after_one_odd_image - 0.01).abs() < 0.001, "{after_one_odd_image}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Pictures of a moving board through a lens, for tests: blurred, noisy, partly covered, with depths.
+//! Images of a moving board through a lens, for tests: blurred, noisy, partly covered, with depths.
 
 use image::{GrayImage, Luma};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3};
@@ -6,9 +6,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::{MotionModel, Setup};
 #[cfg(feature = "opencv")]
-use super::{Picture, Tracker, Update};
+use super::{Image, Tracker, Update};
+use super::{MotionModel, Setup};
 use crate::depth::DepthImage;
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::SmallSample;
@@ -19,21 +19,21 @@ use crate::targets::{Grid, TargetSpec};
 use crate::verify::Predictor;
 
 pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
-/// Seconds between pictures.
+/// Seconds between images.
 pub const PERIOD_S: f64 = 1.0 / 30.0;
 pub const FAR_M: f32 = 3.5;
 const PAPER: f64 = 205.0;
 const INK: f64 = 45.0;
 const AROUND: f64 = 120.0;
 
-/// A rectangle of one grey in the picture.
+/// A rectangle of one grey in the image.
 #[derive(Debug, Clone, Copy)]
 pub struct Cover {
     pub low: Vector2<f64>,
     pub high: Vector2<f64>,
 }
 
-/// A camera and how its pictures are.
+/// A camera and how its images are.
 pub struct Stage {
     pub camera: Intrinsics,
     pub blur_px: f64,
@@ -44,7 +44,7 @@ pub struct Stage {
     pub depth_noise_m: f64,
     /// Ray of every pixel at depth 1.
     rays: Vec<Vector2<f64>>,
-    /// Normal numbers to draw from: a picture needs 300 000.
+    /// Normal numbers to draw from: an image needs 300 000.
     normals: Vec<f32>,
 }
 
@@ -68,8 +68,8 @@ impl Stage {
         Self { camera, blur_px: 0.7, noise: 2.0, covers: Vec::new(), depth_noise_m: 0.0, rays, normals }
     }
 
-    /// The picture; with no board in it for `None`.
-    pub fn picture(&self, board: Option<&Isometry3<f64>>, seed: u64) -> GrayImage {
+    /// The image; with no board in it for `None`.
+    pub fn image(&self, board: Option<&Isometry3<f64>>, seed: u64) -> GrayImage {
         let (width, height) = (self.camera.width, self.camera.height);
         let on_board: Vec<Option<Vector2<f64>>> =
             self.rays.iter().map(|ray| board.and_then(|board| meet(board, ray)).map(|(at, _)| at)).collect();
@@ -209,10 +209,10 @@ impl Watch {
         *(base_from_camera.inverse() * *base_from_target).isometry()
     }
 
-    /// The next picture, with the board there or with none.
+    /// The next image, with the board there or with none.
     pub fn see(&mut self, board: Option<&Pose<Base, Target>>) -> Update {
         let board = board.map(|b| self.camera_from_target(b));
-        let grey = self.stage.picture(board.as_ref(), self.seed);
+        let grey = self.stage.image(board.as_ref(), self.seed);
         self.show(&grey, None)
     }
 
@@ -220,8 +220,8 @@ impl Watch {
         self.time_s += PERIOD_S;
         self.seed += 1;
         let (time_s, base_from_tip) = (self.time_s, self.base_from_tip);
-        let picture = Picture { time_s, grey, depth, far_plane_m: FAR_M, base_from_tip };
-        self.tracker.see(&picture).expect("a good picture")
+        let image = Image { time_s, grey, depth, far_plane_m: FAR_M, base_from_tip };
+        self.tracker.see(&image).expect("a good image")
     }
 }
 

@@ -1,4 +1,4 @@
-//! From picture to picture: what is expected, what is seen, and whether it can be the board.
+//! From image to image: what is expected, what is seen, and whether it can be the board.
 
 use nalgebra::Matrix6;
 
@@ -6,7 +6,7 @@ use super::by_depth::by_depth;
 use super::detection::{Board, Expected, Eye};
 use super::filter::{BoardPose, Filter};
 use super::noise::CornerNoise;
-use super::{BoardDetection, Estimate, Picture, Setup, State, TrackError, Update};
+use super::{BoardDetection, Estimate, Image, Setup, State, TrackError, Update};
 use crate::geometry::frames::{Base, Camera, Pose};
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardPoints;
@@ -16,17 +16,17 @@ const SEARCH: f64 = 2.5;
 /// Sights that do not fit what is expected but fit each other, after which they are believed: one is a mistake, two may
 /// be the same mistake, three in a row are a board that was moved.
 const SIGHTS_TO_MOVE: usize = 3;
-/// Pictures between two searches of the whole picture in vain: a picture with corners enough, but no whole board, takes
+/// Images between two searches of the whole image in vain: an image with corners enough, but no whole board, takes
 /// several times as long as one with a board.
 const PAUSE: usize = 3;
 /// Blur of the edges before any was measured, 1σ [px]: a lens in focus.
 const USUAL_BLUR_PX: f64 = 0.8;
 
-/// Follows a board. One picture after the other goes in, and where the board is comes out.
+/// Follows a board. One image after the other goes in, and where the board is comes out.
 ///
-/// Every picture is taken by itself first: corners near where the board is expected, or the whole picture searched for the
+/// Every image is taken by itself first: corners near where the board is expected, or the whole image searched for the
 /// whole board where nothing is expected or nothing was found there; then a pose with its covariance. A filter for
-/// constant velocity joins the pictures. The mathematics is in `docs/tracking.md`.
+/// constant velocity joins the images. The mathematics is in `docs/tracking.md`.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     setup: Setup,
@@ -34,12 +34,12 @@ pub struct Tracker {
     filter: Option<Filter>,
     /// Sights that the filter did not believe, and how many.
     elsewhere: Option<(Filter, usize)>,
-    /// Time of the last picture that the filter believed \[s\].
+    /// Time of the last image that the filter believed \[s\].
     believed_s: Option<f64>,
     first_dark: bool,
     blur_px: f64,
     noise: CornerNoise,
-    /// Pictures that are not to be searched as a whole.
+    /// Images that are not to be searched as a whole.
     pause: usize,
     last: Option<Update>,
 }
@@ -83,7 +83,7 @@ impl Tracker {
         &self.setup
     }
 
-    /// Forgets every picture.
+    /// Forgets every image.
     pub fn reset(&mut self) {
         self.filter = None;
         self.elsewhere = None;
@@ -95,39 +95,39 @@ impl Tracker {
         self.last = None;
     }
 
-    /// Takes a picture in. A picture of the same time as the one before changes nothing and gets the same answer; an
+    /// Takes an image in. An image of the same time as the one before changes nothing and gets the same answer; an
     /// earlier one starts the tracker anew.
     ///
-    /// A board that is not in the picture is no error: [`Update::state`] says so.
+    /// A board that is not in the image is no error: [`Update::state`] says so.
     ///
     /// # Errors
     /// [`TrackError::OtherSize`], [`TrackError::NotFinite`], [`TrackError::BadTime`], which leave the tracker as it was;
     /// [`TrackError::Vision`].
-    pub fn see(&mut self, picture: &Picture<'_>) -> Result<Update, TrackError> {
-        self.check(picture)?;
+    pub fn see(&mut self, image: &Image<'_>) -> Result<Update, TrackError> {
+        self.check(image)?;
         if let Some(last) = &self.last {
-            if last.time_s == picture.time_s {
+            if last.time_s == image.time_s {
                 return Ok(last.clone());
             }
-            if last.time_s > picture.time_s {
+            if last.time_s > image.time_s {
                 self.reset();
             }
         }
-        let base_from_camera = self.setup.calibrated.base_from_camera(&picture.base_from_tip);
-        let filter = self.expected(picture.time_s);
-        let board = self.look(picture, &base_from_camera, filter.as_ref())?;
+        let base_from_camera = self.setup.calibrated.base_from_camera(&image.base_from_tip);
+        let filter = self.expected(image.time_s);
+        let board = self.look(image, &base_from_camera, filter.as_ref())?;
         self.filter = filter;
         let seen = board.and_then(|board| self.seen(board, &base_from_camera));
-        let believed = seen.as_ref().is_some_and(|seen| self.believe(picture.time_s, seen));
+        let believed = seen.as_ref().is_some_and(|seen| self.believe(image.time_s, seen));
         if self.filter.is_none() {
             self.elsewhere = None;
         }
         let by_depth = seen
             .as_ref()
-            .zip(picture.depth)
-            .and_then(|(seen, depth)| by_depth(picture, depth, seen, &self.setup.calibrated, &self.setup.target));
+            .zip(image.depth)
+            .and_then(|(seen, depth)| by_depth(image, depth, seen, &self.setup.calibrated, &self.setup.target));
         let update = Update {
-            time_s: picture.time_s,
+            time_s: image.time_s,
             state: self.state(if believed { seen.as_ref() } else { None }),
             seen,
             by_depth,
@@ -138,23 +138,23 @@ impl Tracker {
     }
 
     /// Where the board will be at `time_s` if it goes on as it went, and how sure that is; `None` while nothing is known
-    /// of it, for a time before the last picture, and for one for which it would be lost.
+    /// of it, for a time before the last image, and for one for which it would be lost.
     pub fn at(&self, time_s: f64) -> Option<Estimate> {
         let known_s = self.filter.as_ref()?.time_s();
         (time_s >= known_s).then(|| self.expected(time_s))?.map(|filter| filter.estimate())
     }
 
-    fn check(&self, picture: &Picture<'_>) -> Result<(), TrackError> {
-        let time_s = picture.time_s;
+    fn check(&self, image: &Image<'_>) -> Result<(), TrackError> {
+        let time_s = image.time_s;
         if !time_s.is_finite() {
             return Err(TrackError::BadTime { time_s });
         }
-        if !picture.base_from_tip.is_finite() {
+        if !image.base_from_tip.is_finite() {
             return Err(TrackError::NotFinite { time_s });
         }
         let camera = &self.setup.calibrated.intrinsics;
-        let depth = picture.depth.map(|depth| ("depth image", (depth.width, depth.height)));
-        for (what, (width, height)) in [("picture", picture.grey.dimensions())].into_iter().chain(depth) {
+        let depth = image.depth.map(|depth| ("depth image", (depth.width, depth.height)));
+        for (what, (width, height)) in [("image", image.grey.dimensions())].into_iter().chain(depth) {
             if (width, height) != (camera.width, camera.height) {
                 let (camera_width, camera_height) = (camera.width, camera.height);
                 return Err(TrackError::OtherSize { what, width, height, camera_width, camera_height });
@@ -176,13 +176,13 @@ impl Tracker {
 
     fn look(
         &mut self,
-        picture: &Picture<'_>,
+        image: &Image<'_>,
         base_from_camera: &Pose<Base, Camera>,
         filter: Option<&Filter>,
     ) -> Result<Option<Board>, TrackError> {
         let Setup { target, calibrated, .. } = &self.setup;
-        let eye = Eye { image: picture.grey, target, board: &self.board, camera: &calibrated.intrinsics };
-        let expected = filter.map(|filter| self.in_picture(filter, base_from_camera));
+        let eye = Eye { image: image.grey, target, board: &self.board, camera: &calibrated.intrinsics };
+        let expected = filter.map(|filter| self.in_image(filter, base_from_camera));
         let mut near = None;
         if let Some(expected) = &expected
             && matches!(self.setup.target, TargetSpec::Chessboard(_))
@@ -208,7 +208,7 @@ impl Tracker {
         Ok(board.or(near))
     }
 
-    fn in_picture(&self, filter: &Filter, base_from_camera: &Pose<Base, Camera>) -> Expected {
+    fn in_image(&self, filter: &Filter, base_from_camera: &Pose<Base, Camera>) -> Expected {
         let camera_from_target = *(base_from_camera.inverse() * filter.base_from_target()).isometry();
         let (shift_m, turn_rad) = filter.sigmas();
         let centre = self.setup.target.centre();
@@ -218,7 +218,7 @@ impl Tracker {
         Expected { camera_from_target, radius_px, blur_px: self.blur_px, first_dark: self.first_dark }
     }
 
-    /// Pose and covariance of a board in the picture, and what the next picture can use of it.
+    /// Pose and covariance of a board in the image, and what the next image can use of it.
     fn seen(&mut self, board: Board, base_from_camera: &Pose<Base, Camera>) -> Option<BoardDetection> {
         let inverse = board.fit.information.cholesky()?.inverse();
         let variance = self.noise.variance(board.fit.cost, board.fit.corners.len());

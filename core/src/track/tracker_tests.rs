@@ -31,9 +31,9 @@ fn estimate_of(update: &Update) -> Estimate {
     update.estimate.clone().expect("an estimate")
 }
 
-fn errors_over(pictures: usize, watch: &mut Watch, truth: impl Fn(f64) -> Pose<Base, Target>) -> (Vec<f64>, Vec<f64>) {
+fn errors_over(images: usize, watch: &mut Watch, truth: impl Fn(f64) -> Pose<Base, Target>) -> (Vec<f64>, Vec<f64>) {
     let (mut shifts, mut turns) = (Vec::new(), Vec::new());
-    for _ in 0..pictures {
+    for _ in 0..images {
         let now = truth(watch.time_s + PERIOD_S);
         let update = watch.see(Some(&now));
         assert!(corners_of(&update) > 0, "{:?} at {} s", update.state, update.time_s);
@@ -114,7 +114,7 @@ fn a_board_half_covered_is_followed_by_the_corners_that_are_seen() {
 }
 
 #[test]
-fn a_board_partly_out_of_the_picture_is_followed() {
+fn a_board_partly_out_of_the_image_is_followed() {
     let mut watch = Watch::new();
     let at = |time_s: f64| board_at(Vector3::new(0.1 + 0.09 * time_s, 0.02, 0.0), Vector3::zeros());
     let (mut fewest, mut shifts) = (usize::MAX, Vec::new());
@@ -138,7 +138,7 @@ fn a_board_that_is_gone_is_coasted_then_lost_then_found_without_a_jump_of_veloci
         watch.see(Some(&now));
     }
     let since_s = watch.time_s;
-    let mut previous = estimate_of(&watch.tracker.last.clone().expect("a picture"));
+    let mut previous = estimate_of(&watch.tracker.last.clone().expect("an image"));
     while watch.time_s + PERIOD_S < since_s + MotionModel::default().coast_s {
         let update = watch.see(None);
         assert_eq!(update.state, State::Coasting { since_s });
@@ -160,10 +160,10 @@ fn a_board_that_is_gone_is_coasted_then_lost_then_found_without_a_jump_of_veloci
 }
 
 #[test]
-fn one_wild_picture_does_not_move_the_estimate() {
+fn one_wild_image_does_not_move_the_estimate() {
     let mut watch = Watch::new();
     errors_over(10, &mut watch, |_| still());
-    // The same board elsewhere, for one picture.
+    // The same board elsewhere, for one image.
     let update = watch.see(Some(&board_at(Vector3::new(0.04, 0.03, 0.05), Vector3::new(0.2, 0.1, 0.4))));
     assert!(update.seen.is_some() && matches!(update.state, State::Coasting { .. }), "{:?}", update.state);
     let (shift, turn) = error(&estimate_of(&update).base_from_target, &still());
@@ -173,7 +173,7 @@ fn one_wild_picture_does_not_move_the_estimate() {
 }
 
 #[test]
-fn a_board_that_is_moved_suddenly_is_found_again_within_three_pictures() {
+fn a_board_that_is_moved_suddenly_is_found_again_within_three_images() {
     // Also by whole squares, where the pattern looks the same but for its ends.
     let turned = still().rotation() * Vector3::new(2.0 * GRID.square_m, 0.0, 0.0);
     let by_squares = Isometry3::translation(turned.x, turned.y, turned.z) * still().isometry();
@@ -193,7 +193,7 @@ fn a_board_that_is_moved_suddenly_is_found_again_within_three_pictures() {
 }
 
 #[test]
-fn the_covariance_of_one_picture_is_that_of_its_errors() {
+fn the_covariance_of_one_image_is_that_of_its_errors() {
     // Squared errors over what the covariance expects, of 6 degrees of freedom each: in 99.9 of 100 cases the mean of n
     // lies within 6 (1 ± 3.29 √(2 / 6n)); corners are a little correlated by the grey levels' steps, hence 10 % more.
     let mut total = 0.0;
@@ -212,7 +212,7 @@ fn the_covariance_of_one_picture_is_that_of_its_errors() {
     }
     let mean = total / f64::from(count) / 6.0;
     let bound = 3.29 * (2.0 / (6.0 * f64::from(count))).sqrt() + 0.1;
-    println!("covariance of one picture: {mean:.3} of what is expected, bound ±{bound:.3}");
+    println!("covariance of one image: {mean:.3} of what is expected, bound ±{bound:.3}");
     assert!((mean - 1.0).abs() < bound, "{mean}");
 }
 
@@ -224,13 +224,13 @@ fn the_covariance_of_the_estimate_is_that_of_its_errors_for_boards_that_stand_or
         for run in 0..5 {
             watch.tracker.reset();
             let from_s = watch.time_s;
-            for picture in 0..10 {
+            for image in 0..10 {
                 let t = watch.time_s + PERIOD_S - from_s;
                 let shift = velocity * t + Vector3::new(-0.03, -0.02, 0.01 * f64::from(run));
                 let now = board_at(shift, Vector3::new(0.0, 0.0, f64::from(run)));
                 let estimate = estimate_of(&watch.see(Some(&now)));
                 // Every third: the errors of neighbours belong together.
-                if picture % 3 == 2 {
+                if image % 3 == 2 {
                     let off = crate::geometry::se3::log((estimate.base_from_target.inverse() * now).isometry());
                     total += off.dot(&estimate.covariance.cholesky().expect("positive").solve(&off));
                     count += 6.0;
@@ -277,7 +277,7 @@ fn depths_and_corners_agree_on_where_the_board_is() {
     let mut watch = Watch::new();
     watch.stage.depth_noise_m = 0.5e-3;
     let in_camera = watch.camera_from_target(&still());
-    let grey = watch.stage.picture(Some(&in_camera), 5);
+    let grey = watch.stage.image(Some(&in_camera), 5);
     let depth = watch.stage.depth(&in_camera, 6);
     let by_depth = watch.show(&grey, Some(&depth)).by_depth.expect("depths");
     let (shift, turn) = error(&by_depth.base_from_target, &still());
@@ -288,25 +288,24 @@ fn depths_and_corners_agree_on_where_the_board_is() {
 }
 
 #[test]
-fn pictures_of_another_size_and_poses_that_are_no_numbers_are_refused() {
+fn images_of_another_size_and_poses_that_are_no_numbers_are_refused() {
     let mut tracker = Tracker::new(stage::setup()).expect("a good set-up");
     let grey = GrayImage::new(320, 240);
-    let good =
-        Picture { time_s: 1.0, grey: &grey, depth: None, far_plane_m: 3.5, base_from_tip: stage::base_from_tip() };
+    let good = Image { time_s: 1.0, grey: &grey, depth: None, far_plane_m: 3.5, base_from_tip: stage::base_from_tip() };
     let error = tracker.see(&good).expect_err("refused");
-    assert!(matches!(error, TrackError::OtherSize { what: "picture", width: 320, camera_width: 640, .. }), "{error}");
+    assert!(matches!(error, TrackError::OtherSize { what: "image", width: 320, camera_width: 640, .. }), "{error}");
     let grey = GrayImage::new(640, 480);
-    let good = Picture { grey: &grey, ..good };
-    assert_eq!(tracker.see(&good).expect("a picture").state, State::Searching);
+    let good = Image { grey: &grey, ..good };
+    assert_eq!(tracker.see(&good).expect("an image").state, State::Searching);
     let nowhere = Pose::from_isometry(Isometry3::translation(f64::NAN, 0.0, 0.0));
-    let error = tracker.see(&Picture { base_from_tip: nowhere, ..good }).expect_err("refused");
+    let error = tracker.see(&Image { base_from_tip: nowhere, ..good }).expect_err("refused");
     assert_eq!(
         error.to_string(),
-        "the robot pose of the picture at 1 s is not finite: read it again with the next picture"
+        "the robot pose of the image at 1 s is not finite: read it again with the next image"
     );
-    assert!(matches!(tracker.see(&Picture { time_s: f64::NAN, ..good }), Err(TrackError::BadTime { .. })));
+    assert!(matches!(tracker.see(&Image { time_s: f64::NAN, ..good }), Err(TrackError::BadTime { .. })));
     let depth = crate::depth::DepthImage::new(1, 1, vec![1.0]).expect("one");
-    let error = tracker.see(&Picture { depth: Some(&depth), ..good }).expect_err("refused");
+    let error = tracker.see(&Image { depth: Some(&depth), ..good }).expect_err("refused");
     assert!(matches!(error, TrackError::OtherSize { what: "depth image", .. }), "{error}");
 }
 
@@ -333,7 +332,7 @@ fn set_ups_that_cannot_be_worked_with_are_refused() {
 }
 
 #[test]
-fn a_step_back_in_time_starts_anew_and_a_picture_shown_twice_counts_once() {
+fn a_step_back_in_time_starts_anew_and_an_image_shown_twice_counts_once() {
     let mut watch = Watch::new();
     errors_over(3, &mut watch, |_| still());
     let first = watch.tracker.last.clone();
@@ -344,7 +343,7 @@ fn a_step_back_in_time_starts_anew_and_a_picture_shown_twice_counts_once() {
 }
 
 #[test]
-fn a_sharp_picture_of_exact_coverage_is_followed() {
+fn a_sharp_image_of_exact_coverage_is_followed() {
     use crate::detect::rendered::Scene;
     use crate::geometry::camera::Intrinsics;
     let mut setup = stage::setup();

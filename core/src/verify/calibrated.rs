@@ -103,7 +103,7 @@ impl Predictor {
         )
     }
 
-    /// The board's pose in one picture, by its corners and the shape that the calibration found, from its pose as a flat
+    /// The board's pose in one image, by its corners and the shape that the calibration found, from its pose as a flat
     /// board of the stated size. That a board is 2 % larger than stated puts it 2 % farther away.
     ///
     /// `None` when that puts a corner behind the camera, or a corner is no point of this board.

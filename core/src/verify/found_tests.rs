@@ -104,7 +104,7 @@ fn a_found_scale_predicts_as_well_as_it_says() {
     );
     assert!((0.8..1.25).contains(&mean) && (0.8..1.25).contains(&single), "{mean} {single}");
     assert!(stated >= 17, "{stated}");
-    // A robot of 0.1 mm and 0.02°, which at half a metre is 0.17 mm, and a picture of 0.1 px.
+    // A robot of 0.1 mm and 0.02°, which at half a metre is 0.17 mm, and an image of 0.1 px.
     assert!(centre_m < 0.5e-3, "{centre_m}");
 }
 

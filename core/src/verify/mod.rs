@@ -2,7 +2,7 @@
 //!
 //! The bare chain — reported robot pose and calibration, nothing fitted — predicts where the board is; the corners say
 //! where it was seen. Both are of the board and the joints as the calibration found them. What lies between is the error
-//! that a user of the calibration gets: of the calibration, of the robot and of the picture together. It is an error of
+//! that a user of the calibration gets: of the calibration, of the robot and of the image together. It is an error of
 //! prediction, measured on the board; it is not the residual of any fit.
 
 mod calibrated;
@@ -114,7 +114,7 @@ pub struct CaptureCheck {
     pub name: String,
     /// RMS of the 2-D distances between measured corners and those that the bare chain predicts, pixels.
     pub rms_px: f64,
-    /// The same with the board's pose fitted to this one picture: what of it is corners and lens, pixels.
+    /// The same with the board's pose fitted to this one image: what of it is corners and lens, pixels.
     pub pnp_rms_px: f64,
     /// Every corner against its prediction.
     pub residuals: Vec<CornerResidual>,
@@ -147,7 +147,7 @@ pub struct Verification {
     pub centre_rms_m: f64,
     /// RMS of the angle between the board as seen and as predicted, radians.
     pub orientation_rms_rad: f64,
-    /// Scatter of the board's origin over the captures, each located by robot, calibration and its own picture: RMS
+    /// Scatter of the board's origin over the captures, each located by robot, calibration and its own image: RMS
     /// distance from the mean, metres. In the frame in which the board stands still: the base, or the tip when the
     /// camera does. A board that was moved after the calibration leaves it small while every prediction is wrong by the
     /// same amount. `None` for one capture.

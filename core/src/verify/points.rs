@@ -54,7 +54,7 @@ impl Predictor {
         Ok(self.measured(base_from_tip, Point3::from(ray.into_inner() * (depth_m / ray.z))))
     }
 
-    /// The point of the board's plane that a pixel sees, with the board's pose in this picture by
+    /// The point of the board's plane that a pixel sees, with the board's pose in this image by
     /// [`seen`](Self::seen).
     ///
     /// # Errors

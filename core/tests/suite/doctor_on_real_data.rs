@@ -62,7 +62,7 @@ fn diagnosis(data: &Path, name: &str, detector: &str) -> Diagnosis {
     let observations = Observations {
         mode: dataset.mode,
         target: dataset.target,
-        image_size: dataset.image_size.expect("pictures"),
+        image_size: dataset.image_size.expect("images"),
         camera: CameraKnowledge::Estimate { model: Distortion::BrownConrady([0.0; 5]), start: None },
         views,
     };
@@ -108,7 +108,7 @@ fn good_sets_raise_no_false_alarm() {
     ] {
         let diagnosis = diagnosis(&data, name, detector);
         for finding in diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning) {
-            // In the corners that the set brings along, those of the first picture are three times as far off as those of any
+            // In the corners that the set brings along, those of the first image are three times as far off as those of any
             // other; the second is at its limit.
             let known = ["images/im_26.png", "images/im_17.png"];
             assert!(finding.views.iter().all(|view| known.contains(&view.as_str())), "{name}: {finding}");

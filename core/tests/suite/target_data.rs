@@ -1,4 +1,4 @@
-//! Markers and tags in recorded pictures with published or reference corners.
+//! Markers and tags in recorded images with published or reference corners.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -89,7 +89,7 @@ fn the_tag_of_the_eye_to_hand_set_is_found_in_all_views() {
     println!("PnP rms {rms:.3?} px, apart {apart:.3?} px");
     // References in BASELINES.md: 0.210 px (sub-pixel corners of OpenCV) and 0.219 px (those compared here).
     assert!(median(rms.clone()).is_some_and(|usual| usual < 0.22), "{rms:?}");
-    // Refinements differ by 0.1 to 0.2 px per axis on such pictures; with the two conventions mixed up the median is 0.7 px.
+    // Refinements differ by 0.1 to 0.2 px per axis on such images; with the two conventions mixed up the median is 0.7 px.
     assert!(median(apart.clone()).is_some_and(|usual| usual < 0.45) && apart.iter().all(|d| *d < 1.0), "{apart:?}");
 }
 

@@ -1,4 +1,4 @@
-//! What a session tells of hand-eye transform, place of the board and joint offsets: the linear model at the truth.
+//! What a session says about hand-eye transform, place of the board and joint offsets: the linear model at the truth.
 
 use handeye_core::geometry::frames::Pose;
 use handeye_core::geometry::se3::{adjoint, skew};

@@ -1,4 +1,4 @@
-//! The cell of the public reference scene, for pictures and timings.
+//! The cell of the public reference scene, for images and timings.
 
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_sim_link::cell::render::{BoardSurface, Light, RenderScene, props};

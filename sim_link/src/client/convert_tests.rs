@@ -11,8 +11,8 @@ use super::*;
 type Seen = Pose<Base, Tip>;
 
 #[test]
-fn a_sensor_picture_is_not_mirrored() {
-    // From the sensor: y is up, x is to the left of the picture, z ahead.
+fn a_sensor_image_is_not_mirrored() {
+    // From the sensor: y is up, x is to the left of the image, z ahead.
     let camera_from_sensor = sensor_from_camera().inverse();
     let up = camera_from_sensor.isometry() * Point3::new(0.0, 0.1, 1.0);
     let left = camera_from_sensor.isometry() * Point3::new(0.1, 0.0, 1.0);

@@ -205,7 +205,7 @@ impl Channel {
 
 impl Drop for Channel {
     /// A request socket that lingers, or is not reaped yet, still reports events, and the library's I/O thread would
-    /// wait for ever for a monitor that nobody reads any more. So the reports are switched off first: they go to a
+    /// wait for ever for a monitor that nobody reads now. So the reports are switched off first: they go to a
     /// second monitor, which is told nothing.
     fn drop(&mut self) {
         if let Err(error) = self.request.monitor(&format!("{MONITOR}-{}-off", self.serial), 0) {

@@ -160,7 +160,7 @@ fn the_doctor_answers_for_a_healthy_session_and_for_one_without_an_answer() {
 }
 
 #[test]
-fn a_track_has_a_pose_for_every_picture_and_needs_a_hand_eye_transform() {
+fn a_track_has_a_pose_for_every_image_and_needs_a_hand_eye_transform() {
     let (_home, session) = copy_of_session();
     let result = session.join("result.json");
     let file = session.join("track.json");
@@ -172,7 +172,7 @@ fn a_track_has_a_pose_for_every_picture_and_needs_a_hand_eye_transform() {
         assert!(text(&output.stdout).starts_with("tracked in "), "{}", text(&output.stdout));
         let track: Value = serde_json::from_slice(&std::fs::read(&file).expect("written")).expect("JSON");
         assert_eq!(track["format"], "handeye-track");
-        let frames = track["frames"].as_array().expect("pictures");
+        let frames = track["frames"].as_array().expect("images");
         assert_eq!((frames.len(), track["summary"]["frames"].as_u64()), (5, Some(5)));
         assert!(frames.iter().all(|frame| frame["base_from_target"]["translation_m"].is_array()), "{track:#}");
     }

@@ -1,4 +1,4 @@
-//! Pictures of the cell against the analytic projection of what is in them, with the detector that users have.
+//! Images of the cell against the analytic projection of what is in them, with the detector that users have.
 
 use handeye_core::detect;
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
@@ -56,7 +56,7 @@ fn measure(renderer: &Renderer, camera: &Intrinsics, view: usize) -> Errors {
     };
     let frame = renderer.render(&scene, &Imaging::default(), view as u64);
     let found = detect::detect(&gray_from_rgb(&frame.rgb), &TargetSpec::Chessboard(GRID))
-        .expect("a picture")
+        .expect("an image")
         .unwrap_or_else(|| panic!("the board of view {view} is not found"));
     let mut worst_depth_m: f64 = 0.0;
     let corners = found

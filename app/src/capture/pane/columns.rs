@@ -15,8 +15,8 @@ pub const HEAD: f32 = 36.0;
 /// A column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Column {
-    /// The picture.
-    Picture,
+    /// The image.
+    Image,
     /// Number and pose.
     Name,
     /// Whether it is used.
@@ -56,7 +56,7 @@ impl Default for Sort {
 impl Column {
     /// From left to right.
     pub const ALL: [Self; 10] = [
-        Self::Picture,
+        Self::Image,
         Self::Name,
         Self::Use,
         Self::Purpose,
@@ -71,7 +71,7 @@ impl Column {
     /// Least width in points.
     fn width(self) -> f32 {
         match self {
-            Self::Picture => 54.0,
+            Self::Image => 54.0,
             Self::Name => 92.0,
             Self::Use => 34.0,
             Self::Purpose => 56.0,
@@ -86,7 +86,7 @@ impl Column {
         match self {
             Self::Name => 2.0,
             Self::Flags => 1.5,
-            Self::Picture | Self::Use => 0.0,
+            Self::Image | Self::Use => 0.0,
             _ => 0.6,
         }
     }
@@ -98,7 +98,7 @@ impl Column {
 
     fn name(self, language: Language) -> &'static str {
         match self {
-            Self::Picture => "",
+            Self::Image => "",
             Self::Name => tr!(language, "Pose"),
             Self::Use => tr!(language, "Use"),
             Self::Purpose => tr!(language, "For"),
@@ -122,7 +122,7 @@ impl Column {
 
     fn what(self, language: Language) -> &'static str {
         match self {
-            Self::Picture => "",
+            Self::Image => "",
             Self::Name => tr!(language, "Number of the capture, and the taught pose at which it was taken"),
             Self::Use => tr!(language, "Captures that are not used stay in the session and touch no number"),
             Self::Purpose => tr!(language, "Whether it enters the fit, or verifies it"),
@@ -133,11 +133,11 @@ impl Column {
             ),
             Self::Correction => tr!(
                 language,
-                "By so much the fit moved the reported place of the tip: what the robot seems to be off at this pose"
+                "How far the fit moved the reported place of the tip: what the robot seems to be off at this pose"
             ),
-            Self::Turn => tr!(language, "By so much the fit turned the reported orientation of the tip"),
-            Self::Influence => tr!(language, "By so much the answer moves when this capture is left out"),
-            Self::Noise => tr!(language, "Noise of a corner in this picture, one sigma, measured when it was taken"),
+            Self::Turn => tr!(language, "How far the fit turned the reported orientation of the tip"),
+            Self::Influence => tr!(language, "How far the answer moves when this capture is left out"),
+            Self::Noise => tr!(language, "Noise of a corner in this image, one sigma, measured when it was taken"),
             Self::Flags => tr!(language, "What is remarkable; point at it to read why and what to do"),
         }
     }
@@ -173,7 +173,7 @@ pub fn sorted(rows: &[CaptureRow], sort: Sort) -> Vec<usize> {
         Column::Use => Some(f64::from(u8::from(row.excluded))),
         Column::Purpose => Some(f64::from(u8::from(row.verifies()))),
         Column::Flags => Some(-f64::from(super::flags::weight(row))),
-        Column::Picture | Column::Name => Some(f64::from(row.id.0)),
+        Column::Image | Column::Name => Some(f64::from(row.id.0)),
     };
     order.sort_by(|&a, &b| {
         let by_value = match (number(&rows[a]), number(&rows[b])) {

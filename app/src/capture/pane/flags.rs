@@ -51,13 +51,13 @@ fn why_aside(row: &CaptureRow, language: Language) -> Option<String> {
         Some((mm, deg)) => text!(
             "It does not fit the other captures, so the answer is without it: its board is {mm} mm and {deg}° from where \
              they put it. The arm may still have moved, the board may have been touched, or the pose is of another \
-             picture. Look at its picture and capture this pose again, or keep all views in the result to see the \
+             image. Look at its image and capture this pose again, or keep all views in the result to see the \
              difference.",
             mm = format!("{mm:.2}"),
             deg = format!("{deg:.3}")
         ),
         None => text!(
-            "Its corners are no image of the board, so the answer is without it. Look at its picture: reflections, a \
+            "Its corners are no image of the board, so the answer is without it. Look at its image: reflections, a \
              covered board, wrong columns and rows. Capture this pose again, or keep all views in the result to see the \
              difference."
         ),
@@ -68,7 +68,7 @@ fn why_aside(row: &CaptureRow, language: Language) -> Option<String> {
 /// The same of single corners.
 fn why_corners_aside(row: &CaptureRow, language: Language) -> Option<String> {
     let why = text!(
-        "Corners of this picture that are far from where the rest of it puts them, and which the answer is without: \
+        "Corners of this image that are far from where the rest of it puts them, and which the answer is without: \
          {count}. Look there for reflections and things in front of the board.",
         count = row.corners_aside
     );
@@ -91,7 +91,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         Detected::Unreadable => {
             let why = tr!(
                 language,
-                "The picture of this capture cannot be read from the disk, so it is not used. Delete it and capture this \
+                "The image of this capture cannot be read from the disk, so it is not used. Delete it and capture this \
                  pose again."
             );
             flag(Some(Tone::Bad), tr!(language, "Not readable"), why.to_owned());
@@ -99,19 +99,19 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         Detected::NoBoard => {
             let why = tr!(
                 language,
-                "The board was not found in this picture, so it is not used. Look whether it is wholly in view, sharp and \
+                "The board was not found in this image, so it is not used. Look whether it is wholly in view, sharp and \
                  lit, and whether its columns and rows are right; or delete this capture."
             );
             flag(Some(Tone::Warning), tr!(language, "No board"), why.to_owned());
         }
         Detected::NotYet => {
-            let why = tr!(language, "The board is being looked for in this picture.");
+            let why = tr!(language, "The board is being looked for in this image.");
             flag(Some(Tone::Busy), tr!(language, "Looking…"), why.to_owned());
         }
         Detected::Board => {}
     }
     if let Some(why) = why_aside(row, language) {
-        flag(Some(Tone::Warning), tr!(language, "Set aside"), why);
+        flag(Some(Tone::Warning), tr!(language, "Outlier"), why);
     }
     if let (Some(rms_px), Some(line_px)) = (row.rms_px, circumstances.outlier_line_px)
         && rms_px > line_px
@@ -121,7 +121,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
     {
         let (rms, line) = (format!("{rms_px:.3}"), format!("{line_px:.3}"));
         let why = text!(
-            "Its residual of {rms} px is above the line that you drew at {line} px. Exclude it if its picture is bad.",
+            "Its residual of {rms} px is above the line that you drew at {line} px. Exclude it if its image is bad.",
             rms = rms,
             line = line
         );
@@ -130,7 +130,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
     if row.found.contains(&FindingCode::LargeResidual) {
         let why = tr!(
             language,
-            "Its corners fit much worse than those of the other captures. Look at its picture: blur, a reflection or a \
+            "Its corners fit much worse than those of the other captures. Look at its image: blur, a reflection or a \
              moved board. Then exclude it or capture this pose again."
         );
         flag(Some(Tone::Warning), tr!(language, "Large residual"), why.to_owned());

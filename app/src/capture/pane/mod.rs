@@ -13,13 +13,13 @@ use crate::capture::rows::{self, CaptureTable};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::{self, Marks};
 use crate::gui::style::theme::{Palette, Tone};
-use crate::live::pane::stands_over_picture;
+use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
 use crate::live::textures::Thumbnails;
 use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model};
 use crate::{text, tr};
 
-/// Most pictures that are averaged: more take longer than they help.
+/// Most images that are averaged: more take longer than they help.
 const MOST_FRAMES: u32 = 64;
 /// Height of the line at the bottom that says how captures go.
 const STATUS: f32 = 36.0;
@@ -76,28 +76,28 @@ fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Out
         let words = RichText::new(name).strong().size(15.0).color(Marks::of(ui).on_accent);
         let key = RichText::new(tr!(language, "Space")).size(11.0).color(Marks::of(ui).on_accent.gamma_multiply(0.75));
         let big = Button::new(words).fill(Palette::of(ui).accent).min_size(Vec2::new(130.0, 32.0)).shortcut_text(key);
-        let what = tr!(language, "Waits until robot and picture stand still, then keeps picture, depth and robot pose");
+        let what = tr!(language, "Waits until robot and image stand still, then keeps image, depth and robot pose");
         capture_ui(ui, big, name, what, CapturePurpose::Calibrate);
         let name = tr!(language, "Capture for verification");
         let what = tr!(language, "This capture never enters the fit and tells how good the calibration is");
         capture_ui(ui, Button::new(name).min_size(Vec2::new(0.0, 32.0)), name, what, CapturePurpose::Verify);
         frames_ui(ui, model.view.capture, language, outbox);
-        tour_ui(ui, model, hindrance, outbox);
+        sequence_ui(ui, model, hindrance, outbox);
         selected_ui(ui, model, table, outbox);
     });
 }
 
 /// The whole set from one click: what somebody wants who has never calibrated anything.
-fn tour_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outbox: &mut Outbox) {
+fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outbox: &mut Outbox) {
     let language = model.view.language;
-    if model.touring {
-        if ui.button(tr!(language, "Stop the tour")).clicked() {
-            outbox.send(Command::StopTour);
+    if model.sequence_runs {
+        if ui.button(tr!(language, "Stop the sequence")).clicked() {
+            outbox.send(Command::StopSequence);
         }
         return;
     }
     let count = model.document().taught.len();
-    // With captures in the table the tour is in the pane of the taught poses.
+    // With captures in the table the sequence is in the pane of the taught poses.
     if count == 0 || !model.document().captures.is_empty() {
         return;
     }
@@ -109,7 +109,7 @@ fn tour_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outbox: 
         None => button.on_hover_text(what),
     };
     if button.clicked() {
-        outbox.send(Command::RunTour { purpose: Some(CapturePurpose::Calibrate) });
+        outbox.send(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     }
 }
 
@@ -118,10 +118,10 @@ fn hindrance(model: &Model) -> Option<&'static str> {
     let language = model.view.language;
     if model.capture.is_some() {
         Some(tr!(language, "A capture is under way"))
-    } else if model.touring {
-        Some(tr!(language, "The tour takes the captures now"))
+    } else if model.sequence_runs {
+        Some(tr!(language, "The sequence takes the captures now"))
     } else if !model.camera.is_connected() || model.frame.is_none() {
-        Some(tr!(language, "There are no pictures: connect a cell first"))
+        Some(tr!(language, "There are no images: connect a cell first"))
     } else if !model.control.is_connected() {
         Some(tr!(language, "The robot is not connected"))
     } else {
@@ -130,12 +130,12 @@ fn hindrance(model: &Model) -> Option<&'static str> {
 }
 
 fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: crate::text::Language, outbox: &mut Outbox) {
-    let name = tr!(language, "Pictures to average");
+    let name = tr!(language, "Images to average");
     let mut frames = options.frames;
-    let suffix = if frames == 1 { tr!(language, " picture") } else { tr!(language, " pictures") };
+    let suffix = if frames == 1 { tr!(language, " image") } else { tr!(language, " images") };
     let prefix = tr!(language, "mean of ");
     let drag = DragValue::new(&mut frames).range(1..=MOST_FRAMES).speed(0.1).prefix(prefix).suffix(suffix);
-    let what = tr!(language, "The mean of several pictures has less noise: four pictures halve it");
+    let what = tr!(language, "The mean of several images has less noise: four images halve it");
     let response = ui.add(drag).on_hover_text(what);
     response.widget_info(|| WidgetInfo {
         value: Some(f64::from(frames)),
@@ -162,7 +162,7 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
             text!("{fit} in the fit · {verify} verify · {out} excluded", fit = fit, verify = verify, out = out)
         } else {
             text!(
-                "{fit} in the fit · {aside} set aside · {verify} verify · {out} excluded",
+                "{fit} in the fit · {aside} outliers · {verify} verify · {out} excluded",
                 fit = fit - aside,
                 aside = aside,
                 verify = verify,
@@ -193,9 +193,9 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
     }
 }
 
-/// Why the last capture was refused, once the picture no longer says so.
+/// Why the last capture was refused, once the image no longer says so.
 fn kept_refusal(model: &Model) -> Option<&CaptureRefused> {
-    model.refused.as_ref().filter(|_| !stands_over_picture(model))
+    model.refused.as_ref().filter(|_| !stands_over_image(model))
 }
 
 /// How the capture goes, or why the last one was refused.

@@ -62,7 +62,7 @@ pub fn row_ui(
     for (column, x) in Column::places(place.width()) {
         let cell = Rect::from_x_y_ranges(place.left() + x.min..=place.left() + x.max, place.y_range());
         match column {
-            Column::Picture => picture(ui, model, row, cell, thumbnails),
+            Column::Image => image(ui, model, row, cell, thumbnails),
             Column::Name => title(ui, row, cell),
             Column::Use => use_ui(ui, row, cell, language, outbox),
             Column::Purpose => {
@@ -90,14 +90,14 @@ pub fn row_ui(
 }
 
 fn spoken(row: &CaptureRow, name: &str, language: Language) -> String {
-    let aside = if row.is_aside() { format!(", {}", tr!(language, "set aside")) } else { String::new() };
+    let aside = if row.is_aside() { format!(", {}", tr!(language, "outlier")) } else { String::new() };
     match row.rms_px {
         Some(rms_px) => format!("{name}{aside}, {rms_px:.3} px"),
         None => format!("{name}{aside}"),
     }
 }
 
-fn picture(ui: &Ui, model: &Model, row: &CaptureRow, cell: Rect, thumbnails: &mut Thumbnails) {
+fn image(ui: &Ui, model: &Model, row: &CaptureRow, cell: Rect, thumbnails: &mut Thumbnails) {
     let palette = Palette::of(ui);
     let frame = Rect::from_center_size(cell.center(), Vec2::new(44.0, 33.0));
     match model.observed(row.id) {

@@ -149,12 +149,12 @@ fn a_capture_that_was_set_aside_says_so_with_how_far_it_is_off_and_what_to_do() 
     let first = sorted(&table.rows, Sort { column: Column::Flags, descending: false })[0];
     assert_eq!(table.rows[first].id, sample::OUTLIER, "it is worth looking at before all others");
     let mut pane = pane(model);
-    assert!(pane.sees("3: Set aside") && !pane.sees("4: Set aside"));
-    assert!(pane.sees("9 in the fit · 1 set aside · 2 verify · 0 excluded"));
-    assert!(pane.sees("Capture 3 · pose 3, set aside, 18.000 px"));
+    assert!(pane.sees("3: Outlier") && !pane.sees("4: Outlier"));
+    assert!(pane.sees("9 in the fit · 1 outliers · 2 verify · 0 excluded"));
+    assert!(pane.sees("Capture 3 · pose 3, outlier, 18.000 px"));
     change(pane.model(), |captures| captures[2].excluded = true);
     pane.steps();
-    assert!(pane.sees("3: Excluded") && !pane.sees("set aside"), "who took it out by hand knows");
+    assert!(pane.sees("3: Excluded") && !pane.sees("outlier"), "who took it out by hand knows");
 }
 
 #[test]

@@ -15,7 +15,7 @@ use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use super::cell::SceneArg;
 use super::output::Output;
 use super::{Failure, RerunArg, out, record, rerun_arg, solve};
-use crate::cli::auto::sequence::Tour;
+use crate::cli::auto::sequence::PoseSequence;
 use crate::model::{CaptureOptions, Step, Truth};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
 use crate::session::start::{self, BUILT_IN_ARM};
@@ -102,7 +102,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     recorder.note(Entry::Step(Step::Capture));
     record::document(&recorder, &session);
     record::cell(&recorder, cell.arm(), &truth).map_err(Failure::failed)?;
-    let captured = Tour {
+    let captured = PoseSequence {
         cell: &mut cell,
         plan: &plan,
         options: CaptureOptions { frames: args.frames, ..CaptureOptions::default() },

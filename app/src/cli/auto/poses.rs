@@ -14,7 +14,7 @@ use crate::session::start::REFERENCE_POSES;
 /// How many views `--poses auto` plans.
 const PLANNED_VIEWS: usize = 20;
 
-/// A tour of poses.
+/// A sequence of poses.
 pub struct Plan {
     /// Where the arm begins.
     pub start_joints: Option<[f64; 6]>,
@@ -45,7 +45,7 @@ impl Plan {
             .map(<[f64; 6]>::try_from)
             .transpose()
             .map_err(|_wrong_length| Failure::unusable(anyhow::anyhow!("the start needs six joint angles")))?;
-        let limits = taught.limits.unwrap_or(limits::TOUR);
+        let limits = taught.limits.unwrap_or(limits::SEQUENCE);
         Ok(Self {
             start_joints,
             goals: taught.poses.iter().map(|p| (p.name.clone(), p.goal.clone())).collect(),
@@ -54,7 +54,7 @@ impl Plan {
         })
     }
 
-    /// Views from where the scene says that board and camera are *meant* to be: what a person planning a tour knows.
+    /// Views from where the scene says that board and camera are *meant* to be: what a person planning a sequence knows.
     fn planned(scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
         let mut meant = scene.clone();
         meant.camera.random_offset_mm = 0.0;
@@ -72,8 +72,8 @@ impl Plan {
                 .enumerate()
                 .map(|(i, view)| (format!("planned {}", i + 1), Goal::Joints(view.joints.to_vec())))
                 .collect(),
-            joint_limits: limits::of_joints(&limits::TOUR, 1.0),
-            tip_limits: limits::of_tip(&limits::TOUR, 1.0),
+            joint_limits: limits::of_joints(&limits::SEQUENCE, 1.0),
+            tip_limits: limits::of_tip(&limits::SEQUENCE, 1.0),
         })
     }
 }

@@ -10,7 +10,7 @@ use handeye_sim_link::client::{CallOptions, LinkError};
 
 use super::super::{Failure, record};
 use super::poses::Plan;
-use crate::capture::{self, CaptureEnd, CaptureRequest, Pictures};
+use crate::capture::{self, CaptureEnd, CaptureRequest, Images};
 use crate::model::{CaptureOptions, CapturePurpose, LiveFrame};
 use crate::rerun_log::Recorder;
 use crate::text::Language;
@@ -19,8 +19,8 @@ use crate::text::Language;
 /// be silent, so that a network has some time to come back when the computer wakes up.
 const TRIES: u32 = 3;
 
-/// A tour of the poses of a plan.
-pub struct Tour<'a> {
+/// A sequence of the poses of a plan.
+pub struct PoseSequence<'a> {
     pub cell: &'a mut CellClient,
     pub plan: &'a Plan,
     pub options: CaptureOptions,
@@ -37,41 +37,41 @@ enum Visit {
     Unreached(LinkError),
 }
 
-impl Tour<'_> {
+impl PoseSequence<'_> {
     /// Visits every pose and captures there. A pose that the arm cannot reach, or that gives no capture, is named and
-    /// left out; anything else ends the tour.
+    /// left out; anything else ends the sequence.
     pub fn run(&mut self) -> Result<(), Failure> {
         let plan = self.plan;
         let began = Instant::now();
-        let mut pictures = 0;
+        let mut images = 0;
         self.set_going().map_err(Failure::failed)?;
         if let Some(start) = &plan.start_joints {
-            self.persisting("the start", |tour| {
-                tour.cell.arm().move_to_joints(start, &plan.joint_limits, tour.cancel)
+            self.persisting("the start", |sequence| {
+                sequence.cell.arm().move_to_joints(start, &plan.joint_limits, sequence.cancel)
             })?;
         }
         for (index, (name, goal)) in plan.goals.iter().enumerate() {
             let number = index as u64 + 1;
-            let visit = self.persisting(&format!("pose {name:?}"), |tour| {
-                match tour.go_to(goal) {
+            let visit = self.persisting(&format!("pose {name:?}"), |sequence| {
+                match sequence.go_to(goal) {
                     Err(error @ LinkError::Unreached { .. }) => return Ok(Visit::Unreached(error)),
                     arrived => arrived?,
                 }
                 let request = CaptureRequest::new(
                     number,
                     CapturePurpose::Calibrate,
-                    tour.options,
+                    sequence.options,
                     Some(name.clone()),
-                    tour.session.document(),
+                    sequence.session.document(),
                 );
-                let target = tour.session.document().meta.target;
-                let info = tour.cell.info().clone();
+                let target = sequence.session.document().meta.target;
+                let info = sequence.cell.info().clone();
                 let mut eye = Passes {
-                    cell: &mut *tour.cell,
+                    cell: &mut *sequence.cell,
                     info,
-                    cancel: tour.cancel,
+                    cancel: sequence.cancel,
                     began,
-                    pictures: &mut pictures,
+                    images: &mut images,
                     first: true,
                 };
                 capture::take(request, &target, &mut eye).map(Visit::Ended)
@@ -111,13 +111,13 @@ impl Tour<'_> {
                     value: joints.len() as f64,
                 })?;
                 cell.arm().move_to_joints(joints, &plan.joint_limits, cancel)?;
-                // Waiting for the joints costs no pictures.
+                // Waiting for the joints costs no images.
                 cell.arm().settle(&SettleOptions::default(), cancel).map(drop)
             }
         }
     }
 
-    /// Stepped, a pass takes as long as it takes, and the same command gives the same pictures on every machine.
+    /// Stepped, a pass takes as long as it takes, and the same command gives the same images on every machine.
     fn set_going(&mut self) -> Result<(), LinkError> {
         let sim = self.cell.arm().sim();
         sim.set_stepping(!self.real_time)?;
@@ -166,18 +166,18 @@ fn is_forgotten(error: &LinkError) -> bool {
     )
 }
 
-/// The pictures of one pass after the other.
+/// The images of one pass after the other.
 struct Passes<'a> {
     cell: &'a mut CellClient,
     info: CellInfo,
     cancel: &'a CancelToken,
     began: Instant,
-    pictures: &'a mut u64,
-    /// The arm has just come to rest, and the pictures of that pass are there.
+    images: &'a mut u64,
+    /// The arm has just come to rest, and the images of that pass are there.
     first: bool,
 }
 
-impl Pictures for Passes<'_> {
+impl Images for Passes<'_> {
     type Error = LinkError;
 
     fn now_s(&self) -> f64 {
@@ -189,7 +189,7 @@ impl Pictures for Passes<'_> {
             self.cell.arm().sim().step(&CallOptions::cancelled_by(self.cancel))?;
         }
         let frame = self.cell.camera().grab()?;
-        *self.pictures += 1;
-        Ok(record::live_frame(&self.info, *self.pictures, self.now_s(), frame))
+        *self.images += 1;
+        Ok(record::live_frame(&self.info, *self.images, self.now_s(), frame))
     }
 }

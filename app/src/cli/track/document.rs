@@ -1,4 +1,4 @@
-//! The JSON of a track: written picture by picture, so that hours of it need no memory, and readable whenever it ends.
+//! The JSON of a track: written image by image, so that hours of it need no memory, and readable whenever it ends.
 
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::Path;
@@ -35,7 +35,7 @@ impl Document {
         Ok(document)
     }
 
-    /// Adds a picture.
+    /// Adds an image.
     pub fn add(&mut self, tracked: &Tracked) -> Result<(), Failure> {
         if self.open.is_none() {
             return Ok(());

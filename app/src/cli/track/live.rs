@@ -1,4 +1,4 @@
-//! Tracking without a window: pictures in, poses out, and the arm on a thread of its own.
+//! Tracking without a window: images in, poses out, and the arm on a thread of its own.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use handeye_core::geometry::statistics::median_high;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::files::image_file::gray_from_rgb;
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
-use handeye_core::track::{Estimate, Keep, Picture, Setup, State};
+use handeye_core::track::{Estimate, Image, Keep, Setup, State};
 use handeye_sim_link::client::cell::{
     Arm, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment, FollowWish as ArmWish,
     MotionTolerance, SettleOptions,
@@ -49,8 +49,8 @@ pub enum Task {
     },
 }
 
-/// Pictures before the arm reaches for a corner: the filter has settled by then.
-const PICTURES_BEFORE_REACH: u64 = 15;
+/// Images before the arm reaches for a corner: the filter has settled by then.
+const IMAGES_BEFORE_REACH: u64 = 15;
 
 /// What to do.
 pub struct Job<'a> {
@@ -60,7 +60,7 @@ pub struct Job<'a> {
     pub setup: Setup,
     /// What the arm does.
     pub task: Task,
-    /// How many pictures.
+    /// How many images.
     pub frames: Option<u64>,
     /// The cell belongs to this program: how its board moves.
     pub own_cell: Option<BoardMotion>,
@@ -116,7 +116,7 @@ impl Live {
         Ok(Self { arm, feed })
     }
 
-    /// Tracks until there are pictures enough or it is cancelled. The arm is at rest when it returns.
+    /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns.
     pub fn run(
         mut self,
         job: &Job<'_>,
@@ -188,7 +188,7 @@ impl Live {
         // Close to its column the arm has no room to follow.
         let from_column = |goal: &Pose<Base, Tip>| goal.translation().xy().norm();
         if let Some(first) = goals.max_by(|a, b| from_column(a).total_cmp(&from_column(b))) {
-            let limits = limits::of_tip(&limits::TOUR, 1.0);
+            let limits = limits::of_tip(&limits::SEQUENCE, 1.0);
             self.arm
                 .move_to_pose(first, &limits, &MotionTolerance::default(), cancel)
                 .and_then(|()| self.arm.settle(&SettleOptions::default(), cancel).map(|_| ()))
@@ -207,7 +207,7 @@ impl Live {
         publish: &mut dyn FnMut(&Tracked) -> Result<(), Failure>,
     ) -> Result<(Summary, Option<Estimate>), Failure> {
         let frames = match job.task {
-            Task::Reach { .. } => Some(job.frames.unwrap_or(PICTURES_BEFORE_REACH)),
+            Task::Reach { .. } => Some(job.frames.unwrap_or(IMAGES_BEFORE_REACH)),
             Task::Watch | Task::Follow(_) => job.frames,
         };
         let mut newest = None;
@@ -228,7 +228,7 @@ impl Live {
             let sight = TrackedImage {
                 number: summary.frames + 1,
                 received_s,
-                picture: Picture {
+                image: Image {
                     time_s: frame.sim_time_s,
                     grey: &gray_from_rgb(&frame.rgb),
                     depth: Some(&frame.depth),
@@ -243,7 +243,7 @@ impl Live {
             summary.add(&tracked, line.take_status().as_ref(), took_s);
             publish(&tracked)?;
             if job.recorder.is_on() {
-                record::picture(job.recorder, feed.info(), summary.frames, frame);
+                record::image(job.recorder, feed.info(), summary.frames, frame);
                 job.recorder.note(Entry::Tracked(Arc::new(tracked.clone())));
             }
             if took_s > next_line_s {
@@ -277,7 +277,7 @@ fn reach(
         let joints = arm.joint_angles().map_err(Failure::failed)?;
         kinematics.reach(&goal.base_from_tip, &joints).map_err(Failure::failed)?;
     }
-    let limits = limits::of_tip(&limits::TOUR, 1.0);
+    let limits = limits::of_tip(&limits::SEQUENCE, 1.0);
     arm.move_to_pose(&goal.base_from_tip, &limits, &MotionTolerance::default(), cancel).map_err(Failure::failed)
 }
 
@@ -292,7 +292,7 @@ fn progress(tracked: &Tracked) -> String {
         let at = estimate.base_from_target.translation() * 1e3;
         format!(", at {:.2} {:.2} {:.2} mm", at.x, at.y, at.z)
     });
-    format!("{:.2} s: {state}{place}, {:.1} pictures/s", tracked.update.time_s, tracked.rate_hz)
+    format!("{:.2} s: {state}{place}, {:.1} images/s", tracked.update.time_s, tracked.rate_hz)
 }
 
 impl Summary {
@@ -337,7 +337,7 @@ impl Summary {
     /// For people.
     pub fn text(&self) -> String {
         let mut lines = vec![format!(
-            "tracked in {} of {} pictures, {:.1} pictures/s, {:.1} ms from picture to pose (median)",
+            "tracked in {} of {} images, {:.1} images/s, {:.1} ms from image to pose (median)",
             self.tracked,
             self.frames,
             self.rate_hz(),

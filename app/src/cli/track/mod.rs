@@ -40,7 +40,7 @@ pub struct TrackArgs {
     /// With --corner and --reach: how far the tip stays off the board, millimetres.
     #[arg(long, value_name = "MM", default_value_t = 100.0)]
     stand_off: f64,
-    /// End after so many pictures; without it, at Ctrl-C.
+    /// End after so many images; without it, at Ctrl-C.
     #[arg(long, value_name = "N")]
     frames: Option<u64>,
     /// Write every pose and a summary as JSON to this file; `-` for standard output instead of the summary.

@@ -19,7 +19,7 @@ pub fn about_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         ui,
         tr!(
             language,
-            "Finds where a camera is on a robot or beside it, from pictures of a printed board, and says how far off the \
+            "Finds where a camera is on a robot or beside it, from images of a printed board, and says how far off the \
              answer may be."
         ),
     );

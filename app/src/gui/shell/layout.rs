@@ -9,7 +9,7 @@ use crate::model::{Pane, Step};
 pub const STORAGE_KEY: &str = "layout";
 
 /// The upper left: what the camera sees.
-const PICTURE: [Pane; 1] = [Pane::Colour];
+const IMAGE: [Pane; 1] = [Pane::Colour];
 /// The tabs at the upper right: the same in space.
 const SPACE: [Pane; 2] = [Pane::Depth, Pane::Scene];
 /// The tabs at the lower left: what there is.
@@ -18,7 +18,7 @@ const RECORDS: [Pane; 3] = [Pane::Poses, Pane::Charts, Pane::Log];
 const TOOLS: [Pane; 8] =
     [Pane::Connect, Pane::Target, Pane::Jog, Pane::Taught, Pane::Result, Pane::Verify, Pane::Export, Pane::Track];
 
-/// Share of the height for the pictures.
+/// Share of the height for the images.
 const UPPER: f32 = 0.56;
 /// Share of the lower row's width for the records: the tabs of the tools all fit beside it in the smallest window.
 const LOWER_LEFT: f32 = 0.47;
@@ -69,11 +69,11 @@ impl Default for Layout {
             let children = panes.iter().map(|&pane| tiles.insert_pane(Slot::from(pane))).collect();
             tiles.insert_tab_tile(children)
         };
-        let (picture, space, records, tools) = (tabs(&PICTURE), tabs(&SPACE), tabs(&RECORDS), tabs(&TOOLS));
+        let (image, space, records, tools) = (tabs(&IMAGE), tabs(&SPACE), tabs(&RECORDS), tabs(&TOOLS));
         let mut row = |[left, right]: [TileId; 2], part| {
             tiles.insert_container(Linear::new_binary(LinearDir::Horizontal, [left, right], part))
         };
-        let upper = row([picture, space], 0.5);
+        let upper = row([image, space], 0.5);
         let lower = row([records, tools], LOWER_LEFT);
         let root = tiles.insert_container(Linear::new_binary(LinearDir::Vertical, [upper, lower], UPPER));
         Self { tree: Tree::new("panes", root, tiles) }
@@ -109,7 +109,7 @@ impl Layout {
 
     /// Adds a pane to the tabs where its kin are; `false` when there are none.
     fn add(&mut self, pane: Pane) -> bool {
-        let groups = [&PICTURE[..], &SPACE, &RECORDS, &TOOLS];
+        let groups = [&IMAGE[..], &SPACE, &RECORDS, &TOOLS];
         let kin: &[Pane] = groups.into_iter().find(|all| all.contains(&pane)).unwrap_or(&[]);
         let home = kin
             .iter()

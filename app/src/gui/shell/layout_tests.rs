@@ -23,7 +23,7 @@ fn a_pane_of_another_version_goes_and_a_new_one_comes_to_its_kin() {
 }
 
 #[test]
-fn a_layout_from_before_the_3d_pane_gets_it_beside_the_depth_picture_and_behind_it() {
+fn a_layout_from_before_the_3d_pane_gets_it_beside_the_depth_image_and_behind_it() {
     let text = serde_json::to_string(&Layout::default()).expect("it can be written").replace("\"Scene\"", "\"Gone\"");
     let layout: Layout = serde_json::from_str(&text).expect("a layout");
     let layout = layout.brought_up_to_date();

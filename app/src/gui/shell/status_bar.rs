@@ -1,4 +1,4 @@
-//! The bar at the bottom: the robot in numbers, the age of the pictures, the last thing that went as asked.
+//! The bar at the bottom: the robot in numbers, the age of the images, the last thing that went as asked.
 
 use egui::{Button, Label, RichText, Sense, Ui, Vec2};
 
@@ -49,7 +49,7 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
         field_ui(ui, tr!(language, "Image age"), &age, "88.8 s", if stale { palette.warning } else { palette.text });
         field_ui(ui, tr!(language, "Dropped"), &model.dropped_frames.to_string(), "88888", palette.text).on_hover_text(
-            tr!(language, "Pictures that arrived but were replaced by newer ones before the window could show them"),
+            tr!(language, "Images that arrived but were replaced by newer ones before the window could show them"),
         );
     });
     ui.add_space(2.0);

@@ -57,7 +57,7 @@ struct Panes<'a> {
     model: &'a Model,
     textures: &'a mut Textures,
     outbox: &'a mut Outbox,
-    /// The pixel under the pointer, from whichever picture it is over.
+    /// The pixel under the pointer, from whichever image it is over.
     pointed: Option<ImagePoint>,
 }
 

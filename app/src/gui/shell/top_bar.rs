@@ -76,11 +76,11 @@ fn frame_rate_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
     let language = model.view.language;
     let text = match model.frame_age_s() {
-        Some(age_s) if age_s > STALE_AFTER_S => tr!(language, "no new pictures").to_owned(),
+        Some(age_s) if age_s > STALE_AFTER_S => tr!(language, "no new images").to_owned(),
         _ => text!("{rate} fps", rate = format!("{:.0}", frame.info.rate_hz)).say(language),
     };
     ui.label(RichText::new("·").color(palette.weak));
-    ui.label(RichText::new(text).color(palette.weak)).on_hover_text(tr!(language, "Pictures that arrive per second"));
+    ui.label(RichText::new(text).color(palette.weak)).on_hover_text(tr!(language, "Images that arrive per second"));
 }
 
 fn session_ui(ui: &mut Ui, session: &SessionFacts, language: Language) {

@@ -1,4 +1,4 @@
-//! Colours of what is drawn over pictures and in charts: the same thing has the same colour in both.
+//! Colours of what is drawn over images and in charts: the same thing has the same colour in both.
 
 use egui::{Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2};
 
@@ -18,7 +18,7 @@ pub struct Marks {
     pub predicted: Color32,
     /// Residuals.
     pub residual: Color32,
-    /// What is drawn of a recorded picture, so that nobody takes it for the live one.
+    /// What is drawn of a recorded image, so that nobody takes it for the live one.
     pub review: Color32,
     /// Text on `review`.
     pub on_review: Color32,
@@ -40,7 +40,7 @@ const DARK: Marks = Marks {
     on_review: Color32::from_rgb(30, 22, 6),
     on_accent: Color32::from_rgb(10, 22, 40),
     truth: Color32::from_rgb(255, 124, 192),
-    ..OVER_PICTURES
+    ..OVER_IMAGES
 };
 
 const LIGHT: Marks = Marks {
@@ -53,11 +53,11 @@ const LIGHT: Marks = Marks {
     predicted: Color32::from_rgb(0, 140, 170),
     axes: [Color32::from_rgb(208, 44, 44), Color32::from_rgb(24, 138, 74), Color32::from_rgb(36, 96, 220)],
     truth: Color32::from_rgb(190, 24, 120),
-    ..OVER_PICTURES
+    ..OVER_IMAGES
 };
 
-/// Pictures look the same in both themes.
-const OVER_PICTURES: Marks = Marks {
+/// Images look the same in both themes.
+const OVER_IMAGES: Marks = Marks {
     fit: Color32::from_rgb(92, 159, 255),
     verify: Color32::from_rgb(190, 140, 255),
     excluded: Color32::from_rgb(160, 166, 178),
@@ -77,13 +77,13 @@ impl Marks {
         if ui.visuals().dark_mode { &DARK } else { &LIGHT }
     }
 
-    /// Those over pictures.
-    pub fn over_pictures() -> &'static Self {
-        &OVER_PICTURES
+    /// Those over images.
+    pub fn over_images() -> &'static Self {
+        &OVER_IMAGES
     }
 }
 
-/// Draws over a picture what can be seen on any ground: a dark line under the coloured one.
+/// Draws over an image what can be seen on any ground: a dark line under the coloured one.
 pub fn outlined_line(painter: &Painter, points: &[Pos2], width: f32, colour: Color32) {
     if points.len() < 2 {
         return;
@@ -95,12 +95,12 @@ pub fn outlined_line(painter: &Painter, points: &[Pos2], width: f32, colour: Col
 
 /// The colour of a row of a board: a rainbow from the first to the last, as OpenCV draws boards.
 pub fn of_board_row(row: usize, rows: usize) -> Color32 {
-    // The dark ends of the map cannot be seen on a picture.
+    // The dark ends of the map cannot be seen on an image.
     let part = 0.12 + 0.76 * row as f64 / rows.saturating_sub(1).max(1) as f64;
     super::theme::pixel(ColourMap::Turbo.colour(part))
 }
 
-/// A few words on a dark plate, readable over any picture; gives where it is.
+/// A few words on a dark plate, readable over any image; gives where it is.
 pub fn plate(painter: &Painter, at: Pos2, words: &str, colour: Color32) -> Rect {
     const INSET: Vec2 = Vec2::new(6.0, 3.0);
     let galley = painter.layout_no_wrap(words.to_owned(), FontId::proportional(super::theme::CAPTION), colour);

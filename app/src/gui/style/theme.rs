@@ -25,7 +25,7 @@ pub struct Palette {
     pub card: Color32,
     /// Edges of cards and bars.
     pub edge: Color32,
-    /// Behind pictures.
+    /// Behind images.
     pub well: Color32,
     /// Text that is read.
     pub text: Color32,
@@ -55,7 +55,7 @@ pub struct Palette {
     pub axis_x: Color32,
     /// The y axis of a frame.
     pub axis_y: Color32,
-    /// Marks over pictures, and their outline.
+    /// Marks over images, and their outline.
     pub mark: Color32,
     /// Outline of marks, which makes them visible on anything.
     pub mark_outline: Color32,
@@ -158,7 +158,7 @@ impl Palette {
     }
 }
 
-/// The tint of a picture that is out of date.
+/// The tint of an image that is out of date.
 pub fn stale_tint() -> Color32 {
     Color32::from_gray(110)
 }

@@ -45,7 +45,7 @@ impl Silent {
         Self::built(source, Harness::builder().with_size(size))
     }
 
-    /// The same in a harness that is set up otherwise, as to make pictures.
+    /// The same in a harness that is set up otherwise, as to make images.
     pub fn built(source: CellSource, builder: HarnessBuilder<Window>) -> Self {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
@@ -161,7 +161,7 @@ impl Silent {
         self.steps();
     }
 
-    /// Connected, with a robot and a picture.
+    /// Connected, with a robot and an image.
     pub fn live() -> Self {
         let mut silent = Self::new(CellSource::BuiltIn);
         silent.links(&connected());

@@ -15,7 +15,7 @@ pub struct PaneState {
     pub model: Model,
     /// What the user wants.
     pub outbox: Outbox,
-    /// The pictures.
+    /// The images.
     pub textures: Textures,
     /// The pixel under the pointer, of panes that give one.
     pub pointed: Option<ImagePoint>,

@@ -101,17 +101,17 @@ fn record(n: u32) -> CaptureRecord {
     }
 }
 
-/// Pictures with the column in the red and the row in the green.
-pub fn pictures() -> FrameImages {
+/// Images with the column in the red and the row in the green.
+pub fn images() -> FrameImages {
     let (width, height) = (640, 480);
     let rgb = RgbImage::from_fn(width, height, |column, row| Rgb([(column / 4) as u8, (row / 4) as u8, 120]));
     let metres = (0..width * height).map(|i| 0.3 + 0.2 * (i % width) as f32 / width as f32).collect();
     let depth = DepthImage { width, height, metres };
-    let depth_coloured = depth.colours(ColourMap::Turbo, 0.3, 0.5, 3.5).expect("a picture");
+    let depth_coloured = depth.colours(ColourMap::Turbo, 0.3, 0.5, 3.5).expect("an image");
     FrameImages { rgb, depth, depth_coloured }
 }
 
-/// Connected, with a live picture in which the board is seen, and nothing captured.
+/// Connected, with a live image in which the board is seen, and nothing captured.
 pub fn connected() -> Model {
     let mut model = Model::new(CellSource::BuiltIn, ViewSettings::default());
     model.now_s = 100.0;
@@ -149,7 +149,7 @@ pub fn connected() -> Model {
         joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0],
         base_from_target_true: Some(base_from_target()),
     };
-    model.frame = Some(LiveFrame { info, images: Arc::new(pictures()) });
+    model.frame = Some(LiveFrame { info, images: Arc::new(images()) });
     model.detection = Some(LiveDetection {
         frame: 1,
         corners: Some(corners(1)),
@@ -232,7 +232,7 @@ pub fn solved() -> Model {
 /// The capture that does not fit the others in [`with_an_outlier`].
 pub const OUTLIER: CaptureId = CaptureId(3);
 
-/// The same, with a capture that the estimate set aside: its board is 12.3 mm and 1.5° from where the others put it.
+/// The same, with a capture that the estimate left out as an outlier: its board is 12.3 mm and 1.5° from where the others put it.
 pub fn with_an_outlier() -> Model {
     let mut model = solved();
     let mut solved = Solved::clone(model.solve.current().expect("solved"));
@@ -264,7 +264,7 @@ pub fn previewed() -> Model {
     model
 }
 
-/// Pictures per second of the tracked board.
+/// Images per second of the tracked board.
 const TRACK_HZ: f64 = 20.0;
 
 /// The tracked board at a time: a circle of 30 mm in its plane, twice a minute.

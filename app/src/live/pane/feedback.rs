@@ -1,4 +1,4 @@
-//! What lies over a picture in words: how fresh it is, that it is recorded, how a capture goes.
+//! What lies over an image in words: how fresh it is, that it is recorded, how a capture goes.
 
 use std::path::PathBuf;
 
@@ -19,14 +19,14 @@ use crate::model::{CapturePurpose, CaptureUnderWay, CaptureWait, Model};
 use crate::text::Text;
 use crate::{text, tr};
 
-/// Height of the strip over a recorded picture.
+/// Height of the strip over a recorded image.
 pub const STRIP: f32 = 34.0;
-/// A refusal stands over the picture for so long \[s\]; after that the table of poses keeps it.
+/// A refusal stands over the image for so long \[s\]; after that the table of poses keeps it.
 const REFUSAL_S: f64 = 8.0;
 /// The flash of a capture \[s\].
 const FLASH_S: f64 = 0.35;
 
-/// Frame rate, age, what was dropped, zoom and exaggeration, in the corner of the picture.
+/// Frame rate, age, what was dropped, zoom and exaggeration, in the corner of the image.
 pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, points_per_px: f32) {
     let language = model.view.language;
     let mut lines: Vec<(String, Color32)> = Vec::new();
@@ -40,21 +40,21 @@ pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, poin
             age = format!("{age_s:.1}"),
             dropped = model.dropped_frames
         );
-        let colour = if stale { Marks::over_pictures().review } else { Color32::from_gray(215) };
+        let colour = if stale { Marks::over_images().review } else { Color32::from_gray(215) };
         lines.push((words.say(language), colour));
         if frame.info.image_age_s > 0.0 {
             let ms = format!("{:.0}", frame.info.image_age_s * 1e3);
             let words = text!("Image up to {ms} ms older than the pose: let the arm stand", ms = ms);
-            lines.push((words.say(language), Marks::over_pictures().review));
+            lines.push((words.say(language), Marks::over_images().review));
         }
     }
     if shown.capture.is_none() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_none()) {
-        lines.push((tr!(language, "Board not found").to_owned(), Marks::over_pictures().review));
+        lines.push((tr!(language, "Board not found").to_owned(), Marks::over_images().review));
     }
     let overlays = model.view.overlays;
     if overlays.residuals && has_residuals(model, shown) {
         let words = text!("Residuals × {times}", times = format!("{:.0}", overlays.exaggeration));
-        lines.push((words.say(language), Marks::over_pictures().residual));
+        lines.push((words.say(language), Marks::over_images().residual));
     }
     if model.viewport.zoom > 1.0 {
         lines.push((format!("{:.0} %", points_per_px * 100.0), Color32::from_gray(215)));
@@ -75,7 +75,7 @@ fn has_residuals(model: &Model, shown: &Shown<'_>) -> bool {
     }
 }
 
-/// The strip that says that a picture is recorded, and the way back.
+/// The strip that says that an image is recorded, and the way back.
 pub fn review_ui(ui: &mut Ui, model: &Model, id: CaptureId, outbox: &mut Outbox) {
     let language = model.view.language;
     let colours = Marks::of(ui);
@@ -106,7 +106,7 @@ pub fn review_ui(ui: &mut Ui, model: &Model, id: CaptureId, outbox: &mut Outbox)
     });
 }
 
-/// A recorded picture that is not there yet.
+/// A recorded image that is not there yet.
 pub fn reading_ui(ui: &mut Ui, model: &Model, id: CaptureId, outbox: &mut Outbox) {
     let rect = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(rect);
@@ -117,7 +117,7 @@ pub fn reading_ui(ui: &mut Ui, model: &Model, id: CaptureId, outbox: &mut Outbox
     ui.scope_builder(UiBuilder::new().max_rect(below).layout(Layout::top_down(Align::Center)), |ui| {
         ui.add_space((below.height() * 0.4).max(0.0));
         ui.add(Spinner::new().size(26.0));
-        ui.label(tr!(model.view.language, "Reading the pictures of this capture…"));
+        ui.label(tr!(model.view.language, "Reading the images of this capture…"));
     });
 }
 
@@ -137,25 +137,25 @@ pub fn capture_ui(ui: &mut Ui, model: &Model, room: Rect, in_words: bool, outbox
                 outbox.send(Command::CancelCapture);
             }
         });
-    } else if let Some(refused) = model.refused.as_ref().filter(|_| stands_over_picture(model)) {
+    } else if let Some(refused) = model.refused.as_ref().filter(|_| stands_over_image(model)) {
         let words = text!("No capture: {why}", why = refused.why.clone()).say(language);
         plate_ui(ui, room, Tone::Warning, &words, |_| {});
     }
 }
 
-/// Whether the last refusal of a capture stands over the picture.
-pub fn stands_over_picture(model: &Model) -> bool {
+/// Whether the last refusal of a capture stands over the image.
+pub fn stands_over_image(model: &Model) -> bool {
     model.refused.as_ref().is_some_and(|refused| model.now_s - refused.at_s < REFUSAL_S)
 }
 
 /// What a capture waits for, in words.
 pub fn waiting(capture: &CaptureUnderWay) -> Text {
     let what = match capture.wait {
-        CaptureWait::Pictures(Wait::ForPicture) => text!("waiting for a picture"),
-        CaptureWait::Pictures(Wait::RobotMoves) => text!("waiting for the robot to stand still"),
-        CaptureWait::Pictures(Wait::PictureChanges) => text!("waiting for the picture to come to rest"),
-        CaptureWait::Pictures(Wait::Averaging { done, of }) => {
-            text!("averaging pictures, {done} of {of}", done = done, of = of)
+        CaptureWait::Images(Wait::ForImage) => text!("waiting for an image"),
+        CaptureWait::Images(Wait::RobotMoves) => text!("waiting for the robot to stand still"),
+        CaptureWait::Images(Wait::ImageChanges) => text!("waiting for the image to come to rest"),
+        CaptureWait::Images(Wait::Averaging { done, of }) => {
+            text!("averaging images, {done} of {of}", done = done, of = of)
         }
         CaptureWait::Measuring => text!("measuring the board"),
         CaptureWait::Saving => text!("saving"),
@@ -166,7 +166,7 @@ pub fn waiting(capture: &CaptureUnderWay) -> Text {
     }
 }
 
-/// Words on a plate at the bottom of the picture.
+/// Words on a plate at the bottom of the image.
 fn plate_ui(ui: &mut Ui, room: Rect, tone: Tone, words: &str, action_ui: impl FnOnce(&mut Ui)) {
     const HEIGHT: f32 = 40.0;
     let palette = Palette::of(ui);
@@ -201,7 +201,7 @@ struct Newest {
     since_s: f64,
 }
 
-/// A short flash over the picture when a capture was added.
+/// A short flash over the image when a capture was added.
 fn flash(ui: &Ui, model: &Model, room: Rect) {
     let key = Id::new("newest capture");
     let id = model.document().captures.last().map(|capture| capture.id);

@@ -1,4 +1,4 @@
-//! The pictures, colour and depth: live, or recorded with a capture.
+//! The images, colour and depth: live, or recorded with a capture.
 
 mod feedback;
 mod overlays;
@@ -7,7 +7,7 @@ mod readout;
 mod toolbar;
 pub(crate) mod view;
 
-pub use feedback::{stands_over_picture, waiting};
+pub use feedback::{stands_over_image, waiting};
 
 use std::sync::Arc;
 
@@ -26,14 +26,14 @@ use crate::live::textures::LiveTextures;
 use crate::model::{FrameImages, ImagePoint, Model};
 use crate::tr;
 
-/// Height of the line over a picture.
+/// Height of the line over an image.
 const HEADER: f32 = 34.0;
-/// Height of what is under a picture, the same for both so that they stay of one size.
+/// Height of what is under an image, the same for both so that they stay of one size.
 const FOOTER: f32 = 46.0;
 /// Distance of text to the edge of a pane.
 const INSET: f32 = 10.0;
 
-/// The pictures that are shown.
+/// The images that are shown.
 #[derive(Clone, Copy)]
 pub struct Shown<'a> {
     /// The pixels.
@@ -71,7 +71,7 @@ impl<'a> Shown<'a> {
         })
     }
 
-    /// Depth \[m\] at a pixel of the colour picture; `None` without a surface.
+    /// Depth \[m\] at a pixel of the colour image; `None` without a surface.
     fn depth_m(&self, point: ImagePoint) -> Option<f32> {
         match self.images.depth_at(point, self.far_plane_m) {
             DepthSample::Metres(depth_m) => Some(depth_m),
@@ -80,24 +80,24 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// The colour picture with everything drawn over it. Gives the pixel under the pointer: of both pictures one at most
+/// The colour image with everything drawn over it. Gives the pixel under the pointer: of both images one at most
 /// has one, and whoever draws both tells the model with `Command::PointAt`.
 pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
     let language = model.view.language;
     let shown = match content(model, textures) {
-        Content::Pictures(shown) => shown,
+        Content::Images(shown) => shown,
         Content::Reading(id) => {
             feedback::reading_ui(ui, model, id, outbox);
             return None;
         }
         Content::Nothing => {
-            empty::status_ui(ui, &status::before_first_picture(model), language, outbox);
+            empty::status_ui(ui, &status::before_first_image(model), language, outbox);
             return None;
         }
     };
-    let picture = crate::live::pane::view::Picture {
+    let image = crate::live::pane::view::Image {
         texture: textures.rgb.as_ref(),
-        name: tr!(language, "Colour picture"),
+        name: tr!(language, "Colour image"),
         model,
         shown,
         with_overlays: true,
@@ -107,22 +107,22 @@ pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &m
         model,
         outbox,
         |ui, outbox| toolbar::overlays_ui(ui, model, outbox),
-        |ui, outbox| picture.picture_ui(ui, outbox),
+        |ui, outbox| image.image_ui(ui, outbox),
         |ui, _| readout::readout_ui(ui, model, &shown),
     )
 }
 
-/// The depth picture. Gives the pixel of the colour picture under the pointer, as [`colour_ui`] does.
+/// The depth image. Gives the pixel of the colour image under the pointer, as [`colour_ui`] does.
 pub fn depth_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
     let language = model.view.language;
-    let Content::Pictures(shown) = content(model, textures) else {
-        let detail = tr!(language, "It comes together with the colour picture.");
-        marks::nothing_yet_ui(ui, tr!(language, "No depth picture yet"), detail);
+    let Content::Images(shown) = content(model, textures) else {
+        let detail = tr!(language, "It comes together with the colour image.");
+        marks::nothing_yet_ui(ui, tr!(language, "No depth image yet"), detail);
         return None;
     };
-    let picture = crate::live::pane::view::Picture {
+    let image = crate::live::pane::view::Image {
         texture: textures.depth.as_ref(),
-        name: tr!(language, "Depth picture"),
+        name: tr!(language, "Depth image"),
         model,
         shown,
         with_overlays: false,
@@ -132,41 +132,41 @@ pub fn depth_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mu
         model,
         outbox,
         |ui, outbox| toolbar::depth_ui(ui, model, outbox),
-        |ui, outbox| picture.picture_ui(ui, outbox),
+        |ui, outbox| image.image_ui(ui, outbox),
         |ui, _| match shown.depth_range_m {
             Some(range_m) => {
                 let depth_m = model.cursor.and_then(|point| shown.depth_m(point));
                 colour_bar::colour_bar_ui(ui, model.view.depth_colours, range_m, depth_m, language);
             }
             None => {
-                ui.label(tr!(language, "There is no depth in this picture"));
+                ui.label(tr!(language, "There is no depth in this image"));
             }
         },
     )
 }
 
 enum Content<'a> {
-    Pictures(Shown<'a>),
-    /// The pictures of this capture are on their way from the disk.
+    Images(Shown<'a>),
+    /// The images of this capture are on their way from the disk.
     Reading(CaptureId),
     Nothing,
 }
 
 fn content<'a>(model: &'a Model, textures: &LiveTextures) -> Content<'a> {
     match (Shown::of(model, textures), &model.review) {
-        (Some(shown), _) => Content::Pictures(shown),
+        (Some(shown), _) => Content::Images(shown),
         (None, Some(review)) => Content::Reading(review.id),
         (None, None) => Content::Nothing,
     }
 }
 
-/// A line at the top, a picture, and a line at the bottom. Gives what the picture gives.
+/// A line at the top, an image, and a line at the bottom. Gives what the image gives.
 fn tile_ui<R>(
     ui: &mut Ui,
     model: &Model,
     outbox: &mut Outbox,
     header_ui: impl FnOnce(&mut Ui, &mut Outbox),
-    picture_ui: impl FnOnce(&mut Ui, &mut Outbox) -> R,
+    image_ui: impl FnOnce(&mut Ui, &mut Outbox) -> R,
     footer_ui: impl FnOnce(&mut Ui, &mut Outbox),
 ) -> R {
     let palette = Palette::of(ui);
@@ -187,7 +187,7 @@ fn tile_ui<R>(
         well.min.y = strip.max.y;
     }
     ui.painter().rect_filled(well, CornerRadius::ZERO, palette.well);
-    let result = ui.scope_builder(UiBuilder::new().max_rect(well), |ui| picture_ui(ui, outbox)).inner;
+    let result = ui.scope_builder(UiBuilder::new().max_rect(well), |ui| image_ui(ui, outbox)).inner;
     ui.scope_builder(row(footer), |ui| footer_ui(ui, outbox));
     result
 }

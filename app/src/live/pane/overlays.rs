@@ -1,4 +1,4 @@
-//! What is drawn over the colour picture: corners, axes, the predicted board, coverage, residuals.
+//! What is drawn over the colour image: corners, axes, the predicted board, coverage, residuals.
 
 use egui::{Color32, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 use handeye_core::geometry::frames::{Camera, Pose, Target};
@@ -19,11 +19,11 @@ const AXIS_SQUARES: f64 = 3.0;
 /// What is left of a sight of the board that is some frames old.
 const OLD_SIGHT: f32 = 0.35;
 
-/// The board as it was seen in the picture that is shown, or a little earlier.
+/// The board as it was seen in the image that is shown, or a little earlier.
 struct ShownDetection<'a> {
     corners: &'a [Corner],
     camera_from_target: Option<Pose<Camera, Target>>,
-    /// 1 when it is of this picture, less when it is of an earlier one.
+    /// 1 when it is of this image, less when it is of an earlier one.
     strength: f32,
 }
 
@@ -66,12 +66,12 @@ fn sight<'a>(model: &'a Model, shown: &Shown<'_>) -> Option<ShownDetection<'a>> 
     })
 }
 
-/// How strongly a sight of the board is drawn over a picture that came so many frames later.
+/// How strongly a sight of the board is drawn over an image that came so many frames later.
 pub fn strength(frames_later: u64) -> f32 {
     (1.0 - 0.2 * frames_later.min(100) as f32).max(OLD_SIGHT)
 }
 
-/// The board's pose in a recorded picture: as fitted, or as seen by the verification.
+/// The board's pose in a recorded image: as fitted, or as seen by the verification.
 fn recorded_pose(model: &Model, shown: &Shown<'_>) -> Option<Pose<Camera, Target>> {
     let solved = model.solve.solved.as_ref()?;
     let id = shown.capture?;
@@ -119,7 +119,7 @@ fn axes(painter: &Painter, projector: &Projector<'_>, target: &TargetSpec, stren
     let origin = Point3::origin();
     // z goes into the board.
     let ends = [Point3::new(length_m, 0.0, 0.0), Point3::new(0.0, length_m, 0.0), Point3::new(0.0, 0.0, length_m)];
-    for ((end, colour), name) in ends.iter().zip(Marks::over_pictures().axes).zip(["x", "y", "z"]) {
+    for ((end, colour), name) in ends.iter().zip(Marks::over_images().axes).zip(["x", "y", "z"]) {
         let colour = colour.gamma_multiply(strength);
         for piece in projector.line(&origin, end) {
             marks::outlined_line(painter, &piece, 2.4, colour);
@@ -133,7 +133,7 @@ fn axes(painter: &Painter, projector: &Projector<'_>, target: &TargetSpec, stren
     }
 }
 
-/// Where the board is expected in the picture that is shown: where tracking has it in the live one while it is tracked,
+/// Where the board is expected in the image that is shown: where tracking has it in the live one while it is tracked,
 /// because it may then be anywhere; otherwise where robot pose and calibration say that it is.
 pub fn expected(model: &Model, shown: &Shown<'_>) -> Option<Pose<Camera, Target>> {
     let (calibrated, base_from_tip) = (model.calibrated()?, shown.base_from_tip.as_ref()?);
@@ -150,7 +150,7 @@ fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &Targe
     let (Some(calibrated), Some(camera_from_target)) = (model.calibrated(), expected(model, shown)) else { return };
     let projector = Projector { intrinsics: &calibrated.intrinsics, camera_from_target, place };
     // An answer of another set of captures is drawn, but does not shine.
-    let colour = Marks::over_pictures().predicted.gamma_multiply(if model.solve.fresh { 1.0 } else { 0.5 });
+    let colour = Marks::over_images().predicted.gamma_multiply(if model.solve.fresh { 1.0 } else { 0.5 });
     let lines = board_lines(target);
     for [from, to] in &lines.inside {
         for piece in projector.line(from, to) {
@@ -168,21 +168,21 @@ fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &Targe
 fn coverage(painter: &Painter, table: &CaptureTable, place: &Place) {
     let Some(coverage) = &table.coverage else { return };
     let (columns, rows) = (coverage.columns, coverage.rows);
-    let cell = place.picture.size() / Vec2::new(columns.max(1) as f32, rows.max(1) as f32);
+    let cell = place.image.size() / Vec2::new(columns.max(1) as f32, rows.max(1) as f32);
     for row in 0..rows {
         for column in 0..columns {
             if coverage.count(column, row) == 0 {
-                let min = place.picture.min + Vec2::new(column as f32, row as f32) * cell;
+                let min = place.image.min + Vec2::new(column as f32, row as f32) * cell;
                 painter.rect_filled(Rect::from_min_size(min, cell).shrink(0.5), 0.0, Color32::from_black_alpha(90));
             }
         }
     }
     let (width, height) = table.image_size;
-    // Pictures of another size, of an older camera setting, are stretched like the cells.
+    // Images of another size, of an older camera setting, are stretched like the cells.
     let scale = place.size_px / Vec2::new(width.max(1) as f32, height.max(1) as f32);
     for (outline, &row) in coverage.outlines.iter().zip(&table.outlined) {
         let Some(row) = table.rows.get(row) else { continue };
-        let colour = marks::of_capture(Marks::over_pictures(), row.excluded, row.verifies()).gamma_multiply(0.75);
+        let colour = marks::of_capture(Marks::over_images(), row.excluded, row.verifies()).gamma_multiply(0.75);
         let points: Vec<Pos2> = outline
             .px
             .iter()
@@ -192,7 +192,7 @@ fn coverage(painter: &Painter, table: &CaptureTable, place: &Place) {
     }
 }
 
-/// Where the corners of the live picture should be: by the board's pose in this one picture while it is tracked, since
+/// Where the corners of the live image should be: by the board's pose in this one image while it is tracked, since
 /// the calibrated board is no longer there; otherwise by robot and calibration alone.
 pub fn live_chain(model: &Model) -> Option<Pose<Camera, Target>> {
     let (calibrated, detection) = (model.calibrated()?, model.detection.as_ref()?);
@@ -203,16 +203,16 @@ pub fn live_chain(model: &Model) -> Option<Pose<Camera, Target>> {
     }
 }
 
-/// Whether the live picture has residuals.
+/// Whether the live image has residuals.
 pub fn has_live_residuals(model: &Model) -> bool {
     live_chain(model).is_some() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_some())
 }
 
-/// Measured minus predicted, exaggerated: a recorded picture has those of its fit or verification, the live one those of
+/// Measured minus predicted, exaggerated: a recorded image has those of its fit or verification, the live one those of
 /// the bare chain, or of the pose of the tracked board.
 fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &ShownDetection<'_>, place: &Place) {
     let exaggeration = model.view.overlays.exaggeration;
-    let colour = Marks::over_pictures().residual.gamma_multiply(sight.strength);
+    let colour = Marks::over_images().residual.gamma_multiply(sight.strength);
     let arrow = |px: &Vector2<f64>, residual_px: &Vector2<f64>| {
         let (from, to) = (screen(place, px), screen(place, &(px + residual_px * exaggeration)));
         if !(to.x.is_finite() && to.y.is_finite()) {
@@ -238,7 +238,7 @@ fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &ShownD
     }
 }
 
-/// Corners of the live picture, and measured minus predicted.
+/// Corners of the live image, and measured minus predicted.
 pub fn live_residuals(model: &Model, corners: &[Corner]) -> Vec<(Vector2<f64>, Vector2<f64>)> {
     let (Some(calibrated), Some(camera_from_target)) = (model.calibrated(), live_chain(model)) else {
         return Vec::new();

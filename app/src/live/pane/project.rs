@@ -1,4 +1,4 @@
-//! Lines in space as lines in the picture, curved where the lens bends them.
+//! Lines in space as lines in the image, curved where the lens bends them.
 
 use egui::{Pos2, Vec2};
 use handeye_core::geometry::camera::Intrinsics;
@@ -10,7 +10,7 @@ use super::view::Place;
 
 /// Pieces of a line of the length of a board.
 const PIECES: usize = 12;
-/// A point that is so many pictures away from the middle is not on the screen, and its place means little.
+/// A point that is so many images away from the middle is not on the screen, and its place means little.
 const FARTHEST: f64 = 3.0;
 
 /// What is needed to draw things of the board.
@@ -19,12 +19,12 @@ pub struct Projector<'a> {
     pub intrinsics: &'a Intrinsics,
     /// The board.
     pub camera_from_target: Pose<Camera, Target>,
-    /// The picture on the screen.
+    /// The image on the screen.
     pub place: &'a Place,
 }
 
 impl Projector<'_> {
-    /// A point of the board on the screen; `None` behind the camera and far outside of the picture.
+    /// A point of the board on the screen; `None` behind the camera and far outside of the image.
     pub fn point(&self, in_target: &Point3<f64>) -> Option<Pos2> {
         let px = self.intrinsics.project(&(self.camera_from_target.isometry() * in_target)).ok()?;
         let (width, height) = (f64::from(self.intrinsics.width), f64::from(self.intrinsics.height));

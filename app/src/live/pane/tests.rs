@@ -34,7 +34,7 @@ fn depth(model: Model) -> PaneHarness {
 
 fn reviewed(id: u32) -> Model {
     let mut model = sample::solved();
-    model.review = Some(Review { id: CaptureId(id), images: Some(Arc::new(sample::pictures())) });
+    model.review = Some(Review { id: CaptureId(id), images: Some(Arc::new(sample::images())) });
     model
 }
 
@@ -57,15 +57,15 @@ fn an_image_that_may_be_older_than_its_pose_says_by_how_much() {
 }
 
 #[test]
-fn the_pixel_under_the_pointer_is_that_of_the_picture_also_when_it_is_zoomed() {
+fn the_pixel_under_the_pointer_is_that_of_the_image_also_when_it_is_zoomed() {
     let mut pane = colour(sample::connected());
     for viewport in [Viewport::default(), Viewport { centre: [0.3, 0.6], zoom: 5.0 }] {
         pane.model().viewport = viewport;
         pane.steps();
         let place = Place::new(
-            pane.rect("Colour picture"),
+            pane.rect("Colour image"),
             vec2(640.0, 480.0),
-            // What is visible is the room itself when the picture is larger.
+            // What is visible is the room itself when the image is larger.
             viewport,
         );
         let wanted = ImagePoint { column: 200, row: 300 };
@@ -79,16 +79,16 @@ fn the_pixel_under_the_pointer_is_that_of_the_picture_also_when_it_is_zoomed() {
 fn a_place_holds_what_is_under_the_pointer_and_leaves_no_room_empty() {
     let room = Rect::from_min_size(Pos2::new(10.0, 20.0), vec2(640.0, 480.0));
     let fit = Place::new(room, vec2(640.0, 480.0), Viewport::default());
-    assert_eq!(fit.picture, room);
+    assert_eq!(fit.image, room);
     assert_eq!(fit.screen(Vec2::ZERO), room.min + Vec2::splat(0.5), "whole numbers are the middles of pixels");
     let corner = Place::new(room, vec2(640.0, 480.0), Viewport { centre: [0.0, 0.0], zoom: 4.0 });
-    assert_eq!((corner.picture.min, corner.visible), (room.min, room));
+    assert_eq!((corner.image.min, corner.visible), (room.min, room));
 }
 
 #[test]
 fn the_wheel_zooms_at_the_pointer_and_a_double_click_fits() {
     let mut pane = colour(sample::connected());
-    let rect = pane.rect("Colour picture");
+    let rect = pane.rect("Colour image");
     let at = rect.min + rect.size() * vec2(0.25, 0.75);
     pane.harness.hover_at(at);
     pane.steps();
@@ -109,8 +109,8 @@ fn the_wheel_zooms_at_the_pointer_and_a_double_click_fits() {
     let zoomed = pane.model().viewport;
     assert!(zoomed.zoom > 1.5, "{zoomed:?}");
     let after = Place::new(pane_room(&pane), vec2(640.0, 480.0), zoomed);
-    let part = |place: &Place| (at - place.picture.min) / place.picture.size();
-    // The room is larger than the fitted picture in one direction; there it is held at the edge.
+    let part = |place: &Place| (at - place.image.min) / place.image.size();
+    // The room is larger than the fitted image in one direction; there it is held at the edge.
     assert!((part(&before) - part(&after)).abs().min_elem() < 2e-3, "{:?} {:?}", part(&before), part(&after));
 
     for pressed in [true, false, true, false] {
@@ -125,17 +125,17 @@ fn the_wheel_zooms_at_the_pointer_and_a_double_click_fits() {
     assert_eq!(viewport(&pane.commands()), Some(Viewport::default()));
 }
 
-/// The room that a picture has in the pane.
+/// The room that an image has in the pane.
 fn pane_room(pane: &PaneHarness) -> Rect {
-    pane.rect("Colour picture")
+    pane.rect("Colour image")
 }
 
 #[test]
-fn a_drag_moves_a_zoomed_picture_with_the_pointer() {
+fn a_drag_moves_a_zoomed_image_with_the_pointer() {
     let mut model = sample::connected();
     model.viewport = Viewport { centre: [0.5, 0.5], zoom: 4.0 };
     let mut pane = colour(model);
-    let room = pane.rect("Colour picture");
+    let room = pane.rect("Colour image");
     let drag = |pane: &mut PaneHarness, button| {
         let event = |pos, pressed| egui::Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE };
         pane.harness.hover_at(room.center());
@@ -156,34 +156,34 @@ fn a_drag_moves_a_zoomed_picture_with_the_pointer() {
         let next = drag(&mut pane, button).expect("it moves");
         let before = Place::new(room, vec2(640.0, 480.0), now);
         let after = Place::new(room, vec2(640.0, 480.0), next);
-        let moved = after.picture.min - before.picture.min;
+        let moved = after.image.min - before.image.min;
         assert!((moved - vec2(30.0, -20.0)).length() < 0.1, "{button:?}: {moved:?}");
     }
     pane.model().viewport = Viewport::default();
     pane.steps();
-    assert_eq!(drag(&mut pane, PointerButton::Primary), None, "all of the picture is there already");
+    assert_eq!(drag(&mut pane, PointerButton::Primary), None, "all of the image is there already");
 }
 
 #[test]
-fn recorded_pictures_of_another_session_are_not_taken_for_those_of_the_same_number() {
+fn recorded_images_of_another_session_are_not_taken_for_those_of_the_same_number() {
     let mut pane = colour(reviewed(3));
     let uploads = pane.harness.state().textures.live.uploads();
     pane.steps();
     assert_eq!(pane.harness.state().textures.live.uploads(), uploads);
-    pane.model().review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::pictures())) });
+    pane.model().review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::images())) });
     pane.steps();
     assert_eq!(pane.harness.state().textures.live.uploads(), uploads + 1);
 }
 
 #[test]
-fn a_board_that_is_not_found_is_said_so_on_the_live_picture() {
+fn a_board_that_is_not_found_is_said_so_on_the_live_image() {
     let mut model = sample::connected();
     if let Some(seen) = &mut model.detection {
         seen.corners = None;
     }
     let mut pane = colour(model);
     assert!(pane.sees("Board not found"));
-    pane.model().review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::pictures())) });
+    pane.model().review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::images())) });
     pane.steps();
     assert!(!pane.sees("Board not found"));
 }
@@ -196,7 +196,7 @@ fn overlays_and_depth_colours_are_switched_by_their_names() {
     assert_eq!(sent, [Command::SetOverlays(crate::model::Overlays { coverage: true, ..overlays })]);
     let sent = pane.click("Corners");
     assert_eq!(sent, [Command::SetOverlays(crate::model::Overlays { corners: false, ..overlays })]);
-    assert!(pane.sees("Residuals × 50"), "the exaggeration is stated on the picture");
+    assert!(pane.sees("Residuals × 50"), "the exaggeration is stated on the image");
     let mut pane = depth(sample::connected());
     assert_eq!(pane.click("Viridis"), [Command::SetDepthColours(ColourMap::Viridis)]);
     assert_eq!(pane.click("Full range"), [Command::SetDepthScale(crate::model::DepthScale::Full)]);
@@ -232,24 +232,24 @@ fn without_a_calibration_there_is_no_made_up_place_in_the_base() {
 }
 
 #[test]
-fn a_recorded_picture_says_so_and_leads_back() {
+fn a_recorded_image_says_so_and_leads_back() {
     let mut pane = colour(reviewed(3));
     assert!(pane.sees("Capture 3 · pose 3, recorded · residual 0.0"));
-    assert!(!pane.sees("fps"), "a recorded picture has no frame rate");
+    assert!(!pane.sees("fps"), "a recorded image has no frame rate");
     assert_eq!(pane.click("Back to live"), [Command::BackToLive]);
     let mut pane = colour(reviewed(sample::FITTED + 1));
     assert!(pane.sees("prediction error"), "the verification fits nothing");
     pane.model().review = Some(Review { id: CaptureId(3), images: None });
     pane.steps();
-    assert!(pane.sees("Reading the pictures of this capture…"));
+    assert!(pane.sees("Reading the images of this capture…"));
     assert_eq!(pane.click("Back to live"), [Command::BackToLive]);
 }
 
 #[test]
-fn a_click_picks_a_point_in_the_step_that_verifies_and_only_in_the_live_picture() {
-    let at = |pane: &PaneHarness| pane.rect("Colour picture").min + Vec2::new(100.0, 50.0);
+fn a_click_picks_a_point_in_the_step_that_verifies_and_only_in_the_live_image() {
+    let at = |pane: &PaneHarness| pane.rect("Colour image").min + Vec2::new(100.0, 50.0);
     let click = |pane: &mut PaneHarness| {
-        let place = Place::new(pane.rect("Colour picture"), vec2(640.0, 480.0), Viewport::default());
+        let place = Place::new(pane.rect("Colour image"), vec2(640.0, 480.0), Viewport::default());
         let at = at(pane);
         pane.harness.hover_at(at);
         pane.steps();
@@ -262,7 +262,7 @@ fn a_click_picks_a_point_in_the_step_that_verifies_and_only_in_the_live_picture(
             });
         }
         pane.steps();
-        (pane.commands(), (at - place.picture.min) / place.points_per_px())
+        (pane.commands(), (at - place.image.min) / place.points_per_px())
     };
     let mut model = sample::solved();
     let (sent, _) = click(&mut colour(model.clone()));
@@ -278,7 +278,7 @@ fn a_click_picks_a_point_in_the_step_that_verifies_and_only_in_the_live_picture(
 #[test]
 fn a_capture_says_what_it_waits_for_and_a_refusal_goes_away() {
     let mut model = sample::connected();
-    let wait = CaptureWait::Pictures(Wait::RobotMoves);
+    let wait = CaptureWait::Images(Wait::RobotMoves);
     model.capture = Some(CaptureUnderWay { number: 1, purpose: CapturePurpose::Calibrate, wait, since_s: 99.0 });
     let mut pane = colour(model);
     assert!(pane.sees("Capturing… waiting for the robot to stand still"));
@@ -314,7 +314,7 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
     };
     let target = model.document().meta.target;
     for corner in model.detection.as_ref().and_then(|seen| seen.corners.as_ref()).expect("seen") {
-        let at = projector.point(&target.point(corner.index)).expect("in the picture");
+        let at = projector.point(&target.point(corner.index)).expect("in the image");
         // The sample has no robot noise and corner noise of 0.05 px.
         let seen = place.screen(vec2(corner.px.x as f32, corner.px.y as f32));
         assert!(at.distance(seen) < 1.0, "{at:?} {seen:?}");
@@ -327,7 +327,7 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
     assert!(behind.line(&Point3::origin(), &Point3::new(0.1, 0.0, 0.0)).is_empty());
 }
 
-/// The corners of the live picture against where a pose has them: RMS \[px\].
+/// The corners of the live image against where a pose has them: RMS \[px\].
 fn apart_px(model: &Model, camera_from_target: &Pose<Camera, Target>) -> f64 {
     let (intrinsics, target) = (model.intrinsics().expect("a camera"), model.document().meta.target);
     let corners = model.detection.as_ref().and_then(|seen| seen.corners.clone()).expect("seen");
@@ -339,7 +339,7 @@ fn apart_px(model: &Model, camera_from_target: &Pose<Camera, Target>) -> f64 {
 }
 
 #[test]
-fn residuals_of_the_live_picture_are_those_of_the_board_that_the_calibration_found() {
+fn residuals_of_the_live_image_are_those_of_the_board_that_the_calibration_found() {
     let mut model = sample::solved();
     let corners = model.detection.as_ref().and_then(|seen| seen.corners.clone()).expect("seen");
     let largest = |model: &Model| {
@@ -348,7 +348,7 @@ fn residuals_of_the_live_picture_are_those_of_the_board_that_the_calibration_fou
         residuals.iter().map(|(_, residual_px)| residual_px.norm()).fold(0.0, f64::max)
     };
     assert!(largest(&model) < 1.0, "{} px", largest(&model));
-    // A board of twice the size is not the one in the picture.
+    // A board of twice the size is not the one in the image.
     let mut solved = Solved::clone(model.solve.solved.as_ref().expect("solved"));
     solved.calibrated.as_mut().expect("calibrated").shape.scale = 2.0;
     model.solve.solved = Some(Arc::new(solved));
@@ -358,7 +358,7 @@ fn residuals_of_the_live_picture_are_those_of_the_board_that_the_calibration_fou
 #[test]
 fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_board() {
     let mut model = sample::tracking();
-    // The board has gone 30 mm from where the calibration found it, and the picture shows it there.
+    // The board has gone 30 mm from where the calibration found it, and the image shows it there.
     let frame = model.frame.as_ref().expect("live").clone();
     let calibrated = model.calibrated().expect("calibrated").clone();
     let textures = LiveTextures::default();
@@ -380,7 +380,7 @@ fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_
 
     model.track.on = false;
     assert_eq!(at(&model), Some(of_calibration), "and without tracking they are of the calibration again");
-    model.review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::pictures())) });
+    model.review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::images())) });
     model.track.on = true;
     let record = model.document().capture(CaptureId(3)).expect("there").base_from_tip;
     assert_eq!(at(&model), Some(calibrated.camera_from_target(&record)), "a recorded image belongs to its own time");

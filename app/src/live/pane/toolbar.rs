@@ -1,4 +1,4 @@
-//! The lines over the pictures: what is drawn over the colours, and which colours depths have.
+//! The lines over the images: what is drawn over the colours, and which colours depths have.
 
 use egui::{DragValue, RichText, Ui, WidgetInfo, WidgetType};
 use handeye_core::depth::ColourMap;
@@ -7,7 +7,7 @@ use crate::command::{Command, Outbox};
 use crate::model::{DepthScale, Model, Overlays};
 use crate::tr;
 
-/// Residuals are shown at least as they are, and never so large that a good one leaves the picture.
+/// Residuals are shown at least as they are, and never so large that a good one leaves the image.
 const EXAGGERATIONS: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
 /// A switch per overlay.
@@ -22,7 +22,7 @@ pub fn overlays_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             &mut now.corners,
             tr!(language, "Corners"),
-            tr!(language, "Corners that were found, coloured by row; the first one has a ring. Faint ones are of an earlier picture"),
+            tr!(language, "Corners that were found, coloured by row; the first one has a ring. Faint ones are of an earlier image"),
         );
         switch_ui(
             ui,
@@ -46,7 +46,7 @@ pub fn overlays_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             &mut now.residuals,
             tr!(language, "Residuals"),
-            tr!(language, "From predicted to measured corners, exaggerated: of a capture after the fit, of the live picture by robot and calibration alone, or by the board's pose in it while the board is tracked"),
+            tr!(language, "From predicted to measured corners, exaggerated: of a capture after the fit, of the live image by robot and calibration alone, or by the board's pose in it while the board is tracked"),
         );
         exaggeration_ui(ui, &mut now, tr!(language, "Exaggeration of residuals"));
     });
@@ -73,7 +73,7 @@ fn exaggeration_ui(ui: &mut Ui, overlays: &mut Overlays, name: &str) {
         .widget_info(|| WidgetInfo { value: Some(value), ..WidgetInfo::labeled(WidgetType::DragValue, true, name) });
 }
 
-/// Colour map and range of the depth picture.
+/// Colour map and range of the depth image.
 pub fn depth_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     egui::ScrollArea::horizontal().id_salt("depth colours").show(ui, |ui| {
@@ -98,7 +98,7 @@ pub fn depth_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             (
                 DepthScale::Auto,
                 tr!(language, "Auto range"),
-                tr!(language, "Colours for the depths that are in the picture"),
+                tr!(language, "Colours for the depths that are in the image"),
             ),
             (
                 DepthScale::Full,

@@ -1,4 +1,4 @@
-//! One picture: where it is on the screen, how it is zoomed and moved, and what is drawn over it.
+//! One image: where it is on the screen, how it is zoomed and moved, and what is drawn over it.
 
 use egui::{Color32, PointerButton, Pos2, Rect, Response, Sense, Stroke, StrokeKind, TextureHandle, Ui, Vec2};
 use egui::{WidgetInfo, WidgetType};
@@ -15,19 +15,19 @@ pub const LARGEST_ZOOM: f32 = 60.0;
 /// Zoom per point of wheel movement; a notch of a wheel is about 50 points.
 const ZOOM_PER_POINT: f32 = 0.004;
 
-/// Where a picture is on the screen.
+/// Where an image is on the screen.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
-    /// All of the picture, which may be larger than the room.
-    pub picture: Rect,
+    /// All of the image, which may be larger than the room.
+    pub image: Rect,
     /// What can be seen of it.
     pub visible: Rect,
-    /// Width and height in pixels of the colour picture.
+    /// Width and height in pixels of the colour image.
     pub size_px: Vec2,
 }
 
 impl Place {
-    /// A picture in a room.
+    /// An image in a room.
     pub fn new(room: Rect, size_px: Vec2, viewport: Viewport) -> Self {
         let size_px = size_px.max(Vec2::splat(1.0));
         let zoom = viewport.zoom.clamp(1.0, LARGEST_ZOOM);
@@ -35,42 +35,42 @@ impl Place {
         let scale = (room.width() / size_px.x).min(room.height() / size_px.y).max(0.0) * zoom;
         let size = size_px * scale;
         let centre = held(Vec2::from(viewport.centre), room.size(), size);
-        let picture = Rect::from_min_size(room.center() - centre * size, size);
-        Self { picture, visible: picture.intersect(room), size_px }
+        let image = Rect::from_min_size(room.center() - centre * size, size);
+        Self { image, visible: image.intersect(room), size_px }
     }
 
     /// A place in pixels, whose whole numbers are the middles of pixels, on the screen.
     pub fn screen(&self, px: Vec2) -> Pos2 {
-        self.picture.min + (px + Vec2::splat(0.5)) / self.size_px * self.picture.size()
+        self.image.min + (px + Vec2::splat(0.5)) / self.size_px * self.image.size()
     }
 
     /// How many points on the screen a pixel takes.
     pub fn points_per_px(&self) -> f32 {
-        self.picture.width() / self.size_px.x
+        self.image.width() / self.size_px.x
     }
 
     /// The pixel at a place on the screen.
     fn pixel(&self, at: Pos2) -> ImagePoint {
-        let part = (at - self.picture.min) / self.picture.size();
+        let part = (at - self.image.min) / self.image.size();
         let index = |part: f32, count: f32| ((part * count).max(0.0) as u32).min((count as u32).saturating_sub(1));
         ImagePoint { column: index(part.x, self.size_px.x), row: index(part.y, self.size_px.y) }
     }
 }
 
-/// The middle of the room as part of the picture, held so that no room is empty while there is picture to fill it.
-fn held(centre: Vec2, room: Vec2, picture: Vec2) -> Vec2 {
-    let hold = |centre: f32, room: f32, picture: f32| {
-        if picture <= room || !centre.is_finite() {
+/// The middle of the room as part of the image, held so that no room is empty while there is image to fill it.
+fn held(centre: Vec2, room: Vec2, image: Vec2) -> Vec2 {
+    let hold = |centre: f32, room: f32, image: f32| {
+        if image <= room || !centre.is_finite() {
             return 0.5;
         }
-        let half = room / picture / 2.0;
+        let half = room / image / 2.0;
         centre.clamp(half, 1.0 - half)
     };
-    Vec2::new(hold(centre.x, room.x, picture.x), hold(centre.y, room.y, picture.y))
+    Vec2::new(hold(centre.x, room.x, image.x), hold(centre.y, room.y, image.y))
 }
 
-/// One picture.
-pub struct Picture<'a> {
+/// One image.
+pub struct Image<'a> {
     /// Its pixels.
     pub texture: Option<&'a TextureHandle>,
     /// Its name.
@@ -83,20 +83,20 @@ pub struct Picture<'a> {
     pub with_overlays: bool,
 }
 
-impl Picture<'_> {
-    /// Draws it in the middle of the room; gives the pixel of the colour picture under the pointer.
-    pub fn picture_ui(&self, ui: &mut Ui, outbox: &mut Outbox) -> Option<ImagePoint> {
+impl Image<'_> {
+    /// Draws it in the middle of the room; gives the pixel of the colour image under the pointer.
+    pub fn image_ui(&self, ui: &mut Ui, outbox: &mut Outbox) -> Option<ImagePoint> {
         let texture = self.texture?;
         let room = ui.max_rect();
         let (columns, rows) = self.shown.images.rgb.dimensions();
         let place = Place::new(room, Vec2::new(columns as f32, rows as f32), self.model.viewport);
-        let response = ui.interact(place.visible, ui.id().with("picture"), Sense::click_and_drag());
+        let response = ui.interact(place.visible, ui.id().with("image"), Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, self.name));
 
         let tint = if self.is_stale() { theme::stale_tint() } else { Color32::WHITE };
         let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
         let painter = ui.painter().with_clip_rect(place.visible.intersect(ui.clip_rect()));
-        painter.image(texture.id(), place.picture, uv, tint);
+        painter.image(texture.id(), place.image, uv, tint);
         if self.with_overlays {
             overlays::paint(ui, &painter, self.model, &self.shown, &place);
         }
@@ -138,8 +138,8 @@ impl Picture<'_> {
             || response.dragged_by(PointerButton::Secondary)
             || (response.dragged_by(PointerButton::Primary) && now.zoom > 1.0);
         if pans && response.drag_delta() != Vec2::ZERO {
-            let centre = (room.center() - response.drag_delta() - place.picture.min) / place.picture.size();
-            next.centre = held(centre, room.size(), place.picture.size()).into();
+            let centre = (room.center() - response.drag_delta() - place.image.min) / place.image.size();
+            next.centre = held(centre, room.size(), place.image.size()).into();
         }
         if response.double_clicked() {
             next = Viewport::default();
@@ -165,8 +165,8 @@ fn zoomed(now: Viewport, factor: f32, at: Pos2, room: Rect, place: &Place) -> Vi
     let zoom = (now.zoom * factor).clamp(1.0, LARGEST_ZOOM);
     // A hair above 1 cannot be told from 1, and would make a drag pan.
     let zoom = if zoom < 1.01 { 1.0 } else { zoom };
-    let size = place.picture.size() * (zoom / now.zoom.clamp(1.0, LARGEST_ZOOM));
-    let under = (at - place.picture.min) / place.picture.size();
+    let size = place.image.size() * (zoom / now.zoom.clamp(1.0, LARGEST_ZOOM));
+    let under = (at - place.image.min) / place.image.size();
     let centre = under + (room.center() - at) / size;
     Viewport { centre: held(centre, room.size(), size).into(), zoom }
 }
@@ -186,7 +186,7 @@ fn cross(ui: &Ui, painter: &egui::Painter, place: &Place, point: ImagePoint) {
 /// The point that was picked.
 fn ring(painter: &egui::Painter, place: &Place, point: ImagePoint) {
     let centre = place.screen(Vec2::new(point.column as f32, point.row as f32));
-    let colour = Marks::over_pictures().picked;
+    let colour = Marks::over_images().picked;
     painter.circle_stroke(centre, 8.0, Stroke::new(4.0, Color32::from_black_alpha(150)));
     painter.circle_stroke(centre, 8.0, Stroke::new(2.0, colour));
     for direction in [Vec2::RIGHT, Vec2::LEFT, Vec2::UP, Vec2::DOWN] {

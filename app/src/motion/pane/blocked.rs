@@ -31,8 +31,8 @@ impl Blocked {
             })
         } else if model.robot.is_none() || model.cell.is_none() {
             Some(tr!(language, "Waiting until the robot has been read"))
-        } else if model.touring {
-            Some(tr!(language, "A tour is under way: stop it to move the arm yourself"))
+        } else if model.sequence_runs {
+            Some(tr!(language, "A sequence is under way: stop it to move the arm yourself"))
         } else {
             None
         };

@@ -20,7 +20,7 @@ fn id() -> Id {
 }
 
 /// A button to be held. One that senses clicks alone is let go by egui after 0.8 s or a few points of movement, when
-/// neither can be a click any more.
+/// neither can be a click now.
 pub fn button(face: RichText) -> Button<'static> {
     Button::new(face).sense(Sense::click_and_drag())
 }

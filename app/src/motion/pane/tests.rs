@@ -45,7 +45,7 @@ fn a_button_moves_from_the_press_to_the_release() {
     pane.steps();
     assert_eq!(pane.commands(), [Command::JogReleased]);
     pane.steps();
-    assert!(pane.commands().is_empty(), "nothing is held any more");
+    assert!(pane.commands().is_empty(), "nothing is held now");
 }
 
 #[test]

@@ -30,9 +30,9 @@ pub(super) fn lens(known: &Known) -> String {
     below(paths::camera(known.mode()), paths::LENS)
 }
 
-/// A colour picture, compressed.
-pub(super) fn write_picture(pen: Pen<'_>, known: &Known, rgb: &RgbImage) -> Result<(), RecordError> {
-    let path = below(&lens(known), paths::PICTURE);
+/// A colour image, compressed.
+pub(super) fn write_image(pen: Pen<'_>, known: &Known, rgb: &RgbImage) -> Result<(), RecordError> {
+    let path = below(&lens(known), paths::IMAGE);
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY)
         .encode_image(rgb)
@@ -41,10 +41,10 @@ pub(super) fn write_picture(pen: Pen<'_>, known: &Known, rgb: &RgbImage) -> Resu
 }
 
 fn not_compressed(path: &str, (width, height): (u32, u32), error: &ImageError) -> RecordError {
-    RecordError::Picture { path: path.to_owned(), width, height, reason: error.to_string() }
+    RecordError::Image { path: path.to_owned(), width, height, reason: error.to_string() }
 }
 
-/// Depths as a picture, and as coloured points in the base.
+/// Depths as an image, and as coloured points in the base.
 pub(super) fn write_depth(
     pen: Pen<'_>,
     known: &Known,
@@ -112,7 +112,7 @@ fn points_in_base(
     (points, colours)
 }
 
-/// Where the corners of a board are in a picture, as far as they are in it.
+/// Where the corners of a board are in an image, as far as they are in it.
 pub(super) fn projected(
     target: &TargetSpec,
     intrinsics: &Intrinsics,
@@ -127,7 +127,7 @@ pub(super) fn projected(
     pixels.filter(inside).collect()
 }
 
-/// Where the calibration puts the corners in the live picture.
+/// Where the calibration puts the corners in the live image.
 pub(super) fn write_prediction(
     pen: Pen<'_>,
     known: &Known,

@@ -1,4 +1,4 @@
-//! The captures: each a camera where it stood, with its picture, the corners in it and what the calibration makes of them.
+//! The captures: each a camera where it stood, with its image, the corners in it and what the calibration makes of them.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -107,7 +107,7 @@ impl Captures {
         changes
     }
 
-    /// Takes over corners; `None` when there is no such capture any more.
+    /// Takes over corners; `None` when there is no such capture now.
     pub fn observe(&mut self, id: CaptureId, corners: Option<Vec<Corner>>) -> Option<&Shown> {
         let shown = self.shown.get_mut(&id)?;
         shown.corners = corners;
@@ -121,8 +121,8 @@ impl Captures {
         self.shown.keys().filter(differs).copied().collect()
     }
 
-    /// A picture as it is on the disk; `None` without a folder.
-    pub fn picture(&self, record: &CaptureRecord) -> Result<Option<EncodedImage>, RecordError> {
+    /// An image as it is on the disk; `None` without a folder.
+    pub fn image(&self, record: &CaptureRecord) -> Result<Option<EncodedImage>, RecordError> {
         let Some(folder) = &self.folder else { return Ok(None) };
         let file = folder.join(&record.image);
         match std::fs::read(&file) {
@@ -166,7 +166,7 @@ impl Captures {
         pen.write(&below(&path, paths::LENS), &pinhole(&intrinsics, style::CAPTURE_IMAGE_PLANE, colour, line))
     }
 
-    /// All that is in the picture of a capture, below a lens or another place of pictures.
+    /// All that is in the image of a capture, below a lens or another place of images.
     pub fn write_marks(pen: Pen<'_>, known: &Known, shown: &Shown, below_path: &str) -> Result<(), RecordError> {
         let outcome = known.solved.as_deref().and_then(|solved| outcome(solved, shown.record.id));
         let residuals = outcome.map_or(&[][..], |outcome| outcome.residuals);
@@ -182,7 +182,7 @@ impl Captures {
         pen.write(&below(below_path, paths::RESIDUALS), &arrows)
     }
 
-    /// The board as the picture of a capture has it, and as the calibration does.
+    /// The board as the image of a capture has it, and as the calibration does.
     pub fn write_boards(pen: Pen<'_>, known: &Known, shown: &Shown) -> Result<(), RecordError> {
         let path = paths::capture(shown.record.id);
         if known.mount().is_none() {
@@ -234,9 +234,9 @@ fn colour(item: &CaptureItem) -> Color {
     }
 }
 
-/// Its number, and that it was set aside where it was.
+/// Its number, and that it was left out as an outlier where it was.
 fn label(id: CaptureId, standing: Standing) -> String {
-    if standing == Standing::Aside { format!("{id} (set aside)") } else { id.to_string() }
+    if standing == Standing::Aside { format!("{id} (outlier)") } else { id.to_string() }
 }
 
 #[cfg(test)]
@@ -247,7 +247,7 @@ mod tests {
     fn a_capture_that_was_set_aside_is_named_so_and_has_the_colour_of_a_warning() {
         let item = |standing| CaptureItem { base_from_camera: None, standing, rms_px: None, times_median: Some(1.0) };
         let id = CaptureId(7);
-        assert_eq!(label(id, Standing::Aside), "7 (set aside)");
+        assert_eq!(label(id, Standing::Aside), "7 (outlier)");
         assert_eq!(colour(&item(Standing::Aside)), style::SET_ASIDE);
         assert_eq!(label(id, Standing::Fit), "7");
         assert_ne!(colour(&item(Standing::Fit)), style::SET_ASIDE);

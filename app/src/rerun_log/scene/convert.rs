@@ -13,7 +13,7 @@ use crate::scene;
 /// Squared radius that holds 95 % of a Gaussian in three dimensions: the quantile of chi square.
 const CHI_SQUARE_3_95: f64 = 7.814_728;
 
-/// Rerun's pixel (0, 0) is the corner of the picture, ours the middle of its first pixel.
+/// Rerun's pixel (0, 0) is the corner of the image, ours the middle of its first pixel.
 const PIXEL_SHIFT: f64 = 0.5;
 
 /// A pose as a transform along the tree of entities.
@@ -67,7 +67,7 @@ pub(super) fn pinhole(intrinsics: &Intrinsics, image_plane_m: f32, colour: Color
         .with_line_width(Radius::new_ui_points(line_ui_points))
 }
 
-/// Marks in a picture; none clears those that were there.
+/// Marks in an image; none clears those that were there.
 pub(super) fn marks(pixels: impl IntoIterator<Item = Vector2<f64>>, colour: Color) -> Points2D {
     let pixels: Vec<[f32; 2]> = pixels.into_iter().map(|px| pixel(&px)).collect();
     Points2D::new(pixels).with_colors([colour]).with_radii([Radius::new_ui_points(style::CORNER_UI_POINTS)])

@@ -30,9 +30,9 @@ pub enum RecordError {
         /// Which.
         reason: String,
     },
-    /// A picture could not be compressed; everything else of the entry is recorded.
-    #[error("a picture of {width}×{height} could not be compressed for {path}: {reason}")]
-    Picture {
+    /// An image could not be compressed; everything else of the entry is recorded.
+    #[error("an image of {width}×{height} could not be compressed for {path}: {reason}")]
+    Image {
         /// Which entity.
         path: String,
         /// Width in pixels.

@@ -1,14 +1,14 @@
 //! The scene in the recording: entries of the application become entities of Rerun.
 //!
 //! One [`SceneWriter`] writes one recording. It keeps what later entries need from earlier ones (camera, board, captures)
-//! and nothing else; pictures of captures are read from the session's folder when they are written.
+//! and nothing else; images of captures are read from the session's folder when they are written.
 //!
 //! | part | writes |
 //! | --- | --- |
 //! | `robot` | arm, tip, the way that the tip went |
 //! | `items` | cameras and boards of the scene, those that a simulated cell says are true among them |
 //! | `camera` | the live camera: image, depths, points in the base |
-//! | `captures` | a frustum per capture with picture, corners, residuals, boards |
+//! | `captures` | a frustum per capture with image, corners, residuals, boards |
 //! | `result` | the board as calibrated, uncertainties, numbers, report |
 //! | `track` | the board as it is tracked |
 //!
@@ -48,8 +48,8 @@ use paths::below;
 use pen::{Clock, Instant, Pen};
 use robot::Trail;
 
-/// Depths and points of live pictures are recorded once in this time [s, simulated]: they are ten times the size of the
-/// picture, and what they show changes slowly.
+/// Depths and points of live images are recorded once in this time [s, simulated]: they are ten times the size of the
+/// image, and what they show changes slowly.
 const DEPTH_EVERY_S: f64 = 1.0;
 
 /// Turns entries into entities, see the [module](self).
@@ -62,8 +62,8 @@ pub struct SceneWriter {
     session_trail: Trail,
     connection_trail: Trail,
     captures: Captures,
-    /// Number and time \[s\] of the newest picture.
-    newest_picture: Option<(u64, f64)>,
+    /// Number and time \[s\] of the newest image.
+    newest_image: Option<(u64, f64)>,
     depth_at_s: Option<f64>,
     /// The far plane of the depth sensor \[m\], once an image says.
     far_plane_m: Option<f32>,
@@ -85,7 +85,7 @@ impl SceneWriter {
             session_trail: Trail::new(paths::TRAJECTORY_SESSION, style::PAST_WAY),
             connection_trail: Trail::new(paths::TRAJECTORY_CONNECTION, style::WAY),
             captures: Captures::default(),
-            newest_picture: None,
+            newest_image: None,
             depth_at_s: None,
             far_plane_m: None,
         }
@@ -110,7 +110,7 @@ impl SceneWriter {
     /// long as all of them are of one recording.
     ///
     /// # Errors
-    /// [`RecordError::Stream`] when the recording takes nothing more. Other errors concern one picture or document, and
+    /// [`RecordError::Stream`] when the recording takes nothing more. Other errors concern one image or document, and
     /// the rest of the entry is written.
     pub fn write(&mut self, rec: &RecordingStream, entry: &Entry) -> Result<(), RecordError> {
         let pen = Pen::new(rec);
@@ -119,7 +119,7 @@ impl SceneWriter {
             Entry::Robot { sim_time_s, base_from_tip, joints_rad } => {
                 self.robot(pen, *sim_time_s, base_from_tip, joints_rad)
             }
-            Entry::Picture { info, images } => self.picture(pen, info, images),
+            Entry::Image { info, images } => self.image(pen, info, images),
             Entry::Detection(detection) => self.detection(pen, detection),
             Entry::Document { folder, document } => self.document(pen, folder.clone(), document),
             Entry::Observed { id, observed } => self.observed(pen, *id, observed),
@@ -216,9 +216,9 @@ impl SceneWriter {
         self.connection_trail.go(pen, &to)
     }
 
-    fn picture(&mut self, pen: Pen<'_>, info: &FrameInfo, images: &FrameImages) -> Result<(), RecordError> {
+    fn image(&mut self, pen: Pen<'_>, info: &FrameInfo, images: &FrameImages) -> Result<(), RecordError> {
         self.clock.tick(info.sim_time_s);
-        self.newest_picture = Some((info.number, self.clock.sim_time_s));
+        self.newest_image = Some((info.number, self.clock.sim_time_s));
         self.far_plane_m = Some(info.far_plane_m);
         pen.at(self.clock.live());
         self.tip(pen, &info.base_from_tip, Some(&info.joints_rad))?;
@@ -227,7 +227,7 @@ impl SceneWriter {
             write_board(pen, &self.known, self.known.true_board())?;
         }
         let mut faults = Faults::default();
-        faults.tolerate(camera::write_picture(pen, &self.known, &images.rgb))?;
+        faults.tolerate(camera::write_image(pen, &self.known, &images.rgb))?;
         camera::write_prediction(pen, &self.known, &info.base_from_tip)?;
         let age_s = self.depth_at_s.map(|at| self.clock.sim_time_s - at);
         // A negative age is a simulation that was started again.
@@ -240,9 +240,9 @@ impl SceneWriter {
     }
 
     fn detection(&mut self, pen: Pen<'_>, detection: &LiveDetection) -> Result<(), RecordError> {
-        let of_picture = self.newest_picture.filter(|(number, _)| *number == detection.frame);
+        let of_image = self.newest_image.filter(|(number, _)| *number == detection.frame);
         let live = self.clock.live();
-        pen.at(Instant { sim_time_s: of_picture.map_or(live.sim_time_s, |(_, time)| Some(time)), ..live });
+        pen.at(Instant { sim_time_s: of_image.map_or(live.sim_time_s, |(_, time)| Some(time)), ..live });
         let corners = detection.corners.as_deref().unwrap_or_default();
         pen.write(&below(&camera::lens(&self.known), paths::CORNERS), &corner_marks(corners, style::SEEN))?;
         result::number(pen, paths::PLOT_SEARCH, Some(detection.took_s * 1e3))?;
@@ -283,7 +283,7 @@ impl SceneWriter {
         faults.finish()
     }
 
-    /// A capture with its picture; on the time line of captures also robot and camera as they were.
+    /// A capture with its image; on the time line of captures also robot and camera as they were.
     fn new_capture(&mut self, pen: Pen<'_>, id: CaptureId, faults: &mut Faults) -> Result<(), RecordError> {
         let Some(shown) = self.captures.get(id) else { return Ok(()) };
         let (record, taken) = (shown.record.clone(), shown.taken);
@@ -300,9 +300,9 @@ impl SceneWriter {
         } else {
             self.trails(pen, &record.base_from_tip)?;
         }
-        let picture = self.captures.picture(&record);
-        if let Ok(Some(picture)) = &picture {
-            pen.write(&below(&camera::lens(&self.known), paths::PICTURE), picture)?;
+        let image = self.captures.image(&record);
+        if let Ok(Some(image)) = &image {
+            pen.write(&below(&camera::lens(&self.known), paths::IMAGE), image)?;
         }
         match self.captures.depth(&record) {
             Ok(Some((depth, rgb))) => {
@@ -321,10 +321,10 @@ impl SceneWriter {
                 Captures::write_boards(pen, &self.known, shown)?;
             }
         }
-        match picture {
-            Ok(Some(picture)) => {
+        match image {
+            Ok(Some(image)) => {
                 let lens = below(&paths::capture(id), paths::LENS);
-                pen.write(&below(&lens, paths::PICTURE), &picture)
+                pen.write(&below(&lens, paths::IMAGE), &image)
             }
             Ok(None) => Ok(()),
             Err(error) => faults.tolerate(Err(error)),
@@ -363,8 +363,8 @@ impl SceneWriter {
         }
         let Some(shown) = self.captures.newest_selected() else { return pen.clear(paths::SELECTED) };
         Captures::write_marks(pen, &self.known, shown, paths::SELECTED)?;
-        match self.captures.picture(&shown.record)? {
-            Some(picture) => pen.write(&below(paths::SELECTED, paths::PICTURE), &picture),
+        match self.captures.image(&shown.record)? {
+            Some(image) => pen.write(&below(paths::SELECTED, paths::IMAGE), &image),
             None => Ok(()),
         }
     }

@@ -27,7 +27,7 @@ pub const POINTS: &str = "base/points";
 pub const CAPTURES: &str = "base/captures";
 /// The board as it is tracked, `base_from_target`.
 pub const TRACKED_BOARD: &str = "base/track/board";
-/// The board by the newest picture alone.
+/// The board by the newest image alone.
 pub const TRACKED_BY_PNP: &str = "base/track/by_pnp";
 /// The board by the newest depths alone.
 pub const TRACKED_BY_DEPTH: &str = "base/track/by_depth";
@@ -41,7 +41,7 @@ pub const TRUE_CAMERA: &str = "truth/camera";
 /// Where the board really is, `base_from_target`.
 pub const TRUE_BOARD: &str = "truth/board";
 
-/// The capture that was selected last: its picture, corners, predicted corners and residuals.
+/// The capture that was selected last: its image, corners, predicted corners and residuals.
 pub const SELECTED: &str = "selected";
 
 /// Residual of the fit \[px\].
@@ -54,7 +54,7 @@ pub const PLOT_VERIFIED: &str = "plots/residual/verification";
 pub const PLOT_EXPECTED: &str = "plots/expected_error";
 /// The six joints \[deg\].
 pub const PLOT_JOINTS: &str = "plots/joints";
-/// From picture to tracked pose \[ms\].
+/// From image to tracked pose \[ms\].
 pub const PLOT_LATENCY: &str = "plots/track/latency";
 /// Time that the search for the board took \[ms\].
 pub const PLOT_SEARCH: &str = "plots/live/search";
@@ -78,8 +78,8 @@ pub const RESULT: &str = "result";
 
 /// Below a camera: its projection, with everything that is in pixels below it.
 pub const LENS: &str = "lens";
-/// Below a lens: the colour picture.
-pub const PICTURE: &str = "picture";
+/// Below a lens: the colour image.
+pub const IMAGE: &str = "image";
 /// Below a lens: depths.
 pub const DEPTH: &str = "depth";
 /// Below a lens: the corners that were found.
@@ -88,7 +88,7 @@ pub const CORNERS: &str = "corners";
 pub const PREDICTED: &str = "predicted";
 /// Below a lens: from prediction to corner, made longer by [`super::style::RESIDUAL_FACTOR`].
 pub const RESIDUALS: &str = "residuals_x50";
-/// Below a camera: the board in its picture alone, `camera_from_target` by PnP.
+/// Below a camera: the board in its image alone, `camera_from_target` by PnP.
 pub const SEEN_BOARD: &str = "seen_board";
 /// Below a camera: the board where the calibration puts it, `camera_from_target`.
 pub const PREDICTED_BOARD: &str = "predicted_board";

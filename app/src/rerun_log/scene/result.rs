@@ -19,7 +19,7 @@ pub(super) const SERIES: [(&str, &str); 11] = [
     (paths::PLOT_HELDOUT, "residual of views held out [px]"),
     (paths::PLOT_VERIFIED, "error of prediction, verification [px]"),
     (paths::PLOT_EXPECTED, "expected error, 95 % [mm]"),
-    (paths::PLOT_LATENCY, "picture to pose [ms]"),
+    (paths::PLOT_LATENCY, "image to pose [ms]"),
     (paths::PLOT_SEARCH, "search for the board [ms]"),
     (paths::PLOT_TRACK_ERROR, "tracked position against the truth [mm]"),
     (paths::PLOT_TRACK_TURN, "tracked orientation against the truth [°]"),

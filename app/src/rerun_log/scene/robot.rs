@@ -31,7 +31,7 @@ pub(super) fn write_solids(pen: Pen<'_>) -> Result<(), RecordError> {
                     let ends = [a, b].map(|end| point(&(solid.world_from_shape * end)));
                     capsules.push((solid, ends, radius as f32));
                 }
-                // The arm has no other shapes; the picture of one that got some would lack them.
+                // The arm has no other shapes; the image of one that got some would lack them.
                 Shape::Sphere { .. } | Shape::Box { .. } | Shape::Plane => {}
             }
         }

@@ -17,9 +17,9 @@ pub const LARGE_AXES: f32 = 0.1;
 pub const AXES: f32 = 0.04;
 /// Axes of what is there once per capture.
 pub const SMALL_AXES: f32 = 0.02;
-/// Where the picture of the live camera hangs.
+/// Where the image of the live camera hangs.
 pub const LIVE_IMAGE_PLANE: f32 = 0.12;
-/// Where the pictures of captures hang.
+/// Where the images of captures hang.
 pub const CAPTURE_IMAGE_PLANE: f32 = 0.04;
 /// Lines of frusta and boards [points of the screen].
 pub const THIN_UI_POINTS: f32 = 1.0;
@@ -42,7 +42,7 @@ pub const RESIDUAL: Color = colour(255, 230, 80);
 pub const NEUTRAL: Color = colour(130, 160, 200);
 /// A capture that is out of the fit.
 pub const EXCLUDED: Color = colour(110, 110, 110);
-/// A capture that the estimate set aside: beside the green, yellow and red of residuals it must not be mistaken.
+/// A capture that the estimate left out as an outlier: beside the green, yellow and red of residuals it must not be mistaken.
 pub const SET_ASIDE: Color = colour(255, 120, 0);
 /// A capture that is selected.
 pub const SELECTED: Color = colour(255, 255, 255);

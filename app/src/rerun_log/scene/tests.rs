@@ -77,12 +77,12 @@ fn robot(model: &Model) -> Entry {
 }
 
 fn all(model: &Model) -> Vec<Entry> {
-    let frame = model.frame.as_ref().expect("a picture");
+    let frame = model.frame.as_ref().expect("an image");
     let mut entries = vec![
         Entry::Cell(Arc::new(model.cell.clone().expect("connected"))),
         robot(model),
         document(model),
-        Entry::Picture { info: frame.info.clone(), images: Arc::clone(&frame.images) },
+        Entry::Image { info: frame.info.clone(), images: Arc::clone(&frame.images) },
         Entry::Detection(Arc::new(model.detection.clone().expect("seen"))),
     ];
     for (id, observed) in &model.observed {
@@ -119,7 +119,7 @@ fn a_solved_session_is_at_the_documented_places_with_what_belongs_there() {
         ("/base/points", "Points3D:positions"),
         ("/base/tip/camera", "Transform3D:quaternion"),
         ("/base/tip/camera/lens", "Pinhole:image_from_camera"),
-        ("/base/tip/camera/lens/picture", "EncodedImage:blob"),
+        ("/base/tip/camera/lens/image", "EncodedImage:blob"),
         ("/base/tip/camera/lens/depth", "EncodedDepthImage:blob"),
         ("/base/tip/camera/lens/corners", "Points2D:positions"),
         ("/base/tip/camera/lens/predicted", "Points2D:positions"),
@@ -267,7 +267,7 @@ fn selecting_a_capture_changes_its_frustum_and_no_other() {
 }
 
 #[test]
-fn a_picture_that_is_gone_is_named_and_everything_else_is_recorded() {
+fn an_image_that_is_gone_is_named_and_everything_else_is_recorded() {
     let model = sample::captured();
     let folder = tempfile::tempdir().expect("a folder");
     let mut bench = Bench::new();

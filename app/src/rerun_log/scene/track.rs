@@ -14,7 +14,7 @@ use super::style;
 use crate::model::Tracked;
 use crate::scene::Known;
 
-/// What one picture has brought; what it has not is no longer there.
+/// What one image has brought; what it has not is no longer there.
 pub(super) fn write(pen: Pen<'_>, known: &Known, tracked: &Tracked) -> Result<(), RecordError> {
     let update = &tracked.update;
     write_estimate(pen, known, tracked)?;

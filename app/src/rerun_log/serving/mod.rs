@@ -1,7 +1,7 @@
 //! The servers from which viewers read, and the page with the web viewer.
 //!
 //! Why two servers: a server keeps what it has sent for viewers that come later, up to a limit, and forgets the oldest
-//! first. Pictures would push the captures out within a minute. So what lasts and what is live are served side by side, and
+//! first. Images would push the captures out within a minute. So what lasts and what is live are served side by side, and
 //! a viewer reads both as one recording.
 //!
 //! Rerun's own server listens by itself and answers whoever asks. What it serves is taken out of it here and put behind a

@@ -36,7 +36,7 @@ impl Frustum<'_> {
         self.base_from_camera.isometry() * Point3::new(0.0, 0.0, 0.6 * self.length_m)
     }
 
-    /// Draws the pyramid, and over the top edge of the picture a small roof that tells up from down.
+    /// Draws the pyramid, and over the top edge of the image a small roof that tells up from down.
     pub fn draw(&self, canvas: &mut Canvas, width: f32, edge: Color32, fill: Color32) {
         let (apex, corners) = self.points();
         let stroke = Stroke::new(width, edge);
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_end_of_a_frustum_is_the_edge_of_the_picture_at_its_distance() {
+    fn the_end_of_a_frustum_is_the_edge_of_the_image_at_its_distance() {
         let intrinsics = Intrinsics::pinhole(640, 480, 589.37);
         let base_from_camera = Pose::from_translation_xyzw([0.1, 0.2, 0.3], [0.0, 1.0, 0.0, 0.0]);
         let frustum = Frustum { base_from_camera, intrinsics: &intrinsics, length_m: 0.2 };

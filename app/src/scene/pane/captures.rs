@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn the_colour_of_a_capture_tells_its_purpose_and_how_bad_its_residual_is() {
-        let marks = Marks::over_pictures();
+        let marks = Marks::over_images();
         let warning = Color32::from_rgb(240, 176, 64);
         let of = |standing, times_median: Option<f64>, line_px| {
             let rms_px = times_median.map(|times| 0.2 * times);

@@ -62,7 +62,7 @@ pub fn draw(canvas: &mut Canvas, ui: &Ui, model: &Model, table: &CaptureTable, p
                 language,
                 "From where captures were taken. Those of the fit turn to the colour of a warning as their residual goes \
                  to three times the median or over the outlier line, and have it when the estimate set them aside; \
-                 verifying and excluded ones have the colours of the charts. Click one to look at its picture."
+                 verifying and excluded ones have the colours of the charts. Click one to look at its image."
             )
             .to_owned(),
         });

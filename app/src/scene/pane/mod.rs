@@ -34,7 +34,7 @@ use eye::{Eye, Side};
 const HEADER: f32 = 34.0;
 /// Distance of text to the edge of the pane.
 const INSET: f32 = 10.0;
-/// Zoom per point of wheel movement, as in the pictures.
+/// Zoom per point of wheel movement, as in the images.
 const ZOOM_PER_POINT: f64 = 0.004;
 /// A capture is pointed at this near to its middle, in points on the screen.
 const GRASP: f32 = 9.0;

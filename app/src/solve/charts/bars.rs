@@ -54,7 +54,7 @@ pub fn influence_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &m
         instead_ui(ui, tr!(language, "Influence appears with the first calibration from four captures or more"));
         return;
     }
-    let what = tr!(language, "By so much the answer moves when this capture is left out");
+    let what = tr!(language, "How far the answer moves when this capture is left out");
     ui.label(RichText::new(what).color(Palette::of(ui).weak));
     let room = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(room);
@@ -171,7 +171,7 @@ impl Bars {
         let what = match (row.excluded, row.verifies()) {
             (true, _) => tr!(language, "excluded"),
             (false, true) => tr!(language, "verifies the fit: error of the prediction"),
-            (false, false) if row.is_aside() => tr!(language, "set aside"),
+            (false, false) if row.is_aside() => tr!(language, "outlier"),
             (false, false) => tr!(language, "in the fit"),
         };
         format!("{}\n{} {value}\n{what}", text!("Capture {name}", name = row.title()).say(language), self.name)

@@ -87,7 +87,7 @@ fn the_bar_of_a_capture_that_was_set_aside_says_so() {
     pane.harness.hover_at(plot.left_bottom() + vec2(pitch * 2.5, -4.0));
     // Words at the pointer take half a second.
     pane.harness.run_steps(60);
-    assert!(pane.sees("Capture 3 · pose 3") && pane.sees("set aside"));
+    assert!(pane.sees("Capture 3 · pose 3") && pane.sees("outlier"));
 }
 
 #[test]

@@ -40,7 +40,7 @@ pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Out
                 (Some(_), _) => tr!(
                     language,
                     "In 95 of 100 cases the calibration puts a point where the board was seen no further off than this. \
-                     What the robot and the picture add at that moment comes on top."
+                     What the robot and the image add at that moment comes on top."
                 ),
                 (None, true) => tr!(language, "These captures do not determine it. See what was found below."),
                 (None, false) => tr!(language, "A closed form states no uncertainty: choose the joint estimate below."),

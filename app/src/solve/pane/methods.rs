@@ -43,7 +43,7 @@ fn keep_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let mut keep = model.keep_outliers;
     let what = tr!(
         language,
-        "Views and corners that do not fit the others are set aside and named. With this they stay in the answer, so \
+        "Views and corners that do not fit the others are left out as outliers and named. With this they stay in the answer, so \
          that you see the difference; it may then be much worse than it says"
     );
     if ui.checkbox(&mut keep, tr!(language, "Keep all views")).on_hover_text(what).changed() {

@@ -136,7 +136,7 @@ fn another_method_is_chosen_from_the_comparison() {
 #[test]
 fn keeping_all_views_is_one_click() {
     let mut pane = driven(sample::with_an_outlier());
-    assert!(pane.sees("Views set aside: 1 of 10"));
+    assert!(pane.sees("Outlier views: 1 of 10"));
     assert_eq!(pane.click("Keep all views"), [Command::SetKeepOutliers(true)]);
     pane.model().keep_outliers = true;
     pane.steps();
@@ -174,8 +174,8 @@ fn with_everything_found(calibration: &mut handeye_core::estimate::Calibration) 
 fn what_the_estimate_found_out_is_stated_with_units() {
     let pane = driven(changed(|solved| with_everything_found(&mut solved.calibration)));
     for line in [
-        "Views set aside: 2 of 10",
-        "Corners set aside: 2, in 1 of 10 views",
+        "Outlier views: 2 of 10",
+        "Outlier corners: 2, in 1 of 10 views",
         "Bend of the board: x 0.400 ± 0.030 mm, y -0.100 ± 0.020 mm",
         "Noise of views: 0.120 px",
         "Uncertainty widened: 2.0 times",

@@ -1,4 +1,4 @@
-//! Taught poses: the places that a tour visits, in their order.
+//! Taught poses: the places that a sequence visits, in their order.
 
 mod row;
 pub mod sequence;
@@ -17,7 +17,7 @@ pub fn taught_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let poses = &model.document().taught;
     parts::body_ui(ui, "taught poses", |ui| {
         teach::teach_ui(ui, model, outbox);
-        crate::taught::pane::sequence::tour_ui(ui, model, outbox);
+        crate::taught::pane::sequence::sequence_ui(ui, model, outbox);
         if poses.is_empty() {
             let detail = tr!(
                 language,
@@ -39,8 +39,8 @@ pub fn immovable(model: &Model) -> Option<&'static str> {
         Some(tr!(language, "Not connected: the arm cannot be moved until the connection is there"))
     } else if model.resting_simulation().is_some() {
         Some(tr!(language, "The arm moves only while the simulation runs"))
-    } else if model.touring || model.planning {
-        Some(tr!(language, "A tour is under way"))
+    } else if model.sequence_runs || model.planning {
+        Some(tr!(language, "A sequence is under way"))
     } else {
         None
     }

@@ -24,7 +24,7 @@ struct Renaming {
     to: String,
 }
 
-/// How the last tour of a pose went.
+/// How the last sequence of a pose went.
 enum Mark {
     None,
     UnderWay,
@@ -41,7 +41,7 @@ pub fn row_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbo
         ui.spacing_mut().item_spacing.x = 3.0;
         let name = &pose.name;
         let grip = text!("Drag {name} to another place", name = name).say(language);
-        let is_free = !model.touring;
+        let is_free = !model.sequence_runs;
         parts::sign_ui(ui, Sign::Grip, &grip, is_free).dnd_set_drag_payload(Dragged(index));
         parts::dot_ui(ui, mark.colour(ui));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -75,12 +75,12 @@ pub fn row_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbo
 }
 
 fn mark(model: &Model, name: &str) -> Mark {
-    let Some(tour) = model.tour.as_ref().filter(|tour| !tour.is_planned()) else { return Mark::None };
-    let Some(place) = tour.names.iter().position(|visited| visited == name) else { return Mark::None };
-    match tour.outcomes.get(place) {
+    let Some(sequence) = model.sequence.as_ref().filter(|sequence| !sequence.is_planned()) else { return Mark::None };
+    let Some(place) = sequence.names.iter().position(|visited| visited == name) else { return Mark::None };
+    match sequence.outcomes.get(place) {
         Some(StopOutcome::Done) => Mark::Done,
         Some(StopOutcome::Skipped(why)) => Mark::Skipped(why.clone()),
-        None if model.touring && tour.current() == Some(name) => Mark::UnderWay,
+        None if model.sequence_runs && sequence.current() == Some(name) => Mark::UnderWay,
         None => Mark::None,
     }
 }
@@ -133,9 +133,9 @@ fn name_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbox: 
         .char_limit(60)
         .frame(egui::Frame::NONE)
         .text_color(if taken { palette.bad } else { palette.text });
-    let mut response = ui.add_enabled(!model.touring, field);
+    let mut response = ui.add_enabled(!model.sequence_runs, field);
     let name = text!("Name of pose {n}", n = index + 1).say(language);
-    let enabled = !model.touring;
+    let enabled = !model.sequence_runs;
     response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, enabled, &name));
     if taken {
         response = response.on_hover_text(tr!(language, "There is a pose of that name already"));

@@ -5,17 +5,17 @@ use egui::{Button, Ui};
 use super::immovable;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
-use crate::model::{CapturePurpose, Model, StopOutcome, Tour};
+use crate::model::{CapturePurpose, Model, PoseSequence, StopOutcome};
 use crate::{text, tr};
 
-/// Buttons that begin a tour, or its progress.
-pub fn tour_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
-    match &model.tour {
-        Some(tour) if model.touring => progress_ui(ui, model, tour, outbox),
-        tour => {
+/// Buttons that begin a sequence, or its progress.
+pub fn sequence_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    match &model.sequence {
+        Some(sequence) if model.sequence_runs => progress_ui(ui, model, sequence, outbox),
+        sequence => {
             begin_ui(ui, model, outbox);
-            if let Some(tour) = tour.as_ref().filter(|tour| !tour.is_planned()) {
-                summary_ui(ui, model, tour);
+            if let Some(sequence) = sequence.as_ref().filter(|sequence| !sequence.is_planned()) {
+                summary_ui(ui, model, sequence);
             }
         }
     }
@@ -42,35 +42,35 @@ fn begin_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             (None, tr!(language, "Move only"), tr!(language, "Visits every pose and captures nothing")),
         ] {
             if parts::gated_ui(ui, reason, Button::new(name)).on_hover_text(what).clicked() {
-                outbox.send(Command::RunTour { purpose });
+                outbox.send(Command::RunSequence { purpose });
             }
         }
     });
 }
 
 /// How far it is, and the button that ends it.
-pub fn progress_ui(ui: &mut Ui, model: &Model, tour: &Tour, outbox: &mut Outbox) {
+pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let language = model.view.language;
-    let (done, of) = (tour.outcomes.len(), tour.names.len());
-    let said = match tour.current() {
+    let (done, of) = (sequence.outcomes.len(), sequence.names.len());
+    let said = match sequence.current() {
         Some(name) => text!("Pose {n} of {of}: {name}", n = done + 1, of = of, name = name),
         None => text!("All {of} poses were visited", of = of),
     }
     .say(language);
-    if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop tour")) {
-        outbox.send(Command::StopTour);
+    if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop sequence")) {
+        outbox.send(Command::StopSequence);
     }
 }
 
 /// How the last one went.
-pub fn summary_ui(ui: &mut Ui, model: &Model, tour: &Tour) {
-    let done = tour.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
-    let skipped = tour.outcomes.len() - done;
-    let left = tour.names.len() - tour.outcomes.len();
+pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
+    let done = sequence.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
+    let skipped = sequence.outcomes.len() - done;
+    let left = sequence.names.len() - sequence.outcomes.len();
     let said = text!(
-        "Last tour: {done} of {of} done, {skipped} skipped, {left} not visited",
+        "Last sequence: {done} of {of} done, {skipped} skipped, {left} not visited",
         done = done,
-        of = tour.names.len(),
+        of = sequence.names.len(),
         skipped = skipped,
         left = left
     );

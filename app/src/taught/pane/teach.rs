@@ -48,7 +48,7 @@ pub fn teach_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             outbox.send(Command::SetDialog(Some(Dialog::ExportPoses)));
         }
         let what = tr!(language, "Ten poses around the board, instead of those in the list. Undo brings them back");
-        let reason = model.touring.then(|| tr!(language, "A tour is under way"));
+        let reason = model.sequence_runs.then(|| tr!(language, "A sequence is under way"));
         let button = Button::new(tr!(language, "Reference poses"));
         if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
             outbox.send(Command::TeachReference);

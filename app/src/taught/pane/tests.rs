@@ -9,7 +9,7 @@ use super::*;
 use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
-use crate::model::{CapturePurpose, Dialog, LinkState, StopOutcome, Tour};
+use crate::model::{CapturePurpose, Dialog, LinkState, PoseSequence, StopOutcome};
 use crate::text::Text;
 
 /// Three poses: one of joints, two of the tip.
@@ -98,20 +98,20 @@ fn a_pose_is_dragged_to_the_place_below_another() {
 #[test]
 fn all_poses_are_run_for_each_purpose() {
     let mut pane = driven(model());
-    let calibrate = Command::RunTour { purpose: Some(CapturePurpose::Calibrate) };
+    let calibrate = Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) };
     assert_eq!(pane.click("Capture at each"), [calibrate]);
-    assert_eq!(pane.click("Verify at each"), [Command::RunTour { purpose: Some(CapturePurpose::Verify) }]);
-    assert_eq!(pane.click("Move only"), [Command::RunTour { purpose: None }]);
+    assert_eq!(pane.click("Verify at each"), [Command::RunSequence { purpose: Some(CapturePurpose::Verify) }]);
+    assert_eq!(pane.click("Move only"), [Command::RunSequence { purpose: None }]);
     pane.model().mover = LinkState::Failed { why: "gone".to_owned() };
     pane.steps();
     assert!(!pane.is_enabled("Capture at each") && !pane.is_enabled("Go to front"));
 }
 
 #[test]
-fn a_tour_says_how_each_pose_went_and_can_be_stopped() {
+fn a_sequence_says_how_each_pose_went_and_can_be_stopped() {
     let mut model = model();
-    model.touring = true;
-    model.tour = Some(Tour {
+    model.sequence_runs = true;
+    model.sequence = Some(PoseSequence {
         names: ["front", "left", "right"].map(str::to_owned).into(),
         planned: None,
         purpose: Some(CapturePurpose::Calibrate),
@@ -122,10 +122,10 @@ fn a_tour_says_how_each_pose_went_and_can_be_stopped() {
     assert!(pane.sees("Pose 3 of 3: right"));
     assert!(pane.sees("Skipped: the board was not found"));
     assert!(!pane.is_enabled("Remove front"));
-    assert_eq!(pane.click("Stop tour"), [Command::StopTour]);
-    pane.model().touring = false;
+    assert_eq!(pane.click("Stop sequence"), [Command::StopSequence]);
+    pane.model().sequence_runs = false;
     pane.steps();
-    assert!(pane.sees("Last tour: 1 of 3 done, 1 skipped, 1 not visited"));
+    assert!(pane.sees("Last sequence: 1 of 3 done, 1 skipped, 1 not visited"));
 }
 
 #[test]

@@ -47,8 +47,8 @@ fn follow(model: &Model) -> Option<&'static str> {
         })
     } else if model.cell.as_ref().is_none_or(|cell| cell.arm.is_none()) {
         Some(tr!(language, "This arm's kinematics is not known, so it cannot follow"))
-    } else if model.touring {
-        Some(tr!(language, "A tour is under way: stop it to move the arm yourself"))
+    } else if model.sequence_runs {
+        Some(tr!(language, "A sequence is under way: stop it to move the arm yourself"))
     } else if model.motion != Motion::Idle {
         Some(tr!(language, "The arm is moving: wait until it stands, or stop it"))
     } else if !model.track.on {

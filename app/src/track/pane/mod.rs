@@ -70,7 +70,7 @@ fn tracking_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outbo
             }
         } else {
             let button = egui::Button::new(tr!(language, "Start tracking"));
-            let what = tr!(language, "Look for the board in every picture and tell where it is in the base");
+            let what = tr!(language, "Look for the board in every image and tell where it is in the base");
             if parts::gated_ui(ui, blocked.tracking, button).on_hover_text(what).clicked() {
                 outbox.send(Command::SetTracking(true));
             }

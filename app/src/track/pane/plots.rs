@@ -18,18 +18,18 @@ const WINDOW_S: f64 = 30.0;
 const TICK_S: f64 = 10.0;
 /// Height of a plot.
 const HEIGHT: f32 = 128.0;
-/// Points further apart than this are not joined: no picture was tracked meanwhile \[s\].
+/// Points further apart than this are not joined: no image was tracked meanwhile \[s\].
 const GAP_S: f64 = 0.5;
 
 /// A line of a plot.
 struct Curve {
     name: &'static str,
     colour: egui::Color32,
-    /// Seconds before the newest picture, and values; `None` where there is none.
+    /// Seconds before the newest image, and values; `None` where there is none.
     points: Vec<(f64, Option<f64>)>,
 }
 
-/// Both plots; nothing before the first picture.
+/// Both plots; nothing before the first image.
 pub fn plots_ui(ui: &mut Ui, model: &Model) {
     let history = &model.track.history;
     let Some(newest) = history.back() else { return };
@@ -121,7 +121,7 @@ fn plot_ui(ui: &mut Ui, name: &str, scale: Scale, curves: &[Curve], language: La
         .map(|tick| f64::from(tick) * TICK_S)
         .map(|ago_s| (x(ago_s), if ago_s > 0.0 { format!("−{ago_s:.0}") } else { "0".to_owned() }))
         .collect();
-    axes::axes_ui(ui, plot, scale, name, tr!(language, "Time before the newest picture [s]"), &ticks);
+    axes::axes_ui(ui, plot, scale, name, tr!(language, "Time before the newest image [s]"), &ticks);
     for curve in curves {
         for piece in curve.pieces() {
             let line: Vec<Pos2> =

@@ -1,4 +1,4 @@
-//! Where the tracked board is in the base, by all pictures and by the newest alone.
+//! Where the tracked board is in the base, by all images and by the newest alone.
 
 use egui::Ui;
 use handeye_core::geometry::frames::{Base, Pose, Target};
@@ -44,7 +44,7 @@ pub fn pose_ui(ui: &mut Ui, model: &Model) {
         Some(estimate) => estimate_ui(ui, estimate, model.view.rotation, language),
         None => parts::hint_ui(ui, tr!(language, "Where it is now is not known.")),
     }
-    newest_picture_ui(ui, &newest.update, language);
+    newest_image_ui(ui, &newest.update, language);
     if let Some(error) = newest.error {
         truth_ui(ui, error, language);
     }
@@ -89,12 +89,12 @@ fn estimate_ui(ui: &mut Ui, estimate: &Estimate, rotation: RotationFormat, langu
     parts::stated_ui(ui, tr!(language, "Velocity [mm/s]"), &numbers::row(velocity.as_slice(), 1, FIGURES));
 }
 
-/// The newest picture alone, in two ways that share only the hand-eye transform.
-fn newest_picture_ui(ui: &mut Ui, update: &Update, language: Language) {
+/// The newest image alone, in two ways that share only the hand-eye transform.
+fn newest_image_ui(ui: &mut Ui, update: &Update, language: Language) {
     if update.seen.is_none() && update.by_depth.is_none() {
         return;
     }
-    parts::section_ui(ui, tr!(language, "Newest picture alone"));
+    parts::section_ui(ui, tr!(language, "Newest image alone"));
     let position = |pose: &Pose<Base, Target>| numbers::row((pose.translation() * 1e3).as_slice(), 2, FIGURES);
     if let Some(seen) = &update.seen {
         let what = text!(
@@ -105,7 +105,7 @@ fn newest_picture_ui(ui: &mut Ui, update: &Update, language: Language) {
             .on_hover_text(what.say(language));
     }
     let Some(by_depth) = &update.by_depth else {
-        parts::hint_ui(ui, tr!(language, "The picture has no depth at enough corners to compare with."));
+        parts::hint_ui(ui, tr!(language, "The image has no depth at enough corners to compare with."));
         return;
     };
     let what = text!(
@@ -130,7 +130,7 @@ fn newest_picture_ui(ui: &mut Ui, update: &Update, language: Language) {
 fn truth_ui(ui: &mut Ui, error: TrackError, language: Language) {
     parts::section_ui(ui, tr!(language, "Against the simulator's truth"));
     let what =
-        tr!(language, "Distance of the middle of the board from where the simulated cell had it in the same picture");
+        tr!(language, "Distance of the middle of the board from where the simulated cell had it in the same image");
     parts::stated_ui(ui, tr!(language, "Position error [mm]"), &numbers::fixed(error.position_m * 1e3, 3, FIGURES))
         .on_hover_text(what);
     let turned = numbers::fixed(error.rotation_rad.to_degrees(), 3, FIGURES);

@@ -15,7 +15,7 @@ pub fn state(model: &Model) -> (Option<Tone>, Text) {
         return (None, text!("The board is not tracked"));
     }
     let Some(newest) = &model.track.newest else {
-        return (Some(Tone::Busy), text!("Waiting for the first picture…"));
+        return (Some(Tone::Busy), text!("Waiting for the first image…"));
     };
     let update = &newest.update;
     let ago = |since_s: f64| format!("{:.1}", (update.time_s - since_s).max(0.0));
@@ -49,7 +49,7 @@ pub fn state_ui(ui: &mut Ui, model: &Model) {
     let words = text!("{rate} Hz · {latency} ms", rate = rate, latency = latency).say(language);
     let what = crate::tr!(
         language,
-        "Poses per second, and the time from the arrival of a picture to the pose that comes of it"
+        "Poses per second, and the time from the arrival of an image to the pose that comes of it"
     );
     ui.label(RichText::new(words).color(palette.weak)).on_hover_text(what);
 }

@@ -43,7 +43,7 @@ fn tracking_is_started_and_stopped() {
     assert_eq!(pane.click("Start tracking"), [Command::SetTracking(true)]);
     pane.model().track.on = true;
     pane.steps();
-    assert!(pane.sees("Waiting for the first picture"));
+    assert!(pane.sees("Waiting for the first image"));
     assert_eq!(pane.click("Stop tracking"), [Command::SetTracking(false)]);
 }
 
@@ -118,7 +118,7 @@ fn corners_and_depth_are_told_side_by_side_with_the_distance_between_them() {
     assert!(pane.sees("By depth [mm]: 102.00 200.00 300.00"));
     assert!(pane.sees("Apart: 2.00 mm, 0.00°"));
     newest(&mut pane, |tracked| tracked.update.by_depth = None);
-    assert!(!pane.sees("Apart") && pane.sees("The picture has no depth"));
+    assert!(!pane.sees("Apart") && pane.sees("The image has no depth"));
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn the_arm_says_why_it_cannot_follow() {
     };
     blocked(|model| model.track.on = false, "Start tracking first");
     blocked(|model| model.mover = LinkState::Failed { why: "gone".to_owned() }, "the arm cannot be moved until");
-    blocked(|model| model.touring = true, "A tour is under way");
+    blocked(|model| model.sequence_runs = true, "A sequence is under way");
     let unknown = |model: &mut Model| model.cell.iter_mut().for_each(|cell| cell.arm = None);
     blocked(unknown, "This arm's kinematics is not known");
     let rests = |model: &mut Model| model.robot.iter_mut().for_each(|it| it.simulation = Simulation::Stopped);

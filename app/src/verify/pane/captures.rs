@@ -13,7 +13,7 @@ use crate::{text, tr};
 /// Squared error over what is stated that one capture in a hundred exceeds.
 const UNLIKELY: f64 = 2.8;
 
-/// The table; the first column shows the picture.
+/// The table; the first column shows the image.
 pub fn captures_ui(
     ui: &mut Ui,
     model: &Model,
@@ -25,7 +25,7 @@ pub fn captures_ui(
     Grid::new("verified captures").num_columns(6).spacing([12.0, 3.0]).striped(true).show(ui, |ui| {
         let weak = Palette::of(ui).weak;
         for (heading, what) in [
-            (tr!(language, "Capture"), tr!(language, "Click to see its picture")),
+            (tr!(language, "Capture"), tr!(language, "Click to see its image")),
             ("mm", tr!(language, "Middle of the board: as seen from as predicted")),
             ("°", tr!(language, "Orientation of the board: as seen from as predicted")),
             ("px", tr!(language, "Corners: as seen from as predicted, RMS")),

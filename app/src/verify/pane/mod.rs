@@ -24,7 +24,7 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             tr!(
                 language,
                 "Captures at places that are not in the fit, with the board in view: at poses that are planned for it, or \
-                 where you move the arm yourself. The calibration predicts where the board is; the picture says where it is \
+                 where you move the arm yourself. The calibration predicts where the board is; the image says where it is \
                  seen. The board has to stay where it was."
             ),
         );
@@ -70,11 +70,11 @@ fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let reason = if !model.camera.is_connected() || !model.control.is_connected() {
             Some(tr!(language, "Not connected: there is nothing to capture"))
         } else if model.resting_simulation().is_some() {
-            Some(tr!(language, "Pictures are renewed only while the simulation runs"))
+            Some(tr!(language, "Images are renewed only while the simulation runs"))
         } else if model.capture.is_some() {
             Some(tr!(language, "A capture is under way"))
-        } else if model.touring || model.planning {
-            Some(tr!(language, "A tour is under way"))
+        } else if model.sequence_runs || model.planning {
+            Some(tr!(language, "A sequence is under way"))
         } else {
             None
         };

@@ -1,4 +1,4 @@
-//! A point of the picture in the base, measured in two ways.
+//! A point of the image in the base, measured in two ways.
 
 use egui::Ui;
 use handeye_core::verify::MeasuredPoint;
@@ -20,7 +20,7 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             tr!(
                 language,
-                "In the step Verify, click a point of the board in the live picture. Its place in the base is then \
+                "In the step Verify, click a point of the board in the live image. Its place in the base is then \
                  measured twice: from the depth at the pixel, and from the board as it is seen."
             ),
         );
@@ -44,7 +44,7 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         ui,
         tr!(
             language,
-            "± is one standard deviation, as far as the calibration causes it; what the picture adds comes on top."
+            "± is one standard deviation, as far as the calibration causes it; what the image adds comes on top."
         ),
     );
 }

@@ -6,18 +6,18 @@ use handeye_core::estimate::handeye::Mode;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
-use crate::model::{CapturePurpose, Model, Motion, Pane, StopOutcome, Tour};
+use crate::model::{CapturePurpose, Model, Motion, Pane, PoseSequence, StopOutcome};
 use crate::taught::pane::immovable;
-use crate::taught::pane::tour;
+use crate::taught::pane::sequence;
 use crate::{text, tr};
 
 /// The button that begins, or how far it is; and how it went.
 pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let verifies = |tour: &&Tour| tour.purpose == Some(CapturePurpose::Verify);
-    match model.tour.as_ref().filter(verifies) {
-        Some(tour) if model.touring => {
-            tour::progress_ui(ui, model, tour, outbox);
+    let verifies = |sequence: &&PoseSequence| sequence.purpose == Some(CapturePurpose::Verify);
+    match model.sequence.as_ref().filter(verifies) {
+        Some(sequence) if model.sequence_runs => {
+            sequence::progress_ui(ui, model, sequence, outbox);
             return;
         }
         _ if model.planning => {
@@ -33,7 +33,7 @@ pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let what = tr!(
         language,
         "Plans a few poses with the whole board in view that differ from all captures, moves the arm to each, and captures \
-         there for verification. Stop tour and STOP end it; what was captured is kept"
+         there for verification. Stop sequence and STOP end it; what was captured is kept"
     );
     if parts::gated_ui(ui, blocked(model), button).on_hover_text(what).clicked() {
         outbox.send(Command::VerifyAtPlanned);
@@ -41,8 +41,8 @@ pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     if let Some(message) = model.messages.standing_in(Pane::Verify) {
         parts::notice_ui(ui, Tone::Warning, &message.text.say(language), |_| ());
     }
-    if let Some(tour) = model.tour.as_ref().filter(|tour| tour.is_planned()) {
-        went_ui(ui, model, tour);
+    if let Some(sequence) = model.sequence.as_ref().filter(|sequence| sequence.is_planned()) {
+        went_ui(ui, model, sequence);
     }
 }
 
@@ -72,10 +72,10 @@ fn blocked(model: &Model) -> Option<&'static str> {
     }
 }
 
-fn went_ui(ui: &mut Ui, model: &Model, tour: &Tour) {
+fn went_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
     let language = model.view.language;
-    tour::summary_ui(ui, model, tour);
-    for (name, outcome) in tour.names.iter().zip(&tour.outcomes) {
+    sequence::summary_ui(ui, model, sequence);
+    for (name, outcome) in sequence.names.iter().zip(&sequence.outcomes) {
         if let StopOutcome::Skipped(why) = outcome {
             let said = text!("{name} was skipped: {why}", name = name, why = why.clone());
             parts::caption_ui(ui, &said.say(language));

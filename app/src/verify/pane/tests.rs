@@ -8,7 +8,8 @@ use super::*;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, Pane, PickedPoint, Severity, Solved, StopOutcome, Tour,
+    CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, Pane, PickedPoint, PoseSequence, Severity, Solved,
+    StopOutcome,
 };
 
 fn driven(model: Model) -> Driven {
@@ -31,7 +32,7 @@ fn a_capture_for_verification_is_asked_for_and_cancelled() {
     pane.model().capture = Some(CaptureUnderWay {
         number: 1,
         purpose: CapturePurpose::Verify,
-        wait: CaptureWait::Pictures(Wait::RobotMoves),
+        wait: CaptureWait::Images(Wait::RobotMoves),
         since_s: 99.0,
     });
     pane.steps();
@@ -149,8 +150,8 @@ fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane
     assert!(pane.sees("Planning poses that are not in the fit"));
     assert!(!pane.is_enabled("Capture for verification"));
     pane.model().planning = false;
-    pane.model().touring = true;
-    pane.model().tour = Some(Tour {
+    pane.model().sequence_runs = true;
+    pane.model().sequence = Some(PoseSequence {
         names: vec!["check 1".to_owned(), "check 2".to_owned(), "check 3".to_owned()],
         planned: Some(vec![[0.0; 6]; 3]),
         purpose: Some(CapturePurpose::Verify),
@@ -159,12 +160,12 @@ fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane
     });
     pane.steps();
     assert!(pane.sees("Pose 3 of 3: check 3"));
-    assert_eq!(pane.click("Stop tour"), [Command::StopTour]);
-    pane.model().touring = false;
+    assert_eq!(pane.click("Stop sequence"), [Command::StopSequence]);
+    pane.model().sequence_runs = false;
     let why = Text::verbatim("it was broken off");
     pane.model().messages.say_at(Home::Pane(Pane::Verify), Severity::Warning, why, 99.0);
     pane.steps();
-    assert!(pane.sees("Last tour: 1 of 3 done, 1 skipped, 1 not visited"));
+    assert!(pane.sees("Last sequence: 1 of 3 done, 1 skipped, 1 not visited"));
     assert!(pane.sees("check 2 was skipped: the board was not found") && pane.sees("it was broken off"));
     assert!(pane.is_enabled(PLANNED) && pane.nothing_is_cut_off());
 }

@@ -37,7 +37,7 @@ pub fn request(number: u64, frames: u32) -> CaptureRequest {
     }
 }
 
-/// A vision thread without a thread: a test puts pictures in, sets the clock and has it take turns.
+/// A vision thread without a thread: a test puts images in, sets the clock and has it take turns.
 pub struct Table {
     pub vision: Vision,
     pub tap: Arc<Tap<LiveFrame>>,
@@ -88,7 +88,7 @@ impl Table {
         self.vision.turn().is_ok()
     }
 
-    /// Puts a picture of the next pass in.
+    /// Puts an image of the next pass in.
     pub fn put(&mut self, rgb: &RgbImage) {
         self.frames += 1;
         let mut now_s = self.now_s.lock().expect("no panic");
@@ -111,7 +111,7 @@ impl Table {
         self.tap.put(LiveFrame { info, images: Arc::new(images) });
     }
 
-    /// Pictures until the capture has ended.
+    /// Images until the capture has ended.
     pub fn feed(&mut self, rgb: &RgbImage, most: usize) -> Result<Measured, CaptureRefused> {
         for _ in 0..most {
             self.put(rgb);
@@ -123,7 +123,7 @@ impl Table {
                 break;
             }
         }
-        Err(self.refused().expect("a capture ends with a picture or a reason"))
+        Err(self.refused().expect("a capture ends with an image or a reason"))
     }
 
     pub fn refused(&self) -> Option<CaptureRefused> {
@@ -209,7 +209,7 @@ impl CellBench {
     pub fn live(&mut self, count: usize) -> Vec<LiveDetection> {
         let mut found = Vec::new();
         while found.len() < count {
-            self.woken.recv_timeout(PATIENCE).expect("pictures come");
+            self.woken.recv_timeout(PATIENCE).expect("images come");
             self.workers.drain(|event| {
                 if let Event::Detection(detection) = event {
                     found.push(*detection);

@@ -1,7 +1,7 @@
-//! The vision thread: looks for the board in the newest picture, and takes captures. It owns no connection; pictures
+//! The vision thread: looks for the board in the newest image, and takes captures. It owns no connection; images
 //! come to it from the camera worker through a [`Tap`].
 //!
-//! One picture at a time: tasks first, then the capture, which only costs what the pictures of a scene at rest take to
+//! One image at a time: tasks first, then the capture, which only costs what the images of a scene at rest take to
 //! be compared, then the live search. So whatever is asked for is taken up within one search, and a capture that waits
 //! goes on within one search, however long a search takes.
 
@@ -15,7 +15,7 @@ use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::image::GrayImage;
 use handeye_core::project::files::image_file::gray_from_rgb;
 use handeye_core::targets::TargetSpec;
-use handeye_core::track::{Picture, Setup};
+use handeye_core::track::{Image, Setup};
 use handeye_sim_link::client::CancelToken;
 
 use search::Search;
@@ -29,15 +29,15 @@ use crate::text::Text;
 use crate::track::follow_line::FollowLine;
 use crate::track::worker::{TrackedImage, Tracking};
 
-/// How often the clock is looked at while a capture waits for pictures that do not come.
+/// How often the clock is looked at while a capture waits for images that do not come.
 const CLOCK_PERIOD: Duration = Duration::from_millis(100);
 
 /// What the vision thread can be asked for.
 #[derive(Debug, Clone)]
 pub enum VisionTask {
-    /// What to look for, from the next picture on. A capture of another board is given up.
+    /// What to look for, from the next image on. A capture of another board is given up.
     SetTarget(TargetSpec),
-    /// The camera, for the pose of the board in live pictures.
+    /// The camera, for the pose of the board in live images.
     SetIntrinsics(Intrinsics),
     /// Take a capture. One that is under way is given up.
     Capture(CaptureRequest),
@@ -203,7 +203,7 @@ impl Vision {
         let sight = TrackedImage {
             number: info.number,
             received_s: info.received_s,
-            picture: Picture {
+            image: Image {
                 time_s: info.sim_time_s,
                 grey,
                 depth: Some(&frame.images.depth),

@@ -1,4 +1,4 @@
-//! The board in live pictures.
+//! The board in live images.
 
 use std::time::Instant;
 

@@ -19,12 +19,12 @@ fn watching(target: TargetSpec) -> Table {
 }
 
 #[test]
-fn the_newest_picture_is_searched_and_the_others_are_counted() {
+fn the_newest_image_is_searched_and_the_others_are_counted() {
     let mut table = watching(BOARD);
     table.ask(VisionTask::SetIntrinsics(Intrinsics::pinhole(480, 360, 400.0)));
-    let picture = board(0);
+    let image = board(0);
     for _ in 0..3 {
-        table.put(&picture);
+        table.put(&image);
     }
     assert!(table.turn());
     let (detection, _) = table.detections.take().expect("a detection");
@@ -61,15 +61,15 @@ fn what_a_capture_waits_for_is_told_when_it_changes() {
     table.ask(VisionTask::Capture(request(7, 3)));
     let measured = table.feed(&board(1), 10).expect("a capture");
     assert_eq!((measured.number, measured.frames), (7, 3));
-    assert_eq!(measured.corner_noise_px, Some(0.0), "three pictures, all the same");
+    assert_eq!(measured.corner_noise_px, Some(0.0), "three images, all the same");
     assert_eq!(measured.thumbnail.dimensions(), (160, 120));
     assert_eq!(*measured.rgb, board(1), "nothing is drawn on it");
     assert_eq!(measured.pose_name.as_deref(), Some("view"));
     let again = handeye_core::capture::observe_image(&measured.rgb, &BOARD).expect("searches").expect("the board");
-    assert_eq!(again.corners, measured.corners, "the kept picture gives the same corners");
-    let averaging = |done| (7, CaptureWait::Pictures(Wait::Averaging { done, of: 3 }));
+    assert_eq!(again.corners, measured.corners, "the kept image gives the same corners");
+    let averaging = |done| (7, CaptureWait::Images(Wait::Averaging { done, of: 3 }));
     let told = [
-        (7, CaptureWait::Pictures(Wait::ForPicture)),
+        (7, CaptureWait::Images(Wait::ForImage)),
         averaging(1),
         averaging(2),
         (7, CaptureWait::Measuring),
@@ -79,7 +79,7 @@ fn what_a_capture_waits_for_is_told_when_it_changes() {
 }
 
 #[test]
-fn a_picture_without_the_board_or_with_a_blurred_one_is_refused_with_the_reason() {
+fn an_image_without_the_board_or_with_a_blurred_one_is_refused_with_the_reason() {
     let mut table = watching(BOARD);
     table.ask(VisionTask::Capture(request(1, 1)));
     let empty = RgbImage::from_pixel(320, 240, Rgb([120, 130, 140]));
@@ -136,7 +136,7 @@ fn a_request_to_cancel_is_taken_up_before_the_measurement_is_handed_over() {
         table.put(&board(0));
         table.turn();
     }
-    // The picture that completes it and the request come together.
+    // The image that completes it and the request come together.
     table.put(&board(0));
     table.tasks.as_ref().expect("open").send(VisionTask::CancelCapture).expect("room");
     table.turn();
@@ -145,9 +145,9 @@ fn a_request_to_cancel_is_taken_up_before_the_measurement_is_handed_over() {
 }
 
 #[test]
-fn no_pictures_and_a_simulation_that_rests_are_told_apart() {
+fn no_images_and_a_simulation_that_rests_are_told_apart() {
     for (camera_answers, kind, words) in
-        [(false, RefusalKind::NoPictures, "No pictures"), (true, RefusalKind::NotSettled, "simulation is paused")]
+        [(false, RefusalKind::NoImages, "No images"), (true, RefusalKind::NotSettled, "simulation is paused")]
     {
         let mut table = watching(BOARD);
         table.ask(VisionTask::Capture(request(1, 1)));
@@ -169,11 +169,11 @@ fn no_pictures_and_a_simulation_that_rests_are_told_apart() {
 }
 
 #[test]
-fn pictures_that_never_come_to_rest_are_refused_after_the_limit() {
+fn images_that_never_come_to_rest_are_refused_after_the_limit() {
     let mut table = watching(BOARD);
     let options = CaptureOptions { settle_limit_s: 1.0, ..CaptureOptions::default() };
     table.ask(VisionTask::Capture(CaptureRequest { options, ..request(1, 1) }));
-    // The lower half is now dark, now light: not the whole picture, so it is no flicker.
+    // The lower half is now dark, now light: not the whole image, so it is no flicker.
     let plain = board(0);
     let other = {
         let mut other = plain.clone();
@@ -190,7 +190,7 @@ fn pictures_that_never_come_to_rest_are_refused_after_the_limit() {
     }
     let refused = table.refused().expect("it gives up");
     assert_eq!(refused.kind, RefusalKind::NotSettled);
-    assert!(refused.why.say(Language::English).contains("picture still changes after 1 s"), "{refused:?}");
+    assert!(refused.why.say(Language::English).contains("image still changes after 1 s"), "{refused:?}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Sub-pixel place of a chessboard corner as the saddle point of its intensities.
 //!
-//! Around a corner the picture of four squares is unchanged by half a turn, whatever the perspective and the blur: both
+//! Around a corner the image of four squares is unchanged by half a turn, whatever the perspective and the blur: both
 //! edges are lines through the corner. A quadratic fitted with weights centred on the corner therefore has its
 //! stationary point exactly there, and fitting again with the weights moved to the last answer converges to it.
 //!

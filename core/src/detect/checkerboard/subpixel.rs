@@ -1,4 +1,4 @@
-//! OpenCV's refinement of corners, for those whose picture our own model does not fit; and the error function.
+//! OpenCV's refinement of corners, for those whose image our own model does not fit; and the error function.
 
 use image::GrayImage;
 use nalgebra::Vector2;

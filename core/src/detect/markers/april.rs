@@ -96,7 +96,7 @@ fn overlooked(
     Ok(found)
 }
 
-/// Whether the cells of a tag are in the picture where the map has them, and light all around it. `gap` is the distance
+/// Whether the cells of a tag are in the image where the map has them, and light all around it. `gap` is the distance
 /// to the next tag as a part of its side.
 fn shows(image: &GrayImage, map: &Matrix3<f64>, on_target: &[Vector2<f64>; 4], cells: &[bool], gap: f64) -> bool {
     // Cells are a square.

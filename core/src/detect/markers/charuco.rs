@@ -46,7 +46,7 @@ pub(in crate::detect) fn find(
     Ok(spread::is_enough(&corners, |index| board.grid().point(index)).then_some(corners))
 }
 
-/// Which layout the board in the picture has; `None` when it is not there, or when the markers seen do not tell: those of
+/// Which layout the board in the image has; `None` when it is not there, or when the markers seen do not tell: those of
 /// one row lie the same way in both. Boards of an even number of inner rows have only one layout, [`Layout::New`] by name.
 ///
 /// # Errors

@@ -26,7 +26,7 @@ const BLUR_PX: (f64, f64) = (0.2, 4.0);
 const MIN_CONTRAST: f64 = 5.0;
 /// Largest RMS misfit as a part of the contrast.
 const MAX_MISFIT: f64 = 0.2;
-/// Variance of rounding to whole grey levels: no picture is known better.
+/// Variance of rounding to whole grey levels: no image is known better.
 const ROUNDING: f64 = 1.0 / 12.0;
 
 type Parameters = SVector<f64, 9>;

@@ -13,7 +13,7 @@ const MAX_MISFIT: f64 = 0.2;
 /// A step of the fit below this ends it \[px\].
 const CONVERGED_PX: f64 = 5e-4;
 const MAX_STEPS: usize = 15;
-/// Variance of rounding to whole grey levels: no picture is known better.
+/// Variance of rounding to whole grey levels: no image is known better.
 const ROUNDING: f64 = 1.0 / 12.0;
 
 /// Curve (3), blur across the edge, mean level (2), half the step (2).

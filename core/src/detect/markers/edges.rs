@@ -3,7 +3,7 @@
 //! A corner of a tag has no half-turn symmetry, so that blur moves what most corner detectors call its place. Its edges
 //! are not moved. Every line of pixels across an edge has it where its steepest steps are, which needs no level to be
 //! known; a curve of second degree through these places is where a fit to all pixels begins, with a Gaussian blur,
-//! `I = m(s) + h(s) erf((x − c(s)) / √2 σ)`. Where the picture is sharper than its pixels that profile is wrong, and the
+//! `I = m(s) + h(s) erf((x − c(s)) / √2 σ)`. Where the image is sharper than its pixels that profile is wrong, and the
 //! sum of the grey levels of each line says how much of it is dark, whatever the profile. Edges are bent as far as all
 //! of them together say that the lens bends them, and two of them meet in a corner. Small squares that touch the tag at
 //! its corners, as Kalibr prints them, lie beyond the ends of the edges and are not touched.
@@ -34,7 +34,7 @@ const MIN_CONTRAST: f64 = 15.0;
 const PASSES: usize = 3;
 /// Part of the steepest step from which on a step counts.
 const STEEP: f64 = 0.3;
-/// How far edges may be bent when nothing is known yet: their curvature times the width of the picture. A wide lens
+/// How far edges may be bent when nothing is known yet: their curvature times the width of the image. A wide lens
 /// (k₁ = −0.3 at a focal length of 0.8 widths) bends them by 0.3 at the border.
 const ANY_BEND: f64 = 1.0;
 /// What is believed of that before the edges are asked, and how many of them it is worth.
@@ -102,7 +102,7 @@ pub(in crate::detect) type Refined = (Vector2<f64>, Matrix2<f64>);
 /// dark border and `gap` that of the light around them, both as parts of a side. `None` for a corner at an edge that is
 /// covered or cut by the border of the image, and for squares too small for their blur.
 ///
-/// All edges are fitted twice: first bent at will; then no more than these say is usual in this picture.
+/// All edges are fitted twice: first bent at will; then no more than these say is usual in this image.
 pub(in crate::detect) fn refine(
     image: &GrayImage,
     squares: &[[Vector2<f64>; 4]],
@@ -149,7 +149,7 @@ fn keep_clear(squares: &mut [[Option<Edge>; 4]]) {
     }
 }
 
-/// The deviation of the curvature of edges, times the width of the picture: their scatter less what noise makes of it
+/// The deviation of the curvature of edges, times the width of the image: their scatter less what noise makes of it
 /// (a variance component by moments).
 fn usual_bend<'a>(edges: impl Iterator<Item = &'a Edge>, width: f64) -> f64 {
     let (mut sum, mut weights, mut count) = (0.0, 0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Gross hypotheses: poses inverted or in another unit, quaternion order, camera elsewhere, pictures and poses out of step.
+//! Gross hypotheses: poses inverted or in another unit, quaternion order, camera elsewhere, images and poses out of step.
 //!
 //! Each is a change of the reported poses. Under each the closed forms are solved anew, and the distance between where
 //! the chain puts the board and where the camera saw it is compared: it is measured on the camera's side, in millimetres,
@@ -44,7 +44,7 @@ pub(super) struct Change {
     order_in_inverse: bool,
     /// Factor on all lengths.
     pub unit: f64,
-    /// Every picture belongs to the pose so many rows further.
+    /// Every image belongs to the pose so many rows further.
     pub shift: isize,
 }
 

@@ -184,7 +184,7 @@ fn matters(model: &Model<'_>, judged: &Judged) -> bool {
     }
 }
 
-/// How far a move displaces the board in the picture, RMS over its points and the views after it, metres.
+/// How far a move displaces the board in the image, RMS over its points and the views after it, metres.
 pub(super) fn moved_m(model: &Model<'_>, effect: Effect, numbers: &[f64]) -> f64 {
     let numbers = DVector::from_column_slice(numbers);
     let count = model.rows.len();

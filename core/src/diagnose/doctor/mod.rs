@@ -2,7 +2,7 @@
 //!
 //! # What it tests
 //! Gross faults of how poses were written down ([`gross`]): inverted poses or the wrong mode (the same equations),
-//! millimetres against metres, the order of quaternions, pictures and poses out of step. Then, in a linear Gaussian model of
+//! millimetres against metres, the order of quaternions, images and poses out of step. Then, in a linear Gaussian model of
 //! pose pairs ([`model`]): a target that is not of its stated size or is bent, intrinsics that do not fit, a target or a
 //! camera that moved during the session, the zero of a joint, views that contradict the others.
 //!

@@ -21,7 +21,7 @@ use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::chain::Chain;
 use crate::geometry::se3;
 
-/// Smallest noise level of the robot, m and rad: below it nothing changes any more.
+/// Smallest noise level of the robot, m and rad: below it nothing changes now.
 const LEAST: f64 = 1e-6;
 /// Largest change of a variance in one step, as a logarithm.
 const LARGEST_STEP: f64 = 2.0;
@@ -49,7 +49,7 @@ pub(super) struct Model<'a> {
 #[derive(Clone, Default)]
 pub(super) struct State {
     pub effects: Vec<Effect>,
-    /// Views set aside.
+    /// Outlier views.
     pub aside: Vec<usize>,
 }
 

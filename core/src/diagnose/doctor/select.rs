@@ -10,9 +10,9 @@ use crate::progress::Work;
 
 /// Least views: twelve unknowns, six of a hypothesis, and noise levels to judge them by.
 pub(super) const NEED: usize = 5;
-/// Views set aside at the most, as a part of all: beyond it the others are no majority to judge by.
+/// Outlier views at the most, as a part of all: beyond it the others are no majority to judge by.
 const MOST_ASIDE: f64 = 0.34;
-/// A view whose misfit is so many times the median belongs to the set of views that may be set aside together.
+/// A view whose misfit is so many times the median belongs to the set of views that may be left out as an outlier together.
 const FAR: f64 = 5.0;
 /// Rounds of moving the solution to where the majority wants it; the second already changes it by a rounding.
 const ROUNDS: usize = 3;

@@ -1,4 +1,4 @@
-//! What the pictures alone say: the target's pose in every view, how precisely, and how lens and target shape turn it.
+//! What the images alone say: the target's pose in every view, how precisely, and how lens and target shape turn it.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
 

@@ -20,7 +20,7 @@ const CORRECTION_SIGMAS: f64 = 6.0;
 const INFLUENCE: f64 = 0.5;
 /// Prediction error over what the noise levels explain; they are themselves known to a fifth or so.
 const PREDICTION: f64 = 1.5;
-/// Robot noise over corner noise, both in pixels, from which better pictures hardly help: a tenth part in the square.
+/// Robot noise over corner noise, both in pixels, from which better images hardly help: a tenth part in the square.
 const ROBOT_OVER_CORNERS: f64 = 3.0;
 /// Distance from the middle of the closed forms, metres, from which one of them is worth a word.
 const DISAGREE_M: f64 = 5e-3;
@@ -71,7 +71,7 @@ fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding>
         return None;
     }
     let text = text!(
-        "View {view} alone moves the answer by {influence} mm; the median view moves it by {median} mm. Check its picture \
+        "View {view} alone moves the answer by {influence} mm; the median view moves it by {median} mm. Check its image \
          and its robot pose, or add views like it so that it does not stand alone.",
         view = &view.name,
         influence = format!("{:.2}", largest_m * 1e3),
@@ -86,7 +86,7 @@ fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding>
 fn residuals(used: &[&ViewResult]) -> Option<Finding> {
     let (view, largest, middle) = stands_out(used, |v| v.rms_px)?;
     let text = text!(
-        "The corners of view {view} fit with {rms} px, those of the median view with {median} px. Look at its picture for \
+        "The corners of view {view} fit with {rms} px, those of the median view with {median} px. Look at its image for \
          blur, reflections and wrong corners; leave it out if there are any.",
         view = &view.name,
         rms = format!("{largest:.2}"),
@@ -114,7 +114,7 @@ fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Findin
     let (median_mm, median_deg) = (middle(|v| v.correction_m)? * 1e3, middle(|v| v.correction_rad)?.to_degrees());
     let text = text!(
         "The robot pose of view {view} had to be corrected by {mm} mm and {deg}°, the median by {median_mm} mm and \
-         {median_deg}°. The arm may have moved when the picture was taken, or the board has; leave the view out or capture \
+         {median_deg}°. The arm may have moved when the image was taken, or the board has; leave the view out or capture \
          it again.",
         view = &view.name,
         mm = format!("{mm:.2}"),
@@ -153,7 +153,7 @@ fn robot_noise(calibration: &Calibration) -> Option<Finding> {
     let (mm, deg) = (noise.robot_m * 1e3, noise.robot_rad.to_degrees());
     let text = text!(
         "The robot limits the answer: its noise of {mm} mm and {deg}° per axis moves corners by {robot} px, their own noise \
-         is {corner} px. Better pictures will not help much; more views, and settling longer before each, will.",
+         is {corner} px. Better images will not help much; more views, and settling longer before each, will.",
         mm = format!("{mm:.3}"),
         deg = format!("{deg:.3}"),
         robot = format!("{robot_px:.2}"),

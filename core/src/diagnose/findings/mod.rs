@@ -49,11 +49,11 @@ pub enum FindingCode {
     WrongQuaternionOrder,
     /// Robot poses are in millimetres where metres were stated, or the other way round.
     WrongLengthUnit,
-    /// Pictures and robot poses are out of step by one row.
+    /// Images and robot poses are out of step by one row.
     ShiftedPoses,
     /// The target is not of the stated size.
     WrongScale,
-    /// The intrinsics given do not fit the pictures.
+    /// The intrinsics given do not fit the images.
     WrongIntrinsics,
     /// The target moved during the session.
     BoardMoved,
@@ -73,7 +73,7 @@ pub enum FindingCode {
     UncertaintyWidened,
     /// Robot and corner noise cannot be told apart.
     NoiseUnclear,
-    /// The robot poses contradict the pictures by more than any arm errs.
+    /// The robot poses contradict the images by more than any arm errs.
     InconsistentPoses,
     /// One direction of the answer is known much worse than the others.
     WeakDirection,

@@ -1,4 +1,4 @@
-//! Findings on what the joint estimate decided by itself: views and corners set aside, views numbered from the other end, a
+//! Findings on what the joint estimate decided by itself: views and corners left out as an outlier, views numbered from the other end, a
 //! bent target, a widened uncertainty, noise levels that cannot be told apart.
 
 use super::{Finding, FindingCode, Severity, listed};
@@ -51,9 +51,9 @@ fn outliers(calibration: &Calibration) -> Option<Finding> {
         },
     );
     let what = if names.len() == 1 {
-        text!("{count} view set aside, the answer is without: {list} ({how_far}).")
+        text!("{count} outlier view, the answer is without: {list} ({how_far}).")
     } else {
-        text!("{count} views set aside, the answer is without: {list} ({how_far}).")
+        text!("{count} outlier views, the answer is without: {list} ({how_far}).")
     };
     let what = what.with("count", names.len()).with("list", listed(&names)).with("how_far", how_far);
     let advice = text!(
@@ -76,9 +76,9 @@ fn corners(calibration: &Calibration) -> Option<Finding> {
     }
     let count: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
     let what = if count == 1 {
-        text!("{count} corner set aside, far from where the rest of the view puts them: in {list}.")
+        text!("{count} outlier corner, far from where the rest of the view puts them: in {list}.")
     } else {
-        text!("{count} corners set aside, far from where the rest of the view puts them: in {list}.")
+        text!("{count} outlier corners, far from where the rest of the view puts them: in {list}.")
     };
     let what = what.with("count", count).with("list", listed(&names));
     let text = Text::sentences([what, text!("Look for reflections and things in front of the target.")]);
@@ -139,7 +139,7 @@ fn unclear(calibration: &Calibration) -> Option<Finding> {
     }
     let text = text!(
         "Robot and corner noise can hardly be told apart: the robot's {mm} mm is known to ± {mm_percent} % and its {deg}° to \
-         ± {deg_percent} %. The expected error allows for it. More views, or better pictures, tell them apart.",
+         ± {deg_percent} %. The expected error allows for it. More views, or better images, tell them apart.",
         mm = format!("{:.3}", noise.robot_m * 1e3),
         mm_percent = format!("{:.0}", position * 100.0),
         deg = format!("{:.3}", noise.robot_rad.to_degrees()),

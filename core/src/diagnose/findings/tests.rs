@@ -170,7 +170,7 @@ fn one_wrong_robot_pose_is_named_by_correction_and_influence() {
     }
     assert!(find(&found, FindingCode::LargeResidual).is_none(), "its corners are as good as the others'");
     let found = of_trial(&t, false, &FindingOptions::default());
-    let aside = find(&found, FindingCode::OutlierView).expect("set aside");
+    let aside = find(&found, FindingCode::OutlierView).expect("outlier");
     assert_eq!(aside.views, ["7"]);
     // PnP knows the tilt of one view to a tenth of a degree.
     assert!((aside.value("angle").expect("stated") - 0.5).abs() < 0.3, "{aside}");
@@ -178,7 +178,7 @@ fn one_wrong_robot_pose_is_named_by_correction_and_influence() {
 }
 
 #[test]
-fn one_blurred_picture_is_named_by_its_residual() {
+fn one_blurred_image_is_named_by_its_residual() {
     let mut t = set(20, 90);
     for (i, corner) in t.views[4].corners.iter_mut().enumerate() {
         // A pixel to every side, in a pattern that no pose follows.

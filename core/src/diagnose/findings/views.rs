@@ -84,7 +84,7 @@ fn not_found(in_fit: &[&ObservedView], only_poses: bool) -> Option<Finding> {
         return None;
     }
     let text = text!(
-        "The target was not found in {count} of {of} views ({list}). Look at these pictures: is it wholly in view, sharp and \
+        "The target was not found in {count} of {of} views ({list}). Look at these images: is it wholly in view, sharp and \
          lit, and are its columns and rows right?",
         count = missing.len(),
         of = in_fit.len(),

@@ -276,10 +276,10 @@ pub struct ViewRecord {
     pub rms_px: Option<f64>,
     /// How far the hand-eye translation moves without this view, millimetres.
     pub influence_mm: Option<f64>,
-    /// How far it is from what the other views expect, over the limit from which it is set aside.
+    /// How far it is from what the other views expect, over the limit from which it is left out as an outlier.
     #[serde(default)]
     pub distance: Option<f64>,
-    /// Corners of it that were set aside, by their index.
+    /// Corners of it that were left out as outliers, by their index.
     #[serde(default)]
     pub corners_aside: Vec<usize>,
     /// Whether its target was numbered from the other end than detected.

@@ -70,7 +70,7 @@ fn joints_of_another_arm_are_an_error_and_one_capture_without_joints_leaves_them
     assert_eq!(store.document().tip_by_joint(), Ok(BTreeMap::new()));
     assert_eq!(Dataset::read(dir.path()).unwrap_or_else(|e| panic!("{e}")).arm, None);
     store.apply(Edit::SetExcluded { ids: vec![id], excluded: true }).expect("exclude");
-    assert!(matches!(store.document().tip_by_joint(), Err(ArmError::Foreign { .. })), "it does not count any more");
+    assert!(matches!(store.document().tip_by_joint(), Err(ArmError::Foreign { .. })), "it no longer counts");
 }
 
 #[test]

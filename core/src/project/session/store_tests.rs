@@ -264,8 +264,8 @@ fn a_copy_is_complete_and_independent() {
     let home = folder();
     let (from, to) = (home.path().join("a"), home.path().join("deep/b"));
     let mut store = store_with(&from, 2);
-    let (picture, depth) = (image(3), depth());
-    store.add_capture(&Capture { depth_m: Some(&depth), ..Capture::new(&picture, pose(3)) }).expect("add");
+    let (image, depth) = (image(3), depth());
+    store.add_capture(&Capture { depth_m: Some(&depth), ..Capture::new(&image, pose(3)) }).expect("add");
     store.apply(Edit::SetRole { ids: vec![CaptureId(1)], role: Role::Verification }).expect("role");
     store.apply(delete(3)).expect("delete");
     store.write_result(&CalibrationResult::default()).expect("result");
@@ -287,7 +287,7 @@ fn a_copy_is_complete_and_independent() {
     let before = content(&from);
     copy.undo().expect("undo");
     let back = copy.document().captures[2].clone();
-    assert_eq!(copy.load_rgb(&back).expect("image"), picture);
+    assert_eq!(copy.load_rgb(&back).expect("image"), image);
     assert_eq!(copy.load_depth_m(&back).expect("depth"), Some(depth));
     copy.apply(delete(1)).expect("delete");
     assert_eq!(content(&from), before);

@@ -142,7 +142,7 @@ fn the_dataset_has_the_captures_in_use_and_no_others() {
     };
     store.apply(Edit::DeleteCaptures(vec![CaptureId(1)])).expect("delete");
     store.apply(Edit::SetExcluded { ids: vec![CaptureId(2)], excluded: true }).expect("exclude");
-    store.apply(Edit::SetRole { ids: vec![CaptureId(4)], role: Role::Verification }).expect("set aside");
+    store.apply(Edit::SetRole { ids: vec![CaptureId(4)], role: Role::Verification }).expect("outlier");
     assert_eq!(in_dataset(dir.path()), ["images/0003.png", "images/0005.png"]);
     store.undo().expect("undo");
     assert_eq!(in_dataset(dir.path()), ["images/0003.png", "images/0004.png", "images/0005.png"]);

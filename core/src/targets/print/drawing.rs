@@ -8,7 +8,7 @@ use crate::detect::markers;
 use crate::targets::{AprilGrid, Charuco, Dictionary, Grid, Layout, TargetSpec};
 
 /// Radius of a dot as a part of the distance between dots, and that of the larger dot at the origin: both leave as much
-/// light between dots as a blurred picture needs.
+/// light between dots as a blurred image needs.
 const DOT: f64 = 0.25;
 const LARGER_DOT: f64 = 0.375;
 /// Radius of a shifted dot as a part of the distance between rows: the nearest dot is 1.41 of it away.

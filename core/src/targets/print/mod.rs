@@ -1,7 +1,7 @@
 //! Targets on paper, at exact physical scale.
 //!
 //! [`Drawing`] is what is black on a target, in metres in the target frame. [`Sheet`] lays it on a page with rulers and a
-//! line of text, and [`pdf`] writes the page. Rendered pictures for tests are made of the same drawing, so that what is
+//! line of text, and [`pdf`] writes the page. Rendered images for tests are made of the same drawing, so that what is
 //! printed is what is tested to be found.
 
 mod drawing;

@@ -1,4 +1,4 @@
-//! Pictures of a drawing through a camera, for tests that need the truth.
+//! Images of a drawing through a camera, for tests that need the truth.
 
 use image::{GrayImage, Luma};
 use nalgebra::{Isometry3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
@@ -20,7 +20,7 @@ const SAMPLES: usize = 10;
 /// Buckets of shapes along a side.
 const BUCKETS: usize = 96;
 
-/// A picture to be taken of a target.
+/// An image to be taken of a target.
 pub(crate) struct Photo {
     pub camera: Intrinsics,
     pub camera_from_target: Isometry3<f64>,
@@ -36,8 +36,8 @@ pub(crate) struct Photo {
 }
 
 impl Photo {
-    /// The target's middle is `distance_m` in front of the camera and imaged `offset_px` from the middle of the picture;
-    /// the target is tilted by `tilt` about an axis at `azimuth` in the picture, and turned by `roll`.
+    /// The target's middle is `distance_m` in front of the camera and imaged `offset_px` from the middle of the image;
+    /// the target is tilted by `tilt` about an axis at `azimuth` in the image, and turned by `roll`.
     pub fn new(
         target: TargetSpec,
         camera: Intrinsics,

@@ -39,7 +39,7 @@ pub enum Fault {
         /// True angle minus the encoder's, degrees.
         offset_deg: f64,
     },
-    /// One picture is taken before the arm has arrived at the pose that is recorded.
+    /// One image is taken before the arm has arrived at the pose that is recorded.
     InMotion {
         /// Which, counted from 1.
         view: usize,
@@ -92,7 +92,7 @@ impl Fault {
         }
     }
 
-    /// Where the sheet is, in its own axes, when the picture is taken.
+    /// Where the sheet is, in its own axes, when the image is taken.
     pub(super) fn slip(self, moment: &Moment<'_>) -> Isometry3<f64> {
         match self {
             Self::BoardSlipped { view, by_m } if moment.view >= view => {
@@ -105,8 +105,8 @@ impl Fault {
         }
     }
 
-    /// What the encoders showed when the picture was taken.
-    pub(super) fn encoders_of_picture(self, moment: &Moment<'_>) -> JointAngles {
+    /// What the encoders showed when the image was taken.
+    pub(super) fn encoders_of_image(self, moment: &Moment<'_>) -> JointAngles {
         let Self::InMotion { view, by_m } = self else { return moment.encoders };
         if moment.view != view {
             return moment.encoders;

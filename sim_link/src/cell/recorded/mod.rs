@@ -1,4 +1,4 @@
-//! Sessions of the cell without pictures: views as a person without a plan would choose them, with the cell's
+//! Sessions of the cell without images: views as a person without a plan would choose them, with the cell's
 //! kinematics and lens, its robot's errors, and corners with Gaussian noise where a detector would find them.
 //!
 //! A session costs a few milliseconds, so that hundreds of them can be judged. One thing may be wrong with it, a
@@ -131,7 +131,7 @@ pub fn record(scene: &Scene, options: &SessionOptions) -> Result<RecordedSession
         // Each is captured after a move.
         let stop = index as u64 + 1;
         let moment = Moment { truth: &truth, view: index + 1, before, encoders: joints };
-        let seen_at = fault.map_or(joints, |fault| fault.encoders_of_picture(&moment));
+        let seen_at = fault.map_or(joints, |fault| fault.encoders_of_image(&moment));
         let slip = fault.map_or_else(nalgebra::Isometry3::identity, |fault| fault.slip(&moment));
         let base_from_target = Pose::from_isometry(
             truth.world_from_plane * slip * truth.world_from_plane.inv_mul(truth.base_from_target.isometry()),

@@ -1,4 +1,4 @@
-//! The short way for floors and tables, which fill most of most pictures.
+//! The short way for floors and tables, which fill most of most images.
 //!
 //! The same colours as by [`super::shade::Coat`], but the place on the surface comes from linear forms of the ray, and
 //! the averaging width of the pattern is that of the middle of a run of pixels instead of each pixel's own.

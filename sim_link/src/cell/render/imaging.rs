@@ -1,4 +1,4 @@
-//! What a sensor does to the ideal picture: blur, noise, rounding.
+//! What a sensor does to the ideal image: blur, noise, rounding.
 
 use std::sync::LazyLock;
 
@@ -13,7 +13,7 @@ const MAX_BLUR_PX: f64 = 20.0;
 /// Steps of the tabulated normal distribution; the outermost are at ±4.3 standard deviations.
 const QUANTILES: usize = 1 << 16;
 
-/// Keeps the depth noise apart from the noise of the picture.
+/// Keeps the depth noise apart from the noise of the image.
 const DEPTH_STREAM: u64 = 0xD1B5_4A32_D192_ED03;
 
 /// Blur, exposure, noise and rounding of linear colours, three per pixel.

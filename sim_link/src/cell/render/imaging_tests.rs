@@ -15,8 +15,8 @@ fn mean_and_deviation(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 #[test]
 fn noise_has_the_stated_deviation_and_no_offset() {
     let imaging = Imaging { noise_grey: 5.0, ..Imaging::default() };
-    let picture = develop(flat(0.5), SIDE, SIDE, &imaging, 3);
-    let (mean, deviation) = mean_and_deviation(picture.iter().map(|&b| f64::from(b)));
+    let image = develop(flat(0.5), SIDE, SIDE, &imaging, 3);
+    let (mean, deviation) = mean_and_deviation(image.iter().map(|&b| f64::from(b)));
     // 120 000 values: standard error 0.014 of the mean, 0.010 of the deviation; rounding adds 1/12 of variance.
     assert!((mean - 127.5).abs() < 0.06, "{mean}");
     assert!((deviation - (25.0f64 + 1.0 / 12.0).sqrt()).abs() < 0.04, "{deviation}");
@@ -25,8 +25,8 @@ fn noise_has_the_stated_deviation_and_no_offset() {
 #[test]
 fn noise_of_channels_and_neighbours_and_seeds_is_independent() {
     let imaging = Imaging { noise_grey: 8.0, ..Imaging::default() };
-    let picture = |seed| develop(flat(0.5), SIDE, SIDE, &imaging, seed).into_raw();
-    let (one, other) = (picture(1), picture(2));
+    let image = |seed| develop(flat(0.5), SIDE, SIDE, &imaging, seed).into_raw();
+    let (one, other) = (image(1), image(2));
     let correlation = |a: &[u8], b: &[u8]| {
         let products = a.iter().zip(b).map(|(&a, &b)| (f64::from(a) - 127.5) * (f64::from(b) - 127.5) / 64.0);
         mean_and_deviation(products).0
@@ -37,7 +37,7 @@ fn noise_of_channels_and_neighbours_and_seeds_is_independent() {
         assert!(value.abs() < 0.015, "{shift}: {value}");
     }
     assert!(correlation(&one, &other).abs() < 0.015);
-    assert_eq!(one, picture(1));
+    assert_eq!(one, image(1));
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn blur_spreads_a_bright_pixel_evenly_to_all_sides_and_over_no_channel() {
 }
 
 #[test]
-fn a_flat_picture_stays_flat_up_to_the_border() {
+fn a_flat_image_stays_flat_up_to_the_border() {
     let imaging = Imaging { blur_px: 2.0, ..Imaging::default() };
     assert!(develop(flat(0.6), SIDE, SIDE, &imaging, 0).iter().all(|&b| b == 153));
 }

@@ -1,8 +1,8 @@
-//! Pictures of the cell: RGB and registered depth, computed on one CPU core without a graphics card.
+//! Images of the cell: RGB and registered depth, computed on one CPU core without a graphics card.
 //!
 //! The lens is exact for every model of [`handeye_core::geometry::camera`], and so is the anti-aliasing of the board: a pixel
 //! holds the integral of the printed pattern over its own area, so that a corner detector meets the truth and not
-//! the artefacts of a sampler. Every picture is a function of its arguments alone, seed included.
+//! the artefacts of a sampler. Every image is a function of its arguments alone, seed included.
 //!
 //! Pixel (0, 0) is the centre of the top left pixel and row 0 is the top row. Colours are linear reflectances from
 //! 0 to 1; there is no gamma. Lengths are metres.
@@ -162,7 +162,7 @@ pub enum Finish {
 /// One lamp and the light that comes from everywhere.
 ///
 /// A surface that faces the lamp shines with `ambient + diffuse` times its colour; keep the sum at or below 1 and
-/// no picture saturates.
+/// no image saturates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Light {
     /// Where the lamp is.
@@ -190,7 +190,7 @@ impl Default for Light {
     }
 }
 
-/// What the sensor adds to the ideal picture. A value that is not above zero, or not a number, switches its effect off.
+/// What the sensor adds to the ideal image. A value that is not above zero, or not a number, switches its effect off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Imaging {
@@ -213,10 +213,10 @@ impl Default for Imaging {
     }
 }
 
-/// A picture and the depth of each of its pixels.
+/// An image and the depth of each of its pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RenderedFrame {
-    /// The picture, row 0 on top.
+    /// The image, row 0 on top.
     pub rgb: RgbImage,
     /// Distance along the optical axis of what the centre of each pixel sees, row by row from the top; the far plane
     /// exactly where there is nothing between near and far plane.

@@ -1,4 +1,4 @@
-//! The ray of every pixel of one camera, and the picture cut into tiles.
+//! The ray of every pixel of one camera, and the image cut into tiles.
 
 use std::ops::Range;
 

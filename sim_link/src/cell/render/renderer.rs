@@ -34,7 +34,7 @@ impl Renderer {
     /// A renderer for one camera. What is nearer than `near_m` or not nearer than `far_m` along the optical axis is
     /// not drawn, as in any rasteriser.
     ///
-    /// Pixels that the lens model does not reach show the background; so does the whole picture when the
+    /// Pixels that the lens model does not reach show the background; so does the whole image when the
     /// intrinsics are not usable, see [`Intrinsics::validate`].
     pub fn new(intrinsics: Intrinsics, near_m: f64, far_m: f64) -> Self {
         Self { intrinsics, near_m, far_m, table: RayTable::new(&intrinsics) }
@@ -45,14 +45,14 @@ impl Renderer {
         &self.intrinsics
     }
 
-    /// Picture and depth. The same arguments give the same bytes; give each frame its own `seed`.
+    /// Image and depth. The same arguments give the same bytes; give each frame its own `seed`.
     pub fn render(&self, scene: &RenderScene, imaging: &Imaging, seed: u64) -> RenderedFrame {
         let mut traced = self.trace(scene, true);
         let depth_m = self.finish_depth(std::mem::take(&mut traced.depths_m), imaging, seed);
         RenderedFrame { rgb: self.finish_rgb(traced, imaging, seed), depth_m }
     }
 
-    /// The picture of [`Self::render`] alone, bit for bit.
+    /// The image of [`Self::render`] alone, bit for bit.
     pub fn render_rgb(&self, scene: &RenderScene, imaging: &Imaging, seed: u64) -> RgbImage {
         self.finish_rgb(self.trace(scene, true), imaging, seed)
     }

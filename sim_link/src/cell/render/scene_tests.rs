@@ -1,4 +1,4 @@
-//! Bodies, order of depth, clipping, edges, and pictures as values.
+//! Bodies, order of depth, clipping, edges, and images as values.
 
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -145,26 +145,26 @@ fn what_lies_close_behind_a_tilted_board_changes_no_pixel() {
     // Half a millimetre behind the sheet, and a little smaller so that it shows on no side.
     let plate = Shape::Box { half_extents: Vector3::new(0.095, 0.07, 0.002) };
     let plate = Solid::new(plate, tilted * Translation3::new(0.0, 0.0, 0.0025), [0.9, 0.1, 0.1]);
-    let pictures = [scene(vec![plate]), scene(Vec::new())].map(|mut scene| {
+    let images = [scene(vec![plate]), scene(Vec::new())].map(|mut scene| {
         scene.board.world_from_target = tilted * Translation3::new(-0.0675, -0.045, 0.0);
         renderer().render(&scene, &Imaging::default(), 0)
     });
-    assert!(pictures[0] == pictures[1]);
+    assert!(images[0] == images[1]);
 }
 
 #[test]
-fn a_wall_that_fills_the_picture_has_one_colour_and_the_depth_of_its_plane() {
+fn a_wall_that_fills_the_image_has_one_colour_and_the_depth_of_its_plane() {
     let turned = UnitQuaternion::from_euler_angles(0.3, -0.2, 0.0);
     let wall = Shape::Box { half_extents: Vector3::new(3.0, 3.0, 0.1) };
     let pose = Isometry3::from_parts(Translation3::new(0.0, 0.0, 1.1), turned);
-    let picture =
+    let image =
         renderer().render(&without_board(vec![Solid::new(wall, pose, [0.4, 0.5, 0.6])]), &Imaging::default(), 0);
-    let colour = picture.rgb.get_pixel(80, 60);
-    assert!(picture.rgb.pixels().all(|pixel| pixel == colour));
+    let colour = image.rgb.get_pixel(80, 60);
+    assert!(image.rgb.pixels().all(|pixel| pixel == colour));
     let normal = turned * Vector3::z();
     let offset = normal.dot(&(pose * Point3::new(0.0, 0.0, -0.1)).coords);
     let camera = small_camera();
-    for (i, depth) in picture.depth_m.iter().enumerate() {
+    for (i, depth) in image.depth_m.iter().enumerate() {
         let px = nalgebra::Vector2::new((i % 160) as f64, (i / 160) as f64);
         let ray = camera.unproject(&px).expect("a pinhole");
         let expected = offset / normal.dot(&(ray.into_inner() / ray.z));
@@ -177,12 +177,12 @@ fn the_back_of_the_sheet_is_plain() {
     let mut scene = scene(Vec::new());
     let half_turn = Isometry3::rotation(Vector3::y() * std::f64::consts::PI);
     scene.board.world_from_target = Isometry3::translation(0.0675, -0.045, 0.5) * half_turn;
-    let picture = renderer().render_rgb(&scene, &Imaging::default(), 0);
-    let middle = *picture.get_pixel(80, 60);
+    let image = renderer().render_rgb(&scene, &Imaging::default(), 0);
+    let middle = *image.get_pixel(80, 60);
     for (x, y) in [(60, 50), (70, 65), (95, 55), (99, 70)] {
-        assert_eq!(*picture.get_pixel(x, y), middle);
+        assert_eq!(*image.get_pixel(x, y), middle);
     }
-    assert_ne!(middle, *picture.get_pixel(1, 1));
+    assert_ne!(middle, *image.get_pixel(1, 1));
 }
 
 #[test]
@@ -222,9 +222,9 @@ fn the_print_wins_against_the_table_that_it_lies_on() {
         let about = Isometry3::translation(0.0, 0.0, 0.5) * turn * Isometry3::translation(0.0, 0.0, -0.5);
         scene.board.world_from_target = about * scene.board.world_from_target;
         scene.solids[0].world_from_shape = about * scene.solids[0].world_from_shape;
-        let picture = renderer().render_rgb(&scene, &Imaging::default(), 0);
+        let image = renderer().render_rgb(&scene, &Imaging::default(), 0);
         for (x, y) in (60..100).flat_map(|x| (50..70).map(move |y| (x, y))) {
-            let [r, _, b] = picture.get_pixel(x, y).0;
+            let [r, _, b] = image.get_pixel(x, y).0;
             assert_eq!(r, b, "no wood shines through at {x} {y}");
         }
     }
@@ -232,19 +232,19 @@ fn the_print_wins_against_the_table_that_it_lies_on() {
 
 #[test]
 fn edges_of_bodies_are_smooth_and_keep_their_area() {
-    // A square plate turned by 0.3 rad about the axis: its area in the picture is known.
+    // A square plate turned by 0.3 rad about the axis: its area in the image is known.
     let side = 0.2;
     let plate = Solid::new(
         Shape::Box { half_extents: Vector3::new(side / 2.0, side / 2.0, 1e-4) },
         Isometry3::new(Vector3::new(0.003, 0.002, 0.5), Vector3::z() * 0.3),
         [0.0; 3],
     );
-    let picture = renderer().render_rgb(&without_board(vec![plate]), &Imaging::default(), 0);
-    let covered: f64 = picture.pixels().map(|p| 1.0 - f64::from(p.0[2]) / 191.0).sum();
+    let image = renderer().render_rgb(&without_board(vec![plate]), &Imaging::default(), 0);
+    let covered: f64 = image.pixels().map(|p| 1.0 - f64::from(p.0[2]) / 191.0).sum();
     let expected = (small_camera().fx * side / (0.5 - 1e-4)).powi(2);
     // 16 rays per pixel on about 200 edge pixels: the errors, at most 1/16 each, average out.
     assert!((covered / expected - 1.0).abs() < 2e-3, "{covered} {expected}");
-    let levels: std::collections::BTreeSet<u8> = picture.pixels().map(|p| p.0[2]).collect();
+    let levels: std::collections::BTreeSet<u8> = image.pixels().map(|p| p.0[2]).collect();
     assert!(levels.len() > 10, "{levels:?}");
 }
 
@@ -289,7 +289,7 @@ fn a_body_darkens_the_floor_below_it_and_leaves_the_print_alone() {
     let (with, without) = (render(true), render(false));
     let camera = small_camera();
     let below = camera.project(&Point3::new(0.1, 0.3, 1.0)).expect("in front");
-    let at = |picture: &handeye_core::image::RgbImage| picture.get_pixel(below.x as u32, below.y as u32).0[0];
+    let at = |image: &handeye_core::image::RgbImage| image.get_pixel(below.x as u32, below.y as u32).0[0];
     assert!(f32::from(at(&with)) < 0.75 * f32::from(at(&without)), "{} {}", at(&with), at(&without));
 
     let facing = LightSource::Directional(Unit::new_normalize(Vector3::new(0.0, -0.2, -1.0)));
@@ -306,12 +306,12 @@ fn squares_smaller_than_a_pixel_average_to_grey() {
     let mut scene = scene(Vec::new());
     // 2 mm at 3 m are a tenth of a pixel of this camera.
     scene.board = BoardSurface::new(Isometry3::translation(-0.4, -0.3, 3.0), 401, 301, 0.002, [0.9, 0.7]);
-    let picture = renderer().render_rgb(&scene, &Imaging::default(), 0);
+    let image = renderer().render_rgb(&scene, &Imaging::default(), 0);
     scene.board.dark = scene.board.white;
     let white = f64::from(renderer().render_rgb(&scene, &Imaging::default(), 0).get_pixel(80, 60).0[0]);
     let expected = white * 0.5 * (1.0 + 0.06 / 0.9);
     for (x, y) in (65..95).flat_map(|x| (50..70).map(move |y| (x, y))) {
-        let level = f64::from(picture.get_pixel(x, y).0[0]);
+        let level = f64::from(image.get_pixel(x, y).0[0]);
         assert!((level - expected).abs() < 2.0, "{x} {y}: {level}, expected {expected}");
     }
 }
@@ -342,7 +342,7 @@ fn a_fisheye_renders_what_is_in_front_of_its_plane() {
 }
 
 #[test]
-fn unusable_intrinsics_give_an_empty_picture_and_no_panic() {
+fn unusable_intrinsics_give_an_empty_image_and_no_panic() {
     for camera in [
         Intrinsics { fx: f64::NAN, ..small_camera() },
         Intrinsics { width: 0, ..small_camera() },

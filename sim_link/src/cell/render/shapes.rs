@@ -1,4 +1,4 @@
-//! Surfaces in camera coordinates: where a ray meets them, and which tiles of the picture they can touch.
+//! Surfaces in camera coordinates: where a ray meets them, and which tiles of the image they can touch.
 //!
 //! A ray leaves the origin along `(x, y, 1)`, so the distance parameter of a hit is its depth along the optical axis.
 //! Plain arrays, because this is the innermost loop of the renderer.

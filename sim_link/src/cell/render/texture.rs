@@ -110,7 +110,7 @@ pub(super) fn tiles([x, y]: [f64; 2], half: [f64; 2], pitch_m: f64, joint_m: f64
     (0.7 + 0.3 * open as f32) * (1.0 + 0.03 * tone)
 }
 
-/// A picture of one number per texel. It repeats mirrored, so that no seam shows.
+/// An image of one number per texel. It repeats mirrored, so that no seam shows.
 struct Map {
     /// Texels of the finest level per texel, inverse.
     scale: f64,

@@ -1,4 +1,4 @@
-//! The picture of the board against the analytic projection, by measurements that share no code with the renderer.
+//! The image of the board against the analytic projection, by measurements that share no code with the renderer.
 
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::image::RgbImage;
@@ -35,7 +35,7 @@ fn corner(column: f64, row: f64) -> Point3<f64> {
     Point3::new(column * SQUARE_M, row * SQUARE_M, 0.0)
 }
 
-/// A pose 0.3 to 0.6 m away, tilted by up to 45 degrees and rolled by up to `roll`, all squares in the picture.
+/// A pose 0.3 to 0.6 m away, tilted by up to 45 degrees and rolled by up to `roll`, all squares in the image.
 fn random_pose(random: &mut ChaCha8Rng, camera: &Intrinsics, roll: f64) -> Isometry3<f64> {
     loop {
         let distance = random.random_range(0.3..0.6);
@@ -55,14 +55,14 @@ fn random_pose(random: &mut ChaCha8Rng, camera: &Intrinsics, roll: f64) -> Isome
     }
 }
 
-fn grey(picture: &RgbImage, x: i64, y: i64) -> f64 {
-    f64::from(picture.get_pixel(x as u32, y as u32).0[1])
+fn grey(image: &RgbImage, x: i64, y: i64) -> f64 {
+    f64::from(image.get_pixel(x as u32, y as u32).0[1])
 }
 
 /// The point to which the grey gradients around it are orthogonal, by weighted least squares, from a start nearby.
 ///
 /// Reference: Förstner, Gülch 1987, "A fast operator for detection and precise location of distinct points".
-fn refine(picture: &RgbImage, start: Vector2<f64>, sigma_px: f64) -> Vector2<f64> {
+fn refine(image: &RgbImage, start: Vector2<f64>, sigma_px: f64) -> Vector2<f64> {
     let reach = (2.5 * sigma_px).ceil() as i64;
     let mut at = start;
     for _ in 0..20 {
@@ -72,8 +72,8 @@ fn refine(picture: &RgbImage, start: Vector2<f64>, sigma_px: f64) -> Vector2<f64
             for x in x0 - reach..=x0 + reach {
                 let p = Vector2::new(x as f64, y as f64);
                 let gradient = Vector2::new(
-                    grey(picture, x + 1, y) - grey(picture, x - 1, y),
-                    grey(picture, x, y + 1) - grey(picture, x, y - 1),
+                    grey(image, x + 1, y) - grey(image, x - 1, y),
+                    grey(image, x, y + 1) - grey(image, x, y - 1),
                 );
                 let weight = (-(p - at).norm_squared() / (2.0 * sigma_px * sigma_px)).exp();
                 let outer = gradient * gradient.transpose() * weight;
@@ -104,24 +104,24 @@ fn errors(all: &[Vector2<f64>]) -> Errors {
 }
 
 #[test]
-fn corners_measured_in_the_picture_are_where_the_lens_model_projects_them() {
+fn corners_measured_in_the_image_are_where_the_lens_model_projects_them() {
     for camera in cameras() {
         let renderer = Renderer::new(camera, 0.01, 3.5);
         let mut random = ChaCha8Rng::seed_from_u64(7);
-        // Every other picture as sharp as can be, which is the hardest to measure in, the rest as a good lens makes it.
+        // Every other image as sharp as can be, which is the hardest to measure in, the rest as a good lens makes it.
         let mut all = [Vec::new(), Vec::new()];
         for seed in 0..200 {
             let blurred = seed % 2;
             let imaging = Imaging { blur_px: [0.0, 0.7][blurred], ..Imaging::default() };
             let pose = random_pose(&mut random, &camera, std::f64::consts::PI);
-            let picture = renderer.render_rgb(&scene(pose), &imaging, seed as u64);
+            let image = renderer.render_rgb(&scene(pose), &imaging, seed as u64);
             for i in 0..COLUMNS * ROWS {
                 let (c, r) = ((i % COLUMNS) as f64, (i / COLUMNS) as f64);
                 let at = |c: f64, r: f64| camera.project(&(pose * corner(c, r))).expect("in front");
                 let truth = at(c, r);
                 let side = (at(c + 0.5, r) - at(c - 0.5, r)).norm().min((at(c, r + 0.5) - at(c, r - 0.5)).norm());
-                // The window stays inside the four squares, where the picture is symmetric about the corner.
-                all[blurred].push(refine(&picture, truth, 0.2 * side) - truth);
+                // The window stays inside the four squares, where the image is symmetric about the corner.
+                all[blurred].push(refine(&image, truth, 0.2 * side) - truth);
             }
         }
         for Errors { mean, rms } in all.map(|all| errors(&all)) {
@@ -132,7 +132,7 @@ fn corners_measured_in_the_picture_are_where_the_lens_model_projects_them() {
     }
 }
 
-/// Along a picture row, the sum of the dark parts of the pixels from the middle of a dark square to the middle of a
+/// Along an image row, the sum of the dark parts of the pixels from the middle of a dark square to the middle of a
 /// white one is the place of the edge between them, whatever the blur: a ruler without an estimator.
 #[test]
 fn edges_have_no_bias() {
@@ -142,7 +142,7 @@ fn edges_have_no_bias() {
         let mut all = Vec::new();
         for seed in 0..30 {
             let pose = random_pose(&mut random, &camera, 20f64.to_radians());
-            let picture = renderer.render_rgb(&scene(pose), &Imaging::default(), seed);
+            let image = renderer.render_rgb(&scene(pose), &Imaging::default(), seed);
             let at = |c: f64, r: f64| camera.project(&(pose * corner(c, r))).expect("in front");
             for i in 0..(COLUMNS - 2) * (ROWS - 1) {
                 let (column, row) = ((1 + i % (COLUMNS - 2)) as f64, (i / (COLUMNS - 2)) as f64 + 0.5);
@@ -155,9 +155,9 @@ fn edges_have_no_bias() {
                 let edge = at(column, on_line).x;
                 let half = 0.3 * (at(column + 1.0, row) - at(column, row)).norm();
                 let (from, to) = ((edge - half).round() as i64, (edge + half).round() as i64);
-                let (left, right) = (grey(&picture, from, line as i64), grey(&picture, to, line as i64));
+                let (left, right) = (grey(&image, from, line as i64), grey(&image, to, line as i64));
                 assert!((left - right).abs() > 100.0, "an edge is where the model says");
-                let of_left: f64 = (from..=to).map(|x| (grey(&picture, x, line as i64) - right) / (left - right)).sum();
+                let of_left: f64 = (from..=to).map(|x| (grey(&image, x, line as i64) - right) / (left - right)).sum();
                 all.push(Vector2::new(from as f64 - 0.5 + of_left - edge, 0.0));
             }
         }
@@ -204,10 +204,10 @@ fn every_square_has_its_colour_where_the_lens_model_puts_it() {
         let mut random = ChaCha8Rng::seed_from_u64(17);
         for seed in 0..10 {
             let pose = random_pose(&mut random, &camera, std::f64::consts::PI);
-            let picture = renderer.render_rgb(&scene(pose), &Imaging::default(), seed);
+            let image = renderer.render_rgb(&scene(pose), &Imaging::default(), seed);
             for (c, r) in (-1..=9).flat_map(|c| (-1..=6).map(move |r| (c, r))) {
                 let px = camera.project(&(pose * corner(f64::from(c) + 0.5, f64::from(r) + 0.5))).expect("in front");
-                let dark = grey(&picture, px.x.round() as i64, px.y.round() as i64) < 60.0;
+                let dark = grey(&image, px.x.round() as i64, px.y.round() as i64) < 60.0;
                 assert_eq!(dark, (c + r) % 2 == 0, "square {c} {r}");
             }
         }
@@ -218,11 +218,11 @@ fn every_square_has_its_colour_where_the_lens_model_puts_it() {
 fn an_upright_camera_sees_the_boards_x_axis_to_the_right_and_its_y_axis_down() {
     let camera = cameras()[0];
     let pose = Isometry3::translation(-0.0675, -0.045, 0.35);
-    let picture = Renderer::new(camera, 0.01, 3.5).render_rgb(&scene(pose), &Imaging::default(), 0);
+    let image = Renderer::new(camera, 0.01, 3.5).render_rgb(&scene(pose), &Imaging::default(), 0);
     // The outermost squares of the first column are dark at the top and white at the bottom, the last column's not.
     let level = |c: f64, r: f64| {
         let px = camera.project(&(pose * corner(c, r))).expect("in front");
-        (px, grey(&picture, px.x.round() as i64, px.y.round() as i64))
+        (px, grey(&image, px.x.round() as i64, px.y.round() as i64))
     };
     let ((top_left, a), (top_right, b), (bottom_left, c)) = (level(-0.5, -0.5), level(9.5, -0.5), level(-0.5, 6.5));
     assert!(top_left.x < 200.0 && top_right.x > 440.0 && bottom_left.y > 300.0);

@@ -106,7 +106,7 @@ impl Scene {
         Self::parse(REALISTIC, "assets/scenes/realistic.toml")
     }
 
-    /// The realistic cell with a board that moves in a circle, and pictures that come as fast as a camera's.
+    /// The realistic cell with a board that moves in a circle, and images that come as fast as a camera's.
     ///
     /// # Errors
     /// None as long as the file that is built in is valid, which a test asserts.

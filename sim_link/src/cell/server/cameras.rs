@@ -17,11 +17,11 @@ use crate::cell::world::{Handle, Moment, Shown, VisionSensor};
 const MAX_RENDERERS: usize = 4;
 
 /// Buffers that are kept: colour and depth of a few sensors.
-const MAX_PICTURES: usize = 8;
+const MAX_IMAGES: usize = 8;
 
 /// One buffer of a sensor as clients get it: row by row from the bottom.
 #[derive(Debug, Clone)]
-pub struct Picture {
+pub struct Image {
     /// Its bytes: R, G, B per pixel, or one little-endian `f32` in metres.
     pub bytes: Vec<u8>,
     /// The whole reply to the plain request for it.
@@ -34,14 +34,14 @@ enum Channel {
     Depth,
 }
 
-/// What a picture depends on.
+/// What an image depends on.
 #[derive(Debug, Clone)]
 struct Source {
     intrinsics: Intrinsics,
     range_m: (f64, f64),
     /// Absent for a buffer that nothing was drawn into.
     moment: Option<Arc<Moment>>,
-    /// The pass, where pictures have noise.
+    /// The pass, where images have noise.
     pass: Option<u64>,
 }
 
@@ -87,7 +87,7 @@ pub struct Cameras {
     board: BoardSurface,
     renderers: Vec<Renderer>,
     ranges_m: Vec<(f64, f64)>,
-    pictures: BTreeMap<(Handle, Channel), (Source, Picture)>,
+    images: BTreeMap<(Handle, Channel), (Source, Image)>,
     ideal_depths: Option<IdealDepths>,
 }
 
@@ -114,26 +114,26 @@ impl Cameras {
             board: BoardSurface::new(out_of_sight(), grid.columns, grid.rows, grid.square_m, scene.paper_m),
             renderers: Vec::new(),
             ranges_m: Vec::new(),
-            pictures: BTreeMap::new(),
+            images: BTreeMap::new(),
             ideal_depths: None,
         }
     }
 
     /// The colour buffer of a sensor.
-    pub fn colour(&mut self, handle: Handle, sensor: &VisionSensor, stage: &Stage) -> &Picture {
+    pub fn colour(&mut self, handle: Handle, sensor: &VisionSensor, stage: &Stage) -> &Image {
         let shown = sensor.shown().filter(|_| !sensor.ignore_rgb);
         let noisy = self.imaging.noise_grey > 0.0;
-        self.picture(handle, Channel::Colour, sensor, shown, noisy, stage)
+        self.image(handle, Channel::Colour, sensor, shown, noisy, stage)
     }
 
     /// The depth buffer of a sensor, metres along the optical axis.
-    pub fn depth(&mut self, handle: Handle, sensor: &VisionSensor, stage: &Stage) -> &Picture {
+    pub fn depth(&mut self, handle: Handle, sensor: &VisionSensor, stage: &Stage) -> &Image {
         let shown = sensor.shown().filter(|_| !sensor.ignore_depth);
         let noisy = self.imaging.depth_noise_m > 0.0 || self.imaging.depth_noise_per_m2 > 0.0;
-        self.picture(handle, Channel::Depth, sensor, shown, noisy, stage)
+        self.image(handle, Channel::Depth, sensor, shown, noisy, stage)
     }
 
-    fn picture(
+    fn image(
         &mut self,
         handle: Handle,
         channel: Channel,
@@ -141,7 +141,7 @@ impl Cameras {
         shown: Option<&Shown>,
         noisy: bool,
         stage: &Stage,
-    ) -> &Picture {
+    ) -> &Image {
         let source = Source {
             intrinsics: sensor.intrinsics,
             range_m: (sensor.near_m, sensor.far_m),
@@ -149,18 +149,18 @@ impl Cameras {
             pass: shown.filter(|_| noisy).map(|shown| shown.pass),
         };
         let key = (handle, channel);
-        let is_current = self.pictures.get(&key).is_some_and(|(kept, _)| kept.is(&source));
+        let is_current = self.images.get(&key).is_some_and(|(kept, _)| kept.is(&source));
         if !is_current {
-            if self.pictures.len() >= MAX_PICTURES {
-                self.pictures.clear();
+            if self.images.len() >= MAX_IMAGES {
+                self.images.clear();
             }
             let bytes = self.draw(handle, channel, sensor, shown, stage);
             let size = [sensor.intrinsics.width, sensor.intrinsics.height];
             let reply = message::returned_image(&bytes, size);
-            self.pictures.insert(key, (source.clone(), Picture { bytes, reply }));
+            self.images.insert(key, (source.clone(), Image { bytes, reply }));
         }
         // Just inserted if it was not there, so the entry is never made here.
-        &self.pictures.entry(key).or_insert_with(|| (source, Picture { bytes: Vec::new(), reply: Vec::new() })).1
+        &self.images.entry(key).or_insert_with(|| (source, Image { bytes: Vec::new(), reply: Vec::new() })).1
     }
 
     fn draw(
@@ -183,7 +183,7 @@ impl Cameras {
         let imaging = self.imaging;
         match channel {
             Channel::Colour => {
-                let (picture, metres) = self.renderer(sensor).render_rgb_with_ideal_depth(&scene, &imaging, seed);
+                let (image, metres) = self.renderer(sensor).render_rgb_with_ideal_depth(&scene, &imaging, seed);
                 self.ideal_depths = shown.moment.pose(handle).map(|world_from_sensor| IdealDepths {
                     moment: Arc::clone(&shown.moment),
                     world_from_sensor: *world_from_sensor,
@@ -191,7 +191,7 @@ impl Cameras {
                     range_m: (sensor.near_m, sensor.far_m),
                     metres,
                 });
-                bottom_up(picture.as_raw(), 3 * width)
+                bottom_up(image.as_raw(), 3 * width)
             }
             Channel::Depth => {
                 let known = self.ideal_depths.as_ref().and_then(|ideal| ideal.of(handle, sensor, &shown.moment));

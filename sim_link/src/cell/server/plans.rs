@@ -31,7 +31,7 @@ pub trait Plan: std::fmt::Debug + Send {
     /// Moves joints or objects to the state.
     ///
     /// # Errors
-    /// What it is to move does not exist any more.
+    /// What it is to move no longer exists.
     fn apply(&mut self, cell: &mut Cell) -> Result<(), ApiError>;
 
     /// Whether the state is the last one.
@@ -167,7 +167,7 @@ impl Plans {
     /// The motion that a state map belongs to.
     ///
     /// # Errors
-    /// There is none, or none any more.
+    /// There is none, or none now.
     pub fn of(&mut self, state: &Fields<'_>) -> Result<(i64, &mut Motion), ApiError> {
         let id = Self::id(state)?;
         let motion = self.plans.get_mut(&id).ok_or(ApiError::Field { problem: "invalid", name: "ruckigObj" })?;

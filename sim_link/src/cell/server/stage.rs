@@ -128,7 +128,7 @@ impl Builder {
     }
 }
 
-/// Floors have tiles and tables have grain, so that the eye finds its way in a picture.
+/// Floors have tiles and tables have grain, so that the eye finds its way in an image.
 fn finish(alias: &str) -> Finish {
     match alias {
         "Floor" => Finish::Tiles { pitch_m: 0.5, joint_m: 0.006 },

@@ -51,7 +51,7 @@ impl Sensors {
     }
 }
 
-/// The objects whose state belongs to every picture.
+/// The objects whose state belongs to every image.
 #[derive(Debug, Clone)]
 struct Robot {
     joints: Vec<Handle>,

@@ -22,7 +22,7 @@ const BRAKING_SHARE: f64 = 0.9;
 const APPROACH_SHARE: f64 = 0.7;
 
 /// Near the goal the tip makes up for this share of its distance per second [1/s]: slow enough that the noise of a goal
-/// from pictures, 0.1 mm from one to the next, asks for less than a fiftieth of the acceleration.
+/// from images, 0.1 mm from one to the next, asks for less than a fiftieth of the acceleration.
 const APPROACH_RATE: f64 = 8.0;
 
 /// Largest share of the distance that is made up for in one pass: with more, a long pass would swing past the goal.
@@ -118,7 +118,7 @@ impl<'a> FollowPlan<'a> {
         Pose::from_isometry(self.now.base_from_tip)
     }
 
-    /// What was in the way; the arm comes to rest, and goals are not looked at any more.
+    /// What was in the way; the arm comes to rest, and goals are no longer looked at.
     pub fn obstacle(&self) -> Option<FollowEnd> {
         self.obstacle
     }

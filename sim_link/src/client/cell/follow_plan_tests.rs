@@ -175,7 +175,7 @@ fn along_with_a_goal_on_a_circle_the_tip_lags_by_less_than_a_millimetre() {
 }
 
 #[test]
-fn the_noise_of_a_goal_from_pictures_hardly_shakes_the_arm() {
+fn the_noise_of_a_goal_from_images_hardly_shakes_the_arm() {
     let (arm, limits) = (arm(), open());
     let start = arm.tip(&START);
     let mut rng = ChaCha8Rng::seed_from_u64(7);

@@ -2,7 +2,7 @@
 //!
 //! [`CellClient`] finds the objects of the scene and holds two connections, because a connection can do one thing at a
 //! time: [`Arm`] moves and stops, [`CameraFeed`] takes frames, and after [`CellClient::split`] each lives on a thread of
-//! its own, so that pictures keep coming while the arm moves.
+//! its own, so that images keep coming while the arm moves.
 //!
 //! # How motions are driven
 //! Each point of a motion, a jog or a path that is followed is computed here and sent for one pass of the simulation: the

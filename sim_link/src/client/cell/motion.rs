@@ -28,7 +28,7 @@ pub(super) const LONGEST_MOTION: Duration = Duration::from_mins(10);
 /// another client may hold the simulation for ever.
 pub(super) const BRAKE_GRACE: Duration = Duration::from_millis(300);
 
-/// Longest time to come to rest, in real time. From the fastest motion of the reference tour it takes about two seconds.
+/// Longest time to come to rest, in real time. From the fastest motion of the reference sequence it takes about two seconds.
 pub(super) const LONGEST_BRAKING: Duration = Duration::from_secs(10);
 
 /// An arm that got no point for longer has come to rest for all to see, and starts from there. Passes do not count: a

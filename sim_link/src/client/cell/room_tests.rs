@@ -12,7 +12,7 @@ use crate::cell::scene::{BoardMotionSpec, BoardPath, ResolvedScene, Scene};
 const DT_S: f64 = 0.05;
 
 /// The reference scene, its arm, and the joints at each of the ten reference poses, one after the other.
-fn after_the_tour() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointAngles>) {
+fn after_the_sequence() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointAngles>) {
     let scene = Scene::reference().expect("the scene").resolve(1).expect("valid");
     let arm = ArmKinematics::new(scene.world_from_arm, scene.connection_from_tip, scene.joint_limits);
     let board = BoardInView {
@@ -26,7 +26,7 @@ fn after_the_tour() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointAngl
     let mut at = scene.start_joints;
     let joints = poses.iter().map(|pose| {
         let Goal::Tip(goal) = &pose.goal else { panic!("{} is a pose of the tip", pose.name) };
-        at = arm.reach(goal, &at).expect("the tour visits it");
+        at = arm.reach(goal, &at).expect("the sequence visits it");
         at
     });
     let joints = joints.collect();
@@ -84,9 +84,9 @@ fn paths() -> impl Iterator<Item = BoardPath> {
 }
 
 #[test]
-fn from_where_the_reference_tour_ends_a_board_on_a_circle_cannot_be_followed_and_that_is_known_beforehand() {
-    let (scene, arm, board, tour) = after_the_tour();
-    let last = *tour.last().expect("ten poses");
+fn from_where_the_reference_sequence_ends_a_board_on_a_circle_cannot_be_followed_and_that_is_known_beforehand() {
+    let (scene, arm, board, sequence) = after_the_sequence();
+    let last = *sequence.last().expect("ten poses");
     let limits = FollowLimits::default();
     assert!(!arm.has_room_to_follow(&limits, &board, &BoardReach::default(), &last));
     let ended = followed((&scene, &arm), last, &moving(BoardPath::Circle, 0.05), 0.0, 60.0);
@@ -96,15 +96,15 @@ fn from_where_the_reference_tour_ends_a_board_on_a_circle_cannot_be_followed_and
 
 #[test]
 fn from_the_place_that_is_found_every_path_of_the_board_is_followed_for_minutes() {
-    let (scene, arm, board, tour) = after_the_tour();
+    let (scene, arm, board, sequence) = after_the_sequence();
     let (limits, reach) = (FollowLimits::default(), BoardReach::default());
-    for (index, from) in tour.iter().enumerate() {
+    for (index, from) in sequence.iter().enumerate() {
         let place = arm.place_to_follow(&limits, &board, &reach, from).expect("there is room");
         assert!(place.room >= ENOUGH, "{}", place.room);
         let travel_deg = planning::travel(from, &place.joints).to_degrees();
         println!("pose {}: room {:.3}, after {travel_deg:.0}° for the joint that turns most", index + 1, place.room);
-        // Minutes after the last, where a person is after the tour; enough to go round after the others.
-        let seconds = if index + 1 == tour.len() { 300.0 } else { 20.0 };
+        // Minutes after the last, where a person is after the sequence; enough to go round after the others.
+        let seconds = if index + 1 == sequence.len() { 300.0 } else { 20.0 };
         for path in paths() {
             for speed_m_s in [0.05, 0.1] {
                 let worst = followed((&scene, &arm), place.joints, &moving(path, speed_m_s), 0.0, seconds);
@@ -125,9 +125,9 @@ fn from_the_place_that_is_found_every_path_of_the_board_is_followed_for_minutes(
 
 #[test]
 fn a_place_that_is_found_amid_the_path_of_the_board_has_room_for_all_of_the_path() {
-    let (scene, arm, board, tour) = after_the_tour();
+    let (scene, arm, board, sequence) = after_the_sequence();
     let limits = FollowLimits::default();
-    let from = *tour.last().expect("ten poses");
+    let from = *sequence.last().expect("ten poses");
     for path in paths() {
         let motion = moving(path, 0.05);
         let course = Course::new(&motion, scene.seed);
@@ -142,9 +142,9 @@ fn a_place_that_is_found_amid_the_path_of_the_board_has_room_for_all_of_the_path
 
 #[test]
 fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
-    let (scene, arm, board, tour) = after_the_tour();
+    let (scene, arm, board, sequence) = after_the_sequence();
     let place = arm
-        .place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), tour.last().expect("ten poses"))
+        .place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), sequence.last().expect("ten poses"))
         .expect("there is room");
     let camera_from_target = (place.base_from_tip * board.tip_from_camera).inverse() * board.base_from_target;
     for point in board.target.points() {
@@ -154,14 +154,15 @@ fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
     }
     // By the planner's own knowledge of the scene, which has a floor and a plate as well.
     let setup = planning::ViewSetup::of(&scene);
-    assert!(setup.path_is_free(tour.last().expect("ten poses"), &place.joints, 0.01));
+    assert!(setup.path_is_free(sequence.last().expect("ten poses"), &place.joints, 0.01));
 }
 
 #[test]
 fn where_there_is_room_the_nearest_place_is_near() {
-    let (_, arm, board, tour) = after_the_tour();
+    let (_, arm, board, sequence) = after_the_sequence();
     let (limits, reach) = (FollowLimits::default(), BoardReach::default());
-    let first = arm.place_to_follow(&limits, &board, &reach, tour.last().expect("ten poses")).expect("there is room");
+    let first =
+        arm.place_to_follow(&limits, &board, &reach, sequence.last().expect("ten poses")).expect("there is room");
     assert!(arm.has_room_to_follow(&limits, &board, &reach, &first.joints), "following begins there without a move");
     let again = arm.place_to_follow(&limits, &board, &reach, &first.joints).expect("there is room");
     let travel_deg = planning::travel(&first.joints, &again.joints).to_degrees();
@@ -170,10 +171,10 @@ fn where_there_is_room_the_nearest_place_is_near() {
 
 #[test]
 fn a_board_out_of_reach_has_no_place() {
-    let (_, arm, board, tour) = after_the_tour();
+    let (_, arm, board, sequence) = after_the_sequence();
     let far = Pose::from_isometry(Translation3::new(0.0, -2.0, 0.0) * board.base_from_target.isometry());
     let board = BoardInView { base_from_target: far, ..board };
-    let from = tour.last().expect("ten poses");
+    let from = sequence.last().expect("ten poses");
     let none = arm.place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), from);
     assert!(matches!(none, Err(NoPlace { .. })), "{none:?}");
 }

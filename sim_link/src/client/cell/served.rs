@@ -90,7 +90,7 @@ impl Arm {
         };
         match &outcome {
             Ok(()) => self.sim.move_to_pose_cleanup(state),
-            // A server that has gone or hangs drives nothing any more, and asking it to tidy up only takes time.
+            // A server that has gone or hangs drives nothing now, and asking it to tidy up only takes time.
             Err(LinkError::Disconnected { .. } | LinkError::Timeout { .. } | LinkError::Unreachable { .. }) => outcome,
             // The arm has to stand before the caller hears of it. If it cannot be told to, that is the worse news.
             Err(_) => self.stop().and(self.sim.move_to_pose_cleanup(state)).and(outcome),

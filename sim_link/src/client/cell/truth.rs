@@ -14,7 +14,7 @@ use crate::wire::Reader;
 /// The function through which a cell publishes its truth; CoppeliaSim has no such function.
 pub const TRUTH_FUNCTION: &str = "handeye.truth";
 
-/// The function through which a cell tells of the pass that its images show.
+/// The function through which a cell reports the pass that its images show.
 const MOMENT_FUNCTION: &str = "handeye.moment";
 
 /// The truth about a simulated cell.
@@ -90,7 +90,7 @@ pub(super) struct ShownMoment {
     pub base_from_target: Option<Pose<Base, Target>>,
 }
 
-/// What the images show, from a cell that has [`MOMENT_FUNCTION`]; `None` when they show nothing yet, or not any more.
+/// What the images show, from a cell that has [`MOMENT_FUNCTION`]; `None` when they show nothing yet, or not now.
 ///
 /// # Errors
 /// [`LinkError::BadTruth`] when a part cannot be computed with; otherwise as for any call.

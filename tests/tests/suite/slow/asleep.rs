@@ -50,7 +50,7 @@ fn check(mut child: Child, mut said: BufReader<ChildStderr>, out: &Path) -> Stri
 }
 
 #[test]
-fn a_tour_goes_on_when_the_cell_has_forgotten_the_sleeper() {
+fn a_sequence_goes_on_when_the_cell_has_forgotten_the_sleeper() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
     let scene = Scene::reference().expect("a scene");
@@ -80,7 +80,7 @@ fn a_tour_goes_on_when_the_cell_has_forgotten_the_sleeper() {
 }
 
 #[test]
-fn a_tour_goes_on_when_the_cell_in_the_same_program_slept_as_well() {
+fn a_sequence_goes_on_when_the_cell_in_the_same_program_slept_as_well() {
     /// Longer than a client waits for an answer.
     const NAP: Duration = Duration::from_secs(6);
     let folder = tempfile::tempdir().expect("a folder");

@@ -38,7 +38,7 @@ fn the_ten_reference_poses_calibrate_the_exact_cell() {
     let result = auto(folder.path(), &["--poses", "seed10", "--json", json.to_str().expect("UTF-8")]);
     let (mm, deg, percent) = errors(&result);
     println!("reference scene, ten poses: {mm:.3} mm, {deg:.4}°, focal length {percent:.4} %");
-    // The cell is exact and its pictures have no noise: what is left is rounding to grey levels.
+    // The cell is exact and its images have no noise: what is left is rounding to grey levels.
     assert!(mm <= 0.03 && deg <= 0.03 && percent <= 0.2, "{mm} mm {deg}° {percent} %");
     assert_eq!(result.views.len(), 10);
     assert_eq!(CalibrationResult::read(&json).expect("the copy"), result);

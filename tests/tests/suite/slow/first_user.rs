@@ -25,7 +25,7 @@ fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
     desktop.until_seen("4 of 10 poses");
     desktop.photograph("2-capturing");
     desktop.until_seen("10 poses");
-    desktop.until_seen("Tour ended");
+    desktop.until_seen("Sequence ended");
     desktop.click("4 Solve");
     desktop.until_seen("Expected error");
     desktop.photograph("3-solved");

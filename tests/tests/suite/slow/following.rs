@@ -28,7 +28,7 @@ const FIRST: CaptureId = CaptureId(7);
 const TRIALS: u32 = 5;
 
 /// The cell, and a client that can have its passes wait for the workbench: what is measured is then what the workbench
-/// does with the pictures, however busy the machine is.
+/// does with the images, however busy the machine is.
 struct Cell {
     pacer: Sim,
     _server: CellServer,
@@ -68,7 +68,7 @@ fn passes_in(seconds: f64) -> u32 {
     (seconds / TIME_STEP_S).round() as u32
 }
 
-/// A calibrated workbench that tracks: realistic pictures, 33 a second.
+/// A calibrated workbench that tracks: realistic images, 33 a second.
 fn tracking(folder: &std::path::Path) -> (Workbench, Cell) {
     let mut scene = Scene::realistic().expect("the scene");
     scene.simulation.time_step_s = TIME_STEP_S;
@@ -110,10 +110,10 @@ fn sim_time_s(model: &Model) -> f64 {
     model.frame.as_ref().map_or(0.0, |frame| frame.info.sim_time_s)
 }
 
-/// What the camera really sees in the newest picture: by the cell's own word for camera and board.
+/// What the camera really sees in the newest image: by the cell's own word for camera and board.
 fn true_view(model: &Model) -> Pose<Camera, Target> {
     let truth = model.cell.as_ref().and_then(|cell| cell.truth.as_ref()).expect("the cell's truth");
-    let frame = &model.frame.as_ref().expect("a picture").info;
+    let frame = &model.frame.as_ref().expect("an image").info;
     let base_from_target = frame.base_from_target_true.expect("where the board is");
     (frame.base_from_tip * truth.tip_from_camera).inverse() * base_from_target
 }
@@ -205,11 +205,11 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
         bench.click(Command::HideBoard(true));
         let hidden_s = sim_time_s(bench.model());
         let mut fastest_rad_s: f64 = 0.0;
-        let mut before = bench.model().frame.clone().expect("a picture").info;
+        let mut before = bench.model().frame.clone().expect("an image").info;
         let mut at_rest_since_s = None;
         while at_rest_since_s.is_none_or(|since_s| before.sim_time_s < since_s + 0.6) {
             cell.pass(&mut bench);
-            let now = bench.model().frame.clone().expect("a picture").info;
+            let now = bench.model().frame.clone().expect("an image").info;
             let dt_s = now.sim_time_s - before.sim_time_s;
             if dt_s > 0.0 {
                 let turned = now.joints_rad.iter().zip(before.joints_rad).map(|(now, before)| (now - before).abs());

@@ -63,7 +63,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
-fn a_tour_ended_by(signal: &str) {
+fn a_sequence_ended_by(signal: &str) {
     let mut cell = CellProcess::start(&[]);
     let mut witness = Witness::of(&cell);
     witness.0.sim().start_simulation().expect("it starts");
@@ -76,7 +76,7 @@ fn a_tour_ended_by(signal: &str) {
     witness.until_moving();
 
     let (status, took) = desktop.end_by(signal);
-    println!("SIG{signal} in a tour: {status} after {took:.2?}");
+    println!("SIG{signal} in a sequence: {status} after {took:.2?}");
     assert!(status.success(), "it ends as closing the window does: {status}");
     assert!(took < LIMIT, "{took:?}");
 
@@ -104,12 +104,12 @@ fn a_tour_ended_by(signal: &str) {
 }
 
 #[test]
-fn a_signal_in_a_tour_ends_the_window_as_closing_it_does() {
+fn a_signal_in_a_sequence_ends_the_window_as_closing_it_does() {
     if !desktop::is_possible() {
         return;
     }
     for signal in ["TERM", "HUP", "INT"] {
-        a_tour_ended_by(signal);
+        a_sequence_ended_by(signal);
     }
 }
 

@@ -1,6 +1,6 @@
 //! The recording as people look at it: in a browser, in the native viewer, and in one that hangs.
 //!
-//! Pictures go to `$HANDEYE_SCREENSHOTS`, or else beside the build.
+//! Images go to `$HANDEYE_SCREENSHOTS`, or else beside the build.
 
 use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader};
@@ -44,15 +44,15 @@ fn native_viewer() -> Option<PathBuf> {
     None
 }
 
-/// How many colours there are in a part of a picture, given in shares of its sides: left, top, right, bottom.
-fn colours(picture: &Path, [left, top, right, bottom]: [f64; 4]) -> usize {
-    let picture = image::open(picture).unwrap_or_else(|error| panic!("{}: {error}", picture.display())).to_rgb8();
-    let (width, height) = (f64::from(picture.width()), f64::from(picture.height()));
+/// How many colours there are in a part of an image, given in shares of its sides: left, top, right, bottom.
+fn colours(image: &Path, [left, top, right, bottom]: [f64; 4]) -> usize {
+    let image = image::open(image).unwrap_or_else(|error| panic!("{}: {error}", image.display())).to_rgb8();
+    let (width, height) = (f64::from(image.width()), f64::from(image.height()));
     let inside = |x: u32, y: u32| {
         let (x, y) = (f64::from(x) / width, f64::from(y) / height);
         (left..right).contains(&x) && (top..bottom).contains(&y)
     };
-    let seen = picture.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y)).map(|(_, _, pixel)| pixel.0);
+    let seen = image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y)).map(|(_, _, pixel)| pixel.0);
     seen.collect::<BTreeSet<_>>().len()
 }
 
@@ -77,8 +77,8 @@ fn address(lines: impl std::io::Read) -> String {
     panic!("it ended without an address");
 }
 
-/// Has a browser take a picture of a page.
-fn photograph(url: &str, picture: &Path, profile: &Path) {
+/// Has a browser take an image of a page.
+fn photograph(url: &str, image: &Path, profile: &Path) {
     let mut browser = Command::new("chromium")
         .args(["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"])
         .args(["--enable-unsafe-swiftshader", "--disable-background-networking", "--disable-component-update"])
@@ -87,7 +87,7 @@ fn photograph(url: &str, picture: &Path, profile: &Path) {
         .arg("--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1")
         .args(["--timeout=60000", "--virtual-time-budget=90000"])
         .arg(format!("--user-data-dir={}", profile.display()))
-        .arg(format!("--screenshot={}", picture.display()))
+        .arg(format!("--screenshot={}", image.display()))
         .arg(url)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
@@ -113,19 +113,19 @@ fn a_browser_without_network_shows_a_live_session_in_3d() {
     let _session = Ends(session);
     let url = address(said);
     // The arm is on its way to its poses meanwhile.
-    let picture = shots().join("rerun-web.png");
+    let image = shots().join("rerun-web.png");
     let deadline = Instant::now() + PATIENCE;
     loop {
-        let _old = std::fs::remove_file(&picture).is_ok();
-        photograph(&url, &picture, &folder.path().join("browser"));
-        // The middle of the window, between the panels: 3D scene and pictures. A viewer without a recording has but a few.
-        let seen = colours(&picture, [0.2, 0.1, 0.75, 0.7]);
-        println!("web viewer: {seen} colours, {}", picture.display());
+        let _old = std::fs::remove_file(&image).is_ok();
+        photograph(&url, &image, &folder.path().join("browser"));
+        // The middle of the window, between the panels: 3D scene and images. A viewer without a recording has but a few.
+        let seen = colours(&image, [0.2, 0.1, 0.75, 0.7]);
+        println!("web viewer: {seen} colours, {}", image.display());
         if seen > 500 {
             return;
         }
         // A busy machine takes longer to load the viewer than the browser waits.
-        assert!(Instant::now() < deadline, "{seen} colours: see {}", picture.display());
+        assert!(Instant::now() < deadline, "{seen} colours: see {}", image.display());
     }
 }
 
@@ -135,17 +135,17 @@ fn the_button_opens_the_native_viewer_which_shows_the_cell() {
     if !desktop::is_possible() {
         return;
     }
-    // A viewer that takes a picture of itself: what it draws on a screen of memory is not to be had otherwise.
+    // A viewer that takes an image of itself: what it draws on a screen of memory is not to be had otherwise.
     let folder = tempfile::tempdir().expect("a folder");
-    let picture = shots().join("rerun-native.png");
-    let _old = std::fs::remove_file(&picture).is_ok();
+    let image = shots().join("rerun-native.png");
+    let _old = std::fs::remove_file(&image).is_ok();
     let watch = Watch::folder(&shots());
     let wrapper = folder.path().join("rerun");
     let script = format!(
         "#!/bin/sh\n[ \"$1\" = --version ] && exec '{viewer}' --version\nexec '{viewer}' \"$@\" --screenshot-to \
-         '{picture}' --window-size 1400x900\n",
+         '{image}' --window-size 1400x900\n",
         viewer = viewer.display(),
-        picture = std::path::absolute(&picture).expect("a path").display(),
+        image = std::path::absolute(&image).expect("a path").display(),
     );
     std::fs::write(&wrapper, script).expect("written");
     let allowed = Command::new("chmod").arg("+x").arg(&wrapper).status();
@@ -158,13 +158,13 @@ fn the_button_opens_the_native_viewer_which_shows_the_cell() {
     desktop.click("Capture");
     desktop.until_seen("1 of");
     desktop.click("Rerun");
-    assert!(watch.closes_within(&picture, PATIENCE), "the viewer takes no picture of itself");
-    let seen = colours(&picture, [0.2, 0.1, 0.75, 0.7]);
-    println!("native viewer: {seen} colours, {}", picture.display());
-    assert!(seen > 500, "{seen} colours: see {}", picture.display());
+    assert!(watch.closes_within(&image, PATIENCE), "the viewer takes no image of itself");
+    let seen = colours(&image, [0.2, 0.1, 0.75, 0.7]);
+    println!("native viewer: {seen} colours, {}", image.display());
+    assert!(seen > 500, "{seen} colours: see {}", image.display());
 }
 
-/// Pictures that the workbench shows within a time, and the largest memory \[bytes\] that it had.
+/// Images that the workbench shows within a time, and the largest memory \[bytes\] that it had.
 fn at_work(bench: &mut Workbench, seconds: f64) -> (f64, u64) {
     let number = |model: &Model| model.frame.as_ref().map_or(0, |frame| frame.info.number);
     let first = number(bench.model());
@@ -172,7 +172,7 @@ fn at_work(bench: &mut Workbench, seconds: f64) -> (f64, u64) {
     let mut largest = 0;
     while began.elapsed().as_secs_f64() < seconds {
         let seen = number(bench.model());
-        bench.until("another picture", |model| number(model) > seen);
+        bench.until("another image", |model| number(model) > seen);
         largest = largest.max(resident_bytes());
     }
     let shown = number(bench.model()) - first;
@@ -187,7 +187,7 @@ fn resident_bytes() -> u64 {
 }
 
 #[test]
-fn a_viewer_that_is_stopped_changes_neither_the_pictures_nor_the_bound_of_the_memory() {
+fn a_viewer_that_is_stopped_changes_neither_the_images_nor_the_bound_of_the_memory() {
     let Some(viewer) = native_viewer() else { return };
     // `HANDEYE_STOPPED_S=30` for the long run.
     let stopped_s = std::env::var("HANDEYE_STOPPED_S").ok().and_then(|text| text.parse().ok()).unwrap_or(8.0);
@@ -195,7 +195,7 @@ fn a_viewer_that_is_stopped_changes_neither_the_pictures_nor_the_bound_of_the_me
     let cell = CellProcess::start(&[]);
     let source = CellSource::Address(format!("tcp://127.0.0.1:{}", cell.port()));
     let mut bench = Workbench::start_recording(source, folder.path(), None, RerunChoice::Web);
-    bench.until("pictures", |model| model.frame.is_some() && matches!(model.rerun.viewer, ViewerState::Web { .. }));
+    bench.until("images", |model| model.frame.is_some() && matches!(model.rerun.viewer, ViewerState::Web { .. }));
     bench.click(WorkbenchCommand::StartSimulation);
     let ViewerState::Web { url } = bench.model().rerun.viewer.clone() else { panic!("no viewer") };
     let decoded = url.replace("%2B", "+").replace("%3A", ":").replace("%2F", "/");
@@ -213,7 +213,7 @@ fn a_viewer_that_is_stopped_changes_neither_the_pictures_nor_the_bound_of_the_me
     process::signal(&reader.0, "CONT");
     let (after_hz, _) = at_work(&mut bench, 2.0);
     println!(
-        "pictures per second: {before_hz:.1} with a viewer, {stopped_hz:.1} while it is stopped, {after_hz:.1} \
+        "images per second: {before_hz:.1} with a viewer, {stopped_hz:.1} while it is stopped, {after_hz:.1} \
          afterwards; memory {} MB, {} MB",
         before_bytes / 1_000_000,
         stopped_bytes / 1_000_000

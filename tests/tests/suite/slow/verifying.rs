@@ -41,8 +41,8 @@ fn a_calibration_is_verified_at_planned_poses_that_were_not_in_the_fit() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = solved(folder.path());
     bench.click(Command::VerifyAtPlanned);
-    bench.until("the tour", |model| model.touring);
-    bench.until("its end", |model| !model.touring);
+    bench.until("the sequence", |model| model.sequence_runs);
+    bench.until("its end", |model| !model.sequence_runs);
     bench.until("the verification", |model| {
         model.solve.current().is_some_and(|solved| solved.verified_captures.len() == 5)
     });
@@ -69,7 +69,7 @@ fn a_stop_ends_the_verification_and_keeps_what_was_captured() {
     bench.click(Command::VerifyAtPlanned);
     bench.until("a capture", |model| !poses(model, Role::Verification).is_empty());
     bench.click(Command::Stop);
-    bench.until("the arm at rest", |model| !model.touring && !model.stop_pending && model.motion == Motion::Idle);
+    bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending && model.motion == Motion::Idle);
     let kept = poses(bench.model(), Role::Verification).len();
     assert!((1..5).contains(&kept), "{kept}");
     let sim_time = |model: &Model| model.robot.as_ref().map_or(0.0, |robot| robot.sim_time_s);

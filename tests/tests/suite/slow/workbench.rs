@@ -25,15 +25,15 @@ fn idle_and_fresh(model: &Model) -> bool {
 }
 
 /// A cell that keeps pace with real time, with the ten reference poses captured and solved. The cell comes with it.
-fn toured(sessions: &Path) -> (Workbench, CellServer) {
+fn sequence_done(sessions: &Path) -> (Workbench, CellServer) {
     let scene = Scene::reference().expect("the scene");
     let cell = CellServer::start(CellConfig { real_time: Some(true), ..CellConfig::new(scene) }).expect("a cell");
     let mut bench = Workbench::start(CellSource::Address(cell.endpoint()), sessions, None);
     bench.until("a cell", connected);
     bench.click(Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
-    bench.click(Command::RunTour { purpose: Some(CapturePurpose::Calibrate) });
-    bench.until("the end of the tour", |model| !model.touring);
+    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.until("the end of the sequence", |model| !model.sequence_runs);
     bench.until("a solution", idle_and_fresh);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
     (bench, cell)
@@ -62,7 +62,7 @@ fn result_beside(session: &Path) -> CalibrationResult {
 #[test]
 fn ten_poses_are_visited_captured_solved_verified_and_exported() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (mut bench, _cell) = toured(folder.path());
+    let (mut bench, _cell) = sequence_done(folder.path());
     let model = bench.model();
     let solved = model.solve.current().expect("solved");
     let truth = solved.result.truth.expect("the cell publishes its truth");
@@ -162,14 +162,14 @@ fn a_session_is_opened_again_as_it_was_and_solves_to_the_same_bits_as_the_comman
 }
 
 #[test]
-fn a_stop_ends_the_tour_and_keeps_what_was_captured() {
+fn a_stop_ends_the_sequence_and_keeps_what_was_captured() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut bench = Workbench::start(CellSource::BuiltIn, folder.path(), None);
     bench.until("a cell", connected);
-    bench.click(Command::RunTour { purpose: Some(CapturePurpose::Calibrate) });
+    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("two captures", |model| model.document().captures.len() >= 2);
     bench.click(Command::Stop);
-    bench.until("the arm at rest", |model| !model.touring && !model.stop_pending);
+    bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending);
     let kept = bench.model().document().captures.len();
     assert!((2..10).contains(&kept), "{kept}");
     // A session that the first capture began is a recent one as well.
@@ -218,7 +218,7 @@ fn a_server_that_never_answers_is_left_for_a_cell_and_the_session_stays_open() {
     bench.click(Command::Connect(CellSource::Address(cell.endpoint())));
     bench.until("the cell", |model| model.control.is_connected() && model.camera.is_connected());
     bench.click(Command::StartSimulation);
-    bench.until("the board in a picture", |model| {
+    bench.until("the board in an image", |model| {
         model.detection.as_ref().is_some_and(|detection| detection.corners.is_some())
     });
     assert_eq!(bench.model().session.name().as_deref(), Some("mine"));

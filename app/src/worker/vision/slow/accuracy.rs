@@ -65,7 +65,7 @@ fn captured_around_moves(scene: Scene, bound_px: f64) {
     let moved = bench
         .events
         .iter()
-        .filter(|event| matches!(event, Event::CaptureWaits { wait: CaptureWait::Pictures(Wait::RobotMoves), .. }));
+        .filter(|event| matches!(event, Event::CaptureWaits { wait: CaptureWait::Images(Wait::RobotMoves), .. }));
     assert!(moved.count() >= 3, "captures were asked for in motion");
 }
 
@@ -75,20 +75,20 @@ fn a_capture_around_a_motion_never_shows_the_arm_in_motion() {
 }
 
 #[test]
-fn nor_does_one_in_noisy_pictures() {
+fn nor_does_one_in_noisy_images() {
     captured_around_moves(Scene::realistic().expect("a scene"), 0.3);
 }
 
-/// Noise of a grey level when the mean of pictures with a noise per channel is rounded to whole levels, and its grey
+/// Noise of a grey level when the mean of images with a noise per channel is rounded to whole levels, and its grey
 /// once more: luma weighs the channels by 0.299, 0.587 and 0.114, and rounding is uniform over one level.
-fn grey_noise(per_channel: f64, pictures: f64) -> f64 {
+fn grey_noise(per_channel: f64, images: f64) -> f64 {
     let rounding = 1.0 / 12.0;
     let luma = 0.299_f64.powi(2) + 0.587_f64.powi(2) + 0.114_f64.powi(2);
-    ((per_channel.powi(2) / pictures + rounding) * luma + rounding).sqrt()
+    ((per_channel.powi(2) / images + rounding) * luma + rounding).sqrt()
 }
 
 #[test]
-fn averaging_sixteen_pictures_lowers_corner_noise_as_far_as_whole_levels_allow() {
+fn averaging_sixteen_images_lowers_corner_noise_as_far_as_whole_levels_allow() {
     const CAPTURES: u64 = 7;
     const JITTER_PX: f64 = 1.2e-3;
     for noise_grey in [1.8, 8.0] {
@@ -104,16 +104,16 @@ fn averaging_sixteen_pictures_lowers_corner_noise_as_far_as_whole_levels_allow()
             let sixteen = bench.capture(request(2 * number + 1, 16)).expect("a capture");
             assert_eq!(sixteen.frames, 16);
             averaged.add(&sixteen.corners);
-            stated.push(sixteen.corner_noise_px.expect("sixteen pictures"));
+            stated.push(sixteen.corner_noise_px.expect("sixteen images"));
         }
         let (single, averaged) = (single.sigma_px().expect("seven"), averaged.sigma_px().expect("seven"));
         // 2.7 at 1.8 levels, where rounding is half of what is left; 3.9 at 8 levels, near the √16 of the noise alone.
         let (ratio, expected) = (single / averaged, grey_noise(noise_grey, 1.0) / grey_noise(noise_grey, 16.0));
         println!(
-            "noise {noise_grey}: one picture {single:.4} px, sixteen {averaged:.4} px, ratio {ratio:.2} of \
+            "noise {noise_grey}: one image {single:.4} px, sixteen {averaged:.4} px, ratio {ratio:.2} of \
              {expected:.2}; stated {stated:.4?}"
         );
-        // The detector lays its windows anew in every picture and sums in single precision, which jitters by a thousandth of
+        // The detector lays its windows anew in every image and sums in single precision, which jitters by a thousandth of
         // a pixel or so. Each scatter has 840 degrees of freedom, 2.4 % of its own.
         let left = (single / expected).hypot(JITTER_PX);
         assert!(averaged < 1.1 * left && ratio < 1.1 * expected, "{averaged} px instead of {left} px");
@@ -124,7 +124,7 @@ fn averaging_sixteen_pictures_lowers_corner_noise_as_far_as_whole_levels_allow()
 }
 
 #[test]
-fn every_live_picture_is_judged_and_a_paused_simulation_is_named() {
+fn every_live_image_is_judged_and_a_paused_simulation_is_named() {
     let mut bench = CellBench::start(Scene::reference().expect("a scene"), true);
     bench.client.arm().move_to_joints(&views()[0], &brisk(), &CancelToken::default()).expect("it gets there");
     bench.live(10);
@@ -142,7 +142,7 @@ fn every_live_picture_is_judged_and_a_paused_simulation_is_named() {
         all[all.len() / 2]
     };
     let hit_ms = ms(&hits);
-    // A board of another size is a miss in every picture.
+    // A board of another size is a miss in every image.
     let other = handeye_core::targets::Grid { columns: 13, rows: 9, square_m: 0.015 };
     bench
         .workers

@@ -55,7 +55,7 @@ const LIGHT_SD: f64 = 5e-4;
 const MIN_LEVELS: usize = 12;
 
 /// Refines a board found to a pixel or so on `levels[depth]`, in pixels of that level. The result is in pixels of
-/// `levels[0]`, the image; corners whose picture is not that of a corner stay and have no covariance.
+/// `levels[0]`, the image; corners whose image is not that of a corner stay and have no covariance.
 pub(super) fn refine(levels: &[Level], depth: usize, found: &Ordered) -> Ordered {
     let (Some(image), Some(level)) = (levels.first(), levels.get(depth)) else { return found.clone() };
     let scale = f64::from(1u32 << depth);

@@ -1,4 +1,4 @@
-//! The picture of one corner, fitted.
+//! The image of one corner, fitted.
 //!
 //! Near an inner corner the board is two lines that divide dark from light crosswise. Seen through the lens by pixels
 //! that have an area, the intensity is

@@ -1,9 +1,9 @@
-//! Chessboards without help: found by their saddles, grown into a grid, refined by a model of the picture.
+//! Chessboards without help: found by their saddles, grown into a grid, refined by a model of the image.
 //!
-//! 1. [`saddles`]: on a pyramid of halved images, coarse first, points where the picture curves up one way and down the
+//! 1. [`saddles`]: on a pyramid of halved images, coarse first, points where the image curves up one way and down the
 //!    other, with four alternating sectors on a ring around them;
 //! 2. [`lattice`]: from a saddle with four neighbours the grid grows by prediction, step by step;
-//! 3. [`board`]: the picture around every corner is fitted ([`fit`]), with what the neighbours say about the bend of
+//! 3. [`board`]: the image around every corner is fitted ([`fit`]), with what the neighbours say about the bend of
 //!    the edges and the fall of the light.
 
 mod board;
@@ -41,7 +41,7 @@ pub(in crate::detect) fn find(image: &GrayImage, grid: &Grid) -> Option<Ordered>
     })
 }
 
-/// Refines corners that are known to a pixel or so; those whose picture is not that of a corner stay, without a
+/// Refines corners that are known to a pixel or so; those whose image is not that of a corner stay, without a
 /// covariance.
 pub(in crate::detect) fn refine(image: &GrayImage, found: &Ordered) -> Ordered {
     board::refine(&[Level::full(image)], 0, found)

@@ -17,7 +17,7 @@ pub(super) const LANES: usize = 32;
 /// Pixels needed for the nine parameters.
 const MIN_PIXELS: usize = 16;
 
-/// Where a corner is thought to be, and what of its picture counts.
+/// Where a corner is thought to be, and what of its image counts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     pub centre: Vector2<f64>,

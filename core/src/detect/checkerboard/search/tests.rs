@@ -243,7 +243,7 @@ fn stated_covariances_are_those_of_the_errors() {
         let normalised = f64::sqrt(sum / count);
         println!("blur {blur} noise {noise}: normalised {normalised:.3}");
         // Of 420 numbers the root mean square of a unit normal is known to 0.035: three of these, and as much for the
-        // part of the picture that the model does not have.
+        // part of the image that the model does not have.
         assert!((normalised - 1.0).abs() < 0.2, "blur {blur} noise {noise}: {normalised}");
     }
 }

@@ -16,7 +16,7 @@ use crate::wording::Text;
 /// A turn from which a view is likelier seen the wrong way round than moved, degrees.
 const TURNED_DEG: f64 = 20.0;
 
-/// Every hypothesis: those taken in, then the best of every other kind. Views that were set aside one after the other are
+/// Every hypothesis: those taken in, then the best of every other kind. Views that were left out as outliers one after the other are
 /// one hypothesis.
 pub(in super::super) fn fine(selection: &Selection<'_>) -> Vec<Hypothesis> {
     let mut found: Vec<Hypothesis> = Vec::new();
@@ -97,7 +97,7 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
             let fx = model.sight.intrinsics.map_or(1.0, |camera| camera.fx);
             let percent = 100.0 * number(0) / fx;
             let what = text!(
-                "The intrinsics given do not fit the pictures: the focal length would be {percent} % ± {sigma} % off.",
+                "The intrinsics given do not fit the images: the focal length would be {percent} % ± {sigma} % off.",
                 percent = format!("{percent:+.2}"),
                 sigma = format!("{:.2}", 100.0 * sigma(0) / fx)
             );
@@ -167,7 +167,7 @@ fn of_views(selection: &Selection<'_>, judged: &Judged, views: &[usize]) -> Hypo
     let model = &selection.model;
     let names: Vec<String> = views.iter().map(|i| model.sight.views[*i].name.clone()).collect();
     let mut numbers = common(judged);
-    // The view that is out by most; its displacement is by the fit without those set aside.
+    // The view that is out by most; its displacement is by the fit without those left out as an outlier.
     let size = |i: &usize| model.displacement_m(&selection.fit.residuals[*i]);
     let worst = views.iter().copied().max_by(|a, b| size(a).total_cmp(&size(b)));
     let mm = worst.map_or(0.0, |i| size(&i) * 1e3);
@@ -184,9 +184,9 @@ fn of_views(selection: &Selection<'_>, judged: &Judged, views: &[usize]) -> Hypo
     };
     let what = what.with("list", listed(&names)).with("mm", format!("{mm:.2}")).with("deg", format!("{deg:.2}"));
     let why = if deg > TURNED_DEG {
-        text!("The board may have been read the wrong way round, or the pose belongs to another picture.")
+        text!("The board may have been read the wrong way round, or the pose belongs to another image.")
     } else {
-        text!("The arm or the board may have been moving, or the pose belongs to another picture.")
+        text!("The arm or the board may have been moving, or the pose belongs to another image.")
     };
     Hypothesis {
         code: FindingCode::OutlierView,

@@ -176,9 +176,9 @@ fn gross_words(code: FindingCode, tried: &Tried) -> Option<Text> {
             )
         }
         FindingCode::ShiftedPoses if tried.change.shift > 0 => {
-            text!("Every picture belongs to the robot pose of the row after it.")
+            text!("Every image belongs to the robot pose of the row after it.")
         }
-        FindingCode::ShiftedPoses => text!("Every picture belongs to the robot pose of the row before it."),
+        FindingCode::ShiftedPoses => text!("Every image belongs to the robot pose of the row before it."),
         _ => return None,
     })
 }
@@ -190,7 +190,7 @@ fn gross_advice(code: FindingCode) -> Option<Text> {
         }
         FindingCode::WrongQuaternionOrder => text!("Check the order of the columns."),
         FindingCode::WrongLengthUnit => text!("Check the unit of the poses and the size of the target."),
-        FindingCode::ShiftedPoses => text!("Check how pictures and poses were paired."),
+        FindingCode::ShiftedPoses => text!("Check how images and poses were paired."),
         _ => return None,
     })
 }
@@ -212,9 +212,9 @@ pub(super) fn gross_findings(hypotheses: &[Hypothesis]) -> Vec<Finding> {
 
 pub(super) fn hopeless(sight: &SessionViews, misfit_m: f64) -> Finding {
     let text = text!(
-        "Robot poses and pictures contradict each other: the board comes together within {misfit} mm only, at a distance of \
+        "Robot poses and images contradict each other: the board comes together within {misfit} mm only, at a distance of \
          {distance} mm. Inverted poses, the other mode, millimetres, quaternion order and rows out of step do not explain \
-         it. Check that the poses belong to these pictures, and the axes and angles that the poses were made from.",
+         it. Check that the poses belong to these images, and the axes and angles that the poses were made from.",
         misfit = format!("{:.0}", misfit_m * 1e3),
         distance = format!("{:.0}", sight.distance_m * 1e3)
     );
@@ -227,18 +227,18 @@ pub(super) fn implausible(robot_m: f64, robot_rad: f64, beside: bool) -> Finding
     let (mm, deg) = (robot_m * 1e3, robot_rad.to_degrees());
     let what = if beside {
         text!(
-            "The robot poses scatter by {mm} mm and {deg}° per axis about what the pictures say, even with what else was \
+            "The robot poses scatter by {mm} mm and {deg}° per axis about what the images say, even with what else was \
              found, more than an arm errs (below 2 mm and 0.5°)."
         )
     } else {
         text!(
-            "The robot poses scatter by {mm} mm and {deg}° per axis about what the pictures say, more than an arm errs \
+            "The robot poses scatter by {mm} mm and {deg}° per axis about what the images say, more than an arm errs \
              (below 2 mm and 0.5°)."
         )
     };
     let what = what.with("mm", format!("{mm:.2}")).with("deg", format!("{deg:.3}"));
     let advice = text!(
-        "The arm may have been moving, poses and pictures may not be of the same moment, or the arm's own geometry is wrong. \
+        "The arm may have been moving, poses and images may not be of the same moment, or the arm's own geometry is wrong. \
          Capture again at rest; no solver can mend it."
     );
     let text = Text::sentences([what, advice]);

@@ -57,7 +57,7 @@ use variance::Levels;
 pub struct Noise {
     /// Of a corner, pixels.
     pub corner_px: f64,
-    /// Of what all corners of a view have in common beyond that, pixels: errors of lens, target and picture that look like
+    /// Of what all corners of a view have in common beyond that, pixels: errors of lens, target and image that look like
     /// a pose. A pose from `n` corners has the covariance `(corner_px² + view_px²) (Jᵀ J)⁻¹`. Zero where the data ask for
     /// none.
     pub view_px: f64,

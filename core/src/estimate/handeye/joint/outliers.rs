@@ -1,9 +1,9 @@
-//! The joint estimate with wrong views and wrong corners set aside.
+//! The joint estimate with wrong views and wrong corners left out.
 //!
 //! The distance of a view is that of its own pose, from its corners, to the pose that the chain predicts from its reported
 //! robot pose: `T² = eᵀ V⁻¹ e` with `e` in the tangent space and `V` the sum of robot noise, corner noise and what the
 //! estimate itself is uncertain by (added for a view outside the fit, taken off for one inside it). Of good views it follows
-//! `6 F(6, ν)`. Views beyond a limit that one healthy session in a thousand passes are set aside, and the rest is fitted
+//! `6 F(6, ν)`. Views beyond a limit that one healthy session in a thousand passes are left out as outliers, and the rest is fitted
 //! again until nothing changes.
 //!
 //! Several wrong views hide each other: they raise the estimated noise until none of them stands out. That shows, because
@@ -11,7 +11,7 @@
 //! does not return. In either case the fit begins with the six in ten views that the start fits best and grows from there.
 //! At the end the farthest view in the fit is judged once more by a fit without it, until one is found right.
 //!
-//! A corner is set aside when its residual, its view's own pose being free, is several times what nine in ten corners
+//! A corner is left out as an outlier when its residual, its view's own pose being free, is several times what nine in ten corners
 //! have; so long tails of honest noise are kept.
 //!
 //! # Reference
@@ -34,7 +34,7 @@ use crate::geometry::statistics::median;
 use crate::progress::{CancelToken, Work};
 use crate::targets::observation::{Corner, View};
 
-/// Share of healthy sessions in which some view may be set aside.
+/// Share of healthy sessions in which some view may be left out as an outlier.
 const FALSE_ALARM: f64 = 0.001;
 /// Views below which none can be told from the others.
 const NEED: usize = 6;
@@ -65,7 +65,7 @@ const LEAST_CORNERS: f64 = 0.5;
 /// How far a view lies from where the others expect it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
-    /// `T²` over its limit; above 1 the view is set aside.
+    /// `T²` over its limit; above 1 the view is left out as an outlier.
     pub of_limit: f64,
     /// Distance of the view's pose from the predicted one at the middle of the target, metres.
     pub metres: f64,
@@ -80,11 +80,11 @@ pub struct Screened {
     pub solution: JointSolution,
     /// Which views are in the fit, ascending.
     pub kept: Vec<usize>,
-    /// The views that were given, without the corners set aside.
+    /// The views that were given, without the corners left out as an outlier.
     pub views: Vec<View>,
     /// For every view, how far it is from what the fit expects.
     pub distances: Vec<Distance>,
-    /// Corners set aside, as view and index of the point.
+    /// Outlier corners, as view and index of the point.
     pub corners: Vec<(usize, usize)>,
 }
 
@@ -343,7 +343,7 @@ fn distances(
 /// Limit of `T²` that all of `views` healthy views stay below but in [`FALSE_ALARM`] of sessions.
 fn limit(views: usize, freedom: f64) -> f64 {
     let level = 1.0 - FALSE_ALARM / views as f64;
-    // Both numbers are positive, so the distribution exists; without it nothing is set aside.
+    // Both numbers are positive, so the distribution exists; without it nothing is left out as an outlier.
     FisherSnedecor::new(6.0, freedom).map_or(f64::INFINITY, |f| 6.0 * f.inverse_cdf(level))
 }
 

@@ -24,7 +24,7 @@ pub fn point_covariance(hand_eye: &Matrix6<f64>, point: &Point3<f64>) -> Matrix3
 
 /// Expected error of a point that the camera measures, at the place where it saw the target: 95 % of errors are below
 /// this many metres. It counts the hand-eye transform alone, with what robot and corner noise did to it; the noise of
-/// a later robot pose or picture comes on top.
+/// a later robot pose or image comes on top.
 pub fn tip_error_95_m(solution: &JointSolution) -> f64 {
     tip_error_95_at(&solution.hand_eye_covariance(), solution.small_sample, &solution.reference_point)
 }

@@ -2,7 +2,7 @@
 //!
 //! The covariance of the joint estimate holds if the errors of all views are independent and as large as the noise levels
 //! say. Real robots are off in the same direction in neighbouring poses, and what lens and board do not follow of their
-//! models comes back in every picture, so it may be too small. Nothing but the data can tell. Each of the checks here
+//! models comes back in every image, so it may be too small. Nothing but the data can tell. Each of the checks here
 //! compares what they show with what the covariance promises and gives a ratio of variances with the probability of
 //! one so large if the covariance were true:
 //!

@@ -56,7 +56,7 @@ pub fn check(views: &[LinearView]) -> Check {
 const SIX: f64 = 6.0;
 
 /// The estimated errors with a mean square of one in translation and in rotation: estimates are smaller than the errors
-/// themselves by a factor that depends on how well the pictures show them. `None` where there are none.
+/// themselves by a factor that depends on how well the images show them. `None` where there are none.
 fn standardised(views: &[&LinearView]) -> Option<Vec<Vector6<f64>>> {
     let rms = |at: usize| {
         let squared: f64 = views.iter().map(|v| v.robot.fixed_rows::<3>(at).norm_squared()).sum();

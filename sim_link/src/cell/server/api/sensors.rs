@@ -118,11 +118,11 @@ fn get_vision_sensor_depth(call: &mut Call<'_>) -> Outcome {
     let sensor = call.cell.world.tree.sensor(handle)?;
     let in_metres = call.args.integer_or(1, 0)? & METRES != 0;
     let crop = Crop::read(call, 2, sensor)?;
-    let picture = call.cell.cameras.depth(handle, sensor, &call.cell.stage);
+    let image = call.cell.cameras.depth(handle, sensor, &call.cell.stage);
     if in_metres && crop.is_all_of(sensor) {
-        return Ok(Answer::Encoded(picture.reply.clone()));
+        return Ok(Answer::Encoded(image.reply.clone()));
     }
-    let mut bytes = crop.cut(&picture.bytes, sensor.intrinsics.width as usize, 4);
+    let mut bytes = crop.cut(&image.bytes, sensor.intrinsics.width as usize, 4);
     if !in_metres {
         let range_m = sensor.far_m - sensor.near_m;
         bytes = metres(&bytes).flat_map(|z| (((z - sensor.near_m) / range_m) as f32).to_le_bytes()).collect();

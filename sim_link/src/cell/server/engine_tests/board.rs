@@ -1,4 +1,4 @@
-//! The board that moves, hides, and is where the moment of a picture says.
+//! The board that moves, hides, and is where the moment of an image says.
 
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
@@ -8,7 +8,7 @@ use super::*;
 use crate::cell::kinematics::JointAngles;
 use crate::cell::scene::ResolvedScene;
 
-/// Grey levels of a picture, row 0 on top.
+/// Grey levels of an image, row 0 on top.
 struct Grey {
     width: usize,
     levels: Vec<f64>,
@@ -113,7 +113,7 @@ fn reprojection_error(bench: &mut Bench, scene: &ResolvedScene) -> f64 {
 }
 
 #[test]
-fn the_picture_shows_the_board_where_the_moment_says_while_board_and_arm_move() {
+fn the_image_shows_the_board_where_the_moment_says_while_board_and_arm_move() {
     let mut scene = Scene::default();
     scene.board.motion.path = crate::cell::scene::BoardPath::RandomWalk;
     scene.board.motion.speed_m_s = 0.15;

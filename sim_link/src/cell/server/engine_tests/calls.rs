@@ -139,7 +139,7 @@ fn signals_and_logs_are_kept_within_bounds() {
 }
 
 /// The colour buffer as it is sent.
-fn picture(bench: &mut Bench) -> Vec<u8> {
+fn image(bench: &mut Bench) -> Vec<u8> {
     let camera = Value::from(bench.engine.cell.stage.camera);
     let image = bench.call(A, "sim.getVisionSensorImg", vec![camera]);
     image.list().expect("two values")[0].blob().expect("bytes").to_vec()
@@ -149,21 +149,21 @@ fn picture(bench: &mut Bench) -> Vec<u8> {
 fn image_noise_is_new_in_every_pass_and_the_same_for_everybody_who_looks() {
     let mut scene = Scene::default();
     (scene.image.noise_grey, scene.camera.width, scene.camera.height) = (2.0, 64, 48);
-    let mut pictures = [(); 2].map(|()| {
+    let mut images = [(); 2].map(|()| {
         let mut bench = Bench::with(&scene, false);
         bench.call(A, "sim.setStepping", vec![Value::from(true)]);
         bench.call(A, "sim.startSimulation", vec![]);
-        let mut pictures = Vec::new();
+        let mut images = Vec::new();
         for _ in 0..3 {
             bench.call(A, "sim.step", vec![]);
-            pictures.push(picture(&mut bench));
-            assert_eq!(pictures.last(), Some(&picture(&mut bench)));
+            images.push(image(&mut bench));
+            assert_eq!(images.last(), Some(&image(&mut bench)));
         }
-        pictures
+        images
     });
-    assert_eq!(pictures[0], pictures[1], "the same seed gives the same noise");
-    pictures[0].dedup();
-    assert_eq!(pictures[0].len(), 3);
+    assert_eq!(images[0], images[1], "the same seed gives the same noise");
+    images[0].dedup();
+    assert_eq!(images[0].len(), 3);
 }
 
 #[test]
@@ -172,11 +172,11 @@ fn a_world_without_its_board_or_arm_is_still_drawn() {
     bench.call(A, "sim.setStepping", vec![Value::from(true)]);
     bench.call(A, "sim.startSimulation", vec![]);
     bench.call(A, "sim.step", vec![]);
-    let before = picture(&mut bench);
+    let before = image(&mut bench);
     let (plane, joint) = (bench.engine.cell.stage.plane, bench.engine.cell.stage.joints[2]);
     bench.call(A, "sim.removeObjects", vec![wire::integers([plane, joint])]);
     bench.call(A, "sim.step", vec![]);
-    assert_ne!(picture(&mut bench), before);
+    assert_ne!(image(&mut bench), before);
     assert!(bench.error("handeye.truth", vec![]).ends_with("object does not exist."));
     let start = tip_pose(&mut bench);
     let params = to_pose(&mut bench, &start, vec![]);

@@ -167,7 +167,7 @@ fn an_idle_stepping_client_freezes_time_and_each_step_moves_it_by_one_pass() {
     assert_eq!(bench.get("sim.setStepping", vec![Value::from(true)]), Value::from(1));
     assert_eq!(bench.get("sim.setStepping", vec![Value::from(false)]), Value::from(2));
     assert_eq!(bench.get("sim.setStepping", vec![Value::from(false)]), Value::from(1));
-    assert!(bench.is_pass_near(), "nobody steps any more, so time runs");
+    assert!(bench.is_pass_near(), "nobody steps now, so time runs");
 }
 
 #[test]
@@ -436,7 +436,7 @@ fn the_ids_of_one_connection_take_only_their_share_and_go_with_it() {
     assert_eq!(bench.engine.clients.records.len(), MAX_CLIENTS_PER_CONNECTION);
     assert_eq!(refused, 2 * MAX_CLIENTS - MAX_CLIENTS_PER_CONNECTION);
     bench.call(A, "sim.startSimulation", vec![]);
-    // All of them are gone with their connection, not only the last that spoke: nobody holds the passes any more.
+    // All of them are gone with their connection, not only the last that spoke: nobody holds the passes now.
     bench.engine.disconnected(&crowd, bench.now);
     bench.now += Duration::from_secs(3);
     bench.turn();

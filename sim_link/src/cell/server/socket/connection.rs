@@ -35,7 +35,7 @@ pub enum Gone {
     /// The other side said nothing.
     #[error("it did not introduce itself within {HANDSHAKE_LIMIT:?}")]
     NoIntroduction,
-    /// The other side says nothing any more.
+    /// The other side says nothing now.
     #[error("it does not answer pings")]
     Silent,
     /// It holds what others need.
