@@ -135,7 +135,7 @@ fn signals_and_logs_are_kept_within_bounds() {
     }
     assert_eq!(bench.engine.cell.log.len(), 200);
     bench.call(A, "sim.addLog", vec![Value::from(450), Value::Null]);
-    assert!(bench.error("sim.addLog", vec![Value::from(420), Value::from("oh")]).ends_with("oh"));
+    bench.call(A, "sim.addLog", vec![Value::from(420), Value::from("oh")]);
 }
 
 /// The colour buffer as it is sent.
