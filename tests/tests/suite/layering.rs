@@ -85,7 +85,8 @@ fn core_is_below_sim_link_is_below_app() {
 const TRUTH: [&str; 3] = ["GroundTruth", "ground_truth", "TruthComparison"];
 
 /// The files of core that keep or report it, and compute nothing from it.
-const MAY_NAME_THE_TRUTH: [&str; 3] = ["project/session/document.rs", "project/session/mod.rs", "project/result/mod.rs"];
+const MAY_NAME_THE_TRUTH: [&str; 3] =
+    ["project/session/document.rs", "project/session/mod.rs", "project/result/mod.rs"];
 
 /// Lines of a source that name the truth; none where the source may.
 fn lines_that_see_the_truth(path: &str, text: &str) -> Vec<String> {
