@@ -108,7 +108,7 @@ impl Settings {
     /// How the window looks at the start; what is not kept here has its default.
     pub fn view(&self) -> ViewSettings {
         let Self { theme, language, rotation, depth_scale, depth_colours, .. } = *self;
-        ViewSettings { theme, language, rotation, depth_scale, depth_colours, ..ViewSettings::default() }
+        ViewSettings { depth_colours, theme, language, rotation, depth_scale, ..ViewSettings::default() }
     }
 
     /// The cell to work with at the start.

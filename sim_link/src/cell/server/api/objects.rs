@@ -47,10 +47,10 @@ fn get_object(call: &mut Call<'_>) -> Outcome {
 
 /// The simulator's words, and which of a program's paths it was.
 fn unknown(error: WorldError, path: &str) -> ApiError {
+    const SHOWN: usize = 100;
     if error != WorldError::NoSuchPath {
         return error.into();
     }
-    const SHOWN: usize = 100;
     let path: String = path.chars().take(SHOWN).collect();
     ApiError::Other(format!("{error} ('{path}'; sim.getObjectsInTree(sim.handle_scene) lists what is there)"))
 }
