@@ -76,6 +76,8 @@ pub struct ZmqTransport {
     endpoint: Endpoint,
     heartbeat: Option<Duration>,
     serial: u64,
+    /// The last connection ended between two requests, and no request was sent since.
+    lost: bool,
 }
 
 struct Channel {
@@ -84,6 +86,8 @@ struct Channel {
     serial: u64,
     awaiting_reply: bool,
     shaken_hands: bool,
+    /// Follows a connection that ended: a server that refuses this one has gone. Anybody else waits for it to come up.
+    succeeds_lost: bool,
     lost_since: Option<Instant>,
     retries: bool,
 }
@@ -93,7 +97,14 @@ impl ZmqTransport {
     ///
     /// `heartbeat` is the time after which a silent host counts as gone, or `None` for no heartbeats.
     pub fn new(endpoint: &Endpoint, heartbeat: Option<Duration>) -> Self {
-        Self { channel: None, context: zmq::Context::new(), endpoint: endpoint.clone(), heartbeat, serial: 0 }
+        Self {
+            channel: None,
+            context: zmq::Context::new(),
+            endpoint: endpoint.clone(),
+            heartbeat,
+            serial: 0,
+            lost: false,
+        }
     }
 
     /// Makes the socket, so that an address that can never work is known before the first call.
@@ -111,15 +122,15 @@ impl ZmqTransport {
     }
 
     fn ready(&mut self) -> Result<&mut Channel, TransportFault> {
-        let usable = self.channel.as_mut().is_some_and(|channel| {
-            channel.listen_to_monitor();
-            channel.lost_since.is_none() && !channel.awaiting_reply
-        });
+        let lost = self.ended();
+        let usable = !lost && self.channel.as_ref().is_some_and(|channel| !channel.awaiting_reply);
         if !usable {
             self.channel = None;
             self.serial += 1;
-            let channel = Channel::connect(&self.context, &self.endpoint, self.heartbeat, self.serial);
-            self.channel = Some(channel.map_err(|error| TransportFault::Refused(error.to_string()))?);
+            let mut channel = Channel::connect(&self.context, &self.endpoint, self.heartbeat, self.serial)
+                .map_err(|error| TransportFault::Refused(error.to_string()))?;
+            channel.succeeds_lost = self.lost;
+            self.channel = Some(channel);
         }
         self.channel.as_mut().ok_or(TransportFault::Disconnected)
     }
@@ -158,6 +169,7 @@ impl Channel {
             serial,
             awaiting_reply: false,
             shaken_hands: false,
+            succeeds_lost: false,
             lost_since: None,
             retries: false,
         })
@@ -173,8 +185,8 @@ impl Channel {
             } else if event == zmq::SocketEvent::DISCONNECTED as u16 && self.shaken_hands {
                 // Before the handshake it is only an attempt that failed: the library tries again by itself.
                 self.lost_since = self.lost_since.or_else(|| Some(Instant::now()));
-            } else if event == zmq::SocketEvent::CONNECT_RETRIED as u16 && self.lost_since.is_some() {
-                self.retries = true;
+            } else if event == zmq::SocketEvent::CONNECT_RETRIED as u16 {
+                self.retries |= self.lost_since.is_some() || (self.succeeds_lost && !self.shaken_hands);
             }
         }
     }
@@ -182,7 +194,7 @@ impl Channel {
     /// Why there will be no reply, as soon as that is certain.
     fn fault(&self) -> Option<TransportFault> {
         match self.lost_since {
-            Some(_) if self.retries => Some(TransportFault::Disconnected),
+            _ if self.retries => Some(TransportFault::Disconnected),
             Some(since) if since.elapsed() > RETRY_NEWS => Some(TransportFault::TooLong),
             _ => None,
         }
@@ -219,6 +231,7 @@ impl Transport for ZmqTransport {
         let channel = self.ready()?;
         channel.request.send(message, zmq::DONTWAIT).map_err(|error| TransportFault::Refused(error.to_string()))?;
         channel.awaiting_reply = true;
+        self.lost = false;
         Ok(())
     }
 
@@ -265,9 +278,11 @@ impl Transport for ZmqTransport {
     }
 
     fn ended(&mut self) -> bool {
-        self.channel.as_mut().is_some_and(|channel| {
+        let ended = self.channel.as_mut().is_some_and(|channel| {
             channel.listen_to_monitor();
             channel.lost_since.is_some()
-        })
+        });
+        self.lost |= ended;
+        ended
     }
 }

@@ -258,6 +258,34 @@ fn a_connection_that_ends_between_two_calls_is_known_to_have_lost_what_the_serve
     drop(server.join().expect("no panic"));
 }
 
+#[test]
+fn a_server_that_dies_between_two_calls_is_reported_by_the_second_and_waited_for_by_the_third() {
+    let (answered, is_answered) = pair();
+    let (endpoint, server) = serve(move |peer| {
+        let (to, _) = peer.next();
+        peer.say(&to, &ret(Vec::new()));
+        done(&is_answered);
+    });
+    let mut connection = connect(&endpoint, options());
+    connection.call("sim.x", vec![]).expect("an answer");
+    answered.send(()).expect("the server listens");
+    join(server);
+    let deadline = Instant::now() + PATIENCE;
+    while connection.is_connected() {
+        assert!(Instant::now() < deadline, "nobody notices that the server has gone");
+    }
+    // Not after the time allowed for a reply: whoever holds the arm has to know at once.
+    let error = connection.call("sim.x", vec![]).expect_err("the server has gone");
+    assert_eq!(error, LinkError::Disconnected { call: "sim.x".to_owned() });
+    // A server that is being restarted is waited for.
+    let client = std::thread::spawn(move || connection.call("sim.x", vec![]));
+    let peer = Peer::bind(Some(endpoint.port()));
+    let (to, _) = peer.next();
+    peer.say(&to, &ret(vec![Value::from(2)]));
+    let reply = client.join().expect("no panic").expect("answered");
+    assert_eq!(reply.integer(0), Ok(2));
+}
+
 /// A plain TCP peer that completes ZeroMQ's handshake by hand and does then what a library would not.
 fn by_hand(then: impl FnOnce(TcpStream) + Send + 'static) -> (Endpoint, JoinHandle<()>) {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
