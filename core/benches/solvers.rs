@@ -63,14 +63,7 @@ fn views(camera: &Intrinsics, count: usize) -> Vec<ObservedView> {
                     Corner::new(index, px + noise(&mut rng, CORNER_NOISE_PX).xy())
                 })
                 .collect();
-            ObservedView {
-                name: format!("{i:05}"),
-                base_from_tip: Some(Pose::from_isometry(base_from_tip)),
-                corners: Some(corners),
-                tip_by_joint: Vec::new(),
-                camera_from_target: None,
-                in_fit: true,
-            }
+            ObservedView::new(format!("{i:05}"), Some(Pose::from_isometry(base_from_tip)), Some(corners))
         })
         .collect()
 }

@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{parent}_from_camera");
     println!("  translation [mm]: {:?}", (pose.translation() * 1e3).as_slice());
     println!("  rotation, quaternion xyzw: {:?}", pose.rotation().coords.as_slice());
-    if let Some(error_m) = calibration.tip_error_95_m {
+    if let Some(error_m) = calibration.tip_error_95_m() {
         println!("expected error of a measured point, 95 %: {:.3} mm", error_m * 1e3);
     }
     Ok(())

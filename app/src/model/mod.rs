@@ -494,7 +494,7 @@ impl Model {
 
     /// The camera: as calibrated, or else as its settings say.
     pub fn intrinsics(&self) -> Option<Intrinsics> {
-        let calibrated = self.solve.solved.as_ref().and_then(|solved| solved.calibration.intrinsics);
+        let calibrated = self.solve.solved.as_ref().and_then(|solved| solved.calibration.intrinsics());
         calibrated.or_else(|| Some(self.cell.as_ref()?.nominal_intrinsics))
     }
 

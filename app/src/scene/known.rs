@@ -104,7 +104,7 @@ impl Known {
 
     /// The camera: as calibrated, or else as the cell's settings say.
     pub fn intrinsics(&self) -> Option<Intrinsics> {
-        let calibrated = self.solved.as_ref().and_then(|solved| solved.calibration.intrinsics);
+        let calibrated = self.solved.as_ref().and_then(|solved| solved.calibration.intrinsics());
         calibrated
             .or_else(|| Some(self.cell.as_ref()?.nominal_intrinsics))
             .or_else(|| self.document_truth.as_ref()?.intrinsics)

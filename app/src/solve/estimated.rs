@@ -1,6 +1,6 @@
 //! What the joint estimate decided and found out besides the answer, in words with units.
 
-use handeye_core::estimate::{Calibration, JointOffsets, ShapeEstimate, ViewStatus};
+use handeye_core::estimate::{Calibration, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
 
 use crate::text;
 use crate::text::Text;
@@ -26,14 +26,15 @@ pub fn estimated(calibration: &Calibration) -> Vec<EstimatedValue> {
     let mut lines = Vec::new();
     lines.extend(views_aside(calibration));
     lines.extend(corners_aside(calibration));
-    if let Some(shape) = &calibration.shape {
+    let Some(joint) = &calibration.joint else { return lines };
+    if let Some(shape) = &joint.shape {
         lines.extend(bend(shape));
         lines.extend(size(shape));
     }
-    lines.extend(view_noise(calibration));
-    lines.extend(widening(calibration));
-    lines.extend(freedom(calibration));
-    lines.extend(calibration.joint_offsets.as_ref().map(joint_offsets));
+    lines.extend(view_noise(joint));
+    lines.extend(widening(joint));
+    lines.push(freedom(joint));
+    lines.extend(joint.joint_offsets.as_ref().map(joint_offsets));
     lines
 }
 
@@ -83,8 +84,8 @@ fn size(shape: &ShapeEstimate) -> Option<EstimatedValue> {
     })
 }
 
-fn view_noise(calibration: &Calibration) -> Option<EstimatedValue> {
-    let view_px = calibration.noise?.view_px;
+fn view_noise(joint: &JointFit) -> Option<EstimatedValue> {
+    let view_px = joint.noise.view_px;
     (view_px > 0.0).then(|| EstimatedValue {
         what: text!("Noise of views"),
         value: Text::verbatim(format!("{view_px:.3} px")),
@@ -96,8 +97,8 @@ fn view_noise(calibration: &Calibration) -> Option<EstimatedValue> {
     })
 }
 
-fn widening(calibration: &Calibration) -> Option<EstimatedValue> {
-    let widening = calibration.widening.as_ref()?;
+fn widening(joint: &JointFit) -> Option<EstimatedValue> {
+    let widening = &joint.widening;
     let by = widening.by?;
     Some(EstimatedValue {
         what: text!("Uncertainty widened"),
@@ -109,18 +110,18 @@ fn widening(calibration: &Calibration) -> Option<EstimatedValue> {
     })
 }
 
-fn freedom(calibration: &Calibration) -> Option<EstimatedValue> {
-    let degrees = calibration.small_sample?.degrees_of_freedom;
+fn freedom(joint: &JointFit) -> EstimatedValue {
+    let degrees = joint.small_sample.degrees_of_freedom;
     let value =
         if degrees > KNOWN { text!("known") } else { text!("{n} degrees of freedom", n = format!("{degrees:.1}")) };
-    Some(EstimatedValue {
+    EstimatedValue {
         what: text!("Noise levels"),
         value,
         meaning: text!(
             "The fewer degrees of freedom the noise levels have, the wider the stated error is for the same noise"
         ),
         why: None,
-    })
+    }
 }
 
 fn joint_offsets(offsets: &JointOffsets) -> EstimatedValue {
@@ -162,12 +163,10 @@ mod tests {
     fn said(change: impl FnOnce(&mut Calibration)) -> Vec<(String, String)> {
         let model = sample::solved();
         let mut calibration = model.solve.current().expect("solved").calibration.clone();
-        calibration.shape = None;
-        calibration.widening = None;
-        calibration.joint_offsets = None;
-        if let Some(noise) = &mut calibration.noise {
-            noise.view_px = 0.0;
-        }
+        let joint = calibration.joint.as_mut().expect("a joint estimate");
+        (joint.shape, joint.joint_offsets) = (None, None);
+        joint.widening = Widening { factor: 1.0, by: None, checks: Vec::new() };
+        joint.noise.view_px = 0.0;
         change(&mut calibration);
         let lines = estimated(&calibration);
         lines.iter().map(|it| (it.what.say(Language::English), it.value.say(Language::English))).collect()
@@ -191,19 +190,16 @@ mod tests {
             c.views[0].status = ViewStatus::Outlier;
             c.views[1].corners_aside = vec![3, 4];
             c.views[2].corners_aside = vec![5];
-            c.shape = Some(ShapeEstimate {
+            let joint = c.joint.as_mut().expect("a joint estimate");
+            joint.shape = Some(ShapeEstimate {
                 shape: BoardShape { warp_m: [4e-4, -1e-4], scale: 1.001 },
                 warp_sigma_m: Some([3e-5, 2e-5]),
                 scale_sigma: Some(2e-4),
             });
-            if let Some(noise) = &mut c.noise {
-                noise.view_px = 0.12;
-            }
-            c.widening = Some(Widening { factor: 4.0, by: Some(Evidence::Neighbours), checks: Vec::new() });
-            if let Some(sample) = &mut c.small_sample {
-                sample.degrees_of_freedom = f64::INFINITY;
-            }
-            c.joint_offsets = Some(JointOffsets {
+            joint.noise.view_px = 0.12;
+            joint.widening = Widening { factor: 4.0, by: Some(Evidence::Neighbours), checks: Vec::new() };
+            joint.small_sample.degrees_of_freedom = f64::INFINITY;
+            joint.joint_offsets = Some(JointOffsets {
                 offsets_rad: vec![1.0_f64.to_radians(), (-0.5_f64).to_radians()],
                 sigma_rad: vec![0.01_f64.to_radians(); 2],
                 heldout_before_px: 0.5,

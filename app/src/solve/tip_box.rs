@@ -38,7 +38,7 @@ pub struct BoxState {
 /// place of a capture counts from which the middle of the box is known worst.
 pub fn judge_box(chosen: Option<WorkBox>, solved: &Solved, document: &Document) -> Option<(WorkBox, BoxError)> {
     let calibration = &solved.calibration;
-    let (covariance, law) = (calibration.hand_eye_covariance?, calibration.small_sample?);
+    let (covariance, law) = (*calibration.hand_eye_covariance()?, calibration.joint.as_ref()?.small_sample);
     let hand_eye = calibration.hand_eye?;
     let work_box = match chosen {
         Some(chosen) => chosen,
@@ -73,7 +73,7 @@ fn about_target(hand_eye: &HandEye, solved: &Solved, document: &Document) -> Opt
     let middle = match hand_eye {
         HandEye::EyeInHand { base_from_target, .. } => base_from_target.isometry() * document.meta.target.centre(),
         HandEye::EyeToHand { base_from_camera, .. } => {
-            base_from_camera.isometry() * solved.calibration.reference_point?
+            base_from_camera.isometry() * solved.calibration.joint.as_ref()?.reference_point
         }
     };
     let at = |half_side_m: f64| [middle.x + half_side_m, middle.y + half_side_m, middle.z + half_side_m];
@@ -113,7 +113,7 @@ mod tests {
     fn a_calibration_without_uncertainty_judges_no_box() {
         let model = sample::solved();
         let mut solved = Solved::clone(model.solve.current().expect("solved"));
-        solved.calibration.small_sample = None;
+        solved.calibration.joint = None;
         assert!(judge_box(None, &solved, model.document()).is_none());
     }
 }

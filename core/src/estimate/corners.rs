@@ -3,10 +3,10 @@
 use nalgebra::Point3;
 
 use super::lens::Lens;
-use super::refine::{self, Refined};
+use super::refine::{self, Judged, Refined};
 use super::{
-    CalibrateError, Calibration, CornerResidual, Method, Observations, Options, ShapeEstimate, SharedCovariance,
-    ViewResult, ViewStatus, check_motion, chosen, closed_forms,
+    CalibrateError, CalibratedCamera, Calibration, CornerResidual, JointFit, LinkCovariances, Method, Observations,
+    Options, ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::{self, JointProblem, camera_from_target};
@@ -56,8 +56,8 @@ pub fn calibrate(
             let kept = refined.screened.kept_views();
             let problem = JointProblem { weights: refined.weights, ..JointProblem::new(mode, &board, &kept) };
             let problem = refine::kept_problem(&problem, &kept, &refined.screened.solution);
-            refine::judge(&mut calibration, &problem, &mut refined.screened.solution, work)?;
-            take_joint(&mut calibration, &problem, &refined, &seen);
+            let judged = refine::judge(&problem, &mut refined.screened.solution, work)?;
+            take_joint(&mut calibration, &problem, &refined, judged, &seen);
         }
     }
     Ok(calibration)
@@ -137,9 +137,7 @@ fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens
         view.camera_from_target = Some(*pose);
     }
     Calibration {
-        intrinsics: Some(lens.intrinsics),
-        intrinsics_fixed: !lens.free,
-        intrinsics_sigma: lens.sigma,
+        camera: Some(CalibratedCamera { intrinsics: lens.intrinsics, fixed: !lens.free, sigma_px: lens.sigma }),
         rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(seen.iter().map(|s| s.corners.len())))),
         views,
         ..Calibration::default()
@@ -170,29 +168,45 @@ fn with_robot(
     Ok((views, pairs))
 }
 
-fn take_joint(calibration: &mut Calibration, problem: &JointProblem<'_>, refined: &Refined, seen: &[DetectedView<'_>]) {
+fn take_joint(
+    calibration: &mut Calibration,
+    problem: &JointProblem<'_>,
+    refined: &Refined,
+    judged: Judged,
+    seen: &[DetectedView<'_>],
+) {
     let screened = &refined.screened;
     let solution = &screened.solution;
-    calibration.shared = Some(SharedCovariance { free: solution.free, covariance: solution.covariance.clone() });
-    calibration.hand_eye_covariance = Some(solution.hand_eye_covariance());
-    calibration.target_covariance = Some(solution.target_covariance());
-    calibration.small_sample = Some(solution.small_sample);
-    if let Some(sigma) = solution.intrinsics_sigma().first_chunk::<4>() {
-        calibration.intrinsics_sigma = Some(*sigma);
-    }
-    let estimated = solution.free.warp || solution.free.scale;
-    calibration.shape = estimated.then(|| ShapeEstimate {
-        shape: solution.shape,
-        warp_sigma_m: solution.warp_covariance().map(|c| [c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
-        scale_sigma: solution.scale_sigma(),
-    });
-    calibration.joint_offsets.clone_from(&refined.joints);
-    calibration.tip_error_95_m = Some(quality::tip_error_95_m(solution));
-    calibration.reference_point = Some(solution.reference_point);
-    calibration.noise = Some(solution.noise);
-    calibration.rms_px = Some(solution.rms_px);
-    calibration.intrinsics = Some(solution.intrinsics);
     calibration.hand_eye = Some(solution.hand_eye);
+    calibration.link_covariances =
+        Some(LinkCovariances { hand_eye: solution.hand_eye_covariance(), target: solution.target_covariance() });
+    let sigma_px = solution.intrinsics_sigma().first_chunk::<4>().copied();
+    calibration.camera = calibration.camera.map(|camera| CalibratedCamera {
+        intrinsics: solution.intrinsics,
+        sigma_px: sigma_px.or(camera.sigma_px),
+        ..camera
+    });
+    calibration.rms_px = Some(solution.rms_px);
+    let estimated = solution.free.warp || solution.free.scale;
+    calibration.joint = Some(JointFit {
+        free: solution.free,
+        covariance: solution.covariance.clone(),
+        noise: solution.noise,
+        small_sample: solution.small_sample,
+        widening: judged.widening,
+        tip_error_95_m: quality::tip_error_95_m(solution),
+        reference_point: solution.reference_point,
+        error_curve: judged.error_curve,
+        heldout_rms_px: judged.heldout_rms_px,
+        expected_heldout_rms_px: judged.expected_heldout_rms_px,
+        robot_effect_px: judged.robot_effect_px,
+        shape: estimated.then(|| ShapeEstimate {
+            shape: solution.shape,
+            warp_sigma_m: solution.warp_covariance().map(|c| [c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
+            scale_sigma: solution.scale_sigma(),
+        }),
+        joint_offsets: refined.joints.clone(),
+    });
     let points = problem.board.points(&solution.shape);
     for (i, s) in seen.iter().enumerate() {
         let view = &mut calibration.views[s.index];

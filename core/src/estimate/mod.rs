@@ -27,7 +27,7 @@ use crate::progress::{Stage, Work};
 use crate::project::dataset::CameraInput;
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardShape;
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, View};
 
 /// What was observed, from a dataset folder, a session or a live capture.
 #[derive(Debug, Clone)]
@@ -59,6 +59,30 @@ pub struct ObservedView {
     pub camera_from_target: Option<Pose<Camera, Target>>,
     /// Whether the view takes part; one that does not is listed as [`ViewStatus::Excluded`] and touches no number.
     pub in_fit: bool,
+}
+
+impl ObservedView {
+    /// A view that takes part, of a robot whose joint angles are not known.
+    pub fn new(name: impl Into<String>, base_from_tip: Option<Pose<Base, Tip>>, corners: Option<Vec<Corner>>) -> Self {
+        Self {
+            name: name.into(),
+            base_from_tip,
+            corners,
+            tip_by_joint: Vec::new(),
+            camera_from_target: None,
+            in_fit: true,
+        }
+    }
+}
+
+impl From<&View> for ObservedView {
+    /// A view that takes part.
+    fn from(view: &View) -> Self {
+        Self {
+            tip_by_joint: view.tip_by_joint.clone(),
+            ..Self::new(view.name.clone(), Some(view.base_from_tip), Some(view.corners.clone()))
+        }
+    }
 }
 
 /// What is known about the camera.
@@ -227,56 +251,89 @@ pub enum CalibrateError {
 pub struct Calibration {
     /// Both rigid links; `None` without a robot.
     pub hand_eye: Option<HandEye>,
-    /// Covariance of the hand-eye transform, right perturbation `[t; r]`; `None` for a closed form.
-    pub hand_eye_covariance: Option<Matrix6<f64>>,
-    /// Covariance of the target's place.
-    pub target_covariance: Option<Matrix6<f64>>,
-    /// How well everything is known that the views share; of the joint estimate only.
-    pub shared: Option<SharedCovariance>,
-    /// Intrinsics; `None` when only pose pairs were given.
-    pub intrinsics: Option<Intrinsics>,
-    /// Whether they were given and kept.
-    pub intrinsics_fixed: bool,
-    /// Standard deviations of fx, fy, cx, cy in pixels, when they were estimated.
-    pub intrinsics_sigma: Option<[f64; 4]>,
-    /// Noise levels of the joint estimate.
-    pub noise: Option<Noise>,
+    /// How well the links are known; `None` for a closed form.
+    pub link_covariances: Option<LinkCovariances>,
+    /// The camera; `None` when only pose pairs were given.
+    pub camera: Option<CalibratedCamera>,
     /// RMS of 2-D corner residuals, pixels.
     pub rms_px: Option<f64>,
-    /// The same on views held out of the fit, each predicted from its reported robot pose.
-    pub heldout_rms_px: Option<f64>,
-    /// What [`heldout_rms_px`](Self::heldout_rms_px) should be if the model and its noise levels are true, pixels.
-    pub expected_heldout_rms_px: Option<f64>,
-    /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow
-    /// stays in the answer.
-    pub robot_effect_px: Option<f64>,
-    /// How the error of the hand-eye transform is distributed in units of its covariance; of the joint estimate only.
-    pub small_sample: Option<SmallSample>,
-    /// Whether the covariances are true to the data, and by how much they were widened; of the joint estimate only.
-    pub widening: Option<Widening>,
-    /// The shape of the target when it was estimated.
-    pub shape: Option<ShapeEstimate>,
-    /// What an attempt at joint offsets gave; `None` when there was none.
-    pub joint_offsets: Option<JointOffsets>,
-    /// Expected error of a measured point where the camera saw the target, 95 %, metres.
-    pub tip_error_95_m: Option<f64>,
-    /// Where that error is stated: camera coordinates, metres.
-    pub reference_point: Option<Point3<f64>>,
-    /// That error by number of views; of the joint estimate only.
-    pub error_curve: Option<ErrorCurve>,
+    /// What only the joint estimate knows; `None` for a closed form, and without a robot.
+    pub joint: Option<JointFit>,
     /// Every closed form and what it said.
     pub methods: Vec<MethodResult>,
     /// One entry per view, in the order of the observations.
     pub views: Vec<ViewResult>,
 }
 
-/// How well everything is known that predicts a view.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SharedCovariance {
+impl Calibration {
+    /// The intrinsics; `None` when only pose pairs were given.
+    pub fn intrinsics(&self) -> Option<Intrinsics> {
+        self.camera.as_ref().map(|camera| camera.intrinsics)
+    }
+
+    /// Covariance of the hand-eye transform, right perturbation `[t; r]`, m and rad; `None` for a closed form.
+    pub fn hand_eye_covariance(&self) -> Option<&Matrix6<f64>> {
+        self.link_covariances.as_ref().map(|links| &links.hand_eye)
+    }
+
+    /// Expected error of a measured point where the camera saw the target, 95 %, metres; of the joint estimate only.
+    pub fn tip_error_95_m(&self) -> Option<f64> {
+        self.joint.as_ref().map(|joint| joint.tip_error_95_m)
+    }
+}
+
+/// Covariances of the rigid links, right perturbations `[t; r]`, m and rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkCovariances {
+    /// Of the camera on its mount.
+    pub hand_eye: Matrix6<f64>,
+    /// Of the target on its anchor.
+    pub target: Matrix6<f64>,
+}
+
+/// The camera of a calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CalibratedCamera {
+    /// Its lens.
+    pub intrinsics: Intrinsics,
+    /// Whether the intrinsics were given and kept.
+    pub fixed: bool,
+    /// Standard deviations of fx, fy, cx, cy in pixels, when they were estimated.
+    pub sigma_px: Option<[f64; 4]>,
+}
+
+/// What the joint estimate knows beyond the links and the camera.
+#[derive(Debug, Clone)]
+pub struct JointFit {
     /// What was estimated besides the links.
     pub free: Free,
-    /// As in [`crate::estimate::handeye::joint::JointSolution::covariance`].
+    /// Covariance of all that predictions share, as in
+    /// [`JointSolution::covariance`](crate::estimate::handeye::joint::JointSolution::covariance).
     pub covariance: DMatrix<f64>,
+    /// Noise levels.
+    pub noise: Noise,
+    /// How the error of the hand-eye transform is distributed in units of its covariance.
+    pub small_sample: SmallSample,
+    /// Whether the covariances are true to the data, and by how much they were widened.
+    pub widening: Widening,
+    /// Expected error of a measured point where the camera saw the target, 95 %, metres.
+    pub tip_error_95_m: f64,
+    /// Where that error is stated: camera coordinates, metres.
+    pub reference_point: Point3<f64>,
+    /// That error by number of views.
+    pub error_curve: ErrorCurve,
+    /// RMS of 2-D corner residuals on views held out of the fit, each predicted from its reported robot pose, pixels;
+    /// `None` with too few views to leave some out.
+    pub heldout_rms_px: Option<f64>,
+    /// What [`heldout_rms_px`](Self::heldout_rms_px) should be if the model and its noise levels are true, pixels.
+    pub expected_heldout_rms_px: f64,
+    /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow
+    /// stays in the answer.
+    pub robot_effect_px: f64,
+    /// The shape of the target when it was estimated.
+    pub shape: Option<ShapeEstimate>,
+    /// What an attempt at joint offsets gave; `None` when there was none.
+    pub joint_offsets: Option<JointOffsets>,
 }
 
 /// What one closed form said.

@@ -1,8 +1,8 @@
 //! Calibration from robot and target poses alone.
 
 use super::{
-    CalibrateError, Calibration, CameraKnowledge, Method, Observations, ViewResult, ViewStatus, best_start,
-    check_motion, chosen, closed_forms,
+    CalibrateError, CalibratedCamera, Calibration, CameraKnowledge, LinkCovariances, Method, Observations, ViewResult,
+    ViewStatus, best_start, check_motion, chosen, closed_forms,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, pose_graph};
@@ -25,11 +25,10 @@ pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -
     check_motion(&pairs)?;
     let methods = closed_forms(&pairs, work)?;
     let mut calibration = Calibration {
-        intrinsics: match observations.camera {
-            CameraKnowledge::Fixed(intrinsics) => Some(intrinsics),
+        camera: match observations.camera {
+            CameraKnowledge::Fixed(intrinsics) => Some(CalibratedCamera { intrinsics, fixed: true, sigma_px: None }),
             CameraKnowledge::Estimate { .. } => None,
         },
-        intrinsics_fixed: true,
         methods,
         views: observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::Used)).collect(),
         ..Calibration::default()
@@ -42,8 +41,10 @@ pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -
         Method::Joint => {
             let start = best_start(&calibration.methods, |s| misfit(&pairs, s))?;
             let solution = pose_graph::refine(&pairs, &start)?;
-            calibration.hand_eye_covariance = Some(solution.covariance.fixed_view::<6, 6>(0, 0).into_owned());
-            calibration.target_covariance = Some(solution.covariance.fixed_view::<6, 6>(6, 6).into_owned());
+            calibration.link_covariances = Some(LinkCovariances {
+                hand_eye: solution.covariance.fixed_view::<6, 6>(0, 0).into_owned(),
+                target: solution.covariance.fixed_view::<6, 6>(6, 6).into_owned(),
+            });
             (solution.mount_from_camera, solution.anchor_from_target)
         }
     };

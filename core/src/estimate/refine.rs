@@ -4,12 +4,14 @@ use nalgebra::Isometry3;
 
 use super::corners::squared_residuals;
 use super::lens::Lens;
-use super::{CalibrateError, Calibration, JointOffsets, MethodResult, Options};
+use super::{CalibrateError, JointOffsets, MethodResult, Options};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::{Consensus, consensus, half_turn_about};
 use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
+use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{self, CornerWeights, Free, JointProblem, JointSolution, JointStart};
 use crate::estimate::handeye::{HandEyeError, PosePair, subset};
+use crate::estimate::uncertainty::widening::Widening;
 use crate::estimate::uncertainty::{quality, widening};
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::progress::Work;
@@ -206,25 +208,35 @@ fn offsets(
     Ok(Some(found))
 }
 
-/// Numbers of a calibration that need the whole problem: error on held-out views, whether the covariance is true to the
-/// data, error by number of views. The covariance is widened where it is not.
+/// What needs the whole problem.
+pub struct Judged {
+    pub heldout_rms_px: Option<f64>,
+    pub expected_heldout_rms_px: f64,
+    pub robot_effect_px: f64,
+    pub widening: Widening,
+    pub error_curve: ErrorCurve,
+}
+
+/// Error on held-out views, whether the covariance is true to the data, error by number of views. The covariance is
+/// widened where it is not.
 pub fn judge(
-    calibration: &mut Calibration,
     problem: &JointProblem<'_>,
     solution: &mut JointSolution,
     work: &Work<'_>,
-) -> Result<(), HandEyeError> {
+) -> Result<Judged, HandEyeError> {
     // Leaving out a fifth of so many views changes their noise levels by a few percent, and finding them again would
     // take longer than everything else.
     let known = (problem.views.len() > subset::MOST_VIEWS).then_some(solution.noise);
     let folds = JointProblem { noise: known, ..*problem };
-    calibration.heldout_rms_px = quality::held_out_rms_px(&folds, &solution.as_start(), *work)?;
+    let heldout_rms_px = quality::held_out_rms_px(&folds, &solution.as_start(), *work)?;
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
-    calibration.expected_heldout_rms_px = Some(expected.prediction_px);
-    calibration.robot_effect_px = Some(expected.robot_px);
     let widening = widening::check(problem, solution, work.cancel)?;
     solution.widen(widening.factor);
-    calibration.widening = Some(widening);
-    calibration.error_curve = Some(joint::prediction::error_by_views(problem, solution, *work)?);
-    Ok(())
+    Ok(Judged {
+        heldout_rms_px,
+        expected_heldout_rms_px: expected.prediction_px,
+        robot_effect_px: expected.robot_px,
+        widening,
+        error_curve: joint::prediction::error_by_views(problem, solution, *work)?,
+    })
 }

@@ -12,20 +12,12 @@ impl Trial {
         } else {
             CameraKnowledge::Fixed(self.intrinsics)
         };
-        let observed = |view: &crate::targets::observation::View| ObservedView {
-            name: view.name.clone(),
-            base_from_tip: Some(view.base_from_tip),
-            corners: Some(view.corners.clone()),
-            tip_by_joint: Vec::new(),
-            camera_from_target: None,
-            in_fit: true,
-        };
         Observations {
             mode: Some(self.mode),
             target: BOARD,
             image_size: (self.intrinsics.width, self.intrinsics.height),
             camera,
-            views: self.views.iter().map(observed).collect(),
+            views: self.views.iter().map(ObservedView::from).collect(),
         }
     }
 }

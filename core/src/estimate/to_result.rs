@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Calibration, ViewStatus};
-use crate::estimate::handeye::joint::SmallSample;
+use super::{Calibration, JointFit, ViewStatus};
 use crate::project::result::{
     self, BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, Provenance,
     Quality, WideningRecord,
@@ -17,22 +16,20 @@ impl Calibration {
         input_sha256: Option<String>,
         options: BTreeMap<String, serde_json::Value>,
     ) -> CalibrationResult {
+        let noise = self.joint.as_ref().map(|joint| joint.noise);
         let mut result = CalibrationResult {
-            intrinsics: self
-                .intrinsics
-                .as_ref()
-                .map(|i| IntrinsicsEstimate::new(i, self.intrinsics_sigma, self.intrinsics_fixed)),
+            intrinsics: self.camera.map(|c| IntrinsicsEstimate::new(&c.intrinsics, c.sigma_px, c.fixed)),
             quality: Quality {
                 rms_px: self.rms_px,
-                sigma_px: self.noise.map(|n| n.corner_px),
-                heldout_rms_px: self.heldout_rms_px,
-                tip_error_95_mm: self.tip_error_95_m.map(|m| m * 1e3),
-                robot_sigma_mm: self.noise.map(|n| n.robot_m * 1e3),
-                robot_sigma_deg: self.noise.map(|n| n.robot_rad.to_degrees()),
+                sigma_px: noise.map(|n| n.corner_px),
+                heldout_rms_px: self.joint.as_ref().and_then(|joint| joint.heldout_rms_px),
+                tip_error_95_mm: self.tip_error_95_m().map(|m| m * 1e3),
+                robot_sigma_mm: noise.map(|n| n.robot_m * 1e3),
+                robot_sigma_deg: noise.map(|n| n.robot_rad.to_degrees()),
             },
             methods: self.methods.iter().map(method).collect(),
             views: self.views.iter().map(view).collect(),
-            estimate: self.small_sample.map(|sample| self.details(&sample)),
+            estimate: self.joint.as_ref().map(details),
             provenance: Provenance {
                 tool_version: tool_version.to_owned(),
                 input_sha256,
@@ -41,35 +38,36 @@ impl Calibration {
             ..CalibrationResult::default()
         };
         if let Some(links) = &self.hand_eye {
-            result.set_links(links, self.hand_eye_covariance.as_ref(), self.target_covariance.as_ref());
+            let covariances = self.link_covariances.as_ref();
+            result.set_links(links, covariances.map(|c| &c.hand_eye), covariances.map(|c| &c.target));
         }
         result
     }
+}
 
-    fn details(&self, sample: &SmallSample) -> EstimateDetails {
-        EstimateDetails {
-            reference_point_m: self.reference_point.map(|p| p.coords.into()),
-            degrees_of_freedom: Some(sample.degrees_of_freedom).filter(|v| v.is_finite()),
-            region_scale: Some(sample.scale),
-            view_sigma_px: self.noise.map(|n| n.view_px),
-            widening: self.widening.as_ref().map(|w| WideningRecord {
-                factor: w.factor.sqrt(),
-                by: w.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
-            }),
-            board: self.shape.map(|s| BoardEstimate {
-                warp_mm: s.shape.warp_m.map(|m| m * 1e3),
-                warp_sigma_mm: s.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
-                scale: s.shape.scale,
-                scale_sigma: s.scale_sigma,
-            }),
-            joint_offsets: self.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
-                offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
-                sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),
-                heldout_before_px: j.heldout_before_px,
-                heldout_after_px: j.heldout_after_px,
-                accepted: j.accepted,
-            }),
-        }
+fn details(joint: &JointFit) -> EstimateDetails {
+    EstimateDetails {
+        reference_point_m: Some(joint.reference_point.coords.into()),
+        degrees_of_freedom: Some(joint.small_sample.degrees_of_freedom).filter(|v| v.is_finite()),
+        region_scale: Some(joint.small_sample.scale),
+        view_sigma_px: Some(joint.noise.view_px),
+        widening: Some(WideningRecord {
+            factor: joint.widening.factor.sqrt(),
+            by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
+        }),
+        board: joint.shape.map(|s| BoardEstimate {
+            warp_mm: s.shape.warp_m.map(|m| m * 1e3),
+            warp_sigma_mm: s.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
+            scale: s.shape.scale,
+            scale_sigma: s.scale_sigma,
+        }),
+        joint_offsets: joint.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
+            offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
+            sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),
+            heldout_before_px: j.heldout_before_px,
+            heldout_after_px: j.heldout_after_px,
+            accepted: j.accepted,
+        }),
     }
 }
 

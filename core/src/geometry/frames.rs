@@ -4,7 +4,7 @@
 //! coordinates in `dst`. Chains read by adjacent names:
 //!
 //! ```
-//! use handeye_core::frames::{Base, Camera, Pose, Target, Tip};
+//! use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 //! let base_from_tip = Pose::<Base, Tip>::identity();
 //! let tip_from_camera = Pose::<Tip, Camera>::identity();
 //! let camera_from_target = Pose::<Camera, Target>::identity();
@@ -15,7 +15,7 @@
 //! The wrong order is not a wrong number but a compile error:
 //!
 //! ```compile_fail
-//! use handeye_core::frames::{Base, Camera, Pose, Tip};
+//! use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 //! let base_from_tip = Pose::<Base, Tip>::identity();
 //! let tip_from_camera = Pose::<Tip, Camera>::identity();
 //! let wrong = tip_from_camera * base_from_tip;
@@ -24,7 +24,7 @@
 //! and neither does a transform go where another is expected:
 //!
 //! ```compile_fail
-//! use handeye_core::frames::{Base, Pose, Tip};
+//! use handeye_core::geometry::frames::{Base, Pose, Tip};
 //! let base_from_tip = Pose::<Base, Tip>::identity();
 //! let tip_from_base: Pose<Tip, Base> = base_from_tip;
 //! ```

@@ -51,21 +51,21 @@ impl Predictor {
     /// [`VerifyError::NoHandEye`], [`VerifyError::NoIntrinsics`].
     pub fn new(calibration: &Calibration) -> Result<Self, VerifyError> {
         let hand_eye = calibration.hand_eye.ok_or(VerifyError::NoHandEye)?;
-        let intrinsics = calibration.intrinsics.ok_or(VerifyError::NoIntrinsics)?;
-        let shared = calibration.shared.clone();
-        let uncertainty = calibration.noise.zip(shared).map(|(noise, shared)| Uncertainty {
-            noise,
-            free: shared.free,
-            covariance: shared.covariance,
+        let intrinsics = calibration.intrinsics().ok_or(VerifyError::NoIntrinsics)?;
+        let joint = calibration.joint.as_ref();
+        let uncertainty = joint.map(|joint| Uncertainty {
+            noise: joint.noise,
+            free: joint.free,
+            covariance: joint.covariance.clone(),
         });
-        let accepted = calibration.joint_offsets.as_ref().filter(|joints| joints.accepted);
+        let offsets = joint.and_then(|joint| joint.joint_offsets.as_ref()).filter(|offsets| offsets.accepted);
         Ok(Self {
             hand_eye,
             intrinsics,
-            shape: calibration.shape.map_or_else(BoardShape::default, |estimate| estimate.shape),
-            joint_offsets_rad: accepted.map_or_else(Vec::new, |joints| joints.offsets_rad.clone()),
-            hand_eye_covariance: calibration.hand_eye_covariance,
-            small_sample: calibration.small_sample.unwrap_or(SmallSample::KNOWN),
+            shape: joint.and_then(|joint| joint.shape).map_or_else(BoardShape::default, |estimate| estimate.shape),
+            joint_offsets_rad: offsets.map_or_else(Vec::new, |offsets| offsets.offsets_rad.clone()),
+            hand_eye_covariance: calibration.hand_eye_covariance().copied(),
+            small_sample: joint.map_or(SmallSample::KNOWN, |joint| joint.small_sample),
             uncertainty,
         })
     }

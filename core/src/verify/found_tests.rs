@@ -151,20 +151,12 @@ fn views_of_an_arm_with_offsets(count: usize, noise: &Noise, intrinsics: &Intrin
 }
 
 fn observed(views: &[View], intrinsics: Intrinsics) -> Observations {
-    let observed = |view: &View| ObservedView {
-        name: view.name.clone(),
-        base_from_tip: Some(view.base_from_tip),
-        corners: Some(view.corners.clone()),
-        tip_by_joint: view.tip_by_joint.clone(),
-        camera_from_target: None,
-        in_fit: true,
-    };
     Observations {
         mode: Some(Mode::EyeInHand),
         target: BOARD,
         image_size: (intrinsics.width, intrinsics.height),
         camera: CameraKnowledge::Fixed(intrinsics),
-        views: views.iter().map(observed).collect(),
+        views: views.iter().map(ObservedView::from).collect(),
     }
 }
 
@@ -175,7 +167,14 @@ fn accepted_joint_offsets_are_part_of_the_prediction() {
         let views = views_of_an_arm_with_offsets(40, &REALISTIC, &camera(), 8200 + seed);
         let observations = observed(&views[..30], camera());
         let calibration = solved(&observations, Options { joint_offsets: true, ..Options::default() });
-        assert!(calibration.joint_offsets.as_ref().is_some_and(|joints| joints.accepted), "seed {seed}");
+        assert!(
+            calibration
+                .joint
+                .as_ref()
+                .and_then(|joint| joint.joint_offsets.as_ref())
+                .is_some_and(|offsets| offsets.accepted),
+            "seed {seed}"
+        );
         let calibrated = Predictor::new(&calibration).expect("complete");
         let v = check_all(&calibrated, &views[30..]);
         mean += v.consistency.expect("stated").ratio / 10.0;
@@ -210,13 +209,13 @@ fn the_error_of_a_measured_point_follows_the_law_of_the_calibration() {
     // Six views leave few degrees of freedom.
     let t = trial(Mode::EyeInHand, 6, &REALISTIC, camera(), 84);
     let calibration = solved(&t.observations(false), Options::default());
-    let law = calibration.small_sample.expect("of a joint estimate");
+    let law = calibration.joint.as_ref().expect("a joint estimate").small_sample;
     let calibrated = Predictor::new(&calibration).expect("complete");
     // The point for which the result states its expected error.
-    let reference = calibration.reference_point.expect("stated");
+    let reference = calibration.joint.as_ref().expect("a joint estimate").reference_point;
     let px = t.intrinsics.project(&reference).expect("in front");
     let point = calibrated.point_at_depth(&t.views[0].base_from_tip, &px, reference.z).expect("a point");
-    let (here, stated) = (point.error_95_m().expect("stated"), calibration.tip_error_95_m.expect("stated"));
+    let (here, stated) = (point.error_95_m().expect("stated"), calibration.tip_error_95_m().expect("stated"));
     assert!((here / stated - 1.0).abs() < 1e-6, "{here} here, {stated} in the result");
     let gaussian = quality::radius_95(&point.covariance_in_base.expect("stated"));
     println!(

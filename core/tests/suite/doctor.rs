@@ -1,12 +1,12 @@
 //! Small versions of the studies of the doctor; the example `doctor_cases` runs them at length.
 
-#[path = "../../examples/doctor_cases/arm.rs"]
+#[path = "../../studies/doctor_cases/arm.rs"]
 mod arm;
-#[path = "../../examples/doctor_cases/cases.rs"]
+#[path = "../../studies/doctor_cases/cases.rs"]
 mod cases;
-#[path = "../../examples/doctor_cases/faults.rs"]
+#[path = "../../studies/doctor_cases/faults.rs"]
 mod faults;
-#[path = "../../examples/doctor_cases/sim.rs"]
+#[path = "../../studies/doctor_cases/sim.rs"]
 mod sim;
 
 use handeye_core::diagnose::doctor::diagnose;

@@ -50,14 +50,7 @@ fn diagnosis(data: &Path, name: &str, detector: &str) -> Diagnosis {
     let views = dataset
         .entries
         .iter()
-        .map(|entry| ObservedView {
-            name: entry.name.clone(),
-            base_from_tip: entry.base_from_tip,
-            corners: by_name(&entry.name),
-            tip_by_joint: Vec::new(),
-            camera_from_target: None,
-            in_fit: true,
-        })
+        .map(|entry| ObservedView::new(&entry.name, entry.base_from_tip, by_name(&entry.name)))
         .collect();
     let observations = Observations {
         mode: dataset.mode,

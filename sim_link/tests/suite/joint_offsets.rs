@@ -1,6 +1,6 @@
 //! Which joint offsets a session of the cell can tell beside the hand-eye transform.
 
-#[path = "../../examples/support/information.rs"]
+#[path = "../../studies/support/information.rs"]
 mod information;
 
 use handeye_sim_link::cell::recorded::{SessionOptions, record};

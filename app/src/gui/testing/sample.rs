@@ -182,14 +182,7 @@ const FINDINGS: FindingOptions = FindingOptions { goal_mm: Some(0.5) };
 
 /// What was seen in the captures of the fit.
 fn observations() -> Observations {
-    let views = (1..=FITTED).map(|n| ObservedView {
-        name: record(n).image,
-        base_from_tip: Some(base_from_tip(n)),
-        corners: Some(corners(n)),
-        tip_by_joint: Vec::new(),
-        camera_from_target: None,
-        in_fit: true,
-    });
+    let views = (1..=FITTED).map(|n| ObservedView::new(record(n).image, Some(base_from_tip(n)), Some(corners(n))));
     Observations {
         mode: Some(Mode::EyeInHand),
         target: BOARD,

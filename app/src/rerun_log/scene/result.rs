@@ -50,13 +50,13 @@ pub(super) fn write(pen: Pen<'_>, known: &Known, solved: &Solved) -> Result<(), 
             write_board(pen, known, Some(board))?;
             let path = paths::board(known.mode());
             pen.write(&below(path, paths::CORNERS), &board_points(target, style::ESTIMATED))?;
-            write_uncertainty(pen, path, calibration.target_covariance.as_ref())?;
+            write_uncertainty(pen, path, calibration.link_covariances.as_ref().map(|links| &links.target))?;
         }
-        write_uncertainty(pen, paths::camera(known.mode()), calibration.hand_eye_covariance.as_ref())?;
+        write_uncertainty(pen, paths::camera(known.mode()), calibration.hand_eye_covariance())?;
     }
     number(pen, paths::PLOT_RMS, calibration.rms_px)?;
-    number(pen, paths::PLOT_HELDOUT, calibration.heldout_rms_px)?;
-    number(pen, paths::PLOT_EXPECTED, calibration.tip_error_95_m.map(|metres| metres * 1e3))?;
+    number(pen, paths::PLOT_HELDOUT, calibration.joint.as_ref().and_then(|joint| joint.heldout_rms_px))?;
+    number(pen, paths::PLOT_EXPECTED, calibration.tip_error_95_m().map(|metres| metres * 1e3))?;
     let verification = solved.verification.as_ref().and_then(|outcome| outcome.as_ref().ok());
     number(pen, paths::PLOT_VERIFIED, verification.map(|verification| verification.rms_px))?;
     pen.write(paths::REPORT, &TextDocument::from_markdown(report::markdown(solved)))?;

@@ -14,8 +14,8 @@ use crate::{text, tr};
 /// The chart.
 pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
-    let curve = model.solve.solved.as_ref().and_then(|solved| solved.calibration.error_curve.as_ref());
-    let Some((curve, now)) = curve.and_then(|curve| Some((curve, curve.now()?))) else {
+    let joint = model.solve.solved.as_ref().and_then(|solved| solved.calibration.joint.as_ref());
+    let Some((curve, now)) = joint.and_then(|joint| Some((&joint.error_curve, joint.error_curve.now()?))) else {
         instead_ui(ui, tr!(language, "The expected error appears with the first joint calibration"));
         return;
     };

@@ -42,8 +42,8 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
         });
     });
     parts::hint_ui(ui, meaning);
-    let law = solved.calibration.small_sample.unwrap_or(SmallSample::KNOWN);
-    let within = solved.calibration.hand_eye_covariance.as_ref().map(|c| Within95::new(&pose, c, law));
+    let law = solved.calibration.joint.as_ref().map_or(SmallSample::KNOWN, |joint| joint.small_sample);
+    let within = solved.calibration.hand_eye_covariance().map(|c| Within95::new(&pose, c, law));
     let deg = |radians: [f64; 3]| radians.map(f64::to_degrees);
     parts::stated_ui(ui, "x y z [mm]", &numbers::row(translation_mm.as_slice(), 3, 9));
     if let Some(within) = &within {

@@ -52,11 +52,11 @@ pub fn against_truth(model: &Model, solved: &Solved) -> Option<AgainstTruth> {
     let hand_eye = solved.calibration.hand_eye?;
     let truth = true_mount_from_camera(model, hand_eye.mode())?;
     let found = hand_eye.mount_from_camera();
-    let at_board_m = solved
-        .calibration
-        .reference_point
-        .map(|point| (found.isometry().transform_point(&point) - truth.isometry().transform_point(&point)).norm());
-    let is_within = solved.calibration.hand_eye_covariance.as_ref().and_then(|covariance| {
+    let at_board_m = solved.calibration.joint.as_ref().map(|joint| {
+        let point = joint.reference_point;
+        (found.isometry().transform_point(&point) - truth.isometry().transform_point(&point)).norm()
+    });
+    let is_within = solved.calibration.hand_eye_covariance().and_then(|covariance| {
         let error = se3::log((found.inverse() * truth).isometry());
         let weighted = Cholesky::new(*covariance)?.solve(&error);
         Some(error.dot(&weighted) <= CHI_SQUARE_6_95)

@@ -46,8 +46,8 @@ pub fn noise_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     stated(ui, tr!(language, "Robot rotation"), quality.robot_sigma_deg.map(|deg| format!("{deg:.4}°")));
     parts::section_ui(ui, tr!(language, "Residuals, which are no accuracy"));
     stated(ui, tr!(language, "Fit, RMS"), quality.rms_px.map(|px| format!("{px:.3} px")));
-    let heldout = quality.heldout_rms_px.map(|px| match solved.calibration.expected_heldout_rms_px {
-        Some(expected) => format!("{px:.3} px ({expected:.3})"),
+    let heldout = quality.heldout_rms_px.map(|px| match &solved.calibration.joint {
+        Some(joint) => format!("{px:.3} px ({:.3})", joint.expected_heldout_rms_px),
         None => format!("{px:.3} px"),
     });
     stated(ui, tr!(language, "Held out, RMS"), heldout).on_hover_text(tr!(

@@ -151,23 +151,20 @@ fn with_everything_found(calibration: &mut handeye_core::estimate::Calibration) 
     }
     calibration.views[3].corners_aside = vec![1, 2];
     calibration.views[4].renumbered = true;
-    calibration.shape = Some(ShapeEstimate {
+    let joint = calibration.joint.as_mut().expect("a joint estimate");
+    joint.shape = Some(ShapeEstimate {
         shape: BoardShape { warp_m: [4e-4, -1e-4], scale: 1.0 },
         warp_sigma_m: Some([3e-5, 2e-5]),
         scale_sigma: None,
     });
-    calibration.widening = Some(Widening { factor: 4.0, by: Some(Evidence::Neighbours), checks: Vec::new() });
-    if let Some(sample) = &mut calibration.small_sample {
-        sample.level_sigma = [0.1, 0.8, 0.9];
-    }
-    if let Some(noise) = &mut calibration.noise {
-        noise.view_px = 0.12;
-    }
-    calibration.robot_effect_px = Some(10.0);
+    joint.widening = Widening { factor: 4.0, by: Some(Evidence::Neighbours), checks: Vec::new() };
+    joint.small_sample.level_sigma = [0.1, 0.8, 0.9];
+    joint.noise.view_px = 0.12;
+    joint.robot_effect_px = 10.0;
     // The camera's place along its own x axis is known worst.
     let mut covariance = nalgebra::Matrix6::identity() * 1e-12;
     covariance[(0, 0)] = 1e-6;
-    calibration.hand_eye_covariance = Some(covariance);
+    calibration.link_covariances.as_mut().expect("stated").hand_eye = covariance;
 }
 
 #[test]
@@ -186,10 +183,7 @@ fn what_the_estimate_found_out_is_stated_with_units() {
     }
     assert!(pane.nothing_is_cut_off());
     let plain = driven(changed(|solved| {
-        solved.calibration.shape = None;
-        solved.calibration.widening = None;
-        solved.calibration.small_sample = None;
-        solved.calibration.noise = None;
+        solved.calibration.joint = None;
     }));
     assert!(!plain.sees("What the estimate found out"), "there is nothing to say");
 }
@@ -209,13 +203,9 @@ fn a_camera_beside_the_robot_is_shown_in_the_base() {
 
 /// What the sample was calibrated from.
 fn observations(model: &Model) -> Observations {
-    let views = model.document().in_use().map(|record| ObservedView {
-        name: record.image.clone(),
-        base_from_tip: Some(record.base_from_tip),
-        corners: model.observed(record.id).and_then(|observed| observed.corners.clone()),
-        tip_by_joint: Vec::new(),
-        camera_from_target: None,
-        in_fit: true,
+    let views = model.document().in_use().map(|record| {
+        let corners = model.observed(record.id).and_then(|observed| observed.corners.clone());
+        ObservedView::new(&record.image, Some(record.base_from_tip), corners)
     });
     Observations {
         mode: Some(Mode::EyeInHand),
@@ -251,8 +241,8 @@ fn every_finding() -> Vec<findings::Finding> {
     judge(&good, &|_| (), 1e-9);
     judge(
         &good,
-        &|c| c.tip_error_95_m = c.tip_error_95_m.map(|m| m * 1.000_001),
-        0.95 * 1e3 * calibration.tip_error_95_m.expect("stated"),
+        &|c| c.joint.as_mut().expect("a joint estimate").tip_error_95_m *= 1.000_001,
+        0.95 * 1e3 * calibration.tip_error_95_m().expect("stated"),
     );
     for views in [1, 2, 5] {
         judge(&turned(views, &|n| [0.0, 0.0, 0.3 * n as f64]), &|_| (), 1000.0);
@@ -281,10 +271,11 @@ fn every_finding() -> Vec<findings::Finding> {
                 view.correction_rad = Some(1e-4 * times);
                 view.camera_from_target = Some(Pose::from_translation_xyzw([0.0, 0.0, 0.4], [0.0, 0.0, 0.0, 1.0]));
             }
-            c.tip_error_95_m = Some(1e-4);
-            c.heldout_rms_px = Some(3.0);
-            c.expected_heldout_rms_px = Some(1.0);
-            c.robot_effect_px = Some(10.0);
+            let joint = c.joint.as_mut().expect("a joint estimate");
+            joint.tip_error_95_m = 1e-4;
+            joint.heldout_rms_px = Some(3.0);
+            joint.expected_heldout_rms_px = 1.0;
+            joint.robot_effect_px = 10.0;
             let shift = Pose::from_translation_xyzw([0.0, 0.0, 0.02], [0.0, 0.0, 0.0, 1.0]);
             for method in c.methods.iter_mut().take(1) {
                 if let Ok(solution) = &mut method.outcome {

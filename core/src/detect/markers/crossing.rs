@@ -4,8 +4,9 @@
 //! used, a cross of arms as wide as the light margin around a marker, since what is beyond is no part of the model.
 
 use image::GrayImage;
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, SVector, Vector2};
 
+use super::grey_levels::{self, Sums};
 use crate::detect::checkerboard::subpixel::erf_and_slope;
 
 /// Part of a grid step up to which a pixel counts along an edge: half-way to the next corner, less its blur.
@@ -64,31 +65,9 @@ pub(in crate::detect) fn fit(image: &GrayImage, expected: &Expected, reach_px: f
 
 fn fit_once(image: &GrayImage, expected: &Expected) -> Option<Crossing> {
     let pixels = window(image, expected)?;
-    let mut x = start(&pixels, expected);
-    let mut now = sums(&pixels, &x);
-    let mut damping = 1e-3;
-    for _ in 0..MAX_STEPS {
-        let mut damped = now.hessian;
-        for i in 0..9 {
-            damped[(i, i)] *= 1.0 + damping;
-        }
-        let step = damped.cholesky()?.solve(&now.gradient);
-        let mut candidate = x - step;
-        candidate[4] = candidate[4].clamp(BLUR_PX.0, BLUR_PX.1);
-        let next = sums(&pixels, &candidate);
-        if next.cost <= now.cost {
-            (x, now) = (candidate, next);
-            damping *= 0.1;
-            if step[0].hypot(step[1]) < CONVERGED_PX {
-                break;
-            }
-        } else {
-            damping = f64::max(damping * 10.0, 1e-3);
-            if damping > 1e3 {
-                break;
-            }
-        }
-    }
+    let hold = |x: &mut Parameters| x[4] = x[4].clamp(BLUR_PX.0, BLUR_PX.1);
+    let is_small = |step: &Parameters| step[0].hypot(step[1]) < CONVERGED_PX;
+    let (x, now) = grey_levels::fit(start(&pixels, expected), MAX_STEPS, |x| sums(&pixels, x), hold, is_small)?;
     let contrast = if expected.dark { x[8] } else { -x[8] };
     let variance = now.cost / (pixels.len() - 9) as f64;
     let lines_apart = (x[2] - x[3]).sin().abs();
@@ -100,7 +79,7 @@ fn fit_once(image: &GrayImage, expected: &Expected) -> Option<Crossing> {
     if !is_corner {
         return None;
     }
-    let covariance = now.hessian.cholesky()?.inverse() * variance.max(ROUNDING);
+    let covariance = now.normal.cholesky()?.inverse() * variance.max(ROUNDING);
     let covariance_px2 = covariance.fixed_view::<2, 2>(0, 0).into_owned();
     Some(Crossing { px: expected.px + Vector2::new(x[0], x[1]), covariance_px2, contrast })
 }
@@ -150,20 +129,14 @@ fn start(pixels: &[(Vector2<f64>, f64)], expected: &Expected) -> Parameters {
     Parameters::from_column_slice(&[0.0, 0.0, angles[0], angles[1], 0.7, level, 0.0, 0.0, contrast])
 }
 
-struct Sums {
-    cost: f64,
-    hessian: SMatrix<f64, 9, 9>,
-    gradient: Parameters,
-}
-
-/// Sum of squared misfits, JᵀJ and Jᵀr of centre (2), angles of both normals, blur, level, relative gradient of the light
+/// Of centre (2), angles of both normals, blur, level, relative gradient of the light
 /// (2) and contrast.
-fn sums(pixels: &[(Vector2<f64>, f64)], x: &Parameters) -> Sums {
+fn sums(pixels: &[(Vector2<f64>, f64)], x: &Parameters) -> Sums<9> {
     let scale = std::f64::consts::FRAC_1_SQRT_2 / x[4];
     let (n1, n2) = (Vector2::new(x[2].cos(), x[2].sin()), Vector2::new(x[3].cos(), x[3].sin()));
     let (t1, t2) = (Vector2::new(-n1.y, n1.x), Vector2::new(-n2.y, n2.x));
     let (centre, light_slope) = (Vector2::new(x[0], x[1]), Vector2::new(x[6], x[7]));
-    let mut out = Sums { cost: 0.0, hessian: SMatrix::zeros(), gradient: Parameters::zeros() };
+    let mut out = Sums::zero();
     for (p, value) in pixels {
         let d = p - centre;
         let (s1, s2) = (n1.dot(&d) * scale, n2.dot(&d) * scale);
@@ -183,10 +156,7 @@ fn sums(pixels: &[(Vector2<f64>, f64)], x: &Parameters) -> Sums {
             level * d.y,
             light * e1 * e2,
         ]);
-        let residual = level * light - value;
-        out.cost += residual * residual;
-        out.gradient += row * residual;
-        out.hessian.ger(1.0, &row, &row, 1.0);
+        out.add(&row, level * light - value);
     }
     out
 }

@@ -3,9 +3,10 @@
 //! `I = m(s) + h(s) erf((x − c(s)) / √2 σ)` with the place `s` along the edge, `x` across it, the curve `c` of second degree,
 //! the blur `σ`, and the mean level `m` and half the step `h` changing evenly along the edge, by Levenberg–Marquardt.
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{SVector, Vector3};
 
 use super::edges::{Edge, Scan};
+use super::grey_levels::{self, Sums};
 use crate::detect::checkerboard::subpixel::erf_and_slope;
 
 /// Largest RMS misfit of the Gaussian profile as a part of half the contrast.
@@ -30,12 +31,6 @@ pub(in crate::detect) struct Profile<'a> {
     pub least_blur: f64,
 }
 
-struct Sums {
-    cost: f64,
-    hessian: SMatrix<f64, 8, 8>,
-    gradient: Parameters,
-}
-
 impl Profile<'_> {
     /// The edge by least squares; `None` where the profile is another.
     pub fn fit(&self, start: &Edge) -> Option<Edge> {
@@ -51,37 +46,16 @@ impl Profile<'_> {
         x[4] = f64::midpoint(before, after);
         // Blur lowers the step seen.
         x[6] = 0.6 * (after - before);
-        let mut now = self.sums(&pixels, &x);
-        let mut damping = 1e-3;
-        for _ in 0..MAX_STEPS {
-            let mut damped = now.hessian;
-            for i in 0..8 {
-                damped[(i, i)] *= 1.0 + damping;
-            }
-            let step = damped.cholesky()?.solve(&now.gradient);
-            let mut candidate = x - step;
-            candidate[3] = candidate[3].clamp(0.1, 6.0);
-            let next = self.sums(&pixels, &candidate);
-            if next.cost <= now.cost {
-                (x, now) = (candidate, next);
-                damping *= 0.1;
-                if step.fixed_rows::<3>(0).amax() < CONVERGED_PX {
-                    break;
-                }
-            } else {
-                damping = f64::max(damping * 10.0, 1e-3);
-                if damping > 1e3 {
-                    break;
-                }
-            }
-        }
+        let hold = |x: &mut Parameters| x[3] = x[3].clamp(0.1, 6.0);
+        let is_small = |step: &Parameters| step.fixed_rows::<3>(0).amax() < CONVERGED_PX;
+        let (x, now) = grey_levels::fit(x, MAX_STEPS, |x| self.sums(&pixels, x), hold, is_small)?;
         let variance = now.cost / (pixels.len() as f64 - 8.0);
         let curve = x.fixed_rows::<3>(0).into_owned();
         let near = (curve - start.curve).amax() < 0.5;
         if !(near && x[3] >= self.least_blur && variance.sqrt() <= MAX_MISFIT * x[6].abs()) {
             return None;
         }
-        let covariance = now.hessian.cholesky()?.inverse().fixed_view::<3, 3>(0, 0) * variance.max(ROUNDING);
+        let covariance = now.normal.cholesky()?.inverse().fixed_view::<3, 3>(0, 0) * variance.max(ROUNDING);
         let mut found = *start;
         (found.curve, found.covariance) = (curve, covariance);
         Some(found)
@@ -101,9 +75,9 @@ impl Profile<'_> {
         (pixels.len() > 16).then_some(pixels)
     }
 
-    fn sums(&self, pixels: &[Vector3<f64>], x: &Parameters) -> Sums {
+    fn sums(&self, pixels: &[Vector3<f64>], x: &Parameters) -> Sums<8> {
         let scale = std::f64::consts::FRAC_1_SQRT_2 / x[3];
-        let mut out = Sums { cost: 0.0, hessian: SMatrix::zeros(), gradient: Parameters::zeros() };
+        let mut out = Sums::zero();
         for p in pixels {
             let s = p.x;
             let half = x[6] + x[7] * s;
@@ -113,16 +87,13 @@ impl Profile<'_> {
             let by_blur = -half * slope * q / x[3];
             let row =
                 Parameters::from_column_slice(&[by_curve, by_curve * s, by_curve * s * s, by_blur, 1.0, s, e, e * s]);
-            let residual = x[4] + x[5] * s + half * e - p.z;
-            out.cost += residual * residual;
-            out.gradient += row * residual;
-            out.hessian.ger(1.0, &row, &row, 1.0);
+            out.add(&row, x[4] + x[5] * s + half * e - p.z);
         }
         // The curvature a priori, for noise of two grey levels.
         let weight = 4.0 / (self.bend * self.bend);
         out.cost += weight * x[2] * x[2];
         out.gradient[2] += weight * x[2];
-        out.hessian[(2, 2)] += weight;
+        out.normal[(2, 2)] += weight;
         out
     }
 }

@@ -5,6 +5,7 @@ pub(crate) mod charuco;
 pub(crate) mod crossing;
 pub(crate) mod edge_profile;
 pub(crate) mod edges;
+mod grey_levels;
 pub(crate) mod spread;
 
 use image::GrayImage;

@@ -3,13 +3,14 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Finding, FindingCode, FindingOptions, Severity};
-use crate::estimate::{Calibration, ViewResult, ViewStatus};
+use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus};
+use crate::geometry::statistics::{SIGMA_PER_MEDIAN_SIZE, median};
 use crate::text;
 use crate::wording::Text;
 
 /// Views below which none can stand out from the others.
 const MIN_FOR_OUTLIERS: usize = 5;
-/// How many robust standard deviations (1.4826 times the median absolute deviation) a view may lie above the median. Five
+/// How many robust standard deviations ([`SIGMA_PER_MEDIAN_SIZE`] times the median absolute deviation) a view may lie above the median. Five
 /// are reached by chance in one of 3 million views of Gaussian noise; real noise has longer tails.
 const ROBUST_SIGMAS: f64 = 5.0;
 /// And at least so many times the median, because the deviation of a handful of views is itself uncertain.
@@ -40,14 +41,6 @@ pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Find
     found
 }
 
-/// Median of values that are not all the same length as the views; `None` when there are none.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.retain(|v| v.is_finite());
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    (n > 0).then(|| 0.5 * (values[n / 2] + values[(n - 1) / 2]))
-}
-
 /// The view that stands out most by a value, the value and the median of all; `None` when none does.
 fn stands_out<'a>(
     views: &[&'a ViewResult],
@@ -57,15 +50,15 @@ fn stands_out<'a>(
     if valued.len() < MIN_FOR_OUTLIERS {
         return None;
     }
-    let middle = median(valued.iter().map(|(_, x)| *x).collect())?;
-    let deviation = 1.4826 * median(valued.iter().map(|(_, x)| (x - middle).abs()).collect())?;
+    let middle = median(valued.iter().map(|(_, x)| *x))?;
+    let deviation = SIGMA_PER_MEDIAN_SIZE * median(valued.iter().map(|(_, x)| (x - middle).abs()))?;
     let (view, largest) = valued.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let limit = (middle + ROBUST_SIGMAS * deviation).max(TIMES_MEDIAN * middle);
     (largest > limit).then_some((view, largest, middle))
 }
 
 fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding> {
-    let error_m = calibration.tip_error_95_m?;
+    let error_m = calibration.tip_error_95_m()?;
     let (view, largest_m, median_m) = stands_out(used, |v| v.influence_m)?;
     if largest_m < INFLUENCE * error_m {
         return None;
@@ -104,12 +97,12 @@ fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Findin
         [by_distance, by_angle].into_iter().flatten().max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
     // Views tell their corrections unequally well, so the median alone is no measure: the noise level must be left too.
     // One view that makes up all of the noise has at most the root of six times the views.
-    let noise = calibration.noise?;
+    let noise = calibration.joint.as_ref()?.noise;
     let over_noise = (view.correction_m? / noise.robot_m).hypot(view.correction_rad? / noise.robot_rad);
     if over_noise < CORRECTION_SIGMAS.min(0.75 * (6.0 * used.len() as f64).sqrt()) {
         return None;
     }
-    let middle = |value: fn(&ViewResult) -> Option<f64>| median(used.iter().filter_map(|v| value(v)).collect());
+    let middle = |value: fn(&ViewResult) -> Option<f64>| median(used.iter().filter_map(|v| value(v)));
     let (mm, deg) = (view.correction_m? * 1e3, view.correction_rad?.to_degrees());
     let (median_mm, median_deg) = (middle(|v| v.correction_m)? * 1e3, middle(|v| v.correction_rad)?.to_degrees());
     let text = text!(
@@ -128,7 +121,8 @@ fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Findin
 }
 
 fn prediction(calibration: &Calibration) -> Option<Finding> {
-    let (heldout, expected) = (calibration.heldout_rms_px?, calibration.expected_heldout_rms_px?);
+    let joint = calibration.joint.as_ref()?;
+    let (heldout, expected) = (joint.heldout_rms_px?, joint.expected_heldout_rms_px);
     if heldout <= PREDICTION * expected {
         return None;
     }
@@ -144,7 +138,7 @@ fn prediction(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn robot_noise(calibration: &Calibration) -> Option<Finding> {
-    let (noise, robot_px) = (calibration.noise?, calibration.robot_effect_px?);
+    let JointFit { noise, robot_effect_px: robot_px, .. } = *calibration.joint.as_ref()?;
     // Both as 2-D distances.
     let corner_px = noise.corner_px * std::f64::consts::SQRT_2;
     if robot_px < ROBOT_OVER_CORNERS * corner_px {
@@ -166,7 +160,7 @@ fn robot_noise(calibration: &Calibration) -> Option<Finding> {
 
 /// Compared where the board was seen; without a joint estimate at the camera itself.
 fn closed_forms(calibration: &Calibration) -> Option<Finding> {
-    let point = calibration.reference_point.unwrap_or_else(Point3::origin);
+    let point = calibration.joint.as_ref().map_or_else(Point3::origin, |joint| joint.reference_point);
     let places: Vec<(&'static str, Vector3<f64>)> = calibration
         .methods
         .iter()
@@ -175,10 +169,10 @@ fn closed_forms(calibration: &Calibration) -> Option<Finding> {
     if places.len() < 3 {
         return None;
     }
-    let component = |i: usize| median(places.iter().map(|(_, p)| p[i]).collect());
+    let component = |i: usize| median(places.iter().map(|(_, p)| p[i]));
     let middle = Vector3::new(component(0)?, component(1)?, component(2)?);
     let distances: Vec<(&'static str, f64)> = places.iter().map(|(name, p)| (*name, (p - middle).norm())).collect();
-    let typical_m = median(distances.iter().map(|(_, d)| *d).collect())?;
+    let typical_m = median(distances.iter().map(|(_, d)| *d))?;
     let mut off: Vec<(&'static str, f64)> = distances.into_iter().filter(|(_, d)| *d > DISAGREE_M).collect();
     if off.is_empty() {
         return None;
@@ -203,7 +197,8 @@ fn closed_forms(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
-    let error_mm = calibration.tip_error_95_m? * 1e3;
+    let JointFit { tip_error_95_m, error_curve: curve, .. } = calibration.joint.as_ref()?;
+    let error_mm = tip_error_95_m * 1e3;
     let finding = |code, severity, text| {
         Finding::new(code, severity, text).with("expected_error_95", error_mm, "mm").with("goal", goal_mm, "mm")
     };
@@ -216,7 +211,6 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
         );
         return Some(finding(FindingCode::GoalReached, Severity::Info, text));
     }
-    let curve = calibration.error_curve.as_ref()?;
     let (views, _) = curve.now()?;
     let needed = curve.views_for(goal_mm * 1e-3);
     let not_reached = |advice: Text| {

@@ -20,7 +20,7 @@ const UNEVEN: f64 = 5.0;
 const MATTERS_M: f64 = 5e-4;
 
 pub fn finding(calibration: &Calibration) -> Option<Finding> {
-    let (covariance, point) = (calibration.hand_eye_covariance?, calibration.reference_point?);
+    let (covariance, point) = (calibration.hand_eye_covariance()?, calibration.joint.as_ref()?.reference_point);
     let distance_m = point.coords.norm();
     // A point at the board moves by t + phi × p; a turn counts with the distance.
     let mut at_board = Matrix6::zeros();

@@ -2,7 +2,7 @@
 //! bent target, a widened uncertainty, noise levels that cannot be told apart.
 
 use super::{Finding, FindingCode, Severity, listed};
-use crate::estimate::{Calibration, ViewResult, ViewStatus};
+use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus};
 use crate::text;
 use crate::wording::Text;
 
@@ -101,7 +101,7 @@ fn renumbered(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn bent(calibration: &Calibration) -> Option<Finding> {
-    let estimate = calibration.shape?;
+    let estimate = calibration.joint.as_ref()?.shape?;
     let sigma = estimate.warp_sigma_m?.map(|m| m * 1e3);
     let [x, y] = estimate.shape.warp_m.map(|m| m * 1e3);
     let text = text!(
@@ -117,7 +117,7 @@ fn bent(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn widened(calibration: &Calibration) -> Option<Finding> {
-    let widening = calibration.widening.as_ref()?;
+    let widening = &calibration.joint.as_ref()?.widening;
     let by = widening.by?;
     let times = widening.factor.sqrt();
     let text = text!(
@@ -131,7 +131,7 @@ fn widened(calibration: &Calibration) -> Option<Finding> {
 
 /// When robot and corner noise cannot be told apart, the robot's level is a guess between zero and what is stated.
 fn unclear(calibration: &Calibration) -> Option<Finding> {
-    let (sample, noise, robot_px) = (calibration.small_sample?, calibration.noise?, calibration.robot_effect_px?);
+    let JointFit { small_sample: sample, noise, robot_effect_px: robot_px, .. } = *calibration.joint.as_ref()?;
     let [_, position, orientation] = sample.level_sigma;
     let unclear = position.max(orientation);
     if unclear < UNCLEAR || robot_px < NO_MATTER * noise.corner_px {

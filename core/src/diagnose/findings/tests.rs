@@ -66,7 +66,7 @@ fn the_views_that_a_goal_takes_are_those_that_reach_it() {
     let t = set(10, 82);
     let observations = t.observations(false);
     let calibration = solve(&observations);
-    let goal_mm = calibration.tip_error_95_m.expect("joint") * 1e3 / 1.95;
+    let goal_mm = calibration.tip_error_95_m().expect("joint") * 1e3 / 1.95;
     let found = findings(&observations, Some(&calibration), &FindingOptions { goal_mm: Some(goal_mm) });
     let finding = find(&found, FindingCode::GoalNotReached).expect("above");
     let more = finding.value("more_views").expect("within reach");
@@ -213,7 +213,8 @@ fn a_prediction_within_the_noise_is_no_finding_and_one_twice_as_bad_is() {
     }
     let observations = set(20, 93).observations(false);
     let mut calibration = solve(&observations);
-    calibration.heldout_rms_px = calibration.expected_heldout_rms_px.map(|px| 2.0 * px);
+    let joint = calibration.joint.as_mut().expect("a joint estimate");
+    joint.heldout_rms_px = Some(2.0 * joint.expected_heldout_rms_px);
     let found = findings(&observations, Some(&calibration), &FindingOptions::default());
     let finding = find(&found, FindingCode::PoorPrediction).expect("twice what the noise explains");
     assert_eq!(finding.severity, Severity::Warning);
@@ -250,7 +251,7 @@ fn a_board_that_is_never_tilted_leaves_the_focal_length_weak() {
     let found = findings(&observations, Some(&calibration), &FindingOptions::default());
     let finding = find(&found, FindingCode::LittleTilt).expect("10°");
     assert!((finding.value("largest_tilt").expect("stated") - 10.0).abs() < 1e-6);
-    calibration.intrinsics_fixed = true;
+    calibration.camera.as_mut().expect("estimated").fixed = true;
     let found = findings(&observations, Some(&calibration), &FindingOptions::default());
     assert!(find(&found, FindingCode::LittleTilt).is_none(), "a camera that is given needs no tilt");
 }

@@ -4,16 +4,13 @@ use nalgebra::Vector3;
 
 use super::{Finding, FindingCode, Severity, listed};
 use crate::diagnose::coverage::{Coverage, CoveredView};
+use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::estimate::handeye::{HandEyeError, motion};
-use crate::estimate::{Calibration, CameraKnowledge, Observations, ObservedView, ViewStatus};
+use crate::estimate::{Calibration, CameraKnowledge, GOOD_VIEWS, Observations, ObservedView, ViewStatus};
 use crate::geometry::frames::{Anchor, Mount, Pose};
 use crate::text;
 use crate::wording::Text;
 
-/// Least number of views of any calibration.
-const NEED: usize = 3;
-/// Views of a good session. The noise levels rest on as many numbers; with ten they are known to a fifth.
-const GOOD_VIEWS: usize = 10;
 /// Largest turn between two views, degrees, below which views count as alike: the published sessions turn by 60° and more.
 const ALIKE_DEG: f64 = 20.0;
 /// RMS turn about the second axis, degrees, below which it is weak. In simulation (ten views, robot noise 0.1 mm and
@@ -54,13 +51,13 @@ pub fn findings(observations: &Observations, calibration: Option<&Calibration>) 
 }
 
 fn number(views: usize) -> Option<Finding> {
-    let (severity, need, text) = if views < NEED {
+    let (severity, need, text) = if views < MIN_VIEWS {
         let text = if views == 1 {
             text!("{views} view of the target: a calibration takes {need} at the least. Capture more poses.")
         } else {
             text!("{views} views of the target: a calibration takes {need} at the least. Capture more poses.")
         };
-        (Severity::Problem, NEED, text)
+        (Severity::Problem, MIN_VIEWS, text)
     } else if views < GOOD_VIEWS {
         let text = text!(
             "{views} views of the target: enough for an answer, few for the noise levels on which its stated uncertainty \
@@ -165,8 +162,8 @@ fn named(axis: &Vector3<f64>) -> String {
 
 /// Only where intrinsics were estimated.
 fn tilt(calibration: &Calibration) -> Option<Finding> {
-    let sigma = calibration.intrinsics_sigma.filter(|_| !calibration.intrinsics_fixed)?;
-    let intrinsics = calibration.intrinsics?;
+    let camera = calibration.camera.filter(|camera| !camera.fixed)?;
+    let (intrinsics, sigma) = (camera.intrinsics, camera.sigma_px?);
     let used = calibration.views.iter().filter(|v| v.status == ViewStatus::Used);
     let largest_deg = used
         .filter_map(|v| v.camera_from_target)
@@ -189,7 +186,7 @@ fn tilt(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn coverage(observations: &Observations, seen: &[&ObservedView]) -> Option<Finding> {
-    if seen.len() < NEED {
+    if seen.len() < MIN_VIEWS {
         return None;
     }
     let views =

@@ -8,16 +8,16 @@ impl Dataset {
     /// What was observed. Where the data set has a corner table, its corners count; elsewhere `detected` gives those of
     /// an entry by its index, `None` when the target was not found in its image.
     pub fn observations(&self, mut detected: impl FnMut(usize) -> Option<Vec<Corner>>) -> Observations {
-        let views = self.entries.iter().enumerate().map(|(index, entry)| ObservedView {
-            name: entry.name.clone(),
-            base_from_tip: entry.base_from_tip,
-            corners: match &entry.corners {
+        let views = self.entries.iter().enumerate().map(|(index, entry)| {
+            let corners = match &entry.corners {
                 Some(listed) => Some(listed.clone()).filter(|corners| !corners.is_empty()),
                 None => detected(index),
-            },
-            tip_by_joint: entry.tip_by_joint.clone(),
-            camera_from_target: entry.camera_from_target,
-            in_fit: true,
+            };
+            ObservedView {
+                tip_by_joint: entry.tip_by_joint.clone(),
+                camera_from_target: entry.camera_from_target,
+                ..ObservedView::new(&entry.name, entry.base_from_tip, corners)
+            }
         });
         Observations {
             mode: self.mode,

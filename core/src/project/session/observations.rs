@@ -51,12 +51,9 @@ impl Document {
                 (Role::Calibration, corners) => {
                     seen.captures.push(capture.id);
                     seen.observations.views.push(ObservedView {
-                        name: capture.image.clone(),
-                        base_from_tip: Some(capture.base_from_tip),
-                        corners,
                         tip_by_joint,
-                        camera_from_target: None,
                         in_fit: capture.is_in_use(),
+                        ..ObservedView::new(&capture.image, Some(capture.base_from_tip), corners)
                     });
                 }
                 (Role::Verification, Some(corners)) if !capture.excluded => {

@@ -1,15 +1,15 @@
 //! A small version of the study in `examples/monte_carlo`: the bound is right, the estimate reaches it, its regions hold.
 
-#[path = "../../../examples/monte_carlo/answer.rs"]
+#[path = "../../../studies/monte_carlo/answer.rs"]
 mod answer;
-#[path = "../../../examples/monte_carlo/bound.rs"]
+#[path = "../../../studies/monte_carlo/bound.rs"]
 mod bound;
-#[path = "../../../examples/monte_carlo/scene.rs"]
+#[path = "../../../studies/monte_carlo/scene.rs"]
 mod scene;
-#[path = "../../../examples/monte_carlo/small_sample.rs"]
+#[path = "../../../studies/monte_carlo/small_sample.rs"]
 mod small_sample;
 #[expect(dead_code, reason = "the study prints more than is tested here")]
-#[path = "../../../examples/monte_carlo/tally.rs"]
+#[path = "../../../studies/monte_carlo/tally.rs"]
 mod tally;
 
 use bound::Normals;

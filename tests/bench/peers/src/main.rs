@@ -1,4 +1,4 @@
-//! Times the crate `vision-calibration` on corners from a file; see `core/examples/solver_times.rs` for the format.
+//! Times the crate `vision-calibration` on corners from a file; see `core/studies/solver_times.rs` for the format.
 //! Prints a line of JSON.
 
 use std::error::Error;

@@ -34,14 +34,8 @@ fn read(path: &str) -> Result<Observations, Box<dyn Error>> {
         let (&[x, y, z, qw, qx, qy, qz], px) = n.split_first_chunk::<7>().ok_or("a view begins with a pose")?;
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(qw, qx, qy, qz));
         let corners = px.chunks_exact(2).enumerate().map(|(i, p)| Corner::new(i, Vector2::new(p[0], p[1])));
-        views.push(ObservedView {
-            name: i.to_string(),
-            base_from_tip: Some(Pose::from_isometry(Isometry3::from_parts(Translation3::new(x, y, z), rotation))),
-            corners: Some(corners.collect()),
-            tip_by_joint: Vec::new(),
-            camera_from_target: None,
-            in_fit: true,
-        });
+        let base_from_tip = Pose::from_isometry(Isometry3::from_parts(Translation3::new(x, y, z), rotation));
+        views.push(ObservedView::new(i.to_string(), Some(base_from_tip), Some(corners.collect())));
     }
     Ok(Observations {
         mode: Some(Mode::EyeInHand),

@@ -196,12 +196,8 @@ fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometr
         })
         .collect::<Option<_>>()?;
     Some(ObservedView {
-        name: format!("{index:03}"),
-        base_from_tip: Some(Pose::from_isometry(reported)),
-        corners: Some(corners),
         tip_by_joint: if setup.joints { twists } else { Vec::new() },
-        camera_from_target: None,
-        in_fit: true,
+        ..ObservedView::new(format!("{index:03}"), Some(Pose::from_isometry(reported)), Some(corners))
     })
 }
 

@@ -130,31 +130,24 @@ pub fn product(trial: &Trial) -> Result<Answer, String> {
     } else {
         CameraKnowledge::Fixed(trial.intrinsics)
     };
-    let observed = |view: &handeye_core::targets::observation::View| ObservedView {
-        name: view.name.clone(),
-        base_from_tip: Some(view.base_from_tip),
-        corners: Some(view.corners.clone()),
-        tip_by_joint: Vec::new(),
-        camera_from_target: None,
-        in_fit: true,
-    };
     let observations = Observations {
         mode: Some(trial.cell.mode),
         target: BOARD,
         image_size: (trial.intrinsics.width, trial.intrinsics.height),
         camera,
-        views: trial.views.iter().map(observed).collect(),
+        views: trial.views.iter().map(ObservedView::from).collect(),
     };
     let found =
         estimate::calibrate(&observations, Method::Joint, &CancelToken::default()).map_err(|e| e.to_string())?;
     let missing = || "the calibration has no hand-eye transform".to_owned();
+    let joint = found.joint.as_ref().ok_or_else(missing)?;
     Ok(Answer {
         mount_from_camera: found.hand_eye.ok_or_else(missing)?.mount_from_camera(),
-        covariance: found.hand_eye_covariance.ok_or_else(missing)?,
-        small_sample: found.small_sample.ok_or_else(missing)?,
-        noise: found.noise.ok_or_else(missing)?,
+        covariance: *found.hand_eye_covariance().ok_or_else(missing)?,
+        small_sample: joint.small_sample,
+        noise: joint.noise,
         aside: found.views.iter().filter(|view| view.status == ViewStatus::Outlier).count(),
-        tip_error_95_m: found.tip_error_95_m.ok_or_else(missing)?,
-        reference_point: found.reference_point.ok_or_else(missing)?,
+        tip_error_95_m: joint.tip_error_95_m,
+        reference_point: joint.reference_point,
     })
 }
