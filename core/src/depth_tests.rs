@@ -83,8 +83,8 @@ fn the_colours_of_missing_and_far_pixels_are_in_no_map() {
 #[test]
 fn an_image_spans_the_range_and_marks_what_is_no_depth() {
     let image = row(&[0.1, 0.2, 1.85, 3.4, f32::NAN, 3.5]);
-    let picture = image.colours(ColourMap::Grey, 0.2, 3.4, FAR_M).expect("a range");
-    let colours: Vec<[u8; 3]> = picture.pixels().map(|p| p.0).collect();
+    let coloured = image.colours(ColourMap::Grey, 0.2, 3.4, FAR_M).expect("a range");
+    let colours: Vec<[u8; 3]> = coloured.pixels().map(|p| p.0).collect();
     assert_eq!(colours, [[0; 3], [0; 3], [131; 3], [255; 3], INVALID_COLOUR, FAR_COLOUR]);
     for (near, far) in [(1.0, 1.0), (2.0, 1.0), (f32::NAN, 1.0), (0.0, f32::INFINITY)] {
         assert!(matches!(image.colours(ColourMap::Turbo, near, far, FAR_M), Err(DepthError::BadRange { .. })));

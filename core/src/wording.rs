@@ -71,6 +71,11 @@ impl Text {
         Self { english: Cow::Owned(words.into()), values: Vec::new(), verbatim: true }
     }
 
+    /// The words, where they are somebody else's ([`Text::verbatim`]).
+    pub fn foreign_words(&self) -> Option<&str> {
+        self.verbatim.then_some(&*self.english)
+    }
+
     /// With a value more, for what is said with one of several templates.
     #[must_use]
     pub fn with(mut self, name: &'static str, value: impl Into<Value>) -> Self {

@@ -1,11 +1,38 @@
 //! Signals to processes, and their end.
 
-use std::process::{Child, Command, ExitStatus};
+use std::io::{BufRead as _, BufReader};
+use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 /// Longest wait for the end of a process that is to end. Only a failure takes so long.
 const PATIENCE: Duration = Duration::from_mins(4);
+
+/// Starts `handeye`; with what it says on standard error.
+///
+/// # Panics
+/// When it does not run.
+pub fn start(arguments: &[&str]) -> (Child, BufReader<ChildStderr>) {
+    let mut child = Command::new(crate::handeye_binary())
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("handeye runs");
+    let said = BufReader::new(child.stderr.take().expect("its messages"));
+    (child, said)
+}
+
+/// Reads what a process says until something is said.
+///
+/// # Panics
+/// When it ends before.
+pub fn until_said(said: &mut BufReader<ChildStderr>, what: &str) {
+    let mut all = String::new();
+    while !all.contains(what) {
+        assert!(said.read_line(&mut all).is_ok_and(|bytes| bytes > 0), "{all}");
+    }
+}
 
 /// Sends a signal by its name, for example `TERM`.
 ///

@@ -131,7 +131,7 @@ impl App {
                 self.say_of_connection(Severity::Warning, text);
             }
             (LinkState::Failed { why }, _) if link != Link::Motion => {
-                self.say_of_connection(Severity::Error, text::Text::verbatim(why));
+                self.say_of_connection(Severity::Error, why);
             }
             _ => {}
         }

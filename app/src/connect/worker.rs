@@ -86,7 +86,7 @@ impl Control {
                 Ok(())
             }
             Err(error) => {
-                let text = text!("The arm may still move, the stop failed: {error}", error = &error);
+                let text = text!("The arm may still move, the stop failed: {error}", error = error.why().clone());
                 outlet.notice(Severity::Error, text);
                 Err(error)
             }

@@ -15,7 +15,7 @@ use handeye_core::testing::{Need, skip};
 use super::testing::Silent;
 use super::testing::sample;
 use crate::model::{CellSource, LinkState, Model, Pane, Step, ThemeChoice, ViewSettings};
-use crate::text::Language;
+use crate::text::{Language, Text};
 
 /// Small enough for a repository, large enough for everything; the harness takes 8 of them at each edge \[points\].
 const SIZE: Vec2 = vec2(1280.0, 800.0);
@@ -95,7 +95,7 @@ fn looks_like(name: &str, theme: ThemeChoice, language: Language, state: State) 
 fn searching() -> Model {
     let address = "tcp://127.0.0.1:23000".to_owned();
     let searching =
-        LinkState::Searching { address: address.clone(), attempt: 3, why: Some("nothing answers".to_owned()) };
+        LinkState::Searching { address: address.clone(), attempt: 3, why: Some(Text::verbatim("nothing answers")) };
     let mut model = Model::new(CellSource::Address(address), ViewSettings::default());
     model.now_s = 100.0;
     model.control = searching.clone();
@@ -107,7 +107,7 @@ fn searching() -> Model {
 /// Solved, and then the cable was pulled: the images are as old as the loss.
 fn lost() -> Model {
     let since_s = 88.0;
-    let lost = LinkState::Lost { since_s, why: "the cell closed the connection".to_owned(), attempt: 2 };
+    let lost = LinkState::Lost { since_s, why: Text::verbatim("the cell closed the connection"), attempt: 2 };
     let mut model = sample::solved();
     if let Some(frame) = &mut model.frame {
         frame.info.received_s = since_s;

@@ -28,6 +28,8 @@ pub enum Action {
     Reconnect,
     /// Let simulated time advance.
     StartSimulation,
+    /// Lets a paused simulation go on.
+    ContinueSimulation,
 }
 
 /// The connection as a whole: that of its two halves which is worse off.
@@ -50,15 +52,19 @@ pub fn hindrance(model: &Model) -> Option<Status> {
     if connection.tone != Tone::Good {
         return Some(connection);
     }
-    let (title, detail) = match model.resting_simulation()? {
-        Simulation::Paused => {
-            (text!("The simulation is paused"), text!("Images and joints stand still until it goes on."))
-        }
-        Simulation::Stopped | Simulation::Running => {
-            (text!("The simulation is stopped"), text!("Images are renewed only while it runs."))
-        }
+    let (title, detail, action) = match model.resting_simulation()? {
+        Simulation::Paused => (
+            text!("The simulation is paused"),
+            text!("Images and joints stand still until it goes on."),
+            Action::ContinueSimulation,
+        ),
+        Simulation::Stopped | Simulation::Running => (
+            text!("The simulation is stopped"),
+            text!("Images are renewed only while it runs."),
+            Action::StartSimulation,
+        ),
     };
-    Some(Status { tone: Tone::Warning, title, detail, action: Some(Action::StartSimulation) })
+    Some(Status { tone: Tone::Warning, title, detail, action: Some(action) })
 }
 
 /// What is between the start and the first image.
@@ -96,7 +102,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
                 None => {
                     text!("A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed.")
                 }
-                Some(why) => Text::verbatim(sentence(why)),
+                Some(why) => sentence(why),
             };
             status(Tone::Busy, text!("Starting the built-in cell…"), detail, None)
         }
@@ -132,13 +138,17 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
                 CellSource::BuiltIn => text!("The built-in cell did not start"),
                 CellSource::Address(address) => text!("Cannot connect to {address}", address = address),
             };
-            status(Tone::Bad, title, Text::verbatim(sentence(why)), Some(Action::Reconnect))
+            status(Tone::Bad, title, sentence(why), Some(Action::Reconnect))
         }
     }
 }
 
 /// First letter large, unless the first word is a name in code; full stop at the end.
-fn sentence(text: &str) -> String {
+fn sentence(why: &Text) -> Text {
+    why.foreign_words().map_or_else(|| why.clone(), |words| Text::verbatim(sentence_of(words)))
+}
+
+fn sentence_of(text: &str) -> String {
     let is_code =
         text.split_whitespace().next().is_some_and(|word| word.trim_end_matches(['.', ':']).contains(['.', '/']));
     let mut letters = text.chars();
@@ -172,9 +182,9 @@ mod tests {
 
     #[test]
     fn a_reason_becomes_a_sentence() {
-        assert_eq!(sentence("nothing answers"), "Nothing answers.");
-        assert_eq!(sentence("Done."), "Done.");
-        assert_eq!(sentence("sim.getObject: no answer"), "sim.getObject: no answer.");
-        assert_eq!(sentence(""), "");
+        assert_eq!(sentence_of("nothing answers"), "Nothing answers.");
+        assert_eq!(sentence_of("Done."), "Done.");
+        assert_eq!(sentence_of("sim.getObject: no answer"), "sim.getObject: no answer.");
+        assert_eq!(sentence_of(""), "");
     }
 }

@@ -9,14 +9,14 @@ use super::*;
 use crate::command::Event;
 use crate::gui::testing::{Silent, connected, frame, robot};
 use crate::model::{CellSource, ImagePoint, Link, LinkState, Pane, RotationFormat, Simulation, Step};
-use crate::text::Language;
+use crate::text::{Language, Text};
 
 #[test]
 fn every_state_of_the_connection_says_what_goes_on() {
     let mut built_in = Silent::new(CellSource::BuiltIn);
     built_in.links(&LinkState::StartingCell { why: None });
     assert!(built_in.sees("Starting the built-in cell…"));
-    built_in.links(&LinkState::Failed { why: "no scene".to_owned() });
+    built_in.links(&LinkState::Failed { why: Text::verbatim("no scene") });
     assert!(built_in.sees("The built-in cell did not start"));
     assert!(built_in.sees("No scene."));
     built_in.links(&connected());
@@ -24,7 +24,7 @@ fn every_state_of_the_connection_says_what_goes_on() {
     assert!(built_in.sees("Waiting for the first image…"));
 
     let mut remote = Silent::new(CellSource::Address("tcp://sim:23000".to_owned()));
-    let why = Some("nothing answers".to_owned());
+    let why = Some(Text::verbatim("nothing answers"));
     remote.links(&LinkState::Searching { address: "tcp://sim:23000".to_owned(), attempt: 3, why });
     assert!(remote.sees("Searching for tcp://sim:23000…"));
     assert!(remote.sees("Try 3. Nothing answers."));
@@ -33,7 +33,7 @@ fn every_state_of_the_connection_says_what_goes_on() {
 #[test]
 fn a_lost_connection_says_since_when_and_why_and_keeps_the_last_image() {
     let mut silent = Silent::live();
-    let why = "the cable is out".to_owned();
+    let why = Text::verbatim("the cable is out");
     let lost = LinkState::Lost { since_s: 88.0, why: why.clone(), attempt: 0 };
     silent.absorb(Event::Link { link: Link::Camera, state: lost });
     assert!(silent.sees("Camera connection lost 12 s ago"));

@@ -8,6 +8,7 @@ use handeye_sim_link::client::CancelToken;
 
 use crate::live::depth;
 use crate::model::{DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};
+use crate::text;
 use crate::worker::link::{Duty, Outlet};
 use crate::worker::port::{CameraPort, Connected, Connector, PortError, RawFrame};
 use crate::worker::rate::RateMeter;
@@ -64,7 +65,7 @@ impl Camera {
         let depth_coloured = raw
             .depth
             .colours(self.colours, near_m, far_m, far_plane_m)
-            .map_err(|error| PortError::Refused(format!("the depth image cannot be shown: {error}")))?;
+            .map_err(|error| PortError::Refused(text!("The depth image cannot be shown: {why}", why = error)))?;
         self.number += 1;
         let info = FrameInfo {
             number: self.number,

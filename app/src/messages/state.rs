@@ -86,9 +86,9 @@ impl Messages {
         self.kept.back()
     }
 
-    /// What the status line says: the last thing that went as asked.
+    /// What the status line says: the last thing that went as asked, until something else happens.
     pub fn status_line(&self) -> Option<&Message> {
-        self.kept.iter().rev().find(|message| message.home == Home::StatusLine)
+        self.kept.iter().next_back().filter(|message| message.home == Home::StatusLine)
     }
 
     /// What a pane has to say that is still so: the last warning or error that has its place there.

@@ -46,7 +46,7 @@ pub use handeye_sim_link::client::cell::BoardPath;
 pub use workflow::{Dialog, Pane, Step};
 
 use crate::session::start;
-use crate::text::Language;
+use crate::text::{Language, Text};
 
 /// Which cell the window works with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,7 +74,7 @@ pub enum LinkState {
     /// The built-in cell is being started.
     StartingCell {
         /// Why the last try failed.
-        why: Option<String>,
+        why: Option<Text>,
     },
     /// It has never been connected yet.
     Searching {
@@ -83,7 +83,7 @@ pub enum LinkState {
         /// How many times it was tried, this one included.
         attempt: u32,
         /// Why the last try failed.
-        why: Option<String>,
+        why: Option<Text>,
     },
     /// It works.
     Connected {
@@ -97,7 +97,7 @@ pub enum LinkState {
         /// When it broke.
         since_s: f64,
         /// Why.
-        why: String,
+        why: Text,
         /// How many times it was tried since.
         attempt: u32,
     },
@@ -106,14 +106,14 @@ pub enum LinkState {
         /// When it broke.
         since_s: f64,
         /// Why it broke, or why the last try failed.
-        why: String,
+        why: Text,
         /// How many times it was tried since, this one included.
         attempt: u32,
     },
     /// Trying again cannot help until the user does something.
     Failed {
         /// What is wrong and what to do.
-        why: String,
+        why: Text,
     },
 }
 

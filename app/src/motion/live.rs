@@ -5,7 +5,7 @@ use handeye_sim_link::client::cell::{
     Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes,
     JogEnd, JogObstacle, JointAngles, MotionTolerance, SettleOptions, UnknownKinematics,
 };
-use handeye_sim_link::client::{CancelToken, LinkError};
+use handeye_sim_link::client::{CancelToken, LinkError, SimulationState};
 use nalgebra::Vector3;
 
 use crate::limits;
@@ -113,7 +113,7 @@ impl MotionPort for LiveMotion {
             Ok(Ok(JogEnd::OtherTip)) => Ok(Some(other_tip())),
             Ok(Err(why)) => Ok(Some(why)),
             Err(error) if error.is_connection_loss() => Err(port_error(error)),
-            Err(error) => Ok(Some(Text::verbatim(error.to_string()))),
+            Err(error) => Ok(Some(said(&error))),
         }
     }
 
@@ -223,12 +223,41 @@ fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, P
         LinkError::Cancelled { .. } if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
         error if error.is_connection_loss() => Err(port_error(error)),
         // These are found out before anything moves.
-        error @ (LinkError::NotRunning { .. }
-        | LinkError::JointOutOfRange { .. }
+        error @ (LinkError::JointOutOfRange { .. }
         | LinkError::BadMotion { .. }
         | LinkError::NoSuchObject { .. }
-        | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(Text::verbatim(error.to_string()))),
-        error => Ok(MotionOutcome::Failed(Text::verbatim(error.to_string()))),
+        | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(said(&error))),
+        error => Ok(MotionOutcome::Failed(said(&error))),
+    }
+}
+
+/// What a person does about it, in the language of the window; what is rare stays in the words of the client.
+fn said(error: &LinkError) -> Text {
+    match error {
+        LinkError::NotRunning { state: SimulationState::Paused, .. } => {
+            text!("The simulation is paused: continue it first")
+        }
+        LinkError::NotRunning { .. } => text!("The simulation is stopped: start it first"),
+        LinkError::JointElsewhere { joint, at_deg, goal_deg } => text!(
+            "Joint {joint} stands at {at}° instead of {goal}°: another client or a script of the scene moves or holds it",
+            joint = joint,
+            at = format!("{at_deg:.3}"),
+            goal = format!("{goal_deg:.3}")
+        ),
+        LinkError::JointOutOfRange { joint, goal_deg, min_deg, max_deg } => text!(
+            "Joint {joint} cannot go to {goal}°: its range is {min}° to {max}°",
+            joint = joint,
+            goal = format!("{goal_deg:.2}"),
+            min = format!("{min_deg:.1}"),
+            max = format!("{max_deg:.1}")
+        ),
+        LinkError::Unreached { distance_mm, angle_deg } => text!(
+            "The tip stopped {mm} mm and {deg}° from its goal, which may be out of reach: choose another pose, or go \
+             there joint by joint",
+            mm = format!("{distance_mm:.2}"),
+            deg = format!("{angle_deg:.2}")
+        ),
+        other => Text::verbatim(other.to_string()),
     }
 }
 

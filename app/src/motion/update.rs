@@ -43,29 +43,30 @@ impl App {
             self.model.motion = Motion::Idle;
         }
         let what = what.unwrap_or_else(|| text!("the goal"));
-        // What an earlier motion still has to say does not move a sequence on.
-        if self.model.sequence_runs && id == self.numbers.motion {
-            self.sequence_moved(&outcome);
-        }
         if self.model.planning && self.numbers.plan == Some(id) {
             return self.plan_refused(&outcome);
         }
         if self.numbers.follow == Some(id) {
             return self.follow_ended(outcome);
         }
-        match outcome {
+        match &outcome {
             MotionOutcome::Arrived => {}
             MotionOutcome::Stopped => {
                 self.say_in(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
             }
             MotionOutcome::Refused(why) => {
+                let why = why.clone();
                 let said = text!("The arm does not move to {what}: {why}", what = what, why = why);
                 self.say_in(Pane::Jog, Severity::Warning, said);
             }
             MotionOutcome::Failed(why) => {
-                let said = text!("The arm did not get to {what}: {why}", what = what, why = why);
+                let said = text!("The arm did not get to {what}: {why}", what = what, why = why.clone());
                 self.say_in(Pane::Jog, Severity::Error, said);
             }
+        }
+        // What an earlier motion still has to say does not move a sequence on.
+        if self.model.sequence_runs && id == self.numbers.motion {
+            self.sequence_moved(&outcome);
         }
     }
 

@@ -53,7 +53,9 @@ impl Motions {
             Ok(outcome) => (outcome, Ok(())),
             // Nobody sends the arm any further. What may still move is the business of the stop.
             Err(error) if cancel.is_cancelled() => (MotionOutcome::Stopped, Err(error)),
-            Err(error) => (MotionOutcome::Failed(text!("The connection broke: {error}", error = &error)), Err(error)),
+            Err(error) => {
+                (MotionOutcome::Failed(text!("The connection broke: {error}", error = error.why().clone())), Err(error))
+            }
         };
         outlet.report(Event::Moved { id: task.id(), outcome: reported });
         ended
@@ -70,7 +72,7 @@ impl Motions {
         self.desk.done();
         let (views, ended) = match planned {
             Ok(views) => (views, Ok(())),
-            Err(error) => (Err(text!("The connection broke: {error}", error = &error)), Err(error)),
+            Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
         };
         outlet.report(Event::Planned { id, views });
         ended
@@ -126,7 +128,7 @@ impl Motions {
         let outcome = port.jog(request, &mut held);
         let (why, ended) = match outcome {
             Ok(why) => (why, Ok(())),
-            Err(error) => (Some(text!("The connection broke: {error}", error = &error)), Err(error)),
+            Err(error) => (Some(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
         };
         if let Some(event) = self.desk.end_jog(request, why, forgotten, outlet.now_s()) {
             outlet.report(event);

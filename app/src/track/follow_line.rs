@@ -147,7 +147,8 @@ impl Inner {
         // The clock of a simulation that is started anew goes back.
         if !(-LONGEST_GUESS_S..=LONGEST_GUESS_S).contains(&ahead_s) {
             return Err(text!(
-                "The newest image is {age} s old: the camera fell silent",
+                "The newest image is {age} s of simulation old: the camera fell silent, or the simulation runs faster than \
+                 images are taken and has to keep real time",
                 age = format!("{ahead_s:.1}")
             ));
         }

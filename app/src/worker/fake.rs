@@ -120,7 +120,7 @@ impl FakeCell {
             let _released = hang.recv().is_err();
         }
         let script = self.script();
-        if script.broken { Err(PortError::Lost("the cable is out".to_owned())) } else { Ok(script) }
+        if script.broken { Err(PortError::Lost(Text::verbatim("the cable is out"))) } else { Ok(script) }
     }
 
     fn connected<Port>(&self, port: Port) -> Result<Connected<Port>, PortError> {
@@ -129,7 +129,7 @@ impl FakeCell {
             return Err(script.refusals.remove(0));
         }
         if script.broken {
-            return Err(PortError::Lost("nothing answers".to_owned()));
+            return Err(PortError::Lost(Text::verbatim("nothing answers")));
         }
         Ok(Connected { port, address: "tcp://fake:1".to_owned(), server: "fake cell 1.2".to_owned() })
     }
@@ -146,7 +146,7 @@ impl Connector for FakeCell {
 
     fn connect_motion(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
         if self.script().broken {
-            return Err(PortError::Lost("nothing answers".to_owned()));
+            return Err(PortError::Lost(Text::verbatim("nothing answers")));
         }
         let server = "fake cell 1.2".to_owned();
         Ok(Connected { port: Box::new(self.clone()), address: "tcp://fake:1".to_owned(), server })
@@ -233,7 +233,7 @@ impl FakeCell {
 impl MotionPort for FakeCell {
     fn check(&mut self) -> Result<(), PortError> {
         let script = self.script();
-        if script.broken { Err(PortError::Lost("the cable is out".to_owned())) } else { Ok(()) }
+        if script.broken { Err(PortError::Lost(Text::verbatim("the cable is out"))) } else { Ok(()) }
     }
 
     fn move_to(&mut self, goal: &MotionGoal, _speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {

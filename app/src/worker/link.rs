@@ -165,7 +165,7 @@ impl<D: Duty> LinkLoop<'_, D> {
                 Err(RecvTimeoutError::Disconnected) => return Err(Ended),
                 Ok(Request::Do(task)) => {
                     if let Err(error) = self.duty.perform(None, task, &self.outlet) {
-                        tracing::debug!(%error, "a task without a connection");
+                        tracing::debug!(?error, "a task without a connection");
                     }
                 }
             }

@@ -11,9 +11,8 @@ use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkErr
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
 use crate::model::{BoardMotion, CellFacts, CellSource, RobotState, Simulation};
 use crate::motion::live::LiveMotion;
-
-/// Why nothing answers now.
-const CLOSED: &str = "the server closed the connection; start it again if it has ended";
+use crate::text;
+use crate::text::Text;
 
 /// Connects to the cell that the window was started for.
 pub struct LiveConnector {
@@ -41,7 +40,7 @@ impl LiveConnector {
                 }
             }
         };
-        address.parse().map_err(|error: LinkError| PortError::Hopeless(error.to_string()))
+        address.parse().map_err(|error: LinkError| PortError::Hopeless(Text::verbatim(error.to_string())))
     }
 
     /// Makes one connection.
@@ -120,7 +119,7 @@ pub(crate) fn check_arm(arm: &mut Arm) -> Result<(), PortError> {
 }
 
 fn check(is_connected: bool) -> Result<(), PortError> {
-    if is_connected { Ok(()) } else { Err(PortError::Lost(CLOSED.to_owned())) }
+    if is_connected { Ok(()) } else { Err(PortError::Lost(closed())) }
 }
 
 impl ControlPort for LiveControl {
@@ -203,7 +202,7 @@ impl CameraPort for LiveCamera {
 }
 
 fn start_built_in() -> Result<CellServer, PortError> {
-    let hopeless = |error: &dyn Display| PortError::Hopeless(error.to_string());
+    let hopeless = |error: &dyn Display| PortError::Hopeless(Text::verbatim(error.to_string()));
     let scene = Scene::reference().map_err(|error| hopeless(&error))?;
     CellServer::start(CellConfig::new(scene)).map_err(|error| hopeless(&error))
 }
@@ -211,16 +210,22 @@ fn start_built_in() -> Result<CellServer, PortError> {
 pub(crate) fn port_error(error: LinkError) -> PortError {
     let text = match &error {
         // Which call found out is of no interest when nobody is there for any call.
-        LinkError::Unreachable { endpoint, .. } => format!(
-            "nothing answers at {endpoint}; start CoppeliaSim or a cell there, check that its ZMQ remote API add-on is \
-             enabled and which port its status bar shows (usually 23000)"
+        LinkError::Unreachable { endpoint, .. } => text!(
+            "Nothing answers at {endpoint}. Start CoppeliaSim or a cell there, check that its ZMQ remote API add-on is \
+             enabled and which port its status bar shows (usually 23000).",
+            endpoint = endpoint
         ),
-        LinkError::Disconnected { .. } => CLOSED.to_owned(),
-        other => other.to_string(),
+        LinkError::Disconnected { .. } => closed(),
+        other => Text::verbatim(other.to_string()),
     };
     match error {
         LinkError::BadEndpoint { .. } => PortError::Hopeless(text),
         error if error.is_connection_loss() => PortError::Lost(text),
         _ => PortError::Refused(text),
     }
+}
+
+/// Why nothing answers now.
+fn closed() -> Text {
+    text!("The server closed the connection. Start it again if it has ended.")
 }

@@ -193,7 +193,7 @@ fn a_motion_can_be_cancelled_without_a_stop() {
 #[test]
 fn nothing_begins_before_a_stop_is_done() {
     let (cell, mut bench) = fake(FakeMotions::Arrive);
-    cell.script().refuse_tasks = Some(PortError::Lost("the cable is out".to_owned()));
+    cell.script().refuse_tasks = Some(PortError::Lost(Text::verbatim("the cable is out")));
     bench.workers.press_stop();
     bench.move_to(1, HOME, 1.0);
     let MotionOutcome::Refused(why) = bench.moved(1) else { panic!("it was not refused") };

@@ -10,18 +10,24 @@ use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, Robot
 use crate::text::Text;
 
 /// Why a port has no answer.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PortError {
     /// The connection is broken or was never made: worth another try.
-    #[error("{0}")]
-    Lost(String),
+    Lost(Text),
     /// The cell answered no.
-    #[error("{0}")]
-    Refused(String),
+    Refused(Text),
     /// It cannot work before the user changes something.
-    #[error("{0}")]
-    Hopeless(String),
+    Hopeless(Text),
+}
+
+impl PortError {
+    /// Why, for the screen.
+    pub fn why(&self) -> &Text {
+        match self {
+            Self::Lost(why) | Self::Refused(why) | Self::Hopeless(why) => why,
+        }
+    }
 }
 
 /// A connection that has just been made.

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::port::PortError;
 use crate::model::{CellSource, LinkState};
+use crate::text::Text;
 
 /// Pauses between tries. A person who starts the simulator waits for the first ones; a machine that is off for the
 /// night should not be bothered more often than the last.
@@ -15,7 +16,7 @@ const PAUSES: [Duration; 4] =
 pub struct Reconnect {
     source: CellSource,
     attempt: u32,
-    why: Option<String>,
+    why: Option<Text>,
     /// Since when a connection that once worked is gone.
     lost_since_s: Option<f64>,
     hopeless: bool,
@@ -47,7 +48,7 @@ impl Reconnect {
 
     /// The try failed.
     pub fn failed(&mut self, error: &PortError) -> LinkState {
-        self.why = Some(error.to_string());
+        self.why = Some(error.why().clone());
         self.hopeless = matches!(error, PortError::Hopeless(_));
         match self.lost_since_s {
             _ if self.hopeless => LinkState::Failed { why: self.reason() },
@@ -77,7 +78,7 @@ impl Reconnect {
         }
     }
 
-    fn reason(&self) -> String {
+    fn reason(&self) -> Text {
         self.why.clone().unwrap_or_default()
     }
 }
@@ -87,7 +88,7 @@ mod tests {
     use super::*;
 
     fn gone() -> PortError {
-        PortError::Lost("nothing answers".to_owned())
+        PortError::Lost(Text::verbatim("nothing answers"))
     }
 
     #[test]
@@ -131,9 +132,9 @@ mod tests {
     fn what_cannot_work_waits_for_the_user() {
         let mut reconnect = Reconnect::new(CellSource::BuiltIn);
         reconnect.trying();
-        let state = reconnect.failed(&PortError::Hopeless("no memory".to_owned()));
-        assert_eq!(state, LinkState::Failed { why: "no memory".to_owned() });
+        let state = reconnect.failed(&PortError::Hopeless(Text::verbatim("no memory")));
+        assert_eq!(state, LinkState::Failed { why: Text::verbatim("no memory") });
         assert_eq!(reconnect.pause(), None);
-        assert_eq!(reconnect.trying(), LinkState::StartingCell { why: Some("no memory".to_owned()) });
+        assert_eq!(reconnect.trying(), LinkState::StartingCell { why: Some(Text::verbatim("no memory")) });
     }
 }

@@ -6,6 +6,7 @@ use crossbeam_channel::{Receiver, bounded};
 use super::fake::FakeCell;
 use super::*;
 use crate::model::{Link, LinkState, Severity, Simulation};
+use crate::text::Text;
 
 /// A healthy worker answers within milliseconds; this is for a machine that does something else.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -78,12 +79,12 @@ fn both_connections_are_made_and_images_and_robot_arrive() {
 #[test]
 fn a_server_that_comes_up_later_is_found_without_being_asked() {
     let cell = FakeCell::new(1);
-    cell.script().refusals = vec![PortError::Lost("nothing answers".to_owned()); 4];
+    cell.script().refusals = vec![PortError::Lost(Text::verbatim("nothing answers")); 4];
     let mut bench = Bench::start(&CellSource::Address("tcp://fake:1".to_owned()), &cell);
     bench.until_link(
         Link::Camera,
         "the reason",
-        |state| matches!(state, LinkState::Searching { why: Some(why), .. } if why == "nothing answers"),
+        |state| matches!(state, LinkState::Searching { why: Some(why), .. } if why.foreign_words() == Some("nothing answers")),
     );
     bench.until_link(Link::Camera, "the camera", LinkState::is_connected);
 }
@@ -99,7 +100,7 @@ fn a_connection_that_breaks_is_reported_and_made_again() {
     for link in [Link::Camera, Link::Control] {
         bench.until_or_seen(
             link,
-            |state| matches!(state, LinkState::Lost { since_s, why, .. } if *since_s == 7.0 && why.contains("cable")),
+            |state| matches!(state, LinkState::Lost { since_s, why, .. } if *since_s == 7.0 && why.foreign_words().is_some_and(|why| why.contains("cable"))),
         );
     }
     cell.script().broken = false;
@@ -166,7 +167,7 @@ fn a_stop_reaches_the_arm() {
 #[test]
 fn a_stop_pressed_while_the_connection_is_down_is_carried_out_when_it_is_back() {
     let cell = FakeCell::new(1);
-    cell.script().refusals = vec![PortError::Lost("nothing answers".to_owned()); 6];
+    cell.script().refusals = vec![PortError::Lost(Text::verbatim("nothing answers")); 6];
     let mut bench = Bench::built_in(&cell);
     bench.workers.press_stop();
     bench.until("the confirmation", |event| matches!(event, Event::Stopped));
@@ -175,7 +176,7 @@ fn a_stop_pressed_while_the_connection_is_down_is_carried_out_when_it_is_back() 
 #[test]
 fn a_stop_that_fails_is_told_and_tried_again() {
     let cell = FakeCell::new(1);
-    cell.script().refuse_tasks = Some(PortError::Lost("the cable is out".to_owned()));
+    cell.script().refuse_tasks = Some(PortError::Lost(Text::verbatim("the cable is out")));
     let mut bench = Bench::built_in(&cell);
     bench.workers.press_stop();
     bench.until(
@@ -206,10 +207,10 @@ fn the_simulation_of_the_built_in_cell_is_started_and_that_of_somebody_else_is_n
 #[test]
 fn what_cannot_work_waits_for_the_user_and_is_then_tried_again() {
     let cell = FakeCell::new(1);
-    cell.script().refusals = vec![PortError::Hopeless("no free port".to_owned()); 2];
+    cell.script().refusals = vec![PortError::Hopeless(Text::verbatim("no free port")); 2];
     let mut bench = Bench::built_in(&cell);
     for link in [Link::Control, Link::Camera] {
-        bench.until_or_seen(link, |state| *state == LinkState::Failed { why: "no free port".to_owned() });
+        bench.until_or_seen(link, |state| *state == LinkState::Failed { why: Text::verbatim("no free port") });
     }
     bench.workers.ask_control(Request::Reconnect).expect("it takes requests");
     bench.until_link(Link::Control, "control", LinkState::is_connected);

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::convert::ConvertError;
 use super::endpoint::Endpoint;
+use super::sim::SimulationState;
 use crate::wire::{MAX_MESSAGE_BYTES, WireError};
 
 /// Why a call, or a task made of calls, has no result. Each message says what to do next.
@@ -159,12 +160,15 @@ pub enum LinkError {
         after: Duration,
     },
     /// The simulation does not run, so nothing would move and no image would be new.
-    #[error("{task}: the simulation is {state}; start it first")]
+    #[error("{task}: the simulation is {}", match state {
+        SimulationState::Paused => "paused; continue it first",
+        SimulationState::Stopped | SimulationState::Running => "stopped; start it first",
+    })]
     NotRunning {
         /// What was asked for.
         task: &'static str,
-        /// `stopped` or `paused`.
-        state: &'static str,
+        /// Paused or stopped.
+        state: SimulationState,
     },
     /// A joint cannot go there; the simulator would clamp it without a word.
     #[error("joint {joint} cannot go to {goal_deg:.2}°: its range is {min_deg:.1}° to {max_deg:.1}°")]

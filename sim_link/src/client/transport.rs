@@ -76,7 +76,7 @@ pub struct ZmqTransport {
     endpoint: Endpoint,
     heartbeat: Option<Duration>,
     serial: u64,
-    /// The last connection ended between two requests, and no request was sent since.
+    /// The last connection that was made has ended, and none was made since.
     lost: bool,
 }
 
@@ -231,7 +231,6 @@ impl Transport for ZmqTransport {
         let channel = self.ready()?;
         channel.request.send(message, zmq::DONTWAIT).map_err(|error| TransportFault::Refused(error.to_string()))?;
         channel.awaiting_reply = true;
-        self.lost = false;
         Ok(())
     }
 
@@ -246,10 +245,9 @@ impl Transport for ZmqTransport {
         channel.listen_to_monitor();
         // A reply that arrived before the connection broke is still a reply.
         let reply = channel.take_reply()?;
-        match channel.fault() {
-            Some(fault) if reply.is_none() => Err(fault),
-            _ => Ok(reply),
-        }
+        let fault = channel.fault().filter(|_| reply.is_none());
+        self.lost = fault == Some(TransportFault::Disconnected) || (self.lost && !channel.shaken_hands);
+        fault.map_or(Ok(reply), Err)
     }
 
     fn reset(&mut self) {

@@ -21,6 +21,7 @@ mod slow {
     mod first_user;
     mod following;
     mod fuzz;
+    mod interrupted;
     mod leaving;
     mod official_client;
     mod rerun_recording;

@@ -61,7 +61,7 @@ fn an_empty_session_says_what_to_do_and_captures() {
     assert!(pane.sees("No captures yet") && pane.sees("press Space"));
     assert_eq!(pane.click("Capture"), [Command::Capture(CapturePurpose::Calibrate)]);
     assert_eq!(pane.click("Capture for verification"), [Command::Capture(CapturePurpose::Verify)]);
-    pane.model().camera = crate::model::LinkState::Failed { why: "gone".to_owned() };
+    pane.model().camera = crate::model::LinkState::Failed { why: Text::verbatim("gone") };
     pane.steps();
     assert!(pane.click("Capture").is_empty(), "there is nothing to capture");
 }

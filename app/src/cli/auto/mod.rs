@@ -10,7 +10,7 @@ use handeye_core::estimate::{Method, Options};
 use handeye_core::project::session::{FolderLock, Session, SessionMeta, Store};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint};
+use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
 
 use super::cell::SceneArg;
 use super::output::Output;
@@ -86,6 +86,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let mut cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())
         .map_err(Failure::failed)?;
     let truth = cell.camera().ground_truth().map_err(Failure::failed)?;
+    let ran_before = cell.arm().sim().get_simulation_state().map_err(Failure::failed)? != SimulationState::Stopped;
 
     keep_earlier_session(&folder)?;
     // That it is another arm is no fault: its joint angles are then kept and not used.
@@ -112,11 +113,12 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         cancel: &cancel,
     }
     .run();
-    // Whatever happened on the way, the arm is not left moving and the simulation not running or waiting for steps.
+    // Whatever happened on the way, the arm is not left moving and the simulation not waiting for steps. It ends unless
+    // somebody else had started it.
     let ended = cell.arm().stop().and_then(|()| {
         let sim = cell.arm().sim();
         sim.set_stepping(false)?;
-        sim.stop_simulation()
+        if ran_before { Ok(()) } else { sim.stop_simulation() }
     });
     if captured.is_err() && !session.document().captures.is_empty() {
         let (count, folder) = (session.document().captures.len(), folder.display());

@@ -1,12 +1,13 @@
 //! Visiting the poses, with a capture at each.
 
-use std::time::Instant;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use handeye_core::progress::CancelToken;
 use handeye_core::project::session::Store;
 use handeye_core::project::taught_poses::Goal;
 use handeye_sim_link::client::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
-use handeye_sim_link::client::{CallOptions, LinkError};
+use handeye_sim_link::client::{CallOptions, LinkError, SimulationState};
 
 use super::super::{Failure, record};
 use super::poses::Plan;
@@ -15,9 +16,13 @@ use crate::model::{CaptureOptions, CapturePurpose, LiveFrame};
 use crate::rerun_log::Recorder;
 use crate::text::Language;
 
-/// How often a conversation that broke on the way to one pose is taken up again. A try waits for as long as a server may
-/// be silent, so that a network has some time to come back when the computer wakes up.
+/// How often a conversation that broke on the way to one pose is taken up again.
 const TRIES: u32 = 3;
+/// Pause before such a try: a network comes back when the computer wakes up, and a server that died is reported within
+/// two seconds.
+const BEFORE_TRY: Duration = Duration::from_millis(400);
+/// Between two looks at a simulation that is paused.
+const LOOK: Duration = Duration::from_millis(100);
 
 /// A sequence of the poses of a plan.
 pub struct PoseSequence<'a> {
@@ -131,20 +136,37 @@ impl PoseSequence<'_> {
         what: &str,
         mut work: impl FnMut(&mut Self) -> Result<T, LinkError>,
     ) -> Result<T, Failure> {
+        let mut tries = 0;
         let mut outcome = work(self);
-        for this in 1..=TRIES {
-            match outcome {
-                Err(error) if is_forgotten(&error) && !self.cancel.is_cancelled() => {
+        loop {
+            outcome = match outcome {
+                Err(LinkError::NotRunning { state: SimulationState::Paused, .. }) => {
+                    self.wait_out_pause(what).and_then(|()| work(self))
+                }
+                Err(error) if is_forgotten(&error) && !self.cancel.is_cancelled() && tries < TRIES => {
+                    tries += 1;
                     tracing::warn!(
-                        "on the way to {what}: {error}. If this computer was asleep, that is why; going on, try {this} of \
-                         {TRIES}"
+                        "on the way to {what}: {error}. If this computer was asleep, that is why; going on, try {tries} \
+                         of {TRIES}"
                     );
-                    outcome = self.take_up_again().and_then(|()| work(self));
+                    thread::sleep(BEFORE_TRY);
+                    self.take_up_again().and_then(|()| work(self))
                 }
                 outcome => return outcome.map_err(Failure::failed),
-            }
+            };
         }
-        outcome.map_err(Failure::failed)
+    }
+
+    /// Until somebody lets the simulation go on. One that is ended meanwhile is found out by what comes next.
+    fn wait_out_pause(&mut self, what: &str) -> Result<(), LinkError> {
+        tracing::warn!("on the way to {what}: the simulation is paused; this goes on when it does");
+        while self.cell.arm().sim().get_simulation_state()? == SimulationState::Paused {
+            if self.cancel.is_cancelled() {
+                return Err(LinkError::Cancelled { call: "waiting for the simulation to go on".to_owned() });
+            }
+            thread::sleep(LOOK);
+        }
+        Ok(())
     }
 
     /// As new clients: what the server may still keep for these would only be in the way.

@@ -15,7 +15,7 @@ use handeye_sim_link::client::cell::{
     Arm, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment, FollowWish as ArmWish,
     MotionTolerance, SettleOptions,
 };
-use handeye_sim_link::client::{ConnectionOptions, Endpoint};
+use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError, Sim, SimulationState};
 use serde_json::{Value, json};
 
 use crate::cli::{Failure, record};
@@ -116,13 +116,15 @@ impl Live {
         Ok(Self { arm, feed })
     }
 
-    /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns.
+    /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns. The summary is of what
+    /// was done, also where it ends with an error.
     pub fn run(
         mut self,
         job: &Job<'_>,
         cancel: &CancelToken,
         publish: &mut dyn FnMut(&Tracked) -> Result<(), Failure>,
-    ) -> Result<Summary, Failure> {
+        summary: &mut Summary,
+    ) -> Result<(), Failure> {
         if let Some(board) = &job.own_cell {
             self.prepare_own_cell(board, cancel)?;
         }
@@ -138,12 +140,11 @@ impl Live {
         let Self { mut arm, feed } = self;
         let wish = match job.task {
             Task::Watch => {
-                return Self::watch(feed, tracking, job, &line, cancel, &|| false, publish).map(|it| it.0);
+                return Self::watch(feed, tracking, job, &line, cancel, &|| false, publish, summary).map(drop);
             }
             Task::Reach { index, stand_off_m } => {
-                let (summary, newest) = Self::watch(feed, tracking, job, &line, cancel, &|| false, publish)?;
-                reach(&mut arm, job, newest, index, stand_off_m, cancel)?;
-                return Ok(summary);
+                let newest = Self::watch(feed, tracking, job, &line, cancel, &|| false, publish, summary)?;
+                return reach(&mut arm, job, newest, index, stand_off_m, cancel);
             }
             Task::Follow(wish) => wish,
         };
@@ -164,17 +165,17 @@ impl Live {
                 arm.follow(&kinematics, &FollowLimits::default(), &mut wanted)
             })
             .map_err(Failure::failed)?;
-        let watched = Self::watch(feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), publish);
+        let watched = Self::watch(feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), publish, summary);
         end.cancel();
         let followed = arm_thread
             .join()
             .map_err(|_panic| Failure::failed(anyhow::anyhow!("the thread that moves the arm ended with a panic")))?;
-        let (mut summary, _newest) = watched?;
+        watched?;
         summary.follow_ended = match followed.map_err(Failure::failed)? {
             FollowEnd::Released => line.take_ended().map(|why: Text| why.say(Language::English)),
             end => Some(end_of_following(end).say(Language::English)),
         };
-        Ok(summary)
+        Ok(())
     }
 
     /// Has the arm of the cell that this program started look at the board, and the board move.
@@ -205,23 +206,26 @@ impl Live {
         cancel: &CancelToken,
         arm_stands: &dyn Fn() -> bool,
         publish: &mut dyn FnMut(&Tracked) -> Result<(), Failure>,
-    ) -> Result<(Summary, Option<Estimate>), Failure> {
+        summary: &mut Summary,
+    ) -> Result<Option<Estimate>, Failure> {
         let frames = match job.task {
             Task::Reach { .. } => Some(job.frames.unwrap_or(IMAGES_BEFORE_REACH)),
             Task::Watch | Task::Follow(_) => job.frames,
         };
         let mut newest = None;
         let far_plane_m = feed.info().depth_optics.far_m as f32;
-        let mut summary = Summary::default();
         let began = Instant::now();
+        let mut pause = Pause::default();
         let mut seen_s = f64::NEG_INFINITY;
         let mut next_line_s = PROGRESS_S;
         while !cancel.is_cancelled() && !arm_stands() && frames.is_none_or(|frames| summary.frames < frames) {
             let now_s = feed.sim().get_simulation_time().map_err(Failure::failed)?;
             if now_s == seen_s {
+                pause.look(feed.sim()).map_err(Failure::failed)?;
                 std::thread::sleep(LOOK);
                 continue;
             }
+            pause.is_over();
             let frame = feed.grab().map_err(Failure::failed)?;
             let received_s = began.elapsed().as_secs_f64();
             seen_s = frame.sim_time_s;
@@ -251,7 +255,40 @@ impl Live {
                 tracing::info!("{}", progress(&tracked));
             }
         }
-        Ok((summary, newest))
+        Ok(newest)
+    }
+}
+
+/// How long time has to stand still before it is asked why: more than an image takes on a slow machine.
+const STANDS_STILL: Duration = Duration::from_secs(1);
+
+/// A simulation whose time stands still: said once, and waited for.
+#[derive(Default)]
+struct Pause {
+    since: Option<Instant>,
+    is_said: bool,
+}
+
+impl Pause {
+    fn look(&mut self, sim: &mut Sim) -> Result<(), LinkError> {
+        let since = *self.since.get_or_insert_with(Instant::now);
+        if self.is_said || since.elapsed() < STANDS_STILL {
+            return Ok(());
+        }
+        self.is_said = true;
+        match sim.get_simulation_state()? {
+            SimulationState::Running => tracing::warn!("the time of the simulation stands still: waiting for it"),
+            SimulationState::Paused => tracing::warn!("the simulation is paused: waiting until it is continued"),
+            SimulationState::Stopped => tracing::warn!("the simulation is stopped: waiting until it is started"),
+        }
+        Ok(())
+    }
+
+    fn is_over(&mut self) {
+        if self.is_said {
+            tracing::info!("the simulation goes on");
+        }
+        *self = Self::default();
     }
 }
 

@@ -17,7 +17,7 @@ use super::output::Output;
 use super::{Failure, RerunArg, out, rerun_arg, solve};
 use crate::model::{FollowWish, Tracked};
 use crate::rerun_log::{Pace, RerunChoice};
-use live::{Job, Live, Task};
+use live::{Job, Live, Summary, Task};
 
 /// Options of `handeye track`.
 #[derive(Debug, Args)]
@@ -132,8 +132,11 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         }
         Ok(())
     };
-    let summary = Live::connect(&endpoint)?.run(&job, &cancel, &mut add)?;
-    document.finish(&summary)?;
+    let mut summary = Summary::default();
+    let tracked = Live::connect(&endpoint).and_then(|live| live.run(&job, &cancel, &mut add, &mut summary));
+    // What was tracked before an error is as good as the rest.
+    document.finish(&summary, tracked.as_ref().err())?;
+    tracked?;
     if !args.json.as_ref().is_some_and(Output::is_standard) {
         out::print(&summary.text())?;
     }

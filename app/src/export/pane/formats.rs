@@ -78,7 +78,7 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
             ui.add(egui::Label::new(egui::RichText::new(said).small().color(warning)).wrap());
         }
         None => {
-            parts::caption_ui(ui, format.description());
+            parts::caption_ui(ui, &format.description().say(language));
         }
     });
 }

@@ -47,6 +47,7 @@ pub(crate) fn action_ui(ui: &mut Ui, action: Option<Action>, language: Language,
         None => return,
         Some(Action::Reconnect) => (tr!(language, "Try again now"), Command::Reconnect),
         Some(Action::StartSimulation) => (tr!(language, "Start simulation"), Command::StartSimulation),
+        Some(Action::ContinueSimulation) => (tr!(language, "Continue simulation"), Command::StartSimulation),
     };
     if ui.button(text).clicked() {
         outbox.send(command);

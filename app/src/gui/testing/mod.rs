@@ -19,6 +19,7 @@ use crate::model::{
 };
 use crate::rerun_log::RerunChoice;
 use crate::settings::SettingsFile;
+use crate::text::Text;
 use crate::worker::fake::FakeCell;
 use crate::worker::{Clock, Connector, PortError, Waker};
 
@@ -49,7 +50,7 @@ impl Silent {
     pub fn built(source: CellSource, builder: HarnessBuilder<Window>) -> Self {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
-        cell.script().refusals = vec![PortError::Hopeless("not in this test".to_owned()); 2];
+        cell.script().refusals = vec![PortError::Hopeless(Text::verbatim("not in this test")); 2];
         let connect: Connect = Arc::new(move |_source| Arc::new(cell.clone()) as Arc<dyn Connector>);
         let clock: Clock = Arc::new(|| 100.0);
         let (wake, woken) = crossbeam_channel::bounded(1);

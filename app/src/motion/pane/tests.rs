@@ -74,7 +74,7 @@ fn the_arm_is_let_go_when_the_window_loses_the_focus() {
 fn the_arm_is_let_go_when_the_connection_is_lost() {
     let mut pane = driven(sample::connected());
     hold(&mut pane, "Turn −Z");
-    pane.model().mover = LinkState::Failed { why: "gone".to_owned() };
+    pane.model().mover = LinkState::Failed { why: Text::verbatim("gone") };
     pane.steps();
     assert_eq!(pane.commands(), [Command::JogReleased]);
 }

@@ -102,7 +102,7 @@ fn all_poses_are_run_for_each_purpose() {
     assert_eq!(pane.click("Capture at each"), [calibrate]);
     assert_eq!(pane.click("Verify at each"), [Command::RunSequence { purpose: Some(CapturePurpose::Verify) }]);
     assert_eq!(pane.click("Move only"), [Command::RunSequence { purpose: None }]);
-    pane.model().mover = LinkState::Failed { why: "gone".to_owned() };
+    pane.model().mover = LinkState::Failed { why: Text::verbatim("gone") };
     pane.steps();
     assert!(!pane.is_enabled("Capture at each") && !pane.is_enabled("Go to front"));
 }

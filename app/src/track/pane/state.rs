@@ -3,6 +3,7 @@
 use egui::{RichText, Ui};
 use handeye_core::track::State;
 
+use crate::gui::status::STALE_AFTER_S;
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
 use crate::model::Model;
@@ -17,6 +18,13 @@ pub fn state(model: &Model) -> (Option<Tone>, Text) {
     let Some(newest) = &model.track.newest else {
         return (Some(Tone::Busy), text!("Waiting for the first image…"));
     };
+    // What was seen before the camera went is history.
+    if !model.camera.is_connected() {
+        return (Some(Tone::Bad), text!("No connection to the camera: the board is not tracked"));
+    }
+    if model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S) {
+        return (Some(Tone::Warning), text!("No new images: the board is where it was seen last"));
+    }
     let update = &newest.update;
     let ago = |since_s: f64| format!("{:.1}", (update.time_s - since_s).max(0.0));
     match update.state {

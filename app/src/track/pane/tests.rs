@@ -53,7 +53,7 @@ fn tracking_says_why_it_cannot_begin() {
     assert!(pane.sees("There is no hand-eye calibration yet"));
     assert!(!pane.is_enabled("Start tracking") && !pane.is_enabled("Follow"));
     let mut model = sample::solved();
-    model.camera = LinkState::Failed { why: "gone".to_owned() };
+    model.camera = LinkState::Failed { why: Text::verbatim("gone") };
     pane = driven(model);
     assert!(pane.sees("Not connected: connect to the cell first"));
     assert!(!pane.is_enabled("Start tracking"));
@@ -172,7 +172,7 @@ fn the_arm_says_why_it_cannot_follow() {
         assert!(!pane.is_enabled("Follow"), "{words}");
     };
     blocked(|model| model.track.on = false, "Start tracking first");
-    blocked(|model| model.mover = LinkState::Failed { why: "gone".to_owned() }, "the arm cannot be moved until");
+    blocked(|model| model.mover = LinkState::Failed { why: Text::verbatim("gone") }, "the arm cannot be moved until");
     blocked(|model| model.sequence_runs = true, "A sequence is under way");
     let unknown = |model: &mut Model| model.cell.iter_mut().for_each(|cell| cell.arm = None);
     blocked(unknown, "This arm's kinematics is not known");

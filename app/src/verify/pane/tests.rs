@@ -11,6 +11,7 @@ use crate::model::{
     CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, Pane, PickedPoint, PoseSequence, Severity, Solved,
     StopOutcome,
 };
+use crate::text::Text;
 
 fn driven(model: Model) -> Driven {
     Driven::new(verify_ui, model)
@@ -39,7 +40,7 @@ fn a_capture_for_verification_is_asked_for_and_cancelled() {
     assert!(!pane.is_enabled("Capture for verification"));
     assert_eq!(pane.click("Cancel capture"), [Command::CancelCapture]);
     pane.model().capture = None;
-    pane.model().camera = LinkState::Failed { why: "gone".to_owned() };
+    pane.model().camera = LinkState::Failed { why: Text::verbatim("gone") };
     pane.steps();
     assert!(pane.sees("Not connected"));
 }
@@ -134,8 +135,8 @@ fn captures_at_planned_poses_are_offered_where_they_can_be_taken_and_say_what_is
         assert!(!driven(model).is_enabled(PLANNED));
     };
     is_blocked(|model| model.solve.solved = None);
-    is_blocked(|model| model.mover = LinkState::Failed { why: "gone".to_owned() });
-    is_blocked(|model| model.camera = LinkState::Failed { why: "gone".to_owned() });
+    is_blocked(|model| model.mover = LinkState::Failed { why: Text::verbatim("gone") });
+    is_blocked(|model| model.camera = LinkState::Failed { why: Text::verbatim("gone") });
     is_blocked(|model| model.cell.iter_mut().for_each(|cell| cell.arm = None));
     is_blocked(|model| {
         model.motion = crate::model::Motion::Jogging(crate::model::Jog::Joint { index: 0, forward: true });

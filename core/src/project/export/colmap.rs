@@ -11,6 +11,7 @@ use super::text::{compare_isometry, compare_numbers, compare_text, made_by, pars
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Camera, Pose};
+use crate::wording::Text;
 
 pub(super) struct Colmap;
 
@@ -106,8 +107,8 @@ impl Format for Colmap {
         "colmap"
     }
 
-    fn description(&self) -> &'static str {
-        "text model with the camera's pose in every image, in the robot's base (COLMAP)"
+    fn description(&self) -> Text {
+        crate::text!("text model with the camera's pose in every image, in the robot's base (COLMAP)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

@@ -8,6 +8,7 @@ use super::text::{Rotation, about_transform, entries, quoted};
 use super::yaml::{Leaf, Yaml};
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::estimate::handeye::Mode;
+use crate::wording::Text;
 
 pub(super) struct EasyHandeye;
 
@@ -25,8 +26,8 @@ impl Format for EasyHandeye {
         "easy_handeye"
     }
 
-    fn description(&self) -> &'static str {
-        "YAML file for the publisher of easy_handeye (ROS 1)"
+    fn description(&self) -> Text {
+        crate::text!("YAML file for the publisher of easy_handeye (ROS 1)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

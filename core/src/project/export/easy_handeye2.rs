@@ -7,6 +7,7 @@ use super::text::{Rotation, about_transform, entries, quoted};
 use super::yaml::{Leaf, Yaml};
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::estimate::handeye::Mode;
+use crate::wording::Text;
 
 pub(super) struct EasyHandeye2;
 
@@ -22,8 +23,8 @@ impl Format for EasyHandeye2 {
         "easy_handeye2"
     }
 
-    fn description(&self) -> &'static str {
-        ".calib file for the publisher of easy_handeye2 (ROS 2)"
+    fn description(&self) -> Text {
+        crate::text!(".calib file for the publisher of easy_handeye2 (ROS 2)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

@@ -9,6 +9,7 @@ use super::text::compare_numbers;
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::project::files::json_text;
 use crate::project::result::ResultProblem;
+use crate::wording::Text;
 
 pub(super) struct Ethz;
 
@@ -42,8 +43,8 @@ impl Format for Ethz {
         "ethz"
     }
 
-    fn description(&self) -> &'static str {
-        "JSON of ETH Zürich's hand_eye_calibration"
+    fn description(&self) -> Text {
+        crate::text!("JSON of ETH Zürich's hand_eye_calibration")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

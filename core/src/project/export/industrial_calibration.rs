@@ -13,6 +13,7 @@ use super::yaml::{Leaf, Yaml};
 use super::{ExportError, ExportFile, ExportInput, Format, rotation};
 use crate::estimate::handeye::Mode;
 use crate::geometry::frames::{Anchor, Pose, Target};
+use crate::wording::Text;
 
 pub(super) struct IndustrialCalibration;
 
@@ -50,8 +51,8 @@ impl Format for IndustrialCalibration {
         "industrial_calibration"
     }
 
-    fn description(&self) -> &'static str {
-        "result YAML of industrial_calibration with hand-eye and target (ROS-Industrial)"
+    fn description(&self) -> Text {
+        crate::text!("result YAML of industrial_calibration with hand-eye and target (ROS-Industrial)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

@@ -2,6 +2,7 @@
 
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::project::result::CalibrationResult;
+use crate::wording::Text;
 
 pub(super) struct Json;
 
@@ -10,8 +11,8 @@ impl Format for Json {
         "json"
     }
 
-    fn description(&self) -> &'static str {
-        "handeye's own result with covariances, quality and provenance"
+    fn description(&self) -> Text {
+        crate::text!("handeye's own result with covariances, quality and provenance")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

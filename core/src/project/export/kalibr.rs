@@ -6,6 +6,7 @@ use super::text::{about_intrinsics, numbers};
 use super::yaml::{Leaf, Yaml};
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::wording::Text;
 
 pub(super) struct Kalibr;
 
@@ -37,8 +38,8 @@ impl Format for Kalibr {
         "kalibr"
     }
 
-    fn description(&self) -> &'static str {
-        "camchain.yaml of Kalibr with one camera (intrinsics)"
+    fn description(&self) -> Text {
+        crate::text!("camchain.yaml of Kalibr with one camera (intrinsics)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

@@ -7,6 +7,7 @@ use super::input::NamedTransform;
 use super::text::{Rotation, about_intrinsics, about_transform, compare_numbers, compare_text, numbers, parse_number};
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::wording::Text;
 
 pub(super) struct Matlab;
 
@@ -76,8 +77,8 @@ impl Format for Matlab {
         "matlab"
     }
 
-    fn description(&self) -> &'static str {
-        "script with cameraParameters and rigidtform3d (MATLAB R2022b or later)"
+    fn description(&self) -> Text {
+        crate::text!("script with cameraParameters and rigidtform3d (MATLAB R2022b or later)")
     }
 
     /// Writes what the result has, camera, hand-eye or both.

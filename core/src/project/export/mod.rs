@@ -37,6 +37,7 @@ use std::path::{Path, PathBuf};
 use crate::project::files::image_file::one_line;
 use crate::project::files::{atomic_file, own_folder};
 use crate::project::result::ResultProblem;
+use crate::wording::Text;
 
 pub use error::ExportError;
 pub use input::{ExportInput, ExportView};
@@ -66,7 +67,7 @@ pub trait Format: Send + Sync {
     fn name(&self) -> &'static str;
 
     /// What it is and who reads it, in half a sentence.
-    fn description(&self) -> &'static str;
+    fn description(&self) -> Text;
 
     /// The files of an input that was checked; [`preview`] checks it.
     ///

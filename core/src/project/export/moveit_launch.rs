@@ -7,6 +7,7 @@ use super::input::NamedTransform;
 use super::text::{Rotation, about_transform, compare_numbers, compare_text, parse_exactly, spaced};
 use super::urdf::{compare_origin, origin};
 use super::{ExportError, ExportFile, ExportInput, Format, xml};
+use crate::wording::Text;
 
 pub(super) struct MoveitLaunch;
 
@@ -15,8 +16,8 @@ impl Format for MoveitLaunch {
         "moveit_launch"
     }
 
-    fn description(&self) -> &'static str {
-        "launch file that publishes the hand-eye on tf, as MoveIt Calibration writes it (ROS 1)"
+    fn description(&self) -> Text {
+        crate::text!("launch file that publishes the hand-eye on tf, as MoveIt Calibration writes it (ROS 1)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

@@ -10,6 +10,7 @@ use super::text::{numbers, parse_number};
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::se3;
+use crate::wording::Text;
 
 pub(super) struct Mrcal;
 
@@ -45,8 +46,8 @@ impl Format for Mrcal {
         "mrcal"
     }
 
-    fn description(&self) -> &'static str {
-        ".cameramodel of mrcal with intrinsics, and the hand-eye as extrinsics"
+    fn description(&self) -> Text {
+        crate::text!(".cameramodel of mrcal with intrinsics, and the hand-eye as extrinsics")
     }
 
     /// Needs intrinsics; without a hand-eye the extrinsics are the identity, and the comment says so.

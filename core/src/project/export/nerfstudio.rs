@@ -13,6 +13,7 @@ use super::{ExportError, ExportFile, ExportInput, Format, rotation};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::project::files::json_text;
 use crate::project::result::ResultProblem;
+use crate::wording::Text;
 
 pub(super) struct Nerfstudio;
 
@@ -83,8 +84,8 @@ impl Format for Nerfstudio {
         "nerfstudio"
     }
 
-    fn description(&self) -> &'static str {
-        "transforms.json with the camera's pose in every image, in the robot's base (nerfstudio)"
+    fn description(&self) -> Text {
+        crate::text!("transforms.json with the camera's pose in every image, in the robot's base (nerfstudio)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

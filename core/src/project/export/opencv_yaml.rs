@@ -9,6 +9,7 @@ use super::text::{Rotation, about_intrinsics, about_transform, entry, numbers};
 use super::yaml::{Leaf, Yaml};
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::wording::Text;
 
 pub(super) struct OpencvYaml;
 
@@ -41,8 +42,8 @@ impl Format for OpencvYaml {
         "opencv_yaml"
     }
 
-    fn description(&self) -> &'static str {
-        "YAML for cv::FileStorage with camera matrix, distortion and hand-eye matrix"
+    fn description(&self) -> Text {
+        crate::text!("YAML for cv::FileStorage with camera matrix, distortion and hand-eye matrix")
     }
 
     /// Writes what the result has, intrinsics, hand-eye or both; a result without either is refused.

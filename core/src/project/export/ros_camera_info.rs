@@ -8,6 +8,7 @@ use super::text::{about_intrinsics, numbers, quoted};
 use super::yaml::{Leaf, Yaml};
 use super::{ExportError, ExportFile, ExportInput, Format};
 use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::wording::Text;
 
 pub(super) struct RosCameraInfo;
 
@@ -42,8 +43,8 @@ impl Format for RosCameraInfo {
         "ros_camera_info"
     }
 
-    fn description(&self) -> &'static str {
-        "camera_info YAML that ROS camera drivers load (intrinsics)"
+    fn description(&self) -> Text {
+        crate::text!("camera_info YAML that ROS camera drivers load (intrinsics)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

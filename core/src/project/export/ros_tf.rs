@@ -5,6 +5,7 @@
 use super::text::{Rotation, about_transform, entries, quoted};
 use super::yaml::{Leaf, Yaml};
 use super::{ExportError, ExportFile, ExportInput, Format};
+use crate::wording::Text;
 
 pub(super) struct RosTf;
 
@@ -13,8 +14,8 @@ impl Format for RosTf {
         "ros_tf"
     }
 
-    fn description(&self) -> &'static str {
-        "geometry_msgs/TransformStamped as YAML (ROS 2)"
+    fn description(&self) -> Text {
+        crate::text!("geometry_msgs/TransformStamped as YAML (ROS 2)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

@@ -12,6 +12,7 @@ use super::text::{
     Rotation, about_transform, compare_isometry, compare_numbers, compare_text, number, parse_exactly, spaced,
 };
 use super::{ExportError, ExportFile, ExportInput, Format, rotation};
+use crate::wording::Text;
 
 /// `ros2 run tf2_ros static_transform_publisher` with flags.
 pub(super) struct Ros2;
@@ -72,8 +73,8 @@ impl Format for Ros2 {
         "static_transform_ros2"
     }
 
-    fn description(&self) -> &'static str {
-        "shell script that publishes the hand-eye on tf (ROS 2, Humble and later)"
+    fn description(&self) -> Text {
+        crate::text!("shell script that publishes the hand-eye on tf (ROS 2, Humble and later)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {
@@ -118,8 +119,8 @@ impl Format for Ros1 {
         "static_transform_ros1"
     }
 
-    fn description(&self) -> &'static str {
-        "shell script that publishes the hand-eye on tf (ROS 1)"
+    fn description(&self) -> Text {
+        crate::text!("shell script that publishes the hand-eye on tf (ROS 1)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Translation3};
 use super::input::NamedTransform;
 use super::text::{Rotation, about_transform, compare_isometry, compare_text, spaced};
 use super::{ExportError, ExportFile, ExportInput, Format, rotation, xml};
+use crate::wording::Text;
 
 pub(super) struct Urdf;
 
@@ -35,8 +36,8 @@ impl Format for Urdf {
         "urdf"
     }
 
-    fn description(&self) -> &'static str {
-        "link and fixed joint of the camera for a robot description (ROS, Isaac, simulators)"
+    fn description(&self) -> Text {
+        crate::text!("link and fixed joint of the camera for a robot description (ROS, Isaac, simulators)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

@@ -18,6 +18,7 @@ use super::{ExportError, ExportFile, ExportInput, Format, xml};
 use crate::estimate::handeye::Mode;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::se3;
+use crate::wording::Text;
 
 pub(super) struct Visp;
 
@@ -78,8 +79,8 @@ impl Format for Visp {
         "visp"
     }
 
-    fn description(&self) -> &'static str {
-        "vpPoseVector YAML of the hand-eye, and camera XML for a lens without distortion (ViSP)"
+    fn description(&self) -> Text {
+        crate::text!("vpPoseVector YAML of the hand-eye, and camera XML for a lens without distortion (ViSP)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

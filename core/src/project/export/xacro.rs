@@ -4,6 +4,7 @@ use super::input::NamedTransform;
 use super::text::{Rotation, about_transform, compare_text, identifier};
 use super::urdf::{compare_origin, joint_name, origin};
 use super::{ExportError, ExportFile, ExportInput, Format, xml};
+use crate::wording::Text;
 
 pub(super) struct Xacro;
 
@@ -20,8 +21,8 @@ impl Format for Xacro {
         "xacro"
     }
 
-    fn description(&self) -> &'static str {
-        "macro with link and fixed joint of the camera, to include in a robot description (ROS)"
+    fn description(&self) -> Text {
+        crate::text!("macro with link and fixed joint of the camera, to include in a robot description (ROS)")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

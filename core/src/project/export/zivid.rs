@@ -4,6 +4,7 @@ use super::input::NamedTransform;
 use super::text::{Rotation, about_transform, numbers};
 use super::yaml::{Leaf, Yaml};
 use super::{ExportError, ExportFile, ExportInput, Format};
+use crate::wording::Text;
 
 pub(super) struct Zivid;
 
@@ -20,8 +21,8 @@ impl Format for Zivid {
         "zivid"
     }
 
-    fn description(&self) -> &'static str {
-        "4x4 matrix in millimetres for the Zivid SDK and its hand-eye samples"
+    fn description(&self) -> Text {
+        crate::text!("4x4 matrix in millimetres for the Zivid SDK and its hand-eye samples")
     }
 
     fn render(&self, input: &ExportInput<'_>) -> Result<Vec<ExportFile>, ExportError> {

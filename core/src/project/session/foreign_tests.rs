@@ -183,8 +183,8 @@ fn journal_and_images_alone_are_the_session() {
 fn depth_that_is_gone_is_missed_where_it_is_needed() {
     let home = folder();
     let mut store = store_with(home.path(), 0);
-    let (picture, depth) = (image(1), crate::project::session::tests::depth());
-    store.add_capture(&Capture { depth_m: Some(&depth), ..Capture::new(&picture, pose(1)) }).expect("add");
+    let (rgb, depth) = (image(1), crate::project::session::tests::depth());
+    store.add_capture(&Capture { depth_m: Some(&depth), ..Capture::new(&rgb, pose(1)) }).expect("add");
     drop(store);
     fs::remove_file(home.path().join("depth/0001.tiff")).expect("removed");
     let session = Session::open(home.path()).expect("a calibration needs no depth");

@@ -267,7 +267,10 @@ impl Arm {
                 Point { joints, target: goal.map(|goal| goal.base_from_tip) }
             })?;
             match pass {
-                Pass::NotFollowing { joint, .. } => return Ok(FollowEnd::NotFollowing { joint: joint + 1 }),
+                Pass::NotFollowing { joint, .. } => {
+                    require_running(&mut self.sim, TASK)?;
+                    return Ok(FollowEnd::NotFollowing { joint: joint + 1 });
+                }
                 Pass::None => require_running(&mut self.sim, TASK)?,
                 Pass::Sent if stream.is_stopped() => ending = Some(Ok(FollowEnd::Stopped)),
                 Pass::Sent => ending = ending.or(plan.obstacle().map(Ok)),

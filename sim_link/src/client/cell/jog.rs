@@ -125,7 +125,10 @@ impl Arm {
                 Point { joints: plan.advance(share), target: None }
             })?;
             match pass {
-                Pass::NotFollowing { joint, .. } => return Ok(JogEnd::NotFollowing { joint: joint + 1 }),
+                Pass::NotFollowing { joint, .. } => {
+                    require_running(&mut self.sim, TASK)?;
+                    return Ok(JogEnd::NotFollowing { joint: joint + 1 });
+                }
                 Pass::None => require_running(&mut self.sim, TASK)?,
                 Pass::Sent if plan.is_at_end() => return Ok(JogEnd::Arrived),
                 Pass::Sent if plan.is_at_rest() => match plan.obstacle() {

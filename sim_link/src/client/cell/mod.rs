@@ -263,8 +263,7 @@ fn named(found: Result<ObjectHandle, LinkError>, path: &str, what: &'static str)
 fn require_running(sim: &mut Sim, task: &'static str) -> Result<(), LinkError> {
     match sim.get_simulation_state()? {
         SimulationState::Running => Ok(()),
-        SimulationState::Paused => Err(LinkError::NotRunning { task, state: "paused" }),
-        SimulationState::Stopped => Err(LinkError::NotRunning { task, state: "stopped" }),
+        state => Err(LinkError::NotRunning { task, state }),
     }
 }
 

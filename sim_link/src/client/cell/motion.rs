@@ -347,7 +347,11 @@ impl Arm {
                 Point { joints: sent, target: None }
             })?;
             match pass {
-                Pass::NotFollowing { joint, at_rad } => return Err(joint_elsewhere(joint, at_rad, sent[joint])),
+                Pass::NotFollowing { joint, at_rad } => {
+                    // A simulation that is ended puts the joints back.
+                    require_running(&mut self.sim, task)?;
+                    return Err(joint_elsewhere(joint, at_rad, sent[joint]));
+                }
                 Pass::None => require_running(&mut self.sim, task)?,
                 Pass::Sent if !way.is_over() => {}
                 Pass::Sent if stream.is_stopped() => return Err(LinkError::MotionStopped { task }),

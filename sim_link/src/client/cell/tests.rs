@@ -467,7 +467,7 @@ fn a_server_that_dies_in_a_motion_is_reported_without_further_calls() {
 
 #[test]
 fn nothing_moves_while_the_simulation_does_not_run() {
-    for (state, expected) in [(0, "stopped"), (8, "paused")] {
+    for (state, expected) in [(0, SimulationState::Stopped), (8, SimulationState::Paused)] {
         let world = world();
         edit(&world, |w| w.state = state);
         let mut cell = cell(world);

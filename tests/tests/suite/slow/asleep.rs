@@ -1,8 +1,8 @@
 //! `handeye auto` on a computer that falls asleep.
 
-use std::io::{BufRead as _, BufReader, Read as _};
+use std::io::{BufReader, Read as _};
 use std::path::Path;
-use std::process::{Child, ChildStderr, Command, Stdio};
+use std::process::{Child, ChildStderr};
 use std::time::{Duration, Instant};
 
 use handeye_core::project::result::CalibrationResult;
@@ -11,30 +11,14 @@ use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::ConnectionOptions;
 use handeye_sim_link::client::cell::{Arm, CellPaths};
-use handeye_tests::process::{end_of, put_to_sleep, signal};
+use handeye_tests::process::{end_of, put_to_sleep, signal, start, until_said};
 
 /// Longer than anything that is waited for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(4);
 
 fn auto(out: &Path, arguments: &[&str]) -> (Child, BufReader<ChildStderr>) {
-    let mut child = Command::new(handeye_tests::handeye_binary())
-        .args(["auto", "--rerun", "off", "--out"])
-        .arg(out)
-        .args(arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("handeye runs");
-    let said = BufReader::new(child.stderr.take().expect("its messages"));
-    (child, said)
-}
-
-/// Reads what it says until something is said.
-fn until_said(said: &mut BufReader<ChildStderr>, what: &str) {
-    let mut all = String::new();
-    while !all.contains(what) {
-        assert!(said.read_line(&mut all).is_ok_and(|bytes| bytes > 0), "{all}");
-    }
+    let out = out.display().to_string();
+    start(&[&["auto", "--rerun", "off", "--out", &out], arguments].concat())
 }
 
 fn check(mut child: Child, mut said: BufReader<ChildStderr>, out: &Path) -> String {
