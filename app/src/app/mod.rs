@@ -47,9 +47,9 @@ pub struct App {
     pub(crate) waker: Waker,
     pub(crate) numbers: Numbers,
     /// The question that the solver was asked last.
-    pub(crate) asked: Option<crate::solve::update::Question>,
+    pub(crate) asked: Option<crate::solve::question::Question>,
     pub(crate) recorder: Recorder,
-    pub(crate) recorded: crate::rerun_log::update::Recorded,
+    pub(crate) recorded: crate::rerun_log::recorded::Recorded,
     /// Until when everything has to be over, once the application ends.
     pub(crate) leave_by: Option<Instant>,
 }
@@ -84,7 +84,7 @@ impl App {
         let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
         let model = Model { addresses, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
         let numbers = Numbers::default();
-        let recorded = crate::rerun_log::update::Recorded::default();
+        let recorded = crate::rerun_log::recorded::Recorded::default();
         let mut app = Self {
             model,
             workers,

@@ -22,7 +22,8 @@ mod track;
 use std::io::{IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use crate::gui::GuiArgs;
+use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 pub use failure::Failure;
@@ -65,20 +66,6 @@ enum Command {
     /// Print a target as a PDF at exact physical scale, with rulers to check the print.
     #[command(after_help = target::EXAMPLES)]
     Target(target::TargetArgs),
-}
-
-/// Options of the workbench.
-#[derive(Debug, Args, Default)]
-pub struct GuiArgs {
-    /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
-    #[arg(long, value_name = "ADDR")]
-    pub connect: Option<String>,
-    /// Session folder to open, or to create.
-    #[arg(long, value_name = "DIR")]
-    pub session: Option<std::path::PathBuf>,
-    /// Where the recording goes; beside the session if not given.
-    #[command(flatten)]
-    pub rerun: RerunArg,
 }
 
 /// Runs the program with the arguments of the process.

@@ -4,6 +4,7 @@
 //! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
 
 mod actions;
+mod args;
 mod arrival;
 mod dialogs;
 mod help;
@@ -20,6 +21,7 @@ pub(crate) mod testing;
 mod widget_list;
 mod window;
 
+pub use args::GuiArgs;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -28,7 +30,6 @@ use eframe::NativeOptions;
 use egui::ViewportBuilder;
 
 use crate::app::{App, Connect, Start};
-use crate::cli::GuiArgs;
 use crate::command::Event;
 pub use crate::gui::shell::layout::Layout;
 use crate::model::CellSource;

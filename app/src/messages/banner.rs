@@ -3,8 +3,8 @@
 use egui::{Align, CornerRadius, Frame, Label, Layout, Margin, Rect, RichText, Stroke, Ui, UiBuilder};
 
 use crate::command::Outbox;
-use crate::gui::shell::action_ui;
 use crate::gui::status::Status;
+use crate::gui::style::action::action_ui;
 use crate::gui::style::theme::{CARD_RADIUS, Palette};
 use crate::text::Language;
 

@@ -8,12 +8,11 @@ use handeye_sim_link::client::cell::{
 use handeye_sim_link::client::{CancelToken, LinkError, SimulationState};
 use nalgebra::Vector3;
 
-use crate::limits;
 use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
-use crate::text;
 use crate::text::Text;
-use crate::worker::live::{check_arm, port_error};
+use crate::worker::cell_error::{check_arm, port_error};
 use crate::worker::port::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use crate::{limits, text};
 
 /// A connection that moves the arm.
 pub(crate) struct LiveMotion {

@@ -22,6 +22,7 @@ mod lasting;
 mod native;
 mod pump;
 mod queue;
+pub(crate) mod recorded;
 mod recorder;
 mod report;
 mod reports;

@@ -2,22 +2,11 @@
 
 use std::sync::Arc;
 
-use handeye_core::project::session::CaptureId;
-
 use crate::app::App;
 use crate::command::{Event, SolveOutcome};
-use crate::model::{Dialog, Step};
+use crate::model::Dialog;
 use crate::rerun_log::{Entry, ViewerWish};
 use crate::text::Language;
-
-/// What of the model was noted already.
-#[derive(Debug, Default)]
-pub(crate) struct Recorded {
-    step: Option<Step>,
-    selection: Vec<CaptureId>,
-    /// Messages with smaller numbers.
-    said: u64,
-}
 
 impl App {
     pub(crate) fn open_rerun(&mut self) {

@@ -4,6 +4,7 @@ pub(crate) mod charts;
 pub(crate) mod estimated;
 pub(crate) mod observer;
 pub(crate) mod pane;
+pub(crate) mod question;
 pub(crate) mod state;
 pub(crate) mod tip_box;
 pub(crate) mod update;

@@ -5,30 +5,16 @@ use std::sync::Arc;
 use handeye_core::estimate::handeye::motion::MIN_VIEWS;
 use handeye_core::estimate::{Method, Options};
 use handeye_core::progress::Stage;
-use handeye_core::project::session::{CaptureId, Document, Role, SessionObservations};
+use handeye_core::project::session::{CaptureId, Document, SessionObservations};
 use handeye_core::targets::observation::Corner;
 
+use super::question::Question;
 use crate::app::App;
 use crate::command::SolveOutcome;
 use crate::model::{BoxState, Goal, JobId, Severity, SolveState, SolveStatus, WorkBox, judge_box};
 use crate::text;
 use crate::text::Text;
 use crate::worker::{ArchiveTask, SolveJob};
-
-/// What a calibration depends on. When it is another, there is something to solve.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Question {
-    meta: (
-        handeye_core::estimate::handeye::Mode,
-        handeye_core::targets::TargetSpec,
-        Option<handeye_core::project::dataset::CameraInput>,
-    ),
-    captures: Vec<(CaptureId, Role, bool, bool)>,
-    folder: Option<std::path::PathBuf>,
-    method: String,
-    keep_outliers: bool,
-    goal: Goal,
-}
 
 impl App {
     fn question(&self) -> Question {

@@ -8,10 +8,10 @@ use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState};
 
+use super::cell_error::{check, check_arm, port_error};
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
 use crate::model::{BoardMotion, CellFacts, CellSource, RobotState, Simulation};
 use crate::motion::live::LiveMotion;
-use crate::text;
 use crate::text::Text;
 
 /// Connects to the cell that the window was started for.
@@ -112,16 +112,6 @@ struct LiveControl {
     arm: Arm,
 }
 
-/// Whether the cell is there, as far as is known without asking: a call to a server that has gone would wait for one to
-/// come back.
-pub(crate) fn check_arm(arm: &mut Arm) -> Result<(), PortError> {
-    check(arm.sim().connection().is_connected())
-}
-
-fn check(is_connected: bool) -> Result<(), PortError> {
-    if is_connected { Ok(()) } else { Err(PortError::Lost(closed())) }
-}
-
 impl ControlPort for LiveControl {
     fn facts(&mut self) -> Result<CellFacts, PortError> {
         let kinematics = self.arm.kinematics().map_err(port_error)?;
@@ -205,27 +195,4 @@ fn start_built_in() -> Result<CellServer, PortError> {
     let hopeless = |error: &dyn Display| PortError::Hopeless(Text::verbatim(error.to_string()));
     let scene = Scene::reference().map_err(|error| hopeless(&error))?;
     CellServer::start(CellConfig::new(scene)).map_err(|error| hopeless(&error))
-}
-
-pub(crate) fn port_error(error: LinkError) -> PortError {
-    let text = match &error {
-        // Which call found out is of no interest when nobody is there for any call.
-        LinkError::Unreachable { endpoint, .. } => text!(
-            "Nothing answers at {endpoint}. Start CoppeliaSim or a cell there, check that its ZMQ remote API add-on is \
-             enabled and which port its status bar shows (usually 23000).",
-            endpoint = endpoint
-        ),
-        LinkError::Disconnected { .. } => closed(),
-        other => Text::verbatim(other.to_string()),
-    };
-    match error {
-        LinkError::BadEndpoint { .. } => PortError::Hopeless(text),
-        error if error.is_connection_loss() => PortError::Lost(text),
-        _ => PortError::Refused(text),
-    }
-}
-
-/// Why nothing answers now.
-fn closed() -> Text {
-    text!("The server closed the connection. Start it again if it has ended.")
 }

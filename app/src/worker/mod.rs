@@ -10,6 +10,7 @@
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (images,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
 
+pub(crate) mod cell_error;
 pub(crate) mod files;
 pub(crate) mod link;
 pub(crate) mod live;
@@ -17,6 +18,7 @@ pub(crate) mod newest;
 pub(crate) mod port;
 pub(crate) mod rate;
 pub(crate) mod reconnect;
+mod shared;
 pub(crate) mod slot;
 pub(crate) mod started;
 mod vision;
@@ -24,6 +26,8 @@ mod vision;
 #[cfg(test)]
 pub mod fake;
 
+pub use shared::{Busy, Clock, JOIN_DEADLINE, Waker};
+pub(crate) use shared::{MAX_EVENTS, MAX_REQUESTS, POLL};
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -66,29 +70,6 @@ use link::{Duty, LinkLoop, Outlet};
 use reconnect::Reconnect;
 use slot::Tap;
 use vision::{Vision, VisionSlots};
-
-/// Tells the window that there is something to look at. Called from any thread.
-pub type Waker = Arc<dyn Fn() + Send + Sync>;
-
-/// Seconds since some moment before the workers were started.
-pub type Clock = Arc<dyn Fn() -> f64 + Send + Sync>;
-
-/// Requests that may wait for a worker. A person cannot click faster than it answers, unless it hangs.
-pub(crate) const MAX_REQUESTS: usize = 32;
-
-/// Events that may wait for the window.
-pub(crate) const MAX_EVENTS: usize = 256;
-
-/// How long the end of the program waits for the workers. Calls under way return within a fraction of it.
-pub const JOIN_DEADLINE: Duration = Duration::from_secs(2);
-
-/// How long the end of the program waits for one report of a worker before it looks again.
-pub(crate) const POLL: Duration = Duration::from_millis(5);
-
-/// A worker cannot take the request now.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the connection does not answer; wait until it is back")]
-pub struct Busy;
 
 /// The application's end of the workers.
 pub struct Workers {

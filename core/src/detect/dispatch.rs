@@ -4,6 +4,7 @@ use image::GrayImage;
 
 use super::circles::asymmetric;
 use super::markers::{april, charuco};
+use super::options::{DetectOptions, check};
 use super::order::Ordered;
 use super::{VisionError, checkerboard, circles};
 use crate::targets::observation::Corner;
@@ -11,36 +12,6 @@ use crate::targets::{Grid, TargetSpec};
 
 /// An image with fewer pixels than this per point cannot show the target: squares of less than 3 px are not separated.
 const MIN_SQUARE_PX: u32 = 3;
-
-/// How long a detection may take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Effort {
-    /// The quick methods, for every frame of a live stream: a miss costs a few times what a hit does.
-    Live,
-    /// Every method, for images that are kept: a miss may take some seconds per megapixel.
-    #[default]
-    Thorough,
-}
-
-/// Options of [`detect_with`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub struct DetectOptions {
-    /// How long it may take.
-    pub effort: Effort,
-}
-
-impl DetectOptions {
-    /// For every frame of a live stream.
-    pub fn live() -> Self {
-        Self { effort: Effort::Live }
-    }
-
-    /// For images that are kept.
-    pub fn thorough() -> Self {
-        Self { effort: Effort::Thorough }
-    }
-}
 
 /// [`detect_with`] with all effort.
 ///
@@ -91,24 +62,6 @@ pub fn detect_with(
         TargetSpec::AprilGrid(board) => april::find(image, board, effort),
         TargetSpec::AprilTag(tag) => april::find(image, &tag.alone(), effort),
     }
-}
-
-/// Whether there is something to search, and something to search for.
-pub(super) fn check(image: &GrayImage, target: &TargetSpec) -> Result<(), VisionError> {
-    match target {
-        TargetSpec::Chessboard(grid) | TargetSpec::Circles(grid) | TargetSpec::AsymmetricCircles(grid) => {
-            let Grid { columns, rows, .. } = *grid;
-            if columns < 3 || rows < 3 {
-                return Err(VisionError::TargetTooSmall { columns, rows });
-            }
-        }
-        TargetSpec::Charuco(_) | TargetSpec::AprilGrid(_) | TargetSpec::AprilTag(_) => target.check()?,
-    }
-    let (width, height) = image.dimensions();
-    if width == 0 || height == 0 {
-        return Err(VisionError::BadImage { width, height });
-    }
-    Ok(())
 }
 
 /// Whether the image has room for all points.

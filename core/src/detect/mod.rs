@@ -8,61 +8,15 @@ mod bridge;
 pub(crate) mod checkerboard;
 mod circles;
 pub(crate) mod dispatch;
+mod error;
 pub(crate) mod markers;
+mod options;
 mod order;
 
-pub use crate::detect::dispatch::{DetectOptions, Effort, detect, detect_with};
-pub use crate::detect::markers::charuco::charuco_layout;
-
-/// Why there is no detection.
-///
-/// A board that is simply not in the image is not an error: [`detect`] returns `None`.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum VisionError {
-    /// The target cannot be looked for.
-    #[error("a target of {columns}×{rows} points cannot be detected: it needs at least 3 points along either side")]
-    TargetTooSmall {
-        /// Points along x.
-        columns: usize,
-        /// Points along y.
-        rows: usize,
-    },
-    /// A number of the target is out of range.
-    #[error("the target cannot be detected: {source}")]
-    BadTarget {
-        /// Which, and what it may be.
-        #[from]
-        source: crate::targets::BadTarget,
-    },
-    /// The board in the image has its markers in the other squares.
-    #[error(
-        "the target is said to have the {stated} layout, the ChArUco board in the image has the {seen} one: write \
-         layout = \"{seen}\", or leave it out"
-    )]
-    OtherLayout {
-        /// What is said.
-        stated: &'static str,
-        /// What is seen.
-        seen: &'static str,
-    },
-    /// The image has no pixels, or more than OpenCV can address.
-    #[error("an image of {width}×{height} pixels cannot be searched")]
-    BadImage {
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-    },
-    /// OpenCV refused or failed.
-    #[error("OpenCV could not {operation}: {message}")]
-    OpenCv {
-        /// What it was asked to do.
-        operation: &'static str,
-        /// What it said.
-        message: String,
-    },
-}
+pub use dispatch::{detect, detect_with};
+pub use error::VisionError;
+pub use markers::charuco::charuco_layout;
+pub use options::{DetectOptions, Effort};
 
 #[cfg(test)]
 mod bridge_for_tests;

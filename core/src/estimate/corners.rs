@@ -1,24 +1,22 @@
 //! Calibration from corners.
 
-use nalgebra::Point3;
-
+use super::detected_view::DetectedView;
 use super::lens::Lens;
 use super::refine::{self, Judged, Refined};
+use super::residuals::{residuals, squared_residuals};
 use super::{
-    CalibrateError, CalibratedCamera, Calibration, CornerResidual, JointFit, LinkCovariances, Method, Observations,
-    Options, ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
+    CalibrateError, CalibratedCamera, Calibration, JointFit, LinkCovariances, Method, Observations, Options,
+    ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::{self, JointProblem, camera_from_target};
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::estimate::handeye::{HandEye, Mode, PosePair};
 use crate::estimate::uncertainty::quality;
-use crate::geometry::camera::Intrinsics;
-use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::statistics::median_high;
 use crate::progress::Work;
 use crate::targets::bent::BoardPoints;
-use crate::targets::observation::{Corner, View};
+use crate::targets::observation::View;
 
 pub fn calibrate(
     observations: &Observations,
@@ -102,20 +100,6 @@ fn too_few(observations: &Observations, found: usize) -> CalibrateError {
         images: observations.views.len() - excluded,
         need: MIN_VIEWS,
         target: observations.target.to_string(),
-    }
-}
-
-/// A view in the fit in which the target was found.
-pub(super) struct DetectedView<'a> {
-    /// Its index among all views.
-    index: usize,
-    view: &'a super::ObservedView,
-    pub(super) corners: &'a [Corner],
-}
-
-impl<'a> DetectedView<'a> {
-    fn new((index, view): (usize, &'a super::ObservedView)) -> Option<Self> {
-        Some(Self { index, view, corners: view.corners.as_deref().filter(|_| view.in_fit)? })
     }
 }
 
@@ -267,43 +251,4 @@ fn take_closed_form(
     let all = total_rms(rms.into_iter());
     calibration.rms_px = all.is_finite().then_some(all);
     calibration.hand_eye = Some(HandEye::new(problem.mode, solution.mount_from_camera, solution.anchor_from_target));
-}
-
-/// Residuals of a view at a pose of the target; none at all when a corner has no image there.
-fn residuals(
-    intrinsics: &Intrinsics,
-    camera_from_target: &Pose<Camera, Target>,
-    points: &[Point3<f64>],
-    corners: &[Corner],
-) -> Vec<CornerResidual> {
-    let residual = |corner: &Corner| {
-        let predicted = intrinsics.project(&(camera_from_target.isometry() * points[corner.index])).ok()?;
-        Some(CornerResidual { index: corner.index, px: corner.px, residual_px: corner.px - predicted })
-    };
-    corners.iter().map(residual).collect::<Option<_>>().unwrap_or_default()
-}
-
-/// Sum of squared residuals of one view by the bare chain; a point without an image counts as the cap.
-pub(super) fn squared_residuals(
-    problem: &JointProblem<'_>,
-    intrinsics: &Intrinsics,
-    solution: &ClosedFormSolution,
-    view: &View,
-    cap_px: f64,
-) -> f64 {
-    let chain = camera_from_target(
-        problem.mode,
-        &view.base_from_tip,
-        &solution.mount_from_camera,
-        &solution.anchor_from_target,
-    );
-    view.corners
-        .iter()
-        .map(|corner| {
-            let residual = intrinsics
-                .project(&(chain.isometry() * problem.board.drawn()[corner.index]))
-                .map_or(cap_px, |px| (px - corner.px).norm());
-            residual.min(cap_px).powi(2)
-        })
-        .sum()
 }

@@ -1,7 +1,7 @@
 //! The camera, and the target's pose in every view that goes with it.
 
-use super::corners::DetectedView;
 use super::{CalibrateError, CameraKnowledge, Observations};
+use crate::estimate::detected_view::DetectedView;
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::intrinsics::{self, IntrinsicsError, Options, SeenView};
 use crate::geometry::camera::Intrinsics;

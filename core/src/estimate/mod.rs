@@ -3,11 +3,13 @@
 //! One path for the window, the command line and the tests.
 
 mod corners;
+mod detected_view;
 pub mod handeye;
 pub mod intrinsics;
 mod lens;
 mod pairs;
 mod refine;
+mod residuals;
 mod to_result;
 pub mod uncertainty;
 

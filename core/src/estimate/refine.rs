@@ -1,8 +1,8 @@
 //! The joint estimate within a calibration: its start, outliers, and which unknowns the data support.
 
 use nalgebra::Isometry3;
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::corners::squared_residuals;
 use super::lens::Lens;
 use super::{CalibrateError, JointOffsets, MethodResult, Options};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
@@ -11,6 +11,7 @@ use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{self, CornerWeights, Free, JointProblem, JointSolution, JointStart};
 use crate::estimate::handeye::{HandEyeError, PosePair, subset};
+use crate::estimate::residuals::squared_residuals;
 use crate::estimate::uncertainty::widening::Widening;
 use crate::estimate::uncertainty::{quality, widening};
 use crate::geometry::frames::{Camera, Pose, Target};
@@ -18,7 +19,6 @@ use crate::progress::Work;
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardShape;
 use crate::targets::observation::View;
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 /// Significance from which a bent target is taken into the model: by chance one flat target in a thousand.
 const WARP_LEVEL: f64 = 1e-3;

@@ -206,6 +206,7 @@ fn a_server_that_dies_in_a_long_silent_call_is_noticed_at_once_and_found_again()
         // Dropping the peer is what the end of its process does to its connections.
     });
     let port = endpoint.port();
+    let (restarted, is_restarted) = pair();
     let client = std::thread::spawn(move || {
         let mut connection = connect(&endpoint, options());
         let cancel = CancelToken::default();
@@ -213,12 +214,14 @@ fn a_server_that_dies_in_a_long_silent_call_is_noticed_at_once_and_found_again()
         let error = connection.call_with("sim.moveToConfig", vec![], &move_options).expect_err("died");
         let noticed = Instant::now();
         let epoch = connection.epoch();
+        done(&is_restarted);
         (error, noticed, epoch, connection.call("sim.x", vec![]).map(|reply| reply.integer(0)))
     });
     done(&is_pending);
     join(server);
     let died = Instant::now();
     let peer = Peer::bind(Some(port));
+    restarted.send(()).expect("the client listens");
     let (to, request) = peer.next();
     assert_eq!(func(&request), "sim.x");
     assert!(request.get("ver").is_some(), "a new server has to be introduced to the client");

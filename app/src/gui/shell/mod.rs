@@ -10,9 +10,9 @@ mod top_bar;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 
 use super::shell::layout::Layout;
-use super::status::{self, Action};
+use super::status;
 use super::style::theme::{GAP, Palette};
-use crate::command::{Command, Outbox};
+use crate::command::Outbox;
 use crate::live::textures::Textures;
 use crate::messages::toasts;
 use crate::model::{Model, Pane, Step};
@@ -39,19 +39,6 @@ pub fn all_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut 
         }
         tiles::tiles_ui(ui, model, textures, layout, outbox);
     });
-}
-
-/// The button for an action.
-pub(crate) fn action_ui(ui: &mut Ui, action: Option<Action>, language: Language, outbox: &mut Outbox) {
-    let (text, command) = match action {
-        None => return,
-        Some(Action::Reconnect) => (tr!(language, "Try again now"), Command::Reconnect),
-        Some(Action::StartSimulation) => (tr!(language, "Start simulation"), Command::StartSimulation),
-        Some(Action::ContinueSimulation) => (tr!(language, "Continue simulation"), Command::StartSimulation),
-    };
-    if ui.button(text).clicked() {
-        outbox.send(command);
-    }
 }
 
 /// What is written on the tab of a pane.

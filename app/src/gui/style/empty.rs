@@ -3,8 +3,8 @@
 use egui::{Align, Label, Layout, RichText, Spinner, Stroke, Ui, Vec2};
 
 use crate::command::Outbox;
-use crate::gui::shell::action_ui;
 use crate::gui::status::Status;
+use crate::gui::style::action::action_ui;
 use crate::gui::style::theme::{self, Palette, TITLE, Tone};
 use crate::text::Language;
 

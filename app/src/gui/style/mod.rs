@@ -1,5 +1,6 @@
 //! Colours, fonts, icons, numbers and small widgets that every pane uses.
 
+pub(crate) mod action;
 pub(crate) mod empty;
 pub(crate) mod fonts;
 pub(crate) mod form;

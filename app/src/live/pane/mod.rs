@@ -4,16 +4,14 @@ mod feedback;
 mod overlays;
 mod project;
 mod readout;
+mod shown;
 mod toolbar;
 pub(crate) mod view;
 
 pub use feedback::{stands_over_image, waiting};
-
-use std::sync::Arc;
+pub use shown::Shown;
 
 use egui::{Align, CornerRadius, Layout, Pos2, Rect, Ui, UiBuilder, Vec2};
-use handeye_core::depth::DepthSample;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::session::CaptureId;
 
 use super::colour_bar;
@@ -23,7 +21,7 @@ use crate::gui::style::empty;
 use crate::gui::style::marks;
 use crate::gui::style::theme::Palette;
 use crate::live::textures::LiveTextures;
-use crate::model::{FrameImages, ImagePoint, Model};
+use crate::model::{ImagePoint, Model};
 use crate::tr;
 
 /// Height of the line over an image.
@@ -32,53 +30,6 @@ const HEADER: f32 = 34.0;
 const FOOTER: f32 = 46.0;
 /// Distance of text to the edge of a pane.
 const INSET: f32 = 10.0;
-
-/// The images that are shown.
-#[derive(Clone, Copy)]
-pub struct Shown<'a> {
-    /// The pixels.
-    pub images: &'a Arc<FrameImages>,
-    /// The capture they were recorded with; `None` for the live ones.
-    pub capture: Option<CaptureId>,
-    /// Where the robot reported its tip then.
-    pub base_from_tip: Option<Pose<Base, Tip>>,
-    /// The sensor's far plane \[m\].
-    pub far_plane_m: f32,
-    /// Depths \[m\] at the ends of the colours.
-    pub depth_range_m: Option<[f32; 2]>,
-}
-
-impl<'a> Shown<'a> {
-    /// Those of the model; `None` while there are none.
-    fn of(model: &'a Model, textures: &LiveTextures) -> Option<Self> {
-        let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
-        if let Some(review) = &model.review {
-            return Some(Self {
-                images: review.images.as_ref()?,
-                capture: Some(review.id),
-                base_from_tip: model.document().capture(review.id).map(|record| record.base_from_tip),
-                far_plane_m,
-                depth_range_m: textures.review_range_m(),
-            });
-        }
-        let frame = model.frame.as_ref()?;
-        Some(Self {
-            images: &frame.images,
-            capture: None,
-            base_from_tip: Some(frame.info.base_from_tip),
-            far_plane_m,
-            depth_range_m: Some(frame.info.depth_range_m),
-        })
-    }
-
-    /// Depth \[m\] at a pixel of the colour image; `None` without a surface.
-    fn depth_m(&self, point: ImagePoint) -> Option<f32> {
-        match self.images.depth_at(point, self.far_plane_m) {
-            DepthSample::Metres(depth_m) => Some(depth_m),
-            DepthSample::Far | DepthSample::Invalid => None,
-        }
-    }
-}
 
 /// The colour image with everything drawn over it. Gives the pixel under the pointer: of both images one at most
 /// has one, and whoever draws both tells the model with `Command::PointAt`.

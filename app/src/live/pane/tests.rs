@@ -3,7 +3,7 @@ use std::sync::Arc;
 use egui::{Modifiers, PointerButton, Pos2, Vec2, vec2};
 use handeye_core::capture::Wait;
 use handeye_core::depth::ColourMap;
-use handeye_core::geometry::frames::{Camera, Target};
+use handeye_core::geometry::frames::{Camera, Pose, Target};
 use handeye_core::project::session::CaptureId;
 use handeye_core::verify::Predictor;
 use nalgebra::{Point3, Vector2};

@@ -8,14 +8,14 @@
 //! [`Door`], in this process: there is no port behind the door that somebody else could find.
 
 mod door;
+mod engine;
 mod names;
 mod page;
 mod proxy;
 
+use engine::Engine;
 use std::io;
 use std::sync::Arc;
-
-use tokio::runtime::{Builder, Handle, Runtime};
 
 use super::stream::{SharedSink, Target};
 use door::Door;
@@ -29,9 +29,6 @@ pub const LASTING_BYTES: u64 = 128 * 1024 * 1024;
 /// What is kept of what is live, for viewers that come later \[bytes\].
 pub const LIVE_BYTES: u64 = 32 * 1024 * 1024;
 
-/// Threads of all servers and the page together, however many connections there are.
-const THREADS: usize = 2;
-
 /// The servers.
 pub struct Servers {
     engine: Arc<Engine>,
@@ -44,9 +41,6 @@ struct Served {
     sink: Arc<ProxySink>,
     door: Door,
 }
-
-/// The threads that do the work of the servers; they end when this is dropped, without being waited for.
-struct Engine(Option<Runtime>);
 
 impl Servers {
     /// Starts them on free ports of 127.0.0.1.
@@ -79,25 +73,6 @@ impl Servers {
     /// When there is no port.
     pub fn page(&self) -> io::Result<Page> {
         Page::start(&self.engine, &self.urls())
-    }
-}
-
-impl Engine {
-    fn start() -> io::Result<Self> {
-        let mut builder = Builder::new_multi_thread();
-        Ok(Self(Some(builder.worker_threads(THREADS).thread_name("rerun-server").enable_all().build()?)))
-    }
-
-    fn handle(&self) -> io::Result<&Handle> {
-        self.0.as_ref().map(Runtime::handle).ok_or_else(|| io::Error::other("the servers have ended"))
-    }
-}
-
-impl Drop for Engine {
-    fn drop(&mut self) {
-        if let Some(runtime) = self.0.take() {
-            runtime.shutdown_background();
-        }
     }
 }
 

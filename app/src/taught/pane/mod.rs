@@ -1,10 +1,12 @@
 //! Taught poses: the places that a sequence visits, in their order.
 
+mod immovable;
 mod row;
 pub mod sequence;
 mod teach;
 
 use egui::Ui;
+pub use immovable::immovable;
 
 use crate::command::Outbox;
 use crate::gui::style::parts;
@@ -30,20 +32,6 @@ pub fn taught_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             row::row_ui(ui, model, index, pose, outbox);
         }
     });
-}
-
-/// Why the arm cannot be sent anywhere now.
-pub fn immovable(model: &Model) -> Option<&'static str> {
-    let language = model.view.language;
-    if !model.control.is_connected() || !model.mover.is_connected() {
-        Some(tr!(language, "Not connected: the arm cannot be moved until the connection is there"))
-    } else if model.resting_simulation().is_some() {
-        Some(tr!(language, "The arm moves only while the simulation runs"))
-    } else if model.sequence_runs || model.planning {
-        Some(tr!(language, "A sequence is under way"))
-    } else {
-        None
-    }
 }
 
 #[cfg(test)]

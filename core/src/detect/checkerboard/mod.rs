@@ -14,7 +14,7 @@ use opencv::prelude::*;
 
 use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray};
-use super::dispatch::Effort;
+use super::options::Effort;
 use super::order::{Ordered, canonical};
 use crate::targets::Grid;
 

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector2};
 use opencv::calib3d;
 
 use super::dots;
-use crate::detect::dispatch::Effort;
+use crate::detect::options::Effort;
 use crate::detect::{VisionError, circles};
 use crate::geometry::planar_pose::homography::{homography, jacobian, mapped};
 use crate::targets::observation::Corner;

@@ -11,7 +11,7 @@ use opencv::core::{Point2f, Size, Vector};
 use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray};
 use super::circles::dots::{Dot, quantile};
-use super::dispatch::Effort;
+use super::options::Effort;
 use super::order::{Ordered, canonical};
 use crate::targets::Grid;
 

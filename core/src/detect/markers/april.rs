@@ -3,11 +3,9 @@
 use image::GrayImage;
 use nalgebra::{Matrix3, Vector2};
 
-use super::{Marker, Placed};
-use super::{edges, spread};
-use crate::detect::VisionError;
-use crate::detect::dispatch::Effort;
-use crate::detect::markers;
+use super::{Marker, Placed, edges, spread};
+use crate::detect::options::Effort;
+use crate::detect::{VisionError, markers};
 use crate::geometry::planar_pose::homography::{homography, mapped};
 use crate::targets::AprilGrid;
 use crate::targets::observation::Corner;

@@ -7,11 +7,9 @@ use image::GrayImage;
 use nalgebra::{Matrix3, Vector2};
 
 use super::crossing::{self, Expected};
-use super::spread;
-use super::{Marker, Placed};
-use crate::detect::VisionError;
-use crate::detect::dispatch::Effort;
-use crate::detect::markers;
+use super::{Marker, Placed, spread};
+use crate::detect::options::Effort;
+use crate::detect::{VisionError, markers};
 use crate::geometry::planar_pose::homography::{homography, jacobian, mapped};
 use crate::geometry::statistics::median_high;
 use crate::targets::observation::Corner;
@@ -52,7 +50,7 @@ pub(in crate::detect) fn find(
 /// # Errors
 /// As [`crate::detect::detect`], without [`VisionError::OtherLayout`].
 pub fn charuco_layout(image: &GrayImage, board: &Charuco) -> Result<Option<Layout>, VisionError> {
-    crate::detect::dispatch::check(image, &crate::targets::TargetSpec::Charuco(*board))?;
+    crate::detect::options::check(image, &crate::targets::TargetSpec::Charuco(*board))?;
     let markers = markers::find(image, board.dictionary, 1, Effort::Thorough)?;
     Ok(layout_of(&Charuco { layout: None, ..*board }, &markers).map(|(layout, _)| layout))
 }

@@ -17,7 +17,7 @@ use opencv::core::{Mat, MatTraitConstManual as _, Point2f, Vector, no_array};
 
 use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray};
-use super::dispatch::Effort;
+use super::options::Effort;
 use crate::geometry::planar_pose::homography::{homography, mapped};
 use crate::targets::Dictionary;
 

@@ -7,6 +7,7 @@ use crate::estimate::handeye::joint::simulated::{REALISTIC, Trial, camera, trial
 use crate::estimate::{Method, Options, calibrate, calibrate_with};
 use crate::geometry::frames::Pose;
 use crate::progress::CancelToken;
+use crate::wording::Text;
 
 fn solve(observations: &Observations) -> Calibration {
     calibrate(observations, Method::Joint, &CancelToken::default()).expect("solves")

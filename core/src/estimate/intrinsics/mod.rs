@@ -17,19 +17,23 @@
 //! synthesis", §6; Kannala & Brandt 2006 for the fisheye.
 
 mod adjust;
+mod error;
 mod information;
+mod seen_view;
 mod start;
 
-use nalgebra::{DMatrix, Matrix2};
+pub use error::IntrinsicsError;
+use nalgebra::DMatrix;
+pub use seen_view::SeenView;
 
 use crate::estimate::handeye::joint::equations::FreeParameters;
-use crate::geometry::camera::{CameraError, Distortion, Intrinsics};
+use crate::geometry::camera::Distortion;
+use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Camera, Pose, Target};
-use crate::geometry::planar_pose::{self, PoseError};
+use crate::geometry::planar_pose;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
-use crate::targets::observation::Corner;
 
 use adjust::{Estimate, Problem};
 
@@ -56,22 +60,6 @@ impl Options {
     /// A model on a flat target, without a start.
     pub fn new(model: Distortion) -> Self {
         Self { model, start: None, free_warp: false }
-    }
-}
-
-/// The corners of one view.
-#[derive(Debug, Clone, Copy)]
-pub struct SeenView<'a> {
-    /// At least [`planar_pose::MIN_CORNERS`] that do not lie on one line.
-    pub corners: &'a [Corner],
-    /// One matrix `W` per corner, whose residual counts as `W r`; empty where all corners count alike.
-    pub sqrt_weights: &'a [Matrix2<f64>],
-}
-
-impl<'a> SeenView<'a> {
-    /// A view whose corners all count alike.
-    pub fn unweighted(corners: &'a [Corner]) -> Self {
-        Self { corners, sqrt_weights: &[] }
     }
 }
 
@@ -116,73 +104,6 @@ impl Found {
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.unit_covariance * (self.sigma * self.sigma)
     }
-}
-
-/// Why there is no calibration.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum IntrinsicsError {
-    /// Not enough views.
-    #[error("intrinsics need at least {need} views of the target, there are {got}; capture more from other angles")]
-    TooFewViews {
-        /// Views given.
-        got: usize,
-        /// Views needed.
-        need: usize,
-    },
-    /// The corners of a view fix no pose, by the index of the view.
-    #[error(transparent)]
-    Corners(#[from] PoseError),
-    /// A list of whiteners of another length than that of the corners.
-    #[error("view {view}: there are {sqrt_weights} weights for {corners} corners")]
-    BadWeights {
-        /// Index of the view.
-        view: usize,
-        /// Whiteners given.
-        sqrt_weights: usize,
-        /// Corners given.
-        corners: usize,
-    },
-    /// The image size or the start is not usable.
-    #[error("camera model: {source}")]
-    BadStart {
-        /// What the model says.
-        #[from]
-        source: CameraError,
-    },
-    /// The target has the same orientation to the camera in all views, which leaves the focal length undetermined.
-    #[error(
-        "the target is tilted the same way in all {views} views (within {spread_deg:.1}°), which leaves the focal length \
-         undetermined; capture views tilted by 20° or more about different axes"
-    )]
-    ParallelViews {
-        /// Views given.
-        views: usize,
-        /// Largest angle between the target's normals in two views, degrees.
-        spread_deg: f64,
-    },
-    /// The views determine the camera so weakly that its numbers would be noise.
-    #[error(
-        "the views leave {parameter} undetermined: 0.1 px of corner noise moves it by {sigma_px:.0} px; \
-         capture views tilted by 20° or more about different axes"
-    )]
-    Undetermined {
-        /// Which parameter.
-        parameter: &'static str,
-        /// Its standard deviation for 0.1 px of noise, in pixels.
-        sigma_px: f64,
-    },
-    /// The optimisation ended at numbers that are no camera.
-    #[error(
-        "the calibration did not converge to a camera ({reason}); check the order of corners and the target's size"
-    )]
-    NotACamera {
-        /// What is wrong with them.
-        reason: String,
-    },
-    /// The work was cancelled.
-    #[error("the calibration of the camera was cancelled")]
-    Cancelled,
 }
 
 /// Calibrates a camera of `(width, height)` pixels.

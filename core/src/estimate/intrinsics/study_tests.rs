@@ -4,8 +4,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
 use super::*;
+use crate::geometry::planar_pose::PoseError;
 use crate::geometry::planar_pose::simulated::looking_at;
 use crate::targets::Grid;
+use crate::targets::observation::Corner;
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
 const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);

@@ -1,12 +1,15 @@
+use nalgebra::Matrix2;
 use nalgebra::{Isometry3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
 use super::*;
+use crate::geometry::planar_pose::PoseError;
 use crate::geometry::planar_pose::mirror::mirrored;
 use crate::geometry::planar_pose::refine::refine;
 use crate::targets::Grid;
+use crate::targets::observation::Corner;
 
 const SIZE: (u32, u32) = (640, 480);
 const BROWN: Distortion = Distortion::BrownConrady([-0.21, 0.12, 0.001, -0.002, -0.02]);

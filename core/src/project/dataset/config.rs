@@ -9,6 +9,7 @@ use super::error::{DatasetError, DatasetProblem};
 use super::joints::{JointColumns, RawArm, joint_columns};
 use super::target_table::RawTarget;
 use super::text::line_of;
+use super::value::{AngleUnit, Spanning, bad};
 use crate::estimate::handeye::Mode;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::project::files::image_file::one_line;
@@ -65,14 +66,6 @@ pub(super) enum LengthUnit {
     Metre,
     #[serde(rename = "mm")]
     Millimetre,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-pub(super) enum AngleUnit {
-    #[serde(rename = "rad")]
-    Radian,
-    #[serde(rename = "deg")]
-    Degree,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -203,8 +196,6 @@ impl Config {
     }
 }
 
-pub(super) type Spanning = (std::ops::Range<usize>, DatasetProblem);
-
 fn robot_config(raw: &Spanned<RawRobot>) -> Result<RobotConfig, Spanning> {
     let whole = raw.span();
     let raw = raw.get_ref();
@@ -308,8 +299,4 @@ fn pixels(key: &'static str, value: &Spanned<i64>) -> Result<u32, Spanning> {
         Ok(n) if n > 0 => Ok(n),
         _ => Err(bad(value, key, "a positive number of pixels")),
     }
-}
-
-pub(super) fn bad<T: std::fmt::Display>(value: &Spanned<T>, key: &'static str, want: &'static str) -> Spanning {
-    (value.span(), DatasetProblem::BadValue { key, value: value.get_ref().to_string(), want })
 }

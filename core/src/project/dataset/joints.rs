@@ -4,9 +4,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::Entry;
-use super::config::{AngleUnit, Spanning, bad};
 use super::error::DatasetProblem;
 use crate::geometry::arm::{self, ArmError, ArmKind, ArmModel, JointView, MAX_JOINTS, Placement, TipByJoint};
+use crate::project::dataset::value::{AngleUnit, Spanning, bad};
 
 /// The columns of joint angles, after those of the rotation.
 pub(super) const COLUMNS: [&str; MAX_JOINTS] =

@@ -20,6 +20,7 @@
 
 mod config;
 mod corners;
+mod entry;
 mod error;
 mod images;
 mod joints;
@@ -30,22 +31,25 @@ mod poses;
 mod target_table;
 pub mod template;
 mod text;
+mod value;
 pub mod write;
 
+pub use entry::Entry;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, RgbImage};
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::handeye::Mode;
 use crate::geometry::camera::{Distortion, Intrinsics};
-use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::geometry::frames::Base;
+use crate::geometry::frames::Pose;
+use crate::geometry::frames::Tip;
 use crate::project::files::digest::Listing;
 use crate::project::files::image_file::{self, ImageFileError};
 use crate::targets::TargetSpec;
-use crate::targets::observation::Corner;
 
 use config::{Config, PoseDirection};
 use corners::CornerTable;
@@ -92,29 +96,6 @@ pub struct CameraInput {
     /// The lens model to use; `brown_conrady` when `[camera]` names none. Its coefficients are those of `intrinsics`,
     /// zero without.
     pub model: Distortion,
-}
-
-/// One view.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
-    /// The image as the pose table names it; without a table its path in the folder. No two entries have the same.
-    pub name: String,
-    /// The image file; `None` when only corners or target poses were kept.
-    pub image_path: Option<PathBuf>,
-    /// Tip pose as the controller reported it; `None` when there is no robot.
-    pub base_from_tip: Option<Pose<Base, Tip>>,
-    /// Joint angles as the controller reported them, radians; `None` when the pose table has none.
-    pub joints_rad: Option<Vec<f64>>,
-    /// How the tip moves with each joint, see [`crate::geometry::arm::Arm::tip_by_joint_at`]; empty without joint angles, without
-    /// the arm, or where the two do not fit the poses, see [`Dataset::arm`].
-    pub tip_by_joint: Vec<Vector6<f64>>,
-    /// Corners detected elsewhere, sorted by index, empty when the target was not found in this image; `None` when
-    /// the data set has no corner table.
-    pub corners: Option<Vec<Corner>>,
-    /// Target pose measured elsewhere; `None` when the data set has no such table, or no row for this view.
-    pub camera_from_target: Option<Pose<Camera, Target>>,
-    /// Row in the pose table, as an editor counts it.
-    pub row: Option<usize>,
 }
 
 impl Dataset {

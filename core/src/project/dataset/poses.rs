@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::config::{AngleUnit, LengthUnit, RobotConfig, RotationConvention};
+use super::config::{LengthUnit, RobotConfig, RotationConvention};
 use super::error::{DatasetError, DatasetProblem, shown};
 use super::joints::{self, JointColumns};
 use super::text::{Row, Table, TextFile};
 use crate::geometry::se3;
+use crate::project::dataset::value::AngleUnit;
 
 /// How far the length of a quaternion may be from 1. Three printed decimals stay within it; swapped columns or
 /// another convention do not.

@@ -2,8 +2,9 @@
 
 use nalgebra::Isometry3;
 
-use super::tree::{Handle, Tree};
+use super::tree::Tree;
 use crate::cell::motion::{Course, braked};
+use crate::cell::world::handle::Handle;
 
 /// Time in which a motion that is replaced comes to rest, seconds.
 const BRAKING_S: f64 = 0.6;

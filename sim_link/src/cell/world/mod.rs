@@ -5,6 +5,7 @@
 
 pub mod carrier;
 pub mod error;
+mod handle;
 pub mod joint;
 pub mod paths;
 pub mod poses;
@@ -18,11 +19,12 @@ use nalgebra::Isometry3;
 
 pub use carrier::Carrier;
 pub use error::WorldError;
+pub use handle::Handle;
 pub use joint::{DriveLimits, Joint, JointMode};
 pub use poses::Flagged;
 pub use sensor::{Moment, Reported, Shown, VisionSensor};
 pub use simulation::{Simulation, State};
-pub use tree::{Chain, Handle, Kind, Object, Tree, turn_z};
+pub use tree::{Chain, Kind, Object, Tree, turn_z};
 
 /// The faults of a robot: how it really stands, given how it believes to stand.
 pub trait Faults: std::fmt::Debug + Send {

@@ -1,7 +1,8 @@
 //! Object paths such as `/UR5/joint`, `./link[1]` and `::/Tip`, and the aliases that lead back.
 
 use super::error::WorldError;
-use super::tree::{Handle, Tree};
+use super::tree::Tree;
+use crate::cell::world::handle::Handle;
 
 /// Segments that a path may have. A segment matches at any depth, so the search grows with every one of them.
 const MAX_SEGMENTS: usize = 32;

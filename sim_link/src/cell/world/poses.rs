@@ -6,7 +6,8 @@
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::error::WorldError;
-use super::tree::{Chain, Handle, Kind, Tree};
+use super::tree::{Chain, Kind, Tree};
+use crate::cell::world::handle::Handle;
 
 /// `sim.handle_world`.
 pub const HANDLE_WORLD: Handle = -1;

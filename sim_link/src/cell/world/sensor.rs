@@ -5,7 +5,7 @@ use std::sync::Arc;
 use handeye_core::geometry::camera::Intrinsics;
 use nalgebra::Isometry3;
 
-use super::tree::Handle;
+use crate::cell::world::handle::Handle;
 
 /// Where everything was at one sensing phase, as the robot really stood.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,8 @@
 use nalgebra::Isometry3;
 
 use super::error::WorldError;
-use super::tree::{Handle, Kind, Tree};
+use super::tree::{Kind, Tree};
+use crate::cell::world::handle::Handle;
 
 /// Length of a pass in seconds that a new world has.
 pub const DEFAULT_TIME_STEP_S: f64 = 0.05;

@@ -5,11 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::error::WorldError;
+use super::handle::Handle;
 use super::joint::Joint;
 use super::sensor::VisionSensor;
-
-/// Number by which the API names an object.
-pub type Handle = i64;
 
 /// First handle given out. Scripts test handles with `if handle:` and `handle == -1`, so 0 and below stay unused.
 const FIRST_HANDLE: Handle = 15;

@@ -4,17 +4,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::progress::CancelToken;
 
 use super::hold::Hold;
-use super::motion::joint_elsewhere;
 use super::stream::clock_past;
 use super::truth::{self, GroundTruth};
 use super::{CellInfo, CellObjects, CellPaths, JOINTS, JointAngles, discover, read_joint_angles, require_running};
+use crate::client::cell::joint_elsewhere::joint_elsewhere;
 use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;
 use crate::client::options::{CallOptions, ConnectionOptions};
 use crate::client::sim::{ObjectHandle, Sim};
-use handeye_core::progress::CancelToken;
 
 /// Passes in a row that have to be at rest: one alone may be the turning point of an oscillation.
 const RESTING_PASSES: u32 = 3;

@@ -9,10 +9,10 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3::rotation_vector;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::follow::{FollowEnd, FollowGoal, FollowLimits};
 use super::jog_plan::{JogObstacle, largest_change, nearest};
 use super::reach::ArmKinematics;
 use super::{JOINTS, JointAngles};
+use crate::client::cell::follow_goal::{FollowEnd, FollowGoal, FollowLimits};
 
 /// Share of the tip's acceleration that slows it down; the rest is for the curve that it takes when all joints brake.
 const BRAKING_SHARE: f64 = 0.9;

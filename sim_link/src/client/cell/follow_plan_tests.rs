@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::super::follow::Workspace;
+use super::super::follow_goal::Workspace;
 use super::*;
 use crate::cell::kinematics::JointLimits;
 

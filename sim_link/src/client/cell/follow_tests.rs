@@ -1,3 +1,6 @@
+use nalgebra::{Point3, Vector3};
+
+use super::super::follow_goal::Workspace;
 use super::*;
 
 #[test]

@@ -15,10 +15,12 @@ mod arm;
 mod board;
 mod camera;
 mod follow;
+mod follow_goal;
 mod follow_plan;
 mod hold;
 mod jog;
 mod jog_plan;
+mod joint_elsewhere;
 mod motion;
 mod reach;
 mod room;
@@ -36,7 +38,8 @@ use handeye_core::geometry::camera::Intrinsics;
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use board::{BoardMotion, BoardPath, UnknownPath};
 pub use camera::{CameraFeed, Frame};
-pub use follow::{FollowEnd, FollowGoal, FollowLimits, FollowMoment, FollowWish, Workspace};
+pub use follow::{FollowMoment, FollowWish};
+pub use follow_goal::{FollowEnd, FollowGoal, FollowLimits, Workspace};
 pub use jog::{ArmJog, JogAxes, JogEnd};
 pub use jog_plan::{
     JOINT_SPEED as JOG_JOINT_SPEED_RAD_S, JogObstacle, LINE_SPEED as JOG_LINE_SPEED_M_S,

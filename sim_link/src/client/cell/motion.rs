@@ -13,6 +13,7 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
 use super::arm::{MotionTolerance, SettleOptions};
+use super::joint_elsewhere::joint_elsewhere;
 use super::reach::ArmKinematics;
 use super::stream::{PLACED_OFF_RAD, Pass, Point, Stream, difference_rad};
 use super::{Arm, JOINTS, JointAngles, require_running};
@@ -386,11 +387,6 @@ impl Arm {
         }
         Ok(())
     }
-}
-
-pub(super) fn joint_elsewhere(index: usize, at_rad: f64, goal_rad: f64) -> LinkError {
-    let (at_deg, goal_deg) = (at_rad.to_degrees(), goal_rad.to_degrees());
-    LinkError::JointElsewhere { joint: index + 1, at_deg, goal_deg }
 }
 
 #[cfg(test)]

@@ -9,12 +9,12 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::JointAngles;
-use super::follow::FollowLimits;
 use super::jog_plan::nearest;
 use super::reach::ArmKinematics;
 use super::views::BoardInView;
 use crate::cell::kinematics::jacobian_at;
 use crate::cell::planning::{self, PlannedView, ViewOptions};
+use crate::client::cell::follow_goal::FollowLimits;
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.

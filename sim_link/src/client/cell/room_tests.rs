@@ -3,7 +3,7 @@ use std::path::Path;
 use handeye_core::geometry::frames::Target;
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 
-use super::super::follow::FollowGoal;
+use super::super::follow_goal::FollowGoal;
 use super::super::follow_plan::FollowPlan;
 use super::*;
 use crate::cell::motion::Course;

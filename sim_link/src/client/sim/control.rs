@@ -3,34 +3,11 @@
 use ciborium::Value;
 
 use super::Sim;
-use crate::client::constants::{
-    INT_IDLE_FPS, INT_PROGRAM_VERSION, SIMULATION_ADVANCING, SIMULATION_PAUSED, SIMULATION_STOPPED,
-};
+use super::simulation_state::SimulationState;
+use crate::client::constants::{INT_IDLE_FPS, INT_PROGRAM_VERSION};
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::protocol::ProtocolVersion;
-
-/// Whether time advances.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum SimulationState {
-    /// It does not, and the scene is as it was before the start.
-    Stopped,
-    /// It does not for now.
-    Paused,
-    /// It does; also in the passes that lead in and out of a pause or a stop.
-    Running,
-}
-
-impl SimulationState {
-    fn from_code(code: i64) -> Option<Self> {
-        match code {
-            SIMULATION_STOPPED => Some(Self::Stopped),
-            SIMULATION_PAUSED => Some(Self::Paused),
-            code if code > 0 && code & SIMULATION_ADVANCING != 0 => Some(Self::Running),
-            _ => None,
-        }
-    }
-}
 
 impl Sim {
     /// Starts the simulation, or lets a paused one go on.

@@ -7,12 +7,13 @@ mod control;
 mod motion;
 mod objects;
 mod sensors;
+mod simulation_state;
 
 use ciborium::Value;
 
-pub use control::SimulationState;
 pub use motion::{MotionLimits, MotionState, MotionStatus, PoseMotion};
 pub use sensors::SensorOptics;
+pub use simulation_state::SimulationState;
 
 use super::connection::Connection;
 use super::constants;

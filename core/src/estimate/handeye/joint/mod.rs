@@ -32,216 +32,30 @@ pub(crate) mod normal;
 pub(crate) mod optimise;
 pub mod outliers;
 pub mod prediction;
+mod problem;
+mod solution;
+pub(crate) mod state;
 mod variance;
 pub(crate) mod view_block;
 mod weights;
 
-use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
+use nalgebra::Point3;
+pub use problem::{Free, JointProblem, JointStart, LensPrior, Noise};
+pub use solution::{JointSolution, ViewFit};
 
+use super::HandEye;
+use super::HandEyeError;
 use super::motion::MIN_VIEWS;
-use super::{HandEye, HandEyeError, Mode};
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use crate::geometry::frames::Pose;
 use crate::progress::{Stage, Work};
-use crate::targets::bent::{BoardPoints, BoardShape};
-use crate::targets::observation::{Corner, View};
+use crate::targets::observation::Corner;
 
 pub use chain::{MAX_JOINTS, base_from_tip_by_joints, camera_from_target};
 pub use freedom::SmallSample;
 pub use weights::CornerWeights;
 
 use variance::Levels;
-
-/// Noise levels, one standard deviation per axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// Of a corner, pixels.
-    pub corner_px: f64,
-    /// Of what all corners of a view have in common beyond that, pixels: errors of lens, target and image that look like
-    /// a pose. A pose from `n` corners has the covariance `(corner_px² + view_px²) (Jᵀ J)⁻¹`. Zero where the data ask for
-    /// none.
-    pub view_px: f64,
-    /// Of the reported tip position, metres.
-    pub robot_m: f64,
-    /// Of the reported tip orientation, radians.
-    pub robot_rad: f64,
-}
-
-/// What is estimated besides the two rigid links.
-#[expect(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Free {
-    /// Focal lengths, principal point and distortion.
-    pub intrinsics: bool,
-    /// The two warps of the target, see [`BoardShape`].
-    pub warp: bool,
-    /// The true size of the target over the stated one. It is seen through the robot's translations alone.
-    pub scale: bool,
-    /// A constant offset of every joint, where the views say how the tip turns with them, with a prior of
-    /// [`JOINT_PRIOR_RAD`]. Those of the first and the last joint stay zero: the two links take them up.
-    pub joints: bool,
-}
-
-impl Free {
-    pub(crate) fn form(self) -> equations::FreeParameters {
-        equations::FreeParameters { lens: self.intrinsics, warp: self.warp, scale: self.scale }
-    }
-}
-
-/// What is known of free intrinsics beforehand.
-#[derive(Debug, Clone, Copy)]
-pub struct LensPrior<'a> {
-    /// The expected intrinsics.
-    pub expected: Intrinsics,
-    /// Standard deviations in the order of [`Intrinsics::parameters`]; one that is not finite and positive says nothing.
-    pub sigma: &'a [f64],
-}
-
-/// The data and what is known beforehand.
-#[derive(Debug, Clone, Copy)]
-pub struct JointProblem<'a> {
-    /// Where the camera sits.
-    pub mode: Mode,
-    /// Points of the target as drawn.
-    pub board: &'a BoardPoints,
-    /// Views with corners; a view without corners is an error of the caller.
-    pub views: &'a [View],
-    /// What is estimated besides the links.
-    pub free: Free,
-    /// What is known of free intrinsics.
-    pub lens_prior: Option<LensPrior<'a>>,
-    /// How corners are weighed against each other; `None` for all alike.
-    pub weights: Option<CornerWeights>,
-    /// Noise levels when they are known; otherwise they are estimated.
-    pub noise: Option<Noise>,
-}
-
-impl<'a> JointProblem<'a> {
-    /// Both links from these views, with known intrinsics and a flat target, all corners alike, noise levels estimated.
-    pub fn new(mode: Mode, board: &'a BoardPoints, views: &'a [View]) -> Self {
-        Self { mode, board, views, free: Free::default(), lens_prior: None, weights: None, noise: None }
-    }
-
-    /// Number of joint offsets that are estimated: none unless all views know their joints.
-    fn joint_count(&self) -> usize {
-        let fewest = self.views.iter().map(|view| view.tip_by_joint.len()).min().unwrap_or(0);
-        if self.free.joints { fewest.min(MAX_JOINTS) } else { 0 }
-    }
-}
-
-/// Where the iteration starts.
-#[derive(Debug, Clone, Copy)]
-pub struct JointStart {
-    /// Hand-eye transform, from a closed form.
-    pub mount_from_camera: Pose<Mount, Camera>,
-    /// Place of the target.
-    pub anchor_from_target: Pose<Anchor, Target>,
-    /// Intrinsics; kept when they are not free.
-    pub intrinsics: Intrinsics,
-    /// Shape of the target; kept when it is not free.
-    pub shape: BoardShape,
-    /// Noise levels to start from, where they are to be estimated; `None` finds a start from the misfit.
-    pub noise: Option<Noise>,
-}
-
-/// What happened to one view.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ViewFit {
-    /// RMS of its 2-D corner residuals with the robot pose corrected, pixels.
-    pub rms_px: f64,
-    /// Correction of the reported tip pose: translation \[m\] and rotation vector \[rad\] in the tip frame.
-    pub correction: Vector6<f64>,
-    /// The target's pose by the chain with the robot pose corrected.
-    pub camera_from_target: Pose<Camera, Target>,
-    /// How far the camera point [`JointSolution::reference_point`] moves when this view is left out, metres, to first
-    /// order; `None` when the rest does not determine an answer.
-    pub influence_m: Option<f64>,
-}
-
-/// The joint estimate.
-#[derive(Debug, Clone)]
-pub struct JointSolution {
-    /// Both rigid links.
-    pub hand_eye: HandEye,
-    /// The intrinsics, estimated or as given.
-    pub intrinsics: Intrinsics,
-    /// Shape of the target, estimated or as given.
-    pub shape: BoardShape,
-    /// Offsets of the joints, radians, to be added to the reported angles; empty when they were not estimated.
-    pub joint_offsets_rad: Vec<f64>,
-    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, joints]`,
-    /// metres, radians, pixels; right perturbations. It includes the robot's noise and the uncertainty of every other
-    /// unknown, that of estimated noise levels too.
-    pub covariance: DMatrix<f64>,
-    /// How the error of the hand-eye transform is distributed in units of its covariance.
-    pub small_sample: SmallSample,
-    /// What was estimated.
-    pub free: Free,
-    /// Noise levels, given or estimated.
-    pub noise: Noise,
-    /// One entry per view, in the order given.
-    pub views: Vec<ViewFit>,
-    /// RMS of all 2-D corner residuals with robot poses corrected, pixels.
-    pub rms_px: f64,
-    /// Middle of the target as the camera saw it on average, in camera coordinates \[m\]: where errors are stated.
-    pub reference_point: Point3<f64>,
-    /// Steps of the optimiser in all rounds together.
-    pub iterations: usize,
-}
-
-impl JointSolution {
-    /// Covariance of the hand-eye transform `[t; r]`, right perturbation.
-    pub fn hand_eye_covariance(&self) -> Matrix6<f64> {
-        self.covariance.fixed_view::<6, 6>(0, 0).into_owned()
-    }
-
-    /// Covariance of the target's place `[t; r]`, right perturbation.
-    pub fn target_covariance(&self) -> Matrix6<f64> {
-        self.covariance.fixed_view::<6, 6>(6, 6).into_owned()
-    }
-
-    /// Standard deviations of the free intrinsics in the order of [`Intrinsics::parameters`]; empty when fixed.
-    pub fn intrinsics_sigma(&self) -> Vec<f64> {
-        (12..12 + self.free.form().warp_at(&self.intrinsics)).map(|i| self.sigma(i)).collect()
-    }
-
-    /// Covariance of the two warps, square metres; `None` when they were not estimated.
-    pub fn warp_covariance(&self) -> Option<nalgebra::Matrix2<f64>> {
-        let at = 12 + self.free.form().warp_at(&self.intrinsics);
-        self.free.warp.then(|| self.covariance.fixed_view::<2, 2>(at, at).into_owned())
-    }
-
-    /// Standard deviation of the scale; `None` when it was not estimated.
-    pub fn scale_sigma(&self) -> Option<f64> {
-        self.free.scale.then(|| self.sigma(12 + self.free.form().scale_at(&self.intrinsics)))
-    }
-
-    /// Standard deviations of the joint offsets, radians.
-    pub fn joint_offsets_sigma(&self) -> Vec<f64> {
-        let n = self.covariance.nrows();
-        (n - self.joint_offsets_rad.len()..n).map(|i| self.sigma(i)).collect()
-    }
-
-    fn sigma(&self, index: usize) -> f64 {
-        self.covariance[(index, index)].max(0.0).sqrt()
-    }
-
-    /// Multiplies the covariance, because the data show that it is too small.
-    pub fn widen(&mut self, factor: f64) {
-        self.covariance *= factor;
-    }
-
-    /// Where the iteration ended, to start another from.
-    pub fn as_start(&self) -> JointStart {
-        JointStart {
-            mount_from_camera: self.hand_eye.mount_from_camera(),
-            anchor_from_target: self.hand_eye.anchor_from_target(),
-            intrinsics: self.intrinsics,
-            shape: self.shape,
-            noise: Some(self.noise),
-        }
-    }
-}
 
 /// Standard deviation of a joint's offset before any data: a robot that is a degree off is a broken one, and without a
 /// prior the offsets of the first and the last joint could not be told from the links.
@@ -271,7 +85,7 @@ pub fn estimate<'a>(
     if problem.views.len() < MIN_VIEWS {
         return Err(HandEyeError::TooFewViews { got: problem.views.len(), need: MIN_VIEWS });
     }
-    let mut state = optimise::State::new(problem, start);
+    let mut state = state::State::new(problem, start);
     let mut noise = problem.noise.or(start.noise).unwrap_or_else(|| variance::starting_noise(problem, &state));
     let mut levels = Levels::Three;
     if problem.noise.is_none() {
@@ -320,7 +134,7 @@ const VIEW_NOISE_GAIN: f64 = 9.55;
 
 fn finish(
     problem: &JointProblem<'_>,
-    state: &optimise::State,
+    state: &state::State,
     system: &normal::System,
     noise: Noise,
     levels: Levels,

@@ -3,12 +3,12 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, SMatrix, SVector, Vector6};
 
 use super::equations::{PoseEquations, ViewInput};
-use super::optimise::State;
 use super::view_block::{
     Layout, Own, PixelWeights, Rest, SharedMatrix, SharedVector, ViewBlock, add_form, add_form_gradient, prior_weight,
 };
 use super::{JOINT_PRIOR_RAD, JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::joint::state::State;
 use crate::geometry::se3::skew;
 use crate::progress::CancelToken;
 

@@ -1,17 +1,10 @@
 //! Levenberg–Marquardt on the joint cost at given noise levels.
 
-use nalgebra::{DVector, Point3, Vector6};
-
-use super::chain::Chain;
 use super::normal::System;
-use super::view_block::Layout;
-use super::{JointProblem, JointSolution, JointStart, Noise};
+use super::state::State;
+use super::{JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
-use crate::geometry::camera::Intrinsics;
-use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::progress::CancelToken;
-use crate::targets::bent::BoardShape;
-use crate::targets::observation::View;
 
 /// Steps of one minimisation; a handful is usual.
 const MAX_STEPS: usize = 100;
@@ -21,106 +14,6 @@ const COST_TOLERANCE: f64 = 1e-12;
 const FIRST_DAMPING: f64 = 1e-4;
 /// Past this damping a step is too small to matter.
 const LARGEST_DAMPING: f64 = 1e12;
-
-/// The current values of all unknowns.
-#[derive(Debug, Clone)]
-pub struct State {
-    pub mount_from_camera: Pose<Mount, Camera>,
-    pub anchor_from_target: Pose<Anchor, Target>,
-    pub intrinsics: Intrinsics,
-    pub shape: BoardShape,
-    /// Empty when the joints are not free.
-    pub joints_rad: Vec<f64>,
-    pub corrections: Vec<Vector6<f64>>,
-}
-
-impl State {
-    pub fn new(problem: &JointProblem<'_>, start: &JointStart) -> Self {
-        Self {
-            mount_from_camera: start.mount_from_camera,
-            anchor_from_target: start.anchor_from_target,
-            intrinsics: start.intrinsics,
-            shape: start.shape,
-            joints_rad: vec![0.0; problem.joint_count()],
-            corrections: vec![Vector6::zeros(); problem.views.len()],
-        }
-    }
-
-    /// The state that a solution was found in.
-    pub fn of(solution: &JointSolution) -> Self {
-        Self {
-            mount_from_camera: solution.hand_eye.mount_from_camera(),
-            anchor_from_target: solution.hand_eye.anchor_from_target(),
-            intrinsics: solution.intrinsics,
-            shape: solution.shape,
-            joints_rad: solution.joint_offsets_rad.clone(),
-            corrections: solution.views.iter().map(|view| view.correction).collect(),
-        }
-    }
-
-    pub fn layout(&self, problem: &JointProblem<'_>) -> Layout {
-        Layout { form: problem.free.form().count(&self.intrinsics), joints: self.joints_rad.len() }
-    }
-
-    /// The chain of one view.
-    pub fn chain(&self, problem: &JointProblem<'_>, view: &View, correction: &Vector6<f64>) -> Chain {
-        Chain::with_joints(
-            problem.mode,
-            view,
-            &self.joints_rad,
-            correction,
-            &self.mount_from_camera,
-            &self.anchor_from_target,
-        )
-    }
-
-    fn stepped(&self, problem: &JointProblem<'_>, shared: &DVector<f64>, own: &[Vector6<f64>]) -> Self {
-        let mut next = self.clone();
-        next.mount_from_camera = self.mount_from_camera.perturbed(&shared.fixed_rows::<6>(0).into_owned());
-        next.anchor_from_target = self.anchor_from_target.perturbed(&shared.fixed_rows::<6>(6).into_owned());
-        let form = problem.free.form();
-        let at = |column: usize| shared[Layout::FORM_AT + column];
-        if form.lens {
-            let parameters: Vec<f64> =
-                self.intrinsics.parameters().iter().enumerate().map(|(i, p)| p + at(i)).collect();
-            next.intrinsics = self.intrinsics.with_parameters(&parameters);
-        }
-        if form.warp {
-            let first = form.warp_at(&self.intrinsics);
-            for (k, warp) in next.shape.warp_m.iter_mut().enumerate() {
-                *warp += at(first + k);
-            }
-        }
-        if form.scale {
-            next.shape.scale += at(form.scale_at(&self.intrinsics));
-        }
-        let joints_at = self.layout(problem).joints_at();
-        for (j, offset) in next.joints_rad.iter_mut().enumerate() {
-            *offset += shared[joints_at + j];
-        }
-        for (correction, step) in next.corrections.iter_mut().zip(own) {
-            *correction += step;
-        }
-        next
-    }
-
-    /// Mean over the views of the target's middle in camera coordinates.
-    pub fn mean_target_centre(&self, problem: &JointProblem<'_>) -> Point3<f64> {
-        let points = problem.board.points(&self.shape);
-        let centre =
-            Point3::from(points.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / points.len().max(1) as f64);
-        let sum: nalgebra::Vector3<f64> = problem
-            .views
-            .iter()
-            .zip(&self.corrections)
-            .map(|(view, correction)| {
-                let chain = self.chain(problem, view, correction);
-                (chain.camera_from_target * centre).coords
-            })
-            .sum();
-        Point3::from(sum / problem.views.len().max(1) as f64)
-    }
-}
 
 /// Minimises the cost from `state`, which holds the best point found afterwards. Returns the system at that point and the
 /// number of steps.

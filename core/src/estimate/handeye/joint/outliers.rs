@@ -23,10 +23,10 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::equations::{FreeParameters, PoseEquations, ViewInput};
 use super::normal::System;
-use super::optimise::State;
 use super::view_block::{MAX_SHARED, prior_weight};
 use super::{JointProblem, JointSolution, JointStart, estimate};
 use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::se3;

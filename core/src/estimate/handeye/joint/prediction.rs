@@ -4,10 +4,10 @@
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use super::normal::{System, covariance_of};
-use super::optimise::State;
 use super::view_block::prior_weight;
 use super::{JointProblem, JointSolution};
 use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::estimate::uncertainty::quality;
 use crate::progress::{Stage, Work};

@@ -2,6 +2,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::simulated::{REALISTIC, Trial, camera, trial};
 use super::*;
+use crate::estimate::handeye::Mode;
 use crate::geometry::camera::Distortion;
 use crate::progress::CancelToken;
 

@@ -9,10 +9,10 @@
 use nalgebra::{Matrix4, Vector4, Vector6};
 
 use super::normal::System;
-use super::optimise::State;
 use super::view_block::prior_weight;
 use super::{JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::joint::state::State;
 
 /// Lowest levels: a nanometre, a nanoradian and a millionth of a pixel are exact for every purpose here.
 const LOWEST: Noise = Noise { corner_px: 1e-6, view_px: 0.0, robot_m: 1e-9, robot_rad: 1e-9 };

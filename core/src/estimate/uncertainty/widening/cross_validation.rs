@@ -11,7 +11,7 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 use super::{Check, Evidence};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::normal::{System, covariance_of};
-use crate::estimate::handeye::joint::optimise::State;
+use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::view_block::{Layout, ViewBlock, add_form_gradient, prior_weight};
 use crate::estimate::handeye::joint::{JointProblem, JointSolution, Noise};
 use crate::progress::Work;

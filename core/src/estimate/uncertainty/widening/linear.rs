@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix6, UnitQuaternion, Vector6};
 
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::normal::System;
-use crate::estimate::handeye::joint::optimise::State;
+use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::view_block::{Own, PixelWeights, ViewBlock, prior_weight};
 use crate::estimate::handeye::joint::{JointProblem, JointSolution};
 use crate::geometry::frames::{Base, Pose, Tip};

@@ -1,0 +1,14 @@
+//! What of the model has been recorded.
+
+use handeye_core::project::session::CaptureId;
+
+use crate::model::Step;
+
+/// What of the model was noted already.
+#[derive(Debug, Default)]
+pub(crate) struct Recorded {
+    pub step: Option<Step>,
+    pub selection: Vec<CaptureId>,
+    /// Messages with smaller numbers.
+    pub said: u64,
+}

@@ -1,0 +1,18 @@
+//! Why the arm cannot be sent to a pose.
+
+use crate::model::Model;
+use crate::tr;
+
+/// Why the arm cannot be sent anywhere now.
+pub fn immovable(model: &Model) -> Option<&'static str> {
+    let language = model.view.language;
+    if !model.control.is_connected() || !model.mover.is_connected() {
+        Some(tr!(language, "Not connected: the arm cannot be moved until the connection is there"))
+    } else if model.resting_simulation().is_some() {
+        Some(tr!(language, "The arm moves only while the simulation runs"))
+    } else if model.sequence_runs || model.planning {
+        Some(tr!(language, "A sequence is under way"))
+    } else {
+        None
+    }
+}

@@ -1,0 +1,54 @@
+//! How targets are looked for, and whether one can be.
+
+use image::GrayImage;
+
+use crate::detect::VisionError;
+use crate::targets::{Grid, TargetSpec};
+
+/// How long a detection may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Effort {
+    /// The quick methods, for every frame of a live stream: a miss costs a few times what a hit does.
+    Live,
+    /// Every method, for images that are kept: a miss may take some seconds per megapixel.
+    #[default]
+    Thorough,
+}
+
+/// Options of [`detect_with`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct DetectOptions {
+    /// How long it may take.
+    pub effort: Effort,
+}
+
+impl DetectOptions {
+    /// For every frame of a live stream.
+    pub fn live() -> Self {
+        Self { effort: Effort::Live }
+    }
+
+    /// For images that are kept.
+    pub fn thorough() -> Self {
+        Self { effort: Effort::Thorough }
+    }
+}
+
+/// Whether there is something to search, and something to search for.
+pub(super) fn check(image: &GrayImage, target: &TargetSpec) -> Result<(), VisionError> {
+    match target {
+        TargetSpec::Chessboard(grid) | TargetSpec::Circles(grid) | TargetSpec::AsymmetricCircles(grid) => {
+            let Grid { columns, rows, .. } = *grid;
+            if columns < 3 || rows < 3 {
+                return Err(VisionError::TargetTooSmall { columns, rows });
+            }
+        }
+        TargetSpec::Charuco(_) | TargetSpec::AprilGrid(_) | TargetSpec::AprilTag(_) => target.check()?,
+    }
+    let (width, height) = image.dimensions();
+    if width == 0 || height == 0 {
+        return Err(VisionError::BadImage { width, height });
+    }
+    Ok(())
+}

@@ -1,0 +1,17 @@
+//! A view in the fit in which the target was found.
+
+use crate::targets::observation::Corner;
+
+/// A view in the fit in which the target was found.
+pub(super) struct DetectedView<'a> {
+    /// Its index among all views.
+    pub(super) index: usize,
+    pub(super) view: &'a super::ObservedView,
+    pub(super) corners: &'a [Corner],
+}
+
+impl<'a> DetectedView<'a> {
+    pub(super) fn new((index, view): (usize, &'a super::ObservedView)) -> Option<Self> {
+        Some(Self { index, view, corners: view.corners.as_deref().filter(|_| view.in_fit)? })
+    }
+}

@@ -1,0 +1,101 @@
+//! What the joint estimate is given.
+
+use crate::estimate::handeye::Mode;
+use crate::estimate::handeye::joint::chain::MAX_JOINTS;
+use crate::estimate::handeye::joint::weights::CornerWeights;
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use crate::targets::bent::{BoardPoints, BoardShape};
+use crate::targets::observation::View;
+
+/// Noise levels, one standard deviation per axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of a corner, pixels.
+    pub corner_px: f64,
+    /// Of what all corners of a view have in common beyond that, pixels: errors of lens, target and image that look like
+    /// a pose. A pose from `n` corners has the covariance `(corner_px² + view_px²) (Jᵀ J)⁻¹`. Zero where the data ask for
+    /// none.
+    pub view_px: f64,
+    /// Of the reported tip position, metres.
+    pub robot_m: f64,
+    /// Of the reported tip orientation, radians.
+    pub robot_rad: f64,
+}
+
+/// What is estimated besides the two rigid links.
+#[expect(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Free {
+    /// Focal lengths, principal point and distortion.
+    pub intrinsics: bool,
+    /// The two warps of the target, see [`BoardShape`].
+    pub warp: bool,
+    /// The true size of the target over the stated one. It is seen through the robot's translations alone.
+    pub scale: bool,
+    /// A constant offset of every joint, where the views say how the tip turns with them, with a prior of
+    /// [`JOINT_PRIOR_RAD`]. Those of the first and the last joint stay zero: the two links take them up.
+    pub joints: bool,
+}
+
+impl Free {
+    pub(crate) fn form(self) -> super::equations::FreeParameters {
+        super::equations::FreeParameters { lens: self.intrinsics, warp: self.warp, scale: self.scale }
+    }
+}
+
+/// What is known of free intrinsics beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct LensPrior<'a> {
+    /// The expected intrinsics.
+    pub expected: Intrinsics,
+    /// Standard deviations in the order of [`Intrinsics::parameters`]; one that is not finite and positive says nothing.
+    pub sigma: &'a [f64],
+}
+
+/// The data and what is known beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct JointProblem<'a> {
+    /// Where the camera sits.
+    pub mode: Mode,
+    /// Points of the target as drawn.
+    pub board: &'a BoardPoints,
+    /// Views with corners; a view without corners is an error of the caller.
+    pub views: &'a [View],
+    /// What is estimated besides the links.
+    pub free: Free,
+    /// What is known of free intrinsics.
+    pub lens_prior: Option<LensPrior<'a>>,
+    /// How corners are weighed against each other; `None` for all alike.
+    pub weights: Option<CornerWeights>,
+    /// Noise levels when they are known; otherwise they are estimated.
+    pub noise: Option<Noise>,
+}
+
+impl<'a> JointProblem<'a> {
+    /// Both links from these views, with known intrinsics and a flat target, all corners alike, noise levels estimated.
+    pub fn new(mode: Mode, board: &'a BoardPoints, views: &'a [View]) -> Self {
+        Self { mode, board, views, free: Free::default(), lens_prior: None, weights: None, noise: None }
+    }
+
+    /// Number of joint offsets that are estimated: none unless all views know their joints.
+    pub(super) fn joint_count(&self) -> usize {
+        let fewest = self.views.iter().map(|view| view.tip_by_joint.len()).min().unwrap_or(0);
+        if self.free.joints { fewest.min(MAX_JOINTS) } else { 0 }
+    }
+}
+
+/// Where the iteration starts.
+#[derive(Debug, Clone, Copy)]
+pub struct JointStart {
+    /// Hand-eye transform, from a closed form.
+    pub mount_from_camera: Pose<Mount, Camera>,
+    /// Place of the target.
+    pub anchor_from_target: Pose<Anchor, Target>,
+    /// Intrinsics; kept when they are not free.
+    pub intrinsics: Intrinsics,
+    /// Shape of the target; kept when it is not free.
+    pub shape: BoardShape,
+    /// Noise levels to start from, where they are to be estimated; `None` finds a start from the misfit.
+    pub noise: Option<Noise>,
+}

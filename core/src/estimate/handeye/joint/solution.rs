@@ -1,0 +1,109 @@
+//! What the joint estimate finds.
+
+use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
+
+use crate::estimate::handeye::HandEye;
+use crate::estimate::handeye::joint::freedom::SmallSample;
+use crate::estimate::handeye::joint::problem::{Free, JointStart, Noise};
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Camera, Pose, Target};
+use crate::targets::bent::BoardShape;
+
+/// What happened to one view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewFit {
+    /// RMS of its 2-D corner residuals with the robot pose corrected, pixels.
+    pub rms_px: f64,
+    /// Correction of the reported tip pose: translation \[m\] and rotation vector \[rad\] in the tip frame.
+    pub correction: Vector6<f64>,
+    /// The target's pose by the chain with the robot pose corrected.
+    pub camera_from_target: Pose<Camera, Target>,
+    /// How far the camera point [`JointSolution::reference_point`] moves when this view is left out, metres, to first
+    /// order; `None` when the rest does not determine an answer.
+    pub influence_m: Option<f64>,
+}
+
+/// The joint estimate.
+#[derive(Debug, Clone)]
+pub struct JointSolution {
+    /// Both rigid links.
+    pub hand_eye: HandEye,
+    /// The intrinsics, estimated or as given.
+    pub intrinsics: Intrinsics,
+    /// Shape of the target, estimated or as given.
+    pub shape: BoardShape,
+    /// Offsets of the joints, radians, to be added to the reported angles; empty when they were not estimated.
+    pub joint_offsets_rad: Vec<f64>,
+    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, joints]`,
+    /// metres, radians, pixels; right perturbations. It includes the robot's noise and the uncertainty of every other
+    /// unknown, that of estimated noise levels too.
+    pub covariance: DMatrix<f64>,
+    /// How the error of the hand-eye transform is distributed in units of its covariance.
+    pub small_sample: SmallSample,
+    /// What was estimated.
+    pub free: Free,
+    /// Noise levels, given or estimated.
+    pub noise: Noise,
+    /// One entry per view, in the order given.
+    pub views: Vec<ViewFit>,
+    /// RMS of all 2-D corner residuals with robot poses corrected, pixels.
+    pub rms_px: f64,
+    /// Middle of the target as the camera saw it on average, in camera coordinates \[m\]: where errors are stated.
+    pub reference_point: Point3<f64>,
+    /// Steps of the optimiser in all rounds together.
+    pub iterations: usize,
+}
+
+impl JointSolution {
+    /// Covariance of the hand-eye transform `[t; r]`, right perturbation.
+    pub fn hand_eye_covariance(&self) -> Matrix6<f64> {
+        self.covariance.fixed_view::<6, 6>(0, 0).into_owned()
+    }
+
+    /// Covariance of the target's place `[t; r]`, right perturbation.
+    pub fn target_covariance(&self) -> Matrix6<f64> {
+        self.covariance.fixed_view::<6, 6>(6, 6).into_owned()
+    }
+
+    /// Standard deviations of the free intrinsics in the order of [`Intrinsics::parameters`]; empty when fixed.
+    pub fn intrinsics_sigma(&self) -> Vec<f64> {
+        (12..12 + self.free.form().warp_at(&self.intrinsics)).map(|i| self.sigma(i)).collect()
+    }
+
+    /// Covariance of the two warps, square metres; `None` when they were not estimated.
+    pub fn warp_covariance(&self) -> Option<nalgebra::Matrix2<f64>> {
+        let at = 12 + self.free.form().warp_at(&self.intrinsics);
+        self.free.warp.then(|| self.covariance.fixed_view::<2, 2>(at, at).into_owned())
+    }
+
+    /// Standard deviation of the scale; `None` when it was not estimated.
+    pub fn scale_sigma(&self) -> Option<f64> {
+        self.free.scale.then(|| self.sigma(12 + self.free.form().scale_at(&self.intrinsics)))
+    }
+
+    /// Standard deviations of the joint offsets, radians.
+    pub fn joint_offsets_sigma(&self) -> Vec<f64> {
+        let n = self.covariance.nrows();
+        (n - self.joint_offsets_rad.len()..n).map(|i| self.sigma(i)).collect()
+    }
+
+    fn sigma(&self, index: usize) -> f64 {
+        self.covariance[(index, index)].max(0.0).sqrt()
+    }
+
+    /// Multiplies the covariance, because the data show that it is too small.
+    pub fn widen(&mut self, factor: f64) {
+        self.covariance *= factor;
+    }
+
+    /// Where the iteration ended, to start another from.
+    pub fn as_start(&self) -> JointStart {
+        JointStart {
+            mount_from_camera: self.hand_eye.mount_from_camera(),
+            anchor_from_target: self.hand_eye.anchor_from_target(),
+            intrinsics: self.intrinsics,
+            shape: self.shape,
+            noise: Some(self.noise),
+        }
+    }
+}
