@@ -80,14 +80,22 @@ pub struct ZmqTransport {
     lost: bool,
 }
 
+/// What it means that the address refuses a connection.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Refusal {
+    /// The server is not up yet.
+    NotYet,
+    /// The server has gone: the connection before was made, and has ended.
+    Gone,
+}
+
 struct Channel {
     request: zmq::Socket,
     monitor: zmq::Socket,
     serial: u64,
     awaiting_reply: bool,
     shaken_hands: bool,
-    /// Follows a connection that ended: a server that refuses this one has gone. Anybody else waits for it to come up.
-    succeeds_lost: bool,
+    refusal: Refusal,
     lost_since: Option<Instant>,
     retries: bool,
 }
@@ -129,7 +137,7 @@ impl ZmqTransport {
             self.serial += 1;
             let mut channel = Channel::connect(&self.context, &self.endpoint, self.heartbeat, self.serial)
                 .map_err(|error| TransportFault::Refused(error.to_string()))?;
-            channel.succeeds_lost = self.lost;
+            channel.refusal = if self.lost { Refusal::Gone } else { Refusal::NotYet };
             self.channel = Some(channel);
         }
         self.channel.as_mut().ok_or(TransportFault::Disconnected)
@@ -169,7 +177,7 @@ impl Channel {
             serial,
             awaiting_reply: false,
             shaken_hands: false,
-            succeeds_lost: false,
+            refusal: Refusal::NotYet,
             lost_since: None,
             retries: false,
         })
@@ -186,7 +194,7 @@ impl Channel {
                 // Before the handshake it is only an attempt that failed: the library tries again by itself.
                 self.lost_since = self.lost_since.or_else(|| Some(Instant::now()));
             } else if event == zmq::SocketEvent::CONNECT_RETRIED as u16 {
-                self.retries |= self.lost_since.is_some() || (self.succeeds_lost && !self.shaken_hands);
+                self.retries |= self.lost_since.is_some() || (self.refusal == Refusal::Gone && !self.shaken_hands);
             }
         }
     }

@@ -53,7 +53,7 @@ impl Document {
     /// Ends the document.
     pub fn finish(mut self, summary: &Summary, error: Option<&Failure>) -> Result<(), Failure> {
         let mut summary = summary.json();
-        summary["error"] = json!(error.map(|error| error.to_string()));
+        summary["error"] = json!(error.map(ToString::to_string));
         let end = format!("\n  ],\n  \"summary\": {summary} }}\n");
         self.with(|file| file.write_all(end.as_bytes()).and_then(|()| file.flush()))
     }

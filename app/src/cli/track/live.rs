@@ -66,6 +66,14 @@ pub struct Job<'a> {
     pub own_cell: Option<BoardMotion>,
 }
 
+/// Where it goes, image by image.
+pub struct Taken<'a> {
+    /// The document.
+    pub publish: &'a mut dyn FnMut(&Tracked) -> Result<(), Failure>,
+    /// Of what was done, also where it ends with an error.
+    pub summary: &'a mut Summary,
+}
+
 /// Connections to a cell.
 pub struct Live {
     arm: Arm,
@@ -116,15 +124,8 @@ impl Live {
         Ok(Self { arm, feed })
     }
 
-    /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns. The summary is of what
-    /// was done, also where it ends with an error.
-    pub fn run(
-        mut self,
-        job: &Job<'_>,
-        cancel: &CancelToken,
-        publish: &mut dyn FnMut(&Tracked) -> Result<(), Failure>,
-        summary: &mut Summary,
-    ) -> Result<(), Failure> {
+    /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns.
+    pub fn run(mut self, job: &Job<'_>, cancel: &CancelToken, taken: &mut Taken<'_>) -> Result<(), Failure> {
         if let Some(board) = &job.own_cell {
             self.prepare_own_cell(board, cancel)?;
         }
@@ -140,10 +141,10 @@ impl Live {
         let Self { mut arm, feed } = self;
         let wish = match job.task {
             Task::Watch => {
-                return Self::watch(feed, tracking, job, &line, cancel, &|| false, publish, summary).map(drop);
+                return Self::watch(feed, tracking, job, &line, cancel, &|| false, taken).map(drop);
             }
             Task::Reach { index, stand_off_m } => {
-                let newest = Self::watch(feed, tracking, job, &line, cancel, &|| false, publish, summary)?;
+                let newest = Self::watch(feed, tracking, job, &line, cancel, &|| false, taken)?;
                 return reach(&mut arm, job, newest, index, stand_off_m, cancel);
             }
             Task::Follow(wish) => wish,
@@ -165,13 +166,13 @@ impl Live {
                 arm.follow(&kinematics, &FollowLimits::default(), &mut wanted)
             })
             .map_err(Failure::failed)?;
-        let watched = Self::watch(feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), publish, summary);
+        let watched = Self::watch(feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), taken);
         end.cancel();
         let followed = arm_thread
             .join()
             .map_err(|_panic| Failure::failed(anyhow::anyhow!("the thread that moves the arm ended with a panic")))?;
         watched?;
-        summary.follow_ended = match followed.map_err(Failure::failed)? {
+        taken.summary.follow_ended = match followed.map_err(Failure::failed)? {
             FollowEnd::Released => line.take_ended().map(|why: Text| why.say(Language::English)),
             end => Some(end_of_following(end).say(Language::English)),
         };
@@ -205,9 +206,9 @@ impl Live {
         line: &FollowLine,
         cancel: &CancelToken,
         arm_stands: &dyn Fn() -> bool,
-        publish: &mut dyn FnMut(&Tracked) -> Result<(), Failure>,
-        summary: &mut Summary,
+        taken: &mut Taken<'_>,
     ) -> Result<Option<Estimate>, Failure> {
+        let Taken { publish, summary } = taken;
         let frames = match job.task {
             Task::Reach { .. } => Some(job.frames.unwrap_or(IMAGES_BEFORE_REACH)),
             Task::Watch | Task::Follow(_) => job.frames,

@@ -17,7 +17,7 @@ use super::output::Output;
 use super::{Failure, RerunArg, out, rerun_arg, solve};
 use crate::model::{FollowWish, Tracked};
 use crate::rerun_log::{Pace, RerunChoice};
-use live::{Job, Live, Summary, Task};
+use live::{Job, Live, Summary, Taken, Task};
 
 /// Options of `handeye track`.
 #[derive(Debug, Args)]
@@ -133,7 +133,8 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         Ok(())
     };
     let mut summary = Summary::default();
-    let tracked = Live::connect(&endpoint).and_then(|live| live.run(&job, &cancel, &mut add, &mut summary));
+    let tracked = Live::connect(&endpoint)
+        .and_then(|live| live.run(&job, &cancel, &mut Taken { publish: &mut add, summary: &mut summary }));
     // What was tracked before an error is as good as the rest.
     document.finish(&summary, tracked.as_ref().err())?;
     tracked?;
