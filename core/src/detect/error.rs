@@ -2,7 +2,7 @@
 
 /// Why there is no detection.
 ///
-/// A board that is simply not in the image is not an error: [`detect`] returns `None`.
+/// A board that is simply not in the image is not an error: [`detect`](super::detect) returns `None`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VisionError {

@@ -15,7 +15,7 @@ pub enum Effort {
     Thorough,
 }
 
-/// Options of [`detect_with`].
+/// Options of [`detect_with`](super::detect_with).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct DetectOptions {

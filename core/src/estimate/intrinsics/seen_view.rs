@@ -7,7 +7,7 @@ use crate::targets::observation::Corner;
 /// The corners of one view.
 #[derive(Debug, Clone, Copy)]
 pub struct SeenView<'a> {
-    /// At least [`planar_pose::MIN_CORNERS`] that do not lie on one line.
+    /// At least [`MIN_CORNERS`](crate::geometry::planar_pose::MIN_CORNERS) that do not lie on one line.
     pub corners: &'a [Corner],
     /// One matrix `W` per corner, whose residual counts as `W r`; empty where all corners count alike.
     pub sqrt_weights: &'a [Matrix2<f64>],

@@ -19,7 +19,7 @@ pub struct Entry {
     /// Joint angles as the controller reported them, radians; `None` when the pose table has none.
     pub joints_rad: Option<Vec<f64>>,
     /// How the tip moves with each joint, see [`crate::geometry::arm::Arm::tip_by_joint_at`]; empty without joint angles, without
-    /// the arm, or where the two do not fit the poses, see [`Dataset::arm`].
+    /// the arm, or where the two do not fit the poses, see [`Dataset::arm`](super::Dataset::arm).
     pub tip_by_joint: Vec<Vector6<f64>>,
     /// Corners detected elsewhere, sorted by index, empty when the target was not found in this image; `None` when
     /// the data set has no corner table.

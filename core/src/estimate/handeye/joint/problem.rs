@@ -34,7 +34,7 @@ pub struct Free {
     /// The true size of the target over the stated one. It is seen through the robot's translations alone.
     pub scale: bool,
     /// A constant offset of every joint, where the views say how the tip turns with them, with a prior of
-    /// [`JOINT_PRIOR_RAD`]. Those of the first and the last joint stay zero: the two links take them up.
+    /// [`JOINT_PRIOR_RAD`](super::JOINT_PRIOR_RAD). Those of the first and the last joint stay zero: the two links take them up.
     pub joints: bool,
 }
 
