@@ -22,9 +22,10 @@ mod track;
 use std::io::{IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
-use crate::gui::GuiArgs;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
+
+use crate::gui::GuiArgs;
 
 pub use failure::Failure;
 pub use rerun_arg::RerunArg;

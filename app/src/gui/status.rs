@@ -143,11 +143,12 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
     }
 }
 
-/// First letter large, unless the first word is a name in code; full stop at the end.
+/// A reason as a sentence; those of our own are.
 fn sentence(why: &Text) -> Text {
     why.foreign_words().map_or_else(|| why.clone(), |words| Text::verbatim(sentence_of(words)))
 }
 
+/// First letter large, unless the first word is a name in code; full stop at the end.
 fn sentence_of(text: &str) -> String {
     let is_code =
         text.split_whitespace().next().is_some_and(|word| word.trim_end_matches(['.', ':']).contains(['.', '/']));

@@ -233,8 +233,8 @@ fn a_server_that_dies_in_a_long_silent_call_is_noticed_at_once_and_found_again()
     assert_eq!(next, Ok(Ok(7)));
 }
 
-#[test]
-fn a_connection_that_ends_between_two_calls_is_known_to_have_lost_what_the_server_kept() {
+/// A connection whose server answered once and then died, which is known here by now.
+fn connection_to_the_dead() -> (Endpoint, Connection) {
     let (answered, is_answered) = pair();
     let (endpoint, server) = serve(move |peer| {
         let (to, _) = peer.next();
@@ -249,6 +249,12 @@ fn a_connection_that_ends_between_two_calls_is_known_to_have_lost_what_the_serve
     while connection.is_connected() {
         assert!(Instant::now() < deadline, "nobody notices that the server has gone");
     }
+    (endpoint, connection)
+}
+
+#[test]
+fn a_connection_that_ends_between_two_calls_is_known_to_have_lost_what_the_server_kept() {
+    let (endpoint, mut connection) = connection_to_the_dead();
     let peer = Peer::bind(Some(endpoint.port()));
     let server = std::thread::spawn(move || {
         let (to, request) = peer.next();
@@ -263,20 +269,7 @@ fn a_connection_that_ends_between_two_calls_is_known_to_have_lost_what_the_serve
 
 #[test]
 fn a_server_that_died_is_reported_by_every_call_at_once_until_it_is_back() {
-    let (answered, is_answered) = pair();
-    let (endpoint, server) = serve(move |peer| {
-        let (to, _) = peer.next();
-        peer.say(&to, &ret(Vec::new()));
-        done(&is_answered);
-    });
-    let mut connection = connect(&endpoint, options());
-    connection.call("sim.x", vec![]).expect("an answer");
-    answered.send(()).expect("the server listens");
-    join(server);
-    let deadline = Instant::now() + PATIENCE;
-    while connection.is_connected() {
-        assert!(Instant::now() < deadline, "nobody notices that the server has gone");
-    }
+    let (endpoint, mut connection) = connection_to_the_dead();
     // Not after the time allowed for a reply: whoever holds the arm has to know at once.
     for _ in 0..3 {
         let error = connection.call("sim.x", vec![]).expect_err("the server has gone");

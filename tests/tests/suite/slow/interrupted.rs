@@ -24,6 +24,18 @@ fn end(mut child: Child, mut said: BufReader<ChildStderr>) -> (Option<i32>, Stri
     (end_of(&mut child).code(), rest)
 }
 
+/// Kills the cell of a command, which has to end soon; what it still says.
+fn end_after(cell: &mut CellProcess, child: Child, said: BufReader<ChildStderr>) -> String {
+    cell.kill();
+    let killed = Instant::now();
+    let (code, rest) = end(child, said);
+    let took = killed.elapsed();
+    println!("ended {took:?} after its server");
+    assert_eq!(code, Some(1), "{rest}");
+    assert!(took < A_REPLY, "{took:?}: {rest}");
+    rest
+}
+
 /// A person at the simulator.
 fn person(cell: &CellProcess) -> Arm {
     let options = ConnectionOptions::default();
@@ -76,13 +88,7 @@ fn auto_ends_soon_after_its_server_and_keeps_what_it_captured() {
     let (child, mut said) =
         start(&["auto", "--rerun", "off", "--connect", &address, "--out", &out.display().to_string()]);
     until_said(&mut said, "pose 2 of 10 captured");
-    cell.kill();
-    let killed = Instant::now();
-    let (code, rest) = end(child, said);
-    let took = killed.elapsed();
-    println!("ended {took:?} after its server");
-    assert_eq!(code, Some(1), "{rest}");
-    assert!(took < A_REPLY, "{took:?}: {rest}");
+    let rest = end_after(&mut cell, child, said);
     assert!(rest.contains("captures are kept in"), "{rest}");
     assert!(Session::open(&out).expect("a session").document.captures.len() >= 2, "{rest}");
 }
@@ -104,13 +110,7 @@ fn a_track_says_what_it_waits_for_and_its_json_is_whole_when_the_server_dies() {
     until_said(&mut said, "the simulation is paused: waiting until it is continued");
     person.sim().start_simulation().expect("an answer");
     until_said(&mut said, "the simulation goes on");
-    cell.kill();
-    let killed = Instant::now();
-    let (code, rest) = end(child, said);
-    let took = killed.elapsed();
-    println!("ended {took:?} after its server");
-    assert_eq!(code, Some(1), "{rest}");
-    assert!(took < A_REPLY, "{took:?}: {rest}");
+    end_after(&mut cell, child, said);
     let track: Value = serde_json::from_slice(&std::fs::read(file).expect("written")).expect("JSON");
     assert!(track["summary"]["error"].as_str().is_some_and(|why| why.contains("went away")), "{track:#}");
     let frames = track["frames"].as_array().map(Vec::len);
