@@ -113,30 +113,6 @@ fn a_cell_of_this_project_is_called_so_and_its_facts_are_known() {
 }
 
 #[test]
-fn every_pose_of_the_reference_sequence_is_reached_at_full_and_at_a_quarter_of_the_speed() {
-    let mut live = Live::new(false);
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/poses/seed10.toml");
-    let sequence = TaughtPoses::read(Path::new(file)).expect("the taught poses");
-    let start: JointAngles = sequence.start_joints_rad.expect("a start").try_into().expect("six joints");
-    let mut id = 0;
-    for speed in [1.0, 0.25] {
-        let goals = sequence.poses.iter().map(|pose| match &pose.goal {
-            Goal::Tip(pose) => MotionGoal::Tip(*pose),
-            Goal::Joints(joints) => MotionGoal::Joints(joints.clone().try_into().expect("six joints")),
-        });
-        for goal in std::iter::once(MotionGoal::Joints(start)).chain(goals) {
-            id += 1;
-            live.bench.move_to(id, goal, speed);
-            assert_eq!(live.bench.moved(id), MotionOutcome::Arrived, "{goal:?} at {speed}");
-            if let MotionGoal::Tip(pose) = goal {
-                let (distance_m, angle_rad) = live.tip().distance_to(&pose);
-                assert!(distance_m < 1e-3 && angle_rad < 0.01, "{distance_m} m, {angle_rad} rad");
-            }
-        }
-    }
-}
-
-#[test]
 fn what_is_out_of_reach_is_refused_with_the_reason_and_nothing_moves() {
     let mut live = Live::new(false);
     let before = live.joints();
@@ -295,4 +271,33 @@ fn a_server_that_ends_between_two_calls_is_noticed_at_once() {
     }
     // The next call would wait for five seconds for a server to come back.
     assert!(began.elapsed() < Duration::from_secs(3), "{:?}", began.elapsed());
+}
+
+/// Moves in real time through a whole sequence, twice.
+mod slow {
+    use super::*;
+
+    #[test]
+    fn every_pose_of_the_reference_sequence_is_reached_at_full_and_at_a_quarter_of_the_speed() {
+        let mut live = Live::new(false);
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/poses/seed10.toml");
+        let sequence = TaughtPoses::read(Path::new(file)).expect("the taught poses");
+        let start: JointAngles = sequence.start_joints_rad.expect("a start").try_into().expect("six joints");
+        let mut id = 0;
+        for speed in [1.0, 0.25] {
+            let goals = sequence.poses.iter().map(|pose| match &pose.goal {
+                Goal::Tip(pose) => MotionGoal::Tip(*pose),
+                Goal::Joints(joints) => MotionGoal::Joints(joints.clone().try_into().expect("six joints")),
+            });
+            for goal in std::iter::once(MotionGoal::Joints(start)).chain(goals) {
+                id += 1;
+                live.bench.move_to(id, goal, speed);
+                assert_eq!(live.bench.moved(id), MotionOutcome::Arrived, "{goal:?} at {speed}");
+                if let MotionGoal::Tip(pose) = goal {
+                    let (distance_m, angle_rad) = live.tip().distance_to(&pose);
+                    assert!(distance_m < 1e-3 && angle_rad < 0.01, "{distance_m} m, {angle_rad} rad");
+                }
+            }
+        }
+    }
 }
