@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use handeye_core::estimate::{Method, Options};
 
-use super::gate::Gate;
+use super::gate::{self, Gate};
 use super::output::Output;
 use super::{Failure, RerunArg, rerun_arg, solve};
 use crate::rerun_log::{Pace, RerunChoice};
@@ -33,7 +33,8 @@ pub struct CalibrateArgs {
     /// Try constant offsets of the robot's joints, and take them when views held out say so. Needs joint angles.
     #[arg(long)]
     joint_offsets: bool,
-    /// End with exit code 1 unless a number of the result is below a limit, such as `tip_error_95_mm<0.5`.
+    /// End with exit code 1 unless a number of the result is below a limit, such as `tip_error_95_mm<0.5`. A finding that
+    /// is a problem ends with it too, whatever the numbers.
     #[arg(long, value_name = "NAME<LIMIT")]
     gate: Vec<Gate>,
     #[command(flatten)]
@@ -59,6 +60,6 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     solution.publish(args.json.as_ref())?;
     solution.note(&recorder);
     rerun_arg::finish(recorder, &cancel)?;
-    let failures: Vec<String> = args.gate.iter().filter_map(|gate| gate.failure(&result.quality)).collect();
+    let failures = gate::failures(&args.gate, result);
     if failures.is_empty() { Ok(()) } else { Err(Failure::failed(anyhow::anyhow!("{}", failures.join("; ")))) }
 }

@@ -28,7 +28,7 @@ pub struct DoctorArgs {
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let observations = solve::read(&args.path, &cancel)?.seen.observations;
-    let calibration = match calibrate(&observations, Method::Joint, &cancel) {
+    let mut calibration = match calibrate(&observations, Method::Joint, &cancel) {
         Ok(calibration) => Some(calibration),
         Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => {
             return Err(Failure::failed(CalibrateError::HandEye(HandEyeError::Cancelled)));
@@ -40,7 +40,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
         }
     };
     let options = FindingOptions { goal_mm: args.goal };
-    let diagnosis = diagnose(&observations, calibration.as_ref(), &options, &cancel);
+    let diagnosis = diagnose(&observations, calibration.as_mut(), &options, &cancel);
     if cancel.is_cancelled() {
         return Err(Failure::failed(HandEyeError::Cancelled));
     }

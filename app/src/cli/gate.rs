@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use handeye_core::project::result::Quality;
+use handeye_core::project::result::{CalibrationResult, Quality};
 
 /// A condition such as `tip_error_95_mm<0.5`.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,9 +51,17 @@ impl Number {
     }
 }
 
+/// Why a result does not pass its gates; empty when it does, and when there are none. A problem passes no gate: the numbers
+/// of a result that is not to be used mean nothing.
+pub fn failures(gates: &[Gate], result: &CalibrationResult) -> Vec<String> {
+    let problem = result.problem().filter(|_| !gates.is_empty());
+    let problem = problem.map(|finding| format!("{} is a problem: {}", finding.code, finding.text));
+    problem.into_iter().chain(gates.iter().filter_map(|gate| gate.failure(&result.quality))).collect()
+}
+
 impl Gate {
     /// Why a result does not pass; `None` when it does. A number that is not known does not pass.
-    pub fn failure(&self, quality: &Quality) -> Option<String> {
+    fn failure(&self, quality: &Quality) -> Option<String> {
         let key = self.number.key();
         match self.number.of(quality) {
             None => Some(format!("gate {self}: {key} is not known for this result")),
@@ -92,6 +100,8 @@ impl FromStr for Gate {
 
 #[cfg(test)]
 mod tests {
+    use handeye_core::diagnose::record::FindingRecord;
+
     use super::*;
 
     #[test]
@@ -106,6 +116,24 @@ mod tests {
         assert!(gate.failure(&with(None)).is_some());
         let or_equal: Gate = "tip_error_95_mm <= 0.5".parse().expect("a gate");
         assert_eq!(or_equal.failure(&with(Some(0.5))), None);
+    }
+
+    #[test]
+    fn a_problem_passes_no_gate_however_good_the_numbers_are() {
+        let gate: Gate = "rms_px<1".parse().expect("a gate");
+        let finding = |severity: &str| FindingRecord {
+            code: "wrong_length_unit".to_owned(),
+            severity: severity.to_owned(),
+            text: "Millimetres.".to_owned(),
+            views: Vec::new(),
+            evidence: Vec::new(),
+        };
+        let mut result = CalibrationResult { findings: vec![finding("warning")], ..CalibrationResult::default() };
+        result.quality.rms_px = Some(0.1);
+        assert!(failures(&[gate.clone()], &result).is_empty());
+        result.findings.push(finding("problem"));
+        assert_eq!(failures(&[gate], &result), ["wrong_length_unit is a problem: Millimetres."]);
+        assert!(failures(&[], &result).is_empty(), "without a gate the findings speak for themselves");
     }
 
     #[test]

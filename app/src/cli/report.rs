@@ -11,16 +11,13 @@ use crate::model::Solved;
 pub fn text(result: &CalibrationResult) -> String {
     let mut out = String::new();
     headline(&mut out, result);
-    if let Some(hand_eye) = &result.hand_eye {
-        transform(&mut out, hand_eye);
-    }
-    if let Some(target) = &result.target {
-        transform(&mut out, target);
+    findings(&mut out, result);
+    for link in [&result.hand_eye, &result.target].into_iter().flatten() {
+        transform(&mut out, link, sigma_name(result));
     }
     camera(&mut out, result);
     fit(&mut out, result);
     details(&mut out, result);
-    findings(&mut out, result);
     truth(&mut out, result);
     methods(&mut out, result);
     views(&mut out, result);
@@ -52,12 +49,23 @@ pub fn title(result: &CalibrationResult) -> &'static str {
 
 /// What a user of the calibration can expect; `None` for a camera alone.
 pub fn expected_error(result: &CalibrationResult) -> Option<String> {
-    match result.quality.tip_error_95_mm {
-        Some(error) => Some(format!(
-            "expected error of a measured point: below {error:.3} mm in 95 % of cases, where the target was seen"
-        )),
-        None => result.mode.is_some().then(|| "expected error: not known for this method".to_owned()),
-    }
+    let Some(error) = result.quality.tip_error_95_mm else {
+        let why = match (result.problem(), &result.estimate) {
+            (Some(problem), _) => format!("none can be stated, see the problem below [{}]", problem.code),
+            (None, Some(_)) => "none can be stated, see below what was found".to_owned(),
+            (None, None) => "not known for this method".to_owned(),
+        };
+        return result.mode.is_some().then(|| format!("expected error: {why}"));
+    };
+    let stated =
+        format!("expected error of a measured point: below {error:.3} mm in 95 % of cases, where the target was seen");
+    let estimate = result.estimate.as_ref();
+    Some(match estimate.and_then(|estimate| estimate.moved_mm.zip(estimate.modelled_error_95_mm)) {
+        Some((moved, modelled)) => format!(
+            "{stated}: what is found below would move the answer by {moved:.3} mm, the noise alone makes {modelled:.3} mm"
+        ),
+        None => stated,
+    })
 }
 
 /// What became of a view.
@@ -70,7 +78,13 @@ pub fn status(status: ViewRecordStatus) -> &'static str {
     }
 }
 
-fn transform(out: &mut String, t: &TransformEstimate) {
+/// What the standard deviations are: with something found that is not in the model they are no error of the answer.
+fn sigma_name(result: &CalibrationResult) -> &'static str {
+    let moved = result.estimate.as_ref().is_some_and(|estimate| estimate.moved_mm.is_some());
+    if moved || result.problem().is_some() { "standard deviation by noise alone" } else { "standard deviation" }
+}
+
+fn transform(out: &mut String, t: &TransformEstimate, sigma_name: &str) {
     let [x, y, z] = t.translation_m.map(|v| v * 1e3);
     let [qx, qy, qz, qw] = t.rotation_xyzw;
     line!(out, "{}_from_{}", t.parent_frame, t.child_frame);
@@ -80,7 +94,7 @@ fn transform(out: &mut String, t: &TransformEstimate) {
         let sigma: Vec<f64> = (0..6).map(|i| c[i][i].max(0.0).sqrt()).collect();
         let [a, b, c] = [0, 1, 2].map(|i| sigma[i] * 1e3);
         let [d, e, f] = [3, 4, 5].map(|i| sigma[i].to_degrees());
-        line!(out, "  standard deviation [{a:.3} {b:.3} {c:.3}] mm, [{d:.4} {e:.4} {f:.4}]°");
+        line!(out, "  {sigma_name} [{a:.3} {b:.3} {c:.3}] mm, [{d:.4} {e:.4} {f:.4}]°");
     }
 }
 

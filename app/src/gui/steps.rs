@@ -79,7 +79,7 @@ impl Facts {
             captures_in_use: document.in_use().count(),
             solving: model.solve.is_running(),
             solved: current.is_some(),
-            expected_error_m: current.and_then(|solved| solved.calibration.tip_error_95_m()),
+            expected_error_m: current.and_then(|solved| solved.result.quality.tip_error_95_mm).map(|mm| mm * 1e-3),
             check_captures: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
             verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
             exported: written && current.is_some(),

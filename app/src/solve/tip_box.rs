@@ -38,7 +38,9 @@ pub struct BoxState {
 /// place of a capture counts from which the middle of the box is known worst.
 pub fn judge_box(chosen: Option<WorkBox>, solved: &Solved, document: &Document) -> Option<(WorkBox, BoxError)> {
     let calibration = &solved.calibration;
-    let (covariance, law) = (*calibration.hand_eye_covariance()?, calibration.joint.as_ref()?.small_sample);
+    let covariance = *calibration.hand_eye_covariance()?;
+    // Stated everywhere or nowhere.
+    calibration.tip_error_95_m()?;
     let hand_eye = calibration.hand_eye?;
     let work_box = match chosen {
         Some(chosen) => chosen,
@@ -51,7 +53,8 @@ pub fn judge_box(chosen: Option<WorkBox>, solved: &Solved, document: &Document) 
     };
     let worst =
         views_of_base(&hand_eye, solved, document).into_iter().max_by(|a, b| variance(a).total_cmp(&variance(b)))?;
-    let error = quality::tip_error_95_over(&covariance, law, &TipBox::in_base(from, to, &worst));
+    let error_95_m = |point: &Point3<f64>| calibration.error_95_m(point).unwrap_or(f64::INFINITY);
+    let error = quality::tip_error_95_over(error_95_m, &TipBox::in_base(from, to, &worst));
     Some((work_box, error))
 }
 

@@ -78,14 +78,14 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
 /// # Errors
 /// [`CalibrateError`].
 pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> {
-    let calibration = estimate::calibrate_with(&job.observations, job.method, job.options, work)?;
+    let mut calibration = estimate::calibrate_with(&job.observations, job.method, job.options, work)?;
+    let goal = FindingOptions { goal_mm: Some(job.goal_m * 1e3) };
+    let findings = doctor::diagnose(&job.observations, Some(&mut calibration), &goal, work.cancel).findings;
     let options = start::solve_options(job.method, job.options, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
     }
-    let options = FindingOptions { goal_mm: Some(job.goal_m * 1e3) };
-    let findings = doctor::diagnose(&job.observations, Some(&calibration), &options, work.cancel).findings;
     result.findings = findings.iter().map(Finding::to_record).collect();
     let calibrated = Predictor::new(&calibration).ok();
     let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {

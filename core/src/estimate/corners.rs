@@ -12,7 +12,6 @@ use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::{self, JointProblem, camera_from_target};
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::estimate::handeye::{HandEye, Mode, PosePair};
-use crate::estimate::uncertainty::quality;
 use crate::geometry::statistics::median_high;
 use crate::progress::Work;
 use crate::targets::bent::BoardPoints;
@@ -35,10 +34,24 @@ pub fn calibrate(
     }
     let Some(mode) = observations.mode else { return Ok(calibration) };
 
-    let (mut views, pairs) = with_robot(mode, &seen, &lens)?;
+    let (mut views, mut pairs) = with_robot(mode, &seen, &lens)?;
     check_motion(&pairs)?;
     calibration.methods = closed_forms(&pairs, work)?;
     let board = BoardPoints::new(&observations.target.points());
+    let problem = JointProblem::new(mode, &board, &views);
+    let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods);
+    let turned: &[usize] = begin.as_ref().map_or(&[], |begin| &begin.turned);
+    let mut own = lens.camera_from_target.clone();
+    refine::renumber(&mut views, &mut own, turned, &observations.target);
+    if !turned.is_empty() {
+        for (pair, camera_from_target) in pairs.iter_mut().zip(&own) {
+            pair.camera_from_target = *camera_from_target;
+        }
+        calibration.methods = closed_forms(&pairs, work)?;
+        for i in turned {
+            calibration.views[seen[*i].index].renumbered = true;
+        }
+    }
     let problem = JointProblem::new(mode, &board, &views);
     match method {
         Method::ClosedForm(name) => {
@@ -46,12 +59,13 @@ pub fn calibrate(
             take_closed_form(&mut calibration, &solution, &problem, &seen, &lens);
         }
         Method::Joint => {
-            let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods)?;
-            let mut own = lens.camera_from_target.clone();
-            refine::renumber(&mut views, &mut own, &begin.turned, &observations.target);
-            let mut refined =
-                refine::refine(&JointProblem::new(mode, &board, &views), &own, &lens, &begin, options, work)?;
+            let mut refined = refine::refine(&problem, &own, &lens, &begin?, options, work)?;
             let kept = refined.screened.kept_views();
+            if kept.len() < pairs.len() {
+                // For comparison on the same views.
+                let kept: Vec<PosePair> = refined.screened.kept.iter().map(|i| pairs[*i]).collect();
+                calibration.methods = closed_forms(&kept, work)?;
+            }
             let problem = JointProblem { weights: refined.weights, ..JointProblem::new(mode, &board, &kept) };
             let problem = refine::kept_problem(&problem, &kept, &refined.screened.solution);
             let judged = refine::judge(&problem, &mut refined.screened.solution, work)?;
@@ -178,7 +192,6 @@ fn take_joint(
         noise: solution.noise,
         small_sample: solution.small_sample,
         widening: judged.widening,
-        tip_error_95_m: quality::tip_error_95_m(solution),
         reference_point: solution.reference_point,
         error_curve: judged.error_curve,
         heldout_rms_px: judged.heldout_rms_px,
@@ -195,7 +208,6 @@ fn take_joint(
     for (i, s) in seen.iter().enumerate() {
         let view = &mut calibration.views[s.index];
         view.distance = screened.distances.get(i).copied();
-        view.renumbered = refined.turned.contains(&i);
         view.corners_aside = screened.corners.iter().filter(|(v, _)| *v == i).map(|(_, index)| *index).collect();
         let corners = &screened.views[i].corners;
         let fit = screened.kept.binary_search(&i).ok().map(|place| &solution.views[place]);
@@ -244,7 +256,7 @@ fn take_closed_form(
             &solution.anchor_from_target,
         );
         result.rms_px = view_rms.is_finite().then_some(view_rms);
-        result.residuals = residuals(&lens.intrinsics, &pose, problem.board.drawn(), s.corners);
+        result.residuals = residuals(&lens.intrinsics, &pose, problem.board.drawn(), &view.corners);
         result.camera_from_target = Some(pose);
         rms.push((view_rms, view.corners.len()));
     }

@@ -2,6 +2,7 @@
 //!
 //! One path for the window, the command line and the tests.
 
+pub mod claim;
 mod corners;
 mod detected_view;
 pub mod handeye;
@@ -15,12 +16,14 @@ pub mod uncertainty;
 
 use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
 
+use crate::estimate::claim::Claim;
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::outliers::Distance;
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{Free, Noise, SmallSample};
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, subset};
 use crate::estimate::intrinsics::IntrinsicsError;
+use crate::estimate::uncertainty::quality;
 use crate::estimate::uncertainty::widening::Widening;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -265,6 +268,8 @@ pub struct Calibration {
     pub methods: Vec<MethodResult>,
     /// One entry per view, in the order of the observations.
     pub views: Vec<ViewResult>,
+    /// Which error may be stated; [`diagnose`](crate::diagnose::doctor::diagnose) finds out.
+    pub claim: Claim,
 }
 
 impl Calibration {
@@ -278,9 +283,22 @@ impl Calibration {
         self.link_covariances.as_ref().map(|links| &links.hand_eye)
     }
 
-    /// Expected error of a measured point where the camera saw the target, 95 %, metres; of the joint estimate only.
+    /// Expected error of a measured point where the camera saw the target, 95 %, metres: 95 % of errors are below. It
+    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. Of the joint estimate
+    /// only, and `None` when the data contradict themselves.
     pub fn tip_error_95_m(&self) -> Option<f64> {
-        self.joint.as_ref().map(|joint| joint.tip_error_95_m)
+        self.error_95_m(&self.joint.as_ref()?.reference_point)
+    }
+
+    /// The same at any `point`, camera coordinates in metres.
+    pub fn error_95_m(&self, point: &Point3<f64>) -> Option<f64> {
+        self.claim.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)
+    }
+
+    /// The same where the camera saw the target by the noise alone, as if the model were true whatever was found.
+    pub fn modelled_error_95_m(&self) -> Option<f64> {
+        let joint = self.joint.as_ref()?;
+        Some(quality::tip_error_95_at(self.hand_eye_covariance()?, joint.small_sample, &joint.reference_point))
     }
 }
 
@@ -318,11 +336,9 @@ pub struct JointFit {
     pub small_sample: SmallSample,
     /// Whether the covariances are true to the data, and by how much they were widened.
     pub widening: Widening,
-    /// Expected error of a measured point where the camera saw the target, 95 %, metres.
-    pub tip_error_95_m: f64,
-    /// Where that error is stated: camera coordinates, metres.
+    /// Where the expected error is stated: where the camera saw the target, camera coordinates, metres.
     pub reference_point: Point3<f64>,
-    /// That error by number of views.
+    /// That error by number of views, by the noise alone.
     pub error_curve: ErrorCurve,
     /// RMS of 2-D corner residuals on views held out of the fit, each predicted from its reported robot pose, pixels;
     /// `None` with too few views to leave some out.

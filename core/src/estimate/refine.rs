@@ -18,7 +18,7 @@ use crate::geometry::frames::{Camera, Pose, Target};
 use crate::progress::Work;
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardShape;
-use crate::targets::observation::View;
+use crate::targets::observation::{self, View};
 
 /// Significance from which a bent target is taken into the model: by chance one flat target in a thousand.
 const WARP_LEVEL: f64 = 1e-3;
@@ -32,8 +32,6 @@ const JOINTS_GAIN: f64 = 0.05;
 pub struct Refined {
     pub screened: Screened,
     pub weights: Option<CornerWeights>,
-    /// Views whose target was numbered from its other end.
-    pub turned: Vec<usize>,
     /// What an attempt at joint offsets gave; `None` when there was none.
     pub joints: Option<JointOffsets>,
 }
@@ -80,13 +78,9 @@ const CAP_PX: f64 = 50.0;
 
 /// Numbers the corners of some views from the other end of the target.
 pub fn renumber(views: &mut [View], own: &mut [Pose<Camera, Target>], turned: &[usize], target: &TargetSpec) {
-    let count = target.points().len();
     let half_turn = half_turn_about(&target.centre());
     for &i in turned {
-        for corner in &mut views[i].corners {
-            corner.index = count - 1 - corner.index;
-        }
-        views[i].corners.sort_by_key(|c| c.index);
+        observation::renumber(&mut views[i].corners, target);
         own[i] = Pose::from_isometry(own[i].isometry() * half_turn);
     }
 }
@@ -125,7 +119,7 @@ pub fn refine(
         };
     }
     let joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };
-    Ok(Refined { screened, weights, turned: begin.turned.clone(), joints })
+    Ok(Refined { screened, weights, joints })
 }
 
 fn keep_all(problem: &JointProblem<'_>, start: &JointStart, work: Work<'_>) -> Result<Screened, HandEyeError> {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::claim::Claim;
 use super::{Calibration, JointFit, ViewStatus};
 use crate::project::result::{
     self, BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, Provenance,
@@ -29,7 +30,7 @@ impl Calibration {
             },
             methods: self.methods.iter().map(method).collect(),
             views: self.views.iter().map(view).collect(),
-            estimate: self.joint.as_ref().map(details),
+            estimate: self.joint.as_ref().map(|joint| self.details(joint)),
             provenance: Provenance {
                 tool_version: tool_version.to_owned(),
                 input_sha256,
@@ -43,31 +44,33 @@ impl Calibration {
         }
         result
     }
-}
 
-fn details(joint: &JointFit) -> EstimateDetails {
-    EstimateDetails {
-        reference_point_m: Some(joint.reference_point.coords.into()),
-        degrees_of_freedom: Some(joint.small_sample.degrees_of_freedom).filter(|v| v.is_finite()),
-        region_scale: Some(joint.small_sample.scale),
-        view_sigma_px: Some(joint.noise.view_px),
-        widening: Some(WideningRecord {
-            factor: joint.widening.factor.sqrt(),
-            by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
-        }),
-        board: joint.shape.map(|s| BoardEstimate {
-            warp_mm: s.shape.warp_m.map(|m| m * 1e3),
-            warp_sigma_mm: s.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
-            scale: s.shape.scale,
-            scale_sigma: s.scale_sigma,
-        }),
-        joint_offsets: joint.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
-            offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
-            sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),
-            heldout_before_px: j.heldout_before_px,
-            heldout_after_px: j.heldout_after_px,
-            accepted: j.accepted,
-        }),
+    fn details(&self, joint: &JointFit) -> EstimateDetails {
+        EstimateDetails {
+            modelled_error_95_mm: self.modelled_error_95_m().map(|m| m * 1e3),
+            moved_mm: matches!(self.claim, Claim::Moved(_)).then(|| self.claim.moved_m(&joint.reference_point) * 1e3),
+            reference_point_m: Some(joint.reference_point.coords.into()),
+            degrees_of_freedom: Some(joint.small_sample.degrees_of_freedom).filter(|v| v.is_finite()),
+            region_scale: Some(joint.small_sample.scale),
+            view_sigma_px: Some(joint.noise.view_px),
+            widening: Some(WideningRecord {
+                factor: joint.widening.factor.sqrt(),
+                by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
+            }),
+            board: joint.shape.map(|s| BoardEstimate {
+                warp_mm: s.shape.warp_m.map(|m| m * 1e3),
+                warp_sigma_mm: s.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
+                scale: s.shape.scale,
+                scale_sigma: s.scale_sigma,
+            }),
+            joint_offsets: joint.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
+                offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
+                sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),
+                heldout_before_px: j.heldout_before_px,
+                heldout_after_px: j.heldout_after_px,
+                accepted: j.accepted,
+            }),
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Vector2, Vector6};
 
 use crate::geometry::frames::{Base, Pose, Tip};
+use crate::targets::TargetSpec;
 
 /// One point of the target found in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,4 +43,13 @@ impl View {
     pub fn new(name: String, base_from_tip: Pose<Base, Tip>, corners: Vec<Corner>) -> Self {
         Self { name, base_from_tip, corners, tip_by_joint: Vec::new() }
     }
+}
+
+/// Numbers the corners of a [symmetric](TargetSpec::is_symmetric) target from its other end, and sorts them by number.
+pub fn renumber(corners: &mut [Corner], target: &TargetSpec) {
+    let count = target.points().len();
+    for corner in corners.iter_mut() {
+        corner.index = count - 1 - corner.index;
+    }
+    corners.sort_by_key(|corner| corner.index);
 }

@@ -14,8 +14,8 @@ use super::sim::{Fault, Setup, changed, session};
 /// The diagnosis with the calibration beside it, as the command line makes it.
 pub fn examined(observations: &Observations) -> Diagnosis {
     let cancel = CancelToken::default();
-    let calibration = calibrate(observations, Method::Joint, &cancel).ok();
-    diagnose(observations, calibration.as_ref(), &FindingOptions::default(), &cancel)
+    let mut calibration = calibrate(observations, Method::Joint, &cancel).ok();
+    diagnose(observations, calibration.as_mut(), &FindingOptions::default(), &cancel)
 }
 
 /// The diagnosis of the data alone, which takes a third of the time.

@@ -147,7 +147,7 @@ pub fn product(trial: &Trial) -> Result<Answer, String> {
         small_sample: joint.small_sample,
         noise: joint.noise,
         aside: found.views.iter().filter(|view| view.status == ViewStatus::Outlier).count(),
-        tip_error_95_m: joint.tip_error_95_m,
+        tip_error_95_m: found.tip_error_95_m().ok_or_else(missing)?,
         reference_point: joint.reference_point,
     })
 }

@@ -13,10 +13,13 @@ use handeye_core::diagnose::doctor::diagnose;
 use handeye_core::diagnose::findings::{FindingCode, FindingOptions, Severity};
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::closed_form;
+use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
 use handeye_core::geometry::planar_pose;
 use handeye_core::progress::CancelToken;
 use handeye_core::wording::Catalogue;
 
+use handeye_core::targets::TargetSpec;
+use nalgebra::Vector6;
 use sim::{Fault, Setup, session};
 
 #[test]
@@ -146,4 +149,96 @@ fn the_weakest_direction_is_named_where_tilts_are_small() {
     let weak = findings.iter().find(|f| f.code == FindingCode::WeakDirection).unwrap_or_else(|| panic!("{findings:?}"));
     assert!(weak.value("camera_axis_z").is_some_and(|z| z > 0.95), "{weak}");
     assert!(weak.to_string().contains("about the camera's x and y axes"), "{weak}");
+}
+
+/// The calibration as the command line makes it, with what may be claimed for it.
+fn claimed(observations: &Observations) -> Calibration {
+    let cancel = CancelToken::default();
+    let mut calibration = calibrate(observations, Method::Joint, &cancel).expect("an answer, right or wrong");
+    diagnose(observations, Some(&mut calibration), &FindingOptions { goal_mm: Some(1.0) }, &cancel);
+    calibration
+}
+
+#[test]
+fn the_stated_error_covers_the_true_one_when_what_was_given_is_wrong() {
+    let slip = Vector6::new(8e-3, -5e-3, 0.0, 0.0, 0.0, 0.01);
+    let faults: [(&str, Fault); 5] = [
+        ("size of the board −4 %", Fault { scale: -0.04, ..Fault::default() }),
+        ("focal length +5.9 %", Fault { focal: 0.059, ..Fault::default() }),
+        ("focal length −3 %", Fault { focal: -0.03, ..Fault::default() }),
+        ("board slipped by 9 mm", Fault { board_moved: Some((11, slip)), ..Fault::default() }),
+        ("zero of joint 4 off by 0.5°", Fault { joint: Some((3, 0.5f64.to_radians())), ..Fault::default() }),
+    ];
+    for (name, fault) in &faults {
+        for seed in 0..4 {
+            let mode = if seed % 2 == 0 { Mode::EyeInHand } else { Mode::EyeToHand };
+            let setup = Setup { joints: true, ..Setup::new(mode, 20, 700 + seed) };
+            let calibration = claimed(&session(&setup.with(fault.clone())));
+            let (true_mount_from_camera, _) = sim::links(mode);
+            let found = calibration.hand_eye.expect("a hand-eye").mount_from_camera();
+            let point = calibration.joint.as_ref().expect("a joint estimate").reference_point;
+            let error_m = (found.isometry() * point - true_mount_from_camera * point).norm();
+            let stated_m = calibration.tip_error_95_m().expect("stated");
+            assert!(error_m < stated_m, "{name}, {seed}: off by {error_m}, stated {stated_m}");
+            // Not so wide that it says nothing: a slip looks like noise of the robot, too.
+            let modelled_m = calibration.modelled_error_95_m().expect("stated");
+            assert!(stated_m < 2.0 * error_m + 1.5 * modelled_m, "{name}, {seed}: off by {error_m}, stated {stated_m}");
+        }
+    }
+}
+
+#[test]
+fn no_error_is_stated_where_the_data_contradict_themselves() {
+    for fault in [4, 5] {
+        let (observations, code) = faults::faulty(fault, 5000);
+        let cancel = CancelToken::default();
+        let Ok(mut calibration) = calibrate(&observations, Method::Joint, &cancel) else { continue };
+        let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+        assert!(diagnosis.findings.iter().any(|f| f.code == code && f.severity == Severity::Problem));
+        assert_eq!(calibration.tip_error_95_m(), None, "{code:?}");
+        assert!(calibration.modelled_error_95_m().is_some());
+        let json = calibration.to_result("", None, std::collections::BTreeMap::new());
+        assert_eq!(json.quality.tip_error_95_mm, None, "{code:?}");
+    }
+}
+
+#[test]
+fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice() {
+    let setup = Setup::new(Mode::EyeInHand, 20, 710).with(Fault { scale: -0.04, ..Fault::default() });
+    let (observations, cancel) = (session(&setup), CancelToken::default());
+    let mut calibration = calibrate(&observations, Method::Joint, &cancel).expect("an answer");
+    // The noise alone would reach it.
+    let goal_mm = 1.1e3 * calibration.modelled_error_95_m().expect("stated");
+    let options = FindingOptions { goal_mm: Some(goal_mm) };
+    let found = diagnose(&observations, Some(&mut calibration), &options, &cancel).findings;
+    let goal = found.iter().find(|f| f.code == FindingCode::GoalNotReached).expect("it is not reached");
+    assert!(goal.to_string().contains("More views do not help"), "{goal}");
+    assert!(goal.value("expected_error_95").expect("stated") > 15.0, "{goal:?}");
+}
+
+#[test]
+fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor() {
+    // Circles look the same from both ends.
+    let mut observations = session(&Setup::new(Mode::EyeInHand, 16, 720));
+    observations.target = TargetSpec::Circles(sim::GRID);
+    for n in [2, 3, 9, 13] {
+        let corners = observations.views[n].corners.as_mut().expect("seen");
+        handeye_core::targets::observation::renumber(corners, &TargetSpec::Circles(sim::GRID));
+    }
+    let cancel = CancelToken::default();
+    let (true_mount_from_camera, _) = sim::links(Mode::EyeInHand);
+    for method in [Method::Joint, Method::ClosedForm("park_martin")] {
+        let mut calibration = calibrate(&observations, method, &cancel).expect("an answer");
+        let renumbered = calibration.views.iter().filter(|view| view.renumbered).count();
+        assert_eq!(renumbered, 4, "{method:?}");
+        for result in &calibration.methods {
+            let found = result.outcome.as_ref().expect("an answer").mount_from_camera;
+            let off_m = (found.translation() - true_mount_from_camera.translation.vector).norm();
+            // The least robust of them is off by a centimetre with all views as they should be.
+            assert!(off_m < 0.03, "{method:?}: {} is off by {off_m} m", result.name);
+        }
+        let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+        let alarms: Vec<_> = diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning).collect();
+        assert!(alarms.iter().all(|f| f.code == FindingCode::Renumbered), "{method:?}: {alarms:?}");
+    }
 }

@@ -60,8 +60,8 @@ fn diagnosis(data: &Path, name: &str, detector: &str) -> Diagnosis {
         views,
     };
     let cancel = CancelToken::default();
-    let calibration = calibrate(&observations, Method::Joint, &cancel).ok();
-    let diagnosis = diagnose(&observations, calibration.as_ref(), &FindingOptions::default(), &cancel);
+    let mut calibration = calibrate(&observations, Method::Joint, &cancel).ok();
+    let diagnosis = diagnose(&observations, calibration.as_mut(), &FindingOptions::default(), &cancel);
     println!("{name}\n{}", diagnosis.report());
     diagnosis
 }

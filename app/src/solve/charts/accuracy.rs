@@ -1,6 +1,7 @@
 //! The expected error by number of poses: how it fell, how it will fall, and where the goal is.
 
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, WidgetInfo, WidgetType};
+use handeye_core::estimate::claim::Claim;
 use handeye_core::estimate::handeye::joint::prediction::{ErrorCurve, ErrorPoint};
 
 use super::axes::{self, Scale};
@@ -14,7 +15,13 @@ use crate::{text, tr};
 /// The chart.
 pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
-    let joint = model.solve.solved.as_ref().and_then(|solved| solved.calibration.joint.as_ref());
+    let calibration = model.solve.solved.as_ref().map(|solved| &solved.calibration);
+    if calibration.is_some_and(|calibration| calibration.claim != Claim::AsModelled) {
+        // The curve is that of the noise alone.
+        instead_ui(ui, tr!(language, "More poses do not help before what was found is mended"));
+        return;
+    }
+    let joint = calibration.and_then(|calibration| calibration.joint.as_ref());
     let Some((curve, now)) = joint.and_then(|joint| Some((&joint.error_curve, joint.error_curve.now()?))) else {
         instead_ui(ui, tr!(language, "The expected error appears with the first joint calibration"));
         return;

@@ -1,6 +1,7 @@
 //! Where the camera is, how far off that may be, and how far off it is where the truth is known.
 
 use egui::{RichText, Ui};
+use handeye_core::estimate::claim::Claim;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::joint::SmallSample;
 
@@ -43,7 +44,9 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     });
     parts::hint_ui(ui, meaning);
     let law = solved.calibration.joint.as_ref().map_or(SmallSample::KNOWN, |joint| joint.small_sample);
-    let within = solved.calibration.hand_eye_covariance().map(|c| Within95::new(&pose, c, law));
+    // With something found that is not in the model the covariance is no error of the answer.
+    let covariance = solved.calibration.hand_eye_covariance().filter(|_| solved.calibration.claim == Claim::AsModelled);
+    let within = covariance.map(|c| Within95::new(&pose, c, law));
     let deg = |radians: [f64; 3]| radians.map(f64::to_degrees);
     parts::stated_ui(ui, "x y z [mm]", &numbers::row(translation_mm.as_slice(), 3, 9));
     if let Some(within) = &within {

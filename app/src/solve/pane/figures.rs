@@ -1,5 +1,6 @@
 //! Numbers of the pane that the result does not hold itself.
 
+use handeye_core::estimate::claim::Claim;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::joint::SmallSample;
 use handeye_core::estimate::uncertainty::quality;
@@ -56,7 +57,8 @@ pub fn against_truth(model: &Model, solved: &Solved) -> Option<AgainstTruth> {
         let point = joint.reference_point;
         (found.isometry().transform_point(&point) - truth.isometry().transform_point(&point)).norm()
     });
-    let is_within = solved.calibration.hand_eye_covariance().and_then(|covariance| {
+    let stated = solved.calibration.hand_eye_covariance().filter(|_| solved.calibration.claim == Claim::AsModelled);
+    let is_within = stated.and_then(|covariance| {
         let error = se3::log((found.inverse() * truth).isometry());
         let weighted = Cholesky::new(*covariance)?.solve(&error);
         Some(error.dot(&weighted) <= CHI_SQUARE_6_95)

@@ -5,7 +5,7 @@ use egui::{Align, CornerRadius, DragValue, Frame, Label, Layout, Margin, RichTex
 use crate::command::{Command, Outbox};
 use crate::gui::style::theme::{Palette, Tone};
 use crate::model::{Model, Solved};
-use crate::tr;
+use crate::{text, tr};
 
 /// Size of the number.
 const FIGURE: f32 = 28.0;
@@ -42,10 +42,23 @@ pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Out
                     "In 95 of 100 cases the calibration puts a point where the board was seen no further off than this. \
                      What the robot and the image add at that moment comes on top."
                 ),
-                (None, true) => tr!(language, "These captures do not determine it. See what was found below."),
+                (None, true) => tr!(
+                    language,
+                    "The captures contradict themselves or do not determine it: no error can be stated. See what was found below."
+                ),
                 (None, false) => tr!(language, "A closed form states no uncertainty: choose the joint estimate below."),
             };
             ui.add(Label::new(RichText::new(meaning).color(palette.weak)).wrap());
+            let estimate = solved.result.estimate.as_ref();
+            let moved = estimate.and_then(|estimate| estimate.moved_mm.zip(estimate.modelled_error_95_mm));
+            if let Some((moved_mm, modelled_mm)) = moved {
+                let words = text!(
+                    "What was found below would move the answer by {moved} mm; the noise alone makes {modelled} mm.",
+                    moved = format!("{moved_mm:.3}"),
+                    modelled = format!("{modelled_mm:.3}")
+                );
+                ui.add(Label::new(RichText::new(words.say(language)).color(palette.tone(Tone::Warning))).wrap());
+            }
             if let Some(error_mm) = error_mm {
                 let verdict = if error_mm <= goal_mm {
                     tr!(language, "The goal is reached")

@@ -1,6 +1,7 @@
 //! A point of the image in the base, measured in two ways.
 
 use egui::Ui;
+use handeye_core::estimate::claim::Claim;
 use handeye_core::verify::MeasuredPoint;
 use nalgebra::Vector3;
 
@@ -40,13 +41,20 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         parts::stated_ui(ui, tr!(language, "Difference [mm]"), &millimetres(&difference_mm));
         parts::stated_ui(ui, tr!(language, "Its length [mm]"), &numbers::fixed(difference_mm.norm(), 2, 8));
     }
-    parts::hint_ui(
-        ui,
+    let solved = model.solve.solved.as_ref();
+    let modelled = solved.is_none_or(|solved| solved.calibration.claim == Claim::AsModelled);
+    let meaning = if modelled {
         tr!(
             language,
             "± is one standard deviation, as far as the calibration causes it; what the image adds comes on top."
-        ),
-    );
+        )
+    } else {
+        tr!(
+            language,
+            "± is one standard deviation by the noise alone: what was found in the calibration comes on top, see Solve."
+        )
+    };
+    parts::hint_ui(ui, meaning);
 }
 
 fn point_ui(ui: &mut Ui, model: &Model, caption: &str, point: &Result<MeasuredPoint, Text>) {

@@ -18,6 +18,7 @@
 //! [`MOST_VIEWS`] views so many are examined, spread over the session.
 
 mod agreement;
+mod claim;
 mod effect;
 mod gross;
 mod judge;
@@ -31,8 +32,10 @@ mod words;
 use serde::Serialize;
 
 use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOptions, Severity};
+use crate::estimate::claim::Claim;
 use crate::estimate::{Calibration, Observations};
 use crate::progress::Work;
+use crate::targets::observation;
 use crate::wording::Text;
 
 /// A hypothesis about the data.
@@ -118,23 +121,31 @@ const HOPELESS: f64 = 0.2;
 
 /// Examines a session.
 ///
-/// `calibration` is the joint estimate of these observations, where there is one; the hypotheses do not depend on it.
+/// `calibration` is the joint estimate of these observations, where there is one; the hypotheses do not depend on it. It
+/// learns which error may be stated: see [`Claim`].
 /// `work` is a `&CancelToken`, or a [`Work`]; when it is cancelled [`Diagnosis::untested`] says so.
 pub fn diagnose<'a>(
     observations: &Observations,
-    calibration: Option<&Calibration>,
+    mut calibration: Option<&mut Calibration>,
     options: &FindingOptions,
     work: impl Into<Work<'a>>,
 ) -> Diagnosis {
     let work = work.into();
-    let mut diagnosis = Diagnosis {
-        findings: findings::findings(observations, calibration, options),
-        hypotheses: Vec::new(),
-        untested: None,
-    };
-    if let Err(why) = examine(observations, &mut diagnosis, &work) {
+    let repaired = calibration.as_deref().and_then(|calibration| renumbered(observations, calibration));
+    let observations = repaired.as_ref().unwrap_or(observations);
+    let mut diagnosis = Diagnosis { findings: Vec::new(), hypotheses: Vec::new(), untested: None };
+    if let Err(why) = examine(observations, calibration.as_deref_mut(), &mut diagnosis, &work) {
         diagnosis.untested = Some(why);
     }
+    if let Some(calibration) = calibration.as_deref_mut()
+        && diagnosis.findings.iter().any(|finding| finding.severity == Severity::Problem)
+    {
+        calibration.claim = Claim::Nothing;
+    }
+    // After the claim: the goal is judged by it. Before what was examined, so that what the estimate has already acted
+    // upon is said as the estimate says it.
+    let of_estimate = findings::findings(observations, calibration.as_deref(), options);
+    diagnosis.findings.splice(0..0, of_estimate);
     // What the estimate has already acted upon is said once.
     let mut said: Vec<FindingCode> = Vec::new();
     diagnosis.findings.retain(|finding| {
@@ -148,7 +159,26 @@ pub fn diagnose<'a>(
     diagnosis
 }
 
-fn examine(observations: &Observations, diagnosis: &mut Diagnosis, work: &Work<'_>) -> Result<(), String> {
+/// The observations with the corners numbered as the calibration found them to be; `None` when that changes nothing.
+fn renumbered(observations: &Observations, calibration: &Calibration) -> Option<Observations> {
+    if calibration.views.iter().all(|view| !view.renumbered) {
+        return None;
+    }
+    let mut observations = observations.clone();
+    for (view, result) in observations.views.iter_mut().zip(&calibration.views) {
+        if let Some(corners) = view.corners.as_mut().filter(|_| result.renumbered) {
+            observation::renumber(corners, &observations.target);
+        }
+    }
+    Some(observations)
+}
+
+fn examine(
+    observations: &Observations,
+    calibration: Option<&mut Calibration>,
+    diagnosis: &mut Diagnosis,
+    work: &Work<'_>,
+) -> Result<(), String> {
     let cancelled = || "cancelled".to_owned();
     let sight = crate::diagnose::doctor::views::SessionViews::new(observations)?;
     diagnosis.findings.extend(words::not_finite(&sight));
@@ -174,6 +204,9 @@ fn examine(observations: &Observations, diagnosis: &mut Diagnosis, work: &Work<'
     let selection = select::select(&sight, &start, work).ok_or_else(|| {
         if work.is_cancelled() { cancelled() } else { "the views leave a direction of the answer open".to_owned() }
     })?;
+    if let Some(calibration) = calibration {
+        calibration.claim = claim::claim(&selection, calibration);
+    }
     let fine = words::fine(&selection);
     diagnosis.findings.extend(fine.iter().filter(|h| h.accepted).map(words::finding_of));
     let (robot_m, robot_rad) = selection.fit.robot_sigma();

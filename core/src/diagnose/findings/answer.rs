@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Finding, FindingCode, FindingOptions, Severity};
+use crate::estimate::claim::Claim;
 use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus};
 use crate::geometry::statistics::{SIGMA_PER_MEDIAN_SIZE, median};
 use crate::text;
@@ -197,8 +198,8 @@ fn closed_forms(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
-    let JointFit { tip_error_95_m, error_curve: curve, .. } = calibration.joint.as_ref()?;
-    let error_mm = tip_error_95_m * 1e3;
+    let curve = &calibration.joint.as_ref()?.error_curve;
+    let error_mm = calibration.tip_error_95_m()? * 1e3;
     let finding = |code, severity, text| {
         Finding::new(code, severity, text).with("expected_error_95", error_mm, "mm").with("goal", goal_mm, "mm")
     };
@@ -222,6 +223,9 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
         );
         finding(FindingCode::GoalNotReached, Severity::Advice, text)
     };
+    if calibration.claim != Claim::AsModelled {
+        return Some(not_reached(text!("More views do not help before what was found is mended.")));
+    }
     let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {
         return Some(not_reached(text!(
             "More views like these would take too many: tilt and turn the camera more, come closer, or reduce the noise."

@@ -118,6 +118,8 @@ impl CalibrationResult {
 }
 
 fn check_estimate(estimate: &EstimateDetails) -> Checked {
+    not_negative(estimate.modelled_error_95_mm, "estimate.modelled_error_95_mm")?;
+    not_negative(estimate.moved_mm, "estimate.moved_mm")?;
     not_negative(estimate.degrees_of_freedom, "estimate.degrees_of_freedom")?;
     not_negative(estimate.region_scale, "estimate.region_scale")?;
     not_negative(estimate.view_sigma_px, "estimate.view_sigma_px")?;

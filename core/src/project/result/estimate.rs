@@ -7,6 +7,13 @@ use crate::diagnose::record::FindingRecord;
 /// Details of a joint estimate.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct EstimateDetails {
+    /// Expected error by the noise alone, 95 %, millimetres: as if the model were true whatever the findings say.
+    #[serde(default)]
+    pub modelled_error_95_mm: Option<f64>,
+    /// How far what was found and is not in the model would move a point where the target was seen, millimetres; it is
+    /// part of `quality.tip_error_95_mm`. `None` when nothing of the kind was found.
+    #[serde(default)]
+    pub moved_mm: Option<f64>,
     /// Where the expected error is stated: camera coordinates, metres.
     pub reference_point_m: Option<[f64; 3]>,
     /// Degrees of freedom of the noise levels; `None` when they were given, and the errors are Gaussian.

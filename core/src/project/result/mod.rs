@@ -13,6 +13,7 @@ use std::fmt;
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
+use crate::diagnose::record::FindingRecord;
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Camera, Frame, Mount, Pose};
@@ -359,6 +360,11 @@ impl Default for CalibrationResult {
 }
 
 impl CalibrationResult {
+    /// The first finding because of which the answer is not to be used; `None` when there is none.
+    pub fn problem(&self) -> Option<&FindingRecord> {
+        self.findings.iter().find(|finding| finding.severity == "problem")
+    }
+
     /// States the mode and both links, with their covariances where they are known.
     pub fn set_links(
         &mut self,

@@ -46,6 +46,8 @@ pub(crate) fn golden() -> CalibrationResult {
         })
         .collect();
     result.estimate = Some(EstimateDetails {
+        modelled_error_95_mm: Some(0.2),
+        moved_mm: Some(1.5),
         reference_point_m: Some([0.01, -0.02, 0.45]),
         degrees_of_freedom: Some(31.5),
         region_scale: Some(0.97),

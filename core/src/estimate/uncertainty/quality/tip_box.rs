@@ -1,9 +1,7 @@
 //! The expected error over a box of the workspace.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::tip_error_95_at;
-use crate::estimate::handeye::joint::SmallSample;
 use crate::geometry::frames::{Base, Camera, Pose};
 
 /// A box in which points will be measured, its sides along the axes of the frame it is given in.
@@ -54,13 +52,13 @@ const NODES: [(f64, f64); 3] =
 
 /// Expected error (95 %) of measured points over a box: the worst of it, where that is, and the mean.
 ///
-/// `hand_eye` is the covariance `[t; r]` of the hand-eye transform (right perturbation) and `law` the distribution of its
-/// error. The error vector of a point, `t + r × p`, is linear in the point, so the mean
-/// of its square is a convex function of it and greatest at a corner of the box; the eight corners are compared.
-pub fn tip_error_95_over(hand_eye: &Matrix6<f64>, law: SmallSample, tip_box: &TipBox) -> BoxError {
+/// `error_95_m` is the error at a point in camera coordinates. The error vector of a point, `t + r × p`, is linear in the
+/// point, so the mean of its square is a convex function of it, as is how far a transform moves it, and greatest at a
+/// corner of the box; the eight corners are compared.
+pub fn tip_error_95_over(error_95_m: impl Fn(&Point3<f64>) -> f64, tip_box: &TipBox) -> BoxError {
     let error = |part: &Vector3<f64>| {
         let at = tip_box.at(part);
-        (tip_error_95_at(hand_eye, law, &(tip_box.camera_from_box * at)), at)
+        (error_95_m(&(tip_box.camera_from_box * at)), at)
     };
     let mut worst = (f64::NEG_INFINITY, tip_box.low);
     for corner in 0..8u8 {
@@ -84,9 +82,16 @@ pub fn tip_error_95_over(hand_eye: &Matrix6<f64>, law: SmallSample, tip_box: &Ti
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix6, Vector6};
+
     use super::*;
+    use crate::estimate::handeye::joint::SmallSample;
+    use crate::estimate::uncertainty::quality::tip_error_95_at;
     use crate::geometry::se3;
-    use nalgebra::Vector6;
+
+    fn by(c: Matrix6<f64>, law: SmallSample) -> impl Fn(&Point3<f64>) -> f64 {
+        move |point| tip_error_95_at(&c, law, point)
+    }
 
     fn few(degrees_of_freedom: f64) -> SmallSample {
         SmallSample { degrees_of_freedom, ..SmallSample::KNOWN }
@@ -99,12 +104,12 @@ mod tests {
         let mut c = Matrix6::zeros();
         c[(5, 5)] = 1e-6;
         let tip_box = TipBox::in_camera(Point3::new(0.9, 0.4, 0.5), Point3::new(0.3, 1.2, 0.1));
-        let error = tip_error_95_over(&c, SmallSample::KNOWN, &tip_box);
+        let error = tip_error_95_over(by(c, SmallSample::KNOWN), &tip_box);
         assert!((error.worst_m - 1.95996e-3 * 1.5).abs() < 1e-7, "{error:?}");
         assert!((error.worst_at.xy() - nalgebra::Point2::new(0.9, 1.2)).norm() < 1e-12);
         let line = TipBox::in_camera(Point3::new(0.1, 0.0, 0.5), Point3::new(0.7, 0.0, 0.5));
-        assert!((tip_error_95_over(&c, SmallSample::KNOWN, &line).mean_m - 1.95996e-3 * 0.4).abs() < 1e-7);
-        assert!(tip_error_95_over(&c, few(5.0), &line).mean_m > 1.3 * 1.95996e-3 * 0.4);
+        assert!((tip_error_95_over(by(c, SmallSample::KNOWN), &line).mean_m - 1.95996e-3 * 0.4).abs() < 1e-7);
+        assert!(tip_error_95_over(by(c, few(5.0)), &line).mean_m > 1.3 * 1.95996e-3 * 0.4);
     }
 
     #[test]
@@ -115,7 +120,7 @@ mod tests {
             Pose::from_isometry(se3::exp(&Vector6::new(0.4, -0.2, 0.9, 0.3, 2.0, -0.5)));
         let (low, high) = (Point3::new(-0.3, 0.1, 0.0), Point3::new(0.5, 0.6, 0.4));
         let tip_box = TipBox::in_base(low, high, &camera_from_base);
-        let worst = tip_error_95_over(&c, few(8.0), &tip_box);
+        let worst = tip_error_95_over(by(c, few(8.0)), &tip_box);
         let at = |p: Point3<f64>| tip_error_95_at(&c, few(8.0), &(camera_from_base.isometry() * p));
         assert!((at(worst.worst_at) - worst.worst_m).abs() < 1e-12);
         for i in 0..125 {

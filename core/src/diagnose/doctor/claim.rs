@@ -1,0 +1,76 @@
+//! What the accepted hypotheses do to the answer.
+
+use nalgebra::{Matrix6, Vector6};
+
+use super::effect::Effect;
+use super::judge::{Candidate, Judged};
+use super::model::{Fit, State};
+use super::select::Selection;
+use crate::estimate::claim::{Alternative, Claim};
+use crate::estimate::{Calibration, ViewStatus};
+use crate::geometry::se3;
+
+/// What may be stated for a calibration beside what was judged.
+///
+/// The linear model is fitted with what the calibration counts on already (a bent board, a size, joint offsets, outlier
+/// views) and with the accepted hypotheses besides; between both fits the hand-eye transform moves by what the
+/// calibration misses. Explanations that are as good as the first are alternatives of their own.
+pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Claim {
+    let model = &selection.model;
+    let counted = |effect: Effect| counts_on(calibration, effect);
+    let out: Vec<usize> =
+        (0..model.sight.views.len()).filter(|i| is_out(calibration, &model.sight.views[*i].name)).collect();
+    let mut base = State { effects: Vec::new(), aside: out };
+    let mut with = base.clone();
+    for judged in &selection.taken {
+        match &judged.candidate {
+            Candidate::Effect(effect) => {
+                with.effects.push(*effect);
+                if counted(*effect) {
+                    base.effects.push(*effect);
+                }
+            }
+            Candidate::Views(views) => with.aside.extend(views.iter().filter(|i| !base.aside.contains(i))),
+        }
+    }
+    let as_good = || selection.others.iter().filter(|judged| judged.as_good);
+    let missed = with.effects.len() > base.effects.len() || with.aside.len() > base.aside.len();
+    let others: Vec<&Judged> =
+        as_good().filter(|j| !matches!(j.candidate, Candidate::Effect(e) if counted(e))).collect();
+    if !missed && others.is_empty() {
+        return Claim::AsModelled;
+    }
+    let Some(without) = model.fit(&base, selection.fit.robot) else { return Claim::Nothing };
+    let mut alternatives = Vec::new();
+    if missed {
+        // With so much left out nothing determines the answer.
+        let Some(fit) = model.fit(&with, selection.fit.robot) else { return Claim::Nothing };
+        alternatives.push(between(&without, &fit));
+    }
+    alternatives.extend(others.into_iter().map(|judged| between(&without, &judged.fit)));
+    Claim::Moved(alternatives)
+}
+
+/// Whether the answer is estimated with an effect.
+fn counts_on(calibration: &Calibration, effect: Effect) -> bool {
+    let Some(joint) = &calibration.joint else { return false };
+    match effect {
+        Effect::Warp => joint.free.warp,
+        Effect::Scale => joint.free.scale,
+        Effect::Joint(_) => joint.joint_offsets.as_ref().is_some_and(|offsets| offsets.accepted),
+        Effect::Lens | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
+    }
+}
+
+/// Whether the answer is without a view.
+fn is_out(calibration: &Calibration, name: &str) -> bool {
+    calibration.views.iter().any(|view| view.name == name && view.status != ViewStatus::Used)
+}
+
+fn between(without: &Fit, with: &Fit) -> Alternative {
+    let step = |fit: &Fit| se3::exp(&Vector6::from_iterator(fit.theta.rows(0, 6).iter().copied()));
+    Alternative {
+        shift: se3::log(&(step(without).inverse() * step(with))),
+        covariance: Matrix6::from_iterator(with.covariance.view((0, 0), (6, 6)).iter().copied()),
+    }
+}
