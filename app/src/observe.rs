@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use handeye_core::detect::{self, VisionError};
+use handeye_core::detect::{self, DetectOptions, VisionError};
 use handeye_core::estimate::Observations;
 use handeye_core::image::GrayImage;
 use handeye_core::progress::CancelToken;
-use handeye_core::project::dataset::{Dataset, DatasetError, Entry};
+use handeye_core::project::dataset::{Dataset, DatasetError};
 use handeye_core::project::files::image_file::gray_from_rgb;
 use handeye_core::project::session::{CaptureId, Session, SessionError, SessionObservations};
-use handeye_core::targets::TargetSpec;
 use handeye_core::targets::observation::Corner;
+use handeye_core::targets::{Grid, TargetSpec};
 use rayon::prelude::*;
 
 /// Why a data set or a session could not be observed.
@@ -32,10 +32,33 @@ pub enum ObserveError {
         /// What failed.
         source: VisionError,
     },
+    /// The images show a chessboard of another size than the one described.
+    #[error(
+        "{columns} × {rows} inner corners were looked for and found in none of {images} images; {seen} of them show a \
+         chessboard of {seen_columns} × {seen_rows} inner corners: columns and rows count inner corners, one fewer than \
+         squares. Describe the target as it is"
+    )]
+    OtherChessboard {
+        /// Inner corners along x, as described.
+        columns: usize,
+        /// Inner corners along y, as described.
+        rows: usize,
+        /// Images looked at.
+        images: usize,
+        /// Images that show the other one.
+        seen: usize,
+        /// Its inner corners along the longer side.
+        seen_columns: usize,
+        /// And along the shorter one.
+        seen_rows: usize,
+    },
     /// The caller asked the work to end.
     #[error("cancelled")]
     Cancelled,
 }
+
+/// Part of the images with any grid in sight that must show the same one before it is taken for the target.
+const SAME: f64 = 2.0 / 3.0;
 
 /// Called with how many images of how many are done, from the threads that do the work.
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
@@ -48,8 +71,14 @@ pub fn observe(dataset: &Dataset, progress: Progress<'_>, cancel: &CancelToken) 
     if let Some(Err(why)) = dataset.arm.as_ref().map(|arm| &arm.placement) {
         tracing::warn!("the joint angles are not used: {why}");
     }
-    let mut corners =
-        of_each(dataset.entries.len(), progress, cancel, |index| corners_of(dataset, &dataset.entries[index]))?;
+    // A corner table says what was found in each image.
+    let image_of = |index: usize| -> Result<Option<GrayImage>, ObserveError> {
+        let entry = &dataset.entries[index];
+        let given = entry.corners.is_some() || entry.image_path.is_none();
+        Ok(if given { None } else { Some(dataset.load_gray(entry)?) })
+    };
+    let names: Vec<&str> = dataset.entries.iter().map(|entry| entry.name.as_str()).collect();
+    let mut corners = corners_of(&names, image_of, &dataset.target, progress, cancel)?;
     Ok(dataset.observations(|index| corners[index].take()))
 }
 
@@ -65,23 +94,99 @@ pub fn observe_session(
 ) -> Result<SessionObservations, ObserveError> {
     let image_size = session.image_size()?.unwrap_or_default();
     let (captures, target) = (&session.document.captures, &session.document.meta.target);
-    let corners = of_each(captures.len(), progress, cancel, |index| {
-        let capture = &captures[index];
-        detect(&gray_from_rgb(&session.load_rgb(capture)?), target, &capture.image)
-    })?;
+    let image_of = |index: usize| Ok(Some(gray_from_rgb(&session.load_rgb(&captures[index])?)));
+    let names: Vec<&str> = captures.iter().map(|capture| capture.image.as_str()).collect();
+    let corners = corners_of(&names, image_of, target, progress, cancel)?;
     let corners: BTreeMap<CaptureId, Vec<Corner>> =
         captures.iter().zip(corners).filter_map(|(capture, corners)| Some((capture.id, corners?))).collect();
     Ok(session.document.observations(image_size, |id| corners.get(&id).cloned()))
 }
 
+/// The corners of every image that there is, where the target is seen.
+///
+/// For a chessboard a quick look at all of them first: one of another size is then recognised in seconds. Images in which
+/// nothing was found are searched with all effort afterwards.
+fn corners_of(
+    names: &[&str],
+    image_of: impl Fn(usize) -> Result<Option<GrayImage>, ObserveError> + Sync,
+    target: &TargetSpec,
+    progress: Progress<'_>,
+    cancel: &CancelToken,
+) -> Result<Vec<Option<Vec<Corner>>>, ObserveError> {
+    let look = |index: usize, options: DetectOptions| -> Result<Look, ObserveError> {
+        let Some(image) = image_of(index)? else { return Ok(Look::NoImage) };
+        let corners = detect::detect_with(&image, target, options)
+            .map_err(|source| ObserveError::Vision { name: names[index].to_owned(), source })?;
+        Ok(match (corners, target) {
+            (Some(corners), _) => Look::Found(corners),
+            (None, TargetSpec::Chessboard(grid)) => Look::Missed(detect::chessboard_in_sight(&image, grid)),
+            (None, _) => Look::Missed(None),
+        })
+    };
+    let all: Vec<usize> = (0..names.len()).collect();
+    let TargetSpec::Chessboard(grid) = target else {
+        let looks = of_each(&all, progress, cancel, |index| look(index, DetectOptions::thorough()))?;
+        return Ok(looks.into_iter().map(Look::corners).collect());
+    };
+    let mut looks = of_each(&all, progress, cancel, |index| look(index, DetectOptions::live()))?;
+    other_chessboard(&looks, grid)?;
+    let missed: Vec<usize> = all.into_iter().filter(|index| matches!(looks[*index], Look::Missed(_))).collect();
+    let again = of_each(&missed, progress, cancel, |index| look(index, DetectOptions::thorough()))?;
+    for (index, second) in missed.into_iter().zip(again) {
+        looks[index] = second;
+    }
+    Ok(looks.into_iter().map(Look::corners).collect())
+}
+
+/// What one look at an image gave.
+enum Look {
+    NoImage,
+    Found(Vec<Corner>),
+    /// The target was not found; the sides of the largest chessboard in sight.
+    Missed(Option<(usize, usize)>),
+}
+
+impl Look {
+    fn corners(self) -> Option<Vec<Corner>> {
+        if let Self::Found(corners) = self { Some(corners) } else { None }
+    }
+}
+
+/// Whether the images show a chessboard of another size, always the same, and never the one looked for.
+fn other_chessboard(looks: &[Look], grid: &Grid) -> Result<(), ObserveError> {
+    if looks.iter().any(|look| matches!(look, Look::Found(_))) {
+        return Ok(());
+    }
+    let mut seen = BTreeMap::<(usize, usize), usize>::new();
+    for look in looks {
+        if let Look::Missed(Some(sides)) = look {
+            *seen.entry(*sides).or_default() += 1;
+        }
+    }
+    let with_any: usize = seen.values().sum();
+    let Some((&(columns, rows), &count)) = seen.iter().max_by_key(|(_, count)| **count) else { return Ok(()) };
+    let asked = (grid.columns.max(grid.rows), grid.columns.min(grid.rows));
+    if (columns, rows) == asked || (count as f64) < SAME * with_any as f64 || 2 * count < looks.len() {
+        return Ok(());
+    }
+    Err(ObserveError::OtherChessboard {
+        columns: grid.columns,
+        rows: grid.rows,
+        images: looks.len(),
+        seen: count,
+        seen_columns: columns,
+        seen_rows: rows,
+    })
+}
+
 fn of_each<T: Send>(
-    count: usize,
+    indices: &[usize],
     progress: Progress<'_>,
     cancel: &CancelToken,
     work: impl Fn(usize) -> Result<T, ObserveError> + Sync,
 ) -> Result<Vec<T>, ObserveError> {
-    let done = AtomicUsize::new(0);
-    let one = |index| {
+    let (done, count) = (AtomicUsize::new(0), indices.len());
+    let one = |index: usize| {
         if cancel.is_cancelled() {
             return Err(ObserveError::Cancelled);
         }
@@ -90,18 +195,6 @@ fn of_each<T: Send>(
         result
     };
     // All of them before the first error: in parallel another one could come first.
-    let each: Vec<_> = (0..count).into_par_iter().with_max_len(1).map(one).collect();
+    let each: Vec<_> = indices.par_iter().with_max_len(1).map(|index| one(*index)).collect();
     each.into_iter().collect()
-}
-
-fn corners_of(dataset: &Dataset, entry: &Entry) -> Result<Option<Vec<Corner>>, ObserveError> {
-    // A corner table says what was found in each image.
-    if entry.corners.is_some() || entry.image_path.is_none() {
-        return Ok(None);
-    }
-    detect(&dataset.load_gray(entry)?, &dataset.target, &entry.name)
-}
-
-fn detect(image: &GrayImage, target: &TargetSpec, name: &str) -> Result<Option<Vec<Corner>>, ObserveError> {
-    detect::detect(image, target).map_err(|source| ObserveError::Vision { name: name.to_owned(), source })
 }

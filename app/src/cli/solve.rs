@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::anyhow;
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{Method, ObservedView, Options};
+use handeye_core::estimate::handeye::{HandEyeError, Mode};
+use handeye_core::estimate::{CalibrateError, Method, ObservedView, Options};
 use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::template::{CHOICE, template};
 use handeye_core::project::dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
@@ -74,7 +74,9 @@ pub fn read(folder: &Path, cancel: &CancelToken) -> Result<Input, Failure> {
 
 fn not_observed(error: ObserveError) -> Failure {
     match error {
-        ObserveError::Dataset(_) | ObserveError::Session(_) => Failure::unusable(error),
+        ObserveError::Dataset(_) | ObserveError::Session(_) | ObserveError::OtherChessboard { .. } => {
+            Failure::unusable(error)
+        }
         ObserveError::Vision { .. } | ObserveError::Cancelled => Failure::failed(error),
     }
 }
@@ -174,9 +176,17 @@ pub fn folder(
         goal_m: Goal::default().0,
         truth,
     };
-    let mut solved = worker::answer(&job, cancel.into()).map_err(Failure::failed)?;
+    let mut solved = worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path))?;
     solved.result.provenance.input_sha256 = Some(input.sha256.clone());
     Ok(Solution { folder: path.to_path_buf(), input, solved: Arc::new(solved) })
+}
+
+/// Where there is no answer the data may be at fault, and the doctor says which.
+fn unsolved(error: CalibrateError, folder: &Path) -> Failure {
+    match error {
+        CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
+        error => Failure::failed(anyhow!("{error}; `handeye doctor {}` examines the data", folder.display())),
+    }
 }
 
 /// A data set as a session would have it.

@@ -13,6 +13,7 @@ pub(crate) mod markers;
 mod options;
 mod order;
 
+pub use checkerboard::chessboard_in_sight;
 pub use dispatch::{detect, detect_with};
 pub use error::VisionError;
 pub use markers::charuco::charuco_layout;

@@ -3,7 +3,7 @@
 use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
 use handeye_core::diagnose::findings::{FindingCode, FindingOptions};
 use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{Method, Observations, calibrate};
+use handeye_core::estimate::{Method, Observations, ObservedView, calibrate};
 use handeye_core::progress::CancelToken;
 use nalgebra::{Isometry3, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
@@ -40,13 +40,16 @@ fn twist(translation: Vector3<f64>, rotation: Vector3<f64>) -> Vector6<f64> {
 }
 
 /// Names of the faults.
-pub const FAULTS: [&str; 6] = [
+pub const FAULTS: [&str; 9] = [
     "board slipped 5 mm at view 12",
     "square 2 % wrong",
     "joint 4 offset 0.2°",
     "one view captured in motion",
     "poses inverted",
     "millimetres",
+    "rows out of step from a view on",
+    "rows out of step",
+    "images letter by letter, poses by number",
 ];
 
 /// A session with a fault and the code that has to come first. Both set-ups, with the lens given and estimated, take turns.
@@ -80,14 +83,47 @@ pub fn faulty(fault: usize, seed: u64) -> (Observations, FindingCode) {
             (session(&setup.with(Fault { moving, ..Fault::default() })), FindingCode::OutlierView)
         }
         4 => (changed(session(&setup), |p| p.inverse()), FindingCode::InvertedPoses),
-        _ => {
+        5 => {
             let in_millimetres = |mut p: Isometry3<f64>| {
                 p.translation.vector *= 1e3;
                 p
             };
             (changed(session(&setup), in_millimetres), FindingCode::WrongLengthUnit)
         }
+        6 | 7 => {
+            // An image or a pose, or two, that is missing or there twice: at a view, or before the first.
+            let by = [-2, -1, 1, 2][rng.random_range(0..4usize)];
+            let from = if fault == 6 { rng.random_range(4..=14) } else { 0 };
+            let rows = (0..20).map(|row: usize| if row < from { Some(row) } else { row.checked_add_signed(by) });
+            (paired(session(&setup), rows), FindingCode::ShiftedPoses)
+        }
+        _ => {
+            let mut by_letters: Vec<usize> = (0..20).collect();
+            by_letters.sort_by_key(|view| (view + 1).to_string());
+            let mut session = session(&setup);
+            for (n, view) in session.views.iter_mut().enumerate() {
+                view.name = format!("{}.png", n + 1);
+            }
+            // Row by row the images in the order of their letters, the poses as they were taken.
+            let poses: Vec<_> = session.views.iter().map(|view| view.base_from_tip).collect();
+            session.views = by_letters.iter().map(|view| session.views[*view].clone()).collect();
+            for (view, pose) in session.views.iter_mut().zip(poses) {
+                view.base_from_tip = pose;
+            }
+            (session, FindingCode::ShiftedPoses)
+        }
     }
+}
+
+/// The views with the poses of other rows; views without one are left out.
+fn paired(mut session: Observations, rows: impl Iterator<Item = Option<usize>>) -> Observations {
+    let poses: Vec<_> = session.views.iter().map(|view| (view.base_from_tip, view.tip_by_joint.clone())).collect();
+    let views = session.views.into_iter().zip(rows).filter_map(|(view, row)| {
+        let (base_from_tip, tip_by_joint) = poses.get(row?)?.clone();
+        Some(ObservedView { base_from_tip, tip_by_joint, ..view })
+    });
+    session.views = views.collect();
+    session
 }
 
 /// A healthy session: set-up, number of views, noise, geometry and what is known are drawn at random.

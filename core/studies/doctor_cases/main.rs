@@ -1,6 +1,6 @@
 //! What the doctor says of constructed sessions: forty that are degenerate or hostile, healthy ones, and six faults.
 //!
-//! `cargo run --release -p handeye_core --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT]`, or
+//! `cargo run --release -p handeye_core --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or
 //! `… -- TEXT` for the whole report on every case whose name has that text.
 
 mod arm;
@@ -58,7 +58,11 @@ fn main() {
         println!("scale, lens estimated {estimated}: mean squared error over uncertainty {mean:.2} of 1");
     }
 
+    let only = arguments.next();
     for (fault, name) in faults::FAULTS.iter().enumerate() {
+        if only.as_ref().is_some_and(|only| !name.contains(only.as_str())) {
+            continue;
+        }
         let mut first = 0;
         for seed in 0..seeds {
             let (observations, code) = faults::faulty(fault, 5000 + seed);

@@ -134,6 +134,26 @@ fn sets_without_an_answer_exit_with_1_and_say_what_to_do() {
 }
 
 #[test]
+fn squares_counted_for_inner_corners_are_named_with_the_grid_that_is_there() {
+    let (_home, session) = copy_of_session();
+    let folder = tempfile::tempdir().expect("a folder");
+    for image in std::fs::read_dir(session.join("images")).expect("images") {
+        let image = image.expect("an image").path();
+        std::fs::copy(&image, folder.path().join(image.file_name().expect("a name"))).expect("copied");
+    }
+    // The board has 11 × 8 squares.
+    let described = "[target]\nkind = \"chessboard\"\ncolumns = 11\nrows = 8\nsquare_m = 0.015\n";
+    std::fs::write(folder.path().join("dataset.toml"), described).expect("written");
+    for command in ["calibrate", "doctor"] {
+        let output = handeye(&[command, utf8(folder.path()), "--quiet"]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains("a chessboard of 10 × 7 inner corners"), "{message}");
+        assert!(message.contains("one fewer than squares"), "{message}");
+    }
+}
+
+#[test]
 fn the_doctor_answers_for_a_healthy_session_and_for_one_without_an_answer() {
     let (_home, session) = copy_of_session();
     let report = handeye(&["doctor", utf8(&session)]);

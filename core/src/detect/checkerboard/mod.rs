@@ -32,18 +32,26 @@ const UNSURE_PX: f64 = 0.15;
 
 /// The board's corners with their covariances, in the order of [`super::detect_with`].
 ///
-/// A live search is by [`checker`] alone; with all effort OpenCV looks where that finds nothing.
+/// A live search is by our own [`search`] alone; with all effort OpenCV looks where that sees a grid and not the board. Where
+/// there is no grid of three by three corners on any level of the pyramid there is no board to look for again.
 pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
     let native = search::find(image, grid).filter(|order| alternation(image, order) >= MIN_ALTERNATION);
     let found = match (native, effort) {
         (Some(found), _) => Some(found),
         (None, Effort::Live) => None,
+        (None, Effort::Thorough) if search::largest(image, grid).is_none() => None,
         (None, Effort::Thorough) => search(image, grid)?.map(|found| search::refine(image, &found)),
     };
     let Some(found) = found else { return Ok(None) };
     let found = with_all_stated(image, found)?;
     let ordered = canonical(&found, grid, |order| contrast_of_first_square(image, order) < 0.0);
     Ok(ordered.is_regular().then_some(ordered))
+}
+
+/// The sides of the largest chessboard in sight, or of the part of it that is seen, in inner corners, the longer first;
+/// `None` below three by three. `grid` is what was looked for.
+pub fn chessboard_in_sight(image: &GrayImage, grid: &Grid) -> Option<(usize, usize)> {
+    search::largest(image, grid).map(|(width, height)| (width.max(height), width.min(height)))
 }
 
 /// Corners without a fit are refined by OpenCV and stated with [`UNSURE_PX`].

@@ -104,6 +104,19 @@ fn judged(sight: &SessionViews, pairs: &[PosePair], solution: ClosedFormSolution
     Agreement { solution, misfit_m, median_m }
 }
 
+/// RMS distance of the target's outer points between where a solution puts them for a robot pose and where they were seen,
+/// metres.
+pub(super) fn misfit_of(
+    sight: &SessionViews,
+    solution: &ClosedFormSolution,
+    base_from_tip: &Pose<Base, Tip>,
+    seen: &Isometry3<f64>,
+) -> f64 {
+    let anchor_from_mount = sight.mode.anchor_from_mount(base_from_tip);
+    let chain = solution.mount_from_camera.inverse() * anchor_from_mount.inverse() * solution.anchor_from_target;
+    misfit(sight, chain.isometry(), seen)
+}
+
 /// RMS distance of the target's outer points at two poses, metres.
 pub(super) fn misfit(sight: &SessionViews, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     let squared: f64 = sight.outer.iter().map(|p| (a * p - b * p).norm_squared()).sum();

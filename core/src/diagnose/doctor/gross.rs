@@ -7,6 +7,7 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 
 use super::agreement::{Agreement, agreement, pairs_of};
+use super::pairing::{self, Pairing};
 use super::views::SessionViews;
 use crate::diagnose::findings::FindingCode;
 use crate::estimate::handeye::{HandEyeError, subset};
@@ -44,19 +45,20 @@ pub(super) struct Change {
     order_in_inverse: bool,
     /// Factor on all lengths.
     pub unit: f64,
-    /// Every image belongs to the pose so many rows further.
-    pub shift: isize,
+    /// Which row of the table each image belongs to.
+    pub pairing: Pairing,
 }
 
 impl Change {
-    pub const NONE: Self = Self { inverted: false, order: None, order_in_inverse: false, unit: 1.0, shift: 0 };
+    pub const NONE: Self =
+        Self { inverted: false, order: None, order_in_inverse: false, unit: 1.0, pairing: Pairing::AsGiven };
 
     /// Number of things changed.
     fn count(&self) -> usize {
         usize::from(self.inverted)
             + usize::from(self.order.is_some())
             + usize::from(self.unit != 1.0)
-            + usize::from(self.shift != 0)
+            + usize::from(self.pairing != Pairing::AsGiven)
     }
 
     /// What is said of the poses, the gravest first.
@@ -71,7 +73,7 @@ impl Change {
         if self.unit != 1.0 {
             codes.push(FindingCode::WrongLengthUnit);
         }
-        if self.shift != 0 {
+        if self.pairing != Pairing::AsGiven {
             codes.push(FindingCode::ShiftedPoses);
         }
         codes
@@ -107,7 +109,15 @@ fn reordered(pose: &Isometry3<f64>, order: Order) -> Isometry3<f64> {
 }
 
 /// Every change that is tried.
-pub(super) fn changes() -> Vec<Change> {
+fn changes(sight: &SessionViews) -> Vec<Change> {
+    let mut all = changes_of_poses();
+    all.extend(Pairing::all(sight).into_iter().map(|pairing| Change { pairing, ..Change::NONE }));
+    all.sort_by_key(Change::count);
+    all
+}
+
+/// Every way in which single poses may have been misread.
+fn changes_of_poses() -> Vec<Change> {
     let mut all = Vec::new();
     let orders = [
         (None, false),
@@ -119,13 +129,11 @@ pub(super) fn changes() -> Vec<Change> {
     for unit in [1.0, 1e-3, 1e3] {
         for inverted in [false, true] {
             for (order, order_in_inverse) in orders {
-                all.push(Change { inverted, order, order_in_inverse, unit, shift: 0 });
+                all.push(Change { inverted, order, order_in_inverse, unit, pairing: Pairing::AsGiven });
             }
         }
     }
-    all.extend([-1, 1].map(|shift| Change { shift, ..Change::NONE }));
     all.retain(|c| *c != Change::NONE);
-    all.sort_by_key(Change::count);
     all
 }
 
@@ -153,7 +161,7 @@ pub(super) fn gross(sight: &SessionViews, work: &Work<'_>) -> Option<Gross> {
     let given_m = as_given.as_ref().map_or(f64::INFINITY, |a| a.median_m);
     let sound = given_m < SOUND * sight.distance_m;
     let mut tried = Vec::new();
-    for change in changes() {
+    for change in changes(sight) {
         if work.is_cancelled() {
             return None;
         }
@@ -167,22 +175,33 @@ pub(super) fn gross(sight: &SessionViews, work: &Work<'_>) -> Option<Gross> {
         tried[..near].sort_by_key(|t| t.change.count());
     }
     let views = sight.views.len();
-    let accused = views >= NEED
-        && !sound
-        && tried.first().is_some_and(|t| {
-            let best_m = t.agreement.median_m;
-            best_m < EXPLAINED * sight.distance_m && TIMES * best_m < given_m
-        });
+    let explains = |so_m: f64, given_m: f64| so_m < EXPLAINED * sight.distance_m && TIMES * so_m < given_m;
+    let mut accused = views >= NEED && !sound && tried.first().is_some_and(|t| explains(t.agreement.median_m, given_m));
+    // Half of the views may be in step and the other half not: the median says nothing of the rest.
+    if !accused && let Some(stepped) = stepped(sight, as_given.as_ref().ok()) {
+        tried.insert(0, stepped);
+        accused = true;
+    }
     Some(Gross { as_given, tried, accused, views })
+}
+
+/// A step in the pairing of images and poses that explains what the poses as they are leave; `None` when there is none.
+fn stepped(sight: &SessionViews, as_given: Option<&Agreement>) -> Option<Tried> {
+    let wrong_m = SOUND * sight.distance_m;
+    let given = as_given.map(|agreement| &agreement.solution);
+    if pairing::wrong(sight, Pairing::AsGiven, given, wrong_m).len() < pairing::LEAST_BESIDE {
+        return None;
+    }
+    let change = Change { pairing: pairing::best_step(sight)?, ..Change::NONE };
+    let agreement = solve(sight, &change, true).ok()?;
+    let explained = pairing::explains(sight, change.pairing, given, &agreement.solution, wrong_m);
+    explained.then_some(Tried { change, agreement })
 }
 
 /// The views with a changed robot pose, and what they agree on.
 fn solve(sight: &SessionViews, change: &Change, thorough: bool) -> Result<Agreement, HandEyeError> {
     let count = sight.views.len();
-    let pose_of = |i: usize| {
-        let from = i.checked_add_signed(change.shift).filter(|j| *j < count)?;
-        Some(change.of_pose(&sight.views[from].base_from_tip))
-    };
+    let pose_of = |i: usize| Some(change.of_pose(&change.pairing.pose_of(sight, i)?));
     let all: Vec<Pose<Base, Tip>> = (0..count).map(|i| pose_of(i).unwrap_or_else(Pose::identity)).collect();
     let pairs = pairs_of(sight, &all);
     let most = if *change == Change::NONE { usize::MAX } else { MOST_VIEWS };
@@ -211,9 +230,11 @@ mod tests {
     }
 
     #[test]
-    fn the_changes_are_all_different_and_the_simple_ones_come_first() {
-        let all = changes();
-        assert_eq!(all.len(), 31);
-        assert!(all.windows(2).all(|w| w[0].count() <= w[1].count()));
+    fn the_changes_are_all_different() {
+        let all = changes_of_poses();
+        assert_eq!(all.len(), 29);
+        for (i, change) in all.iter().enumerate() {
+            assert!(!all[..i].contains(change), "{change:?}");
+        }
     }
 }

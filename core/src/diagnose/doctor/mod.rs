@@ -23,6 +23,7 @@ mod effect;
 mod gross;
 mod judge;
 mod model;
+mod pairing;
 mod report;
 mod screen;
 mod select;

@@ -1,5 +1,7 @@
 //! What the images alone say: the target's pose in every view, how precisely, and how lens and target shape turn it.
 
+use std::cmp::Ordering;
+
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
 
 use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
@@ -11,6 +13,7 @@ use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::planar_pose::{self, PlanarPose};
 use crate::geometry::se3::skew;
 use crate::geometry::statistics::median;
+use crate::natural_order;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
@@ -30,9 +33,20 @@ const AMBIGUOUS: f64 = 2.0;
 /// A view whose corners are noisier than this many times the typical one is weighted by its own noise.
 const NOISY: f64 = 2.0;
 
+/// A row of the pose table, whether the target was seen in its image or not.
+pub(super) struct TableRow {
+    pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// Place of its image when the images are sorted by number (1, 2, 10).
+    pub rank_by_number: usize,
+    /// And letter by letter (1, 10, 2).
+    pub rank_by_letters: usize,
+}
+
 /// One view with a robot pose and a pose of the target.
 pub(super) struct SessionView {
     pub name: String,
+    /// Its row in the table.
+    pub row: usize,
     pub base_from_tip: Pose<Base, Tip>,
     pub camera_from_target: Isometry3<f64>,
     /// The mirrored pose, where the corners hardly tell.
@@ -51,6 +65,8 @@ pub(super) struct SessionView {
 pub(super) struct SessionViews {
     pub mode: Mode,
     pub views: Vec<SessionView>,
+    /// Every row of the table.
+    pub table: Vec<TableRow>,
     /// Names of views with numbers that are not finite.
     pub not_finite: Vec<String>,
     /// The camera; `None` for poses measured elsewhere.
@@ -69,6 +85,29 @@ pub(super) struct SessionViews {
     pub distance_m: f64,
 }
 
+/// A view with its row in the table.
+type Row<'a> = (usize, &'a ObservedView);
+
+fn table(views: &[ObservedView]) -> Vec<TableRow> {
+    let ranks = |order: fn(&str, &str) -> Ordering| {
+        let mut sorted: Vec<usize> = (0..views.len()).collect();
+        sorted.sort_by(|a, b| order(&views[*a].name, &views[*b].name));
+        let mut ranks = vec![0; views.len()];
+        for (rank, row) in sorted.into_iter().enumerate() {
+            ranks[row] = rank;
+        }
+        ranks
+    };
+    let (by_number, by_letters) = (ranks(natural_order::compare), ranks(|a, b| a.cmp(b)));
+    let rows = views.iter().zip(by_number).zip(by_letters);
+    let row = |((view, rank_by_number), rank_by_letters): ((&ObservedView, usize), usize)| TableRow {
+        base_from_tip: view.base_from_tip.filter(Pose::is_finite),
+        rank_by_number,
+        rank_by_letters,
+    };
+    rows.map(row).collect()
+}
+
 struct Fit {
     corners: Vec<Corner>,
     wrong: Vec<usize>,
@@ -79,19 +118,19 @@ impl SessionViews {
     /// Looks at all views in the fit that have a robot pose and the target. `Err` says why nothing can be tested.
     pub fn new(observations: &Observations) -> Result<Self, String> {
         let Some(mode) = observations.mode else { return Err("there are no robot poses".to_owned()) };
-        let in_fit: Vec<&ObservedView> = observations.views.iter().filter(|v| v.in_fit).collect();
-        let (finite, broken): (Vec<&ObservedView>, Vec<&ObservedView>) = in_fit.into_iter().partition(|v| is_finite(v));
-        let not_finite = broken.iter().map(|v| v.name.clone()).collect();
-        let seen: Vec<&ObservedView> = finite
+        let in_fit = observations.views.iter().enumerate().filter(|(_, v)| v.in_fit);
+        let (finite, broken): (Vec<Row<'_>>, Vec<Row<'_>>) = in_fit.partition(|(_, v)| is_finite(v));
+        let not_finite = broken.iter().map(|(_, v)| v.name.clone()).collect();
+        let seen: Vec<Row<'_>> = finite
             .into_iter()
-            .filter(|v| v.base_from_tip.is_some() && (v.corners.is_some() || v.camera_from_target.is_some()))
+            .filter(|(_, v)| v.base_from_tip.is_some() && (v.corners.is_some() || v.camera_from_target.is_some()))
             .collect();
-        let seen: Vec<&ObservedView> =
-            subset::spread(seen.len(), super::MOST_VIEWS).into_iter().map(|i| seen[i]).collect();
+        let seen: Vec<Row<'_>> = subset::spread(seen.len(), super::MOST_VIEWS).into_iter().map(|i| seen[i]).collect();
         let (outer, displacement) = board(&observations.target.points());
         let mut sight = Self {
             mode,
             views: Vec::new(),
+            table: table(&observations.views),
             not_finite,
             intrinsics: None,
             lens_free: matches!(observations.camera, CameraKnowledge::Estimate { .. }),
@@ -102,11 +141,11 @@ impl SessionViews {
             displacement,
             distance_m: 0.0,
         };
-        if seen.iter().all(|v| v.corners.is_none()) {
+        if seen.iter().all(|(_, v)| v.corners.is_none()) {
             sight.lens_free = false;
             sight.take_poses(&seen);
         } else {
-            let with_corners: Vec<&ObservedView> = seen.into_iter().filter(|v| v.corners.is_some()).collect();
+            let with_corners: Vec<Row<'_>> = seen.into_iter().filter(|(_, v)| v.corners.is_some()).collect();
             sight.take_corners(observations, &with_corners)?;
         }
         let middle = Point3::from(outer.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / 4.0);
@@ -115,11 +154,12 @@ impl SessionViews {
         Ok(sight)
     }
 
-    fn take_poses(&mut self, seen: &[&ObservedView]) {
-        for view in seen {
+    fn take_poses(&mut self, seen: &[Row<'_>]) {
+        for (row, view) in seen {
             let (Some(base_from_tip), Some(pose)) = (view.base_from_tip, view.camera_from_target) else { continue };
             self.views.push(SessionView {
                 name: view.name.clone(),
+                row: *row,
                 base_from_tip,
                 camera_from_target: *pose.isometry(),
                 alternative: None,
@@ -132,8 +172,8 @@ impl SessionViews {
         }
     }
 
-    fn take_corners(&mut self, observations: &Observations, seen: &[&ObservedView]) -> Result<(), String> {
-        let all: Vec<Vec<Corner>> = seen.iter().map(|v| v.corners.clone().unwrap_or_default()).collect();
+    fn take_corners(&mut self, observations: &Observations, seen: &[Row<'_>]) -> Result<(), String> {
+        let all: Vec<Vec<Corner>> = seen.iter().map(|(_, v)| v.corners.clone().unwrap_or_default()).collect();
         let mut camera = camera_of(observations, &all)?;
         let mut fits = fit_all(&all, &observations.target, &camera);
         if self.lens_free && fits.iter().flatten().any(|f| !f.wrong.is_empty()) {
@@ -154,7 +194,7 @@ impl SessionViews {
         self.corner_px = Some(typical.sqrt());
         self.form_information = DMatrix::zeros(count, count);
         self.form_gradient = DVector::zeros(count);
-        for (view, fit) in seen.iter().zip(fits) {
+        for ((row, view), fit) in seen.iter().zip(fits) {
             let (Some(fit), Some(base_from_tip)) = (fit, view.base_from_tip) else { continue };
             let pose = *fit.pose.best.camera_from_target.isometry();
             let seen = ViewInput {
@@ -177,6 +217,7 @@ impl SessionViews {
             let ambiguous = fit.pose.alternative.filter(|a| a.rms_px < AMBIGUOUS * fit.pose.best.rms_px);
             self.views.push(SessionView {
                 name: view.name.clone(),
+                row: *row,
                 base_from_tip,
                 camera_from_target: pose,
                 alternative: ambiguous.map(|a| *a.camera_from_target.isometry()),

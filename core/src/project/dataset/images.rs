@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::EntryList;
 use super::error::{DatasetError, DatasetProblem, shown};
-use super::{EntryList, natural_order};
+use crate::natural_order;
 use crate::project::files::image_file::{self, one_line};
 
 /// Endings of the formats that are read, in lower case.

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use super::error::shown;
 use super::images;
 use super::joints;
-use super::natural_order;
 use super::outside::leaves;
 use super::text::{TextFile, records, resolve};
+use crate::natural_order;
 use crate::project::files::image_file;
 
 /// What stands before a line that a person has to decide about.

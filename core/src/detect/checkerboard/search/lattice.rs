@@ -32,6 +32,9 @@ const MAX_BEYOND: f64 = 0.6;
 /// Bins of the search for neighbours \[px of the level\].
 const BIN_PX: f64 = 8.0;
 
+/// Points along the shorter side of the smallest grid that is taken for one.
+const LEAST_SIDE: i32 = 3;
+
 type Node = (i32, i32);
 
 const DIRECTIONS: [Node; 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
@@ -60,6 +63,27 @@ pub(super) fn grow(saddles: &[Saddle], size: (usize, usize), columns: usize, row
         }
     }
     None
+}
+
+/// Points of the largest grid among the candidates along its sides, whatever grid is looked for; `None` where no grid has
+/// three by three.
+pub(super) fn largest(saddles: &[Saddle], size: (usize, usize)) -> Option<(usize, usize)> {
+    let bins = Bins::new(saddles, size);
+    let mut visited = vec![false; saddles.len()];
+    let mut best = None;
+    for seed in 0..saddles.len() {
+        if visited[seed] {
+            continue;
+        }
+        let Some(start) = seed_at(saddles, &bins, seed) else { continue };
+        let lattice = Lattice::from_seed(saddles, &bins, &start, saddles.len());
+        for &index in lattice.nodes.values() {
+            visited[index] = true;
+        }
+        let sides = lattice.whole_part();
+        best = best.max(sides.map(|(width, height)| (width * height, width, height)));
+    }
+    best.map(|(_, width, height)| (width, height))
 }
 
 /// Candidates by place.
@@ -231,11 +255,7 @@ impl<'a> Lattice<'a> {
 
     /// The part of the grid that is the board.
     fn board(&self, columns: usize, rows: usize) -> Option<Grown> {
-        let (mut low, mut high) = ((i32::MAX, i32::MAX), (i32::MIN, i32::MIN));
-        for &(x, y) in self.nodes.keys() {
-            low = (low.0.min(x), low.1.min(y));
-            high = (high.0.max(x), high.1.max(y));
-        }
+        let (low, high) = self.bounds();
         let mut best: Option<(usize, Window)> = None;
         for (width, height) in [(columns as i32, rows as i32), (rows as i32, columns as i32)] {
             for y in low.1..=high.1 - height + 1 {
@@ -256,14 +276,50 @@ impl<'a> Lattice<'a> {
         (enough && self.is_whole(&window)).then(|| self.points(&window, columns)).flatten()
     }
 
+    /// Sides of what is left when lines that are mostly missing are taken off its rim; `None` below three by three.
+    fn whole_part(&self) -> Option<(usize, usize)> {
+        let (low, high) = self.bounds();
+        let mut window = Window { x: low.0, y: low.1, width: high.0 - low.0 + 1, height: high.1 - low.1 + 1 };
+        while window.width >= LEAST_SIDE && window.height >= LEAST_SIDE {
+            let Window { x, y, width, height } = window;
+            let rims = [
+                (self.part_of_column(&window, x), Window { x: x + 1, width: width - 1, ..window }),
+                (self.part_of_column(&window, x + width - 1), Window { width: width - 1, ..window }),
+                (self.part_of_row(&window, y), Window { y: y + 1, height: height - 1, ..window }),
+                (self.part_of_row(&window, y + height - 1), Window { height: height - 1, ..window }),
+            ];
+            let emptiest = rims.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+            if emptiest.0 >= MIN_SEEN_IN_LINE {
+                return Some((width as usize, height as usize));
+            }
+            window = emptiest.1;
+        }
+        None
+    }
+
+    fn part_of_row(&self, window: &Window, y: i32) -> f64 {
+        let seen = (window.x..window.x + window.width).filter(|x| self.nodes.contains_key(&(*x, y))).count();
+        seen as f64 / f64::from(window.width)
+    }
+
+    fn part_of_column(&self, window: &Window, x: i32) -> f64 {
+        let seen = (window.y..window.y + window.height).filter(|y| self.nodes.contains_key(&(x, *y))).count();
+        seen as f64 / f64::from(window.height)
+    }
+
+    fn bounds(&self) -> (Node, Node) {
+        let (mut low, mut high) = ((i32::MAX, i32::MAX), (i32::MIN, i32::MIN));
+        for &(x, y) in self.nodes.keys() {
+            low = (low.0.min(x), low.1.min(y));
+            high = (high.0.max(x), high.1.max(y));
+        }
+        (low, high)
+    }
+
     /// Whether every line of the board is mostly seen, and no line beyond it.
     fn is_whole(&self, window: &Window) -> bool {
         let Window { x, y, width, height } = *window;
-        let part = |line: &mut dyn Iterator<Item = Node>, length: i32| {
-            line.filter(|node| self.nodes.contains_key(node)).count() as f64 / f64::from(length)
-        };
-        let row = |y: i32| part(&mut (x..x + width).map(|x| (x, y)), width);
-        let column = |x: i32| part(&mut (y..y + height).map(|y| (x, y)), height);
+        let (row, column) = (|y| self.part_of_row(window, y), |x| self.part_of_column(window, x));
         (y..y + height).all(|y| row(y) >= MIN_SEEN_IN_LINE)
             && (x..x + width).all(|x| column(x) >= MIN_SEEN_IN_LINE)
             && [y - 1, y + height].into_iter().all(|y| row(y) <= MAX_BEYOND)

@@ -27,18 +27,27 @@ const LEVEL_SQUARE_PX: f64 = 10.0;
 /// The board's inner corners in some order, refined; `None` when it is not seen.
 pub(in crate::detect) fn find(image: &GrayImage, grid: &Grid) -> Option<Ordered> {
     let levels = Level::pyramid(image, coarsest(image, grid));
-    levels.iter().enumerate().rev().find_map(|(depth, level)| {
-        let saddles = saddles::find(level);
-        let grown = lattice::grow(&saddles, level.size(), grid.columns, grid.rows)?;
-        let order = Ordered::new(grown.points, grid);
-        if !order.is_regular() {
-            return None;
-        }
-        let refined = board::refine(&levels, depth, &order);
-        // Points that only the grid speaks for must be corners.
-        let proven = grown.seen.iter().zip(&refined.covariances_px2).all(|(seen, refined)| *seen || refined.is_some());
-        (proven && refined.is_regular()).then_some(refined)
-    })
+    levels.iter().enumerate().rev().find_map(|(depth, level)| board_of(&levels, depth, &saddles::find(level), grid))
+}
+
+/// Sides of the largest grid of corners in sight, whatever its size, on the levels where `grid` is looked for; `None` where
+/// no grid has three by three.
+pub(in crate::detect) fn largest(image: &GrayImage, grid: &Grid) -> Option<(usize, usize)> {
+    let levels = Level::pyramid(image, coarsest(image, grid));
+    let sides = levels.iter().filter_map(|level| lattice::largest(&saddles::find(level), level.size()));
+    sides.max_by_key(|(width, height)| width * height)
+}
+
+fn board_of(levels: &[Level<'_>], depth: usize, saddles: &[saddles::Saddle], grid: &Grid) -> Option<Ordered> {
+    let grown = lattice::grow(saddles, levels[depth].size(), grid.columns, grid.rows)?;
+    let order = Ordered::new(grown.points, grid);
+    if !order.is_regular() {
+        return None;
+    }
+    let refined = board::refine(levels, depth, &order);
+    // Points that only the grid speaks for must be corners.
+    let proven = grown.seen.iter().zip(&refined.covariances_px2).all(|(seen, refined)| *seen || refined.is_some());
+    (proven && refined.is_regular()).then_some(refined)
 }
 
 /// Refines corners that are known to a pixel or so; those whose image is not that of a corner stay, without a

@@ -4,7 +4,8 @@ mod fine;
 
 pub(super) use fine::{finding_of, fine};
 
-use super::gross::{self, Gross, Tried};
+use super::gross::{Gross, Tried};
+use super::pairing::Pairing;
 use super::views::SessionViews;
 use super::{Estimate, Hypothesis};
 use crate::diagnose::findings::{Evidence, Finding, FindingCode, Severity, listed};
@@ -76,7 +77,7 @@ pub(super) fn gross(sight: &SessionViews, gross: &Gross) -> Vec<Hypothesis> {
             continue;
         }
         let mut hypothesis = gross_hypothesis(sight, gross, tried, &codes);
-        hypothesis.significant = best && hypothesis.gain > CERTAIN + (gross::changes().len() as f64).ln();
+        hypothesis.significant = best && hypothesis.gain > CERTAIN + (gross.tried.len() as f64).ln();
         hypothesis.accepted = best;
         let twin = twin(sight, tried).filter(|_| codes == [FindingCode::InvertedPoses]);
         let Some(camera_elsewhere) = twin else {
@@ -126,7 +127,7 @@ fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &
         so = format!("{so_mm:.2}"),
         given = format!("{given_mm:.2}")
     );
-    let what = codes.iter().filter_map(|code| gross_words(*code, tried));
+    let what = codes.iter().filter_map(|code| gross_words(sight, *code, tried));
     let (camera_m, target_m) = distances(tried);
     Hypothesis {
         code: codes.first().copied().unwrap_or(FindingCode::InconsistentPoses),
@@ -141,13 +142,16 @@ fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &
             evidence("camera_distance", camera_m, "m"),
             evidence("target_distance", target_m, "m"),
         ],
-        views: Vec::new(),
+        views: match tried.change.pairing {
+            Pairing::Stepped { from, .. } => vec![sight.views[from].name.clone()],
+            _ => Vec::new(),
+        },
         significant: false,
         accepted: false,
     }
 }
 
-fn gross_words(code: FindingCode, tried: &Tried) -> Option<Text> {
+fn gross_words(sight: &SessionViews, code: FindingCode, tried: &Tried) -> Option<Text> {
     let (camera_m, target_m) = distances(tried);
     Some(match code {
         FindingCode::InvertedPoses => text!(
@@ -175,11 +179,36 @@ fn gross_words(code: FindingCode, tried: &Tried) -> Option<Text> {
                 stated = stated
             )
         }
-        FindingCode::ShiftedPoses if tried.change.shift > 0 => {
-            text!("Every image belongs to the robot pose of the row after it.")
-        }
-        FindingCode::ShiftedPoses => text!("Every image belongs to the robot pose of the row before it."),
+        FindingCode::ShiftedPoses => pairing_words(sight, tried.change.pairing)?,
         _ => return None,
+    })
+}
+
+/// Which rows images and poses were paired by.
+fn pairing_words(sight: &SessionViews, pairing: Pairing) -> Option<Text> {
+    let rows = |by: isize| if by.unsigned_abs() == 1 { text!("one row") } else { text!("two rows") };
+    Some(match pairing {
+        Pairing::AsGiven => return None,
+        Pairing::Shifted(by) if by > 0 => {
+            text!("Every image belongs to the robot pose that stands {rows} after its own.", rows = rows(by))
+        }
+        Pairing::Shifted(by) => {
+            text!("Every image belongs to the robot pose that stands {rows} before its own.", rows = rows(by))
+        }
+        Pairing::Stepped { from, before, after } => text!(
+            "From view {view} on images and robot poses are out of step by {rows} against the views before it: an image or \
+             a pose is missing there, or is there twice.",
+            view = &sight.views[from].name,
+            rows = rows(after - before)
+        ),
+        Pairing::ByNumber => text!(
+            "Images and robot poses were paired in different orders: the images letter by letter (1, 10, 2), the poses by \
+             number (1, 2, 10)."
+        ),
+        Pairing::Alphabetical => text!(
+            "Images and robot poses were paired in different orders: the images by number (1, 2, 10), the poses letter by \
+             letter (1, 10, 2)."
+        ),
     })
 }
 
@@ -205,7 +234,7 @@ pub(super) fn gross_findings(hypotheses: &[Hypothesis]) -> Vec<Finding> {
         .chain(others)
         .map(|code| {
             let finding = Finding::new(code, Severity::Problem, h.text_with_advice());
-            Finding { evidence: h.evidence.clone(), ..finding }
+            Finding { evidence: h.evidence.clone(), views: h.views.clone(), ..finding }
         })
         .collect()
 }
