@@ -6,9 +6,10 @@ use handeye_core::diagnose::findings::Severity;
 use handeye_core::estimate::Observations;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::geometry::frames::Pose;
+use handeye_core::geometry::planar_pose;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
-use super::sim::{Fault, GRID, Setup, changed, session, session_of};
+use super::sim::{Fault, GRID, Setup, camera, changed, session, session_of};
 
 pub struct Case {
     pub name: &'static str,
@@ -210,8 +211,36 @@ fn gross() -> Vec<Case> {
         case("quaternion w last", &order, changed(healthy(TO_HAND, 29), w_last)),
         case("inverted and in millimetres", &unit, changed(healthy(IN_HAND, 30), |p| millimetres(p).inverse())),
         case("w first and in millimetres", &order, changed(healthy(IN_HAND, 31), |p| w_first(millimetres(p)))),
+        case(
+            "target poses inverted, eye in hand",
+            &[Code::InvertedTargetPoses],
+            with_target_poses(healthy(IN_HAND, 33), |pose| pose.inverse()),
+        ),
+        case(
+            "target poses inverted, z of the target towards the camera",
+            &[Code::InvertedTargetPoses],
+            with_target_poses(healthy(IN_HAND, 34), |pose| (pose * half_turn_about_x()).inverse()),
+        ),
         case("poses and images out of step", &[Code::ShiftedPoses], out_of_step(healthy(IN_HAND, 32))),
     ]
+}
+
+/// The session with the poses of the target, measured elsewhere, in place of the corners.
+fn with_target_poses(
+    mut observations: Observations,
+    change: impl Fn(Isometry3<f64>) -> Isometry3<f64>,
+) -> Observations {
+    let target = observations.target;
+    for view in &mut observations.views {
+        let corners = view.corners.take().unwrap_or_default();
+        let pose = planar_pose::camera_from_target(&corners, &target, &camera()).ok();
+        view.camera_from_target = pose.map(|pose| Pose::from_isometry(change(*pose.isometry())));
+    }
+    observations
+}
+
+fn half_turn_about_x() -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
 }
 
 /// Sessions with something wrong in them.

@@ -188,6 +188,10 @@ fn examine(
     if views < gross::NEED {
         return Err(format!("{views} views with the target and a robot pose, {} are needed", gross::NEED));
     }
+    if let Some(behind) = words::behind_the_camera(&sight) {
+        diagnosis.findings.push(behind);
+        return Ok(());
+    }
     let gross = gross::gross(&sight, work).ok_or_else(cancelled)?;
     diagnosis.hypotheses = words::gross(&sight, &gross);
     if gross.accused {

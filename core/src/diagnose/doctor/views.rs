@@ -45,7 +45,7 @@ pub(super) struct TableRow {
 /// One view with a robot pose and a pose of the target.
 pub(super) struct SessionView {
     pub name: String,
-    /// Its row in the table.
+    /// Its row in the table of those in the fit.
     pub row: usize,
     pub base_from_tip: Pose<Base, Tip>,
     pub camera_from_target: Isometry3<f64>,
@@ -65,7 +65,7 @@ pub(super) struct SessionView {
 pub(super) struct SessionViews {
     pub mode: Mode,
     pub views: Vec<SessionView>,
-    /// Every row of the table.
+    /// Every row of the table that is in the fit.
     pub table: Vec<TableRow>,
     /// Names of views with numbers that are not finite.
     pub not_finite: Vec<String>,
@@ -88,7 +88,7 @@ pub(super) struct SessionViews {
 /// A view with its row in the table.
 type Row<'a> = (usize, &'a ObservedView);
 
-fn table(views: &[ObservedView]) -> Vec<TableRow> {
+fn table(views: &[&ObservedView]) -> Vec<TableRow> {
     let ranks = |order: fn(&str, &str) -> Ordering| {
         let mut sorted: Vec<usize> = (0..views.len()).collect();
         sorted.sort_by(|a, b| order(&views[*a].name, &views[*b].name));
@@ -100,7 +100,7 @@ fn table(views: &[ObservedView]) -> Vec<TableRow> {
     };
     let (by_number, by_letters) = (ranks(natural_order::compare), ranks(|a, b| a.cmp(b)));
     let rows = views.iter().zip(by_number).zip(by_letters);
-    let row = |((view, rank_by_number), rank_by_letters): ((&ObservedView, usize), usize)| TableRow {
+    let row = |((view, rank_by_number), rank_by_letters): ((&&ObservedView, usize), usize)| TableRow {
         base_from_tip: view.base_from_tip.filter(Pose::is_finite),
         rank_by_number,
         rank_by_letters,
@@ -118,8 +118,9 @@ impl SessionViews {
     /// Looks at all views in the fit that have a robot pose and the target. `Err` says why nothing can be tested.
     pub fn new(observations: &Observations) -> Result<Self, String> {
         let Some(mode) = observations.mode else { return Err("there are no robot poses".to_owned()) };
-        let in_fit = observations.views.iter().enumerate().filter(|(_, v)| v.in_fit);
-        let (finite, broken): (Vec<Row<'_>>, Vec<Row<'_>>) = in_fit.partition(|(_, v)| is_finite(v));
+        let in_fit: Vec<&ObservedView> = observations.views.iter().filter(|v| v.in_fit).collect();
+        let rows = in_fit.iter().copied().enumerate();
+        let (finite, broken): (Vec<Row<'_>>, Vec<Row<'_>>) = rows.partition(|(_, v)| is_finite(v));
         let not_finite = broken.iter().map(|(_, v)| v.name.clone()).collect();
         let seen: Vec<Row<'_>> = finite
             .into_iter()
@@ -130,7 +131,7 @@ impl SessionViews {
         let mut sight = Self {
             mode,
             views: Vec::new(),
-            table: table(&observations.views),
+            table: table(&in_fit),
             not_finite,
             intrinsics: None,
             lens_free: matches!(observations.camera, CameraKnowledge::Estimate { .. }),

@@ -34,6 +34,8 @@ pub enum FindingCode {
     InvertedPoses,
     /// The camera sits on the other side: eye-in-hand where eye-to-hand was stated, or the other way round.
     WrongMode,
+    /// The target's poses are inverted: target from camera where camera from target was stated, or the other way round.
+    InvertedTargetPoses,
     /// Numbers of quaternions are in another order than stated.
     WrongQuaternionOrder,
     /// Robot poses are in millimetres where metres were stated, or the other way round.

@@ -7,7 +7,7 @@ use toml::Spanned;
 
 use super::error::{DatasetError, DatasetProblem};
 use super::joints::{JointColumns, RawArm, joint_columns};
-use super::target_table::RawTarget;
+use super::target_table::{RawTarget, TargetPoseDirection};
 use super::text::line_of;
 use super::value::{AngleUnit, Spanning, bad};
 use crate::estimate::handeye::Mode;
@@ -126,6 +126,7 @@ pub(super) struct Config {
     pub target: TargetSpec,
     pub corners: Option<String>,
     pub target_poses: Option<String>,
+    pub target_pose: TargetPoseDirection,
     pub robot: Option<RobotConfig>,
     pub camera: Option<CameraConfig>,
 }
@@ -172,8 +173,20 @@ impl Config {
             .map_err(|(span, problem)| at(span, problem))?;
         let whole_file = |problem| DatasetError::new(file, None, problem);
         let robot = raw.robot.as_ref().map(robot_config).transpose().map_err(|(span, problem)| at(span, problem))?;
-        let config =
-            Self { mode: raw.mode, target, corners: raw.target.corners, target_poses: raw.target.poses, robot, camera };
+        if raw.target.pose.is_some() && raw.target.poses.is_none() {
+            return Err(whole_file(DatasetProblem::Conflict(
+                "[target] has pose, which says what its table of poses states, but no poses: name the table, or remove pose",
+            )));
+        }
+        let config = Self {
+            mode: raw.mode,
+            target,
+            corners: raw.target.corners,
+            target_poses: raw.target.poses,
+            target_pose: raw.target.pose.unwrap_or_default(),
+            robot,
+            camera,
+        };
         config.check_together().map_err(whole_file)?;
         Ok(config)
     }

@@ -43,9 +43,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::estimate::handeye::Mode;
 use crate::geometry::camera::{Distortion, Intrinsics};
-use crate::geometry::frames::Base;
-use crate::geometry::frames::Pose;
-use crate::geometry::frames::Tip;
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::natural_order;
 use crate::project::files::digest::Listing;
 use crate::project::files::image_file::{self, ImageFileError};
@@ -57,6 +55,7 @@ pub use error::{DatasetError, DatasetProblem};
 pub use joints::DatasetArm;
 use outside::Outside;
 use poses::PoseRow;
+use target_table::TargetPoseDirection;
 use text::TextFile;
 
 /// Name of the description in a dataset folder.
@@ -154,7 +153,9 @@ impl Dataset {
                 joints_rad: view.joints_rad.clone(),
                 tip_by_joint: Vec::new(),
                 corners,
-                camera_from_target: target_poses.remove(&view.path).map(Pose::from_isometry),
+                camera_from_target: target_poses
+                    .remove(&view.path)
+                    .map(|pose| camera_from_target(pose, config.target_pose)),
                 row: view.row,
             });
         }
@@ -335,6 +336,13 @@ fn views(folder: &Path, config: &Config, poses_file: Option<&TextFile>) -> Resul
         return Err(DatasetError::new(folder, None, DatasetProblem::NoImages(hint)));
     }
     Ok(paths.into_iter().map(|path| View::of_image(path.to_string_lossy().into_owned(), path)).collect())
+}
+
+fn camera_from_target(pose: Isometry3<f64>, direction: TargetPoseDirection) -> Pose<Camera, Target> {
+    match direction {
+        TargetPoseDirection::CameraFromTarget => Pose::from_isometry(pose),
+        TargetPoseDirection::TargetFromCamera => Pose::<Target, Camera>::from_isometry(pose).inverse(),
+    }
 }
 
 fn base_from_tip(pose: Isometry3<f64>, direction: PoseDirection) -> Pose<Base, Tip> {

@@ -36,7 +36,7 @@ impl RawKind {
         }
     }
 
-    /// Keys that it has, beside `kind`, `corners` and `poses`.
+    /// Keys that it has, beside `kind`, `corners`, `poses` and `pose`.
     fn keys(self) -> &'static [&'static str] {
         match self {
             Self::Chessboard | Self::Circles | Self::AsymmetricCircles => &["columns", "rows", "square_m"],
@@ -70,6 +70,17 @@ pub(super) struct RawTarget {
     ids: Option<Spanned<IdOrder>>,
     pub corners: Option<String>,
     pub poses: Option<String>,
+    /// What the poses of the target are.
+    pub pose: Option<TargetPoseDirection>,
+}
+
+/// What a row of target poses states.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum TargetPoseDirection {
+    #[default]
+    CameraFromTarget,
+    TargetFromCamera,
 }
 
 impl RawTarget {

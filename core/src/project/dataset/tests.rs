@@ -184,6 +184,22 @@ fn target_poses_make_pose_pairs_without_images() {
 }
 
 #[test]
+fn target_poses_may_state_the_camera_in_the_target() {
+    let poses = "image,x,y,z,qx,qy,qz,qw\n1,0,0,0,0,0,0,1\n";
+    // Half a turn about x: the camera stands before the target, which it sees at the same distance.
+    let row = "image,x,y,z,qx,qy,qz,qw\n1,0.1,0,0.5,1,0,0,0\n";
+    for (key, seen) in [("camera_from_target", [0.1, 0.0, 0.5]), ("target_from_camera", [-0.1, 0.0, 0.5])] {
+        let target = format!("{TARGET}poses = \"target_poses.csv\"\npose = \"{key}\"\n");
+        let folder = Folder::new(&format!("{target}{ROBOT}"), poses, &[]);
+        folder.write("target_poses.csv", row);
+        let pose = folder.read().entries[0].camera_from_target.expect("a target pose");
+        assert!((pose.translation() - Vector3::from(seen)).norm() < 1e-12, "{key}: {pose:?}");
+    }
+    let folder = Folder::new(&format!("{TARGET}pose = \"target_from_camera\"\n{ROBOT}"), poses, &[]);
+    assert!(folder.error().contains("[target] has pose"), "{}", folder.error());
+}
+
+#[test]
 fn tables_in_other_folders_name_images_relative_to_themselves() {
     let folder = Folder::new(&format!("{TARGET}{}", ROBOT.replace("poses.csv", "robot/poses.csv")), "", &["cam/a.png"]);
     fs::create_dir(folder.path().join("robot")).expect("create");

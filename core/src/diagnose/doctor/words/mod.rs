@@ -46,6 +46,22 @@ pub(super) fn not_finite(sight: &SessionViews) -> Option<Finding> {
     Some(finding.with("views", count as f64, ""))
 }
 
+/// Poses of a target that was seen put it in front of the camera.
+pub(super) fn behind_the_camera(sight: &SessionViews) -> Option<Finding> {
+    let behind = sight.views.iter().filter(|view| view.camera_from_target.translation.z <= 0.0).count();
+    if 2 * behind <= sight.views.len() {
+        return None;
+    }
+    let text = text!(
+        "In {behind} of {views} views the target poses put the target behind the camera: they are target_from_camera, or the \
+         camera's z axis looks backwards. Say pose = \"target_from_camera\" in [target], or turn the axes to z forward, y down.",
+        behind = behind,
+        views = sight.views.len()
+    );
+    let finding = Finding::new(FindingCode::InvertedTargetPoses, Severity::Problem, text);
+    Some(finding.with("views_behind", behind as f64, "").with("views", sight.views.len() as f64, ""))
+}
+
 pub(super) fn wrong_corners(sight: &SessionViews) -> Option<Finding> {
     let views: Vec<_> = sight.views.iter().filter(|v| !v.wrong_corners.is_empty()).collect();
     if views.is_empty() {
@@ -84,9 +100,15 @@ pub(super) fn gross(sight: &SessionViews, gross: &Gross) -> Vec<Hypothesis> {
             found.push(hypothesis);
             continue;
         };
-        let mut other =
-            Hypothesis { code: FindingCode::WrongMode, with: vec![FindingCode::InvertedPoses], ..hypothesis.clone() };
-        hypothesis.with = vec![FindingCode::WrongMode];
+        // Of poses that were measured elsewhere nobody has seen that they are camera_from_target.
+        let (first, also) = if sight.intrinsics.is_none() {
+            (FindingCode::InvertedTargetPoses, vec![FindingCode::WrongMode])
+        } else {
+            (FindingCode::WrongMode, Vec::new())
+        };
+        let with = std::iter::once(FindingCode::InvertedPoses).chain(also.iter().copied()).collect();
+        let mut other = Hypothesis { code: first, with, ..hypothesis.clone() };
+        hypothesis.with = std::iter::once(first).chain(also).collect();
         // One finding for both: the likelier.
         if camera_elsewhere {
             hypothesis.accepted = false;
@@ -133,7 +155,7 @@ fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &
         code: codes.first().copied().unwrap_or(FindingCode::InconsistentPoses),
         with: codes.iter().skip(1).copied().collect(),
         text: Text::sentences(what.chain([so_read])),
-        advice: Text::sentences(codes.iter().filter_map(|code| gross_advice(*code))),
+        advice: Text::sentences(codes.iter().filter_map(|code| gross_advice(sight, *code))),
         gain: freedom * ratio,
         estimate: None,
         evidence: vec![
@@ -154,6 +176,14 @@ fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &
 fn gross_words(sight: &SessionViews, code: FindingCode, tried: &Tried) -> Option<Text> {
     let (camera_m, target_m) = distances(tried);
     Some(match code {
+        FindingCode::InvertedPoses if sight.intrinsics.is_none() => text!(
+            "The robot poses or the target poses are the inverse of what is stated, or the camera sits on the other side \
+             (eye in hand against eye to hand): all three are the same equations. With the robot poses inverted the camera \
+             would be {camera} m from what carries it and the target {target} m; with the target poses inverted it is the \
+             other way round.",
+            camera = format!("{camera_m:.2}"),
+            target = format!("{target_m:.2}")
+        ),
         FindingCode::InvertedPoses => text!(
             "The robot poses are the inverse of what is stated, or the camera sits on the other side (eye in hand against \
              eye to hand): both are the same equations. The camera would be {camera} m from what carries it and the board \
@@ -212,8 +242,12 @@ fn pairing_words(sight: &SessionViews, pairing: Pairing) -> Option<Text> {
     })
 }
 
-fn gross_advice(code: FindingCode) -> Option<Text> {
+fn gross_advice(sight: &SessionViews, code: FindingCode) -> Option<Text> {
     Some(match code {
+        FindingCode::InvertedPoses if sight.intrinsics.is_none() => text!(
+            "Check whether the target poses are camera_from_target or target_from_camera, whether the table has base_from_tip \
+             or tip_from_base, and whether the camera is on the tip."
+        ),
         FindingCode::InvertedPoses => {
             text!("Check whether the table has base_from_tip or tip_from_base, and whether the camera is on the tip.")
         }
@@ -228,7 +262,9 @@ fn gross_advice(code: FindingCode) -> Option<Text> {
 pub(super) fn gross_findings(hypotheses: &[Hypothesis]) -> Vec<Finding> {
     let Some(h) = hypotheses.iter().find(|h| h.accepted) else { return Vec::new() };
     // The twin is said in the same sentence.
-    let is_twin = |code: FindingCode| matches!(code, FindingCode::WrongMode | FindingCode::InvertedPoses);
+    let is_twin = |code: FindingCode| {
+        matches!(code, FindingCode::WrongMode | FindingCode::InvertedPoses | FindingCode::InvertedTargetPoses)
+    };
     let others = h.with.iter().copied().filter(|c| !(is_twin(h.code) && is_twin(*c)));
     std::iter::once(h.code)
         .chain(others)
