@@ -28,7 +28,7 @@ use handeye_app::worker::{Clock, LiveConnector, Waker};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
-use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
+use handeye_core::project::session::{CaptureId, CaptureRecord, Document};
 use handeye_core::targets::observation::Corner;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
@@ -249,20 +249,8 @@ fn thousand_views(app: &mut App) {
                 Some(Corner::new(index, px + Vector2::new(off(0.0), off(1.0))))
             })
             .collect();
-        document.captures.push(CaptureRecord {
-            id: CaptureId(n),
-            image: format!("images/{n:04}.png"),
-            depth: None,
-            base_from_tip: base_from_target * camera_from_target.inverse() * tip_from_camera.inverse(),
-            joints_rad: None,
-            sim_time_s: None,
-            role: Role::Calibration,
-            excluded: false,
-            frames: 1,
-            corner_noise_px: None,
-            settled_s: None,
-            pose_name: None,
-        });
+        let base_from_tip = base_from_target * camera_from_target.inverse() * tip_from_camera.inverse();
+        document.captures.push(CaptureRecord::new(CaptureId(n), format!("images/{n:04}.png"), base_from_tip));
         let thumbnail = Arc::new(RgbImage::new(160, 120));
         seen.push((CaptureId(n), Observed { corners: Some(corners), image_size: (640, 480), thumbnail }));
     }

@@ -11,19 +11,11 @@ use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::intrinsics::{Options, SeenView, solve};
 use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
-use handeye_core::geometry::frames::Pose;
 use handeye_core::progress::CancelToken;
-use handeye_core::targets::observation::Corner;
-use handeye_core::targets::{Grid, TargetSpec};
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Normal};
+use handeye_core::testing::sessions::{BOARD, REALISTIC, trial};
+use nalgebra::{Point3, Vector2};
 
-const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 const SIZE: (u32, u32) = (640, 480);
-const CORNER_NOISE_PX: f64 = 0.1;
-const ROBOT_NOISE: (f64, f64) = (1e-4, 3.5e-4);
 const LENSES: [Distortion; 4] = [
     Distortion::None,
     Distortion::BrownConrady([-0.21, 0.12, 0.001, -0.002, -0.02]),
@@ -35,37 +27,8 @@ fn camera(distortion: Distortion) -> Intrinsics {
     Intrinsics { distortion, fy: 579.0, cx: 322.4, cy: 236.1, ..Intrinsics::pinhole(SIZE.0, SIZE.1, 581.0) }
 }
 
-/// An arm with a camera in its hand before a board, tilted up to 40° and rolled up to 60°.
 fn views(camera: &Intrinsics, count: usize) -> Vec<ObservedView> {
-    let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let noise = |rng: &mut ChaCha8Rng, sigma: f64| {
-        let normal = Normal::new(0.0, sigma).expect("a deviation");
-        Vector3::from_fn(|_, _| normal.sample(rng))
-    };
-    let tip_from_camera = Isometry3::new(Vector3::new(0.03, -0.05, 0.04), Vector3::new(0.02, -0.01, 1.55));
-    let base_from_target = Isometry3::new(Vector3::new(0.5, 0.1, 0.02), Vector3::new(0.0, 3.1, 0.1));
-    (0..count)
-        .map(|i| {
-            let azimuth = i as f64 * 2.4;
-            let axis = Unit::new_normalize(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0));
-            let tilt = Rotation3::from_axis_angle(&axis, rng.random_range(0.1..0.7));
-            let roll = Rotation3::from_axis_angle(&Vector3::z_axis(), rng.random_range(-1.0..1.0));
-            let at = Vector3::new(rng.random_range(-0.1..0.1), rng.random_range(-0.08..0.08), 1.0)
-                * rng.random_range(0.3..0.5);
-            let camera_from_target =
-                Isometry3::from_parts(Translation3::from(at), UnitQuaternion::from_rotation_matrix(&(roll * tilt)))
-                    * Translation3::new(-0.0675, -0.045, 0.0);
-            let error = Isometry3::new(noise(&mut rng, ROBOT_NOISE.0), noise(&mut rng, ROBOT_NOISE.1));
-            let base_from_tip = base_from_target * camera_from_target.inverse() * tip_from_camera.inverse() * error;
-            let corners = (0..GRID.len())
-                .map(|index| {
-                    let px = camera.project(&(camera_from_target * GRID.point(index))).expect("in front");
-                    Corner::new(index, px + noise(&mut rng, CORNER_NOISE_PX).xy())
-                })
-                .collect();
-            ObservedView::new(format!("{i:05}"), Some(Pose::from_isometry(base_from_tip)), Some(corners))
-        })
-        .collect()
+    trial(Mode::EyeInHand, count, &REALISTIC, *camera, 5).observations(false).views
 }
 
 fn projection(c: &mut Criterion) {
@@ -89,7 +52,7 @@ fn projection(c: &mut Criterion) {
 fn intrinsics(c: &mut Criterion) {
     let mut group = c.benchmark_group("intrinsics");
     group.sample_size(10).measurement_time(Duration::from_secs(5));
-    let target = TargetSpec::Chessboard(GRID);
+    let target = BOARD;
     for lens in LENSES {
         for count in [10, 100, 1_000, 10_000] {
             if count > 100 && lens.name() != "brown_conrady" {
@@ -120,7 +83,7 @@ fn whole(c: &mut Criterion) {
         for count in [10, 100, 1_000] {
             let observations = Observations {
                 mode: Some(Mode::EyeInHand),
-                target: TargetSpec::Chessboard(GRID),
+                target: BOARD,
                 image_size: SIZE,
                 camera: knowledge,
                 views: views(&truth, count),

@@ -12,7 +12,7 @@ use handeye_core::project::dataset::{DESCRIPTION, Dataset, DatasetError, Dataset
 use handeye_core::project::export::{self, ExportInput, ExportNames};
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::{
-    self, CaptureId, CaptureRecord, Document, Role, Session, SessionMeta, SessionObservations,
+    self, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations,
 };
 
 use super::output::Output;
@@ -199,20 +199,7 @@ fn as_document(dataset: &Dataset) -> Document {
     });
     for (entry, number) in dataset.entries.iter().zip(1..) {
         let Some(base_from_tip) = entry.base_from_tip else { continue };
-        document.captures.push(CaptureRecord {
-            id: CaptureId(number),
-            image: entry.name.clone(),
-            depth: None,
-            base_from_tip,
-            joints_rad: None,
-            sim_time_s: None,
-            role: Role::Calibration,
-            excluded: false,
-            frames: 1,
-            corner_noise_px: None,
-            settled_s: None,
-            pose_name: None,
-        });
+        document.captures.push(CaptureRecord::new(CaptureId(number), entry.name.clone(), base_from_tip));
     }
     document
 }

@@ -20,6 +20,7 @@ mod entry;
 mod file;
 mod lasting;
 mod native;
+mod pace;
 mod pump;
 mod queue;
 pub(crate) mod recorded;
@@ -28,6 +29,7 @@ mod report;
 mod reports;
 pub mod scene;
 mod serving;
+mod shared;
 pub(crate) mod state;
 mod stream;
 pub(crate) mod update;
@@ -35,7 +37,8 @@ mod viewer;
 
 pub use choice::{ChoiceError, RerunChoice};
 pub use entry::Entry;
-pub use recorder::{Pace, Recorder, RecorderOptions};
+pub use pace::Pace;
+pub use recorder::{Recorder, RecorderOptions};
 pub use scene::{RecordError, SceneWriter};
 pub use viewer::ViewerWish;
 

@@ -1,12 +1,14 @@
-use std::sync::Condvar;
+use std::path::Path;
+use std::sync::{Condvar, Mutex};
+use std::time::Instant;
 
 use handeye_core::project::session::Document;
 use rerun::log::LogMsg;
 use rerun::sink::CallbackSink;
 
-use super::super::stream::SharedSink;
+use super::super::stream::{SharedSink, Target};
 use super::*;
-use crate::model::ViewerState;
+use crate::model::{Severity, ViewerState};
 use crate::session::start;
 use crate::text::Language;
 

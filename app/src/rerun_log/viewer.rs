@@ -1,14 +1,14 @@
 //! Opening viewers, each on a thread of its own: programs are started and looked after, which takes its time.
 
 use std::process::Child;
-use std::sync::{Arc, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread::Builder;
 use std::time::Duration;
 
 use rerun::sink::{GrpcSink, GrpcSinkConnectionState};
 
-use super::recorder::Shared;
-use super::serving::{Page, Servers};
+use super::serving::Servers;
+use super::shared::{Shared, Viewers};
 use super::stream::{SharedSink, Target};
 use super::{browser, native};
 use crate::model::{Severity, ViewerState};
@@ -35,13 +35,6 @@ pub enum ViewerWish {
     Web,
     /// One that runs already, at this address.
     Connect(String),
-}
-
-/// The viewers that are open.
-#[derive(Default)]
-pub struct Viewers {
-    servers: Option<Servers>,
-    page: Option<Page>,
 }
 
 /// Opens a viewer unless one is being opened.
@@ -76,10 +69,6 @@ pub(super) fn open(shared: &Arc<Shared>, wish: ViewerWish) {
 }
 
 impl Shared {
-    fn viewers(&self) -> MutexGuard<'_, Viewers> {
-        self.viewers.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn failed(&self, why: Text) {
         self.reports.notice(Severity::Warning, why.clone());
         self.reports.set_viewer(ViewerState::Failed(why));

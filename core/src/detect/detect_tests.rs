@@ -3,12 +3,12 @@ use nalgebra::Vector2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::rendered::{Scene, random_scene};
 use super::{DetectOptions, VisionError, detect, detect_with};
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::planar_pose::simulated::looking_at;
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};
+use crate::testing::Scene;
+use crate::testing::looking_at;
 
 /// Far above the fit's error on clean images, far below the distance between corners.
 const SAME_CORNER_PX: f64 = 0.1;
@@ -21,7 +21,7 @@ fn scene(columns: usize, rows: usize, angles: [f64; 3]) -> Scene {
 }
 
 fn found(scene: &Scene) -> Vec<Corner> {
-    let target = TargetSpec::Chessboard(scene.grid);
+    let target = TargetSpec::Chessboard(scene.grid());
     let corners = detect_with(&scene.render(1), &target, DetectOptions::live()).expect("searches").expect("found");
     assert!(corners.iter().enumerate().all(|(i, c)| c.index == i));
     corners
@@ -81,9 +81,9 @@ fn corners_of_a_rendered_board_are_right_to_a_hundredth_of_a_pixel() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let (mut sum, mut bias, mut count) = (0.0, Vector2::zeros(), 0.0);
     for view in 0..6 {
-        let mut scene = random_scene(&mut rng, 0.7, 3.1);
+        let mut scene = Scene::random(&mut rng, 0.7, 3.1);
         scene.noise = 2.0;
-        let target = TargetSpec::Chessboard(scene.grid);
+        let target = TargetSpec::Chessboard(scene.grid());
         let corners = detect(&scene.render(view), &target).expect("searches").expect("found");
         for (corner, truth) in corners.iter().zip(scene.truth()) {
             let error = corner.px - truth;
@@ -103,9 +103,10 @@ fn corners_of_a_rendered_board_are_right_to_a_hundredth_of_a_pixel() {
 fn small_and_large_boards_are_found() {
     for (distance, blur) in [(0.24, 0.7), (0.9, 0.7), (1.3, 0.5), (0.42, 2.5)] {
         let mut scene = scene(10, 7, [0.2, 0.7, 0.3]);
-        scene.camera_from_target = looking_at(&scene.grid, &scene.camera, distance, [0.2, 0.7, 0.3], Vector2::zeros());
+        scene.camera_from_target =
+            looking_at(&scene.grid(), &scene.camera, distance, [0.2, 0.7, 0.3], Vector2::zeros());
         (scene.blur_px, scene.noise) = (blur, 2.0);
-        let target = TargetSpec::Chessboard(scene.grid);
+        let target = TargetSpec::Chessboard(scene.grid());
         let corners = detect(&scene.render(3), &target).expect("searches");
         let corners = corners.unwrap_or_else(|| panic!("missed at {distance} m, blur {blur} px"));
         let error = worst(&corners, &scene.truth());
@@ -123,7 +124,7 @@ fn an_image_without_the_board_is_no_error() {
     // A board with one row less, and one that leaves the image.
     assert_eq!(detect(&scene(10, 6, [0.2, 0.7, 0.3]).render(1), &target), Ok(None));
     let mut cut = scene(10, 7, [0.2, 0.7, 0.3]);
-    cut.camera_from_target = looking_at(&cut.grid, &cut.camera, 0.42, [0.2, 0.7, 0.3], Vector2::new(260.0, 0.0));
+    cut.camera_from_target = looking_at(&cut.grid(), &cut.camera, 0.42, [0.2, 0.7, 0.3], Vector2::new(260.0, 0.0));
     assert_eq!(detect(&cut.render(1), &target), Ok(None));
 }
 

@@ -9,19 +9,15 @@ use std::path::Path;
 use nalgebra::{Isometry3, Point3, Vector2};
 use opencv::calib3d;
 use opencv::core::{Point2f, Point3f, Size, TermCriteria, TermCriteria_EPS, TermCriteria_MAX_ITER, Vec3d, Vector};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Normal};
 
 use super::bridge::to_points2f;
 use super::bridge_for_tests::{camera_matrix, coefficients, isometries, numbers, to_points3f};
 use crate::estimate::intrinsics::{Found, Options, SeenView, solve};
 use crate::geometry::camera::{Distortion, Intrinsics};
-use crate::geometry::planar_pose::simulated::looking_at;
 use crate::progress::CancelToken;
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};
-use crate::testing::data_folder;
+use crate::testing::{data_folder, seen_corners};
 
 const SQUARE_M: f64 = 1.0 / 32.0;
 
@@ -39,20 +35,9 @@ impl Set {
     /// 15 views of 70 corners with 0.1 px of noise.
     fn simulated(camera: &Intrinsics, seed: u64) -> Self {
         let grid = Grid { columns: 10, rows: 7, square_m: SQUARE_M };
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let noise = Normal::new(0.0, 0.1).expect("a deviation");
-        let views = (0..15)
-            .map(|i| {
-                let angles = [rng.random_range(0.2..=0.7), f64::from(i) * 2.4, rng.random_range(-1.0..1.0)];
-                let offset = Vector2::new(rng.random_range(-90.0..90.0), rng.random_range(-60.0..60.0));
-                let pose = looking_at(&grid, camera, rng.random_range(0.5..0.8), angles, offset);
-                (0..grid.len())
-                    .map(|index| {
-                        let px = camera.project(&(pose * grid.point(index))).expect("in front");
-                        Self::single(index, px + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)))
-                    })
-                    .collect()
-            })
+        let views = seen_corners(&grid, camera, 15, (0.2, 0.7), 0.1, seed)
+            .into_iter()
+            .map(|view| view.into_iter().map(|corner| Self::single(corner.index, corner.px)).collect())
             .collect();
         Self { grid, size: (camera.width, camera.height), views }
     }

@@ -32,6 +32,4 @@ mod intrinsics_opencv_tests;
 #[cfg(test)]
 mod planar_pose_opencv_tests;
 #[cfg(test)]
-pub(crate) mod rendered;
-#[cfg(test)]
 mod targets_tests;

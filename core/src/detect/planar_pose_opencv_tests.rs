@@ -16,11 +16,11 @@ use super::bridge_for_tests::{camera_matrix, coefficients, isometry, numbers, to
 use crate::estimate::handeye::joint::equations::ViewInput;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::planar_pose::refine::refine;
-use crate::geometry::planar_pose::simulated::looking_at;
 use crate::geometry::planar_pose::{PlanarPose, Solution, solve};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};
+use crate::testing::looking_at;
 
 const LENSES: [Distortion; 5] = [
     Distortion::None,

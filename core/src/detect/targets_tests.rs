@@ -6,8 +6,8 @@ use nalgebra::Vector2;
 use super::{VisionError, charuco_layout, detect};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::targets::observation::Corner;
-use crate::targets::print::rendered::Photo;
 use crate::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
+use crate::testing::{Scene, looking_at_point};
 
 /// Where a corner may be. With noise of one grey level and this blur the fits have 0.005 to 0.014 px RMS, so that three to
 /// four deviations of the worst are within.
@@ -37,6 +37,20 @@ fn kalibr(columns: usize, rows: usize) -> AprilGrid {
     }
 }
 
+/// The target's middle is `distance_m` in front of the camera and imaged `offset_px` from the middle of the image; the
+/// target is turned by `roll`, then tilted about an axis at `azimuth` in the image.
+fn photo_of(
+    target: TargetSpec,
+    camera: Intrinsics,
+    distance_m: f64,
+    [tilt, azimuth, roll]: [f64; 3],
+    offset_px: Vector2<f64>,
+) -> Scene {
+    // A tilt after a roll is a tilt about an axis that was rolled back before it.
+    let angles = [tilt, azimuth - roll, roll];
+    Scene::drawn(target, camera, looking_at_point(&target.centre(), &camera, distance_m, angles, offset_px))
+}
+
 /// Tilt, azimuth and roll: straight, tilted either way, turned by any angle.
 const POSES: [[f64; 3]; 4] = [[0.0, 0.0, 0.1], [0.6, 0.4, -0.7], [0.5, 2.3, 1.9], [0.7, 4.0, 3.1]];
 
@@ -47,7 +61,7 @@ fn found(image: &GrayImage, target: &TargetSpec) -> Vec<Corner> {
 }
 
 /// Every corner is where it is in truth; returns how many there are.
-fn right(corners: &[Corner], photo: &Photo, what: &str) -> usize {
+fn right(corners: &[Corner], photo: &Scene, what: &str) -> usize {
     let truth = photo.truth();
     let mut sum = 0.0;
     for corner in corners {
@@ -63,7 +77,7 @@ fn right(corners: &[Corner], photo: &Photo, what: &str) -> usize {
 
 fn whole(target: TargetSpec, distance_m: f64, camera: Intrinsics) {
     for (seed, angles) in POSES.into_iter().enumerate() {
-        let photo = Photo::new(target, camera, distance_m, angles, Vector2::new(8.0, -5.0));
+        let photo = photo_of(target, camera, distance_m, angles, Vector2::new(8.0, -5.0));
         let corners = found(&photo.render(seed as u64), &target);
         let count = right(&corners, &photo, &format!("{target} at {angles:?}"));
         assert_eq!(count, target.len(), "{target} at {angles:?}");
@@ -103,7 +117,7 @@ fn centres_of_dots_are_those_of_the_dots_and_not_of_their_images() {
 fn a_lens_that_bends_the_board_does_not_move_its_corners() {
     let bent = Intrinsics { distortion: Distortion::BrownConrady([-0.3, 0.1, 0.001, -0.001, 0.0]), ..camera() };
     for target in [TargetSpec::Charuco(charuco(6, 4, None)), TargetSpec::AprilGrid(kalibr(4, 3))] {
-        let photo = Photo::new(target, bent, 0.36, [0.3, 0.9, 0.2], Vector2::new(-40.0, 20.0));
+        let photo = photo_of(target, bent, 0.36, [0.3, 0.9, 0.2], Vector2::new(-40.0, 20.0));
         let corners = found(&photo.render(5), &target);
         assert_eq!(right(&corners, &photo, &format!("{target} through a lens")), target.len());
     }
@@ -123,7 +137,7 @@ fn the_part_of_a_board_that_is_in_sight_is_numbered_rightly() {
             (Vector2::new(0.0, 0.0), Some([0, 0, 300, 200])),
             (Vector2::new(0.0, 0.0), Some([280, 100, 360, 480])),
         ] {
-            let mut photo = Photo::new(target, camera(), distance, [0.4, 1.0, 0.5], offset);
+            let mut photo = photo_of(target, camera(), distance, [0.4, 1.0, 0.5], offset);
             photo.covered = covered;
             let corners = found(&photo.render(3), &target);
             let what = format!("{target} moved by {offset:?}, covered {covered:?}");
@@ -150,7 +164,7 @@ fn the_two_layouts_of_a_charuco_board_are_told_apart() {
     for (columns, rows) in [(5, 3), (4, 5), (5, 4)] {
         for layout in Layout::BOTH {
             let printed = TargetSpec::Charuco(charuco(columns, rows, Some(layout)));
-            let photo = Photo::new(printed, camera(), 0.45, [0.4, 1.0, 0.5], Vector2::zeros());
+            let photo = photo_of(printed, camera(), 0.45, [0.4, 1.0, 0.5], Vector2::zeros());
             let image = photo.render(2);
             let unsaid = charuco(columns, rows, None);
             let what = format!("{columns}×{rows}, {}", layout.name());
@@ -176,7 +190,7 @@ fn asymmetric_dots_of_any_number_of_rows_are_numbered_as_the_pattern_has_them() 
     for rows in [6, 7] {
         let target = TargetSpec::AsymmetricCircles(Grid { columns: 4, rows, square_m: 0.025 });
         for roll in [-1.2, 0.3, 1.2] {
-            let photo = Photo::new(target, camera(), 0.5, [0.4, 1.0, roll], Vector2::zeros());
+            let photo = photo_of(target, camera(), 0.5, [0.4, 1.0, roll], Vector2::zeros());
             assert_eq!(right(&found(&photo.render(1), &target), &photo, &format!("{rows} rows")), target.len());
         }
     }
@@ -190,7 +204,7 @@ fn a_mirrored_target_is_not_accepted() {
         TargetSpec::AsymmetricCircles(Grid { columns: 4, rows: 6, square_m: 0.025 }),
     ];
     for target in targets {
-        let photo = Photo::new(target, camera(), 0.45, [0.3, 1.0, 0.2], Vector2::zeros());
+        let photo = photo_of(target, camera(), 0.45, [0.3, 1.0, 0.2], Vector2::zeros());
         let mirrored = imageops::flip_horizontal(&photo.render(1));
         assert_eq!(detect(&mirrored, &target), Ok(None), "{target}");
     }
@@ -198,14 +212,14 @@ fn a_mirrored_target_is_not_accepted() {
 
 #[test]
 fn another_board_is_not_accepted() {
-    let photo = Photo::new(TargetSpec::AprilGrid(kalibr(4, 3)), camera(), 0.33, [0.3, 1.0, 0.2], Vector2::zeros());
+    let photo = photo_of(TargetSpec::AprilGrid(kalibr(4, 3)), camera(), 0.33, [0.3, 1.0, 0.2], Vector2::zeros());
     let tags = photo.render(1);
     // Other numbers, and the same tags in rows of another length.
     for other in [AprilGrid { first_id: 100, ..kalibr(4, 3) }, AprilGrid { ids: IdOrder::TopDown, ..kalibr(6, 6) }] {
         assert_eq!(detect(&tags, &TargetSpec::AprilGrid(other)), Ok(None), "{other}");
     }
     assert_eq!(detect(&tags, &TargetSpec::Charuco(charuco(6, 4, None))), Ok(None));
-    let photo = Photo::new(TargetSpec::Charuco(charuco(6, 4, None)), camera(), 0.42, [0.3, 1.0, 0.2], Vector2::zeros());
+    let photo = photo_of(TargetSpec::Charuco(charuco(6, 4, None)), camera(), 0.42, [0.3, 1.0, 0.2], Vector2::zeros());
     let board = photo.render(1);
     assert_eq!(detect(&board, &TargetSpec::AprilGrid(kalibr(4, 3))), Ok(None));
     let foreign = Charuco { dictionary: "6x6_250".parse().expect("known"), ..charuco(6, 4, None) };
@@ -215,7 +229,7 @@ fn another_board_is_not_accepted() {
 #[test]
 fn the_stated_covariance_is_about_what_the_corners_scatter() {
     for target in [TargetSpec::Charuco(charuco(6, 4, None)), TargetSpec::AprilGrid(kalibr(4, 3))] {
-        let photo = Photo::new(target, camera(), 0.4, [0.5, 1.0, 0.5], Vector2::zeros());
+        let photo = photo_of(target, camera(), 0.4, [0.5, 1.0, 0.5], Vector2::zeros());
         let (mut sum, mut count) = (0.0, 0.0);
         let truth = photo.truth();
         for seed in 0..3 {

@@ -529,6 +529,4 @@ fn best_start(
 }
 
 #[cfg(test)]
-pub(crate) mod simulated;
-#[cfg(test)]
 mod tests;

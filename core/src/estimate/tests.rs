@@ -1,8 +1,8 @@
 use std::cell::RefCell;
 
 use super::*;
-use crate::estimate::handeye::joint::simulated::{REALISTIC, Trial, camera, trial};
 use crate::progress::{CancelToken, Progress};
+use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 
 fn solve(observations: &Observations, method: Method) -> Calibration {
     calibrate(observations, method, &CancelToken::default()).expect("solves")

@@ -163,11 +163,6 @@ impl TargetSpec {
         }
     }
 
-    /// Whether a part of the target is enough: its points are told apart by markers.
-    pub fn allows_partial_views(&self) -> bool {
-        matches!(self, Self::Charuco(_) | Self::AprilGrid(_))
-    }
-
     /// Checks what the types do not say.
     ///
     /// # Errors

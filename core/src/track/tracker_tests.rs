@@ -344,8 +344,8 @@ fn a_step_back_in_time_starts_anew_and_an_image_shown_twice_counts_once() {
 
 #[test]
 fn a_sharp_image_of_exact_coverage_is_followed() {
-    use crate::detect::rendered::Scene;
     use crate::geometry::camera::Intrinsics;
+    use crate::testing::Scene;
     let mut setup = stage::setup();
     setup.calibrated.intrinsics = Intrinsics::pinhole(640, 480, 581.0);
     let mut watch = Watch::with(setup);

@@ -1,13 +1,11 @@
 //! Verification with what a calibration finds out beside the links: the size of the board and offsets of the joints; and
 //! the law of measured points.
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution as _, StandardNormal};
 
 use super::*;
-use crate::estimate::handeye::joint::simulated::{BOARD, REALISTIC, Trial, camera, trial};
 use crate::estimate::handeye::joint::{Noise, SmallSample};
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::estimate::uncertainty::quality;
@@ -16,6 +14,7 @@ use crate::geometry::arm::{ArmKind, ArmModel};
 use crate::geometry::camera::Intrinsics;
 use crate::progress::CancelToken;
 use crate::targets::bent::BoardShape;
+use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, noise_twist, noisy, trial};
 
 /// A print that is so much larger than stated, as one that a printer "fits to the page".
 const SCALE: f64 = 1.024;
@@ -108,10 +107,6 @@ fn a_found_scale_predicts_as_well_as_it_says() {
     assert!(centre_m < 0.5e-3, "{centre_m}");
 }
 
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(rng)
-}
-
 /// Views of a UR5 whose joints stand a little elsewhere than it reports, with the board half a metre in front of it.
 fn views_of_an_arm_with_offsets(count: usize, noise: &Noise, intrinsics: &Intrinsics, seed: u64) -> Vec<View> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -136,11 +131,11 @@ fn views_of_an_arm_with_offsets(count: usize, noise: &Noise, intrinsics: &Intrin
         let corners: Option<Vec<Corner>> = (BOARD.points().iter().enumerate())
             .map(|(index, point)| {
                 let px = intrinsics.project(&(camera_from_target.isometry() * point)).ok()?;
-                let px = px + Vector2::new(normal(&mut rng), normal(&mut rng)) * noise.corner_px;
+                let px = noisy(&mut rng, &px, noise.corner_px);
                 intrinsics.contains(&px).then_some(Corner::new(index, px))
             })
             .collect();
-        let error = Vector6::from_fn(|i, _| normal(&mut rng) * if i < 3 { noise.robot_m } else { noise.robot_rad });
+        let error = noise_twist(&mut rng, noise.robot_m, noise.robot_rad);
         let base_from_tip = arm.forward(&reported).expect("six joints").perturbed(&error);
         let tip_by_joint = arm.tip_by_joint_at(&base_from_tip, &reported).expect("six joints");
         if let Some(corners) = corners {

@@ -1,12 +1,12 @@
 use nalgebra::{Isometry3, Vector2, Vector6};
 
 use super::*;
-use crate::estimate::handeye::joint::simulated::{BOARD, REALISTIC, Trial, camera, trial};
 use crate::estimate::handeye::joint::{Noise, SmallSample};
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::estimate::{Method, calibrate};
 use crate::progress::CancelToken;
 use crate::targets::bent::BoardShape;
+use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, trial};
 
 /// A calibration from the first views of a trial; the others are there to check it.
 fn calibrated(t: &Trial, views: usize, free_intrinsics: bool) -> Predictor {

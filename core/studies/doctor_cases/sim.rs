@@ -2,15 +2,15 @@
 
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView};
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_core::geometry::camera::Distortion;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3;
+use handeye_core::targets::Grid;
 use handeye_core::targets::observation::Corner;
-use handeye_core::targets::{Grid, TargetSpec};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
+use handeye_core::testing::sessions::{BOARD, board_at, camera, noise_twist, noisy};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution as _, StandardNormal};
 
 use super::arm;
 
@@ -96,24 +96,13 @@ pub fn links(mode: Mode) -> (Isometry3<f64>, Isometry3<f64>) {
     }
 }
 
-pub fn camera() -> Intrinsics {
-    Intrinsics::pinhole(640, 480, 581.0)
-}
-
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(rng)
-}
-
 /// A random view of the board at 0.4 to 0.6 m.
 fn random_view(rng: &mut ChaCha8Rng, setup: &Setup) -> Isometry3<f64> {
-    let centre = TargetSpec::Chessboard(GRID).centre();
     let tilt = setup.tilt_deg.to_radians() * rng.random::<f64>().sqrt();
     let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
     let roll = setup.roll_deg.to_radians() * rng.random_range(-1.0..=1.0);
     let jitter = Vector3::new(rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), rng.random_range(0.4..0.6));
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)
-        * UnitQuaternion::from_scaled_axis(Vector3::z() * roll);
-    Isometry3::from_parts(jitter.into(), turn) * Isometry3::translation(-centre.x, -centre.y, -centre.z)
+    board_at(jitter, [tilt, azimuth, roll])
 }
 
 /// Random views of the setup's geometry.
@@ -148,7 +137,7 @@ fn observations(setup: &Setup, views: Vec<ObservedView>) -> Observations {
         given.fy *= 1.0 + setup.fault.focal;
         CameraKnowledge::Fixed(given)
     };
-    Observations { mode: Some(setup.mode), target: TargetSpec::Chessboard(GRID), image_size: (640, 480), camera, views }
+    Observations { mode: Some(setup.mode), target: BOARD, image_size: (640, 480), camera, views }
 }
 
 /// One view: the robot reports the pose planned, and is somewhere else by its noise and the faults.
@@ -168,7 +157,7 @@ fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometr
             off = reported.inverse() * arm::base_from_tip(&really);
         }
     }
-    let noise = Vector6::from_fn(|i, _| normal(rng) * if i < 3 { setup.robot_m } else { setup.robot_rad });
+    let noise = noise_twist(rng, setup.robot_m, setup.robot_rad);
     let mut tip = reported * off * se3::exp(&noise);
     let moving = fault.moving.iter().find(|(view, _)| *view == index).map(|(_, twist)| twist);
     if let Some(twist) = moving {
@@ -191,7 +180,7 @@ fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometr
             point.z += fault.warp_m * (2.0 - u * u - v * v);
             point.coords *= 1.0 + fault.scale;
             let px = lens.project(&(camera_from_target * point)).ok()?;
-            let seen = Vector2::new(px.x + noise_px * normal(rng), px.y + noise_px * normal(rng));
+            let seen = noisy(rng, &px, noise_px);
             lens.contains(&seen).then_some(Corner::new(i, seen))
         })
         .collect::<Option<_>>()?;

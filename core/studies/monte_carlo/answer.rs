@@ -11,9 +11,10 @@ use handeye_core::geometry::frames::{Camera, Mount, Pose};
 use handeye_core::geometry::planar_pose;
 use handeye_core::progress::CancelToken;
 use handeye_core::targets::bent::{BoardPoints, BoardShape};
+use handeye_core::testing::sessions::BOARD;
 use nalgebra::{Matrix6, Point3};
 
-use super::scene::{BOARD, Trial};
+use super::scene::Trial;
 
 /// Noise levels of an exact robot, as an estimator that weighs by their inverse can be given them: a nanometre and a
 /// nanoradian.

@@ -5,15 +5,12 @@ use handeye_core::estimate::handeye::joint::Noise;
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use handeye_core::targets::observation::{Corner, View};
-use handeye_core::targets::{Grid, TargetSpec};
+use handeye_core::testing::sessions::{BOARD, base_from_tip, board_at, noisy, normal, robot_error};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector2, Vector3};
 use rand::seq::SliceRandom as _;
 use rand::{Rng, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution as _, StandardNormal};
 
-/// The board of the reference cell.
-pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 /// Opening angle of the reference cell's camera, degrees.
 const VIEW_ANGLE_DEG: f64 = 57.0;
 /// A mild barrel lens, so that no derivative by a coefficient is taken at zero distortion.
@@ -70,16 +67,8 @@ fn truth(mode: Mode) -> (Pose<Mount, Camera>, Pose<Anchor, Target>) {
     }
 }
 
-fn normal(rng: &mut impl Rng) -> f64 {
-    StandardNormal.sample(rng)
-}
-
-fn normal3(rng: &mut impl Rng) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| normal(rng))
-}
-
 fn direction(rng: &mut impl Rng) -> UnitVector3<f64> {
-    UnitVector3::new_normalize(normal3(rng))
+    UnitVector3::new_normalize(Vector3::from_fn(|_, _| normal(rng)))
 }
 
 /// A camera pose on a cone of 35° about the board's axis, rolled by up to 60°, 0.4 to 0.6 m away and aimed to within
@@ -89,9 +78,7 @@ fn random_view(rng: &mut impl Rng) -> Pose<Camera, Target> {
     let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
     let roll = rng.random_range(-60f64..60.0).to_radians();
     let place = Vector3::new(rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), rng.random_range(0.4..0.6));
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)
-        * UnitQuaternion::from_scaled_axis(Vector3::z() * roll);
-    Pose::from_isometry(Isometry3::from_parts(place.into(), turn) * Isometry3::from(-BOARD.centre().coords))
+    Pose::from_isometry(board_at(place, [tilt, azimuth, roll]))
 }
 
 /// The pixels of all points, `None` when one is not well inside the image.
@@ -108,20 +95,6 @@ fn true_pixels(
     points.iter().map(|p| intrinsics.project(&(camera_from_target.isometry() * p)).ok().filter(inside)).collect()
 }
 
-/// The true tip pose from which the camera sees the target so.
-fn tip_pose(
-    mode: Mode,
-    mount_from_camera: &Pose<Mount, Camera>,
-    anchor_from_target: &Pose<Anchor, Target>,
-    camera_from_target: &Pose<Camera, Target>,
-) -> Pose<Base, Tip> {
-    let anchor_from_mount = *anchor_from_target * camera_from_target.inverse() * mount_from_camera.inverse();
-    match mode {
-        Mode::EyeInHand => anchor_from_mount.relabel(),
-        Mode::EyeToHand => anchor_from_mount.inverse().relabel(),
-    }
-}
-
 /// Draws a trial. Trials of one seed and different numbers are independent; the same pair gives the same trial.
 pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -133,7 +106,12 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
     while pixels.len() < cell.poses {
         let camera_from_target = random_view(&mut rng);
         if let Some(px) = true_pixels(&intrinsics, &points, &camera_from_target) {
-            true_base_from_tip.push(tip_pose(cell.mode, &mount_from_camera, &anchor_from_target, &camera_from_target));
+            true_base_from_tip.push(base_from_tip(
+                cell.mode,
+                &mount_from_camera,
+                &anchor_from_target,
+                &camera_from_target,
+            ));
             pixels.push(px);
         }
     }
@@ -141,14 +119,9 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
     let mut views = Vec::with_capacity(cell.poses);
     for (index, (true_pose, px)) in true_base_from_tip.iter().zip(&pixels).enumerate() {
         // The true pose is the reported one times this error, as the model has it.
-        let error = Isometry3::from_parts(
-            (normal3(&mut rng) * noise.robot_m).into(),
-            UnitQuaternion::from_scaled_axis(normal3(&mut rng) * noise.robot_rad),
-        );
+        let error = robot_error(&mut rng, noise);
         let reported = Pose::from_isometry(true_pose.isometry() * error.inverse());
-        let seen = |(i, px): (usize, &Vector2<f64>)| {
-            Corner::new(i, px + Vector2::new(normal(&mut rng), normal(&mut rng)) * noise.corner_px)
-        };
+        let seen = |(i, px): (usize, &Vector2<f64>)| Corner::new(i, noisy(&mut rng, px, noise.corner_px));
         views.push(View::new(format!("view {index}"), reported, px.iter().enumerate().map(seen).collect()));
     }
     let wrong = vec![false; cell.poses];

@@ -16,6 +16,7 @@ use handeye_core::estimate::handeye::closed_form;
 use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
 use handeye_core::geometry::planar_pose;
 use handeye_core::progress::CancelToken;
+use handeye_core::testing::sessions::camera;
 use handeye_core::wording::Catalogue;
 
 use handeye_core::targets::TargetSpec;
@@ -104,7 +105,7 @@ fn scale_error_of_poses(seed: u64) -> Option<f64> {
     let target = observations.target;
     for view in &mut observations.views {
         let corners = view.corners.take()?;
-        view.camera_from_target = planar_pose::camera_from_target(&corners, &target, &sim::camera()).ok();
+        view.camera_from_target = planar_pose::camera_from_target(&corners, &target, &camera()).ok();
     }
     let diagnosis = faults::examined_alone(&observations);
     let scale = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale)?.estimate?;

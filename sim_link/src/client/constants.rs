@@ -39,8 +39,6 @@ pub const DEPTH_IN_METRES: i64 = 1;
 
 /// Integer parameter: version, 41000 is 4.10.0.
 pub const INT_PROGRAM_VERSION: i64 = 1;
-/// Integer parameter: passes per second while no simulation runs; 0 is as fast as possible.
-pub const INT_IDLE_FPS: i64 = 26;
 /// String parameter: path of the scene file.
 pub const STRING_SCENE_PATH: i64 = 14;
 

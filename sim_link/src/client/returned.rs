@@ -24,11 +24,6 @@ impl Returned {
         &self.values
     }
 
-    /// Whether there is nothing at `index`, or null.
-    pub fn is_missing(&self, index: usize) -> bool {
-        self.values.get(index).is_none_or(Value::is_null)
-    }
-
     /// Any number at `index`.
     ///
     /// # Errors

@@ -5,7 +5,7 @@
 
 use nalgebra::{SVector, Vector3};
 
-use super::edges::{Edge, Scan};
+use super::edge::{Edge, Scan};
 use super::grey_levels::{self, Sums};
 use crate::detect::checkerboard::subpixel::erf_and_slope;
 
@@ -21,7 +21,7 @@ const ROUNDING: f64 = 1.0 / 12.0;
 type Parameters = SVector<f64, 8>;
 
 /// The pixels near an edge with a Gaussian profile.
-pub(in crate::detect) struct Profile<'a> {
+pub(super) struct Profile<'a> {
     pub scan: &'a Scan<'a>,
     /// Lines of pixels that count.
     pub along: Vec<i64>,

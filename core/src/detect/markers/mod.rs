@@ -3,7 +3,8 @@
 pub(crate) mod april;
 pub(crate) mod charuco;
 pub(crate) mod crossing;
-pub(crate) mod edge_profile;
+mod edge;
+mod edge_profile;
 pub(crate) mod edges;
 mod grey_levels;
 pub(crate) mod spread;

@@ -129,8 +129,8 @@ mod tests {
 
     use super::*;
     use crate::estimate::handeye::Mode;
-    use crate::estimate::handeye::joint::simulated::{REALISTIC, Trial, camera, trial};
     use crate::geometry::se3;
+    use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 
     fn pairs(t: &Trial) -> Vec<PosePair> {
         let pair = |view: &crate::targets::observation::View| {
@@ -166,7 +166,7 @@ mod tests {
     fn views_numbered_from_the_other_end_are_named() {
         let t = trial(Mode::EyeToHand, 9, &REALISTIC, camera(), 72);
         let mut pairs = pairs(&t);
-        let centre = crate::estimate::handeye::joint::simulated::BOARD.centre();
+        let centre = crate::testing::sessions::BOARD.centre();
         let half_turn = half_turn_about(&centre);
         for i in [2, 5, 6] {
             pairs[i] = turn(&pairs[i], &half_turn);

@@ -1,13 +1,8 @@
-use nalgebra::Vector2;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Normal};
-
 use super::*;
 use crate::geometry::planar_pose::PoseError;
-use crate::geometry::planar_pose::simulated::looking_at;
 use crate::targets::Grid;
 use crate::targets::observation::Corner;
+use crate::testing::seen_corners;
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
 const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);
@@ -20,21 +15,7 @@ fn camera(distortion: Distortion) -> Intrinsics {
 
 /// Views tilted by up to `tilt` around directions all around.
 fn views(camera: &Intrinsics, count: usize, tilt: (f64, f64), noise_px: f64, seed: u64) -> Vec<Vec<Corner>> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let noise = Normal::new(0.0, noise_px).expect("a deviation");
-    (0..count)
-        .map(|i| {
-            let angles = [rng.random_range(tilt.0..=tilt.1), i as f64 * 2.4, rng.random_range(-1.0..1.0)];
-            let offset = Vector2::new(rng.random_range(-90.0..90.0), rng.random_range(-60.0..60.0));
-            let pose = looking_at(&GRID, camera, rng.random_range(0.5..0.8), angles, offset);
-            (0..GRID.len())
-                .map(|index| {
-                    let px = camera.project(&(pose * GRID.point(index))).expect("in front");
-                    Corner::new(index, px + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)))
-                })
-                .collect()
-        })
-        .collect()
+    seen_corners(&GRID, camera, count, tilt, noise_px, seed)
 }
 
 fn calibrate(views: &[Vec<Corner>], model: Distortion, start: Option<Intrinsics>) -> Result<Found, IntrinsicsError> {

@@ -211,6 +211,4 @@ fn is_collinear(points: &[Vector2<f64>]) -> bool {
 }
 
 #[cfg(test)]
-pub(crate) mod simulated;
-#[cfg(test)]
 mod tests;

@@ -4,10 +4,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-use super::simulated::looking_at;
 use super::*;
 use crate::geometry::camera::Distortion;
 use crate::targets::Grid;
+use crate::testing::looking_at;
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector6;
 
-use super::document::{CaptureId, CaptureRecord, Document};
+use super::capture_id::CaptureId;
+use super::document::{CaptureRecord, Document};
 use crate::geometry::arm::{self, ArmError, ArmModel, JointView};
 use crate::project::dataset;
 

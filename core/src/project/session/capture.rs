@@ -5,9 +5,10 @@ use std::path::Path;
 
 use image::{ImageFormat, RgbImage};
 
+use super::capture_id::CaptureId;
 use super::depth;
-use super::document::{CaptureId, CaptureRecord, Role};
-use super::edit::EditError;
+use super::document::{CaptureRecord, Role};
+use super::edit_error::EditError;
 use super::error::{SessionError, SessionProblem};
 use super::session_file::IMAGES;
 use crate::depth::DepthImage;

@@ -1,12 +1,12 @@
 //! What a session says: plain data, without files and without history.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::{Component, Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::edit::EditError;
+use super::capture_id::CaptureId;
+use super::edit_error::EditError;
 use super::pose_record;
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::geometry::arm::ArmModel;
@@ -83,18 +83,6 @@ impl GroundTruth {
     }
 }
 
-/// Names a capture for as long as the session lives: the number in its file name, from 1. It is never used again in
-/// the same session, also not after the capture was deleted or its making undone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct CaptureId(pub u32);
-
-impl fmt::Display for CaptureId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
 /// What a capture is for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -148,10 +136,23 @@ fn one() -> u32 {
     1
 }
 
-impl CaptureId {
-    /// Stands for a capture without a number while an old session is read.
-    pub(super) fn none() -> Self {
-        Self(0)
+impl CaptureRecord {
+    /// A capture of which no more is known than its image and where the tip was.
+    pub fn new(id: CaptureId, image: String, base_from_tip: Pose<Base, Tip>) -> Self {
+        Self {
+            id,
+            image,
+            depth: None,
+            base_from_tip,
+            joints_rad: None,
+            sim_time_s: None,
+            role: Role::Calibration,
+            excluded: false,
+            frames: 1,
+            corner_noise_px: None,
+            settled_s: None,
+            pose_name: None,
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::edit::EditError;
+use super::edit_error::EditError;
 
 /// What is wrong, and with which file or folder.
 #[derive(Debug, thiserror::Error)]

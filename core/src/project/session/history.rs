@@ -3,8 +3,10 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use super::document::{CaptureId, CaptureRecord, Document};
-use super::edit::{Edit, EditError};
+use super::capture_id::CaptureId;
+use super::document::{CaptureRecord, Document};
+use super::edit::Edit;
+use super::edit_error::EditError;
 
 /// How many changes can be undone. More than a person counts back, and with a hundred captures a few megabytes.
 ///

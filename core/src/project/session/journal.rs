@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::document::{CaptureId, Document};
+use super::capture_id::CaptureId;
+use super::document::Document;
 use super::edit::Edit;
 use super::error::{SessionError, SessionProblem};
 use super::history::History;

@@ -20,10 +20,12 @@
 
 mod arm_use;
 mod capture;
+mod capture_id;
 mod depth;
 mod derived;
 mod document;
 mod edit;
+mod edit_error;
 mod error;
 mod history;
 mod journal;
@@ -41,8 +43,10 @@ use std::sync::Arc;
 use image::RgbImage;
 
 pub use capture::Capture;
-pub use document::{CaptureId, CaptureRecord, Document, GroundTruth, Role, SessionMeta};
-pub use edit::{Edit, EditError, TaughtChange};
+pub use capture_id::CaptureId;
+pub use document::{CaptureRecord, Document, GroundTruth, Role, SessionMeta};
+pub use edit::Edit;
+pub use edit_error::{EditError, TaughtChange};
 pub use error::{SessionError, SessionProblem};
 pub use history::{History, UNDO_STEPS};
 pub use journal::JOURNAL;

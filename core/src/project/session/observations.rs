@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector6;
 
-use super::document::{CaptureId, Document, Role};
+use super::capture_id::CaptureId;
+use super::document::{Document, Role};
 use crate::estimate::{CameraKnowledge, Observations, ObservedView};
 use crate::geometry::arm::ArmError;
 use crate::targets::observation::{Corner, View};

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::document::{CaptureId, CaptureRecord, Document};
+use super::capture_id::CaptureId;
+use super::document::{CaptureRecord, Document};
 use super::error::SessionProblem;
 use crate::project::files::image_file::one_line;
 use crate::project::files::json_text;

@@ -9,8 +9,9 @@ use std::sync::Arc;
 use image::RgbImage;
 
 use super::capture::{Capture, DEPTH};
+use super::capture_id::CaptureId;
 use super::derived::{self, Derived};
-use super::document::{CaptureId, CaptureRecord, Document, SessionMeta};
+use super::document::{CaptureRecord, Document, SessionMeta};
 use super::edit::Edit;
 use super::error::{SessionError, SessionProblem};
 use super::history::History;

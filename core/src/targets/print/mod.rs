@@ -8,9 +8,6 @@ mod drawing;
 mod pdf;
 mod sheet;
 
-#[cfg(all(test, feature = "opencv"))]
-pub(crate) mod rendered;
-
 pub use drawing::{Drawing, Shape};
 pub use pdf::pdf;
 pub use sheet::{Page, Sheet, Text};

@@ -12,7 +12,7 @@ use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::project::dataset::Dataset;
 use handeye_core::project::session::{
-    Capture, CaptureId, CaptureRecord, Document, Edit, History, Role, Session, SessionMeta, Store,
+    Capture, CaptureId, CaptureRecord, Document, Edit, History, Session, SessionMeta, Store,
 };
 use handeye_core::targets::{Grid, TargetSpec};
 use rand::{RngExt as _, SeedableRng as _};
@@ -57,18 +57,8 @@ fn base_from_tip(id: CaptureId) -> Pose<handeye_core::geometry::frames::Base, ha
 /// What the document says about a capture by [`act`].
 fn record(id: CaptureId) -> CaptureRecord {
     CaptureRecord {
-        id,
-        image: format!("images/{id:04}.png"),
         depth: Some(format!("depth/{id:04}.tiff")),
-        base_from_tip: base_from_tip(id),
-        joints_rad: None,
-        sim_time_s: None,
-        role: Role::Calibration,
-        excluded: false,
-        frames: 1,
-        corner_noise_px: None,
-        settled_s: None,
-        pose_name: None,
+        ..CaptureRecord::new(id, format!("images/{id:04}.png"), base_from_tip(id))
     }
 }
 

@@ -309,15 +309,6 @@ impl Tree {
         Ok(())
     }
 
-    /// Sets `parent_from_object` itself.
-    ///
-    /// # Errors
-    /// [`WorldError::NoSuchObject`].
-    pub fn set_local_pose(&mut self, handle: Handle, parent_from_object: Isometry3<f64>) -> Result<(), WorldError> {
-        self.get_mut(handle)?.local = parent_from_object;
-        Ok(())
-    }
-
     /// The objects of a subtree, breadth first, base included.
     ///
     /// # Errors

@@ -7,7 +7,6 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
 use super::hold::Hold;
-use super::stream::clock_past;
 use super::truth::{self, GroundTruth};
 use super::{CellInfo, CellObjects, CellPaths, JOINTS, JointAngles, discover, read_joint_angles, require_running};
 use crate::client::cell::joint_elsewhere::joint_elsewhere;
@@ -239,4 +238,9 @@ impl Arm {
             (before_s, before) = (now_s, now);
         }
     }
+}
+
+/// What is waited for when simulated time stands.
+pub(super) fn clock_past(now_s: f64) -> String {
+    format!("simulated time to go on from {now_s:.3} s")
 }

@@ -1,9 +1,8 @@
 //! Where an arm that follows is sent, within which limits, and how it ends.
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::client::cell::follow_plan::moved;
 use crate::client::error::LinkError;
 
 /// How the arm may move while it follows.
@@ -123,6 +122,14 @@ impl FollowGoal {
         self.base_from_tip.is_finite()
             && self.velocity_m_s.iter().chain(&self.angular_velocity_rad_s).all(|v| v.is_finite())
     }
+}
+
+/// A pose after a shift and a turn in the axes of the base, about its own origin.
+pub(super) fn moved(base_from_tip: &Isometry3<f64>, shift: &Vector3<f64>, turn: &Vector3<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(
+        Translation3::from(base_from_tip.translation.vector + shift),
+        UnitQuaternion::from_scaled_axis(*turn) * base_from_tip.rotation,
+    )
 }
 
 /// How following ended; the arm stands.

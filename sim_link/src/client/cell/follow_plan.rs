@@ -7,12 +7,12 @@
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3::rotation_vector;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use super::jog_plan::{JogObstacle, largest_change, nearest};
 use super::reach::ArmKinematics;
 use super::{JOINTS, JointAngles};
-use crate::client::cell::follow_goal::{FollowEnd, FollowGoal, FollowLimits};
+use crate::client::cell::follow_goal::{FollowEnd, FollowGoal, FollowLimits, moved};
 
 /// Share of the tip's acceleration that slows it down; the rest is for the curve that it takes when all joints brake.
 const BRAKING_SHARE: f64 = 0.9;
@@ -275,14 +275,6 @@ impl<'a> FollowPlan<'a> {
             && limits.workspace.contains(&to.base_from_tip.translation.vector)
             && self.kinematics.limits().contains(&to.joints)
     }
-}
-
-/// A pose after a shift and a turn in the axes of the base, about its own origin.
-pub(super) fn moved(base_from_tip: &Isometry3<f64>, shift: &Vector3<f64>, turn: &Vector3<f64>) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::from(base_from_tip.translation.vector + shift),
-        UnitQuaternion::from_scaled_axis(*turn) * base_from_tip.rotation,
-    )
 }
 
 /// The speed at which what is left shrinks: in proportion to it when it is small, else so that a steady deceleration

@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 
+use super::arm::clock_past;
 use super::sentinel::Sentinel;
 use super::{Arm, JOINTS, JointAngles, read_joint_angles};
 use crate::client::error::LinkError;
@@ -176,11 +177,6 @@ impl Stream {
         }
         Ok(Pass::Sent)
     }
-}
-
-/// What is waited for when simulated time stands.
-pub(super) fn clock_past(now_s: f64) -> String {
-    format!("simulated time to go on from {now_s:.3} s")
 }
 
 /// Between two angles, the short way round: a joint that turns without end comes back from the other side.

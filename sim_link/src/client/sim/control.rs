@@ -4,7 +4,7 @@ use ciborium::Value;
 
 use super::Sim;
 use super::simulation_state::SimulationState;
-use crate::client::constants::{INT_IDLE_FPS, INT_PROGRAM_VERSION};
+use crate::client::constants::INT_PROGRAM_VERSION;
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::protocol::ProtocolVersion;
@@ -171,16 +171,5 @@ impl Sim {
     /// Any [`LinkError`] of a call.
     pub fn program_version(&mut self) -> Result<i64, LinkError> {
         self.get_int_param(INT_PROGRAM_VERSION)
-    }
-
-    /// Has the simulator answer at full speed while no simulation runs (it looks 8 times a second otherwise); returns
-    /// the setting as it was, to be restored.
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn answer_quickly_when_stopped(&mut self) -> Result<i64, LinkError> {
-        let before = self.get_int_param(INT_IDLE_FPS)?;
-        self.set_int_param(INT_IDLE_FPS, 0)?;
-        Ok(before)
     }
 }

@@ -6,9 +6,9 @@ use rand_distr::{Distribution, Normal};
 
 use super::*;
 use crate::detect::checkerboard::subpixel::corner_sub_pix;
-use crate::detect::rendered::{Scene, random_scene};
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::planar_pose::simulated::looking_at;
+use crate::testing::Scene;
+use crate::testing::looking_at;
 
 /// The true corners to the pixel: a detector without refinement is off by up to half of one.
 fn rough(truth: &[Vector2<f64>]) -> Ordered {
@@ -54,7 +54,7 @@ fn compare(views: u64, blur_px: f64, noise: f64) -> [Errors; 2] {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut errors = [Errors::default(), Errors::default()];
     for view in 0..views {
-        let mut scene = random_scene(&mut rng, 0.7, std::f64::consts::PI);
+        let mut scene = Scene::random(&mut rng, 0.7, std::f64::consts::PI);
         (scene.blur_px, scene.noise) = (blur_px, noise);
         let image = scene.render(view);
         let truth = scene.truth();
@@ -106,7 +106,7 @@ fn through_a_lens(scene: &Scene, seed: u64) -> GrayImage {
     let (width, height) = (scene.camera.width, scene.camera.height);
     let part = f64::from(FINER);
     let camera = Intrinsics::pinhole(width * FINER, height * FINER, scene.camera.fx * part);
-    let mut fine = Scene::new(camera, scene.grid, scene.camera_from_target);
+    let mut fine = Scene::new(camera, scene.grid(), scene.camera_from_target);
     fine.blur_px = scene.blur_px * part;
     let fine = fine.render(seed);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -156,7 +156,7 @@ fn edges_along_the_pixels_are_as_good_as_any_however_sharp_they_are() {
             let mut scene = upright_scene(&mut rng, f64::to_radians(off_deg), f64::to_radians(leaning_deg));
             (scene.blur_px, scene.noise) = (lens, noise);
             // Searched for: the board is found on a coarser level, where a sharp edge can look blurred.
-            let found = find(&through_a_lens(&scene, view), &scene.grid).expect("in sight");
+            let found = find(&through_a_lens(&scene, view), &scene.grid()).expect("in sight");
             errors.add_unordered(&found, &scene.truth());
         }
         let rms = errors.rms();
@@ -172,7 +172,7 @@ fn squares_of_eight_pixels_are_enough() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let (mut errors, mut reference) = (Errors::default(), Errors::default());
     for view in 0..6 {
-        let mut scene = random_scene(&mut rng, 0.3, std::f64::consts::PI);
+        let mut scene = Scene::random(&mut rng, 0.3, std::f64::consts::PI);
         // Half the size of the usual.
         scene.camera_from_target.translation.vector *= 2.1;
         scene.noise = 2.0;
@@ -205,7 +205,7 @@ fn light_that_falls_off_across_the_board_does_not_pull_corners() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     let mut errors = Errors::default();
     for view in 0..4 {
-        let scene = random_scene(&mut rng, 0.7, std::f64::consts::PI);
+        let scene = Scene::random(&mut rng, 0.7, std::f64::consts::PI);
         let mut image = scene.render(view);
         for (u, _, pixel) in image.enumerate_pixels_mut() {
             // From full light to a fifth of it over a third of the image: 0.4 % a pixel, a lamp close to the board.
@@ -229,7 +229,7 @@ fn stated_covariances_are_those_of_the_errors() {
         let mut rng = ChaCha8Rng::seed_from_u64(17);
         let (mut sum, mut count) = (0.0, 0.0);
         for view in 0..3 {
-            let mut scene = random_scene(&mut rng, 0.7, std::f64::consts::PI);
+            let mut scene = Scene::random(&mut rng, 0.7, std::f64::consts::PI);
             (scene.blur_px, scene.noise) = (blur, noise);
             let truth = scene.truth();
             let refined = refine(&through_a_lens(&scene, view), &rough(&truth));

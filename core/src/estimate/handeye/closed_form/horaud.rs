@@ -4,7 +4,7 @@ use nalgebra::{Matrix4, Quaternion, SymmetricEigen, UnitQuaternion, Vector4};
 
 use super::linear::RANK_TOLERANCE;
 use super::pairing::{self, Motion};
-use super::{ClosedForm, ClosedFormSolution, Method, check, with_mean_target};
+use super::{ClosedForm, ClosedFormSolution};
 use crate::estimate::handeye::{HandEyeError, PosePair};
 
 /// Estimates `mount_from_camera` from relative motions, the rotation first and the translation with it.
@@ -37,13 +37,7 @@ impl ClosedForm for Horaud {
     }
 
     fn solve(&self, pairs: &[PosePair]) -> Result<ClosedFormSolution, HandEyeError> {
-        check(pairs)?;
-        let method = Method { name: self.name(), views: pairs.len() };
-        let motions = pairing::aligned_motions(&method, pairs)?;
-        let rotation = rotation(&motions).ok_or_else(|| method.fails("the camera did not turn as the robot did"))?;
-        let translation = pairing::translation(&motions, &rotation)
-            .ok_or_else(|| method.fails("the turns leave the translation along one axis open"))?;
-        with_mean_target(&method, pairs, pairing::pose(rotation, translation))
+        pairing::rotation_first(self.name(), pairs, rotation)
     }
 }
 

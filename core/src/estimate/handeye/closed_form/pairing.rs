@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
 use super::linear::Rows;
-use super::{Method, PosePair, horaud};
+use super::{ClosedFormSolution, Method, PosePair, check, horaud, with_mean_target};
 use crate::estimate::handeye::{HandEyeError, motion};
 use crate::geometry::frames::{Camera, Mount, Pose};
 
@@ -64,6 +64,31 @@ pub(super) fn motions(views: &[PosePair]) -> Vec<Motion> {
             camera: with_positive_w(views[j].camera_from_target * views[i].camera_from_target.inverse()),
         })
         .collect()
+}
+
+/// The rotation from all motions, then the translation with it.
+pub(super) fn rotation_first(
+    name: &'static str,
+    pairs: &[PosePair],
+    rotation: impl Fn(&[Motion]) -> Option<UnitQuaternion<f64>>,
+) -> Result<ClosedFormSolution, HandEyeError> {
+    check(pairs)?;
+    let method = Method { name, views: pairs.len() };
+    let motions = aligned_motions(&method, pairs)?;
+    let rotation = rotation(&motions).ok_or_else(|| method.fails("the camera did not turn as the robot did"))?;
+    completed(&method, pairs, &motions, rotation)
+}
+
+/// The solution with this rotation.
+pub(super) fn completed(
+    method: &Method,
+    pairs: &[PosePair],
+    motions: &[Motion],
+    rotation: UnitQuaternion<f64>,
+) -> Result<ClosedFormSolution, HandEyeError> {
+    let translation = translation(motions, &rotation)
+        .ok_or_else(|| method.fails("the turns leave the translation along one axis open"))?;
+    with_mean_target(method, pairs, pose(rotation, translation))
 }
 
 /// The motions of all pairs `i < j` with quaternion signs that match also at half turns.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Quaternion, SMatrix, UnitQuaternion, Vector3};
 
 use super::linear::Rows;
 use super::pairing::{self, Motion};
-use super::{ClosedForm, ClosedFormSolution, Method, check, with_mean_target};
+use super::{ClosedForm, ClosedFormSolution, Method, check};
 use crate::estimate::handeye::{HandEyeError, PosePair};
 use crate::geometry::se3::skew;
 
@@ -54,9 +54,7 @@ impl ClosedForm for TsaiLenz {
         }
         let rotation =
             rotation(&motions).ok_or_else(|| method.fails("the motions of robot and camera do not match"))?;
-        let translation = pairing::translation(&motions, &rotation)
-            .ok_or_else(|| method.fails("the turns leave the translation along one axis open"))?;
-        with_mean_target(&method, pairs, pairing::pose(rotation, translation))
+        pairing::completed(&method, pairs, &motions, rotation)
     }
 }
 

@@ -198,6 +198,6 @@ fn squares(
 }
 
 #[cfg(test)]
-pub(crate) mod simulated;
+pub(crate) use crate::testing::sessions as simulated;
 #[cfg(test)]
 mod tests;

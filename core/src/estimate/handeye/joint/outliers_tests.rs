@@ -1,7 +1,7 @@
 use super::*;
 use crate::estimate::handeye::Mode;
-use crate::estimate::handeye::joint::simulated::{REALISTIC, Trial, camera, trial};
 use crate::progress::CancelToken;
+use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 
 /// The target's own pose in every view: the chain with the error of the robot taken out by a fit of the corners.
 fn own(t: &Trial) -> Vec<Pose<Camera, Target>> {
@@ -73,7 +73,7 @@ fn one_grossly_wrong_view_of_ten_does_not_lead_the_fit_astray() {
             let other_end = |t: &mut Trial| {
                 t.views[6].corners.iter_mut().for_each(|c| c.index = 69 - c.index);
                 let turn =
-                    crate::estimate::handeye::consensus::half_turn_about(&super::super::simulated::BOARD.centre());
+                    crate::estimate::handeye::consensus::half_turn_about(&crate::testing::sessions::BOARD.centre());
                 let truth = &mut t.true_camera_from_target[6];
                 *truth = Pose::from_isometry(truth.isometry() * turn);
             };

@@ -1,8 +1,8 @@
 use super::*;
 use crate::estimate::handeye::Mode;
-use crate::estimate::handeye::joint::simulated::{REALISTIC, Trial, camera, trial};
 use crate::estimate::handeye::joint::{JointSolution, estimate};
 use crate::progress::CancelToken;
+use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 
 fn solve(t: &Trial, free_intrinsics: bool) -> JointSolution {
     estimate(&t.problem(free_intrinsics, None), &t.start(), &CancelToken::default()).expect("solves")

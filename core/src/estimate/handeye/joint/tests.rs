@@ -1,10 +1,10 @@
 use nalgebra::{Isometry3, Vector3};
 
-use super::simulated::{REALISTIC, Trial, camera, trial};
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::geometry::camera::Distortion;
 use crate::progress::CancelToken;
+use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 
 #[test]
 fn exact_data_gives_the_exact_answer_in_both_set_ups() {

@@ -2,11 +2,11 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::*;
 use crate::estimate::handeye::Mode;
-use crate::estimate::handeye::joint::simulated::{REALISTIC, Trial, camera, trial};
 use crate::estimate::handeye::joint::{Noise, estimate};
 use crate::estimate::uncertainty::quality;
 use crate::geometry::frames::Pose;
 use crate::progress::CancelToken;
+use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 
 /// An error of the robot that neighbouring poses share: a field in base axes that is linear in the position.
 fn bend(t: &mut Trial, per_metre: f64) {

@@ -1,4 +1,4 @@
-//! What tests need of the machine that may not be there, and how they say that they skip. Feature `testing`.
+//! What tests need of the machine that may not be there, and how they say that they skip.
 //!
 //! A test that cannot run says so in one line past the test runner, which swallows what passing tests print, and adds a
 //! line to the file that `$HANDEYE_SKIPPED` names, from which `./test` makes its summary. Where `$HANDEYE_REQUIRE` names

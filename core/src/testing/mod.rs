@@ -1,0 +1,15 @@
+//! What tests, studies and benchmarks of all packages share. Feature `testing`.
+//!
+//! [`Scene`] makes images of boards whose corners are known, [`sessions`] chains of robot and camera whose links are known,
+//! and [`skip`] is how a test says that the machine lacks what it needs.
+
+mod drawn;
+mod exact;
+mod machine;
+mod scene;
+pub mod sessions;
+mod views;
+
+pub use machine::{Need, data_folder, programs, python, skip};
+pub use scene::Scene;
+pub use views::{looking_at, looking_at_point, seen_corners};

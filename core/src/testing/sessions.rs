@@ -1,0 +1,180 @@
+//! Simulated sessions: chains of robot, camera and board whose links are known, and what is seen along them.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3, Vector6};
+use rand::{Rng, RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
+
+use crate::estimate::handeye::Mode;
+use crate::estimate::handeye::joint::{Free, JointProblem, JointSolution, JointStart, Noise};
+use crate::estimate::{CameraKnowledge, Observations, ObservedView};
+use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use crate::geometry::se3;
+use crate::targets::bent::{BoardPoints, BoardShape};
+use crate::targets::observation::{Corner, View};
+use crate::targets::{Grid, TargetSpec};
+
+/// The board of the reference cell.
+pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
+
+/// Noise of a good robot and a good camera.
+pub const REALISTIC: Noise =
+    Noise { corner_px: 0.1, view_px: 0.0, robot_m: 1e-4, robot_rad: 0.02 * std::f64::consts::PI / 180.0 };
+
+/// Views of a known chain.
+pub struct Trial {
+    /// Where the camera is.
+    pub mode: Mode,
+    /// The points of the target, metres in its frame.
+    pub points: Vec<Point3<f64>>,
+    /// The same as a board that may be bent.
+    pub board: BoardPoints,
+    /// What robot and camera report.
+    pub views: Vec<View>,
+    /// The true camera.
+    pub intrinsics: Intrinsics,
+    /// The true camera on its mount.
+    pub mount_from_camera: Pose<Mount, Camera>,
+    /// The true place of the target.
+    pub anchor_from_target: Pose<Anchor, Target>,
+    /// The true pose of the target in every view.
+    pub true_camera_from_target: Vec<Pose<Camera, Target>>,
+}
+
+/// A normal number of deviation 1.
+pub fn normal(rng: &mut impl Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// Three metres, then three radians of noise with these deviations.
+pub fn noise_twist(rng: &mut impl Rng, metres: f64, radians: f64) -> Vector6<f64> {
+    Vector6::from_fn(|i, _| normal(rng) * if i < 3 { metres } else { radians })
+}
+
+/// The error of a robot: a translation, and a rotation vector about the place moved to.
+pub fn robot_error(rng: &mut impl Rng, noise: &Noise) -> Isometry3<f64> {
+    let twist = noise_twist(rng, noise.robot_m, noise.robot_rad);
+    let turn = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());
+    Isometry3::from_parts(twist.fixed_rows::<3>(0).into_owned().into(), turn)
+}
+
+/// `camera_from_target` with the middle of [`BOARD`] at `place` \[m\] in the camera's frame, tilted about an axis at
+/// `azimuth` in the image after a turn by `roll` about its normal \[rad\].
+pub fn board_at(place: Vector3<f64>, [tilt, azimuth, roll]: [f64; 3]) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)
+        * UnitQuaternion::from_scaled_axis(Vector3::z() * roll);
+    Isometry3::from_parts(place.into(), turn) * Isometry3::from(-BOARD.centre().coords)
+}
+
+/// The tip pose from which the camera sees the target so.
+pub fn base_from_tip(
+    mode: Mode,
+    mount_from_camera: &Pose<Mount, Camera>,
+    anchor_from_target: &Pose<Anchor, Target>,
+    camera_from_target: &Pose<Camera, Target>,
+) -> Pose<Base, Tip> {
+    let anchor_from_mount = *anchor_from_target * camera_from_target.inverse() * mount_from_camera.inverse();
+    match mode {
+        Mode::EyeInHand => anchor_from_mount.relabel(),
+        Mode::EyeToHand => anchor_from_mount.inverse().relabel(),
+    }
+}
+
+/// The pixel with noise of `noise_px` per axis.
+pub fn noisy(rng: &mut impl Rng, px: &Vector2<f64>, noise_px: f64) -> Vector2<f64> {
+    Vector2::new(px.x + normal(rng) * noise_px, px.y + normal(rng) * noise_px)
+}
+
+/// Views on a 35° cone with ±60° of roll at 0.4 to 0.6 m: the geometry of the published Monte-Carlo tables.
+pub fn trial(mode: Mode, views: usize, noise: &Noise, intrinsics: Intrinsics, seed: u64) -> Trial {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let points = BOARD.points();
+    let mount_from_camera = Pose::from_isometry(se3::exp(&Vector6::new(0.05, 0.01, 0.06, 0.1, -0.2, 1.4)));
+    let anchor_from_target: Pose<Anchor, Target> =
+        Pose::from_isometry(se3::exp(&Vector6::new(0.5, 0.1, 0.2, 0.4, 0.2, -0.3)));
+    let mut out = Vec::new();
+    let mut true_camera_from_target = Vec::new();
+    while out.len() < views {
+        let tilt = 35f64.to_radians() * rng.random::<f64>().sqrt();
+        let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
+        let roll = rng.random_range(-60f64..60.0).to_radians();
+        let distance = rng.random_range(0.4..0.6);
+        let place = Vector3::new(rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), distance);
+        let camera_from_target: Pose<Camera, Target> = Pose::from_isometry(board_at(place, [tilt, azimuth, roll]));
+        let true_tip = base_from_tip(mode, &mount_from_camera, &anchor_from_target, &camera_from_target);
+        let error = robot_error(&mut rng, noise);
+        let reported = Pose::from_isometry(true_tip.isometry() * error.inverse());
+        let corners: Option<Vec<Corner>> = points
+            .iter()
+            .enumerate()
+            .map(|(index, p)| {
+                let px = intrinsics.project(&(camera_from_target.isometry() * p)).ok()?;
+                let seen = noisy(&mut rng, &px, noise.corner_px);
+                intrinsics.contains(&seen).then_some(Corner::new(index, seen))
+            })
+            .collect();
+        if let Some(corners) = corners {
+            true_camera_from_target.push(camera_from_target);
+            out.push(View::new(format!("{}", out.len()), reported, corners));
+        }
+    }
+    let board = BoardPoints::new(&points);
+    Trial {
+        mode,
+        points,
+        board,
+        views: out,
+        intrinsics,
+        mount_from_camera,
+        anchor_from_target,
+        true_camera_from_target,
+    }
+}
+
+impl Trial {
+    /// The views as observed, with the camera given or to be estimated without distortion.
+    pub fn observations(&self, free_intrinsics: bool) -> Observations {
+        let camera = if free_intrinsics {
+            CameraKnowledge::Estimate { model: Distortion::None, start: None }
+        } else {
+            CameraKnowledge::Fixed(self.intrinsics)
+        };
+        Observations {
+            mode: Some(self.mode),
+            target: BOARD,
+            image_size: (self.intrinsics.width, self.intrinsics.height),
+            camera,
+            views: self.views.iter().map(ObservedView::from).collect(),
+        }
+    }
+
+    /// The joint estimate's problem.
+    pub fn problem(&self, free_intrinsics: bool, noise: Option<Noise>) -> JointProblem<'_> {
+        let free = Free { intrinsics: free_intrinsics, ..Free::default() };
+        JointProblem { free, noise, ..JointProblem::new(self.mode, &self.board, &self.views) }
+    }
+
+    /// A start as far off as a poor closed form: millimetres and tenths of a degree.
+    pub fn start(&self) -> JointStart {
+        let off = Vector6::new(0.004, -0.003, 0.005, 0.01, -0.008, 0.006);
+        JointStart {
+            mount_from_camera: self.mount_from_camera.perturbed(&off),
+            anchor_from_target: self.anchor_from_target.perturbed(&(-off)),
+            intrinsics: self.intrinsics,
+            shape: BoardShape::default(),
+            noise: None,
+        }
+    }
+
+    /// Twist from the true link of the camera to the estimated one.
+    pub fn hand_eye_error(&self, solution: &JointSolution) -> Vector6<f64> {
+        let estimated = solution.hand_eye.mount_from_camera();
+        se3::log((self.mount_from_camera.inverse() * estimated).isometry())
+    }
+}
+
+/// The camera of the published tables.
+pub fn camera() -> Intrinsics {
+    Intrinsics::pinhole(640, 480, 581.0)
+}
