@@ -3,10 +3,10 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::Noise;
-use crate::estimate::handeye::joint::simulated::{REALISTIC, Trial, camera, trial};
 use crate::estimate::{Method, Options, calibrate, calibrate_with};
 use crate::geometry::frames::Pose;
 use crate::progress::CancelToken;
+use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 use crate::wording::Text;
 
 fn solve(observations: &Observations) -> Calibration {

@@ -198,6 +198,4 @@ fn squares(
 }
 
 #[cfg(test)]
-pub(crate) use crate::testing::sessions as simulated;
-#[cfg(test)]
 mod tests;
