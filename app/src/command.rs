@@ -117,6 +117,8 @@ pub enum Command {
         /// What is captured at each; `None` only moves.
         purpose: Option<CapturePurpose>,
     },
+    /// Go on with the sequence that was broken off, at the pose at which it was.
+    ContinueSequence,
     /// Have poses planned that are not in the fit, visit them, and capture for verification at each.
     VerifyAtPlanned,
     /// No more poses.

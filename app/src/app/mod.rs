@@ -177,6 +177,7 @@ impl App {
             Command::GoToTaught(name) => self.go_to_taught(&name),
             Command::GoToCapture(id) => self.go_to_capture(id),
             Command::RunSequence { purpose } => self.run_sequence(purpose),
+            Command::ContinueSequence => self.continue_sequence(),
             Command::VerifyAtPlanned => self.plan_verification(),
             Command::StopSequence => self.stop_sequence(),
 

@@ -5,8 +5,8 @@ use handeye_core::project::session::CaptureId;
 use super::*;
 use crate::gui::testing::sample;
 use crate::model::{
-    CapturePurpose, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState, Motion, MotionGoal,
-    MotionOutcome, Pane, PoseSequence, SolveStatus, StopOutcome, ThemeChoice,
+    CapturePurpose, CaptureRefused, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState, Motion,
+    MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind, SolveStatus, StopOutcome, ThemeChoice,
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
@@ -178,6 +178,36 @@ fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_sequence() {
     bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Stopped });
     assert!(!bench.app.model().sequence_runs);
     assert_eq!(bench.app.model().motion, Motion::Idle);
+}
+
+#[test]
+fn a_pause_breaks_a_sequence_off_and_it_is_continued_with_the_pose_that_has_no_capture() {
+    let mut bench = bench(&FakeCell::new(0));
+    bench.app.replace_model(sample::solved());
+    bench.app.apply(Command::VerifyAtPlanned);
+    let id = bench.app.numbers.motion;
+    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
+    let id = bench.app.numbers.motion;
+    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Arrived });
+    let number = bench.app.numbers.capture;
+    let why = Text::verbatim("the simulation is paused");
+    let refused = CaptureRefused { kind: RefusalKind::Paused, why, at_s: 3.0 };
+    bench.app.absorb(Event::CaptureRefused { number, refused });
+    let sequence = bench.app.model().sequence.clone().expect("a sequence");
+    assert!(!bench.app.model().sequence_runs);
+    assert_eq!(sequence.outcomes, [], "the pose is not left out");
+
+    bench.app.apply(Command::ContinueSequence);
+    assert!(bench.app.model().sequence_runs);
+    assert!(matches!(bench.app.model().motion, Motion::Moving { .. }), "it is on its way to the first again");
+
+    bench.app.apply(Command::Stop);
+    let mut another = bench.app.model().session.clone();
+    bench.app.absorb(Event::Document(Box::new(another.clone())));
+    another.folder = Some(PathBuf::from("another session"));
+    bench.app.absorb(Event::Document(Box::new(another)));
+    bench.app.apply(Command::ContinueSequence);
+    assert!(!bench.app.model().sequence_runs, "its poses are those of another session");
 }
 
 #[test]

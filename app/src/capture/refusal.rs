@@ -36,7 +36,7 @@ pub fn of_machine(refusal: &Refusal) -> Why {
                 "The simulation is paused: no simulated time has passed for {seconds} s. Start it and capture again",
                 seconds = NO_IMAGES_S
             );
-            (RefusalKind::NotSettled, why)
+            (RefusalKind::Paused, why)
         }
         Refusal::NoImages => {
             let why = text!(

@@ -99,6 +99,8 @@ pub enum RefusalKind {
     NoBoard,
     /// Robot or image did not come to rest.
     NotSettled,
+    /// The simulation is paused.
+    Paused,
     /// The image is blurred.
     Blurred,
     /// There is a capture from almost the same pose.
@@ -116,7 +118,7 @@ impl RefusalKind {
     pub fn concerns_the_pose(self) -> bool {
         match self {
             Self::NoBoard | Self::NotSettled | Self::Blurred | Self::TooSimilar => true,
-            Self::NoImages | Self::Cancelled | Self::NotSaved => false,
+            Self::Paused | Self::NoImages | Self::Cancelled | Self::NotSaved => false,
         }
     }
 }

@@ -116,7 +116,7 @@ fn a_simulation_without_time_ends_the_capture() {
     for pass_s in [0.0, f64::NAN] {
         let mut reel = Reel { pass_s, ..Reel::new(|_| Ok(sharp.clone())) };
         let (kind, why) = refused(take(request(1), &BOARD, &mut reel));
-        assert_eq!(kind, RefusalKind::NotSettled);
+        assert_eq!(kind, RefusalKind::Paused);
         assert!(why.contains("paused"), "{why}");
         assert!(reel.number < 40, "{} images in {} s", reel.number, reel.now_s.get() - 100.0);
     }

@@ -58,6 +58,8 @@ impl App {
         self.model.frame = None;
         self.model.cell = None;
         self.model.detection = None;
+        // Planned poses are those of the other arm.
+        self.model.sequence = None;
         self.model.sequence_runs = false;
         self.model.planning = false;
         self.model.motion = Motion::Idle;

@@ -141,6 +141,9 @@ impl App {
         if another {
             self.forget_solve();
             self.model.picked = None;
+            // Its poses are those of the other session.
+            self.model.sequence = None;
+            self.model.sequence_runs = false;
         }
         if let Some(names) = &new.export_names
             && let Ok(names) = serde_json::from_value(names.clone())

@@ -36,6 +36,15 @@ impl App {
         self.next_stop();
     }
 
+    /// Goes on with a sequence that was broken off: the pose at which that was is visited again.
+    pub(crate) fn continue_sequence(&mut self) {
+        let left = self.model.sequence.as_ref().and_then(PoseSequence::current);
+        if left.is_some() && !self.model.sequence_runs && !self.model.planning {
+            self.model.sequence_runs = true;
+            self.next_stop();
+        }
+    }
+
     /// Has poses planned that differ from all captures, to verify at.
     pub(crate) fn plan_verification(&mut self) {
         if self.model.sequence_runs || self.model.planning {

@@ -64,7 +64,7 @@ pub enum LinkError {
         call: String,
     },
     /// The server answered with an error.
-    #[error("{call} failed in the simulator: {message}")]
+    #[error("{call} failed in the simulator: {}", without_place(message))]
     Remote {
         /// Which call.
         call: String,
@@ -313,6 +313,15 @@ impl LinkError {
     }
 }
 
+/// What Lua says without the line of the server's code where it was found out, as in `lua/motion.lua:17: missing field`
+/// or `939: in sim.getObject: …`. Whoever reads it cannot do anything about that line.
+fn without_place(message: &str) -> &str {
+    let Some((place, what)) = message.split_once(": ") else { return message };
+    let line = place.rsplit(':').next().unwrap_or(place);
+    let is_line = !line.is_empty() && line.bytes().all(|byte| byte.is_ascii_digit());
+    if is_line { what } else { message }
+}
+
 fn advice_on_bytes(has_spoken: bool) -> &'static str {
     if has_spoken {
         "the server has broken it off: CoppeliaSim's remote API does so with some maps; try again, and if it comes back \
@@ -326,5 +335,27 @@ fn length(bytes: Option<&usize>) -> String {
     match bytes {
         Some(bytes) => format!("has {bytes} bytes"),
         None => format!("has more than {} MiB, or breaks the rules of ZeroMQ", super::transport::MAX_REPLY_BYTES >> 20),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_said_without_the_line_of_the_servers_code_and_recognized_with_and_without_it() {
+        let said = |message: &str| {
+            let error = LinkError::Remote { call: "sim.f".to_owned(), message: message.to_owned() };
+            (error.to_string(), error.is_missing_object())
+        };
+        let missing = "in sim.getObject: Object does not exist. (on argument 1)";
+        for place in
+            ["", "939: ", "/opt/sim/lua/motion.lua:17: ", "C:\\sim\\lua\\motion.lua:17: ", "[string \"x\"]:354: "]
+        {
+            assert_eq!(said(&format!("{place}{missing}")), (format!("sim.f failed in the simulator: {missing}"), true));
+        }
+        for whole in ["joint 3: out of range", "17", "", ": x"] {
+            assert_eq!(said(whole), (format!("sim.f failed in the simulator: {whole}"), false));
+        }
     }
 }

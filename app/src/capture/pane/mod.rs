@@ -16,7 +16,8 @@ use crate::gui::style::theme::{Palette, Tone};
 use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
 use crate::live::textures::Thumbnails;
-use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model};
+use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, PoseSequence};
+use crate::taught::pane::sequence;
 use crate::{text, tr};
 
 /// Most images that are averaged: more take longer than they help.
@@ -95,6 +96,10 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outb
             outbox.send(Command::StopSequence);
         }
         return;
+    }
+    let calibrates = |sequence: &&PoseSequence| sequence.purpose == Some(CapturePurpose::Calibrate);
+    if let Some(sequence) = model.sequence.as_ref().filter(calibrates) {
+        sequence::continue_ui(ui, model, sequence, outbox);
     }
     let count = model.document().taught.len();
     // With captures in the table the sequence is in the pane of the taught poses.

@@ -12,7 +12,7 @@ use handeye_sim_link::client::{CallOptions, LinkError, SimulationState};
 use super::super::{Failure, record};
 use super::poses::Plan;
 use crate::capture::{self, CaptureEnd, CaptureRequest, Images};
-use crate::model::{CaptureOptions, CapturePurpose, LiveFrame};
+use crate::model::{CaptureOptions, CapturePurpose, LiveFrame, RefusalKind};
 use crate::rerun_log::Recorder;
 use crate::text::Language;
 
@@ -79,7 +79,13 @@ impl PoseSequence<'_> {
                     images: &mut images,
                     first: true,
                 };
-                capture::take(request, &target, &mut eye).map(Visit::Ended)
+                match capture::take(request, &target, &mut eye)? {
+                    // The next try waits for the simulation, and takes the capture from the beginning.
+                    CaptureEnd::Refused(refused) if refused.kind == RefusalKind::Paused => {
+                        Err(LinkError::NotRunning { task: "a capture", state: SimulationState::Paused })
+                    }
+                    ended => Ok(Visit::Ended(ended)),
+                }
             })?;
             match visit {
                 Visit::Ended(CaptureEnd::Good(measured, last)) => {

@@ -24,7 +24,7 @@ use crate::model::{FollowStatus, FollowWish, Step, Tracked};
 use crate::rerun_log::{Entry, Recorder};
 use crate::session::start::REFERENCE_POSES;
 use crate::shortfall;
-use crate::text::{Language, Text};
+use crate::text::Language;
 use crate::worker::{FollowLine, TrackedImage, Tracking, end_of_following};
 
 /// Rest between two looks at the clock of the cell.
@@ -124,7 +124,8 @@ impl Live {
         Ok(Self { arm, feed })
     }
 
-    /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns.
+    /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns. Following that ends
+    /// for another reason is an error.
     pub fn run(mut self, job: &Job<'_>, cancel: &CancelToken, taken: &mut Taken<'_>) -> Result<(), Failure> {
         if let Some(board) = &job.own_cell {
             self.prepare_own_cell(board, cancel)?;
@@ -172,11 +173,19 @@ impl Live {
             .join()
             .map_err(|_panic| Failure::failed(anyhow::anyhow!("the thread that moves the arm ended with a panic")))?;
         watched?;
-        taken.summary.follow_ended = match followed.map_err(Failure::failed)? {
-            FollowEnd::Released => line.take_ended().map(|why: Text| why.say(Language::English)),
-            end => Some(end_of_following(end).say(Language::English)),
+        let end = followed.map_err(Failure::failed)?;
+        // What ends in the very moment in which it was followed enough has done what it was asked to.
+        if cancel.is_cancelled() || job.frames.is_some_and(|frames| taken.summary.frames >= frames) {
+            return Ok(());
+        }
+        let why = match end {
+            FollowEnd::Released => line.take_ended().unwrap_or_else(|| end_of_following(FollowEnd::Released)),
+            end => end_of_following(end),
         };
-        Ok(())
+        let why = why.say(Language::English);
+        let error = Failure::failed(anyhow::anyhow!("following ended by itself: {why}"));
+        taken.summary.follow_ended = Some(why);
+        Err(error)
     }
 
     /// Has the arm of the cell that this program started look at the board, and the board move.
@@ -357,6 +366,11 @@ impl Summary {
         if self.took_s > 0.0 { self.frames as f64 / self.took_s } else { 0.0 }
     }
 
+    /// Whether there is nothing to sum up.
+    pub fn is_empty(&self) -> bool {
+        self.frames == 0
+    }
+
     /// For programs.
     pub fn json(&self) -> Value {
         json!({
@@ -390,9 +404,6 @@ impl Summary {
             let deg = rad.to_degrees();
             let mm = m * 1e3;
             lines.push(format!("the tip from its goal: {mm:.2} mm and {deg:.3}° RMS, the way there included"));
-        }
-        if let Some(why) = &self.follow_ended {
-            lines.push(format!("following ended by itself: {why}"));
         }
         lines.join("\n") + "\n"
     }

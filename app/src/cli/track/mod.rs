@@ -137,9 +137,10 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         .and_then(|live| live.run(&job, &cancel, &mut Taken { publish: &mut add, summary: &mut summary }));
     // What was tracked before an error is as good as the rest.
     document.finish(&summary, tracked.as_ref().err())?;
-    tracked?;
-    if !args.json.as_ref().is_some_and(Output::is_standard) {
+    let is_worth_saying = tracked.is_ok() || !summary.is_empty();
+    if is_worth_saying && !args.json.as_ref().is_some_and(Output::is_standard) {
         out::print(&summary.text())?;
     }
+    tracked?;
     rerun_arg::finish(recorder, &cancel)
 }

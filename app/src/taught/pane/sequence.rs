@@ -15,7 +15,7 @@ pub fn sequence_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         sequence => {
             begin_ui(ui, model, outbox);
             if let Some(sequence) = sequence.as_ref().filter(|sequence| !sequence.is_planned()) {
-                summary_ui(ui, model, sequence);
+                summary_ui(ui, model, sequence, outbox);
             }
         }
     }
@@ -62,8 +62,8 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     }
 }
 
-/// How the last one went.
-pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
+/// How the last one went, and the button that goes on with it where poses are left.
+pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let done = sequence.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
     let skipped = sequence.outcomes.len() - done;
     let left = sequence.names.len() - sequence.outcomes.len();
@@ -75,4 +75,18 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
         left = left
     );
     parts::hint_ui(ui, &said.say(model.view.language));
+    continue_ui(ui, model, sequence, outbox);
+}
+
+/// The button that goes on with a sequence that was broken off.
+pub fn continue_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
+    let language = model.view.language;
+    if sequence.current().is_none() {
+        return;
+    }
+    let button = Button::new(tr!(language, "Continue the sequence"));
+    let what = tr!(language, "Goes on at the pose at which it was broken off, with those that are left");
+    if parts::gated_ui(ui, immovable(model), button).on_hover_text(what).clicked() {
+        outbox.send(Command::ContinueSequence);
+    }
 }

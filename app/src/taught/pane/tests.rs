@@ -126,6 +126,11 @@ fn a_sequence_says_how_each_pose_went_and_can_be_stopped() {
     pane.model().sequence_runs = false;
     pane.steps();
     assert!(pane.sees("Last sequence: 1 of 3 done, 1 skipped, 1 not visited"));
+    assert_eq!(pane.click("Continue the sequence"), [Command::ContinueSequence]);
+    let sequence = pane.model().sequence.as_mut().expect("it is still known");
+    sequence.outcomes.push(StopOutcome::Done);
+    pane.steps();
+    assert!(!pane.sees("Continue the sequence"), "nothing is left");
 }
 
 #[test]

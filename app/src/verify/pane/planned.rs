@@ -42,7 +42,7 @@ pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         parts::notice_ui(ui, Tone::Warning, &message.text.say(language), |_| ());
     }
     if let Some(sequence) = model.sequence.as_ref().filter(|sequence| sequence.is_planned()) {
-        went_ui(ui, model, sequence);
+        went_ui(ui, model, sequence, outbox);
     }
 }
 
@@ -72,9 +72,9 @@ fn blocked(model: &Model) -> Option<&'static str> {
     }
 }
 
-fn went_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
+fn went_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let language = model.view.language;
-    sequence::summary_ui(ui, model, sequence);
+    sequence::summary_ui(ui, model, sequence, outbox);
     for (name, outcome) in sequence.names.iter().zip(&sequence.outcomes) {
         if let StopOutcome::Skipped(why) = outcome {
             let said = text!("{name} was skipped: {why}", name = name, why = why.clone());

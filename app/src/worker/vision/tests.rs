@@ -147,7 +147,7 @@ fn a_request_to_cancel_is_taken_up_before_the_measurement_is_handed_over() {
 #[test]
 fn no_images_and_a_simulation_that_rests_are_told_apart() {
     for (camera_answers, kind, words) in
-        [(false, RefusalKind::NoImages, "No images"), (true, RefusalKind::NotSettled, "simulation is paused")]
+        [(false, RefusalKind::NoImages, "No images"), (true, RefusalKind::Paused, "simulation is paused")]
     {
         let mut table = watching(BOARD);
         table.ask(VisionTask::Capture(request(1, 1)));

@@ -1,14 +1,20 @@
 //! Commands whose simulation is paused or ended meanwhile, or whose server dies.
 
 use std::io::{BufReader, Read as _};
+use std::path::Path;
 use std::process::{Child, ChildStderr};
 use std::time::{Duration, Instant};
 
+use handeye_app::command::Command;
+use handeye_app::model::{CaptureOptions, CapturePurpose, CaptureWait, CellSource, Model};
+use handeye_app::rerun_log::RerunChoice;
+use handeye_core::capture::Wait;
 use handeye_core::project::session::Session;
 use handeye_sim_link::client::cell::{Arm, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
+use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, MotionLimits, SimulationState};
 use handeye_tests::CellProcess;
-use handeye_tests::process::{end_of, start, until_said};
+use handeye_tests::process::{end_of, signal, start, until_said};
+use handeye_tests::workbench::Workbench;
 use serde_json::Value;
 
 use crate::solved::copy_of_session;
@@ -60,6 +66,120 @@ fn auto_waits_out_a_pause_and_leaves_a_simulation_running_that_it_did_not_start(
     assert_eq!(code, Some(0), "{rest}");
     assert_eq!(Session::open(&out).expect("a session").document.captures.len(), 10, "{rest}");
     assert_eq!(person.sim().get_simulation_state(), Ok(SimulationState::Running));
+}
+
+/// Waits until the arm has moved and then stands for so many passes.
+fn until_it_stands(person: &mut Arm, passes: u32) {
+    let start = person.joint_angles().expect("an answer");
+    while person.joint_angles().expect("an answer") == start {}
+    let mut joints = start;
+    let (mut time_s, mut seen) = (f64::NAN, 0);
+    while seen < passes {
+        let (now, now_s) =
+            (person.joint_angles().expect("an answer"), person.sim().get_simulation_time().expect("an answer"));
+        seen = if now != joints { 0 } else { seen + u32::from(now_s != time_s) };
+        (joints, time_s) = (now, now_s);
+    }
+}
+
+#[test]
+fn auto_takes_a_capture_again_whose_images_a_pause_broke_off() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("session");
+    let cell = CellProcess::start(&["--fast"]);
+    let mut person = person(&cell);
+    let address = format!("tcp://127.0.0.1:{}", cell.port());
+    // With so many images to average the arm stands at a pose longer than it is on its way to it.
+    let out_text = out.display().to_string();
+    let (child, mut said) =
+        start(&["auto", "--rerun", "off", "--frames", "64", "--connect", &address, "--out", &out_text]);
+    until_said(&mut said, "pose 1 of 10 captured");
+    until_it_stands(&mut person, 20);
+    person.sim().pause_simulation().expect("an answer");
+    until_said(&mut said, "the simulation is paused");
+    person.sim().start_simulation().expect("an answer");
+    let (code, rest) = end(child, said);
+    assert_eq!(code, Some(0), "{rest}");
+    assert_eq!(Session::open(&out).expect("a session").document.captures.len(), 10, "{rest}");
+}
+
+#[test]
+fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cell = CellProcess::start(&[]);
+    let mut person = person(&cell);
+    let source = CellSource::Address(format!("tcp://127.0.0.1:{}", cell.port()));
+    let mut bench = Workbench::start_recording(source, folder.path(), None, RerunChoice::Off);
+    bench.until("a cell", |model| {
+        let connected = model.control.is_connected() && model.camera.is_connected() && model.mover.is_connected();
+        connected && model.frame.is_some() && model.cell.is_some() && model.robot.is_some()
+    });
+    bench.click(Command::StartSimulation);
+    bench.until("passing time", |model| model.resting_simulation().is_none());
+    bench.click(Command::SetCaptureOptions(CaptureOptions { frames: 64, ..CaptureOptions::default() }));
+    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    let averages = |model: &Model| {
+        let wait = model.capture.as_ref().map(|capture| capture.wait);
+        matches!(wait, Some(CaptureWait::Images(Wait::Averaging { .. })))
+    };
+    bench.until("the images of the second pose", |model| model.document().captures.len() == 1 && averages(model));
+    person.sim().pause_simulation().expect("an answer");
+    bench.until("the end of the sequence", |model| !model.sequence_runs);
+    assert_eq!(bench.model().document().captures.len(), 1, "{}", bench.said());
+
+    bench.click(Command::StartSimulation);
+    bench.until("passing time", |model| model.resting_simulation().is_none());
+    bench.click(Command::SetCaptureOptions(CaptureOptions::default()));
+    bench.click(Command::ContinueSequence);
+    bench.until("the end of the sequence", |model| !model.sequence_runs);
+    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
+}
+
+/// Has the arm stand where it saw the board, with room to follow it.
+fn before_the_board(person: &mut Arm, session: &Path) {
+    person.sim().start_simulation().expect("an answer");
+    let session = Session::open(session).expect("a session");
+    let joints = session.document.captures[6].joints_rad.as_deref().expect("joints").try_into().expect("six");
+    let limits = MotionLimits::uniform(6, 1.0, 2.0, 20.0);
+    person.move_to_joints(&joints, &limits, &CancelToken::default()).expect("it gets there");
+}
+
+#[test]
+fn following_that_loses_its_board_fails_and_says_why_and_what_was_asked_for_is_no_failure() {
+    let (folder, session) = copy_of_session();
+    let cell = CellProcess::start(&[]);
+    let mut person = person(&cell);
+    before_the_board(&mut person, &session);
+    let address = format!("tcp://127.0.0.1:{}", cell.port());
+    let file = folder.path().join("track.json");
+    let (session, json) = (session.display().to_string(), file.display().to_string());
+    let follow = ["track", "--follow", "--connect", &address, "--calibration", &session, "--json", &json];
+    let summary = || -> Value {
+        let track: Value = serde_json::from_slice(&std::fs::read(&file).expect("written")).expect("JSON");
+        track["summary"].clone()
+    };
+
+    let (child, said) = start(&[&follow[..], &["--frames", "20"]].concat());
+    let (code, rest) = end(child, said);
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(summary()["error"].is_null() && summary()["follow_ended"].is_null(), "{:#}", summary());
+
+    let (child, mut said) = start(&follow);
+    until_said(&mut said, "images/s");
+    signal(&child, "INT");
+    let (code, rest) = end(child, said);
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(summary()["follow_ended"].is_null(), "{:#}", summary());
+
+    let (child, mut said) = start(&follow);
+    until_said(&mut said, "images/s");
+    person.show_board(false).expect("an answer");
+    let (code, rest) = end(child, said);
+    assert_eq!(code, Some(1), "{rest}");
+    assert!(rest.trim_end().lines().last().is_some_and(|last| last.contains("following ended by itself")), "{rest}");
+    for key in ["error", "follow_ended"] {
+        assert!(summary()[key].as_str().is_some_and(|why| !why.is_empty()), "{:#}", summary());
+    }
 }
 
 #[test]
