@@ -130,7 +130,7 @@ mod tests {
         };
         let mut result = CalibrationResult { findings: vec![finding("warning")], ..CalibrationResult::default() };
         result.quality.rms_px = Some(0.1);
-        assert!(failures(&[gate.clone()], &result).is_empty());
+        assert!(failures(std::slice::from_ref(&gate), &result).is_empty());
         result.findings.push(finding("problem"));
         assert_eq!(failures(&[gate], &result), ["wrong_length_unit is a problem: Millimetres."]);
         assert!(failures(&[], &result).is_empty(), "without a gate the findings speak for themselves");

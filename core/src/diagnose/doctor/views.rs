@@ -98,7 +98,7 @@ fn table(views: &[&ObservedView]) -> Vec<TableRow> {
         }
         ranks
     };
-    let (by_number, by_letters) = (ranks(natural_order::compare), ranks(|a, b| a.cmp(b)));
+    let (by_number, by_letters) = (ranks(natural_order::compare), ranks(Ord::cmp));
     let rows = views.iter().zip(by_number).zip(by_letters);
     let row = |((view, rank_by_number), rank_by_letters): ((&&ObservedView, usize), usize)| TableRow {
         base_from_tip: view.base_from_tip.filter(Pose::is_finite),

@@ -77,7 +77,7 @@ fn until_it_stands(person: &mut Arm, passes: u32) {
     while seen < passes {
         let (now, now_s) =
             (person.joint_angles().expect("an answer"), person.sim().get_simulation_time().expect("an answer"));
-        seen = if now != joints { 0 } else { seen + u32::from(now_s != time_s) };
+        seen = if now == joints { seen + u32::from(now_s != time_s) } else { 0 };
         (joints, time_s) = (now, now_s);
     }
 }

@@ -89,8 +89,8 @@ mod tests {
     use crate::estimate::uncertainty::quality::tip_error_95_at;
     use crate::geometry::se3;
 
-    fn by(c: Matrix6<f64>, law: SmallSample) -> impl Fn(&Point3<f64>) -> f64 {
-        move |point| tip_error_95_at(&c, law, point)
+    fn by(c: &Matrix6<f64>, law: SmallSample) -> impl Fn(&Point3<f64>) -> f64 {
+        move |point| tip_error_95_at(c, law, point)
     }
 
     fn few(degrees_of_freedom: f64) -> SmallSample {
@@ -104,12 +104,12 @@ mod tests {
         let mut c = Matrix6::zeros();
         c[(5, 5)] = 1e-6;
         let tip_box = TipBox::in_camera(Point3::new(0.9, 0.4, 0.5), Point3::new(0.3, 1.2, 0.1));
-        let error = tip_error_95_over(by(c, SmallSample::KNOWN), &tip_box);
+        let error = tip_error_95_over(by(&c, SmallSample::KNOWN), &tip_box);
         assert!((error.worst_m - 1.95996e-3 * 1.5).abs() < 1e-7, "{error:?}");
         assert!((error.worst_at.xy() - nalgebra::Point2::new(0.9, 1.2)).norm() < 1e-12);
         let line = TipBox::in_camera(Point3::new(0.1, 0.0, 0.5), Point3::new(0.7, 0.0, 0.5));
-        assert!((tip_error_95_over(by(c, SmallSample::KNOWN), &line).mean_m - 1.95996e-3 * 0.4).abs() < 1e-7);
-        assert!(tip_error_95_over(by(c, few(5.0)), &line).mean_m > 1.3 * 1.95996e-3 * 0.4);
+        assert!((tip_error_95_over(by(&c, SmallSample::KNOWN), &line).mean_m - 1.95996e-3 * 0.4).abs() < 1e-7);
+        assert!(tip_error_95_over(by(&c, few(5.0)), &line).mean_m > 1.3 * 1.95996e-3 * 0.4);
     }
 
     #[test]
@@ -120,7 +120,7 @@ mod tests {
             Pose::from_isometry(se3::exp(&Vector6::new(0.4, -0.2, 0.9, 0.3, 2.0, -0.5)));
         let (low, high) = (Point3::new(-0.3, 0.1, 0.0), Point3::new(0.5, 0.6, 0.4));
         let tip_box = TipBox::in_base(low, high, &camera_from_base);
-        let worst = tip_error_95_over(by(c, few(8.0)), &tip_box);
+        let worst = tip_error_95_over(by(&c, few(8.0)), &tip_box);
         let at = |p: Point3<f64>| tip_error_95_at(&c, few(8.0), &(camera_from_base.isometry() * p));
         assert!((at(worst.worst_at) - worst.worst_m).abs() < 1e-12);
         for i in 0..125 {
