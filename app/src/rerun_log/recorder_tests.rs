@@ -133,34 +133,6 @@ impl Gate {
 }
 
 #[test]
-fn a_viewer_that_takes_nothing_holds_up_neither_the_caller_nor_the_file() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let gate = Arc::new(Gate::default());
-    let at_gate = Arc::clone(&gate);
-    let sink = SharedSink(Arc::new(CallbackSink::new(move |_| at_gate.pass())));
-    let mut recorder = start(RerunChoice::Record);
-    let shared = Arc::clone(recorder.shared.as_ref().expect("it is on"));
-    shared.write_to_viewers(Target::Viewers { lasting: sink.clone(), live: sink });
-    recorder.note(document(folder.path()));
-    let began = Instant::now();
-    let mut longest = Duration::ZERO;
-    for round in 0..20_000 {
-        let call = Instant::now();
-        recorder.note(robot(f64::from(round) * 0.01));
-        recorder.note(said("hello"));
-        longest = longest.max(call.elapsed());
-    }
-    // 40,000 entries; one that waited for the viewer would wait for ever.
-    assert!(began.elapsed() < SOON, "{:?}", began.elapsed());
-    println!("40,000 entries in {:?}, the longest call {longest:?}", began.elapsed());
-    assert!(!recorder.finish(Duration::from_millis(200)), "the viewer cannot have taken everything");
-    let file = folder.path().join("recording.rrd");
-    let lines = entities(&file).get("/log").copied().unwrap_or_default();
-    assert!(lines > 0, "the file has what was said");
-    gate.open();
-}
-
-#[test]
 fn a_viewer_that_comes_late_gets_what_lasts_and_the_trail_of_the_robot() {
     let folder = tempfile::tempdir().expect("a folder");
     let recorder = start(RerunChoice::Record);
@@ -213,4 +185,36 @@ fn the_web_viewer_and_its_servers_are_there_for_this_machine_only() {
         std::thread::yield_now();
     }
     assert_eq!(recorder.state().viewer, ViewerState::Web { url }, "the same page again");
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn a_viewer_that_takes_nothing_holds_up_neither_the_caller_nor_the_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let gate = Arc::new(Gate::default());
+        let at_gate = Arc::clone(&gate);
+        let sink = SharedSink(Arc::new(CallbackSink::new(move |_| at_gate.pass())));
+        let mut recorder = start(RerunChoice::Record);
+        let shared = Arc::clone(recorder.shared.as_ref().expect("it is on"));
+        shared.write_to_viewers(Target::Viewers { lasting: sink.clone(), live: sink });
+        recorder.note(document(folder.path()));
+        let began = Instant::now();
+        let mut longest = Duration::ZERO;
+        for round in 0..20_000 {
+            let call = Instant::now();
+            recorder.note(robot(f64::from(round) * 0.01));
+            recorder.note(said("hello"));
+            longest = longest.max(call.elapsed());
+        }
+        // 40,000 entries; one that waited for the viewer would wait for ever.
+        assert!(began.elapsed() < SOON, "{:?}", began.elapsed());
+        println!("40,000 entries in {:?}, the longest call {longest:?}", began.elapsed());
+        assert!(!recorder.finish(Duration::from_millis(200)), "the viewer cannot have taken everything");
+        let file = folder.path().join("recording.rrd");
+        let lines = entities(&file).get("/log").copied().unwrap_or_default();
+        assert!(lines > 0, "the file has what was said");
+        gate.open();
+    }
 }

@@ -47,23 +47,6 @@ impl Catalogue for Wordless {
 }
 
 #[test]
-fn whatever_is_found_is_said_in_words_that_can_be_translated() {
-    let closed_forms: Vec<&str> = closed_form::all().iter().map(|solver| solver.name()).collect();
-    let faulty = (0..faults::FAULTS.len()).map(|fault| faults::faulty(fault, 0).0);
-    for observations in cases::cases().into_iter().map(|case| case.observations).chain(faulty) {
-        let diagnosis = faults::examined(&observations);
-        let of_hypotheses = diagnosis.hypotheses.iter().flat_map(|h| [&h.text, &h.advice]);
-        for text in diagnosis.findings.iter().map(|finding| &finding.text).chain(of_hypotheses) {
-            let values = text.say(Wordless);
-            let is_prose = |word: &str| word.len() > 3 && !closed_forms.contains(&word);
-            let prose: Vec<&str> =
-                values.split(|c: char| !c.is_alphabetic() && c != '_').filter(|word| is_prose(word)).collect();
-            assert!(prose.is_empty(), "{prose:?} can be said in English only: {text:?}");
-        }
-    }
-}
-
-#[test]
 fn healthy_sessions_raise_no_alarm() {
     for seed in 0..8 {
         let diagnosis = faults::examined(&faults::healthy(seed));
@@ -241,5 +224,26 @@ fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor
         let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
         let alarms: Vec<_> = diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning).collect();
         assert!(alarms.iter().all(|f| f.code == FindingCode::Renumbered), "{method:?}: {alarms:?}");
+    }
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn whatever_is_found_is_said_in_words_that_can_be_translated() {
+        let closed_forms: Vec<&str> = closed_form::all().iter().map(|solver| solver.name()).collect();
+        let faulty = (0..faults::FAULTS.len()).map(|fault| faults::faulty(fault, 0).0);
+        for observations in cases::cases().into_iter().map(|case| case.observations).chain(faulty) {
+            let diagnosis = faults::examined(&observations);
+            let of_hypotheses = diagnosis.hypotheses.iter().flat_map(|h| [&h.text, &h.advice]);
+            for text in diagnosis.findings.iter().map(|finding| &finding.text).chain(of_hypotheses) {
+                let values = text.say(Wordless);
+                let is_prose = |word: &str| word.len() > 3 && !closed_forms.contains(&word);
+                let prose: Vec<&str> =
+                    values.split(|c: char| !c.is_alphabetic() && c != '_').filter(|word| is_prose(word)).collect();
+                assert!(prose.is_empty(), "{prose:?} can be said in English only: {text:?}");
+            }
+        }
     }
 }

@@ -198,39 +198,43 @@ fn sound_replies() -> Vec<Vec<u8>> {
     .collect()
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 500_000, ..ProptestConfig::default() })]
+mod slow {
+    use super::*;
 
-    #[test]
-    fn random_bytes_never_panic(reply in prop::collection::vec(any::<u8>(), 0..200)) {
-        let _outcome = parse(&reply);
-    }
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 500_000, ..ProptestConfig::default() })]
 
-    #[test]
-    fn damaged_replies_never_panic(
-        which in 0usize..9,
-        hits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..6),
-    ) {
-        let mut reply = sound_replies().swap_remove(which);
-        for (at, byte, kind) in hits {
-            if reply.is_empty() {
-                break;
-            }
-            let at = at.index(reply.len());
-            match kind {
-                0 => reply[at] = byte,
-                1 => reply.insert(at, byte),
-                2 => { reply.remove(at); }
-                _ => reply.truncate(at),
-            }
+        #[test]
+        fn random_bytes_never_panic(reply in prop::collection::vec(any::<u8>(), 0..200)) {
+            let _outcome = parse(&reply);
         }
-        // Whatever is understood must also survive being read as a result.
-        if let Ok(ServerMessage::Returned { values, .. }) = parse(&reply) {
-            let returned = crate::client::Returned::new("fuzz", values);
-            let _outcome = (returned.number(0), returned.text(0), returned.blob(0), returned.resolution(1));
-            let _outcome = returned.pose::<(), ()>(0);
-            let _outcome = returned.matrix::<(), ()>(0);
-            let _outcome = returned.into_map(0);
+
+        #[test]
+        fn damaged_replies_never_panic(
+            which in 0usize..9,
+            hits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..6),
+        ) {
+            let mut reply = sound_replies().swap_remove(which);
+            for (at, byte, kind) in hits {
+                if reply.is_empty() {
+                    break;
+                }
+                let at = at.index(reply.len());
+                match kind {
+                    0 => reply[at] = byte,
+                    1 => reply.insert(at, byte),
+                    2 => { reply.remove(at); }
+                    _ => reply.truncate(at),
+                }
+            }
+            // Whatever is understood must also survive being read as a result.
+            if let Ok(ServerMessage::Returned { values, .. }) = parse(&reply) {
+                let returned = crate::client::Returned::new("fuzz", values);
+                let _outcome = (returned.number(0), returned.text(0), returned.blob(0), returned.resolution(1));
+                let _outcome = returned.pose::<(), ()>(0);
+                let _outcome = returned.matrix::<(), ()>(0);
+                let _outcome = returned.into_map(0);
+            }
         }
     }
 }

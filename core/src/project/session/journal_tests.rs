@@ -230,60 +230,64 @@ fn entry(step: &Step, history: &History) -> Entry {
     })
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+mod slow {
+    use super::*;
 
-    #[test]
-    fn a_journal_replays_to_the_same_document_and_stacks(steps in steps()) {
-        let mut history = History::new(Document::new(meta()));
-        let (begin, _) = encode(1, &Entry::begin(&history)).expect("begin");
-        let mut bytes = begin.into_bytes();
-        let mut sequence = 1;
-        // Where every line ends, and the state there.
-        let mut states = vec![(bytes.len(), history.clone())];
-        for step in &steps {
-            let (line, read) = encode(sequence + 1, &entry(step, &history)).expect("a line");
-            let before = history.clone();
-            let done = match read {
-                Entry::Edit(edit) => history.apply(edit),
-                Entry::Undo => history.undo(),
-                _ => history.redo(),
-            };
-            // A step that does not fit changes nothing and is not written down.
-            if done.is_err() {
-                prop_assert_eq!(&history, &before);
-                continue;
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn a_journal_replays_to_the_same_document_and_stacks(steps in steps()) {
+            let mut history = History::new(Document::new(meta()));
+            let (begin, _) = encode(1, &Entry::begin(&history)).expect("begin");
+            let mut bytes = begin.into_bytes();
+            let mut sequence = 1;
+            // Where every line ends, and the state there.
+            let mut states = vec![(bytes.len(), history.clone())];
+            for step in &steps {
+                let (line, read) = encode(sequence + 1, &entry(step, &history)).expect("a line");
+                let before = history.clone();
+                let done = match read {
+                    Entry::Edit(edit) => history.apply(edit),
+                    Entry::Undo => history.undo(),
+                    _ => history.redo(),
+                };
+                // A step that does not fit changes nothing and is not written down.
+                if done.is_err() {
+                    prop_assert_eq!(&history, &before);
+                    continue;
+                }
+                sequence += 1;
+                bytes.extend(line.as_bytes());
+                states.push((bytes.len(), history.clone()));
+                if matches!(step, Step::Undo) {
+                    let mut again = history.clone();
+                    again.redo().expect("what was undone can be redone");
+                    prop_assert_eq!(again, before);
+                } else {
+                    let mut back = history.clone();
+                    back.undo().expect("what was done can be undone");
+                    prop_assert_eq!(back.document(), before.document());
+                }
             }
-            sequence += 1;
-            bytes.extend(line.as_bytes());
-            states.push((bytes.len(), history.clone()));
-            if matches!(step, Step::Undo) {
-                let mut again = history.clone();
-                again.redo().expect("what was undone can be redone");
-                prop_assert_eq!(again, before);
-            } else {
-                let mut back = history.clone();
-                back.undo().expect("what was done can be undone");
-                prop_assert_eq!(back.document(), before.document());
+            for (length, state) in &states {
+                let replayed = replay(&bytes[..*length]).expect("whole");
+                prop_assert_eq!(&replayed.history, state);
+                prop_assert_eq!(replayed.length, *length);
+                // To the last bit, and not only equal.
+                let text = |history: &History| format!("{history:?}");
+                prop_assert_eq!(text(&replayed.history), text(state));
             }
+            let (last, state) = &states[states.len() - 1];
+            let from = states[states.len().saturating_sub(4)].0;
+            for cut in from..*last {
+                let (length, state) = states.iter().rev().find(|(length, _)| *length <= cut).expect("the first line");
+                let replayed = replay(&bytes[..cut]).expect("torn");
+                prop_assert_eq!((&replayed.history, replayed.length), (state, *length));
+            }
+            let json = session_file::to_json(state.document(), sequence, state.last_capture()).expect("text");
+            let file = session_file::from_json(&json).expect("reads");
+            prop_assert_eq!((&file.document, file.sequence), (&**state.document(), Some(sequence)));
         }
-        for (length, state) in &states {
-            let replayed = replay(&bytes[..*length]).expect("whole");
-            prop_assert_eq!(&replayed.history, state);
-            prop_assert_eq!(replayed.length, *length);
-            // To the last bit, and not only equal.
-            let text = |history: &History| format!("{history:?}");
-            prop_assert_eq!(text(&replayed.history), text(state));
-        }
-        let (last, state) = &states[states.len() - 1];
-        let from = states[states.len().saturating_sub(4)].0;
-        for cut in from..*last {
-            let (length, state) = states.iter().rev().find(|(length, _)| *length <= cut).expect("the first line");
-            let replayed = replay(&bytes[..cut]).expect("torn");
-            prop_assert_eq!((&replayed.history, replayed.length), (state, *length));
-        }
-        let json = session_file::to_json(state.document(), sequence, state.last_capture()).expect("text");
-        let file = session_file::from_json(&json).expect("reads");
-        prop_assert_eq!((&file.document, file.sequence), (&**state.document(), Some(sequence)));
     }
 }

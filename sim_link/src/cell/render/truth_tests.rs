@@ -103,35 +103,6 @@ fn errors(all: &[Vector2<f64>]) -> Errors {
     Errors { mean, rms }
 }
 
-#[test]
-fn corners_measured_in_the_image_are_where_the_lens_model_projects_them() {
-    for camera in cameras() {
-        let renderer = Renderer::new(camera, 0.01, 3.5);
-        let mut random = ChaCha8Rng::seed_from_u64(7);
-        // Every other image as sharp as can be, which is the hardest to measure in, the rest as a good lens makes it.
-        let mut all = [Vec::new(), Vec::new()];
-        for seed in 0..200 {
-            let blurred = seed % 2;
-            let imaging = Imaging { blur_px: [0.0, 0.7][blurred], ..Imaging::default() };
-            let pose = random_pose(&mut random, &camera, std::f64::consts::PI);
-            let image = renderer.render_rgb(&scene(pose), &imaging, seed as u64);
-            for i in 0..COLUMNS * ROWS {
-                let (c, r) = ((i % COLUMNS) as f64, (i / COLUMNS) as f64);
-                let at = |c: f64, r: f64| camera.project(&(pose * corner(c, r))).expect("in front");
-                let truth = at(c, r);
-                let side = (at(c + 0.5, r) - at(c - 0.5, r)).norm().min((at(c, r + 0.5) - at(c, r - 0.5)).norm());
-                // The window stays inside the four squares, where the image is symmetric about the corner.
-                all[blurred].push(refine(&image, truth, 0.2 * side) - truth);
-            }
-        }
-        for Errors { mean, rms } in all.map(|all| errors(&all)) {
-            println!("{}: mean {mean:?} rms {rms:?}", camera.distortion.name());
-            assert!(mean.amax() < 0.002, "{mean:?}");
-            assert!(rms.amax() < 0.025, "{rms:?}");
-        }
-    }
-}
-
 /// Along an image row, the sum of the dark parts of the pixels from the middle of a dark square to the middle of a
 /// white one is the place of the edge between them, whatever the blur: a ruler without an estimator.
 #[test]
@@ -227,4 +198,37 @@ fn an_upright_camera_sees_the_boards_x_axis_to_the_right_and_its_y_axis_down() {
     let ((top_left, a), (top_right, b), (bottom_left, c)) = (level(-0.5, -0.5), level(9.5, -0.5), level(-0.5, 6.5));
     assert!(top_left.x < 200.0 && top_right.x > 440.0 && bottom_left.y > 300.0);
     assert!(a < 60.0 && b < 60.0 && c > 120.0, "{a} {b} {c}");
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn corners_measured_in_the_image_are_where_the_lens_model_projects_them() {
+        for camera in cameras() {
+            let renderer = Renderer::new(camera, 0.01, 3.5);
+            let mut random = ChaCha8Rng::seed_from_u64(7);
+            // Every other image as sharp as can be, which is the hardest to measure in, the rest as a good lens makes it.
+            let mut all = [Vec::new(), Vec::new()];
+            for seed in 0..200 {
+                let blurred = seed % 2;
+                let imaging = Imaging { blur_px: [0.0, 0.7][blurred], ..Imaging::default() };
+                let pose = random_pose(&mut random, &camera, std::f64::consts::PI);
+                let image = renderer.render_rgb(&scene(pose), &imaging, seed as u64);
+                for i in 0..COLUMNS * ROWS {
+                    let (c, r) = ((i % COLUMNS) as f64, (i / COLUMNS) as f64);
+                    let at = |c: f64, r: f64| camera.project(&(pose * corner(c, r))).expect("in front");
+                    let truth = at(c, r);
+                    let side = (at(c + 0.5, r) - at(c - 0.5, r)).norm().min((at(c, r + 0.5) - at(c, r - 0.5)).norm());
+                    // The window stays inside the four squares, where the image is symmetric about the corner.
+                    all[blurred].push(refine(&image, truth, 0.2 * side) - truth);
+                }
+            }
+            for Errors { mean, rms } in all.map(|all| errors(&all)) {
+                println!("{}: mean {mean:?} rms {rms:?}", camera.distortion.name());
+                assert!(mean.amax() < 0.002, "{mean:?}");
+                assert!(rms.amax() < 0.025, "{rms:?}");
+            }
+        }
+    }
 }

@@ -129,38 +129,42 @@ fn pass_rates(start: &JointAngles, points: &[JointAngles]) -> f64 {
     std::iter::once(start).chain(points).zip(points).map(|(a, b)| largest_change(a, b).1 / DT_S).fold(0.0, f64::max)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+mod slow {
+    use super::*;
 
-    #[test]
-    fn wherever_the_tip_is_sent_it_stays_on_its_line_and_no_joint_is_faster_than_it_may_be(
-        start in prop::array::uniform6(-3.0_f64..3.0),
-        along in direction(),
-        turns in any::<bool>(),
-        share in 0.05_f64..1.0,
-    ) {
-        let arm = arm();
-        let tip = arm.tip(&start);
-        let path = if turns {
-            Path::Turn { kinematics: &arm, start: tip, about: along, centre: tip.translation() }
-        } else {
-            Path::Line { kinematics: &arm, start: tip, along }
-        };
-        let mut plan = JogPlan::new(path, start, DT_S, None).expect("no length");
-        // Three metres of line, or more than a turn: most ways end at an obstacle before.
-        let points = run(&mut plan, |pass| (pass < 2000).then_some(share));
-        let rate = pass_rates(&start, &points);
-        prop_assert!(rate <= JOINT_RATE * (1.0 + 1e-9), "{}°/s", rate.to_degrees());
-        for q in &points {
-            let now = arm.tip(q);
-            let (distance_m, angle_rad) = if turns {
-                ((now.translation() - tip.translation()).norm(), 0.0)
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+        #[test]
+        fn wherever_the_tip_is_sent_it_stays_on_its_line_and_no_joint_is_faster_than_it_may_be(
+            start in prop::array::uniform6(-3.0_f64..3.0),
+            along in direction(),
+            turns in any::<bool>(),
+            share in 0.05_f64..1.0,
+        ) {
+            let arm = arm();
+            let tip = arm.tip(&start);
+            let path = if turns {
+                Path::Turn { kinematics: &arm, start: tip, about: along, centre: tip.translation() }
             } else {
-                let moved = now.translation() - tip.translation();
-                ((moved - along * moved.dot(&along)).norm(), tip.distance_to(&now).1)
+                Path::Line { kinematics: &arm, start: tip, along }
             };
-            prop_assert!(distance_m < 1e-7 && angle_rad < 1e-6, "{distance_m} m, {angle_rad} rad off");
-            prop_assert!(arm.limits().contains(q));
+            let mut plan = JogPlan::new(path, start, DT_S, None).expect("no length");
+            // Three metres of line, or more than a turn: most ways end at an obstacle before.
+            let points = run(&mut plan, |pass| (pass < 2000).then_some(share));
+            let rate = pass_rates(&start, &points);
+            prop_assert!(rate <= JOINT_RATE * (1.0 + 1e-9), "{}°/s", rate.to_degrees());
+            for q in &points {
+                let now = arm.tip(q);
+                let (distance_m, angle_rad) = if turns {
+                    ((now.translation() - tip.translation()).norm(), 0.0)
+                } else {
+                    let moved = now.translation() - tip.translation();
+                    ((moved - along * moved.dot(&along)).norm(), tip.distance_to(&now).1)
+                };
+                prop_assert!(distance_m < 1e-7 && angle_rad < 1e-6, "{distance_m} m, {angle_rad} rad off");
+                prop_assert!(arm.limits().contains(q));
+            }
         }
     }
 }

@@ -154,5 +154,5 @@ fn every_live_image_is_judged_and_a_paused_simulation_is_named() {
 
     bench.client.arm().sim().pause_simulation().expect("it pauses");
     let refused = bench.capture(request(9, 1)).expect_err("time stands still");
-    assert_eq!(refused.kind, RefusalKind::NotSettled, "{refused:?}");
+    assert_eq!(refused.kind, RefusalKind::Paused, "{refused:?}");
 }
