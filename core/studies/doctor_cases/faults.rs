@@ -1,15 +1,16 @@
 //! The six faults that have to be ranked first, and healthy sessions.
 
 use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
-use handeye_core::diagnose::findings::{FindingCode, FindingOptions};
+use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity};
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::{Method, Observations, ObservedView, calibrate};
 use handeye_core::progress::CancelToken;
-use nalgebra::{Isometry3, Vector3, Vector6};
+use handeye_core::testing::sessions::normal;
+use nalgebra::{Isometry3, SMatrix, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::sim::{Fault, Setup, changed, session};
+use super::sim::{ArmError, Fault, Setup, changed, session};
 
 /// The diagnosis with the calibration beside it, as the command line makes it.
 pub fn examined(observations: &Observations) -> Diagnosis {
@@ -141,6 +142,63 @@ pub fn healthy(seed: u64) -> Observations {
         joints: rng.random(),
         ..Setup::new(mode, rng.random_range(10..=40), seed)
     })
+}
+
+/// A healthy session as it is met: an arm whose error depends on where it stands and is 1 to 3 mm, views level by level,
+/// corner errors that neighbours share, a sheet that is not flat. Joints are not given where links have errors: an offset
+/// of a joint is then true. The second value is what it was made of.
+pub fn as_met(seed: u64) -> (Observations, Setup) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x3e71);
+    let mode = if rng.random::<bool>() { Mode::EyeInHand } else { Mode::EyeToHand };
+    let size_m = rng.random_range(1e-3..3e-3);
+    let rad_per_m = 0.07f64.to_radians() / 1e-3;
+    let arm_error = match rng.random_range(0..4) {
+        0 => ArmError::None,
+        // The tip is 0.2 m from the middle of its places, RMS, along all three axes together.
+        1 => ArmError::Affine(SMatrix::from_fn(|i, _| {
+            normal(&mut rng) * size_m * if i < 3 { 1.0 } else { rad_per_m } / 0.2
+        })),
+        _ => ArmError::Links(std::array::from_fn(|_| {
+            std::array::from_fn(|k| normal(&mut rng) * 0.5 * size_m * if k < 2 { 1.0 } else { rad_per_m })
+        })),
+    };
+    let robot = [(2e-5, 5e-3), (1e-4, 0.02)][rng.random_range(0..2usize)];
+    let warp_m = if rng.random::<bool>() { 0.0 } else { rng.random_range(-1e-3..1e-3) };
+    let corner_px = [0.03, 0.1, 0.3][rng.random_range(0..3usize)];
+    let setup = Setup {
+        tilt_deg: rng.random_range(25.0..50.0),
+        roll_deg: rng.random_range(20.0..120.0),
+        corner_px,
+        shared_px: if rng.random::<bool>() { 0.5 * corner_px } else { 0.0 },
+        robot_m: robot.0,
+        robot_rad: f64::to_radians(robot.1),
+        estimated: rng.random(),
+        joints: !matches!(arm_error, ArmError::Links(_)) && rng.random(),
+        by_level: rng.random(),
+        arm_error,
+        fault: Fault { warp_m, ..Fault::default() },
+        ..Setup::new(mode, rng.random_range(10..=40), seed)
+    };
+    (session(&setup), setup)
+}
+
+/// Whether a finding accuses something of a healthy session made so.
+pub fn names_a_cause(finding: &Finding, setup: &Setup) -> bool {
+    use FindingCode as C;
+    let cause = [
+        C::BoardMoved,
+        C::CameraMoved,
+        C::WrongScale,
+        C::WrongIntrinsics,
+        C::JointOffset,
+        C::OutlierView,
+        C::OutlierCorners,
+        C::ShiftedPoses,
+        C::WrongMode,
+        C::WrongLengthUnit,
+    ];
+    let flat = setup.fault.warp_m == 0.0 && finding.code == C::BoardBent;
+    finding.severity >= Severity::Warning && (flat || cause.contains(&finding.code))
 }
 
 /// Error of the size found for a target that is 2 % too large, over its uncertainty, squared.

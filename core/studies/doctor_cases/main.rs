@@ -1,12 +1,15 @@
-//! What the doctor says of constructed sessions: forty that are degenerate or hostile, healthy ones, and six faults.
+//! What the doctor says of constructed sessions: forty that are degenerate or hostile, healthy ones, and nine faults.
 //!
 //! `cargo run --release -p handeye_core --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or
-//! `… -- TEXT` for the whole report on every case whose name has that text.
+//! `… -- TEXT` for the whole report on every case whose name has that text; `… -- as-met [SESSIONS] [FIRST]` for the healthy
+//! sessions with an arm whose error depends on where it stands; one alone with its report.
 
 mod arm;
 mod cases;
 mod faults;
 mod sim;
+
+use std::collections::BTreeMap;
 
 use handeye_core::diagnose::findings::Severity;
 use handeye_core::wording::English;
@@ -15,8 +18,33 @@ fn number(argument: Option<String>, otherwise: u64) -> u64 {
     argument.and_then(|a| a.parse().ok()).unwrap_or(otherwise)
 }
 
+/// False alarms in healthy sessions whose arm, board and corners are not ideal.
+fn as_met(first: u64, sessions: u64) {
+    let (mut alarmed, mut alarms) = (0, BTreeMap::<String, usize>::new());
+    for seed in first..first + sessions {
+        let (observations, setup) = faults::as_met(20_000 + seed);
+        let diagnosis = faults::examined(&observations);
+        if sessions == 1 {
+            println!("{}", diagnosis.report());
+        }
+        let named: Vec<_> =
+            diagnosis.findings.iter().filter(|finding| faults::names_a_cause(finding, &setup)).collect();
+        alarmed += usize::from(!named.is_empty());
+        for finding in named {
+            *alarms.entry(format!("{:?}", finding.code)).or_default() += 1;
+            println!("as met {seed}, {setup}: {finding}");
+        }
+    }
+    println!("a cause named in {alarmed} of {sessions} healthy sessions as they are met: {alarms:?}\n");
+}
+
 fn main() {
     let mut arguments = std::env::args().skip(1).peekable();
+    if arguments.next_if(|a| a == "as-met").is_some() {
+        let sessions = number(arguments.next(), 200);
+        as_met(number(arguments.next(), 0), sessions);
+        return;
+    }
     if let Some(text) = arguments.next_if(|a| a.parse::<u64>().is_err()) {
         for case in cases::cases().iter().filter(|c| c.name.contains(&text)) {
             println!("{}\n{}", case.name, faults::examined(&case.observations).report());
@@ -51,6 +79,8 @@ fn main() {
         }
     }
     println!("{alarms} false alarms in {sessions} healthy sessions\n");
+
+    as_met(0, sessions);
 
     for estimated in [false, true] {
         let squares: Vec<f64> = (0..2 * seeds).filter_map(|seed| faults::scale_error(estimated, 9000 + seed)).collect();

@@ -1,5 +1,7 @@
 //! Sessions of a simulated cell with known faults: poses and corners, no images.
 
+use std::fmt;
+
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView};
 use handeye_core::geometry::camera::Distortion;
@@ -7,8 +9,8 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3;
 use handeye_core::targets::Grid;
 use handeye_core::targets::observation::Corner;
-use handeye_core::testing::sessions::{BOARD, board_at, camera, noise_twist, noisy};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use handeye_core::testing::sessions::{BOARD, board_at, camera, noise_twist, noisy, normal};
+use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -28,9 +30,30 @@ pub struct Setup {
     /// Whether intrinsics are estimated.
     pub estimated: bool,
     pub joints: bool,
+    /// Errors of the arm that depend on where it stands.
+    pub arm_error: ArmError,
+    /// Errors of corners that neighbours share: bends of the grid in the image, pixels.
+    pub shared_px: f64,
+    /// Views are taken level by level, each along a round, as a person or a plan does; otherwise in no order.
+    pub by_level: bool,
     pub seed: u64,
     pub fault: Fault,
 }
+
+/// Errors of an arm that depend on where it stands.
+#[derive(Clone, Copy, Default)]
+pub enum ArmError {
+    /// None besides the noise.
+    #[default]
+    None,
+    /// A twist of the tip that grows with its place in the base, per metre from [`WORKPLACE`].
+    Affine(SMatrix<f64, 6, 3>),
+    /// What is wrong with every link.
+    Links(arm::LinkErrors),
+}
+
+/// The middle of where the tip is in both set-ups, metres in the base.
+const WORKPLACE: Vector3<f64> = Vector3::new(0.42, 0.06, 0.45);
 
 /// What is wrong.
 #[derive(Clone, Default)]
@@ -63,6 +86,9 @@ impl Setup {
             robot_rad: 0.02f64.to_radians(),
             estimated: false,
             joints: false,
+            arm_error: ArmError::None,
+            shared_px: 0.0,
+            by_level: false,
             seed,
             fault: Fault::default(),
         }
@@ -70,6 +96,25 @@ impl Setup {
 
     pub fn with(self, fault: Fault) -> Self {
         Self { fault, ..self }
+    }
+}
+
+/// What a report of a study needs to tell sessions apart.
+impl fmt::Display for Setup {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let arm = match self.arm_error {
+            ArmError::None => "arm true",
+            ArmError::Affine(_) => "arm affine",
+            ArmError::Links(_) => "arm links",
+        };
+        let lens = if self.estimated { "lens estimated" } else { "lens given" };
+        let order = if self.by_level { "by level" } else { "in no order" };
+        write!(
+            f,
+            "{:?}, {} views {order}, {arm}, {lens}, corners {} + {} px, ",
+            self.mode, self.views, self.corner_px, self.shared_px
+        )?;
+        write!(f, "warp {:.1} mm", self.fault.warp_m * 1e3)
     }
 }
 
@@ -108,17 +153,27 @@ fn random_view(rng: &mut ChaCha8Rng, setup: &Setup) -> Isometry3<f64> {
 /// Random views of the setup's geometry.
 pub fn session(setup: &Setup) -> Observations {
     let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
-    let mut views = Vec::with_capacity(setup.views);
+    let (mut views, mut planned) = (Vec::with_capacity(setup.views), Vec::new());
     let mut tries = 0;
     while views.len() < setup.views {
         tries += 1;
         assert!(tries < 100 * setup.views + 1000, "no such view is in reach");
-        let planned = random_view(&mut rng, setup);
-        if let Some(view) = observed(setup, &mut rng, views.len(), &planned) {
+        let next = random_view(&mut rng, setup);
+        if let Some(view) = observed(setup, &mut rng, views.len(), &next) {
             views.push(view);
+            planned.push(next);
         }
     }
-    observations(setup, views)
+    if !setup.by_level {
+        return observations(setup, views);
+    }
+    let level = |view: &Isometry3<f64>| (view.translation.z / 0.07) as i32;
+    let around = |view: &Isometry3<f64>| {
+        let normal = view * Vector3::z();
+        normal.y.atan2(normal.x)
+    };
+    planned.sort_by(|a, b| level(a).cmp(&level(b)).then(around(a).total_cmp(&around(b))));
+    session_of(setup, &planned)
 }
 
 /// Views with the given poses of the target in the camera; those out of sight are left out.
@@ -157,6 +212,13 @@ fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometr
             off = reported.inverse() * arm::base_from_tip(&really);
         }
     }
+    match &setup.arm_error {
+        ArmError::None => {}
+        ArmError::Affine(per_metre) => off *= se3::exp(&(per_metre * (reported.translation.vector - WORKPLACE))),
+        ArmError::Links(errors) => {
+            off = off * reported.inverse() * arm::with_errors(&arm::joints_at(&reported)?, errors);
+        }
+    }
     let noise = noise_twist(rng, setup.robot_m, setup.robot_rad);
     let mut tip = reported * off * se3::exp(&noise);
     let moving = fault.moving.iter().find(|(view, _)| *view == index).map(|(_, twist)| twist);
@@ -173,14 +235,19 @@ fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometr
     let camera_from_target = mount_from_camera.inverse() * mount_from_anchor * anchor_from_target;
     let noise_px = if moving.is_some() { 3.0 * setup.corner_px } else { setup.corner_px };
     let lens = camera();
+    let mut shared = SMatrix::<f64, 2, 6>::zeros();
+    if setup.shared_px > 0.0 {
+        shared = SMatrix::from_fn(|_, _| normal(rng) * setup.shared_px);
+    }
     let corners: Vec<Corner> = (0..GRID.len())
         .map(|i| {
             let mut point = GRID.point(i);
             let (u, v) = (2.0 * point.x / (9.0 * GRID.square_m) - 1.0, 2.0 * point.y / (6.0 * GRID.square_m) - 1.0);
+            let bend = shared * Vector6::new(1.0, u, v, u * v, u * u, v * v) / 2.0;
             point.z += fault.warp_m * (2.0 - u * u - v * v);
             point.coords *= 1.0 + fault.scale;
             let px = lens.project(&(camera_from_target * point)).ok()?;
-            let seen = noisy(rng, &px, noise_px);
+            let seen = noisy(rng, &px, noise_px) + bend;
             lens.contains(&seen).then_some(Corner::new(i, seen))
         })
         .collect::<Option<_>>()?;

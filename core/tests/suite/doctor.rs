@@ -56,6 +56,17 @@ fn healthy_sessions_raise_no_alarm() {
 }
 
 #[test]
+fn an_arm_whose_error_depends_on_where_it_stands_raises_no_alarm() {
+    // Of sessions like these one in fifty has a cause named; of those without a model of such errors every fourth had.
+    for seed in 20_000..20_012 {
+        let (observations, setup) = faults::as_met(seed);
+        let findings = faults::examined(&observations).findings;
+        let named: Vec<_> = findings.iter().filter(|finding| faults::names_a_cause(finding, &setup)).collect();
+        assert!(named.is_empty(), "{setup}: {named:?}");
+    }
+}
+
+#[test]
 fn each_injected_fault_is_ranked_first() {
     for (fault, name) in faults::FAULTS.iter().enumerate() {
         for seed in 0..2 {

@@ -40,11 +40,11 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Cla
     if !missed && others.is_empty() {
         return Claim::AsModelled;
     }
-    let Some(without) = model.fit(&base, selection.fit.robot) else { return Claim::Nothing };
+    let Some(without) = model.fit(&base, selection.fit.levels) else { return Claim::Nothing };
     let mut alternatives = Vec::new();
     if missed {
         // With so much left out nothing determines the answer.
-        let Some(fit) = model.fit(&with, selection.fit.robot) else { return Claim::Nothing };
+        let Some(fit) = model.fit(&with, selection.fit.levels) else { return Claim::Nothing };
         alternatives.push(between(&without, &fit));
     }
     alternatives.extend(others.into_iter().map(|judged| between(&without, &judged.fit)));

@@ -1,15 +1,20 @@
 //! One hypothesis judged: fitted with noise levels of its own, tested, and asked to predict views left out.
 
 use nalgebra::{DVector, Matrix6, Vector6};
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, StudentsT};
 
 use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
+use super::screen::view_score;
 use super::views::SessionViews;
+use crate::geometry::statistics::outliers;
 
 /// Probability of a false alarm per hypothesis, after allowance for the alternatives among which the best was picked.
 /// One in ten thousand, because noise of real robots has longer tails than a Gaussian.
 const ALPHA: f64 = 1e-4;
+/// Probability that a hypothesis predicts views left out better by chance, after the same allowance. It is asked for
+/// besides the one above, whose law of the noise may be wrong.
+const HELD_OUT_ALPHA: f64 = 1e-2;
 /// Parts that views are left out in, one at a time; as for the held-out error of a calibration.
 const FOLDS: usize = 5;
 /// An offset of a joint must predict held-out views better by this part: an arm has many ways to be wrong, and one more
@@ -48,6 +53,8 @@ pub(super) struct Judged {
     pub score: f64,
     pub significant: bool,
     pub matters: bool,
+    /// Logarithm of the number of alternatives among which it is the best.
+    ln_alternatives: f64,
     /// Whether it stands beside the one that was taken in first: the robot's poses cannot tell the two apart.
     pub as_good: bool,
     /// Prediction of held-out views without and with it.
@@ -59,34 +66,56 @@ pub(super) struct Judged {
 }
 
 /// How views left out of a fit are predicted.
-#[derive(Clone, Copy)]
 pub(super) struct HeldOut {
     /// Displacement of the board, RMS, metres.
     pub rms_m: f64,
-    /// Logarithm of the predictive likelihood, but for a constant.
-    score: f64,
+    /// Of every view: logarithm of its predictive likelihood, but for a constant.
+    scores: Vec<f64>,
+}
+
+impl HeldOut {
+    /// Whether views are predicted better than by another model, by more than chance: Student's test of the mean gain
+    /// against how the gains scatter over the views, which needs no law of the noise.
+    fn is_better_than(&self, other: &Self, ln_alternatives: f64) -> bool {
+        let gains: Vec<f64> = self.scores.iter().zip(&other.scores).map(|(with, without)| with - without).collect();
+        let count = gains.len() as f64;
+        let mean = gains.iter().sum::<f64>() / count;
+        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        let Ok(distribution) = StudentsT::new(0.0, 1.0, (count - 1.0).max(1.0)) else { return false };
+        let statistic = mean * count.sqrt() / variance.sqrt();
+        statistic > 0.0 && distribution.sf(statistic) * ln_alternatives.exp() < HELD_OUT_ALPHA
+    }
 }
 
 impl Judged {
     /// Whether it is to be taken in.
     pub fn holds(&self) -> bool {
-        let held_out = match (&self.candidate, self.held_out) {
+        let held_out = match (&self.candidate, &self.held_out) {
             // Corners say it themselves, each of hundreds; views are left out, not modelled.
             (Candidate::Effect(Effect::Warp | Effect::Lens) | Candidate::Views(_), _) => true,
             (Candidate::Effect(_), None) => false,
             (Candidate::Effect(Effect::Joint(_)), Some((without, with))) => {
-                with.score > without.score && with.rms_m < (1.0 - HELD_OUT_GAIN) * without.rms_m
+                with.is_better_than(without, self.ln_alternatives) && with.rms_m < (1.0 - HELD_OUT_GAIN) * without.rms_m
             }
-            (Candidate::Effect(_), Some((without, with))) => with.score > without.score,
+            (Candidate::Effect(_), Some((without, with))) => with.is_better_than(without, self.ln_alternatives),
         };
-        self.significant && self.matters && held_out
+        // A bend too small to be reported is still there, and what it leaves must not be taken for something else.
+        let matters = self.matters || self.candidate == Candidate::Effect(Effect::Warp);
+        self.significant && matters && held_out
     }
 
     /// Whether it leaves the robot about as little noise as another hypothesis of another kind does.
     pub fn explains_as_much_as(&self, other: &Self) -> bool {
         let effects = |j: &Self| matches!(j.candidate, Candidate::Effect(_));
         let left = |j: &Self| j.robot[0].1 * j.robot[1].1;
-        effects(self) && effects(other) && self.significant && self.matters && left(self) < AS_GOOD * left(other)
+        // The robot may hide what the corners decide: an explanation that the data contradict is none.
+        let contradicted = other.gain - self.gain > -ALPHA.ln();
+        effects(self)
+            && effects(other)
+            && self.significant
+            && self.matters
+            && !contradicted
+            && left(self) < AS_GOOD * left(other)
     }
 }
 
@@ -118,7 +147,7 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         Candidate::Effect(effect) => next.effects.push(*effect),
         Candidate::Views(views) => next.aside.extend(views),
     }
-    let fit = model.fit(&next, before.robot)?;
+    let fit = model.fit(&next, before.levels)?;
     let (wald, count, numbers, sigma, ln_alternatives);
     match &candidate {
         Candidate::Effect(effect) => {
@@ -142,7 +171,7 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         Candidate::Effect(_) => predicted(model, &next, before).zip(predicted(model, &next, &fit)),
         Candidate::Views(_) => None,
     };
-    let level = |k: usize| (before.robot[k].sqrt(), fit.robot[k].sqrt());
+    let level = |k: usize| (before.levels.noise[k].sqrt(), fit.levels.noise[k].sqrt());
     let mut judged = Judged {
         numbers,
         sigma,
@@ -151,6 +180,7 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         score: gain - 0.5 * count as f64 * (6.0 * fit.views as f64).ln() - ln_alternatives,
         significant: is_significant(wald, count, freedom, ln_alternatives),
         matters: false,
+        ln_alternatives,
         as_good: false,
         held_out,
         robot: [level(0), level(1)],
@@ -159,7 +189,24 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         candidate,
     };
     judged.matters = matters(model, &judged);
+    if let Candidate::Views(views) = &judged.candidate {
+        judged.significant &= stand_apart(&judged, views);
+    }
     Some(judged)
+}
+
+/// Whether each of these views is an outlier among all of them, by a fit that is without.
+fn stand_apart(judged: &Judged, views: &[usize]) -> bool {
+    let fit = &judged.fit;
+    let squared = |view: usize| {
+        let outside = judged.state.aside.contains(&view);
+        if outside { fit.wald_of_views(&[view]) } else { view_score(fit, view) }.unwrap_or(0.0)
+    };
+    let squared: Vec<f64> = (0..fit.residuals.len()).map(squared).collect();
+    let level = 1.0 - ALPHA / squared.len() as f64;
+    let limit = FisherSnedecor::new(6.0, fit.freedom()).map_or(f64::INFINITY, |f| 6.0 * f.inverse_cdf(level));
+    let outliers = outliers(&squared, limit);
+    views.iter().all(|view| outliers.contains(view))
 }
 
 fn ln_choose(n: usize, k: usize) -> f64 {
@@ -207,7 +254,7 @@ fn predicted(model: &Model<'_>, with: &State, fit: &Fit) -> Option<HeldOut> {
     let inside: Vec<usize> = (0..model.rows.len()).filter(|i| !with.aside.contains(i)).collect();
     let normal = inverse(&fit.covariance)?;
     let right = &normal * &fit.theta;
-    let (mut squares, mut score) = (0.0, 0.0);
+    let (mut squares, mut scores) = (0.0, Vec::with_capacity(inside.len()));
     for fold in 0..FOLDS.min(inside.len()) {
         let held: Vec<usize> = inside.iter().copied().skip(fold).step_by(FOLDS).collect();
         let (mut n, mut b) = (normal.clone(), right.clone());
@@ -227,9 +274,9 @@ fn predicted(model: &Model<'_>, with: &State, fit: &Fit) -> Option<HeldOut> {
             let own = fit.weights[i].try_inverse()? + Matrix6::from_iterator(shared.iter().copied());
             // Half the logarithm of the determinant is that of the product of the pivots.
             let cholesky = own.cholesky()?;
-            score -= cholesky.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
-            score -= 0.5 * residual.dot(&cholesky.solve(&residual));
+            let volume = cholesky.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+            scores.push(-volume - 0.5 * residual.dot(&cholesky.solve(&residual)));
         }
     }
-    Some(HeldOut { rms_m: (squares / inside.len() as f64).sqrt(), score })
+    Some(HeldOut { rms_m: (squares / inside.len() as f64).sqrt(), scores })
 }

@@ -13,9 +13,13 @@
 //!
 //! Reference: Patterson & Thompson 1971 (restricted likelihood); Cook & Weisberg 1982 (deletion of cases).
 
+use std::ops::Range;
+use std::rc::Rc;
+
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::effect::Effect;
+use super::field::{Field, SLOPES};
 use super::views::SessionViews;
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::chain::Chain;
@@ -28,6 +32,12 @@ const LARGEST_STEP: f64 = 2.0;
 const MAX_STEPS: usize = 25;
 /// Relative change of both variances that ends the search.
 const SETTLED: f64 = 1e-2;
+/// Slopes of the field that the data have to determine, together, for there to be one. It then explains about as much as
+/// a tenth of one more unknown would.
+const LEAST_DETERMINED: f64 = 0.1;
+/// Information on the logarithm of a variance of the field below which it changes nothing: its effects then stand out of
+/// the noise by a thirtieth.
+const NO_FIELD: f64 = 1e-3;
 
 /// One view in the linear model.
 pub(super) struct Row {
@@ -43,6 +53,24 @@ pub(super) struct Model<'a> {
     pub sight: &'a SessionViews,
     pub solution: ClosedFormSolution,
     pub rows: Vec<Row>,
+    /// Errors of the robot that depend on where it stands, where there are any.
+    pub field: Option<Rc<Field>>,
+}
+
+/// Variances of the robot per axis, of position (m²) and of orientation (rad²).
+#[derive(Clone, Copy)]
+pub(super) struct Levels {
+    /// Of its noise, view by view.
+    pub noise: [f64; 2],
+    /// Of what depends on where it stands, at a typical place.
+    pub field: [f64; 2],
+}
+
+impl Levels {
+    /// With as much of the one as of the other.
+    pub fn even(noise: [f64; 2]) -> Self {
+        Self { noise, field: noise }
+    }
 }
 
 /// Which views and effects are in a fit.
@@ -55,11 +83,12 @@ pub(super) struct State {
 
 /// The result of a fit.
 pub(super) struct Fit {
-    /// `[x (6), y (6), lens if free, numbers of the effects…]`
+    /// `[x (6), y (6), lens if free, slopes of the field if there is one, numbers of the effects…]`
     pub theta: DVector<f64>,
     pub covariance: DMatrix<f64>,
-    /// Variances of the robot's position and orientation per axis.
-    pub robot: [f64; 2],
+    pub levels: Levels,
+    /// Unknowns that the data determine: a slope of the field that follows its prior counts for less than one.
+    pub determined: f64,
     /// Residual of every view, those aside included.
     pub residuals: Vec<Vector6<f64>>,
     pub weights: Vec<Matrix6<f64>>,
@@ -70,7 +99,7 @@ pub(super) struct Fit {
 }
 
 impl<'a> Model<'a> {
-    pub fn new(sight: &'a SessionViews, solution: ClosedFormSolution) -> Self {
+    pub fn new(sight: &'a SessionViews, solution: ClosedFormSolution, field: Option<Rc<Field>>) -> Self {
         let rows = sight
             .views
             .iter()
@@ -93,7 +122,7 @@ impl<'a> Model<'a> {
                 }
             })
             .collect();
-        Self { sight, solution, rows }
+        Self { sight, solution, rows, field }
     }
 
     /// The same views at the solution that a fit found.
@@ -103,7 +132,7 @@ impl<'a> Model<'a> {
             mount_from_camera: self.solution.mount_from_camera.perturbed(&step(0)),
             anchor_from_target: self.solution.anchor_from_target.perturbed(&step(6)),
         };
-        Self::new(self.sight, solution)
+        Self::new(self.sight, solution, self.field.clone())
     }
 
     /// Mean squared displacement of the board by a residual, as a length, metres.
@@ -111,9 +140,23 @@ impl<'a> Model<'a> {
         (residual.transpose() * self.sight.displacement * residual)[0].max(0.0).sqrt()
     }
 
+    /// First column of the field.
+    fn field_at(&self) -> usize {
+        12 + if self.sight.lens_free { self.sight.lens_count() } else { 0 }
+    }
+
     /// First column of the effects.
     pub fn effects_at(&self) -> usize {
-        12 + if self.sight.lens_free { self.sight.lens_count() } else { 0 }
+        self.field_at() + self.slopes()
+    }
+
+    /// Whether a fit found that errors depend on where the robot stands: the data determine a part of the slopes.
+    pub fn has_field(&self, fit: &Fit) -> bool {
+        fit.determined > (fit.width() - self.slopes()) as f64 + LEAST_DETERMINED
+    }
+
+    fn slopes(&self) -> usize {
+        if self.field.is_some() { SLOPES } else { 0 }
     }
 
     fn design(&self, index: usize, state: &State, width: usize) -> DMatrix<f64> {
@@ -126,6 +169,11 @@ impl<'a> Model<'a> {
             let lens = self.sight.lens_count();
             design.view_mut((0, at), (6, lens)).copy_from(&view.by_form.columns(0, lens));
             at += lens;
+        }
+        if let Some(field) = &self.field {
+            let columns = field.columns(index, &row.by_robot);
+            design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
+            at += columns.ncols();
         }
         for effect in &state.effects {
             let columns = effect.columns(self, index);
@@ -164,25 +212,31 @@ impl<'a> Model<'a> {
     }
 
     /// Noise levels and unknowns of a state. `None` when the views leave something open.
-    pub fn fit(&self, state: &State, start: [f64; 2]) -> Option<Fit> {
+    pub fn fit(&self, state: &State, start: Levels) -> Option<Fit> {
         let width = self.width(state);
         let inside: Vec<usize> = (0..self.rows.len()).filter(|i| !state.aside.contains(i)).collect();
-        if 6 * inside.len() <= width {
+        if 6 * inside.len() <= width - self.slopes() {
             return None;
         }
         let designs: Vec<DMatrix<f64>> = (0..self.rows.len()).map(|i| self.design(i, state, width)).collect();
-        let mut robot = start.map(|v| v.max(LEAST * LEAST));
+        let floor = |levels: [f64; 2]| levels.map(|v: f64| v.max(LEAST * LEAST));
+        let mut levels = Levels { noise: floor(start.noise), field: floor(start.field) };
         for step in 0..=MAX_STEPS {
-            let solved = self.solve(state, &inside, &designs, robot)?;
+            let solved = self.solve(state, &inside, &designs, levels)?;
             if step == MAX_STEPS {
-                return Some(self.finished(solved, robot, designs, &inside));
+                return Some(self.finished(solved, levels, designs, &inside));
             }
-            let change = self.scoring(&inside, &designs, &solved, robot);
-            if change.iter().zip(&robot).all(|(c, v)| c.abs() < SETTLED || (*c < 0.0 && *v <= LEAST * LEAST)) {
-                return Some(self.finished(solved, robot, designs, &inside));
+            let changes =
+                [self.scoring(&inside, &designs, &solved, levels.noise), self.scoring_of_field(&solved, levels.field)];
+            let mut settled = true;
+            for (level, change) in [&mut levels.noise, &mut levels.field].into_iter().zip(changes) {
+                for (v, c) in level.iter_mut().zip(change) {
+                    settled &= c.abs() < SETTLED || (c < 0.0 && *v <= LEAST * LEAST);
+                    *v = (*v * c.exp()).max(LEAST * LEAST);
+                }
             }
-            for (v, c) in robot.iter_mut().zip(change) {
-                *v = (*v * c.exp()).max(LEAST * LEAST);
+            if settled {
+                return Some(self.finished(solved, levels, designs, &inside));
             }
         }
         None
@@ -193,9 +247,10 @@ impl<'a> Model<'a> {
         (row.camera + row.robot[0] * robot[0] + row.robot[1] * robot[1]).try_inverse()
     }
 
-    fn solve(&self, state: &State, inside: &[usize], designs: &[DMatrix<f64>], robot: [f64; 2]) -> Option<Solution> {
+    fn solve(&self, state: &State, inside: &[usize], designs: &[DMatrix<f64>], levels: Levels) -> Option<Solution> {
         let width = designs.first()?.ncols();
-        let weights: Vec<Matrix6<f64>> = (0..self.rows.len()).map(|i| self.weight(i, robot)).collect::<Option<_>>()?;
+        let weights: Vec<Matrix6<f64>> =
+            (0..self.rows.len()).map(|i| self.weight(i, levels.noise)).collect::<Option<_>>()?;
         let mut normal = DMatrix::zeros(width, width);
         let mut right = DVector::zeros(width);
         for &i in inside {
@@ -204,9 +259,32 @@ impl<'a> Model<'a> {
             right.gemv_tr(-1.0, &weighted, &self.rows[i].error, 1.0);
         }
         self.add_form(state, &mut normal, &mut right);
+        for (part, level) in self.field_parts().into_iter().zip(levels.field) {
+            part.for_each(|i| normal[(i, i)] += level.recip());
+        }
         let covariance = inverse(&normal)?;
         let theta = &covariance * &right;
         theta.iter().all(|v| v.is_finite()).then_some(Solution { weights, covariance, theta })
+    }
+
+    /// Places of the field's slopes among the unknowns: those of position, those of orientation.
+    fn field_parts(&self) -> [Range<usize>; 2] {
+        let (at, half) = (self.field_at(), self.slopes() / 2);
+        [at..at + half, at + half..at + 2 * half]
+    }
+
+    /// Logarithmic step of both variances of the field: Fisher scoring on the restricted likelihood, in which
+    /// `Zᵀ P Z = (1 - C / v) / v` for effects with the variance `v` and the covariance `C` after the fit.
+    fn scoring_of_field(&self, solved: &Solution, levels: [f64; 2]) -> [f64; 2] {
+        let [position, orientation] = self.field_parts();
+        [(position, levels[0]), (orientation, levels[1])].map(|(part, level)| {
+            let (at, count) = (part.start, part.len());
+            let known = DMatrix::identity(count, count) - solved.covariance.view((at, at), (count, count)) / level;
+            let gradient = 0.5 * (solved.theta.rows(at, count).norm_squared() / level - known.trace());
+            let information = 0.5 * known.norm_squared();
+            // What does not show beside the noise is none.
+            if information < NO_FIELD { 0.0 } else { (gradient / information).clamp(-LARGEST_STEP, LARGEST_STEP) }
+        })
     }
 
     fn residual(&self, index: usize, design: &DMatrix<f64>, theta: &DVector<f64>) -> Vector6<f64> {
@@ -247,10 +325,13 @@ impl<'a> Model<'a> {
         [0, 1].map(|j: usize| step[j].clamp(-LARGEST_STEP, LARGEST_STEP))
     }
 
-    fn finished(&self, solved: Solution, robot: [f64; 2], designs: Vec<DMatrix<f64>>, inside: &[usize]) -> Fit {
+    fn finished(&self, solved: Solution, levels: Levels, designs: Vec<DMatrix<f64>>, inside: &[usize]) -> Fit {
         let Solution { weights, covariance, theta } = solved;
+        let parts = self.field_parts().into_iter().zip(levels.field);
+        let by_prior: f64 = parts.map(|(part, level)| part.map(|i| covariance[(i, i)] / level).sum::<f64>()).sum();
+        let determined = theta.len() as f64 - by_prior;
         let residuals = designs.iter().enumerate().map(|(i, design)| self.residual(i, design, &theta)).collect();
-        Fit { theta, covariance, robot, residuals, weights, designs, views: inside.len() }
+        Fit { theta, covariance, levels, determined, residuals, weights, designs, views: inside.len() }
     }
 }
 
@@ -298,7 +379,7 @@ impl Fit {
 
     /// Degrees of freedom of the noise levels, taken with care: position and orientation share the numbers.
     pub fn freedom(&self) -> f64 {
-        (0.5 * (6.0 * self.views as f64 - self.width() as f64)).max(1.0)
+        (0.5 * (6.0 * self.views as f64 - self.determined)).max(1.0)
     }
 
     /// Wald's statistic of `count` unknowns from `at`.
@@ -330,6 +411,6 @@ impl Fit {
 
     /// Noise of the robot per axis, metres and radians.
     pub fn robot_sigma(&self) -> (f64, f64) {
-        (self.robot[0].sqrt(), self.robot[1].sqrt())
+        (self.levels.noise[0].sqrt(), self.levels.noise[1].sqrt())
     }
 }

@@ -96,7 +96,7 @@ fn moves(model: &Model<'_>, state: &State, fit: &Fit, of: fn(usize) -> Effect) -
 }
 
 /// The statistic of a view against the fit that it is in.
-fn view_score(fit: &Fit, view: usize) -> Option<f64> {
+pub(super) fn view_score(fit: &Fit, view: usize) -> Option<f64> {
     let own = fit.weights[view].try_inverse()?;
     let shared = &fit.designs[view] * &fit.covariance * fit.designs[view].transpose();
     let covariance = DMatrix::from_fn(6, 6, |i, j| own[(i, j)] - shared[(i, j)]);

@@ -1,9 +1,12 @@
 //! Which hypotheses the data support: each is fitted with noise levels of its own, the best is taken in, and the rest are
 //! judged anew beside it.
 
+use std::rc::Rc;
+
 use super::agreement::Agreement;
+use super::field::Field;
 use super::judge::{Candidate, Judged, alternatives, is_significant, judge};
-use super::model::{Fit, Model, State};
+use super::model::{Fit, Levels, Model, State};
 use super::screen::screened;
 use super::views::SessionViews;
 use crate::progress::Work;
@@ -34,16 +37,20 @@ pub(super) struct Selection<'a> {
 
 /// Judges all hypotheses. `None` when the views leave something open, or when it was cancelled.
 pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work<'_>) -> Option<Selection<'a>> {
-    let mut model = Model::new(sight, start.solution);
+    let mut model = Model::new(sight, start.solution, Field::new(sight).map(Rc::new));
     let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
     let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
-    let mut levels = [(start.median_m / 3.0).powi(2), (start.median_m / 3.0 / sight.distance_m.max(0.01)).powi(2)];
+    let noise_m = start.median_m / 3.0;
+    let mut levels = Levels::even([noise_m, noise_m / sight.distance_m.max(0.01)].map(|sigma| sigma.powi(2)));
     // The majority says where the equations are made linear; with many far views there is none, and all are taken.
     let majority = State { effects: Vec::new(), aside: if far.len() <= most_aside { far.clone() } else { Vec::new() } };
     for _ in 0..ROUNDS {
         let fit = model.fit(&majority, levels)?;
-        levels = fit.robot;
+        levels = fit.levels;
         model = model.moved(&fit);
+        if !model.has_field(&fit) {
+            model.field = None;
+        }
     }
     let mut state = State::default();
     let mut fit = model.fit(&state, levels)?;
@@ -71,12 +78,12 @@ pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work
         }
         let Some(next) = taken_now else { break };
         state = next.state.clone();
-        fit = model.fit(&state, next.fit.robot)?;
+        fit = model.fit(&state, next.fit.levels)?;
         taken.push(next);
     }
     drop_overtaken(&model, &mut state, &mut fit, &mut taken)?;
     others.retain(|o| !taken.iter().any(|t| same_kind(&t.candidate, &o.candidate)));
-    if let Some(first) = taken.first() {
+    if let Some(first) = taken.first().filter(|first| first.matters) {
         for other in &mut others {
             other.as_good = other.explains_as_much_as(first);
         }
@@ -108,6 +115,6 @@ fn drop_overtaken(model: &Model<'_>, state: &mut State, fit: &mut Fit, taken: &m
         let Some(weak) = weak else { return Some(()) };
         state.effects.retain(|e| *e != weak);
         taken.retain(|j| j.candidate != Candidate::Effect(weak));
-        *fit = model.fit(state, fit.robot)?;
+        *fit = model.fit(state, fit.levels)?;
     }
 }

@@ -35,7 +35,7 @@ pub(in super::super) fn fine(selection: &Selection<'_>) -> Vec<Hypothesis> {
             Candidate::Views(_) if found.iter().any(|h| h.code == FindingCode::OutlierView) => continue,
             Candidate::Views(_) => of_views(selection, judged, &views),
         };
-        found.push(Hypothesis { accepted: true, ..hypothesis });
+        found.push(Hypothesis { accepted: judged.matters, ..hypothesis });
     }
     for judged in &selection.others {
         let hypothesis = match &judged.candidate {
@@ -219,7 +219,7 @@ fn common(judged: &Judged) -> Vec<Evidence> {
         evidence("robot_angle_without", without_rad.to_degrees(), "°"),
         evidence("robot_angle_with", with_rad.to_degrees(), "°"),
     ];
-    if let Some((without, with)) = judged.held_out {
+    if let Some((without, with)) = &judged.held_out {
         numbers.push(evidence("held_out_without", without.rms_m * 1e3, "mm"));
         numbers.push(evidence("held_out_with", with.rms_m * 1e3, "mm"));
     }
@@ -229,7 +229,7 @@ fn common(judged: &Judged) -> Vec<Evidence> {
 /// By how much it explains the data better.
 fn worth(judged: &Judged) -> Text {
     let [(without_m, with_m), (without_rad, with_rad)] = judged.robot;
-    let held_out = judged.held_out.map(|(without, with)| {
+    let held_out = judged.held_out.as_ref().map(|(without, with)| {
         text!(
             "Views left out are predicted to {with} mm instead of {without} mm.",
             with = format!("{:.2}", with.rms_m * 1e3),

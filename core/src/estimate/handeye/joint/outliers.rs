@@ -3,8 +3,8 @@
 //! The distance of a view is that of its own pose, from its corners, to the pose that the chain predicts from its reported
 //! robot pose: `T² = eᵀ V⁻¹ e` with `e` in the tangent space and `V` the sum of robot noise, corner noise and what the
 //! estimate itself is uncertain by (added for a view outside the fit, taken off for one inside it). Of good views it follows
-//! `6 F(6, ν)`. Views beyond a limit that one healthy session in a thousand passes are left out as outliers, and the rest is fitted
-//! again until nothing changes.
+//! `6 F(6, ν)`. Views beyond a limit that one healthy session in a thousand passes, and twice as far out as any other, are
+//! left out as outliers, and the rest is fitted again until nothing changes.
 //!
 //! Several wrong views hide each other: they raise the estimated noise until none of them stands out. That shows, because
 //! then most distances are far too small. A grossly wrong view may also pull the fit of all into a corner from which it
@@ -30,7 +30,7 @@ use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::se3;
-use crate::geometry::statistics::median;
+use crate::geometry::statistics::{median, outliers};
 use crate::progress::{CancelToken, Work};
 use crate::targets::observation::{Corner, View};
 
@@ -65,7 +65,7 @@ const LEAST_CORNERS: f64 = 0.5;
 /// How far a view lies from where the others expect it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
-    /// `T²` over its limit; above 1 the view is left out as an outlier.
+    /// `T²` over its limit; above 1 the view is left out as an outlier if it stands apart from the others.
     pub of_limit: f64,
     /// Distance of the view's pose from the predicted one at the middle of the target, metres.
     pub metres: f64,
@@ -118,21 +118,20 @@ pub fn estimate_screened<'a>(
     let core = || core_fit(problem, start, &views, &misfits, cancel);
     let fit_all = || estimate(&JointProblem { views: &views, ..*problem }, start, work);
     let of_all = |solution: JointSolution| Fit { solution, kept: all.clone() };
-    let mut fit = if views.len() < NEED {
-        of_all(fit_all()?)
-    } else if let Some(core) = stands_out(&misfits).then(core).flatten() {
-        core
-    } else {
-        match fit_all() {
-            Ok(solution) => of_all(solution),
-            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-            Err(error) => core().ok_or(error)?,
-        }
+    let mut fit = match fit_all() {
+        Ok(solution) => of_all(solution),
+        Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
+        Err(error) if views.len() < NEED => return Err(error),
+        Err(error) => core().ok_or(error)?,
     };
     let mut judged = judge(&fit)?;
     if views.len() >= NEED {
         let hiding = fit.kept.len() == views.len() && median_of(&judged) < HIDING * MEDIAN;
-        if hiding && let Some(core) = core() {
+        // Of views that agree none leads astray, however far it is from the start.
+        let astray = stands_out(&misfits) && judged.iter().any(|j| j.squared > j.limit);
+        if (hiding || astray)
+            && let Some(core) = core()
+        {
             fit = core;
             judged = judge(&fit)?;
         }
@@ -185,7 +184,8 @@ fn settle(
 ) -> Result<(Fit, Vec<Judged>), HandEyeError> {
     let mut seen = vec![fit.kept.clone()];
     for _ in 0..ROUNDS {
-        let mut good: Vec<usize> = (0..views.len()).filter(|&i| judged[i].squared <= judged[i].limit).collect();
+        let wrong = wrong(&judged);
+        let mut good: Vec<usize> = (0..views.len()).filter(|i| !wrong.contains(i)).collect();
         if good == fit.kept || good.len() < MIN_VIEWS {
             break;
         }
@@ -227,8 +227,14 @@ fn without_farthest(
         Err(_) => return Ok(None),
     };
     let next_judged = judge(&next)?;
-    let wrong = next_judged[farthest].squared > next_judged[farthest].limit;
-    Ok(wrong.then_some((next, next_judged)))
+    let is_wrong = wrong(&next_judged).contains(&farthest);
+    Ok(is_wrong.then_some((next, next_judged)))
+}
+
+/// The views that are outliers by their distances.
+fn wrong(judged: &[Judged]) -> Vec<usize> {
+    let squared: Vec<f64> = judged.iter().map(|j| j.squared).collect();
+    outliers(&squared, judged.first().map_or(f64::INFINITY, |j| j.limit))
 }
 
 fn fit_of(
