@@ -104,7 +104,9 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     };
     let only_flat = arguments.get(1).is_some_and(|word| word == "flat");
-    println!("| views | corner errors | bend mm | called bent % | fx, fy, cx, cy held % | RMS error of fx px | stated px | bend held % |");
+    println!(
+        "| views | corner errors | bend mm | called bent % | fx, fy, cx, cy held % | RMS error of fx px | stated px | bend held % |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for (tilted, tilt) in TILTS {
         for count in [4, 6, 10, 20, 40] {

@@ -353,7 +353,11 @@ impl CameraFit {
             noise_px: Some(found.sigma).filter(|sigma| sigma.is_finite()),
             times: stated.ratio.sqrt(),
             degrees_of_freedom: stated.degrees_of_freedom,
-            shape: stated.warp_sigma_m.map(|sigma| ShapeEstimate { shape, warp_sigma_m: Some(sigma), scale_sigma: None }),
+            shape: stated.warp_sigma_m.map(|sigma| ShapeEstimate {
+                shape,
+                warp_sigma_m: Some(sigma),
+                scale_sigma: None,
+            }),
         }
     }
 }

@@ -101,7 +101,8 @@ fn what_is_stated_holds_when_neighbouring_corners_err_alike() {
 fn a_few_wrong_corners_are_named_and_change_nothing() {
     let clean = views().observations(12, 7);
     let mut observations = clean.clone();
-    let wrong = [(3, 0, Vector2::new(300.0, -200.0)), (3, 44, Vector2::new(-6.0, 9.0)), (8, 69, Vector2::new(0.0, 2.0))];
+    let wrong =
+        [(3, 0, Vector2::new(300.0, -200.0)), (3, 44, Vector2::new(-6.0, 9.0)), (8, 69, Vector2::new(0.0, 2.0))];
     for (view, index, off) in wrong {
         observations.views[view].corners.as_mut().expect("corners")[index].px += off;
     }

@@ -54,11 +54,8 @@ pub fn solve_screened(
     let fit = |views: &[Cow<'_, [Corner]>], options: &Options| {
         let sqrt_weights: Vec<Vec<Matrix2<f64>>> =
             views.iter().map(|view| weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(view))).collect();
-        let seen: Vec<SeenView<'_>> = views
-            .iter()
-            .zip(&sqrt_weights)
-            .map(|(corners, sqrt_weights)| SeenView { corners, sqrt_weights })
-            .collect();
+        let seen: Vec<SeenView<'_>> =
+            views.iter().zip(&sqrt_weights).map(|(corners, sqrt_weights)| SeenView { corners, sqrt_weights }).collect();
         solve(&seen, target, size, options, cancel)
     };
     let all: Vec<Cow<'_, [Corner]>> = views.iter().map(|view| Cow::Borrowed(*view)).collect();
