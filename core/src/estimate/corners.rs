@@ -88,7 +88,7 @@ fn believable<'a>(
     options: Options,
     work: &Work<'_>,
 ) -> Result<(Vec<DetectedView<'a>>, Vec<usize>, Lens), CalibrateError> {
-    let lens = Lens::find(observations, &seen, work)?;
+    let lens = Lens::find(observations, &seen, options.keep_outliers, work)?;
     let usual = median_high(lens.rms_px.iter().copied()).unwrap_or(0.0);
     let limit = (WRONG_CORNERS * usual).max(FINE_PX);
     let good = lens.rms_px.iter().filter(|rms| **rms <= limit).count();
@@ -98,7 +98,7 @@ fn believable<'a>(
     let (kept, wrong): (Vec<_>, Vec<_>) = seen.into_iter().zip(&lens.rms_px).partition(|(_, rms)| **rms <= limit);
     let kept: Vec<DetectedView<'a>> = kept.into_iter().map(|(s, _)| s).collect();
     let wrong = wrong.into_iter().map(|(s, _)| s.index).collect();
-    let lens = Lens::find(observations, &kept, work)?;
+    let lens = Lens::find(observations, &kept, options.keep_outliers, work)?;
     Ok((kept, wrong, lens))
 }
 
@@ -126,17 +126,23 @@ fn total_rms(per_view: impl Iterator<Item = (f64, usize)>) -> f64 {
 fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens: &Lens) -> Calibration {
     let mut views: Vec<ViewResult> =
         observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::NoTarget)).collect();
-    let points = observations.target.points();
-    for ((s, rms), pose) in seen.iter().zip(&lens.rms_px).zip(&lens.camera_from_target) {
+    let points = BoardPoints::new(&observations.target.points()).points(&lens.shape);
+    let mut corners_used = Vec::with_capacity(seen.len());
+    for (i, s) in seen.iter().enumerate() {
+        let corners = lens.corners_left(i, s.corners);
         let view = &mut views[s.index];
         view.status = ViewStatus::Used;
-        view.rms_px = Some(*rms);
-        view.residuals = residuals(&lens.intrinsics, pose, &points, s.corners);
-        view.camera_from_target = Some(*pose);
+        view.rms_px = Some(lens.rms_px[i]);
+        view.corners_aside.clone_from(&lens.aside[i]);
+        view.residuals = residuals(&lens.intrinsics, &lens.camera_from_target[i], &points, &corners);
+        view.camera_from_target = Some(lens.camera_from_target[i]);
+        corners_used.push(corners.len());
     }
+    let sigma_px = lens.fit.as_ref().and_then(|fit| fit.sigma_px);
     Calibration {
-        camera: Some(CalibratedCamera { intrinsics: lens.intrinsics, fixed: !lens.free, sigma_px: lens.sigma }),
-        rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(seen.iter().map(|s| s.corners.len())))),
+        camera: Some(CalibratedCamera { intrinsics: lens.intrinsics, fixed: !lens.free, sigma_px }),
+        camera_fit: lens.fit,
+        rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(corners_used))),
         views,
         ..Calibration::default()
     }
@@ -184,6 +190,7 @@ fn take_joint(
         sigma_px: sigma_px.or(camera.sigma_px),
         ..camera
     });
+    calibration.camera_fit = None;
     calibration.rms_px = Some(solution.rms_px);
     let estimated = solution.free.warp || solution.free.scale;
     calibration.joint = Some(JointFit {
@@ -245,8 +252,9 @@ fn take_closed_form(
     lens: &Lens,
 ) {
     let mut rms = Vec::with_capacity(seen.len());
+    let points = problem.board.points(&lens.shape);
     for (s, view) in seen.iter().zip(problem.views) {
-        let squared = squared_residuals(problem, &lens.intrinsics, solution, view, f64::INFINITY);
+        let squared = squared_residuals(problem, (&lens.intrinsics, &lens.shape), solution, view, f64::INFINITY);
         let view_rms = (squared / view.corners.len() as f64).sqrt();
         let result = &mut calibration.views[s.index];
         let pose = camera_from_target(
@@ -256,7 +264,7 @@ fn take_closed_form(
             &solution.anchor_from_target,
         );
         result.rms_px = view_rms.is_finite().then_some(view_rms);
-        result.residuals = residuals(&lens.intrinsics, &pose, problem.board.drawn(), &view.corners);
+        result.residuals = residuals(&lens.intrinsics, &pose, &points, &view.corners);
         result.camera_from_target = Some(pose);
         rms.push((view_rms, view.corners.len()));
     }

@@ -2,6 +2,7 @@
 //!
 //! One path for the window, the command line and the tests.
 
+mod bend;
 pub mod claim;
 mod corners;
 mod detected_view;
@@ -13,6 +14,7 @@ mod refine;
 mod residuals;
 mod to_result;
 pub mod uncertainty;
+mod wrong_corners;
 
 use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
 
@@ -260,6 +262,9 @@ pub struct Calibration {
     pub link_covariances: Option<LinkCovariances>,
     /// The camera; `None` when only pose pairs were given.
     pub camera: Option<CalibratedCamera>,
+    /// What the corners say of an estimated camera without the robot; `None` when it was given, and where a joint estimate
+    /// says it better.
+    pub camera_fit: Option<CameraFit>,
     /// RMS of 2-D corner residuals, pixels.
     pub rms_px: Option<f64>,
     /// What only the joint estimate knows; `None` for a closed form, and without a robot.
@@ -320,6 +325,41 @@ pub struct CalibratedCamera {
     pub fixed: bool,
     /// Standard deviations of fx, fy, cx, cy in pixels, when they were estimated.
     pub sigma_px: Option<[f64; 4]>,
+}
+
+/// How well the corners alone determine an estimated camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraFit {
+    /// Standard deviations of fx, fy, cx, cy in pixels, see [`Stated`](intrinsics::Stated); `None` where there are no more
+    /// residuals than unknowns.
+    pub sigma_px: Option<[f64; 4]>,
+    /// Noise of a corner per axis, pixels; `None` likewise.
+    pub noise_px: Option<f64>,
+    /// By how much standard deviations are larger than those of corners that err independently, because the views scatter
+    /// more; smaller than 1 where they happen to scatter less.
+    pub times: f64,
+    /// Degrees of freedom of that.
+    pub degrees_of_freedom: f64,
+    /// The target where the corners show that it is bent.
+    pub shape: Option<ShapeEstimate>,
+}
+
+impl CameraFit {
+    fn of(found: &intrinsics::Found) -> Self {
+        let stated = found.stated;
+        let shape = found.shape;
+        Self {
+            sigma_px: Some(stated.pinhole_sigma_px).filter(|sigma| sigma.iter().all(|s| s.is_finite())),
+            noise_px: Some(found.sigma).filter(|sigma| sigma.is_finite()),
+            times: stated.ratio.sqrt(),
+            degrees_of_freedom: stated.degrees_of_freedom,
+            shape: stated.warp_sigma_m.map(|sigma| ShapeEstimate {
+                shape,
+                warp_sigma_m: Some(sigma),
+                scale_sigma: None,
+            }),
+        }
+    }
 }
 
 /// What the joint estimate knows beyond the links and the camera.

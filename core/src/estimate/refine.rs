@@ -1,8 +1,8 @@
 //! The joint estimate within a calibration: its start, outliers, and which unknowns the data support.
 
-use nalgebra::Isometry3;
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+use nalgebra::{Isometry3, Vector2};
 
+use super::bend::Deflection;
 use super::lens::Lens;
 use super::{CalibrateError, JointOffsets, MethodResult, Options};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
@@ -17,14 +17,8 @@ use crate::estimate::uncertainty::{quality, widening};
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::progress::Work;
 use crate::targets::TargetSpec;
-use crate::targets::bent::BoardShape;
 use crate::targets::observation::{self, View};
 
-/// Significance from which a bent target is taken into the model: by chance one flat target in a thousand.
-const WARP_LEVEL: f64 = 1e-3;
-/// And the deflection has to matter: a tenth of what the corners' noise is at the target, so that a fit of thousands of
-/// corners does not chase a micrometre.
-const WARP_MATTERS: f64 = 0.1;
 /// Joint offsets are taken when they lower the error on held-out views by so much of it.
 const JOINTS_GAIN: f64 = 0.05;
 
@@ -53,7 +47,7 @@ pub fn start(
         if let (true, Some(half_turn)) = (turned, &half_turn) {
             solution.anchor_from_target = Pose::from_isometry(solution.anchor_from_target.isometry() * half_turn);
         }
-        squared_residuals(problem, &lens.intrinsics, &solution, &problem.views[view], CAP_PX).sqrt()
+        squared_residuals(problem, (&lens.intrinsics, &lens.shape), &solution, &problem.views[view], CAP_PX).sqrt()
     };
     consensus(pairs, &candidates, half_turn.as_ref(), misfit).ok_or_else(|| {
         methods.iter().find_map(|m| m.outcome.clone().err()).unwrap_or(HandEyeError::NoSolution {
@@ -94,14 +88,16 @@ pub fn refine(
     options: Options,
     work: &Work<'_>,
 ) -> Result<Refined, CalibrateError> {
-    let weights = CornerWeights::stated(problem.views);
-    let free = Free { intrinsics: lens.free, scale: options.free_scale, ..Free::default() };
+    let weights = CornerWeights::stated(problem.views.iter().flat_map(|view| &view.corners));
+    // What the corners say without the robot they say with it, and the start is then near the answer.
+    let warp = lens.is_bent();
+    let free = Free { intrinsics: lens.free, warp, scale: options.free_scale, ..Free::default() };
     let problem = JointProblem { free, weights, ..*problem };
     let start = JointStart {
         mount_from_camera: begin.solution.mount_from_camera,
         anchor_from_target: begin.solution.anchor_from_target,
         intrinsics: lens.intrinsics,
-        shape: BoardShape::default(),
+        shape: lens.shape,
         noise: None,
     };
     let mut screened = if options.keep_outliers {
@@ -109,7 +105,7 @@ pub fn refine(
     } else {
         estimate_screened(&problem, &start, own, *work)?
     };
-    if let Some(bent) = bent(&problem, &screened, work)? {
+    if !warp && let Some(bent) = bent(&problem, &screened, work)? {
         // A bent target looks like wrong views to a flat model, so they are judged again.
         let problem = JointProblem { free: Free { warp: true, ..free }, ..problem };
         screened = if options.keep_outliers {
@@ -153,16 +149,15 @@ fn bent(
         // A target seen square on says nothing of its shape.
         Err(_) => return Ok(None),
     };
-    let (Some(covariance), warp) = (solution.warp_covariance(), nalgebra::Vector2::from(solution.shape.warp_m)) else {
-        return Ok(None);
-    };
-    let Some(inverse) = covariance.try_inverse() else { return Ok(None) };
-    let ratio = warp.dot(&(inverse * warp)) / 2.0;
-    let freedom = solution.small_sample.degrees_of_freedom.min(1e6);
-    let limit = FisherSnedecor::new(2.0, freedom).map_or(f64::INFINITY, |f| f.inverse_cdf(1.0 - WARP_LEVEL));
+    let Some(covariance) = solution.warp_covariance() else { return Ok(None) };
     let metres_per_px = solution.reference_point.coords.norm() / solution.intrinsics.fx;
-    let matters = warp.norm() > WARP_MATTERS * solution.noise.corner_px * metres_per_px;
-    Ok((ratio > limit && matters).then_some(solution))
+    let deflection = Deflection {
+        warp_m: Vector2::from(solution.shape.warp_m),
+        covariance,
+        degrees_of_freedom: solution.small_sample.degrees_of_freedom,
+        noise_m: solution.noise.corner_px * metres_per_px,
+    };
+    Ok(deflection.is_shown().then_some(solution))
 }
 
 /// Tries joint offsets and takes them when held-out views say so.

@@ -7,6 +7,7 @@ use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::{JointProblem, camera_from_target};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Camera, Pose, Target};
+use crate::targets::bent::BoardShape;
 use crate::targets::observation::{Corner, View};
 
 /// Residuals of a view at a pose of the target; none at all when a corner has no image there.
@@ -26,7 +27,7 @@ pub(super) fn residuals(
 /// Sum of squared residuals of one view by the bare chain; a point without an image counts as the cap.
 pub(super) fn squared_residuals(
     problem: &JointProblem<'_>,
-    intrinsics: &Intrinsics,
+    (intrinsics, shape): (&Intrinsics, &BoardShape),
     solution: &ClosedFormSolution,
     view: &View,
     cap_px: f64,
@@ -41,7 +42,7 @@ pub(super) fn squared_residuals(
         .iter()
         .map(|corner| {
             let residual = intrinsics
-                .project(&(chain.isometry() * problem.board.drawn()[corner.index]))
+                .project(&(chain.isometry() * problem.board.point(corner.index, shape)))
                 .map_or(cap_px, |px| (px - corner.px).norm());
             residual.min(cap_px).powi(2)
         })

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::claim::Claim;
-use super::{Calibration, JointFit, ViewStatus};
+use super::uncertainty::widening::Evidence;
+use super::{Calibration, CameraFit, JointFit, ShapeEstimate, ViewStatus};
 use crate::project::result::{
     self, BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, Provenance,
     Quality, WideningRecord,
@@ -18,11 +19,12 @@ impl Calibration {
         options: BTreeMap<String, serde_json::Value>,
     ) -> CalibrationResult {
         let noise = self.joint.as_ref().map(|joint| joint.noise);
+        let camera_alone = self.camera_fit.as_ref().filter(|_| self.hand_eye.is_none());
         let mut result = CalibrationResult {
             intrinsics: self.camera.map(|c| IntrinsicsEstimate::new(&c.intrinsics, c.sigma_px, c.fixed)),
             quality: Quality {
                 rms_px: self.rms_px,
-                sigma_px: noise.map(|n| n.corner_px),
+                sigma_px: noise.map(|n| n.corner_px).or_else(|| camera_alone.and_then(|fit| fit.noise_px)),
                 heldout_rms_px: self.joint.as_ref().and_then(|joint| joint.heldout_rms_px),
                 tip_error_95_mm: self.tip_error_95_m().map(|m| m * 1e3),
                 robot_sigma_mm: noise.map(|n| n.robot_m * 1e3),
@@ -30,7 +32,7 @@ impl Calibration {
             },
             methods: self.methods.iter().map(method).collect(),
             views: self.views.iter().map(view).collect(),
-            estimate: self.joint.as_ref().map(|joint| self.details(joint)),
+            estimate: self.joint.as_ref().map(|joint| self.details(joint)).or_else(|| camera_alone.map(of_camera)),
             provenance: Provenance {
                 tool_version: tool_version.to_owned(),
                 input_sha256,
@@ -57,12 +59,7 @@ impl Calibration {
                 factor: joint.widening.factor.sqrt(),
                 by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
             }),
-            board: joint.shape.map(|s| BoardEstimate {
-                warp_mm: s.shape.warp_m.map(|m| m * 1e3),
-                warp_sigma_mm: s.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
-                scale: s.shape.scale,
-                scale_sigma: s.scale_sigma,
-            }),
+            board: joint.shape.map(board),
             joint_offsets: joint.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
                 offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
                 sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),
@@ -71,6 +68,29 @@ impl Calibration {
                 accepted: j.accepted,
             }),
         }
+    }
+}
+
+/// The details of a camera without a robot: the corners' noise is the only one, and the target's size is not seen.
+fn of_camera(fit: &CameraFit) -> EstimateDetails {
+    let widened = fit.times > 1.0;
+    EstimateDetails {
+        degrees_of_freedom: Some(fit.degrees_of_freedom),
+        widening: Some(WideningRecord {
+            factor: fit.times.max(1.0),
+            by: if widened { Evidence::Jackknife.name() } else { "none" }.to_owned(),
+        }),
+        board: fit.shape.map(board),
+        ..EstimateDetails::default()
+    }
+}
+
+fn board(estimate: ShapeEstimate) -> BoardEstimate {
+    BoardEstimate {
+        warp_mm: estimate.shape.warp_m.map(|m| m * 1e3),
+        warp_sigma_mm: estimate.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
+        scale: estimate.shape.scale,
+        scale_sigma: estimate.scale_sigma,
     }
 }
 

@@ -39,11 +39,7 @@ impl BoardPoints {
     /// Takes the points of a target in its frame, metres.
     pub fn new(points: &[Point3<f64>]) -> Self {
         let sag_along = |axis: usize| -> Vec<f64> {
-            let (low, high) = points
-                .iter()
-                .map(|p| p[axis])
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+            let (middle, half) = middle_and_half(points, axis);
             // A target of one row or column does not bend across it.
             let at = |v: f64| if half > 0.0 { 1.0 - ((v - middle) / half).powi(2) } else { 0.0 };
             points.iter().map(|p| at(p[axis])).collect()
@@ -67,6 +63,18 @@ impl BoardPoints {
         &self.drawn
     }
 
+    /// The middle of the target as drawn.
+    pub fn middle(&self) -> Point3<f64> {
+        let [x, y] = [0, 1].map(|axis| middle_and_half(&self.drawn, axis).0);
+        Point3::new(x, y, 0.0)
+    }
+
+    /// From its first to its last point along the longer side as drawn, metres.
+    pub fn longer_side_m(&self) -> f64 {
+        let [x, y] = [0, 1].map(|axis| 2.0 * middle_and_half(&self.drawn, axis).1);
+        x.max(y)
+    }
+
     /// Where a point of a target of that shape really is, metres.
     pub fn point(&self, index: usize, shape: &BoardShape) -> Point3<f64> {
         let [x, y] = self.sag[index];
@@ -84,6 +92,13 @@ impl BoardPoints {
         let by_warp = self.sag[index].map(|s| s * shape.scale);
         (by_warp, self.point(index, shape).coords / shape.scale)
     }
+}
+
+/// Middle and half the length of what points cover along an axis.
+fn middle_and_half(points: &[Point3<f64>], axis: usize) -> (f64, f64) {
+    let range = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = points.iter().map(|p| p[axis]).fold(range, |(low, high), v| (low.min(v), high.max(v)));
+    (0.5 * (low + high), 0.5 * (high - low))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! [`Scene`] makes images of boards whose corners are known, [`sessions`] chains of robot and camera whose links are known,
 //! and [`skip`] is how a test says that the machine lacks what it needs.
 
+mod board_views;
 mod drawn;
 mod exact;
 mod machine;
@@ -10,6 +11,7 @@ mod scene;
 pub mod sessions;
 mod views;
 
+pub use board_views::{BoardViews, SharedErrors};
 pub use machine::{Need, data_folder, programs, python, skip};
 pub use scene::Scene;
 pub use views::{looking_at, looking_at_point, seen_corners};

@@ -1,10 +1,8 @@
 //! Views of a target from all sides.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
-use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution as _, Normal};
 
+use super::BoardViews;
 use crate::geometry::camera::Intrinsics;
 use crate::targets::Grid;
 use crate::targets::observation::Corner;
@@ -52,19 +50,5 @@ pub fn seen_corners(
     noise_px: f64,
     seed: u64,
 ) -> Vec<Vec<Corner>> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let noise = Normal::new(0.0, noise_px).expect("a deviation");
-    (0..count)
-        .map(|i| {
-            let angles = [rng.random_range(tilt.0..=tilt.1), i as f64 * 2.4, rng.random_range(-1.0..1.0)];
-            let offset = Vector2::new(rng.random_range(-90.0..90.0), rng.random_range(-60.0..60.0));
-            let pose = looking_at(grid, camera, rng.random_range(0.5..0.8), angles, offset);
-            (0..grid.len())
-                .map(|index| {
-                    let px = camera.project(&(pose * grid.point(index))).expect("in front");
-                    Corner::new(index, px + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)))
-                })
-                .collect()
-        })
-        .collect()
+    BoardViews { tilt, ..BoardViews::new(*camera, *grid, noise_px) }.corners(count, seed)
 }

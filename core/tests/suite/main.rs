@@ -3,6 +3,7 @@
 //! `slow` is what the fast tier (`./test fast`) leaves out.
 
 mod broken_datasets;
+mod camera_alone;
 mod doctor;
 mod doctor_on_real_data;
 mod joint_on_real_data;

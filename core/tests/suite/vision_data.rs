@@ -108,7 +108,7 @@ fn check(expected: &Expected) {
     let options = Options::new(Distortion::BrownConrady([0.0; 5]));
     let result = solve(&views, &expected.target, expected.size, &options, &CancelToken::default())
         .unwrap_or_else(|e| panic!("{}: {e}", expected.folder));
-    let (rms_px, [fx_sigma_px, ..]) = (result.total_rms_px(), result.pinhole_sigma_px());
+    let (rms_px, [fx_sigma_px, ..]) = (result.total_rms_px(), result.stated.pinhole_sigma_px);
     let camera = result.intrinsics;
     println!(
         "{}{}: {} views, rms {:.4} px, fx {:.2} ± {:.2}, fy {:.2}, cx {:.2}, cy {:.2}",

@@ -1,4 +1,4 @@
-//! Findings on what the joint estimate decided by itself: views and corners left out as an outlier, views numbered from the other end, a
+//! Findings on what the estimate decided by itself: views and corners left out as an outlier, views numbered from the other end, a
 //! bent target, a widened uncertainty, noise levels that cannot be told apart.
 
 use super::{Finding, FindingCode, Severity, listed};
@@ -101,7 +101,9 @@ fn renumbered(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn bent(calibration: &Calibration) -> Option<Finding> {
-    let estimate = calibration.joint.as_ref()?.shape?;
+    let by_robot = calibration.joint.as_ref().and_then(|joint| joint.shape);
+    let by_camera = || calibration.camera_fit.as_ref().and_then(|fit| fit.shape);
+    let estimate = by_robot.or_else(by_camera)?;
     let sigma = estimate.warp_sigma_m?.map(|m| m * 1e3);
     let [x, y] = estimate.shape.warp_m.map(|m| m * 1e3);
     let text = text!(
@@ -113,7 +115,8 @@ fn bent(calibration: &Calibration) -> Option<Finding> {
         y_sigma = format!("{:.2}", sigma[1])
     );
     let finding = Finding::new(FindingCode::BoardBent, Severity::Advice, text);
-    Some(finding.with("warp_x", x, "mm").with("warp_y", y, "mm"))
+    let finding = finding.with("warp_x", x, "mm").with("warp_x_sigma", sigma[0], "mm");
+    Some(finding.with("warp_y", y, "mm").with("warp_y_sigma", sigma[1], "mm"))
 }
 
 fn widened(calibration: &Calibration) -> Option<Finding> {

@@ -5,7 +5,6 @@ use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector,
 use super::{IntrinsicsError, SeenView};
 use crate::estimate::handeye::joint::equations::{FreeParameters, MAX_FORM, PoseEquations, ViewInput};
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::planar_pose::PoseError;
 use crate::geometry::planar_pose::mirror::mirrored;
 use crate::geometry::planar_pose::refine::refine;
 use crate::geometry::se3;
@@ -43,7 +42,7 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    fn check_cancel(&self) -> Result<(), IntrinsicsError> {
+    pub fn check_cancel(&self) -> Result<(), IntrinsicsError> {
         if self.cancel.is_cancelled() { Err(IntrinsicsError::Cancelled) } else { Ok(()) }
     }
 }
@@ -148,16 +147,6 @@ impl Linear {
             }
         }
         Some((matrix, gradient, decrease))
-    }
-
-    /// What the views say about the columns of the form, the poses eliminated, for residuals of standard deviation 1.
-    pub fn information(&self, problem: &Problem<'_>, estimate: &Estimate) -> Result<DMatrix<f64>, IntrinsicsError> {
-        let n = problem.free.count(&estimate.intrinsics);
-        let Some((matrix, _, _)) = self.eliminate(n, 0.0) else {
-            let view = self.blocks.iter().position(|b| b.factor(0.0).is_none()).unwrap_or(0);
-            return Err(PoseError::CollinearCorners { view }.into());
-        };
-        Ok(DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]))
     }
 
     /// The damped step from `estimate` and the decrease of the cost that it promises.

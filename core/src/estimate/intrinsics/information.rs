@@ -18,20 +18,7 @@ const PINHOLE_NAMES: [&str; 4] = ["fx", "fy", "cx", "cy"];
 /// The covariance that goes with an information matrix of `[fx fy cx cy, …]`; refuses one that leaves the pinhole
 /// undetermined.
 pub(super) fn covariance(information: &DMatrix<f64>, camera: &Intrinsics) -> Result<DMatrix<f64>, IntrinsicsError> {
-    let n = information.nrows();
-    let scale: Vec<f64> = (0..n).map(|i| information[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
-    // Parameters differ in size by many orders; scaled to unit diagonal the eigenvalues can be compared.
-    let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] / (scale[i] * scale[j]));
-    if scaled.iter().any(|v| !v.is_finite()) {
-        return Err(IntrinsicsError::NotACamera { reason: "its equations are not numbers".into() });
-    }
-    let eigen = SymmetricEigen::new(scaled);
-    let vectors = &eigen.eigenvectors;
-    let covariance = DMatrix::from_fn(n, n, |i, j| {
-        let sum: f64 =
-            (0..n).map(|k| vectors[(i, k)] * vectors[(j, k)] / eigen.eigenvalues[k].max(MIN_EIGENVALUE)).sum();
-        sum / (scale[i] * scale[j])
-    });
+    let covariance = inverse(information)?;
     for (i, (parameter, focal)) in
         PINHOLE_NAMES.into_iter().zip([camera.fx, camera.fy, camera.fx, camera.fy]).enumerate()
     {
@@ -41,4 +28,22 @@ pub(super) fn covariance(information: &DMatrix<f64>, camera: &Intrinsics) -> Res
         }
     }
     Ok(covariance)
+}
+
+/// The inverse of an information matrix of any of the unknowns.
+pub(super) fn inverse(information: &DMatrix<f64>) -> Result<DMatrix<f64>, IntrinsicsError> {
+    let n = information.nrows();
+    let scale: Vec<f64> = (0..n).map(|i| information[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    // Parameters differ in size by many orders; scaled to unit diagonal the eigenvalues can be compared.
+    let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] / (scale[i] * scale[j]));
+    if scaled.iter().any(|v| !v.is_finite()) {
+        return Err(IntrinsicsError::NotACamera { reason: "its equations are not numbers".into() });
+    }
+    let eigen = SymmetricEigen::new(scaled);
+    let vectors = &eigen.eigenvectors;
+    Ok(DMatrix::from_fn(n, n, |i, j| {
+        let sum: f64 =
+            (0..n).map(|k| vectors[(i, k)] * vectors[(j, k)] / eigen.eigenvalues[k].max(MIN_EIGENVALUE)).sum();
+        sum / (scale[i] * scale[j])
+    }))
 }

@@ -1,8 +1,9 @@
 //! Calibration of a camera from views of a flat target.
 //!
 //! # What it estimates
-//! Focal lengths, principal point and distortion of one lens model, the target's pose in every view and, where it is
-//! asked for, the bend of the target ([`BoardShape`]). The estimate minimises the squared reprojection error
+//! Focal lengths, principal point and distortion of one lens model, the target's pose in every view and, where the corners
+//! show it or it is asked for, the bend of the target ([`BoardShape`]). The size of the target cannot be seen: one twice as
+//! large and twice as far away makes the same image. The estimate minimises the squared reprojection error
 //! `Σ ‖W (project(camera_from_target_i * point_j) − px_ij)‖²`, where `W` is the whitener of a corner, or the identity.
 //! For independent Gaussian noise of the corners that is the maximum of the likelihood.
 //!
@@ -12,18 +13,25 @@
 //! optimum every pose is tried against its mirror image, the second minimum that a flat target has. All sums run in the
 //! order of the views, so the same input gives the same bits.
 //!
+//! # How sure it is
+//! Corners of one view err alike, and then the covariance of independent ones is too small several times. What is stated
+//! rests on how the views scatter, and counts a bend that may be there unseen ([`Stated`], `docs/maths/camera_alone.md`).
+//!
 //! # Reference
 //! Zhang 2000, "A flexible new technique for camera calibration"; Triggs et al. 2000, "Bundle adjustment — a modern
 //! synthesis", §6; Kannala & Brandt 2006 for the fisheye.
 
 mod adjust;
 mod error;
+mod evidence;
 mod information;
+mod screened;
 mod seen_view;
 mod start;
 
 pub use error::IntrinsicsError;
 use nalgebra::DMatrix;
+pub use screened::{Screened, solve_screened};
 pub use seen_view::SeenView;
 
 use crate::estimate::handeye::joint::equations::FreeParameters;
@@ -36,6 +44,7 @@ use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
 
 use adjust::{Estimate, Problem};
+use evidence::Evidence;
 
 /// Views that a calibration needs: two orientations determine the four numbers of a pinhole, a third checks them.
 pub const MIN_VIEWS: usize = 3;
@@ -51,15 +60,27 @@ pub struct Options {
     pub model: Distortion,
     /// Where to start; `None` finds a start from the views. Its distortion counts only when it is of the same model.
     pub start: Option<Intrinsics>,
-    /// Whether the bend of the target is estimated too. A bent target that is taken for flat moves the camera by far
-    /// more than the noise of its corners, and a flat one that is taken for bent costs little.
-    pub free_warp: bool,
+    /// Whether the bend of the target is estimated too.
+    pub bend: Bend,
+}
+
+/// What is thought of the bend of a target. A bent one that is taken for flat moves the camera by far more than the noise
+/// of its corners; a flat one that is taken for bent costs precision, most where views are few or little tilted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bend {
+    /// It is flat, and nothing is allowed for a bend.
+    Never,
+    /// It is estimated where the corners show one, which one flat target in a thousand does by chance; where they do not,
+    /// what is stated of the camera allows for one that they cannot show.
+    IfShown,
+    /// It is estimated.
+    Always,
 }
 
 impl Options {
     /// A model on a flat target, without a start.
     pub fn new(model: Distortion) -> Self {
-        Self { model, start: None, free_warp: false }
+        Self { model, start: None, bend: Bend::Never }
     }
 }
 
@@ -84,8 +105,27 @@ pub struct Found {
     /// Covariance of `[fx fy cx cy, distortion…, warp x, warp y]` for whitened residuals of standard deviation 1; the
     /// warp only where it was estimated. The poses are unknowns in it, not constants.
     pub unit_covariance: DMatrix<f64>,
+    /// What may be stated of the camera and the bend, whatever the corners of a view have in common.
+    pub stated: Stated,
     /// Steps of the optimiser.
     pub steps: usize,
+}
+
+/// How sure an estimate is, by how its views scatter.
+///
+/// Errors that all views share (a lens model that does not follow the lens, a target that is not flat in another way than
+/// [`BoardShape`] bends) are not in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stated {
+    /// Of fx, fy, cx and cy, pixels: 1.96 of them hold the error in 95 % of cases. Not a number where there are no more
+    /// residuals than unknowns.
+    pub pinhole_sigma_px: [f64; 4],
+    /// Of the two warps likewise, metres; `None` where the target was taken for flat.
+    pub warp_sigma_m: Option<[f64; 2]>,
+    /// Variance of the pinhole that the views show over that of corners that err independently.
+    pub ratio: f64,
+    /// Degrees of freedom of that ratio, at least 1.
+    pub degrees_of_freedom: f64,
 }
 
 impl Found {
@@ -94,13 +134,8 @@ impl Found {
         (self.cost / self.corners as f64).sqrt()
     }
 
-    /// Standard deviations of fx, fy, cx and cy in pixels, for independent corner noise of the size that the residuals
-    /// show. Errors of the board (bent, misprinted) are not in them.
-    pub fn pinhole_sigma_px(&self) -> [f64; 4] {
-        std::array::from_fn(|i| self.sigma * self.unit_covariance[(i, i)].sqrt())
-    }
-
-    /// Covariance of `[fx fy cx cy, distortion…, warp x, warp y]` for the noise that the residuals show.
+    /// Covariance of `[fx fy cx cy, distortion…, warp x, warp y]` for independent corner noise of the size that the
+    /// residuals show; [`Found::stated`] has what holds when it is not independent.
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.unit_covariance * (self.sigma * self.sigma)
     }
@@ -140,16 +175,33 @@ pub fn solve(
     if spread_deg < MIN_SPREAD_DEG {
         return Err(IntrinsicsError::ParallelViews { views: views.len(), spread_deg });
     }
-    let free = FreeParameters { lens: true, warp: options.free_warp, scale: false };
-    let problem = Problem { views, board, free, cancel };
+    let lens = FreeParameters { lens: true, warp: false, scale: false };
+    let bent = FreeParameters { warp: true, ..lens };
+    let free = if options.bend == Bend::Always { bent } else { lens };
+    let mut problem = Problem { views, board, free, cancel };
     let (mut estimate, mut steps) = first_optimum(&problem, &planes, &nominal, options)?;
+    steps += mirrored_back(&problem, &mut estimate)?;
+    let columns = if options.bend == Bend::Never { lens } else { bent };
+    let mut evidence = Evidence::new(&problem, &estimate, columns)?;
+    if options.bend == Bend::IfShown && evidence.deflection(&problem, &estimate).is_shown() {
+        problem.free = bent;
+        steps += adjust::minimise(&problem, &mut estimate)?.unwrap_or(0);
+        steps += mirrored_back(&problem, &mut estimate)?;
+        evidence = Evidence::new(&problem, &estimate, columns)?;
+    }
+    finish(&problem, estimate, steps, &evidence)
+}
+
+/// Turns round poses that ended as their mirror image. Returns the steps it took.
+fn mirrored_back(problem: &Problem<'_>, estimate: &mut Estimate) -> Result<usize, IntrinsicsError> {
+    let mut steps = 0;
     for _ in 0..MIRROR_ROUNDS {
-        if !adjust::mirror_poses(&problem, &mut estimate)? {
+        if !adjust::mirror_poses(problem, estimate)? {
             break;
         }
-        steps += adjust::minimise(&problem, &mut estimate)?.unwrap_or(0);
+        steps += adjust::minimise(problem, estimate)?.unwrap_or(0);
     }
-    finish(&problem, estimate, steps)
+    Ok(steps)
 }
 
 /// The optimum from the first start that leads to one.
@@ -187,28 +239,46 @@ fn optimum_from(problem: &Problem<'_>, camera: Intrinsics) -> Result<Option<(Est
     Ok(steps.filter(|_| estimate.intrinsics.validate().is_ok()).map(|steps| (estimate, steps)))
 }
 
-fn finish(problem: &Problem<'_>, estimate: Estimate, steps: usize) -> Result<Found, IntrinsicsError> {
-    let linear = adjust::Linear::new(problem, &estimate)?
-        .ok_or_else(|| IntrinsicsError::NotACamera { reason: "a corner is not in front of it".into() })?;
-    let information = linear.information(problem, &estimate)?;
+fn finish(
+    problem: &Problem<'_>,
+    estimate: Estimate,
+    steps: usize,
+    evidence: &Evidence,
+) -> Result<Found, IntrinsicsError> {
+    // The columns of the evidence that were fitted come first.
+    let fitted = problem.free.count(&estimate.intrinsics);
+    let information = evidence.information.view((0, 0), (fitted, fitted)).into_owned();
     let unit_covariance = information::covariance(&information, &estimate.intrinsics)?;
-    let unknowns = information.nrows() + 6 * problem.views.len();
+    let unknowns = fitted + 6 * problem.views.len();
     let corners: usize = problem.views.iter().map(|v| v.corners.len()).sum();
     // Four corners a view can leave no more equations than unknowns; then nothing is known of the noise.
     let freedom = (2 * corners).saturating_sub(unknowns);
-    let sigma = if freedom > 0 { (linear.cost / freedom as f64).sqrt() } else { f64::NAN };
+    let sigma = if freedom > 0 { (evidence.cost / freedom as f64).sqrt() } else { f64::NAN };
     let rms_px = (0..problem.views.len()).map(|i| adjust::rms_px(problem, &estimate, i)).collect();
     Ok(Found {
         intrinsics: estimate.intrinsics,
         shape: estimate.shape,
         camera_from_target: estimate.poses.into_iter().map(Pose::from_isometry).collect(),
         rms_px,
-        cost: linear.cost,
+        cost: evidence.cost,
         corners,
         sigma,
         unit_covariance,
+        stated: stated(problem, &estimate.intrinsics, evidence),
         steps,
     })
+}
+
+fn stated(problem: &Problem<'_>, intrinsics: &Intrinsics, evidence: &Evidence) -> Stated {
+    let pinhole = evidence.spread(0, 4);
+    let warp = problem.free.warp.then(|| evidence.spread(problem.free.warp_at(intrinsics), 2));
+    Stated {
+        // How far the bend that was left out would move the answer counts as an error of it.
+        pinhole_sigma_px: std::array::from_fn(|i| pinhole.sigma(i).hypot(evidence.left_out(i))),
+        warp_sigma_m: warp.map(|warp| [warp.sigma(0), warp.sigma(1)]),
+        ratio: pinhole.ratio,
+        degrees_of_freedom: pinhole.degrees_of_freedom,
+    }
 }
 
 #[cfg(test)]

@@ -62,7 +62,7 @@ fn the_errors_of_many_calibrations_are_as_large_as_their_sigmas() {
     let mut sum = [0.0; 4];
     for seed in 0..TRIALS {
         let found = solved(&truth, 0.1, None, seed);
-        let sigma = found.pinhole_sigma_px();
+        let sigma = found.stated.pinhole_sigma_px;
         for (i, (got, want)) in found.intrinsics.parameters().iter().zip(truth.parameters()).take(4).enumerate() {
             sum[i] += ((got - want) / sigma[i]).powi(2);
         }

@@ -124,7 +124,7 @@ fn a_bent_target_misleads_a_flat_model_and_not_one_that_is_free_to_bend() {
     let mut scene = Scene::new(BROWN, 0.1);
     scene.shape = BoardShape { warp_m: [0.002, -0.001], scale: 1.0 };
     let views = scene.views(20, 7);
-    let options = Options { free_warp: true, ..Options::new(BROWN) };
+    let options = Options { bend: Bend::Always, ..Options::new(BROWN) };
     let (flat, bent) = (solved(&views, &Options::new(BROWN)).expect("flat"), solved(&views, &options).expect("bent"));
     assert!(flat.cost > 1.5 * bent.cost, "{} {}", flat.cost, bent.cost);
     assert_eq!(flat.shape, BoardShape::default());
@@ -138,6 +138,54 @@ fn a_bent_target_misleads_a_flat_model_and_not_one_that_is_free_to_bend() {
         assert!((got - want).abs() < 4.0 * sigma, "unknown {i}: {got} for {want} ± {sigma}");
     }
     assert!(covariance[(9, 9)].sqrt() < 1e-4, "a tenth of a millimetre is seen");
+}
+
+#[test]
+fn what_a_bend_would_do_is_known_without_a_fit_that_has_it() {
+    let mut scene = Scene::new(BROWN, 0.1);
+    scene.shape = BoardShape { warp_m: [0.0002, -0.0001], scale: 1.0 };
+    let views = scene.views(12, 21);
+    let flat = solved(&views, &Options::new(BROWN)).expect("flat");
+    let bent = solved(&views, &Options { bend: Bend::Always, ..Options::new(BROWN) }).expect("bent");
+    let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
+    let (board, cancel) = (board(), CancelToken::default());
+    let free = FreeParameters { lens: true, warp: false, scale: false };
+    let problem = Problem { views: &seen, board: &board, free, cancel: &cancel };
+    let poses: Vec<Isometry3<f64>> = flat.camera_from_target.iter().map(|p| *p.isometry()).collect();
+    let estimate = Estimate { intrinsics: flat.intrinsics, shape: flat.shape, poses };
+    let columns = FreeParameters { warp: true, ..free };
+    let evidence = Evidence::new(&problem, &estimate, columns).expect("in front");
+    let covariance = bent.covariance();
+    let (from, to) = (flat.intrinsics.parameters(), bent.intrinsics.parameters());
+    for i in 0..4 {
+        // What is not linear in a fifth of a millimetre is small against the noise.
+        let off = evidence.left_out(i) - (to[i] - from[i]);
+        assert!(off.abs() < 0.05 * covariance[(i, i)].sqrt(), "{i}: {off}");
+    }
+    assert!(evidence.left_out(0).abs() > 0.5 * covariance[(0, 0)].sqrt(), "it would move the lens");
+    let deflection = evidence.deflection(&problem, &estimate);
+    for i in 0..2 {
+        let sigma = covariance[(9 + i, 9 + i)].sqrt();
+        let off = deflection.warp_m[i] - bent.shape.warp_m[i];
+        assert!(off.abs() < 0.05 * sigma, "{i}: {off} ± {sigma}");
+    }
+}
+
+#[test]
+fn independent_corners_scatter_as_much_as_expected() {
+    const SESSIONS: u64 = 20;
+    let (mut ratio, mut freedom) = (0.0, 0.0);
+    for seed in 0..SESSIONS {
+        let views = Scene::new(BROWN, 0.1).views(8, 60 + seed);
+        let found = solved(&views, &Options { bend: Bend::IfShown, ..Options::new(BROWN) }).expect("solves");
+        assert_eq!(found.shape, BoardShape::FLAT);
+        ratio += found.stated.ratio / SESSIONS as f64;
+        freedom += found.stated.degrees_of_freedom / SESSIONS as f64;
+    }
+    // Four numbers of eight views, less what the fit takes of them.
+    assert!((8.0..28.0).contains(&freedom), "{freedom}");
+    let deviation = (2.0 / freedom / SESSIONS as f64).sqrt();
+    assert!((ratio - 1.0).abs() < 3.5 * deviation, "{ratio} ± {deviation}");
 }
 
 #[test]

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::diagnose::record::FindingRecord;
 
-/// Details of a joint estimate.
+/// Details of a joint estimate. Of a camera alone there are the target as found, and degrees of freedom and widening of the
+/// standard deviations of its intrinsics.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct EstimateDetails {
     /// Expected error by the noise alone, 95 %, millimetres: as if the model were true whatever the findings say.

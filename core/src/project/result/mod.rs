@@ -48,7 +48,7 @@ pub struct CalibrationResult {
     pub methods: Vec<MethodRecord>,
     /// What became of every view.
     pub views: Vec<ViewRecord>,
-    /// Details of a joint estimate; `None` for a closed form and a camera alone.
+    /// Details of an estimate; `None` for a closed form, and for a camera that was given.
     #[serde(default)]
     pub estimate: Option<EstimateDetails>,
     /// What is weak or wrong, the most severe first.
@@ -141,7 +141,8 @@ pub struct IntrinsicsEstimate {
     pub model: String,
     /// Coefficients in OpenCV's order.
     pub distortion: Vec<f64>,
-    /// Standard deviations; all `None` when the intrinsics were given.
+    /// Standard deviations; all `None` when the intrinsics were given. Without a robot 1.96 of them hold the error in 95 %
+    /// of cases, whatever the corners of a view have in common.
     pub sigma: IntrinsicsSigma,
     /// Whether they were given and not estimated.
     pub fixed: bool,

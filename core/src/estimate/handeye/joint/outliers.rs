@@ -28,6 +28,7 @@ use super::{JointProblem, JointSolution, JointStart, estimate};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::motion::MIN_VIEWS;
+use crate::estimate::wrong_corners;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::se3;
 use crate::geometry::statistics::{median, outliers};
@@ -54,13 +55,6 @@ const TIMES_MEDIAN: f64 = 5.0;
 const SUSPECT: f64 = 0.3;
 /// Rounds of fitting and judging.
 const ROUNDS: usize = 8;
-/// A corner is wrong beyond so many times the residual that nine in ten corners stay below: seven and a half standard
-/// deviations of Gaussian noise.
-const TIMES_COMMON: f64 = 3.5;
-/// The quantile that the residuals are measured by.
-const COMMON: f64 = 0.9;
-/// Part of a view's corners that has to remain.
-const LEAST_CORNERS: f64 = 0.5;
 
 /// How far a view lies from where the others expect it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -391,23 +385,19 @@ fn without_wrong_corners(
         let px = start.intrinsics.project(&(own.isometry() * points[corner.index])).ok()?;
         Some((px - corner.px).norm())
     };
-    let mut lengths: Vec<f64> = problem
+    let lengths: Vec<f64> = problem
         .views
         .iter()
         .zip(own)
         .flat_map(|(view, own)| view.corners.iter().filter_map(move |corner| residual(corner, own)))
         .collect();
-    lengths.sort_by(f64::total_cmp);
-    let Some(common) = lengths.get((COMMON * lengths.len() as f64) as usize) else {
-        return (problem.views.to_vec(), Vec::new());
-    };
-    let limit = TIMES_COMMON * common;
+    let Some(limit) = wrong_corners::limit(lengths) else { return (problem.views.to_vec(), Vec::new()) };
     let mut aside = Vec::new();
     let mut views = problem.views.to_vec();
     for (i, (view, own)) in views.iter_mut().zip(own).enumerate() {
         let is_good = |corner: &Corner| residual(corner, own).is_none_or(|r| r <= limit);
         let good = view.corners.iter().filter(|c| is_good(c)).count();
-        if good < view.corners.len() && good as f64 >= LEAST_CORNERS * view.corners.len() as f64 && good >= 4 {
+        if good < view.corners.len() && wrong_corners::enough(good, view.corners.len()) {
             aside.extend(view.corners.iter().filter(|c| !is_good(c)).map(|c| (i, c.index)));
             view.corners.retain(is_good);
         }

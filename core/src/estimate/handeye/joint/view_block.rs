@@ -96,7 +96,7 @@ pub struct ViewBlock {
 impl ViewBlock {
     /// `None` when the corners of the view determine no pose.
     pub fn new(chain: &Chain, mut equations: PoseEquations, layout: Layout) -> Option<Self> {
-        let rest = split(&mut equations)?;
+        let rest = own_pose_eliminated(&mut equations)?;
         let mut pose_by_shared = SixByShared::zeros();
         pose_by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
         pose_by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
@@ -215,7 +215,7 @@ pub fn add_form_gradient(layout: Layout, form: &SVector<f64, MAX_FORM>, weight: 
 }
 
 /// Leaves in the equations what a pose of the view could explain, and returns the rest.
-fn split(equations: &mut PoseEquations) -> Option<Rest> {
+pub fn own_pose_eliminated(equations: &mut PoseEquations) -> Option<Rest> {
     let factor = Cholesky::new(equations.pose)?;
     let solved_form = factor.solve(&equations.pose_by_form);
     let form = equations.pose_by_form.tr_mul(&solved_form);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, Matrix2};
 
-use crate::targets::observation::{Corner, View};
+use crate::targets::observation::Corner;
 
 /// The part of the mean variance that every corner has in common, whatever its detector says. A tenth costs one part in a
 /// hundred where the statement is true, and keeps a single corner from counting more than ten typical ones.
@@ -18,10 +18,10 @@ pub struct CornerWeights {
 }
 
 impl CornerWeights {
-    /// The weights that the covariances of these views give; `None` unless every corner has one.
-    pub fn stated(views: &[View]) -> Option<Self> {
+    /// The weights that the covariances of the corners of all views give; `None` unless every corner has one.
+    pub fn stated<'a>(corners: impl IntoIterator<Item = &'a Corner>) -> Option<Self> {
         let (mut sum, mut count) = (0.0, 0usize);
-        for corner in views.iter().flat_map(|view| &view.corners) {
+        for corner in corners {
             sum += 0.5 * corner.covariance_px2?.trace();
             count += 1;
         }
@@ -46,7 +46,6 @@ mod tests {
     use nalgebra::Vector2;
 
     use super::*;
-    use crate::geometry::frames::Pose;
 
     #[test]
     fn a_corner_of_four_times_the_variance_counts_a_quarter_or_so() {
@@ -54,13 +53,13 @@ mod tests {
             covariance_px2: Some(Matrix2::identity() * variance),
             ..Corner::new(0, Vector2::zeros())
         };
-        let view = View::new(String::new(), Pose::identity(), vec![corner(0.01), corner(0.04)]);
-        let weights = CornerWeights::stated(std::slice::from_ref(&view)).expect("all are stated");
-        let sqrt_weights = weights.sqrt_weights(&view.corners);
+        let corners = [corner(0.01), corner(0.04)];
+        let weights = CornerWeights::stated(&corners).expect("all are stated");
+        let sqrt_weights = weights.sqrt_weights(&corners);
         let ratio = (sqrt_weights[0][(0, 0)] / sqrt_weights[1][(0, 0)]).powi(2);
         // 0.9 of 0.4 and 1.6 times the mean, and 0.1 for both.
         assert!((ratio - (0.9 * 1.6 + 0.1) / (0.9 * 0.4 + 0.1)).abs() < 1e-12, "{ratio}");
-        let plain = View::new(String::new(), Pose::identity(), vec![Corner::new(0, Vector2::zeros())]);
-        assert_eq!(CornerWeights::stated(&[view, plain]), None);
+        let plain = Corner::new(0, Vector2::zeros());
+        assert_eq!(CornerWeights::stated(corners.iter().chain([&plain])), None);
     }
 }

@@ -1,0 +1,112 @@
+//! The camera without corners that are simply wrong.
+
+use std::borrow::Cow;
+
+use nalgebra::{Isometry3, Matrix2};
+
+use super::{Found, IntrinsicsError, Options, SeenView, solve};
+use crate::estimate::handeye::joint::CornerWeights;
+use crate::estimate::handeye::joint::equations::ViewInput;
+use crate::estimate::wrong_corners;
+use crate::geometry::planar_pose::refine::refine;
+use crate::progress::CancelToken;
+use crate::targets::TargetSpec;
+use crate::targets::bent::BoardPoints;
+use crate::targets::observation::Corner;
+
+/// Rounds of fitting and judging; two are usual where a corner is wrong.
+const ROUNDS: usize = 5;
+/// Rounds in which the worst corners of a view leave its pose.
+const POSE_ROUNDS: usize = 6;
+/// Corners go together when they are off by more than this part of the worst: one wrong corner drags its neighbours, which
+/// come back once it is gone.
+const NEAR_WORST: f64 = 0.5;
+/// Steps of a pose without them.
+const POSE_STEPS: usize = 10;
+
+/// A camera, and what it was found without.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Screened {
+    /// The camera from the corners that are left.
+    pub found: Found,
+    /// Wrong corners of each view, by the index of their point, ascending.
+    pub aside: Vec<Vec<usize>>,
+}
+
+/// [`solve`] with the corners weighed by what their detector states, and without those that are simply wrong.
+///
+/// A corner is wrong when its residual, its view's own pose being free of it, is several times what nine in ten corners of
+/// all views have (`docs/maths/robust.md`). A view of which more than half would have to go is left whole: it is wrong, not
+/// its corners. Corners that were left out are judged again by the camera that is found without them, which may then have
+/// a bent target. `keep_all` leaves none out.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_screened(
+    views: &[&[Corner]],
+    target: &TargetSpec,
+    size: (u32, u32),
+    options: &Options,
+    keep_all: bool,
+    cancel: &CancelToken,
+) -> Result<Screened, IntrinsicsError> {
+    let weights = CornerWeights::stated(views.iter().copied().flatten());
+    let fit = |views: &[Cow<'_, [Corner]>], options: &Options| {
+        let sqrt_weights: Vec<Vec<Matrix2<f64>>> =
+            views.iter().map(|view| weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(view))).collect();
+        let seen: Vec<SeenView<'_>> =
+            views.iter().zip(&sqrt_weights).map(|(corners, sqrt_weights)| SeenView { corners, sqrt_weights }).collect();
+        solve(&seen, target, size, options, cancel)
+    };
+    let all: Vec<Cow<'_, [Corner]>> = views.iter().map(|view| Cow::Borrowed(*view)).collect();
+    let mut now = Screened { found: fit(&all, options)?, aside: vec![Vec::new(); views.len()] };
+    if keep_all {
+        return Ok(now);
+    }
+    let board = BoardPoints::new(&target.points());
+    for _ in 0..ROUNDS {
+        let aside = wrong(views, &board, &now.found);
+        if aside == now.aside {
+            break;
+        }
+        let without = |(view, aside): (&&'_ [Corner], &Vec<usize>)| -> Vec<Corner> {
+            view.iter().filter(|corner| aside.binary_search(&corner.index).is_err()).copied().collect()
+        };
+        let left: Vec<Cow<'_, [Corner]>> = views.iter().zip(&aside).map(|pair| Cow::Owned(without(pair))).collect();
+        let options = Options { start: Some(now.found.intrinsics), ..*options };
+        now = Screened { found: fit(&left, &options)?, aside };
+    }
+    Ok(now)
+}
+
+/// The wrong corners of every view by a camera, those included that it was found without.
+fn wrong(views: &[&[Corner]], board: &BoardPoints, found: &Found) -> Vec<Vec<usize>> {
+    let off = |corner: &Corner, pose: &Isometry3<f64>| {
+        let point = pose * board.point(corner.index, &found.shape);
+        found.intrinsics.project(&point).map_or(f64::INFINITY, |px| (px - corner.px).norm())
+    };
+    let poses = || found.camera_from_target.iter().map(|pose| *pose.isometry());
+    let lengths = views.iter().zip(poses()).flat_map(|(view, pose)| view.iter().map(move |c| off(c, &pose))).collect();
+    let Some(limit) = wrong_corners::limit(lengths) else { return vec![Vec::new(); views.len()] };
+    let of_view = |view: &[Corner], mut pose: Isometry3<f64>| {
+        let mut trusted = view.to_vec();
+        for _ in 0..POSE_ROUNDS {
+            let worst = trusted.iter().map(|corner| off(corner, &pose)).fold(0.0, f64::max);
+            if worst <= limit {
+                break;
+            }
+            trusted.retain(|corner| off(corner, &pose) <= limit.max(NEAR_WORST * worst));
+            if !wrong_corners::enough(trusted.len(), view.len()) {
+                return Vec::new();
+            }
+            let (intrinsics, shape, sqrt_weights) = (&found.intrinsics, &found.shape, &[][..]);
+            let seen = ViewInput { intrinsics, board, shape, corners: &trusted, sqrt_weights };
+            let Some(next) = refine(&seen, &pose, POSE_STEPS) else { break };
+            pose = next.pose;
+        }
+        let mut wrong: Vec<usize> = view.iter().filter(|c| off(c, &pose) > limit).map(|c| c.index).collect();
+        wrong.sort_unstable();
+        if wrong_corners::enough(view.len() - wrong.len(), view.len()) { wrong } else { Vec::new() }
+    };
+    views.iter().zip(poses()).map(|(view, pose)| of_view(view, pose)).collect()
+}

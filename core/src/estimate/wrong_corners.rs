@@ -1,0 +1,22 @@
+//! From where a corner is simply wrong: one rule, for the joint estimate and for the camera alone.
+
+/// A corner is wrong beyond so many times the residual that nine in ten corners stay below: seven and a half standard
+/// deviations of Gaussian noise.
+const TIMES_COMMON: f64 = 3.5;
+/// The quantile that the residuals are measured by.
+const COMMON: f64 = 0.9;
+/// Part of a view's corners that has to remain: with fewer the view is wrong, not its corners.
+const LEAST_PART: f64 = 0.5;
+/// And so many of them, which a pose takes.
+const LEAST: usize = 4;
+
+/// The length of a residual beyond which a corner is wrong, in the unit of the lengths of all corners; `None` without any.
+pub(super) fn limit(mut lengths: Vec<f64>) -> Option<f64> {
+    lengths.sort_by(f64::total_cmp);
+    lengths.get((COMMON * lengths.len() as f64) as usize).map(|common| TIMES_COMMON * common)
+}
+
+/// Whether the corners of a view that are left are enough.
+pub(super) fn enough(left: usize, of: usize) -> bool {
+    left as f64 >= LEAST_PART * of as f64 && left >= LEAST
+}
