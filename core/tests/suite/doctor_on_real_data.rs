@@ -83,12 +83,15 @@ fn the_square_of_the_visp_set_is_said_to_be_wrong_by_what_the_motion_implies() {
 }
 
 #[test]
-fn the_poor_circles_are_said_to_have_inconsistent_poses_and_another_dot_distance() {
+fn the_poor_circles_are_said_to_have_inconsistent_poses_and_no_cause_is_invented() {
     let Some(data) = data_folder() else { return };
     let diagnosis = diagnosis(&data, "rct_circles_eye_in_hand", "");
     let grave = grave(&diagnosis);
     assert!(grave.contains(&FindingCode::InconsistentPoses), "{grave:?}");
-    assert!(grave.contains(&FindingCode::WrongScale), "{grave:?}");
+    // Poses that scatter by half a centimetre say nothing of the size of the target.
+    for code in [FindingCode::WrongScale, FindingCode::BoardMoved, FindingCode::CameraMoved] {
+        assert!(!grave.contains(&code), "{grave:?}");
+    }
 }
 
 #[test]

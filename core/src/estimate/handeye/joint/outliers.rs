@@ -112,20 +112,21 @@ pub fn estimate_screened<'a>(
     let core = || core_fit(problem, start, &views, &misfits, cancel);
     let fit_all = || estimate(&JointProblem { views: &views, ..*problem }, start, work);
     let of_all = |solution: JointSolution| Fit { solution, kept: all.clone() };
-    let mut fit = match fit_all() {
-        Ok(solution) => of_all(solution),
-        Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-        Err(error) if views.len() < NEED => return Err(error),
-        Err(error) => core().ok_or(error)?,
+    let mut fit = if views.len() < NEED {
+        of_all(fit_all()?)
+    } else if let Some(core) = stands_out(&misfits).then(core).flatten() {
+        core
+    } else {
+        match fit_all() {
+            Ok(solution) => of_all(solution),
+            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
+            Err(error) => core().ok_or(error)?,
+        }
     };
     let mut judged = judge(&fit)?;
     if views.len() >= NEED {
         let hiding = fit.kept.len() == views.len() && median_of(&judged) < HIDING * MEDIAN;
-        // Of views that agree none leads astray, however far it is from the start.
-        let astray = stands_out(&misfits) && judged.iter().any(|j| j.squared > j.limit);
-        if (hiding || astray)
-            && let Some(core) = core()
-        {
+        if hiding && let Some(core) = core() {
             fit = core;
             judged = judge(&fit)?;
         }
