@@ -246,7 +246,10 @@ fn the_tip_follows_its_target_on_a_straight_line() {
         let tip = bench.engine.cell.stage.tip;
         let at = bench.call(B, "sim.getObjectPosition", vec![Value::from(tip)]);
         let at = at.list().expect("one value")[0].numbers().expect("three numbers");
-        assert!((at[1] - start[1]).abs() < ROUNDING && (at[0] - start[0] + at[2] - start[2]).abs() < ROUNDING, "{at:?}");
+        assert!(
+            (at[1] - start[1]).abs() < ROUNDING && (at[0] - start[0] + at[2] - start[2]).abs() < ROUNDING,
+            "{at:?}"
+        );
     }
     assert!(passes > 5);
     for (reached, wanted) in tip_pose(&mut bench).iter().zip(&goal) {
