@@ -147,7 +147,7 @@ proptest! {
     }
 
     #[test]
-    fn damped_least_squares_stops_within_its_precision(
+    fn damped_least_squares_ends_within_its_precision(
         joints in any_joints(), nudge in proptest::array::uniform6(-0.05..0.05),
     ) {
         prop_assume!(jacobian(&joints).determinant().abs() > 3e-3);

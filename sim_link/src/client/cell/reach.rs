@@ -138,8 +138,7 @@ impl ArmKinematics {
     /// The joint positions (rad), found from `seed` on, that take the tip as near to `goal` as the arm can.
     pub(super) fn towards(&self, goal: &Pose<Base, Tip>, seed: &JointAngles) -> JointAngles {
         let arm_from_tip = self.chain.base_from_arm.inverse() * goal.isometry();
-        let options = DlsOptions { precision_m: 1e-6, precision_rad: 1e-6, ..DlsOptions::default() };
-        kinematics::towards(&arm_from_tip, &self.chain.connection_from_tip, seed, &options, &self.limits)
+        kinematics::towards(&arm_from_tip, &self.chain.connection_from_tip, seed, &DlsOptions::default(), &self.limits)
     }
 }
 

@@ -169,28 +169,11 @@ impl ArmIk {
         let goal = tree.world_pose(cell.stage.arm, Chain::Reported)?.inv_mul(world_from_goal);
         let world_from_connection = tree.world_pose(cell.stage.connection, Chain::Reported)?;
         let tip = world_from_connection.inv_mul(&tree.world_pose(self.tip, Chain::Reported)?);
-        let Some(joints) = self.solve(&goal, &tip, &seed, &limits) else { return Ok(()) };
+        let Some(joints) = damped_least_squares(&goal, &tip, &seed, &self.options, &limits) else { return Ok(()) };
         for (&handle, position_rad) in cell.stage.joints.iter().zip(joints) {
             cell.world.tree.joint_mut(handle)?.command(position_rad)?;
         }
         Ok(())
-    }
-
-    /// The solver stops as soon as it is within its precision. Asked for more than the caller needs, it ends much
-    /// closer for an iteration or two; if that fails, what the caller accepts is good enough.
-    fn solve(
-        &self,
-        goal: &Isometry3<f64>,
-        tip: &Isometry3<f64>,
-        seed: &JointAngles,
-        limits: &JointLimits,
-    ) -> Option<JointAngles> {
-        let exact = DlsOptions {
-            precision_m: self.options.precision_m.min(1e-6),
-            precision_rad: self.options.precision_rad.min(1e-6),
-            ..self.options
-        };
-        [exact, self.options].iter().find_map(|options| damped_least_squares(goal, tip, seed, options, limits))
     }
 }
 
