@@ -57,7 +57,8 @@ fn healthy_sessions_raise_no_alarm() {
 
 #[test]
 fn an_arm_whose_error_depends_on_where_it_stands_raises_no_alarm() {
-    // Of sessions like these one in fifty has a cause named; of those without a model of such errors every fourth had.
+    // One in fifty sessions like these has a cause named; one in eleven without a model of such errors, among them the
+    // tenth of these.
     for seed in 20_000..20_012 {
         let (observations, setup) = faults::as_met(seed);
         let findings = faults::examined(&observations).findings;
