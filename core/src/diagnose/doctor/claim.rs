@@ -26,7 +26,8 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Cla
         match &judged.candidate {
             Candidate::Effect(effect) => {
                 with.effects.push(*effect);
-                if counted(*effect) {
+                // What is too small to be reported moves no claim: nobody could mend it.
+                if counted(*effect) || !judged.matters {
                     base.effects.push(*effect);
                 }
             }
