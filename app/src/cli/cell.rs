@@ -41,6 +41,9 @@ pub struct CellArgs {
     /// Simulated time from image to image in s; as the scene says if not given.
     #[arg(long, value_name = "SECONDS")]
     time_step: Option<f64>,
+    /// Leave out the functions that CoppeliaSim does not have (`handeye.*`), to try a program as it runs there.
+    #[arg(long)]
+    coppeliasim_only: bool,
 }
 
 impl CellArgs {
@@ -91,6 +94,7 @@ pub fn run(args: &CellArgs) -> Result<(), Failure> {
         bind: args.bind.clone(),
         port: args.port,
         real_time: args.fast.then_some(false),
+        coppeliasim_only: args.coppeliasim_only,
         ..CellConfig::new(args.scene()?)
     })
     .map_err(Failure::failed)?;

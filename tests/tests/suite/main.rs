@@ -18,6 +18,7 @@ mod streams;
 mod slow {
     mod asleep;
     mod auto;
+    mod coppeliasim_only;
     mod first_user;
     mod following;
     mod fuzz;

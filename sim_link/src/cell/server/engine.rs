@@ -30,10 +30,10 @@ const ERROR_LINE: u32 = 354;
 /// A reply and the connection that it goes to.
 pub type Outgoing = (Peer, Vec<u8>);
 
-fn no_module(name: &str) -> String {
+fn no_module(name: &str, registry: &Registry) -> String {
     format!(
-        "module '{name}' not found: the built-in cell has sim, handeye and zmqRemoteApi. Inverse kinematics is in \
-         sim.moveToPose with 'ik'."
+        "module '{name}' not found: the built-in cell has {}. Inverse kinematics is in sim.moveToPose with 'ik'.",
+        registry.names().collect::<Vec<_>>().join(", ")
     )
 }
 
@@ -66,12 +66,12 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Serves a cell.
-    pub fn new(cell: Cell) -> Self {
+    /// Serves a cell by some functions.
+    pub fn new(cell: Cell, registry: Registry) -> Self {
         Self {
             cell,
             clients: Clients::default(),
-            registry: Registry::new(),
+            registry,
             step: 0,
             next_pass: None,
             requests: None,
@@ -311,10 +311,10 @@ impl Engine {
             Ok(Answer::Encoded(bytes)) => self.send(peer, bytes),
             Ok(Answer::Info(name)) => match self.registry.info(&name) {
                 Some(info) => self.send(peer, message::returned(vec![info])),
-                None => self.send(peer, message::failed(&no_module(&name))),
+                None => self.send(peer, message::failed(&no_module(&name, &self.registry))),
             },
             Ok(Answer::Require(name)) if self.registry.has(&name) => self.send(peer, message::returned(Vec::new())),
-            Ok(Answer::Require(name)) => self.send(peer, message::failed(&no_module(&name))),
+            Ok(Answer::Require(name)) => self.send(peer, message::failed(&no_module(&name, &self.registry))),
             Ok(Answer::Later(task)) => {
                 let index = self.clients.connection(peer, &uuid).calls.len();
                 let call = Running { uuid, func, task, waiting: Waiting::Nothing, owed_since: Some(self.cell.now) };

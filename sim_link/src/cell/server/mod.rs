@@ -28,6 +28,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crate::cell::scene::Scene;
+use api::Registry;
 pub use cell::BuildError;
 use cell::Cell;
 use engine::Engine;
@@ -49,13 +50,15 @@ pub struct CellConfig {
     /// A connection that answers nothing for so long is gone although nobody closed it: a pulled plug, a computer that
     /// sleeps. Two seconds later its client is forgotten, with its stepping and its motions.
     pub silence: Duration,
+    /// Only what CoppeliaSim has: no `handeye.*`, so clients read image and pose, stop the arm and end as they do there.
+    pub coppeliasim_only: bool,
 }
 
 impl CellConfig {
     /// A scene on any free port of this machine.
     pub fn new(scene: Scene) -> Self {
         let silence = Duration::from_secs(15);
-        Self { scene, seed: None, bind: "127.0.0.1".to_owned(), port: 0, real_time: None, silence }
+        Self { scene, seed: None, bind: "127.0.0.1".to_owned(), port: 0, real_time: None, silence, coppeliasim_only: false }
     }
 }
 
@@ -110,8 +113,9 @@ impl CellServer {
     /// # Errors
     /// [`CellError`]: a scene out of range, a port in use, an address that is not this machine's.
     pub fn start(config: CellConfig) -> Result<Self, CellError> {
-        let CellConfig { scene, seed, bind, port, real_time, silence } = config;
-        let engine = Engine::new(Cell::new(&scene, seed, real_time)?);
+        let CellConfig { scene, seed, bind, port, real_time, silence, coppeliasim_only } = config;
+        let cell = Cell::new(&scene, seed, real_time)?;
+        let engine = Engine::new(cell, if coppeliasim_only { Registry::coppeliasim_only() } else { Registry::new() });
         let (serving, stopper) = Loop::bind(engine, &bind, port, silence)?;
         let address = serving.address();
         let thread = std::thread::Builder::new()

@@ -24,10 +24,12 @@ fn idle_and_fresh(model: &Model) -> bool {
     model.solve.status == SolveStatus::Idle && model.solve.fresh
 }
 
-/// A cell that keeps pace with real time, with the ten reference poses captured and solved. The cell comes with it.
+/// A cell that keeps pace with real time, with the ten reference poses captured and solved. The cell comes with it; it
+/// has what CoppeliaSim has, so that a session there goes the same way.
 fn sequence_done(sessions: &Path) -> (Workbench, CellServer) {
     let scene = Scene::reference().expect("the scene");
-    let cell = CellServer::start(CellConfig { real_time: Some(true), ..CellConfig::new(scene) }).expect("a cell");
+    let config = CellConfig { real_time: Some(true), coppeliasim_only: true, ..CellConfig::new(scene) };
+    let cell = CellServer::start(config).expect("a cell");
     let mut bench = Workbench::start(CellSource::Address(cell.endpoint()), sessions, None);
     bench.until("a cell", connected);
     bench.click(Command::StartSimulation);

@@ -100,6 +100,18 @@ impl Registry {
         Self { namespaces }
     }
 
+    /// What CoppeliaSim serves too.
+    pub fn coppeliasim_only() -> Self {
+        let mut registry = Self::new();
+        registry.namespaces.remove("handeye");
+        registry
+    }
+
+    /// The names of the namespaces.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.namespaces.keys().copied()
+    }
+
     /// The function with a dotted name.
     pub fn function(&self, name: &str) -> Option<Function> {
         let (namespace, name) = name.split_once('.')?;

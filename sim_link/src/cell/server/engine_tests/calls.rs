@@ -12,7 +12,7 @@ fn functions_and_constants_are_listed_as_clients_expect() {
     let truth = bench.get("zmqRemoteApi.info", vec![Value::from("handeye")]);
     assert!(truth.get("truth").is_some() && truth.get("getObject").is_none());
     let missing = bench.error("zmqRemoteApi.info", vec![Value::from("simGLTF")]);
-    assert!(missing.starts_with("module 'simGLTF' not found: the built-in cell has sim, handeye"), "{missing}");
+    assert!(missing.starts_with("module 'simGLTF' not found: the built-in cell has handeye, sim"), "{missing}");
 }
 
 #[test]

@@ -47,7 +47,7 @@ impl Bench {
 
     fn with(scene: &Scene, real_time: bool) -> Self {
         let cell = Cell::new(scene, None, Some(real_time)).expect("valid scene");
-        Self { engine: Engine::new(cell), now: Duration::ZERO, replies: Vec::new(), waits: 0 }
+        Self { engine: Engine::new(cell, Registry::new()), now: Duration::ZERO, replies: Vec::new(), waits: 0 }
     }
 
     fn send(&mut self, uuid: &str, func: &str, args: Vec<Value>) {
