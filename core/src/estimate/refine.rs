@@ -9,7 +9,9 @@ use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::{Consensus, consensus, half_turn_about};
 use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
-use crate::estimate::handeye::joint::{self, CornerWeights, Free, JointProblem, JointSolution, JointStart};
+use crate::estimate::handeye::joint::{
+    self, CornerWeights, Free, JointProblem, JointSolution, JointStart, with_shown_field,
+};
 use crate::estimate::handeye::{HandEyeError, PosePair, subset};
 use crate::estimate::residuals::squared_residuals;
 use crate::estimate::uncertainty::widening::Widening;
@@ -112,6 +114,15 @@ pub fn refine(
             Screened { solution: bent, ..screened }
         } else {
             estimate_screened(&problem, &bent.as_start(), own, work.cancel)?
+        };
+    }
+    if let Some(with_field) = with_shown_field(&problem, &screened.kept_views(), &screened.solution, *work)? {
+        // An error that all views of a place share makes them look like outliers to a model without it.
+        let problem = JointProblem { free: with_field.free, ..problem };
+        screened = if options.keep_outliers {
+            Screened { solution: with_field, ..screened }
+        } else {
+            estimate_screened(&problem, &with_field.as_start(), own, work.cancel)?
         };
     }
     let joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };

@@ -6,7 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use crate::estimate::handeye::Mode;
-use crate::estimate::handeye::joint::{Free, JointProblem, JointSolution, JointStart, Noise};
+use crate::estimate::handeye::joint::chain::correction_transform;
+use crate::estimate::handeye::joint::field::{HALF, Places};
+use crate::estimate::handeye::joint::{Free, JointProblem, JointSolution, JointStart, Noise, RobotField};
 use crate::estimate::{CameraKnowledge, Observations, ObservedView};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
@@ -20,7 +22,7 @@ pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7
 
 /// Noise of a good robot and a good camera.
 pub const REALISTIC: Noise =
-    Noise { corner_px: 0.1, view_px: 0.0, robot_m: 1e-4, robot_rad: 0.02 * std::f64::consts::PI / 180.0 };
+    Noise { corner_px: 0.1, robot_m: 1e-4, robot_rad: 0.02 * std::f64::consts::PI / 180.0, ..Noise::EXACT };
 
 /// Views of a known chain.
 pub struct Trial {
@@ -57,6 +59,25 @@ pub fn robot_error(rng: &mut impl Rng, noise: &Noise) -> Isometry3<f64> {
     let twist = noise_twist(rng, noise.robot_m, noise.robot_rad);
     let turn = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());
     Isometry3::from_parts(twist.fixed_rows::<3>(0).into_owned().into(), turn)
+}
+
+/// Gives reported tip poses errors that depend on where they are, by a field drawn with the levels of `noise`.
+///
+/// The true pose is the one given times that field at the reported place, as the model has it.
+pub fn add_field(rng: &mut impl Rng, noise: &Noise, views: &mut [View]) {
+    let Some(places) = Places::of(views.iter().map(|view| &view.base_from_tip)) else { return };
+    let mut field = RobotField::none(places);
+    for (k, slope) in field.slopes_mut().iter_mut().enumerate() {
+        *slope = normal(rng) * if k < HALF { noise.field_m } else { noise.field_rad };
+    }
+    for view in views {
+        // A few rounds find where the field brings the reported pose to the one given.
+        let given = view.base_from_tip;
+        for _ in 0..3 {
+            let error = correction_transform(&field.correction(&view.base_from_tip));
+            view.base_from_tip = Pose::from_isometry(given.isometry() * error.inverse());
+        }
+    }
 }
 
 /// `camera_from_target` with the middle of [`BOARD`] at `place` \[m\] in the camera's frame, tilted about an axis at
@@ -118,6 +139,9 @@ pub fn trial(mode: Mode, views: usize, noise: &Noise, intrinsics: Intrinsics, se
             true_camera_from_target.push(camera_from_target);
             out.push(View::new(format!("{}", out.len()), reported, corners));
         }
+    }
+    if noise.field_m > 0.0 || noise.field_rad > 0.0 {
+        add_field(&mut rng, noise, &mut out);
     }
     let board = BoardPoints::new(&points);
     Trial {

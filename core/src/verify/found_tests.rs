@@ -21,7 +21,7 @@ const SCALE: f64 = 1.024;
 /// What the joints of the simulated arm are off by, degrees; the first and the last joint cannot be told.
 const OFFSETS_DEG: [f64; 6] = [0.0, 0.2, -0.15, 0.1, -0.2, 0.0];
 
-const EXACT: Noise = Noise { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+const EXACT: Noise = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
 
 fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
     let captures: Vec<_> = views.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();

@@ -39,7 +39,7 @@ fn truth(t: &Trial) -> Predictor {
 
 #[test]
 fn a_true_calibration_predicts_exact_captures_exactly() {
-    let exact = Noise { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let exact = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let t = trial(mode, 5, &exact, camera(), 71);
         let v = check_all(&truth(&t), &t.views);
@@ -51,7 +51,7 @@ fn a_true_calibration_predicts_exact_captures_exactly() {
 
 #[test]
 fn a_wrong_hand_eye_shows_in_millimetres_and_degrees_of_its_own_size() {
-    let exact = Noise { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let exact = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let t = trial(mode, 5, &exact, camera(), 72);
         let mut wrong = truth(&t);
@@ -96,7 +96,7 @@ fn errors_that_the_calibration_does_not_state_are_found() {
 
 #[test]
 fn a_corner_of_the_board_is_measured_where_it_is_by_depth_and_by_the_plane_of_the_board() {
-    let exact = Noise { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let exact = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let t = trial(mode, 5, &exact, camera(), 76);
         let truth = truth(&t);
@@ -145,7 +145,7 @@ fn the_covariance_of_a_point_is_the_scatter_that_an_uncertain_hand_eye_gives_it(
 
 #[test]
 fn a_depth_image_that_is_off_by_a_millimetre_says_so() {
-    let exact = Noise { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let exact = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
     let t = trial(Mode::EyeInHand, 3, &exact, camera(), 78);
     let truth = truth(&t);
     let view = &t.views[0];

@@ -7,7 +7,8 @@
 //!     --trials N          trials a cell (100)
 //!     --poses 10,20,40    numbers of views
 //!     --px 0.03,0.1,0.3   corner noise, pixels per axis
-//!     --robot 0,1,2       robot: exact; 0.1 mm and 0.02°; 0.5 mm and 0.1°
+//!     --robot 0,1,2       robot: exact; 0.1 mm and 0.02°; 0.5 mm and 0.1°; 3: as 1 with errors that are affine in the place,
+//!                         2 mm and 0.2° at its RMS distance from the mean (the bound is that of robot 1 then)
 //!     --modes hand,to     eye in hand, eye to hand
 //!     --lens known,free   intrinsics known; nine of them unknown
 //!     --corrupted         a tenth of the views is grossly wrong; implies --product
@@ -33,8 +34,8 @@ use rayon::prelude::*;
 use scene::Cell;
 use tally::Summary;
 
-/// The robots of the grid: metres and degrees per axis.
-const ROBOTS: [(f64, f64); 3] = [(0.0, 0.0), (1e-4, 0.02), (5e-4, 0.1)];
+/// The robots of the grid: noise per axis in metres and degrees, then errors that depend on the place likewise.
+const ROBOTS: [[f64; 4]; 4] = [[0.0; 4], [1e-4, 0.02, 0.0, 0.0], [5e-4, 0.1, 0.0, 0.0], [1e-4, 0.02, 2e-3, 0.2]];
 
 struct Arguments {
     cells: Vec<Cell>,
@@ -93,10 +94,11 @@ fn arguments(mut words: impl Iterator<Item = String>) -> Result<Arguments, Strin
         for &free_intrinsics in &lenses {
             for &poses in &poses {
                 for &robot in &robots {
-                    let (robot_m, robot_deg) =
+                    let [robot_m, robot_deg, field_m, field_deg] =
                         *ROBOTS.get(robot).ok_or_else(|| format!("--robot: there is no robot {robot}"))?;
                     for &corner_px in &px {
-                        let noise = Noise { corner_px, view_px: 0.0, robot_m, robot_rad: robot_deg.to_radians() };
+                        let (robot_rad, field_rad) = (robot_deg.to_radians(), field_deg.to_radians());
+                        let noise = Noise { corner_px, robot_m, robot_rad, field_m, field_rad, ..Noise::EXACT };
                         cells.push(Cell { mode, poses, noise, free_intrinsics, corrupted });
                     }
                 }

@@ -5,7 +5,7 @@ use handeye_core::estimate::handeye::joint::Noise;
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use handeye_core::targets::observation::{Corner, View};
-use handeye_core::testing::sessions::{BOARD, base_from_tip, board_at, noisy, normal, robot_error};
+use handeye_core::testing::sessions::{BOARD, add_field, base_from_tip, board_at, noisy, normal, robot_error};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector2, Vector3};
 use rand::seq::SliceRandom as _;
 use rand::{Rng, RngExt as _, SeedableRng as _};
@@ -123,6 +123,9 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
         let reported = Pose::from_isometry(true_pose.isometry() * error.inverse());
         let seen = |(i, px): (usize, &Vector2<f64>)| Corner::new(i, noisy(&mut rng, px, noise.corner_px));
         views.push(View::new(format!("view {index}"), reported, px.iter().enumerate().map(seen).collect()));
+    }
+    if noise.field_m > 0.0 {
+        add_field(&mut rng, noise, &mut views);
     }
     let wrong = vec![false; cell.poses];
     let mut trial = Trial {

@@ -101,8 +101,8 @@ fn division(set: &Set, name: &str, folds: &[usize]) -> Option<Vec<(f64, f64)>> {
 /// Mean over the corners of the squared 2-D residual, predicted from the reported robot pose. Zero without corners.
 fn squared_px(set: &Set, answer: &Answer, view: usize) -> Option<f64> {
     let Some(corners) = set.views.get(view).map(|v| &v.corners) else { return Some(0.0) };
-    let pair = &set.pairs[view];
-    let chain = answer.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * answer.anchor_from_target;
+    let anchor_from_mount = answer.anchor_from_mount(set, view);
+    let chain = answer.mount_from_camera.inverse() * anchor_from_mount.inverse() * answer.anchor_from_target;
     let squared: Option<f64> = corners
         .iter()
         .map(|c| {
@@ -122,7 +122,7 @@ fn board_error_m(set: &Set, answer: &Answer, view: usize) -> Option<f64> {
         camera_from_target = quality::pose_of_view(&answer.intrinsics, board, &answer.shape, &view.corners, start)?;
     }
     Some(quality::board_error_m(
-        &pair.anchor_from_mount,
+        &answer.anchor_from_mount(set, view),
         &answer.mount_from_camera,
         &camera_from_target,
         &answer.anchor_from_target,

@@ -2,7 +2,9 @@
 
 use handeye_core::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use handeye_core::estimate::handeye::joint::outliers::estimate_screened;
-use handeye_core::estimate::handeye::joint::{Free, JointProblem, JointSolution, JointStart, Noise, estimate};
+use handeye_core::estimate::handeye::joint::{
+    Free, JointProblem, JointSolution, JointStart, Noise, RobotField, estimate, with_shown_field,
+};
 use handeye_core::estimate::handeye::{PosePair, pose_graph};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
@@ -18,10 +20,26 @@ pub struct Answer {
     pub anchor_from_target: Pose<Anchor, Target>,
     pub intrinsics: Intrinsics,
     pub shape: BoardShape,
+    /// To be taken out of reported poses, where the method finds it and the row says that it is applied.
+    pub field: Option<RobotField>,
+}
+
+impl Answer {
+    /// By the reported robot pose of a view.
+    pub fn anchor_from_mount(&self, set: &Set, view: usize) -> Pose<Anchor, Mount> {
+        match &self.field {
+            Some(field) => set.mode.anchor_from_mount(&field.applied(&set.views[view].base_from_tip)),
+            None => set.pairs[view].anchor_from_mount,
+        }
+    }
 }
 
 /// Name of our estimator in tables: outlier views left out, camera as given, target flat and of the stated size.
 pub const OURS: &str = "joint";
+
+/// With the robot's field where the data show one: by the links alone, and with the field applied to the reported pose.
+const FIELD: &str = "joint, field in the model";
+const APPLIED: &str = "joint, field applied";
 
 /// Variants of it that free more.
 const VARIANTS: [(&str, Free); 4] = [
@@ -30,7 +48,7 @@ const VARIANTS: [(&str, Free); 4] = [
     ("joint, camera and warp free", Free { intrinsics: true, warp: true, ..FIXED }),
     ("joint, all three free", Free { intrinsics: true, warp: true, scale: true, ..FIXED }),
 ];
-const FIXED: Free = Free { intrinsics: false, warp: false, scale: false, joints: false };
+const FIXED: Free = Free { intrinsics: false, warp: false, scale: false, joints: false, field: false };
 
 /// Fewest views from which camera and warp are freed.
 const MANY: usize = 12;
@@ -48,6 +66,7 @@ pub fn names(set: &Set) -> Vec<&'static str> {
         names.push("reprojection, exact robot");
         names.extend(variants(set).map(|(name, _)| name));
         names.push("joint, all views kept");
+        names.extend([FIELD, APPLIED]);
     }
     names.push(OURS);
     names
@@ -88,6 +107,15 @@ impl Choice {
         Some(Kept { views: screened.kept_views(), solution: screened.solution })
     }
 
+    /// The same with the robot's field where these views show one.
+    fn joint_with_field(&self, set: &Set) -> Option<JointSolution> {
+        let kept = self.joint(set, FIXED)?;
+        let cancel = CancelToken::default();
+        let problem = JointProblem::new(set.mode, &set.board, &self.views);
+        let with = with_shown_field(&problem, &kept.views, &kept.solution, &cancel).ok()?;
+        Some(with.unwrap_or(kept.solution))
+    }
+
     /// The same with all views kept.
     fn joint_of_all(&self, set: &Set, noise: Option<Noise>) -> Option<JointSolution> {
         let problem = JointProblem { noise, ..JointProblem::new(set.mode, &set.board, &self.views) };
@@ -118,6 +146,7 @@ impl Choice {
             anchor_from_target: s.anchor_from_target,
             intrinsics: set.intrinsics,
             shape: BoardShape::default(),
+            field: None,
         };
         if let Some(method) = closed_form::by_name(name) {
             return method.solve(&self.pairs).ok().map(of);
@@ -129,9 +158,10 @@ impl Choice {
                 anchor_from_target: found.anchor_from_target,
             }));
         }
-        let exact = Noise { corner_px: 1.0, view_px: 0.0, robot_m: 1e-9, robot_rad: 1e-9 };
+        let exact = Noise { corner_px: 1.0, robot_m: 1e-9, robot_rad: 1e-9, ..Noise::EXACT };
         let solution = match name {
             OURS => self.joint(set, FIXED)?.solution,
+            FIELD | APPLIED => self.joint_with_field(set)?,
             "joint, all views kept" => self.joint_of_all(set, None)?,
             "reprojection, exact robot" => self.joint_of_all(set, Some(exact))?,
             _ => self.joint(set, VARIANTS.iter().find(|(variant, _)| *variant == name)?.1)?.solution,
@@ -141,6 +171,7 @@ impl Choice {
             anchor_from_target: solution.hand_eye.anchor_from_target(),
             intrinsics: solution.intrinsics,
             shape: solution.shape,
+            field: solution.field.filter(|_| name == APPLIED),
         })
     }
 }

@@ -14,15 +14,14 @@
 //! Reference: Patterson & Thompson 1971 (restricted likelihood); Cook & Weisberg 1982 (deletion of cases).
 
 use std::ops::Range;
-use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::effect::Effect;
-use super::field::{Field, SLOPES};
 use super::views::SessionViews;
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::chain::Chain;
+use crate::estimate::handeye::joint::field::{self, Places, SLOPES};
 use crate::geometry::se3;
 
 /// Smallest noise level of the robot, m and rad: below it nothing changes now.
@@ -53,8 +52,8 @@ pub(super) struct Model<'a> {
     pub sight: &'a SessionViews,
     pub solution: ClosedFormSolution,
     pub rows: Vec<Row>,
-    /// Errors of the robot that depend on where it stands, where there are any.
-    pub field: Option<Rc<Field>>,
+    /// Where the errors of the robot that depend on where it stands are taken, where there are any.
+    pub field: Option<Places>,
 }
 
 /// Variances of the robot per axis, of position (m²) and of orientation (rad²).
@@ -99,7 +98,7 @@ pub(super) struct Fit {
 }
 
 impl<'a> Model<'a> {
-    pub fn new(sight: &'a SessionViews, solution: ClosedFormSolution, field: Option<Rc<Field>>) -> Self {
+    pub fn new(sight: &'a SessionViews, solution: ClosedFormSolution, field: Option<Places>) -> Self {
         let rows = sight
             .views
             .iter()
@@ -132,7 +131,7 @@ impl<'a> Model<'a> {
             mount_from_camera: self.solution.mount_from_camera.perturbed(&step(0)),
             anchor_from_target: self.solution.anchor_from_target.perturbed(&step(6)),
         };
-        Self::new(self.sight, solution, self.field.clone())
+        Self::new(self.sight, solution, self.field)
     }
 
     /// Mean squared displacement of the board by a residual, as a length, metres.
@@ -170,8 +169,8 @@ impl<'a> Model<'a> {
             design.view_mut((0, at), (6, lens)).copy_from(&view.by_form.columns(0, lens));
             at += lens;
         }
-        if let Some(field) = &self.field {
-            let columns = field.columns(index, &row.by_robot);
+        if let Some(places) = &self.field {
+            let columns = field::columns(&places.at(&view.base_from_tip), &row.by_robot);
             design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
             at += columns.ncols();
         }

@@ -1,14 +1,12 @@
 //! Which hypotheses the data support: each is fitted with noise levels of its own, the best is taken in, and the rest are
 //! judged anew beside it.
 
-use std::rc::Rc;
-
 use super::agreement::Agreement;
-use super::field::Field;
 use super::judge::{Candidate, Judged, alternatives, is_significant, judge};
 use super::model::{Fit, Levels, Model, State};
 use super::screen::screened;
 use super::views::SessionViews;
+use crate::estimate::handeye::joint::field::Places;
 use crate::progress::Work;
 
 /// Least views: twelve unknowns, six of a hypothesis, and noise levels to judge them by.
@@ -37,7 +35,8 @@ pub(super) struct Selection<'a> {
 
 /// Judges all hypotheses. `None` when the views leave something open, or when it was cancelled.
 pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work<'_>) -> Option<Selection<'a>> {
-    let mut model = Model::new(sight, start.solution, Field::new(sight).map(Rc::new));
+    let places = Places::for_field(sight.views.iter().map(|view| &view.base_from_tip));
+    let mut model = Model::new(sight, start.solution, places);
     let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
     let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
     let noise_m = start.median_m / 3.0;

@@ -194,13 +194,13 @@ fn one_blurred_image_is_named_by_its_residual() {
 
 #[test]
 fn a_robot_worse_than_the_corners_is_said_to_limit_the_answer_and_an_exact_one_is_not() {
-    let noisy = Noise { corner_px: 0.1, view_px: 0.0, robot_m: 5e-4, robot_rad: 0.1f64.to_radians() };
+    let noisy = Noise { corner_px: 0.1, robot_m: 5e-4, robot_rad: 0.1f64.to_radians(), ..Noise::EXACT };
     let found = of_trial(&trial(Mode::EyeInHand, 20, &noisy, camera(), 91), false, &FindingOptions::default());
     let finding = find(&found, FindingCode::RobotNoise).expect("limits");
     let effect = finding.value("robot_effect").expect("stated");
     // 0.1° about two axes over half a metre at 581 px, and half a millimetre: about 1.6 px, more with the lever of the roll.
     assert!((1.0..4.0).contains(&effect), "{effect}");
-    let exact = Noise { corner_px: 0.1, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let exact = Noise { corner_px: 0.1, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
     let found = of_trial(&trial(Mode::EyeInHand, 20, &exact, camera(), 92), false, &FindingOptions::default());
     assert!(find(&found, FindingCode::RobotNoise).is_none());
 }

@@ -20,9 +20,9 @@ use scene::{Cell, Trial};
 use small_sample::Correction;
 use tally::Summary;
 
-const EXACT: Noise = Noise { corner_px: 0.1, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+const EXACT: Noise = Noise { corner_px: 0.1, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
 /// 0.1 mm and 0.02°: a good robot.
-const GOOD: Noise = Noise { corner_px: 0.1, view_px: 0.0, robot_m: 1e-4, robot_rad: 3.5e-4 };
+const GOOD: Noise = Noise { corner_px: 0.1, robot_m: 1e-4, robot_rad: 3.5e-4, ..Noise::EXACT };
 
 fn cell(mode: Mode, poses: usize, noise: Noise, free_intrinsics: bool) -> Cell {
     Cell { mode, poses, noise, free_intrinsics, corrupted: false }
@@ -39,7 +39,7 @@ fn worst_difference(a: &Matrix6<f64>, b: &Matrix6<f64>) -> f64 {
 fn the_stated_covariance_is_the_independent_bound() {
     // With corners of a hundredth of a pixel and robot errors a tenth of the good robot's, the derivatives at the estimate
     // are those at the truth to about one part in a thousand; a wrong sign or factor anywhere shows as parts in one.
-    let noise = Noise { corner_px: 0.01, view_px: 0.0, robot_m: 1e-5, robot_rad: 3.5e-5 };
+    let noise = Noise { corner_px: 0.01, robot_m: 1e-5, robot_rad: 3.5e-5, ..Noise::EXACT };
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         for free_intrinsics in [false, true] {
             let trial = scene::trial(&cell(mode, 12, noise, free_intrinsics), 5, 0);
@@ -153,7 +153,7 @@ fn kenward_and_rogers_covariance_is_minus_the_weighted_curvature() {
     let levels = [GOOD.corner_px, GOOD.robot_m, GOOD.robot_rad];
     let at = |factors: [f64; 3]| {
         let [corner_px, robot_m, robot_rad] = std::array::from_fn(|k| levels[k] * factors[k].sqrt());
-        bound::hand_eye(&normals, &Noise { corner_px, view_px: 0.0, robot_m, robot_rad }).expect("determined")
+        bound::hand_eye(&normals, &Noise { corner_px, robot_m, robot_rad, ..Noise::EXACT }).expect("determined")
     };
     let mut curvature = Matrix6::zeros();
     for k in 0..3 {

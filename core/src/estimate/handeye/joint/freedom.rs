@@ -13,11 +13,11 @@
 //! Kenward & Roger 1997, "Small sample inference for fixed effects from restricted maximum likelihood", Biometrics 53,
 //! 983–997, whose symbols are used below.
 
-use nalgebra::{Cholesky, DMatrix, Matrix4, Matrix6};
+use nalgebra::{Cholesky, DMatrix, Matrix6};
 
 use super::Noise;
 use super::normal::System;
-use super::variance::{self, Levels};
+use super::variance::{self, LEVELS, Levels};
 use crate::estimate::handeye::HandEyeError;
 
 /// Relative change of a variance for differences: small against the curvature of `C`, large against rounding.
@@ -65,7 +65,7 @@ pub fn adjust(
     covariance: DMatrix<f64>,
 ) -> Result<Adjusted, HandEyeError> {
     let at = |shifts: &[(usize, f64)]| -> Result<DMatrix<f64>, HandEyeError> {
-        let mut factors = [1.0; 4];
+        let mut factors = [1.0; LEVELS];
         for (k, sign) in shifts {
             factors[*k] += sign * STEP;
         }
@@ -74,14 +74,17 @@ pub fn adjust(
             robot_m: noise.robot_m * factors[1].sqrt(),
             robot_rad: noise.robot_rad * factors[2].sqrt(),
             view_px: noise.view_px * factors[3].sqrt(),
+            field_m: noise.field_m * factors[4].sqrt(),
+            field_rad: noise.field_rad * factors[5].sqrt(),
         };
         Ok(system.reduce(&changed)?.inverse())
     };
-    let mut up = Vec::with_capacity(4);
-    let mut down = Vec::with_capacity(4);
-    for k in 0..levels.count() {
-        up.push(at(&[(k, 1.0)])?);
-        down.push(at(&[(k, -1.0)])?);
+    // A level that is not estimated changes nothing.
+    let mut up = vec![covariance.clone(); LEVELS];
+    let mut down = up.clone();
+    for k in levels.estimated() {
+        up[k] = at(&[(k, 1.0)])?;
+        down[k] = at(&[(k, -1.0)])?;
     }
     let hand_eye = |m: &DMatrix<f64>| -> Matrix6<f64> { m.fixed_view::<6, 6>(0, 0).into_owned() };
     let Some(factor) = Cholesky::new(hand_eye(&covariance)) else {
@@ -89,10 +92,10 @@ pub fn adjust(
     };
     let first: Vec<Matrix6<f64>> =
         up.iter().zip(&down).map(|(u, d)| factor.solve(&(hand_eye(&(u - d)) / (2.0 * STEP)))).collect();
-    let counts: Vec<usize> = (0..levels.count()).filter(|&k| first[k].trace() / 6.0 > NO_MATTER).collect();
+    let counts: Vec<usize> = levels.estimated().filter(|&k| first[k].trace() / 6.0 > NO_MATTER).collect();
     let of_levels = levels_covariance(system, noise, levels, &counts)?;
     // Half the relative error of a variance is that of its root.
-    let all: Vec<usize> = (0..levels.count()).collect();
+    let all: Vec<usize> = levels.estimated().collect();
     let spread = levels_covariance(system, noise, levels, &all)?;
     let level_sigma = [0, 1, 2].map(|k| 0.5 * spread[(k, k)].max(0.0).sqrt());
     let small_sample = SmallSample { level_sigma, ..region(&first, &of_levels, &counts) };
@@ -118,18 +121,18 @@ fn levels_covariance(
     noise: &Noise,
     levels: Levels,
     counts: &[usize],
-) -> Result<Matrix4<f64>, HandEyeError> {
+) -> Result<Matrix6<f64>, HandEyeError> {
     let n = counts.len();
-    let mut out = Matrix4::zeros();
+    let mut out = Matrix6::zeros();
     if n == 0 {
         return Ok(out);
     }
     let mut curvature = variance::curvature(system, noise, levels)? * 0.5;
-    if levels == Levels::WithView {
+    if levels.view {
         // From the log of corner² + view² to that of view², at the same corner².
         let view = noise.view_px.powi(2);
         let share = view / (view + noise.corner_px.powi(2));
-        let mut by_levels = Matrix4::identity();
+        let mut by_levels = Matrix6::identity();
         by_levels[(3, 3)] = share;
         by_levels[(3, 0)] = 1.0 - share;
         curvature = by_levels.transpose() * curvature * by_levels;
@@ -148,7 +151,7 @@ fn levels_covariance(
 }
 
 /// Degrees of freedom and scale of the region of six numbers; `first` are `C⁻¹ ∂C`.
-fn region(first: &[Matrix6<f64>], of_levels: &Matrix4<f64>, counts: &[usize]) -> SmallSample {
+fn region(first: &[Matrix6<f64>], of_levels: &Matrix6<f64>, counts: &[usize]) -> SmallSample {
     const L: f64 = 6.0;
     let (mut a1, mut a2) = (0.0, 0.0);
     for &k in counts {

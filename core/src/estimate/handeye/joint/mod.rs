@@ -26,6 +26,7 @@
 
 pub(crate) mod chain;
 pub(crate) mod equations;
+pub(crate) mod field;
 mod freedom;
 mod gram;
 pub(crate) mod normal;
@@ -33,6 +34,7 @@ pub(crate) mod optimise;
 pub mod outliers;
 pub mod prediction;
 mod problem;
+mod shown_field;
 mod solution;
 pub(crate) mod state;
 mod variance;
@@ -41,6 +43,7 @@ mod weights;
 
 use nalgebra::Point3;
 pub use problem::{Free, JointProblem, JointStart, LensPrior, Noise};
+pub use shown_field::with_shown_field;
 pub use solution::{JointSolution, ViewFit};
 
 use super::HandEye;
@@ -52,6 +55,7 @@ use crate::progress::{Stage, Work};
 use crate::targets::observation::Corner;
 
 pub use chain::{MAX_JOINTS, base_from_tip_by_joints, camera_from_target};
+pub use field::RobotField;
 pub use freedom::SmallSample;
 pub use weights::CornerWeights;
 
@@ -87,12 +91,15 @@ pub fn estimate<'a>(
     }
     let mut state = state::State::new(problem, start);
     let mut noise = problem.noise.or(start.noise).unwrap_or_else(|| variance::starting_noise(problem, &state));
-    let mut levels = Levels::Three;
+    let mut levels = Levels { view: false, field: state.field.is_some() };
     if problem.noise.is_none() {
         // Whether the corners of a view share noise is decided by these views alone, not by where the fit began.
         noise.view_px = 0.0;
+        if levels.field && noise.field_m == 0.0 {
+            (noise.field_m, noise.field_rad) = (noise.robot_m, noise.robot_rad);
+        }
     }
-    let mut iterations = 0;
+    let (mut iterations, mut deviance) = (0, None);
     for round in 0..MAX_ROUNDS {
         work.report(Stage::Joint, round, MAX_ROUNDS);
         let (system, steps) = optimise::minimise(problem, &mut state, &noise, work.cancel)?;
@@ -102,25 +109,27 @@ pub fn estimate<'a>(
         }
         let (mut next, likelihood) = variance::restricted_likelihood(&system, &noise, levels)?;
         let mut settled = variance::change(&noise, &next) < ROUND_TOLERANCE;
-        if settled && levels == Levels::Three {
+        if settled && !levels.view {
             let start = Noise { view_px: next.corner_px, ..next };
-            let (with_view, larger) = variance::restricted_likelihood(&system, &start, Levels::WithView)?;
+            let with_view = Levels { view: true, ..levels };
+            let (found, larger) = variance::restricted_likelihood(&system, &start, with_view)?;
             if likelihood - larger > VIEW_NOISE_GAIN {
-                (levels, next, settled) = (Levels::WithView, with_view, false);
+                (levels, next, settled) = (with_view, found, false);
             }
         }
-        noise = next;
+        (noise, deviance) = (next, Some(likelihood));
         if settled {
             break;
         }
     }
-    if levels == Levels::WithView && noise.view_px < NO_VIEW_NOISE * noise.corner_px {
+    if levels.view && noise.view_px < NO_VIEW_NOISE * noise.corner_px {
         // It was asked for on the way and is not needed at the end.
         noise.view_px = 0.0;
-        levels = Levels::Three;
+        levels.view = false;
     }
     let (system, steps) = optimise::minimise(problem, &mut state, &noise, work.cancel)?;
-    finish(problem, &state, &system, noise, levels, iterations + steps, &work)
+    let solution = finish(problem, &state, &system, noise, levels, &work)?;
+    Ok(JointSolution { iterations: iterations + steps, deviance, ..solution })
 }
 
 /// Noise of the view below this part of a corner's noise is none.
@@ -138,7 +147,6 @@ fn finish(
     system: &normal::System,
     noise: Noise,
     levels: Levels,
-    iterations: usize,
     work: &Work<'_>,
 ) -> Result<JointSolution, HandEyeError> {
     let reduced = system.reduce(&noise)?;
@@ -156,13 +164,15 @@ fn finish(
         if work.is_cancelled() {
             return Err(HandEyeError::Cancelled);
         }
+        let by_field = state.by_field(view);
         let camera_from_target = state.chain(problem, view, correction).camera_from_target;
         let of_view = squares(&state.intrinsics, &camera_from_target, &points, &view.corners);
         squared_px += of_view;
         corners += view.corners.len();
         views.push(ViewFit {
             rms_px: (of_view / view.corners.len() as f64).sqrt(),
-            correction: *correction,
+            correction: correction + by_field,
+            by_field,
             camera_from_target: Pose::from_isometry(camera_from_target),
             influence_m: reduced.influence_of(block, system.layout, &noise, correction, &reference_point),
         });
@@ -172,6 +182,8 @@ fn finish(
         intrinsics: state.intrinsics,
         shape: state.shape,
         joint_offsets_rad: state.joints_rad.clone(),
+        field: state.field.clone(),
+        deviance: None,
         covariance: adjusted.covariance,
         small_sample: adjusted.small_sample,
         free: problem.free,
@@ -179,7 +191,7 @@ fn finish(
         views,
         rms_px: (squared_px / corners as f64).sqrt(),
         reference_point,
-        iterations,
+        iterations: 0,
     })
 }
 

@@ -3,6 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, SMatrix, SVector, Vector6};
 
 use super::equations::{PoseEquations, ViewInput};
+use super::field::HALF;
 use super::view_block::{
     Layout, Own, PixelWeights, Rest, SharedMatrix, SharedVector, ViewBlock, add_form, add_form_gradient, prior_weight,
 };
@@ -30,7 +31,10 @@ pub struct System {
     pub blocks: Vec<ViewBlock>,
     pub corrections: Vec<Vector6<f64>>,
     pub layout: Layout,
+    /// Of all but the robot's field, whose priors are its noise levels.
     priors: Vec<SharedPrior>,
+    /// Slopes of the field.
+    pub slopes: Vec<f64>,
     /// Sum of `Jsᵀ Js` over the poses' parts of the views, upper triangle.
     shared: SharedMatrix,
     shared_gradient: SharedVector,
@@ -48,6 +52,7 @@ impl System {
             corrections: state.corrections.clone(),
             layout,
             priors: priors(problem, state, layout),
+            slopes: state.field.as_ref().map_or_else(Vec::new, |field| field.slopes().to_vec()),
             shared: SharedMatrix::zeros(),
             shared_gradient: SharedVector::zeros(),
             rest: Rest { form: SMatrix::zeros(), gradient: SVector::zeros(), squared_px: 0.0 },
@@ -94,27 +99,38 @@ impl System {
         let weights = PixelWeights::new(noise);
         self.blocks.iter().map(|block| block.weighted_squares(weights)).sum::<f64>()
             + self.corrections.iter().map(|c| c.component_mul(c).dot(&prior)).sum::<f64>()
-            + self.prior_cost(None)
+            + self.prior_cost(noise, None)
+    }
+
+    fn known(&self, noise: &Noise) -> impl Iterator<Item = SharedPrior> {
+        let at = self.layout.field_at();
+        let precisions = [noise.field_m.powi(-2), noise.field_rad.powi(-2)];
+        let of_field = self.slopes.iter().enumerate().map(move |(k, slope)| SharedPrior {
+            index: at + k,
+            offset: *slope,
+            precision: precisions[k / HALF],
+        });
+        self.priors.iter().copied().chain(of_field)
     }
 
     /// The cost of what is known beforehand of the shared unknowns, after a step of them.
-    pub fn prior_cost(&self, step: Option<&DVector<f64>>) -> f64 {
-        self.priors.iter().map(|p| p.precision * (p.offset + step.map_or(0.0, |s| s[p.index])).powi(2)).sum()
+    pub fn prior_cost(&self, noise: &Noise, step: Option<&DVector<f64>>) -> f64 {
+        self.known(noise).map(|p| p.precision * (p.offset + step.map_or(0.0, |s| s[p.index])).powi(2)).sum()
     }
 
     /// What is known beforehand, as an information matrix.
-    pub fn prior_information(&self) -> DMatrix<f64> {
+    pub fn prior_information(&self, noise: &Noise) -> DMatrix<f64> {
         let n = self.layout.count();
         let mut known = DMatrix::zeros(n, n);
-        for p in &self.priors {
+        for p in self.known(noise) {
             known[(p.index, p.index)] += p.precision;
         }
         known
     }
 
     /// The part of the unknowns that is known beforehand: `tr(C P)` over the priors of the shared unknowns.
-    pub fn prior_trace(&self, covariance: &DMatrix<f64>) -> f64 {
-        self.priors.iter().map(|p| p.precision * covariance[(p.index, p.index)]).sum()
+    pub fn prior_trace(&self, noise: &Noise, covariance: &DMatrix<f64>) -> f64 {
+        self.known(noise).map(|p| p.precision * covariance[(p.index, p.index)]).sum()
     }
 
     /// Eliminates the corrections.
@@ -131,7 +147,7 @@ impl System {
         let mut gradient = self.shared_gradient * weights.pose;
         add_form(self.layout, &self.rest.form, weights.rest, &mut matrix);
         add_form_gradient(self.layout, &self.rest.gradient, weights.rest, &mut gradient);
-        for p in &self.priors {
+        for p in self.known(noise) {
             matrix[(p.index, p.index)] += p.precision;
             gradient[p.index] += p.precision * p.offset;
         }
@@ -143,7 +159,7 @@ impl System {
             if self.cancel.is_cancelled() {
                 return Err(HandEyeError::Cancelled);
             }
-            let own = Own::new(block, correction, weights.pose, &prior, damping)
+            let own = Own::new(block, n, correction, weights.pose, &prior, damping)
                 .ok_or_else(|| self.singular("the pose correction of a view is undetermined"))?;
             own.take_from(n, &mut matrix, &mut gradient);
             eliminated.push(own);
@@ -204,7 +220,8 @@ fn linearise(problem: &JointProblem<'_>, state: &State, index: usize) -> Result<
             reason: "the estimate puts the target behind the camera",
         }
     })?;
-    ViewBlock::new(&chain, equations, state.layout(problem)).ok_or(HandEyeError::NoSolution {
+    let place = state.field.as_ref().map(|field| field.place(&view.base_from_tip));
+    ViewBlock::new(&chain, equations, state.layout(problem), place.as_ref()).ok_or(HandEyeError::NoSolution {
         method: METHOD,
         views: problem.views.len(),
         reason: "the corners of a view lie on a line and determine no pose",

@@ -22,6 +22,7 @@ use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, SMatrix, Vector6};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::equations::{FreeParameters, PoseEquations, ViewInput};
+use super::field;
 use super::normal::System;
 use super::view_block::{MAX_SHARED, prior_weight};
 use super::{JointProblem, JointSolution, JointStart, estimate};
@@ -305,7 +306,9 @@ fn distances(
     let system = System::new(&inside, &state, cancel)?;
     let covariance = system.reduce(&solution.noise)?.inverse();
     let layout = system.layout;
-    let freedom = 0.5 * (6.0 * fit.kept.len() as f64 - layout.count() as f64);
+    // What is known of an unknown beforehand takes no residuals to find.
+    let determined = layout.count() as f64 - system.prior_trace(&solution.noise, &covariance);
+    let freedom = 0.5 * (6.0 * fit.kept.len() as f64 - determined);
     let limit = limit(views.len(), freedom.max(4.0));
     let robot = prior_weight(&solution.noise).map(f64::recip);
     let in_pixels = solution.noise.corner_px.powi(2) + solution.noise.view_px.powi(2);
@@ -326,6 +329,10 @@ fn distances(
         }
         for j in 0..layout.joints {
             by_shared.set_column(layout.joints_at() + j, &chain.by_joints.column(j));
+        }
+        if let Some(field) = &state.field {
+            let columns = field::columns(&field.place(&view.base_from_tip), &chain.by_correction);
+            by_shared.columns_mut(layout.field_at(), field::SLOPES).copy_from(&columns);
         }
         let by_shared: DMatrix<f64> = DMatrix::from_fn(6, layout.count(), |r, c| by_shared[(r, c)]);
         let shared = &by_shared * &covariance * by_shared.transpose();

@@ -62,7 +62,7 @@ fn wrong_views_are_set_aside_and_the_answer_is_that_of_the_others() {
 
 #[test]
 fn one_grossly_wrong_view_of_ten_does_not_lead_the_fit_astray() {
-    let exact = super::super::Noise { corner_px: 0.1, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let exact = super::super::Noise { corner_px: 0.1, robot_m: 0.0, robot_rad: 0.0, ..super::super::Noise::EXACT };
     for noise in [exact, REALISTIC] {
         for seed in 0..8 {
             let healthy = trial(Mode::EyeInHand, 10, &noise, camera(), 1000 + seed);
@@ -96,7 +96,7 @@ fn one_grossly_wrong_view_of_ten_does_not_lead_the_fit_astray() {
 fn one_wrong_view_of_ten_cannot_hide_behind_the_noise_it_makes() {
     // Wrong in translation alone: the noise of the robot's position follows it, and within the fit its squared distance is
     // 3 N = 30, whatever its error; the limit is 33.
-    let exact = super::super::Noise { corner_px: 0.1, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let exact = super::super::Noise { corner_px: 0.1, robot_m: 0.0, robot_rad: 0.0, ..super::super::Noise::EXACT };
     for (mode, noise) in [(Mode::EyeInHand, exact), (Mode::EyeToHand, exact), (Mode::EyeInHand, REALISTIC)] {
         for seed in 0..5 {
             let mut t = trial(mode, 10, &noise, camera(), 820 + seed);
@@ -120,7 +120,7 @@ fn a_wrong_corner_is_set_aside_and_named() {
 #[test]
 fn noise_that_all_corners_of_a_view_share_is_found_and_stated() {
     // Every view is seen 0.3 px wrong in a way that looks like a pose, on top of 0.03 px of noise, by an exact robot.
-    let fine = super::super::Noise { corner_px: 0.03, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let fine = super::super::Noise { corner_px: 0.03, robot_m: 0.0, robot_rad: 0.0, ..super::super::Noise::EXACT };
     let mut t = trial(Mode::EyeInHand, 20, &fine, camera(), 901);
     for (i, view) in t.views.iter_mut().enumerate() {
         let (dx, dy) = (0.3 * (1.7 * i as f64).sin(), 0.3 * (2.9 * i as f64).cos());

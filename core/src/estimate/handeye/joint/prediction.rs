@@ -78,7 +78,7 @@ pub fn error_by_views<'a>(
     let mut wanted = wanted.iter().peekable();
     let n = system.layout.count();
     let mut information = DMatrix::zeros(n, n);
-    let known = system.prior_information();
+    let known = system.prior_information(&solution.noise);
     let mut gathered = Vec::new();
     for (index, block) in system.blocks.iter().enumerate() {
         if work.is_cancelled() {

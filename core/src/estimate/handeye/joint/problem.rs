@@ -2,6 +2,7 @@
 
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::chain::MAX_JOINTS;
+use crate::estimate::handeye::joint::field::{Places, RobotField};
 use crate::estimate::handeye::joint::weights::CornerWeights;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
@@ -21,6 +22,17 @@ pub struct Noise {
     pub robot_m: f64,
     /// Of the reported tip orientation, radians.
     pub robot_rad: f64,
+    /// Of errors of the reported tip position that depend on where it is, see [`RobotField`], metres: at a distance of the
+    /// RMS spread of the places from their mean. Zero where they are not in the model.
+    pub field_m: f64,
+    /// Of the reported tip orientation likewise, radians.
+    pub field_rad: f64,
+}
+
+impl Noise {
+    /// None at all.
+    pub const EXACT: Self =
+        Self { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0, field_m: 0.0, field_rad: 0.0 };
 }
 
 /// What is estimated besides the two rigid links.
@@ -36,6 +48,8 @@ pub struct Free {
     /// A constant offset of every joint, where the views say how the tip turns with them, with a prior of
     /// [`JOINT_PRIOR_RAD`](super::JOINT_PRIOR_RAD). Those of the first and the last joint stay zero: the two links take them up.
     pub joints: bool,
+    /// Errors of the robot that depend on where it stands, see [`RobotField`].
+    pub field: bool,
 }
 
 impl Free {
@@ -82,6 +96,12 @@ impl<'a> JointProblem<'a> {
     pub(super) fn joint_count(&self) -> usize {
         let fewest = self.views.iter().map(|view| view.tip_by_joint.len()).min().unwrap_or(0);
         if self.free.joints { fewest.min(MAX_JOINTS) } else { 0 }
+    }
+
+    /// The field without errors, where it is free and the tip does not stay where it is.
+    pub(super) fn field(&self) -> Option<RobotField> {
+        let poses = self.views.iter().map(|view| &view.base_from_tip);
+        self.free.field.then(|| Places::of(poses).map(RobotField::none)).flatten()
     }
 }
 

@@ -3,11 +3,14 @@
 use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
 
 use crate::estimate::handeye::HandEye;
+use crate::estimate::handeye::joint::chain::{base_from_tip_by_joints, correction_transform};
+use crate::estimate::handeye::joint::field::RobotField;
 use crate::estimate::handeye::joint::freedom::SmallSample;
 use crate::estimate::handeye::joint::problem::{Free, JointStart, Noise};
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::frames::{Camera, Pose, Target};
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::targets::bent::BoardShape;
+use crate::targets::observation::View;
 
 /// What happened to one view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +19,8 @@ pub struct ViewFit {
     pub rms_px: f64,
     /// Correction of the reported tip pose: translation \[m\] and rotation vector \[rad\] in the tip frame.
     pub correction: Vector6<f64>,
+    /// What of it is the robot's field.
+    pub by_field: Vector6<f64>,
     /// The target's pose by the chain with the robot pose corrected.
     pub camera_from_target: Pose<Camera, Target>,
     /// How far the camera point [`JointSolution::reference_point`] moves when this view is left out, metres, to first
@@ -34,8 +39,12 @@ pub struct JointSolution {
     pub shape: BoardShape,
     /// Offsets of the joints, radians, to be added to the reported angles; empty when they were not estimated.
     pub joint_offsets_rad: Vec<f64>,
-    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, joints]`,
-    /// metres, radians, pixels; right perturbations. It includes the robot's noise and the uncertainty of every other
+    /// Errors of the robot that depend on where it stands; `None` when they were not estimated.
+    pub field: Option<RobotField>,
+    /// Minus twice the log of the restricted likelihood of the noise levels; `None` when these were given.
+    pub deviance: Option<f64>,
+    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, joints,
+    /// slopes of the field]`, metres, radians, pixels; right perturbations. It includes the robot's noise and the uncertainty of every other
     /// unknown, that of estimated noise levels too.
     pub covariance: DMatrix<f64>,
     /// How the error of the hand-eye transform is distributed in units of its covariance.
@@ -83,8 +92,8 @@ impl JointSolution {
 
     /// Standard deviations of the joint offsets, radians.
     pub fn joint_offsets_sigma(&self) -> Vec<f64> {
-        let n = self.covariance.nrows();
-        (n - self.joint_offsets_rad.len()..n).map(|i| self.sigma(i)).collect()
+        let at = 12 + self.free.form().count(&self.intrinsics);
+        (at..at + self.joint_offsets_rad.len()).map(|i| self.sigma(i)).collect()
     }
 
     fn sigma(&self, index: usize) -> f64 {
@@ -94,6 +103,16 @@ impl JointSolution {
     /// Multiplies the covariance, because the data show that it is too small.
     pub fn widen(&mut self, factor: f64) {
         self.covariance *= factor;
+    }
+
+    /// The reported tip pose of a view with what is known of the robot's errors taken out: the offsets of its joints and
+    /// its field.
+    pub fn base_from_tip(&self, view: &View) -> Pose<Base, Tip> {
+        let by_joints = base_from_tip_by_joints(view, &self.joint_offsets_rad);
+        self.field.as_ref().map_or(by_joints, |field| {
+            let correction = correction_transform(&field.correction(&view.base_from_tip));
+            Pose::from_isometry(by_joints.isometry() * correction)
+        })
     }
 
     /// Where the iteration ended, to start another from.

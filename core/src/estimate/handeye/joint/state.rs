@@ -3,6 +3,7 @@
 use nalgebra::{DVector, Point3, Vector6};
 
 use crate::estimate::handeye::joint::chain::Chain;
+use crate::estimate::handeye::joint::field::{RobotField, SLOPES};
 use crate::estimate::handeye::joint::view_block::Layout;
 use crate::estimate::handeye::joint::{JointProblem, JointSolution, JointStart};
 use crate::geometry::camera::Intrinsics;
@@ -19,6 +20,9 @@ pub struct State {
     pub shape: BoardShape,
     /// Empty when the joints are not free.
     pub joints_rad: Vec<f64>,
+    /// `None` when it is not free.
+    pub field: Option<RobotField>,
+    /// Of every view, beyond that of the field.
     pub corrections: Vec<Vector6<f64>>,
 }
 
@@ -30,6 +34,7 @@ impl State {
             intrinsics: start.intrinsics,
             shape: start.shape,
             joints_rad: vec![0.0; problem.joint_count()],
+            field: problem.field(),
             corrections: vec![Vector6::zeros(); problem.views.len()],
         }
     }
@@ -42,21 +47,31 @@ impl State {
             intrinsics: solution.intrinsics,
             shape: solution.shape,
             joints_rad: solution.joint_offsets_rad.clone(),
-            corrections: solution.views.iter().map(|view| view.correction).collect(),
+            field: solution.field.clone(),
+            corrections: solution.views.iter().map(|view| view.correction - view.by_field).collect(),
         }
     }
 
     pub fn layout(&self, problem: &JointProblem<'_>) -> Layout {
-        Layout { form: problem.free.form().count(&self.intrinsics), joints: self.joints_rad.len() }
+        Layout {
+            form: problem.free.form().count(&self.intrinsics),
+            joints: self.joints_rad.len(),
+            field: if self.field.is_some() { SLOPES } else { 0 },
+        }
     }
 
-    /// The chain of one view.
+    /// Correction of a view by the field.
+    pub fn by_field(&self, view: &View) -> Vector6<f64> {
+        self.field.as_ref().map_or_else(Vector6::zeros, |field| field.correction(&view.base_from_tip))
+    }
+
+    /// The chain of one view with a correction beyond that of the field.
     pub fn chain(&self, problem: &JointProblem<'_>, view: &View, correction: &Vector6<f64>) -> Chain {
         Chain::with_joints(
             problem.mode,
             view,
             &self.joints_rad,
-            correction,
+            &(correction + self.by_field(view)),
             &self.mount_from_camera,
             &self.anchor_from_target,
         )
@@ -82,9 +97,12 @@ impl State {
         if form.scale {
             next.shape.scale += at(form.scale_at(&self.intrinsics));
         }
-        let joints_at = self.layout(problem).joints_at();
+        let layout = self.layout(problem);
         for (j, offset) in next.joints_rad.iter_mut().enumerate() {
-            *offset += shared[joints_at + j];
+            *offset += shared[layout.joints_at() + j];
+        }
+        for (k, slope) in next.field.iter_mut().flat_map(RobotField::slopes_mut).enumerate() {
+            *slope += shared[layout.field_at() + k];
         }
         for (correction, step) in next.corrections.iter_mut().zip(own) {
             *correction += step;

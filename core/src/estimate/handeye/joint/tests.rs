@@ -8,7 +8,7 @@ use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 
 #[test]
 fn exact_data_gives_the_exact_answer_in_both_set_ups() {
-    let tiny = Noise { corner_px: 1e-9, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let tiny = Noise { corner_px: 1e-9, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let intrinsics =
             Intrinsics { distortion: Distortion::BrownConrady([-0.1, 0.05, 1e-3, -5e-4, 0.0]), ..camera() };
@@ -44,7 +44,7 @@ fn error_reaches_the_bound_and_the_stated_covariance_is_true() {
 fn noise_levels_are_recovered_where_the_data_can_tell_them() {
     // Half a millimetre and a tenth of a degree stand clear of what 0.1 px of corner noise does to a pose. Spread of a
     // standard deviation from 120 numbers, averaged over 20 trials: 1.4 %; three of those, and the loss to the unknowns.
-    let noise = Noise { corner_px: 0.1, view_px: 0.0, robot_m: 5e-4, robot_rad: 0.1f64.to_radians() };
+    let noise = Noise { corner_px: 0.1, robot_m: 5e-4, robot_rad: 0.1f64.to_radians(), ..Noise::EXACT };
     let trials = 20;
     let mut mean = Vector3::zeros();
     for k in 0..trials {
@@ -80,7 +80,7 @@ fn estimated_noise_costs_little_against_known_noise() {
 
 #[test]
 fn an_exact_robot_is_recognised() {
-    let exact = Noise { corner_px: 0.1, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0 };
+    let exact = Noise { corner_px: 0.1, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
     let t = trial(Mode::EyeInHand, 20, &exact, camera(), 42);
     let solution = estimate(&t.problem(false, None), &t.start(), &CancelToken::default()).expect("solves");
     // The bound of an exact robot at 20 views and 0.1 px is 0.037 mm; with a robot of 0.1 mm it would be 0.21 mm.

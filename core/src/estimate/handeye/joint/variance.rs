@@ -1,13 +1,14 @@
 //! Noise levels from the data: restricted maximum likelihood of the linearised model.
 //!
 //! With all unknowns integrated out, minus twice the log-likelihood of the noise levels is
-//! `(n − 6 N) ln corner² + 6 N ln (corner² + view²) + 3 N ln robot_m² + 3 N ln robot_rad² + ln det H + Q` for `n` residuals of
-//! `N` views, where `H` is the normal matrix and `Q` the least weighted cost. Its derivative by the log of each variance is
+//! `(n − 6 N) ln corner² + 6 N ln (corner² + view²) + 3 N ln robot_m² + 3 N ln robot_rad² + ln det H + Q` (and nine times each of
+//! `ln field_m²` and `ln field_rad²`, where the robot's field is in the model) for `n` residuals of `N` views, where `H` is the normal matrix and `Q` the least weighted cost. Its derivative by the log of each variance is
 //! the familiar `count - expected sum of squares`, the fixed point of the EM iteration; Newton on the logs gets there in a
 //! few steps where EM crawls when the robot is nearly exact.
 
-use nalgebra::{Matrix4, Vector4, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
+use super::field::HALF;
 use super::normal::System;
 use super::view_block::prior_weight;
 use super::{JointProblem, Noise};
@@ -15,9 +16,13 @@ use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 
 /// Lowest levels: a nanometre, a nanoradian and a millionth of a pixel are exact for every purpose here.
-const LOWEST: Noise = Noise { corner_px: 1e-6, view_px: 0.0, robot_m: 1e-9, robot_rad: 1e-9 };
+const LOWEST: Noise =
+    Noise { corner_px: 1e-6, view_px: 0.0, robot_m: 1e-9, robot_rad: 1e-9, field_m: 1e-9, field_rad: 1e-9 };
 /// Highest levels: beyond them the robot pose says nothing.
-const HIGHEST: Noise = Noise { corner_px: 1e4, view_px: 1e4, robot_m: 1.0, robot_rad: 1.0 };
+const HIGHEST: Noise =
+    Noise { corner_px: 1e4, view_px: 1e4, robot_m: 1.0, robot_rad: 1.0, field_m: 1.0, field_rad: 1.0 };
+/// A field of less than this part of the robot's noise is none, and how much less does not matter.
+const NO_FIELD: f64 = 1e-3;
 /// Newton steps.
 const MAX_STEPS: usize = 60;
 /// Largest change of a log-variance in one step.
@@ -27,26 +32,31 @@ const GAIN_TOLERANCE: f64 = 1e-6;
 
 /// Which levels are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Levels {
-    /// Corners and robot.
-    Three,
-    /// And what the corners of a view have in common.
-    WithView,
+pub struct Levels {
+    /// What the corners of a view have in common.
+    pub view: bool,
+    /// The robot's field.
+    pub field: bool,
 }
 
 impl Levels {
-    /// Number of levels.
-    pub fn count(self) -> usize {
-        match self {
-            Self::Three => 3,
-            Self::WithView => 4,
-        }
+    /// Places among the [`Logs`].
+    pub fn estimated(self) -> impl Iterator<Item = usize> {
+        (0..LEVELS).filter(move |k| match k {
+            0..3 => true,
+            3 => self.view,
+            _ => self.field,
+        })
     }
 }
 
-/// Logs of the variances of a corner, of the robot's position and orientation, and of the part of a view that looks like a
-/// pose; the last follows the first where it is not estimated.
-type Logs = Vector4<f64>;
+/// Number of levels.
+pub const LEVELS: usize = 6;
+
+/// Logs of the variances of a corner, of the robot's position and orientation, of the part of a view that looks like a
+/// pose, and of the field's position and orientation. The fourth follows the first where it is not estimated, and the last
+/// two mean nothing then.
+type Logs = Vector6<f64>;
 
 /// Rough levels for the first round: the robot is taken to explain the start's misfit with generous room.
 pub fn starting_noise(problem: &JointProblem<'_>, state: &State) -> Noise {
@@ -64,7 +74,7 @@ pub fn starting_noise(problem: &JointProblem<'_>, state: &State) -> Noise {
     }
     // Corners are good to a fraction of a pixel on any working camera; the rest of the misfit is the robot's to take.
     let misfit_px = if count > 0.0 { f64::sqrt(squared / count) } else { 1.0 };
-    Noise { corner_px: misfit_px.clamp(1e-3, 0.3), view_px: 0.0, robot_m: 1e-3, robot_rad: 2e-3 }
+    Noise { corner_px: misfit_px.clamp(1e-3, 0.3), robot_m: 1e-3, robot_rad: 2e-3, ..Noise::EXACT }
 }
 
 /// Largest relative change of any level, ignoring what happens at the floor.
@@ -74,6 +84,8 @@ pub fn change(a: &Noise, b: &Noise) -> f64 {
         .max(relative(a.corner_px + a.view_px, b.corner_px + b.view_px, LOWEST.corner_px))
         .max(relative(a.robot_m, b.robot_m, LOWEST.robot_m))
         .max(relative(a.robot_rad, b.robot_rad, LOWEST.robot_rad))
+        .max(relative(a.field_m, b.field_m, NO_FIELD * a.robot_m))
+        .max(relative(a.field_rad, b.field_rad, NO_FIELD * a.robot_rad))
 }
 
 /// Minus twice the restricted log-likelihood and its gradient by the log-variances.
@@ -82,7 +94,7 @@ struct Likelihood {
     gradient: Logs,
 }
 
-fn to_noise(logs: &Logs) -> Noise {
+fn to_noise(logs: &Logs, levels: Levels) -> Noise {
     let level = |i: usize, low: f64, high: f64| (0.5 * logs[i]).exp().clamp(low, high);
     let corner_px = level(0, LOWEST.corner_px, HIGHEST.corner_px);
     Noise {
@@ -90,29 +102,36 @@ fn to_noise(logs: &Logs) -> Noise {
         view_px: (logs[3].exp() - corner_px.powi(2)).clamp(0.0, HIGHEST.view_px.powi(2)).sqrt(),
         robot_m: level(1, LOWEST.robot_m, HIGHEST.robot_m),
         robot_rad: level(2, LOWEST.robot_rad, HIGHEST.robot_rad),
+        field_m: if levels.field { level(4, LOWEST.field_m, HIGHEST.field_m) } else { 0.0 },
+        field_rad: if levels.field { level(5, LOWEST.field_rad, HIGHEST.field_rad) } else { 0.0 },
     }
 }
 
 fn to_logs(noise: &Noise) -> Logs {
     let together = noise.corner_px.powi(2) + noise.view_px.powi(2);
-    Logs::new(2.0 * noise.corner_px.ln(), 2.0 * noise.robot_m.ln(), 2.0 * noise.robot_rad.ln(), together.ln())
+    let log = |level: f64| 2.0 * level.ln();
+    Logs::new(
+        log(noise.corner_px),
+        log(noise.robot_m),
+        log(noise.robot_rad),
+        together.ln(),
+        log(noise.field_m.max(LOWEST.field_m)),
+        log(noise.field_rad.max(LOWEST.field_rad)),
+    )
 }
 
 /// Keeps the logs in their range, and the pose's part no smaller than what independent corners make of it.
 fn kept(mut logs: Logs, levels: Levels) -> Logs {
     let (low, high) = (to_logs(&LOWEST), to_logs(&HIGHEST));
-    for i in 0..3 {
+    for i in [0, 1, 2, 4, 5] {
         logs[i] = logs[i].clamp(low[i], high[i]);
     }
-    logs[3] = match levels {
-        Levels::Three => logs[0],
-        Levels::WithView => logs[3].clamp(logs[0], high[3]),
-    };
+    logs[3] = if levels.view { logs[3].clamp(logs[0], high[3]) } else { logs[0] };
     logs
 }
 
 fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, HandEyeError> {
-    let noise = to_noise(logs);
+    let noise = to_noise(logs, levels);
     let reduced = system.reduce(&noise)?;
     let prior = prior_weight(&noise);
     let views = system.blocks.len() as f64;
@@ -140,47 +159,57 @@ fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, 
     let prior_trace = variances.dot(&prior);
     let unknowns = n as f64 + 6.0 * views;
     // tr(H H⁻¹) counts the unknowns; what the priors do not take of it is the corners' share.
-    let known_cost = system.prior_cost(Some(&shared_step));
-    let known_trace = system.prior_trace(&shared_covariance);
+    let known_cost = system.prior_cost(&noise, Some(&shared_step));
+    let known_trace = system.prior_trace(&noise, &shared_covariance);
     let corner_squares = (least_cost - prior_cost - known_cost) + (unknowns - prior_trace - known_trace);
     let (rest, rest_expected) = system.rest_squares(&shared_step, &shared_covariance);
     let rest_squares = (rest + rest_expected) / noise.corner_px.powi(2);
     let expected = squares + variances;
     let robot_m = expected.fixed_rows::<3>(0).sum() * prior[0];
     let robot_rad = expected.fixed_rows::<3>(3).sum() * prior[3];
+    let mut of_field = [0.0; 2];
+    for (k, slope) in system.slopes.iter().enumerate() {
+        let index = system.layout.field_at() + k;
+        of_field[k / HALF] += (slope + shared_step[index]).powi(2) + shared_covariance[(index, index)];
+    }
+    let slopes = if levels.field { HALF as f64 } else { 0.0 };
     let value = in_rest * logs[0]
+        + slopes * (logs[4] + logs[5])
         + in_poses * logs[3]
         + 3.0 * views * (logs[1] + logs[2])
         + reduced.log_determinant()
         + least_cost;
     let by_rest = in_rest - rest_squares;
     let by_poses = in_poses - (corner_squares - rest_squares);
-    let (by_rest, by_poses) = match levels {
-        Levels::Three => (by_rest + by_poses, 0.0),
-        Levels::WithView => (by_rest, by_poses),
+    let (by_rest, by_poses) = if levels.view { (by_rest, by_poses) } else { (by_rest + by_poses, 0.0) };
+    let [field_m, field_rad] = if levels.field {
+        [slopes - of_field[0] / noise.field_m.powi(2), slopes - of_field[1] / noise.field_rad.powi(2)]
+    } else {
+        [0.0; 2]
     };
-    let gradient = Logs::new(by_rest, 3.0 * views - robot_m, 3.0 * views - robot_rad, by_poses);
+    let (robot_m, robot_rad) = (3.0 * views - robot_m, 3.0 * views - robot_rad);
+    let gradient = Logs::new(by_rest, robot_m, robot_rad, by_poses, field_m, field_rad);
     Ok(Likelihood { value, gradient })
 }
 
 /// Second derivatives of minus twice the restricted log-likelihood by the log-variances; those of a level that is not
 /// estimated are zero.
-pub fn curvature(system: &System, noise: &Noise, levels: Levels) -> Result<Matrix4<f64>, HandEyeError> {
+pub fn curvature(system: &System, noise: &Noise, levels: Levels) -> Result<Matrix6<f64>, HandEyeError> {
     let logs = kept(to_logs(noise), levels);
     let at = evaluate(system, &logs, levels)?;
     hessian(system, &logs, &at, levels)
 }
 
-fn hessian(system: &System, logs: &Logs, at: &Likelihood, levels: Levels) -> Result<Matrix4<f64>, HandEyeError> {
+fn hessian(system: &System, logs: &Logs, at: &Likelihood, levels: Levels) -> Result<Matrix6<f64>, HandEyeError> {
     const DIFFERENCE: f64 = 1e-4;
     let high = to_logs(&HIGHEST);
-    let mut hessian = Matrix4::zeros();
-    for i in 0..levels.count() {
+    let mut hessian = Matrix6::zeros();
+    for i in levels.estimated() {
         let mut shifted = *logs;
         // Towards the inside, so that the clamp in `to_noise` cannot flatten the difference.
         let h = if shifted[i] + DIFFERENCE > high[i] { -DIFFERENCE } else { DIFFERENCE };
         shifted[i] += h;
-        if i == 0 && levels == Levels::Three {
+        if i == 0 && !levels.view {
             shifted[3] += h;
         }
         hessian.set_column(i, &((evaluate(system, &shifted, levels)?.gradient - at.gradient) / h));
@@ -213,14 +242,14 @@ pub fn restricted_likelihood(system: &System, start: &Noise, levels: Levels) -> 
             break;
         }
     }
-    Ok((to_noise(&logs), at.value))
+    Ok((to_noise(&logs, levels), at.value))
 }
 
 /// A step down even where the likelihood is not convex in the logs: eigenvalues are taken by their absolute value.
-fn newton_step(hessian: &Matrix4<f64>, gradient: &Logs, damping: f64) -> Logs {
+fn newton_step(hessian: &Matrix6<f64>, gradient: &Logs, damping: f64) -> Logs {
     let eigen = hessian.symmetric_eigen();
     let mut step = Logs::zeros();
-    for i in 0..4 {
+    for i in 0..LEVELS {
         let direction = eigen.eigenvectors.column(i);
         let curvature = eigen.eigenvalues[i].abs() + damping * (1.0 + eigen.eigenvalues[i].abs());
         step -= direction * (direction.dot(gradient) / curvature);

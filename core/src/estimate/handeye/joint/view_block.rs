@@ -1,16 +1,18 @@
 //! The normal equations of one view in the unknowns that all views share and in its own pose correction.
 //!
-//! The shared unknowns are `[mount_from_camera (6), anchor_from_target (6), lens and shape of the target, joints]`.
+//! The shared unknowns are `[mount_from_camera (6), anchor_from_target (6), lens and shape of the target, joints, slopes of
+//! the robot's field]`.
 //! Blocks are kept without the noise levels, so that these can be varied cheaply.
 
-use nalgebra::{Cholesky, Const, DMatrix, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Cholesky, Const, DMatrix, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use super::Noise;
 use super::chain::{Chain, MAX_JOINTS};
 use super::equations::{MAX_FORM, PoseEquations};
+use super::field::{self, SLOPES};
 
 /// Most shared unknowns.
-pub const MAX_SHARED: usize = 12 + MAX_FORM + MAX_JOINTS;
+pub const MAX_SHARED: usize = 12 + MAX_FORM + MAX_JOINTS + SLOPES;
 
 pub type SharedMatrix = SMatrix<f64, MAX_SHARED, MAX_SHARED>;
 pub type SharedVector = SVector<f64, MAX_SHARED>;
@@ -23,6 +25,8 @@ pub struct Layout {
     pub form: usize,
     /// Number of joint offsets.
     pub joints: usize,
+    /// Number of slopes of the robot's field.
+    pub field: usize,
 }
 
 impl Layout {
@@ -33,9 +37,13 @@ impl Layout {
         Self::FORM_AT + self.form
     }
 
+    pub fn field_at(self) -> usize {
+        self.joints_at() + self.joints
+    }
+
     /// Number of shared unknowns.
     pub fn count(self) -> usize {
-        self.joints_at() + self.joints
+        self.field_at() + self.field
     }
 }
 
@@ -94,8 +102,13 @@ pub struct ViewBlock {
 }
 
 impl ViewBlock {
-    /// `None` when the corners of the view determine no pose.
-    pub fn new(chain: &Chain, mut equations: PoseEquations, layout: Layout) -> Option<Self> {
+    /// `None` when the corners of the view determine no pose. `place` is where the robot's field is taken, if there is one.
+    pub fn new(
+        chain: &Chain,
+        mut equations: PoseEquations,
+        layout: Layout,
+        place: Option<&Vector3<f64>>,
+    ) -> Option<Self> {
         let rest = own_pose_eliminated(&mut equations)?;
         let mut pose_by_shared = SixByShared::zeros();
         pose_by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
@@ -104,6 +117,9 @@ impl ViewBlock {
             pose_by_shared.set_column(layout.joints_at() + j, &chain.by_joints.column(j));
         }
         let d = chain.by_correction;
+        if let Some(place) = place {
+            pose_by_shared.columns_mut(layout.field_at(), SLOPES).copy_from(&field::columns(place, &d));
+        }
         let pose_d = equations.pose * d;
         let mut cross = SixByShared::zeros();
         let mut shared_gradient = SharedVector::zeros();
@@ -185,7 +201,7 @@ impl ViewBlock {
         correction: &Vector6<f64>,
     ) -> Option<(DMatrix<f64>, SharedVector)> {
         let weights = PixelWeights::new(noise);
-        let own = Own::new(self, correction, weights.pose, &prior_weight(noise), 0.0)?;
+        let own = Own::new(self, layout.count(), correction, weights.pose, &prior_weight(noise), 0.0)?;
         let mut matrix = SharedMatrix::zeros();
         self.add_shared(layout, &mut matrix);
         matrix *= weights.pose;
@@ -240,8 +256,10 @@ pub struct Own {
 }
 
 impl Own {
+    /// Of a view with `n` shared unknowns.
     pub fn new(
         block: &ViewBlock,
+        n: usize,
         correction: &Vector6<f64>,
         weight: f64,
         prior: &Vector6<f64>,
@@ -254,8 +272,12 @@ impl Own {
         let factor = Cholesky::new(own)?;
         let mut gradient = block.own_gradient * weight + prior.component_mul(correction);
         forward(factor.l_dirty(), gradient.as_mut_slice());
-        let mut whitened = block.cross * weight;
-        for column in whitened.as_mut_slice().chunks_exact_mut(6) {
+        let mut whitened = SixByShared::zeros();
+        let columns = whitened.as_mut_slice().chunks_exact_mut(6).zip(block.cross.as_slice().chunks_exact(6));
+        for (column, cross) in columns.take(n) {
+            for (to, from) in column.iter_mut().zip(cross) {
+                *to = from * weight;
+            }
             forward(factor.l_dirty(), column);
         }
         Some(Self { factor, whitened, whitened_gradient: gradient })

@@ -4,9 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::equations::ViewInput;
-use crate::estimate::handeye::joint::{
-    JointProblem, JointSolution, JointStart, base_from_tip_by_joints, camera_from_target, estimate,
-};
+use crate::estimate::handeye::joint::{JointProblem, JointSolution, JointStart, camera_from_target, estimate};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::planar_pose::refine::refine;
@@ -95,7 +93,7 @@ pub fn held_out_rms_px<'a>(
 /// `None` when a point falls behind the camera.
 fn prediction_squares(problem: &JointProblem<'_>, fit: &JointSolution, view: &View) -> Option<(f64, f64)> {
     let (x, y) = (fit.hand_eye.mount_from_camera(), fit.hand_eye.anchor_from_target());
-    let base_from_tip = base_from_tip_by_joints(view, &fit.joint_offsets_rad);
+    let base_from_tip = fit.base_from_tip(view);
     let predicted = camera_from_target(problem.mode, &base_from_tip, &x, &y);
     let seen = pose_of_view(&fit.intrinsics, problem.board, &fit.shape, &view.corners, &predicted)?;
     let points = problem.board.points(&fit.shape);

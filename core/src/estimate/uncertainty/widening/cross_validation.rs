@@ -26,7 +26,10 @@ pub fn check(problem: &JointProblem<'_>, solution: &JointSolution, work: &Work<'
     let of_view =
         |(block, correction): (&ViewBlock, &Vector6<f64>)| block.information(layout, &solution.noise, correction);
     let told: Vec<_> = fitted.blocks.iter().zip(&fitted.corrections).map(of_view).collect();
-    let all = told.iter().flatten().fold(fitted.prior_information(), |sum, (information, _)| sum + information);
+    let all = told
+        .iter()
+        .flatten()
+        .fold(fitted.prior_information(&solution.noise), |sum, (information, _)| sum + information);
     let mut pairs = Vec::with_capacity(told.len());
     for (told, seen) in told.iter().zip(&reported.blocks) {
         if work.is_cancelled() {

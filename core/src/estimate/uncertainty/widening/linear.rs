@@ -79,7 +79,7 @@ impl LinearView {
         // An error d of the robot shows as own⁻¹ P d in the correction, and its effect on the rest goes through `cross`.
         let weight = PixelWeights::new(noise).pose;
         let prior = prior_weight(noise);
-        let own = Own::new(block, correction, weight, &prior, 0.0)?;
+        let own = Own::new(block, n, correction, weight, &prior, 0.0)?;
         let to_base = turned(&base_from_tip.rotation());
         let scale = Matrix6::from_diagonal(&prior.map(f64::sqrt));
         let gain = block.cross.columns(0, n).transpose() * weight;

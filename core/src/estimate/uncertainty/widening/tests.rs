@@ -107,7 +107,7 @@ fn the_check_is_the_same_every_time_and_says_nothing_of_few_views() {
 #[test]
 fn study_of_healthy_and_bent_sessions() {
     let trials = std::env::var("HANDEYE_TRIALS").ok().and_then(|t| t.parse().ok()).unwrap_or(8);
-    let noisy = Noise { corner_px: 0.1, view_px: 0.0, robot_m: 5e-4, robot_rad: 0.1f64.to_radians() };
+    let noisy = Noise { corner_px: 0.1, robot_m: 5e-4, robot_rad: 0.1f64.to_radians(), ..Noise::EXACT };
     let cells = |per_metre: f64, cells: &[(usize, bool, &Noise)]| {
         let mut widened = 0.0;
         for &(views, free, noise) in cells {

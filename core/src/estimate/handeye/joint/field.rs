@@ -1,0 +1,161 @@
+//! Errors of the robot that depend on where it stands: a field that is affine in the place of the tip.
+//!
+//! An arm whose links are not as its controller takes them to be is off by amounts that change smoothly over its
+//! workspace. To first order the error of the tip, in its own axes, is an affine function of its place in the base. The
+//! constant part is taken up by the hand-eye transform and the target's pose; the eighteen slopes are random effects with
+//! two variances of their own, position and orientation, which are found as those of the noise are (restricted maximum
+//! likelihood). Without them a smooth error of the arm is taken for noise that is independent from view to view, and the
+//! stated uncertainty is too small; or it looks like a board that moved, a target of another size or a wrong lens. Where
+//! the data show none, the model goes without.
+//!
+//! Source: Henderson 1975, "Best linear unbiased estimation and prediction under a selection model" (random effects in
+//! the normal equations).
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
+
+use super::chain::correction_transform;
+use crate::geometry::frames::{Base, Pose, Tip};
+
+/// Slopes: of six errors along three axes. Those of position are first; the three along one axis of the base are
+/// neighbours.
+pub(crate) const SLOPES: usize = 18;
+/// Slopes of position, and of orientation.
+pub(crate) const HALF: usize = SLOPES / 2;
+/// Least views. With fewer there are not twice as many numbers as unknowns and slopes, and the slopes are the noise.
+const NEED: usize = 10;
+/// Least spread of the places, RMS, metres: an arm that turns on the spot has no field.
+const LEAST_SPREAD_M: f64 = 1e-3;
+
+/// The places of a session's views, as the field is a function of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Places {
+    mean: Vector3<f64>,
+    rms_m: f64,
+}
+
+impl Places {
+    /// Of the reported tip poses; `None` where the tip stays where it is.
+    pub fn of<'a>(poses: impl Iterator<Item = &'a Pose<Base, Tip>> + Clone) -> Option<Self> {
+        let count = poses.clone().count() as f64;
+        let mean = poses.clone().map(Pose::translation).sum::<Vector3<f64>>() / count;
+        let rms_m = (poses.map(|pose| (pose.translation() - mean).norm_squared()).sum::<f64>() / count).sqrt();
+        (rms_m > LEAST_SPREAD_M).then_some(Self { mean, rms_m })
+    }
+
+    /// The same where the poses are enough to show a field.
+    pub fn for_field<'a>(poses: impl Iterator<Item = &'a Pose<Base, Tip>> + Clone) -> Option<Self> {
+        if poses.clone().count() < NEED { None } else { Self::of(poses) }
+    }
+
+    /// Where a pose is, in the base's axes; over the session of mean zero and RMS one.
+    pub fn at(&self, base_from_tip: &Pose<Base, Tip>) -> Vector3<f64> {
+        (base_from_tip.translation() - self.mean) / self.rms_m
+    }
+}
+
+/// How something turns with the slopes at a place, where `by_robot` is how it turns with the error of the tip.
+pub(crate) fn columns(place: &Vector3<f64>, by_robot: &Matrix6<f64>) -> DMatrix<f64> {
+    let mut columns = DMatrix::zeros(6, SLOPES);
+    for (part, at) in [(0, 0), (3, HALF)] {
+        for (axis, by) in place.iter().enumerate() {
+            let slopes = by_robot.fixed_columns::<3>(part) * *by;
+            columns.view_mut((0, at + 3 * axis), (6, 3)).copy_from(&slopes);
+        }
+    }
+    columns
+}
+
+/// The error of the tip as an affine function of its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotField {
+    places: Places,
+    /// Metres and radians at a distance of the RMS spread of the places.
+    slopes: [f64; SLOPES],
+}
+
+impl RobotField {
+    pub(crate) fn none(places: Places) -> Self {
+        Self { places, slopes: [0.0; SLOPES] }
+    }
+
+    pub(crate) fn place(&self, base_from_tip: &Pose<Base, Tip>) -> Vector3<f64> {
+        self.places.at(base_from_tip)
+    }
+
+    pub(crate) fn slopes(&self) -> &[f64; SLOPES] {
+        &self.slopes
+    }
+
+    pub(crate) fn slopes_mut(&mut self) -> &mut [f64; SLOPES] {
+        &mut self.slopes
+    }
+
+    /// Where the field is zero: the mean of the reported tip positions, base coordinates \[m\].
+    pub fn origin_m(&self) -> Vector3<f64> {
+        self.places.mean
+    }
+
+    /// Metres of error per metre of way: `rho = A (p - origin)`, in the axes of the tip, for the tip at `p` in the base.
+    pub fn position_slopes(&self) -> Matrix3<f64> {
+        Matrix3::from_column_slice(&self.slopes[..HALF]) / self.places.rms_m
+    }
+
+    /// Radians of error per metre of way: the rotation vector `phi = B (p - origin)`, likewise.
+    pub fn orientation_slopes(&self) -> Matrix3<f64> {
+        Matrix3::from_column_slice(&self.slopes[HALF..]) / self.places.rms_m
+    }
+
+    /// Where the tip is by a reported pose.
+    pub fn applied(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Base, Tip> {
+        let correction = correction_transform(&self.correction(base_from_tip));
+        Pose::from_isometry(base_from_tip.isometry() * correction)
+    }
+
+    /// Error of a reported tip pose: translation \[m\] and rotation vector \[rad\] in the axes of the tip. The true pose is
+    /// `base_from_tip * (rho, exp(phi))`.
+    pub fn correction(&self, base_from_tip: &Pose<Base, Tip>) -> Vector6<f64> {
+        let place = self.place(base_from_tip);
+        let part = |at: usize| Matrix3::from_column_slice(&self.slopes[at..at + HALF]) * place;
+        let (rho, phi) = (part(0), part(HALF));
+        Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::geometry::se3;
+
+    fn poses() -> Vec<Pose<Base, Tip>> {
+        let twist = |k: usize| Vector6::from_fn(|i, _| ((7 * k + 3 * i) as f64).sin() * 0.3);
+        (0..12).map(|k| Pose::from_isometry(se3::exp(&twist(k)))).collect()
+    }
+
+    #[test]
+    fn the_columns_are_the_correction_by_the_slopes_and_the_formula_is_the_documented_one() {
+        let poses = poses();
+        let mut field = RobotField::none(Places::of(poses.iter()).expect("they are apart"));
+        for (k, slope) in field.slopes_mut().iter_mut().enumerate() {
+            *slope = 1e-3 * (k as f64 + 1.0);
+        }
+        let by_robot = Matrix6::from_fn(|i, j| ((5 * i + j) as f64).cos());
+        for pose in &poses {
+            let correction = field.correction(pose);
+            let by_columns = columns(&field.place(pose), &by_robot) * DVector::from_row_slice(field.slopes());
+            assert!((by_columns - by_robot * correction).norm() < 1e-15);
+            let from_origin = pose.translation() - field.origin_m();
+            assert!((field.position_slopes() * from_origin - correction.fixed_rows::<3>(0)).norm() < 1e-15);
+            assert!((field.orientation_slopes() * from_origin - correction.fixed_rows::<3>(3)).norm() < 1e-15);
+        }
+        let sum = poses.iter().map(|pose| field.correction(pose)).sum::<Vector6<f64>>();
+        assert!(sum.norm() < 1e-14, "the constant part is the links'");
+    }
+
+    #[test]
+    fn a_tip_that_stays_has_no_places() {
+        let pose: Pose<Base, Tip> = Pose::identity();
+        assert_eq!(Places::of([pose; 10].iter()), None);
+    }
+}
