@@ -9,7 +9,7 @@ use super::{
     ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
-use crate::estimate::handeye::joint::{self, JointProblem, camera_from_target};
+use crate::estimate::handeye::joint::{JointProblem, camera_from_target};
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::estimate::handeye::{HandEye, Mode, PosePair};
 use crate::geometry::statistics::median_high;
@@ -201,7 +201,9 @@ fn take_joint(
         widening: judged.widening,
         reference_point: solution.reference_point,
         error_curve: judged.error_curve,
-        heldout_rms_px: judged.heldout_rms_px,
+        heldout_rms_px: judged.heldout.map(|held| held.rms_px),
+        heldout_links_rms_px: judged.heldout.map(|held| held.links_rms_px),
+        field: solution.field.clone(),
         expected_heldout_rms_px: judged.expected_heldout_rms_px,
         robot_effect_px: judged.robot_effect_px,
         shape: estimated.then(|| ShapeEstimate {
@@ -223,7 +225,7 @@ fn take_joint(
             // Where the others expect it: that is what it does not fit.
             None => camera_from_target(
                 problem.mode,
-                &joint::base_from_tip_by_joints(&screened.views[i], &solution.joint_offsets_rad),
+                &solution.base_from_tip(&screened.views[i]),
                 &solution.hand_eye.mount_from_camera(),
                 &solution.hand_eye.anchor_from_target(),
             ),

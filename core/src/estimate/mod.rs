@@ -22,7 +22,7 @@ use crate::estimate::claim::Claim;
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::outliers::Distance;
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
-use crate::estimate::handeye::joint::{Free, Noise, SmallSample};
+use crate::estimate::handeye::joint::{Free, Noise, RobotField, SmallSample};
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, subset};
 use crate::estimate::intrinsics::IntrinsicsError;
 use crate::estimate::uncertainty::quality;
@@ -383,6 +383,10 @@ pub struct JointFit {
     /// RMS of 2-D corner residuals on views held out of the fit, each predicted from its reported robot pose, pixels;
     /// `None` with too few views to leave some out.
     pub heldout_rms_px: Option<f64>,
+    /// The same by the two links alone, without the robot's field; the same number where there is none.
+    pub heldout_links_rms_px: Option<f64>,
+    /// Errors of the robot that depend on where it stands, where the data show them.
+    pub field: Option<RobotField>,
     /// What [`heldout_rms_px`](Self::heldout_rms_px) should be if the model and its noise levels are true, pixels.
     pub expected_heldout_rms_px: f64,
     /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow

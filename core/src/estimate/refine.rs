@@ -210,7 +210,7 @@ fn offsets(
 
 /// What needs the whole problem.
 pub struct Judged {
-    pub heldout_rms_px: Option<f64>,
+    pub heldout: Option<quality::HeldOut>,
     pub expected_heldout_rms_px: f64,
     pub robot_effect_px: f64,
     pub widening: Widening,
@@ -228,12 +228,12 @@ pub fn judge(
     // take longer than everything else.
     let known = (problem.views.len() > subset::MOST_VIEWS).then_some(solution.noise);
     let folds = JointProblem { noise: known, ..*problem };
-    let heldout_rms_px = quality::held_out_rms_px(&folds, &solution.as_start(), *work)?;
+    let heldout = quality::held_out(&folds, &solution.as_start(), *work)?;
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
     let widening = widening::check(problem, solution, work.cancel)?;
     solution.widen(widening.factor);
     Ok(Judged {
-        heldout_rms_px,
+        heldout,
         expected_heldout_rms_px: expected.prediction_px,
         robot_effect_px: expected.robot_px,
         widening,

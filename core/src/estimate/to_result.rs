@@ -2,12 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Matrix3;
+
 use super::claim::Claim;
+use super::handeye::joint::RobotField;
 use super::uncertainty::widening::Evidence;
 use super::{Calibration, CameraFit, JointFit, ShapeEstimate, ViewStatus};
 use crate::project::result::{
     self, BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, Provenance,
-    Quality, WideningRecord,
+    Quality, RobotFieldEstimate, WideningRecord,
 };
 
 impl Calibration {
@@ -25,7 +28,7 @@ impl Calibration {
             quality: Quality {
                 rms_px: self.rms_px,
                 sigma_px: noise.map(|n| n.corner_px).or_else(|| camera_alone.and_then(|fit| fit.noise_px)),
-                heldout_rms_px: self.joint.as_ref().and_then(|joint| joint.heldout_rms_px),
+                heldout_rms_px: self.joint.as_ref().and_then(|joint| joint.heldout_links_rms_px),
                 tip_error_95_mm: self.tip_error_95_m().map(|m| m * 1e3),
                 robot_sigma_mm: noise.map(|n| n.robot_m * 1e3),
                 robot_sigma_deg: noise.map(|n| n.robot_rad.to_degrees()),
@@ -67,6 +70,7 @@ impl Calibration {
                 heldout_after_px: j.heldout_after_px,
                 accepted: j.accepted,
             }),
+            robot_field: joint.field.as_ref().map(|field| robot_field(field, joint)),
         }
     }
 }
@@ -82,6 +86,18 @@ fn of_camera(fit: &CameraFit) -> EstimateDetails {
         }),
         board: fit.shape.map(board),
         ..EstimateDetails::default()
+    }
+}
+
+fn robot_field(field: &RobotField, joint: &JointFit) -> RobotFieldEstimate {
+    let rows = |m: Matrix3<f64>| [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]);
+    RobotFieldEstimate {
+        origin_m: field.origin_m().into(),
+        position_slopes: rows(field.position_slopes()),
+        orientation_slopes_rad_per_m: rows(field.orientation_slopes()),
+        typical_mm: joint.noise.field_m * 1e3,
+        typical_deg: joint.noise.field_rad.to_degrees(),
+        heldout_rms_px: joint.heldout_rms_px,
     }
 }
 

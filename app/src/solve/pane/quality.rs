@@ -46,10 +46,13 @@ pub fn noise_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     stated(ui, tr!(language, "Robot rotation"), quality.robot_sigma_deg.map(|deg| format!("{deg:.4}°")));
     parts::section_ui(ui, tr!(language, "Residuals, which are no accuracy"));
     stated(ui, tr!(language, "Fit, RMS"), quality.rms_px.map(|px| format!("{px:.3} px")));
-    let heldout = quality.heldout_rms_px.map(|px| match &solved.calibration.joint {
-        Some(joint) => format!("{px:.3} px ({:.3})", joint.expected_heldout_rms_px),
-        None => format!("{px:.3} px"),
-    });
+    // Of the model as it stands, with the robot's field where there is one: that is what the noise levels explain.
+    let joint = solved.calibration.joint.as_ref();
+    let of_model = joint.and_then(|joint| Some((joint.heldout_rms_px?, joint.expected_heldout_rms_px)));
+    let heldout = match of_model {
+        Some((px, expected)) => Some(format!("{px:.3} px ({expected:.3})")),
+        None => quality.heldout_rms_px.map(|px| format!("{px:.3} px")),
+    };
     stated(ui, tr!(language, "Held out, RMS"), heldout).on_hover_text(tr!(
         language,
         "Of views that were left out of the fit and predicted from their robot poses; in brackets what the noise levels \

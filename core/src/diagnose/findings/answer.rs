@@ -36,6 +36,7 @@ pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Find
     found.extend(residuals(&used));
     found.extend(corrections(calibration, &used));
     found.extend(prediction(calibration));
+    found.extend(robot_field(calibration));
     found.extend(robot_noise(calibration));
     found.extend(closed_forms(calibration));
     found.extend(options.goal_mm.and_then(|goal_mm| goal(calibration, goal_mm)));
@@ -136,6 +137,26 @@ fn prediction(calibration: &Calibration) -> Option<Finding> {
     );
     let finding = Finding::new(FindingCode::PoorPrediction, Severity::Warning, text);
     Some(finding.with("heldout_rms", heldout, "px").with("explained_rms", expected, "px"))
+}
+
+fn robot_field(calibration: &Calibration) -> Option<Finding> {
+    let joint = calibration.joint.as_ref()?;
+    joint.field.as_ref()?;
+    let (mm, deg) = (joint.noise.field_m * 1e3, joint.noise.field_rad.to_degrees());
+    let (without, with) = (joint.heldout_links_rms_px?, joint.heldout_rms_px?);
+    let text = text!(
+        "The robot's errors depend on where it stands: {mm} mm and {deg}° per axis at a typical distance from the middle of \
+         the session. The answer and its expected error count on them. The result has them as an optional correction of \
+         reported poses, which brings views left out of the fit from {without} px to {with} px; a kinematic calibration of \
+         the arm removes their cause.",
+        mm = format!("{mm:.2}"),
+        deg = format!("{deg:.3}"),
+        without = format!("{without:.2}"),
+        with = format!("{with:.2}")
+    );
+    let finding = Finding::new(FindingCode::RobotField, Severity::Advice, text);
+    let finding = finding.with("field_sigma", mm, "mm").with("field_sigma_angle", deg, "°");
+    Some(finding.with("heldout_rms", without, "px").with("heldout_rms_corrected", with, "px"))
 }
 
 fn robot_noise(calibration: &Calibration) -> Option<Finding> {

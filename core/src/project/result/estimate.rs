@@ -29,6 +29,9 @@ pub struct EstimateDetails {
     pub board: Option<BoardEstimate>,
     /// Offsets of the robot's joints, when they were asked for.
     pub joint_offsets: Option<JointOffsetsEstimate>,
+    /// Errors of the robot that depend on where it stands, where the data show them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot_field: Option<RobotFieldEstimate>,
 }
 
 /// A widened covariance.
@@ -66,6 +69,28 @@ pub struct JointOffsetsEstimate {
     pub heldout_after_px: f64,
     /// Whether the answer uses them.
     pub accepted: bool,
+}
+
+/// Errors of the robot as an affine function of where its tip is: an optional correction of reported poses.
+///
+/// With `p` the reported tip position in the base, the true tip pose is `base_from_tip * E`: `E` has the translation
+/// `position_slopes (p - origin_m)` in metres and the rotation vector `orientation_slopes_rad_per_m (p - origin_m)` in
+/// radians, both in the axes of the tip.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RobotFieldEstimate {
+    /// Where the field is zero, in the base, metres: the middle of the session's tip positions.
+    pub origin_m: [f64; 3],
+    /// Metres of error per metre, by rows.
+    pub position_slopes: [[f64; 3]; 3],
+    /// Radians of error per metre, by rows.
+    pub orientation_slopes_rad_per_m: [[f64; 3]; 3],
+    /// Estimated standard deviation of the error of position per axis, at the RMS distance of the session's tip positions
+    /// from the origin, millimetres.
+    pub typical_mm: f64,
+    /// Of the error of orientation likewise, degrees.
+    pub typical_deg: f64,
+    /// Error on held-out views with the correction applied, pixels; `quality.heldout_rms_px` is without it.
+    pub heldout_rms_px: Option<f64>,
 }
 
 /// Findings as they stand in the document.

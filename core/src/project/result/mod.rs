@@ -19,7 +19,9 @@ use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Camera, Frame, Mount, Pose};
 
 pub use check::BadResult;
-pub use estimate::{BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, WideningRecord};
+pub use estimate::{
+    BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, RobotFieldEstimate, WideningRecord,
+};
 pub use file::{ResultError, ResultProblem};
 
 /// What `format` says.

@@ -66,6 +66,14 @@ pub(crate) fn golden() -> CalibrationResult {
             heldout_after_px: 1.0,
             accepted: true,
         }),
+        robot_field: Some(RobotFieldEstimate {
+            origin_m: [0.4, -0.1, 0.5],
+            position_slopes: [[1e-3, 0.0, -2e-3], [0.0, 5e-4, 0.0], [0.0; 3]],
+            orientation_slopes_rad_per_m: [[0.0; 3], [2e-3, 0.0, 0.0], [0.0; 3]],
+            typical_mm: 0.4,
+            typical_deg: 0.03,
+            heldout_rms_px: Some(0.6),
+        }),
     });
     result.findings = vec![crate::diagnose::record::FindingRecord {
         code: "large_residual".to_owned(),

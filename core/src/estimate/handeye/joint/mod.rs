@@ -164,15 +164,13 @@ fn finish(
         if work.is_cancelled() {
             return Err(HandEyeError::Cancelled);
         }
-        let by_field = state.by_field(view);
         let camera_from_target = state.chain(problem, view, correction).camera_from_target;
         let of_view = squares(&state.intrinsics, &camera_from_target, &points, &view.corners);
         squared_px += of_view;
         corners += view.corners.len();
         views.push(ViewFit {
             rms_px: (of_view / view.corners.len() as f64).sqrt(),
-            correction: correction + by_field,
-            by_field,
+            correction: *correction,
             camera_from_target: Pose::from_isometry(camera_from_target),
             influence_m: reduced.influence_of(block, system.layout, &noise, correction, &reference_point),
         });

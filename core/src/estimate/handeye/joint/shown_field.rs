@@ -67,3 +67,7 @@ fn estimated(
         Err(_) => Ok(None),
     }
 }
+
+#[cfg(test)]
+#[path = "shown_field_tests.rs"]
+mod tests;

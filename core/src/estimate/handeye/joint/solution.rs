@@ -17,10 +17,8 @@ use crate::targets::observation::View;
 pub struct ViewFit {
     /// RMS of its 2-D corner residuals with the robot pose corrected, pixels.
     pub rms_px: f64,
-    /// Correction of the reported tip pose: translation \[m\] and rotation vector \[rad\] in the tip frame.
+    /// Correction of the reported tip pose beyond that of the field: translation \[m\] and rotation vector \[rad\] in the tip frame.
     pub correction: Vector6<f64>,
-    /// What of it is the robot's field.
-    pub by_field: Vector6<f64>,
     /// The target's pose by the chain with the robot pose corrected.
     pub camera_from_target: Pose<Camera, Target>,
     /// How far the camera point [`JointSolution::reference_point`] moves when this view is left out, metres, to first

@@ -48,7 +48,7 @@ impl State {
             shape: solution.shape,
             joints_rad: solution.joint_offsets_rad.clone(),
             field: solution.field.clone(),
-            corrections: solution.views.iter().map(|view| view.correction - view.by_field).collect(),
+            corrections: solution.views.iter().map(|view| view.correction).collect(),
         }
     }
 
@@ -61,7 +61,7 @@ impl State {
     }
 
     /// Correction of a view by the field.
-    pub fn by_field(&self, view: &View) -> Vector6<f64> {
+    fn by_field(&self, view: &View) -> Vector6<f64> {
         self.field.as_ref().map_or_else(Vector6::zeros, |field| field.correction(&view.base_from_tip))
     }
 

@@ -4,7 +4,9 @@ use nalgebra::{Point3, Vector3};
 
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::equations::ViewInput;
-use crate::estimate::handeye::joint::{JointProblem, JointSolution, JointStart, camera_from_target, estimate};
+use crate::estimate::handeye::joint::{
+    JointProblem, JointSolution, JointStart, base_from_tip_by_joints, camera_from_target, estimate,
+};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::planar_pose::refine::refine;
@@ -20,6 +22,8 @@ const FOLDS: usize = 5;
 pub struct HeldOut {
     /// RMS of 2-D corner residuals, pixels.
     pub rms_px: f64,
+    /// The same by the two links alone, without the robot's field; the same number where there is none.
+    pub links_rms_px: f64,
     /// RMS over the views of [`board_error_m`], metres.
     pub rms_m: f64,
 }
@@ -53,7 +57,7 @@ pub fn held_out<'a>(
     let work = work.into();
     let count = problem.views.len();
     let folds = if count < 2 * FOLDS { count } else { FOLDS };
-    let (mut squared_px, mut squared_m) = (0.0, 0.0);
+    let mut squares = Squares::default();
     let (mut corners, mut views) = (0usize, 0usize);
     for fold in 0..folds {
         work.report(Stage::HeldOut, fold, folds);
@@ -66,15 +70,32 @@ pub fn held_out<'a>(
             Err(_) => return Ok(None),
         };
         for (_, view) in &held {
-            let Some((px, m)) = prediction_squares(problem, &fit, view) else { return Ok(None) };
-            squared_px += px;
-            squared_m += m;
+            let Some(of_view) = prediction_squares(problem, &fit, view) else { return Ok(None) };
+            squares = squares.plus(&of_view);
             corners += view.corners.len();
             views += 1;
         }
     }
     let rms = |squares: f64, count: usize| (squares / count as f64).sqrt();
-    Ok((corners > 0).then(|| HeldOut { rms_px: rms(squared_px, corners), rms_m: rms(squared_m, views) }))
+    Ok((corners > 0).then(|| HeldOut {
+        rms_px: rms(squares.px, corners),
+        links_rms_px: rms(squares.links_px, corners),
+        rms_m: rms(squares.m, views),
+    }))
+}
+
+/// Sums of squares over held-out views: pixels of all corners, by the links alone too, and metres at the board.
+#[derive(Default)]
+struct Squares {
+    px: f64,
+    links_px: f64,
+    m: f64,
+}
+
+impl Squares {
+    fn plus(&self, other: &Self) -> Self {
+        Self { px: self.px + other.px, links_px: self.links_px + other.links_px, m: self.m + other.m }
+    }
 }
 
 /// [`HeldOut::rms_px`] of [`held_out`].
@@ -89,25 +110,30 @@ pub fn held_out_rms_px<'a>(
     Ok(held_out(problem, start, work)?.map(|held| held.rms_px))
 }
 
-/// Sum of squared 2-D residuals of one view predicted from its reported robot pose, and the squared error at the board;
-/// `None` when a point falls behind the camera.
-fn prediction_squares(problem: &JointProblem<'_>, fit: &JointSolution, view: &View) -> Option<(f64, f64)> {
+/// Squares of one view predicted from its reported robot pose; `None` when a point falls behind the camera.
+fn prediction_squares(problem: &JointProblem<'_>, fit: &JointSolution, view: &View) -> Option<Squares> {
     let (x, y) = (fit.hand_eye.mount_from_camera(), fit.hand_eye.anchor_from_target());
-    let base_from_tip = fit.base_from_tip(view);
-    let predicted = camera_from_target(problem.mode, &base_from_tip, &x, &y);
-    let seen = pose_of_view(&fit.intrinsics, problem.board, &fit.shape, &view.corners, &predicted)?;
     let points = problem.board.points(&fit.shape);
-    let centre = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64);
-    let squared_px: f64 = view
-        .corners
-        .iter()
-        .map(|corner| {
+    let squared_px = |predicted: &Pose<Camera, Target>| -> Option<f64> {
+        let squared = |corner: &Corner| {
             let px = fit.intrinsics.project(&(predicted.isometry() * points[corner.index])).ok()?;
             Some((px - corner.px).norm_squared())
-        })
-        .sum::<Option<f64>>()?;
+        };
+        view.corners.iter().map(squared).sum()
+    };
+    let base_from_tip = fit.base_from_tip(view);
+    let predicted = camera_from_target(problem.mode, &base_from_tip, &x, &y);
+    let px = squared_px(&predicted)?;
+    let links_px = if fit.field.is_some() {
+        let by_joints = base_from_tip_by_joints(view, &fit.joint_offsets_rad);
+        squared_px(&camera_from_target(problem.mode, &by_joints, &x, &y))?
+    } else {
+        px
+    };
+    let seen = pose_of_view(&fit.intrinsics, problem.board, &fit.shape, &view.corners, &predicted)?;
+    let centre = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64);
     let anchor_from_mount = problem.mode.anchor_from_mount(&base_from_tip);
-    Some((squared_px, board_error_m(&anchor_from_mount, &x, &seen, &y, &centre).powi(2)))
+    Some(Squares { px, links_px, m: board_error_m(&anchor_from_mount, &x, &seen, &y, &centre).powi(2) })
 }
 
 /// Steps from a pose nearby: Gauss–Newton from a few pixels off needs three or four.
