@@ -163,6 +163,13 @@ fn details(out: &mut String, result: &CalibrationResult) {
             line!(out, "  target {:.5} ± {sigma:.5} times its stated size", board.scale);
         }
     }
+    if let Some(field) = &estimate.robot_field {
+        let with = field
+            .heldout_rms_px
+            .map_or_else(String::new, |px| format!(", {px:.4} px on views held out with it applied"));
+        let (mm, deg) = (field.typical_mm, field.typical_deg);
+        line!(out, "  robot errors that depend on its place: {mm:.3} mm and {deg:.4}° per axis, typically{with}");
+    }
     if let Some(joints) = &estimate.joint_offsets {
         let each: Vec<String> =
             joints.offsets_deg.iter().zip(&joints.sigma_deg).map(|(o, s)| format!("{o:.4} ± {s:.4}°")).collect();

@@ -116,6 +116,7 @@ pub fn refine(
             estimate_screened(&problem, &bent.as_start(), own, work.cancel)?
         };
     }
+    let mut joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };
     if let Some(with_field) = with_shown_field(&problem, &screened.kept_views(), &screened.solution, *work)? {
         // An error that all views of a place share makes them look like outliers to a model without it.
         let problem = JointProblem { free: with_field.free, ..problem };
@@ -124,8 +125,11 @@ pub fn refine(
         } else {
             estimate_screened(&problem, &with_field.as_start(), own, work.cancel)?
         };
+        if let Some(joints) = joints.as_mut().filter(|joints| joints.accepted) {
+            joints.offsets_rad.clone_from(&screened.solution.joint_offsets_rad);
+            joints.sigma_rad = screened.solution.joint_offsets_sigma();
+        }
     }
-    let joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };
     Ok(Refined { screened, weights, joints })
 }
 

@@ -93,6 +93,7 @@ fn robot_field(field: &RobotField, joint: &JointFit) -> RobotFieldEstimate {
     let rows = |m: Matrix3<f64>| [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]);
     RobotFieldEstimate {
         origin_m: field.origin_m().into(),
+        reach_m: field.reach_m(),
         position_slopes: rows(field.position_slopes()),
         orientation_slopes_rad_per_m: rows(field.orientation_slopes()),
         typical_mm: joint.noise.field_m * 1e3,

@@ -160,6 +160,7 @@ pub fn calibrated() -> Predictor {
         hand_eye: HandEye::EyeInHand { tip_from_camera: tip_from_camera(), base_from_target: Pose::identity() },
         intrinsics: lens(),
         joint_offsets_rad: Vec::new(),
+        field: None,
         hand_eye_covariance: None,
         small_sample: SmallSample::KNOWN,
         uncertainty: None,

@@ -5,7 +5,9 @@ use nalgebra::{DMatrix, Matrix6};
 use super::VerifyError;
 use crate::estimate::Calibration;
 use crate::estimate::handeye::HandEye;
-use crate::estimate::handeye::joint::{Free, Noise, SmallSample, base_from_tip_by_joints, camera_from_target};
+use crate::estimate::handeye::joint::{
+    Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,
+};
 use crate::estimate::uncertainty::quality;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -24,6 +26,8 @@ pub struct Predictor {
     /// Offsets of the joints that the calibration counts on, to be added to the reported angles, radians; empty where it
     /// counts on none.
     pub joint_offsets_rad: Vec<f64>,
+    /// Errors of the robot that depend on where it stands, where the calibration found them.
+    pub field: Option<RobotField>,
     /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
     pub hand_eye_covariance: Option<Matrix6<f64>>,
     /// How the error of the hand-eye transform is distributed in units of that covariance.
@@ -64,13 +68,15 @@ impl Predictor {
             intrinsics,
             shape: joint.and_then(|joint| joint.shape).map_or_else(BoardShape::default, |estimate| estimate.shape),
             joint_offsets_rad: offsets.map_or_else(Vec::new, |offsets| offsets.offsets_rad.clone()),
+            field: joint.and_then(|joint| joint.field.clone()),
             hand_eye_covariance: calibration.hand_eye_covariance().copied(),
             small_sample: joint.map_or(SmallSample::KNOWN, |joint| joint.small_sample),
             uncertainty,
         })
     }
 
-    /// Where the tip is when the robot reports what it does in this view: with the offsets of the joints taken out.
+    /// Where the tip is when the robot reports what it does in this view: with the offsets of the joints and the robot's
+    /// field taken out.
     ///
     /// # Errors
     /// [`VerifyError::NotFinite`]; [`VerifyError::NoJoints`] when there are offsets and the view does not say how its tip
@@ -82,7 +88,7 @@ impl Predictor {
         if view.tip_by_joint.len() < self.joint_offsets_rad.len() {
             return Err(VerifyError::NoJoints { name: view.name.clone() });
         }
-        Ok(base_from_tip_by_joints(view, &self.joint_offsets_rad))
+        Ok(corrected_base_from_tip(view, &self.joint_offsets_rad, self.field.as_ref()))
     }
 
     /// Where the camera is when the tip is there.

@@ -2,7 +2,7 @@
 //!
 //! The pose error of a capture, `e_i = log(predicted⁻¹ * seen)`, is to first order
 //! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and whatever of lens,
-//! target and joints is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP. With
+//! target, joints and the robot's field is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP. With
 //! `B_i = D_i Σ_robot D_iᵀ + (corner_px² + view_px²) (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
 //! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
 //! `√(12 n)`. The inverse is by the matrix inversion lemma, so the cost is linear in the number of captures.
@@ -14,6 +14,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 use super::{CaptureCheck, Predictor, Uncertainty};
 use crate::estimate::handeye::joint::chain::Chain;
 use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
+use crate::estimate::handeye::joint::field::{self, SLOPES};
 use crate::geometry::se3;
 use crate::targets::bent::BoardPoints;
 use crate::targets::observation::View;
@@ -66,7 +67,8 @@ impl Sums {
     /// `None` when the covariance is not one, or not of what this calibration is of.
     pub fn new(calibrated: &Predictor, uncertainty: &Uncertainty) -> Option<Self> {
         let form = uncertainty.free.form();
-        let n = LINKS + form.count(&calibrated.intrinsics) + calibrated.joint_offsets_rad.len();
+        let slopes = if calibrated.field.is_some() { SLOPES } else { 0 };
+        let n = LINKS + form.count(&calibrated.intrinsics) + calibrated.joint_offsets_rad.len() + slopes;
         if uncertainty.covariance.shape() != (n, n) {
             return None;
         }
@@ -96,7 +98,7 @@ impl Sums {
             calibrated.hand_eye.mode(),
             view,
             &calibrated.joint_offsets_rad,
-            &Vector6::zeros(),
+            &calibrated.field.as_ref().map_or_else(Vector6::zeros, |field| field.correction(&view.base_from_tip)),
             &calibrated.hand_eye.mount_from_camera(),
             &calibrated.hand_eye.anchor_from_target(),
         );
@@ -117,6 +119,10 @@ impl Sums {
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
         by_shared.columns_mut(LINKS, form).copy_from(&by_form.columns(0, form));
         by_shared.columns_mut(LINKS + form, joints).copy_from(&chain.by_joints.columns(0, joints));
+        if let Some(field) = &calibrated.field {
+            let columns = field::columns(&field.place(&view.base_from_tip), &chain.by_correction);
+            by_shared.columns_mut(LINKS + form + joints, SLOPES).copy_from(&columns);
+        }
         let own = chain.by_correction * Matrix6::from_diagonal(&self.robot_variance) * chain.by_correction.transpose()
             + pose_covariance * self.corner_variance;
         let error = se3::log((check.predicted_camera_from_target.inverse() * check.seen_camera_from_target).isometry());

@@ -31,6 +31,7 @@ fn truth(t: &Trial) -> Predictor {
         hand_eye: HandEye::new(t.mode, t.mount_from_camera, t.anchor_from_target),
         intrinsics: t.intrinsics,
         joint_offsets_rad: Vec::new(),
+        field: None,
         hand_eye_covariance: None,
         small_sample: SmallSample::KNOWN,
         uncertainty: None,

@@ -47,6 +47,7 @@ pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
         intrinsics,
         shape,
         joint_offsets_rad: joint_offsets_rad(&result),
+        field: result.estimate.as_ref().and_then(|estimate| Some(estimate.robot_field.as_ref()?.field())),
         hand_eye_covariance: covariance,
         small_sample: small_sample(&result),
         uncertainty: None,

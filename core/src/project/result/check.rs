@@ -132,6 +132,13 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
         require(board.scale > 0.0, "estimate.board.scale", "must be positive")?;
         not_negative(board.scale_sigma, "estimate.board.scale_sigma")?;
     }
+    if let Some(field) = &estimate.robot_field {
+        all_finite(&field.origin_m, "estimate.robot_field.origin_m")?;
+        require(field.reach_m > 0.0, "estimate.robot_field.reach_m", "must be a positive length")?;
+        all_finite(field.position_slopes.as_flattened(), "estimate.robot_field.position_slopes")?;
+        let orientation = field.orientation_slopes_rad_per_m.as_flattened();
+        all_finite(orientation, "estimate.robot_field.orientation_slopes_rad_per_m")?;
+    }
     let Some(joints) = &estimate.joint_offsets else { return Ok(()) };
     all_finite(&joints.offsets_deg, "estimate.joint_offsets.offsets_deg")?;
     all_finite(&joints.sigma_deg, "estimate.joint_offsets.sigma_deg")

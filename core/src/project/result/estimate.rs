@@ -1,8 +1,10 @@
 //! What a joint estimate says beyond the answer: how sure it is and why, the target as it found it, the robot's joints.
 
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use crate::diagnose::record::FindingRecord;
+use crate::estimate::handeye::joint::RobotField;
 
 /// Details of a joint estimate. Of a camera alone there are the target as found, and degrees of freedom and widening of the
 /// standard deviations of its intrinsics.
@@ -75,11 +77,14 @@ pub struct JointOffsetsEstimate {
 ///
 /// With `p` the reported tip position in the base, the true tip pose is `base_from_tip * E`: `E` has the translation
 /// `position_slopes (p - origin_m)` in metres and the rotation vector `orientation_slopes_rad_per_m (p - origin_m)` in
-/// radians, both in the axes of the tip.
+/// radians, both in the axes of the tip. Where `p` is farther from the origin than `reach_m` nothing is known, and
+/// `p - origin_m` is shortened to that length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotFieldEstimate {
     /// Where the field is zero, in the base, metres: the middle of the session's tip positions.
     pub origin_m: [f64; 3],
+    /// How far from there the session went, metres.
+    pub reach_m: f64,
     /// Metres of error per metre, by rows.
     pub position_slopes: [[f64; 3]; 3],
     /// Radians of error per metre, by rows.
@@ -91,6 +96,15 @@ pub struct RobotFieldEstimate {
     pub typical_deg: f64,
     /// Error on held-out views with the correction applied, pixels; `quality.heldout_rms_px` is without it.
     pub heldout_rms_px: Option<f64>,
+}
+
+impl RobotFieldEstimate {
+    /// The field, to correct reported poses by.
+    pub fn field(&self) -> RobotField {
+        let matrix = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|i, j| rows[i][j]);
+        let (position, orientation) = (matrix(&self.position_slopes), matrix(&self.orientation_slopes_rad_per_m));
+        RobotField::new(self.origin_m.into(), self.reach_m, &position, &orientation)
+    }
 }
 
 /// Findings as they stand in the document.

@@ -52,7 +52,7 @@ pub(crate) fn golden() -> CalibrationResult {
         degrees_of_freedom: Some(31.5),
         region_scale: Some(0.97),
         view_sigma_px: Some(0.0),
-        widening: Some(WideningRecord { factor: 1.4, by: "split_halves".to_owned() }),
+        widening: Some(WideningRecord { factor: 1.4, by: "neighbours".to_owned() }),
         board: Some(BoardEstimate {
             warp_mm: [0.16, -0.03],
             warp_sigma_mm: Some([0.01, 0.02]),
@@ -68,6 +68,7 @@ pub(crate) fn golden() -> CalibrationResult {
         }),
         robot_field: Some(RobotFieldEstimate {
             origin_m: [0.4, -0.1, 0.5],
+            reach_m: 0.3,
             position_slopes: [[1e-3, 0.0, -2e-3], [0.0, 5e-4, 0.0], [0.0; 3]],
             orientation_slopes_rad_per_m: [[0.0; 3], [2e-3, 0.0, 0.0], [0.0; 3]],
             typical_mm: 0.4,

@@ -13,8 +13,9 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
 
-use super::chain::correction_transform;
+use super::chain::{base_from_tip_by_joints, correction_transform};
 use crate::geometry::frames::{Base, Pose, Tip};
+use crate::targets::observation::View;
 
 /// Slopes: of six errors along three axes. Those of position are first; the three along one axis of the base are
 /// neighbours.
@@ -31,6 +32,8 @@ const LEAST_SPREAD_M: f64 = 1e-3;
 pub(crate) struct Places {
     mean: Vector3<f64>,
     rms_m: f64,
+    /// Largest distance from the mean.
+    reach_m: f64,
 }
 
 impl Places {
@@ -38,8 +41,10 @@ impl Places {
     pub fn of<'a>(poses: impl Iterator<Item = &'a Pose<Base, Tip>> + Clone) -> Option<Self> {
         let count = poses.clone().count() as f64;
         let mean = poses.clone().map(Pose::translation).sum::<Vector3<f64>>() / count;
-        let rms_m = (poses.map(|pose| (pose.translation() - mean).norm_squared()).sum::<f64>() / count).sqrt();
-        (rms_m > LEAST_SPREAD_M).then_some(Self { mean, rms_m })
+        let distances = poses.map(|pose| (pose.translation() - mean).norm());
+        let (squares, reach_m) = distances.fold((0.0, 0.0), |(sum, most): (f64, f64), d| (sum + d * d, most.max(d)));
+        let rms_m = (squares / count).sqrt();
+        (rms_m > LEAST_SPREAD_M).then_some(Self { mean, rms_m, reach_m })
     }
 
     /// The same where the poses are enough to show a field.
@@ -47,9 +52,12 @@ impl Places {
         if poses.clone().count() < NEED { None } else { Self::of(poses) }
     }
 
-    /// Where a pose is, in the base's axes; over the session of mean zero and RMS one.
+    /// Where a pose is, in the base's axes; over the session of mean zero and RMS one. A pose beyond the reach of the
+    /// session counts as at its edge: nothing is known of the field there.
     pub fn at(&self, base_from_tip: &Pose<Base, Tip>) -> Vector3<f64> {
-        (base_from_tip.translation() - self.mean) / self.rms_m
+        let from_mean = base_from_tip.translation() - self.mean;
+        let within = (self.reach_m / from_mean.norm()).min(1.0);
+        from_mean * (within / self.rms_m)
     }
 }
 
@@ -74,6 +82,19 @@ pub struct RobotField {
 }
 
 impl RobotField {
+    /// By its origin and its reach \[m\] and its slopes, as [`Self::position_slopes`] and [`Self::orientation_slopes`] give them.
+    pub fn new(
+        origin_m: Vector3<f64>,
+        reach_m: f64,
+        position_slopes: &Matrix3<f64>,
+        orientation_slopes: &Matrix3<f64>,
+    ) -> Self {
+        let mut field = Self::none(Places { mean: origin_m, rms_m: 1.0, reach_m });
+        field.slopes[..HALF].copy_from_slice(position_slopes.as_slice());
+        field.slopes[HALF..].copy_from_slice(orientation_slopes.as_slice());
+        field
+    }
+
     pub(crate) fn none(places: Places) -> Self {
         Self { places, slopes: [0.0; SLOPES] }
     }
@@ -93,6 +114,11 @@ impl RobotField {
     /// Where the field is zero: the mean of the reported tip positions, base coordinates \[m\].
     pub fn origin_m(&self) -> Vector3<f64> {
         self.places.mean
+    }
+
+    /// How far from there the session went \[m\]; beyond it the field is what it is at that distance.
+    pub fn reach_m(&self) -> f64 {
+        self.places.reach_m
     }
 
     /// Metres of error per metre of way: `rho = A (p - origin)`, in the axes of the tip, for the tip at `p` in the base.
@@ -121,9 +147,19 @@ impl RobotField {
     }
 }
 
+/// The reported tip pose of a view with what is known of the robot's errors taken out: the offsets of its joints, none
+/// where they are empty, and its field.
+pub fn corrected_base_from_tip(view: &View, offsets_rad: &[f64], field: Option<&RobotField>) -> Pose<Base, Tip> {
+    let by_joints = base_from_tip_by_joints(view, offsets_rad);
+    field.map_or(by_joints, |field| {
+        let correction = correction_transform(&field.correction(&view.base_from_tip));
+        Pose::from_isometry(by_joints.isometry() * correction)
+    })
+}
+
 #[cfg(test)]
 mod tests {
-    use nalgebra::DVector;
+    use nalgebra::{DVector, Isometry3};
 
     use super::*;
     use crate::geometry::se3;
@@ -148,7 +184,20 @@ mod tests {
             let from_origin = pose.translation() - field.origin_m();
             assert!((field.position_slopes() * from_origin - correction.fixed_rows::<3>(0)).norm() < 1e-15);
             assert!((field.orientation_slopes() * from_origin - correction.fixed_rows::<3>(3)).norm() < 1e-15);
+            let read = RobotField::new(
+                field.origin_m(),
+                field.reach_m(),
+                &field.position_slopes(),
+                &field.orientation_slopes(),
+            );
+            assert!((read.correction(pose) - correction).norm() < 1e-15);
         }
+        let far: Pose<Base, Tip> = Pose::from_isometry(Isometry3::translation(1e3, 0.0, 0.0));
+        let edge = field.position_slopes() * Vector3::x() * field.reach_m();
+        assert!(
+            (field.correction(&far).fixed_rows::<3>(0) - edge).norm() < 1e-2 * edge.norm(),
+            "nothing is known there"
+        );
         let sum = poses.iter().map(|pose| field.correction(pose)).sum::<Vector6<f64>>();
         assert!(sum.norm() < 1e-14, "the constant part is the links'");
     }

@@ -55,7 +55,7 @@ use crate::progress::{Stage, Work};
 use crate::targets::observation::Corner;
 
 pub use chain::{MAX_JOINTS, base_from_tip_by_joints, camera_from_target};
-pub use field::RobotField;
+pub use field::{RobotField, corrected_base_from_tip};
 pub use freedom::SmallSample;
 pub use weights::CornerWeights;
 

@@ -3,8 +3,7 @@
 use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
 
 use crate::estimate::handeye::HandEye;
-use crate::estimate::handeye::joint::chain::{base_from_tip_by_joints, correction_transform};
-use crate::estimate::handeye::joint::field::RobotField;
+use crate::estimate::handeye::joint::field::{RobotField, corrected_base_from_tip};
 use crate::estimate::handeye::joint::freedom::SmallSample;
 use crate::estimate::handeye::joint::problem::{Free, JointStart, Noise};
 use crate::geometry::camera::Intrinsics;
@@ -106,11 +105,7 @@ impl JointSolution {
     /// The reported tip pose of a view with what is known of the robot's errors taken out: the offsets of its joints and
     /// its field.
     pub fn base_from_tip(&self, view: &View) -> Pose<Base, Tip> {
-        let by_joints = base_from_tip_by_joints(view, &self.joint_offsets_rad);
-        self.field.as_ref().map_or(by_joints, |field| {
-            let correction = correction_transform(&field.correction(&view.base_from_tip));
-            Pose::from_isometry(by_joints.isometry() * correction)
-        })
+        corrected_base_from_tip(view, &self.joint_offsets_rad, self.field.as_ref())
     }
 
     /// Where the iteration ended, to start another from.

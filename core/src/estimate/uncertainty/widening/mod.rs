@@ -1,17 +1,14 @@
 //! Whether the stated uncertainty is true to the data, and by how much it has to be widened where it is not.
 //!
 //! The covariance of the joint estimate holds if the errors of all views are independent and as large as the noise levels
-//! say. Real robots are off in the same direction in neighbouring poses, and what lens and board do not follow of their
-//! models comes back in every image, so it may be too small. Nothing but the data can tell. Each of the checks here
+//! say. Robot errors that are affine in the place are part of the estimate ([`RobotField`]); what else neighbouring poses
+//! have in common, and what lens and board do not follow of their models, comes back in every image, so it may be too small. Nothing but the data can tell. Each of the checks here
 //! compares what they show with what the covariance promises and gives a ratio of variances with the probability of
 //! one so large if the covariance were true:
 //!
 //! | evidence | what is compared |
 //! | --- | --- |
 //! | [`Evidence::Neighbours`] | robot corrections of neighbouring poses, which must not resemble each other |
-//! | [`Evidence::TimeBlocks`] | how far the answer moves without a block of views that follow each other |
-//! | [`Evidence::PoseBlocks`] | the same without a block of neighbouring poses |
-//! | [`Evidence::Halves`] | how far the answers of two halves of the session, or of the poses, lie apart |
 //! | [`Evidence::Jackknife`] | how far the answer moves without one view |
 //! | [`Evidence::CrossValidation`] | how well a view left out is predicted |
 //!
@@ -19,13 +16,15 @@
 //! hundred, and by nothing if there is none. All of it is done on the equations linearised at the solution: leaving a
 //! view out takes a product of small matrices, not another fit.
 //!
+//! [`RobotField`]: crate::estimate::handeye::joint::RobotField
+//!
 //! # Reference
-//! Künsch 1989, "The jackknife and the bootstrap for general stationary observations" (blocks); Moran 1950, "Notes on
+//! Künsch 1989, "The jackknife and the bootstrap for general stationary observations"; Moran 1950, "Notes on
 //! continuous stochastic phenomena" (neighbours); Cribari-Neto 2004 (leverage in such estimates); Good 2005, "Permutation,
 //! parametric, and bootstrap tests of hypotheses".
 
 mod cross_validation;
-mod groups;
+mod jackknife;
 mod linear;
 mod neighbours;
 mod permutation;
@@ -45,12 +44,6 @@ use crate::wording::Text;
 pub enum Evidence {
     /// Robot corrections of neighbouring poses resemble each other.
     Neighbours,
-    /// Blocks of views in their order.
-    TimeBlocks,
-    /// Blocks of neighbouring poses.
-    PoseBlocks,
-    /// Halves of the session or of the poses.
-    Halves,
     /// One view at a time.
     Jackknife,
     /// Prediction of views left out.
@@ -62,9 +55,6 @@ impl Evidence {
     pub fn name(self) -> &'static str {
         match self {
             Self::Neighbours => "neighbours",
-            Self::TimeBlocks => "time_blocks",
-            Self::PoseBlocks => "pose_blocks",
-            Self::Halves => "halves",
             Self::Jackknife => "jackknife",
             Self::CrossValidation => "cross_validation",
         }
@@ -74,9 +64,6 @@ impl Evidence {
     pub fn reason(self) -> Text {
         match self {
             Self::Neighbours => text!("the robot is off in the same direction in neighbouring poses"),
-            Self::TimeBlocks => text!("the answer moves too far without views that follow each other"),
-            Self::PoseBlocks => text!("the answer moves too far without neighbouring poses"),
-            Self::Halves => text!("two halves of the views disagree by more than stated"),
             Self::Jackknife => text!("the answer moves too far without single views"),
             Self::CrossValidation => text!("views left out are predicted worse than stated"),
         }
@@ -115,8 +102,8 @@ pub struct Widening {
 /// Views from which on checks are made: with fewer no order of them is rarer than one in a hundred.
 pub const NEED: usize = 6;
 
-/// Probability below which the covariance counts as refuted. There are six checks, so one in twenty healthy sessions is
-/// widened without need, which costs the others nothing.
+/// Probability below which the covariance counts as refuted. There are three checks, so three healthy sessions in a hundred
+/// are widened without need at the most, which costs the others nothing.
 const SIGNIFICANT: f64 = 0.01;
 
 /// Checks the covariance of a solution against its own data. The cost is linear in the number of views.
@@ -133,10 +120,8 @@ pub fn check<'a>(
         return Ok(Widening { factor: 1.0, by: None, checks: Vec::new() });
     }
     let views = linear::views(problem, solution, &work)?;
-    let mut checks = vec![groups::jackknife(&views)];
-    checks.extend(groups::blocks(&views));
-    checks.push(neighbours::check(&views));
-    checks.push(cross_validation::check(problem, solution, &work)?);
+    let mut checks =
+        vec![jackknife::check(&views), neighbours::check(&views), cross_validation::check(problem, solution, &work)?];
     checks.retain(|check| check.ratio.is_finite() && check.p_value.is_finite());
     let largest = checks.iter().filter(|c| c.is_significant()).max_by(|a, b| a.ratio.total_cmp(&b.ratio));
     Ok(Widening { factor: largest.map_or(1.0, |c| c.ratio), by: largest.map(|c| c.by), checks })
