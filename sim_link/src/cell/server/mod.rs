@@ -58,7 +58,15 @@ impl CellConfig {
     /// A scene on any free port of this machine.
     pub fn new(scene: Scene) -> Self {
         let silence = Duration::from_secs(15);
-        Self { scene, seed: None, bind: "127.0.0.1".to_owned(), port: 0, real_time: None, silence, coppeliasim_only: false }
+        Self {
+            scene,
+            seed: None,
+            bind: "127.0.0.1".to_owned(),
+            port: 0,
+            real_time: None,
+            silence,
+            coppeliasim_only: false,
+        }
     }
 }
 
