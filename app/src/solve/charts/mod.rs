@@ -4,6 +4,7 @@ mod accuracy;
 pub(crate) mod axes;
 mod bars;
 mod coverage;
+mod legend;
 
 use egui::{Frame, Id, Margin, Rect, Ui, UiBuilder, Vec2};
 
