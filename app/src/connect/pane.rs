@@ -4,6 +4,7 @@ use egui::{Button, ComboBox, Id, Label, RichText, TextEdit, Ui, WidgetInfo, Widg
 use handeye_sim_link::client::{Endpoint, LinkError};
 
 use crate::command::{Command, Outbox};
+use crate::connect::server_name;
 use crate::gui::status;
 use crate::gui::style::theme::{Palette, Tone};
 use crate::gui::style::{form, parts};
@@ -89,7 +90,7 @@ fn state_ui(ui: &mut Ui, model: &Model) {
             let (tone, words) = words(model, model.link(link));
             let palette = Palette::of(ui);
             ui.label(RichText::new(name).color(palette.weak));
-            ui.label(RichText::new(words.say(language)).color(palette.tone(tone)));
+            ui.add(Label::new(RichText::new(words.say(language)).color(palette.tone(tone))).extend());
             ui.add_space(10.0);
         }
     });
@@ -100,7 +101,7 @@ fn words(model: &Model, state: &LinkState) -> (Tone, Text) {
     match state {
         LinkState::StartingCell { .. } => (Tone::Busy, text!("starting")),
         LinkState::Searching { attempt, .. } => (Tone::Busy, text!("searching, try {attempt}", attempt = attempt)),
-        LinkState::Connected { server, .. } => (Tone::Good, Text::verbatim(server.clone())),
+        LinkState::Connected { server, .. } => (Tone::Good, server_name(&model.source, server)),
         LinkState::Lost { since_s, .. } => {
             (Tone::Warning, text!("lost {ago} ago", ago = status::duration(model.now_s - since_s)))
         }
