@@ -9,7 +9,7 @@ mod table;
 use egui::{Align, Button, DragValue, Frame, Layout, Margin, RichText, Spinner, Ui, Vec2, WidgetInfo, WidgetType};
 use handeye_core::project::session::CaptureId;
 
-use crate::capture::rows::{self, CaptureRow, CaptureTable};
+use crate::capture::rows::{self, CaptureTable};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::{self, Marks};
 use crate::gui::style::theme::{Palette, Tone};
@@ -17,6 +17,7 @@ use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
 use crate::live::textures::Thumbnails;
 use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, PoseSequence};
+use crate::scene::Standing;
 use crate::taught::pane::sequence;
 use crate::text::Language;
 use crate::{text, tr};
@@ -189,12 +190,11 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
 
 /// How many captures there are of each kind that there is.
 fn counted(table: &CaptureTable, language: Language) -> String {
-    let count = |is_kind: fn(&CaptureRow) -> bool| table.rows.iter().filter(|row| is_kind(row)).count();
-    let fit = count(|row| !row.excluded && !row.verifies() && !row.is_aside());
+    let fit = table.count(Standing::Fit);
     let others = [
-        (count(CaptureRow::is_aside), tr!(language, "outliers")),
-        (count(|row| !row.excluded && row.verifies()), tr!(language, "for verification")),
-        (count(|row| row.excluded), tr!(language, "excluded")),
+        (table.count(Standing::Aside), tr!(language, "outliers")),
+        (table.count(Standing::Verification), tr!(language, "for verification")),
+        (table.count(Standing::Excluded), tr!(language, "excluded")),
     ];
     let mut parts = vec![format!("{fit} {}", tr!(language, "in the fit"))];
     parts.extend(others.into_iter().filter(|(count, _)| *count > 0).map(|(count, kind)| format!("{count} {kind}")));

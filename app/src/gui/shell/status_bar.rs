@@ -123,13 +123,11 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
     let language = model.view.language;
-    let (colour, said) = match under_way(model) {
-        Some(text) => (palette.busy, text.say(language)),
-        None => {
-            let fresh = model.messages.status_line().filter(|message| model.now_s - message.at_s < FRESH_S);
-            let said = fresh.map(|message| message.text.say(language)).unwrap_or_default();
-            (palette.severity(Severity::Info), said)
-        }
+    let (colour, said) = if let Some(text) = under_way(model) {
+        (palette.busy, text.say(language))
+    } else {
+        let fresh = model.messages.status_line().filter(|message| model.now_s - message.at_s < FRESH_S);
+        (palette.severity(Severity::Info), fresh.map(|message| message.text.say(language)).unwrap_or_default())
     };
     ui.add(Label::new(RichText::new(said).color(colour)).truncate());
 }

@@ -12,11 +12,11 @@ use super::canvas::Canvas;
 use super::captures::{self, Spot};
 use super::ground::{self, SPACING_MM};
 use super::legend::{Entry, Sign};
-use crate::capture::rows::{CaptureRow, CaptureTable};
+use crate::capture::rows::CaptureTable;
 use crate::gui::style::marks::Marks;
 use crate::gui::style::theme::Palette;
 use crate::model::Model;
-use crate::scene::{BoardItem, CameraItem, Known, Role, posed_arm};
+use crate::scene::{BoardItem, CameraItem, Known, Role, Standing, posed_arm};
 use crate::text::Language;
 use crate::{text, tr};
 
@@ -66,9 +66,9 @@ fn capture_entries(
     palette: &Palette,
     marks: &Marks,
 ) -> impl Iterator<Item = Entry> {
-    let kinds: [(fn(&CaptureRow) -> bool, _, _, _); 4] = [
+    let kinds = [
         (
-            |row| !row.excluded && !row.verifies() && !row.is_aside(),
+            Standing::Fit,
             marks.fit,
             tr!(language, "Captures in the fit"),
             tr!(
@@ -78,25 +78,25 @@ fn capture_entries(
             ),
         ),
         (
-            CaptureRow::is_aside,
+            Standing::Aside,
             palette.warning,
             tr!(language, "Outliers"),
             tr!(language, "Captures that do not fit the others, and which the answer is without"),
         ),
         (
-            |row| !row.excluded && row.verifies(),
+            Standing::Verification,
             marks.verify,
             tr!(language, "Captures for verification"),
             tr!(language, "Captures that never enter the fit and test it"),
         ),
         (
-            |row| row.excluded,
+            Standing::Excluded,
             marks.excluded,
             tr!(language, "Excluded captures"),
             tr!(language, "Captures that were taken out by hand"),
         ),
     ];
-    kinds.into_iter().filter(|(is_kind, ..)| table.rows.iter().any(is_kind)).map(|(_, colour, name, what)| Entry {
+    kinds.into_iter().filter(|(standing, ..)| table.count(*standing) > 0).map(|(_, colour, name, what)| Entry {
         sign: Sign::Frustum,
         colour,
         name: name.to_owned(),

@@ -123,7 +123,7 @@ impl Bars {
             table.rows.iter().enumerate().map(|(index, row)| (middle(index), row.id.to_string())).collect();
         axes::axes_ui(ui, plot, scale, self.y_name, tr!(language, "Capture"), &ticks);
         let beside = UiBuilder::new().max_rect(axes::beside_name(plot)).layout(Layout::left_to_right(Align::Center));
-        ui.scope_builder(beside, |ui| legend::legend_ui(ui, &table.rows, language));
+        ui.scope_builder(beside, |ui| legend::legend_ui(ui, table, language));
         let response = ui.interact(plot, ui.id().with(self.name), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, self.y_name));
         let index_at = |at: Pos2| {

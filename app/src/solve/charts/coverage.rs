@@ -20,7 +20,7 @@ pub fn coverage_ui(ui: &mut Ui, model: &Model, table: &CaptureTable) {
     let covered = format!("{:.0}", coverage.covered() * 100.0);
     let words = text!("Corners in {covered} % of the cells of the image, in pixels", covered = covered).say(language);
     ui.label(RichText::new(words).color(palette.text));
-    ui.horizontal(|ui| legend::legend_ui(ui, &table.rows, language));
+    ui.horizontal(|ui| legend::legend_ui(ui, table, language));
 
     let room = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(room);

@@ -2,9 +2,10 @@
 
 use egui::{RichText, Sense, Ui, Vec2};
 
-use crate::capture::rows::CaptureRow;
-use crate::gui::style::marks::{self, Marks};
+use crate::capture::rows::CaptureTable;
+use crate::gui::style::marks::Marks;
 use crate::gui::style::theme::{CAPTION, Palette};
+use crate::scene::Standing;
 use crate::text::Language;
 use crate::tr;
 
@@ -12,18 +13,16 @@ use crate::tr;
 const SQUARE: f32 = 9.0;
 
 /// A square and a word for each kind of capture that there is.
-pub fn legend_ui(ui: &mut Ui, rows: &[CaptureRow], language: Language) {
-    let (palette, colours) = (Palette::of(ui), Marks::of(ui));
-    let of = |excluded, verifies| marks::of_capture(colours, excluded, verifies);
-    let kinds: [(fn(&CaptureRow) -> bool, _, _); 4] = [
-        (|row| !row.excluded && !row.verifies() && !row.is_aside(), of(false, false), tr!(language, "in the fit")),
-        (CaptureRow::is_aside, palette.warning, tr!(language, "outlier")),
-        (|row| !row.excluded && row.verifies(), of(false, true), tr!(language, "for verification")),
-        (|row| row.excluded, of(true, false), tr!(language, "excluded")),
-    ];
+pub fn legend_ui(ui: &mut Ui, table: &CaptureTable, language: Language) {
+    let (palette, marks) = (Palette::of(ui), Marks::of(ui));
     ui.spacing_mut().item_spacing.x = 5.0;
-    for (is_kind, colour, name) in kinds {
-        if rows.iter().any(is_kind) {
+    for (standing, colour, name) in [
+        (Standing::Fit, marks.fit, tr!(language, "in the fit")),
+        (Standing::Aside, palette.warning, tr!(language, "outlier")),
+        (Standing::Verification, marks.verify, tr!(language, "for verification")),
+        (Standing::Excluded, marks.excluded, tr!(language, "excluded")),
+    ] {
+        if table.count(standing) > 0 {
             let (square, _) = ui.allocate_exact_size(Vec2::splat(SQUARE), Sense::hover());
             ui.painter().rect_filled(square, 2.0, colour);
             ui.label(RichText::new(name).size(CAPTION).color(palette.weak));

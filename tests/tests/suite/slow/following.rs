@@ -211,7 +211,8 @@ fn after_the_ten_poses_one_click_follows_the_board_along_every_path_for_minutes(
     let folder = tempfile::tempdir().expect("a folder");
     // The cell as it is built in: what a person meets first.
     let scene = Scene::reference().expect("the scene");
-    let (mut bench, mut cell) = tracking_at(folder.path(), "assets/scenes/reference.toml", CellConfig::new(scene), LAST);
+    let (mut bench, mut cell) =
+        tracking_at(folder.path(), "assets/scenes/reference.toml", CellConfig::new(scene), LAST);
     bench.click(Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
     bench.until("the move to where there is room", |model| model.track.follow == FollowStatus::MakingRoom);
     bench.until("following", |model| matches!(model.track.follow, FollowStatus::Following { .. }));
