@@ -1,6 +1,7 @@
 //! Which cell the window works with, and how the connection is doing.
 
-use egui::{Button, ComboBox, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
+use egui::text::LayoutJob;
+use egui::{Align, Button, ComboBox, FontSelection, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::{Endpoint, LinkError};
 
 use crate::command::{Command, Outbox};
@@ -89,8 +90,18 @@ fn state_ui(ui: &mut Ui, model: &Model) {
         ] {
             let (tone, words) = words(model, model.link(link));
             let palette = Palette::of(ui);
-            ui.label(RichText::new(name).color(palette.weak));
-            ui.add(Label::new(RichText::new(words.say(language)).color(palette.tone(tone))).extend());
+            // As one, so that both are in one line.
+            let mut both = LayoutJob::default();
+            let (style, font) = (ui.style(), FontSelection::Default);
+            RichText::new(format!("{name} ")).color(palette.weak).append_to(
+                &mut both,
+                style,
+                font.clone(),
+                Align::Center,
+            );
+            let words = RichText::new(words.say(language)).color(palette.tone(tone));
+            words.append_to(&mut both, style, font, Align::Center);
+            ui.add(Label::new(both).extend());
             ui.add_space(10.0);
         }
     });
