@@ -69,7 +69,7 @@ pub fn row_ui(
             Column::Use => use_ui(ui, row, cell, language, outbox),
             Column::Purpose => {
                 let (words, colour) = if row.is_aside() {
-                    (tr!(language, "aside"), palette.warning)
+                    (tr!(language, "outlier"), palette.warning)
                 } else {
                     let words = if row.verifies() { tr!(language, "verify") } else { tr!(language, "fit") };
                     (words, marks::of_capture(Marks::of(ui), row.excluded, row.verifies()))

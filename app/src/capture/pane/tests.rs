@@ -165,7 +165,7 @@ fn corners_that_were_set_aside_are_counted() {
     model.solve.solved = Some(Arc::new(solved));
     let table = rows::table(&egui::Context::default(), &model);
     let flags = flags::flags(&table.rows[1], flags::Circumstances::default(), Language::English);
-    assert!(flags.iter().any(|flag| flag.name == "Corners aside" && flag.why.contains("without: 3.")), "{flags:?}");
+    assert!(flags.iter().any(|flag| flag.name == "Outlier corners" && flag.why.contains("without: 3.")), "{flags:?}");
 }
 
 #[test]
