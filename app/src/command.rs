@@ -172,7 +172,7 @@ pub enum Command {
     /// Which formats are exported.
     ChooseFormats(BTreeSet<String>),
     /// The format whose text is shown.
-    ShowFormat(String),
+    ShowFormat(Option<String>),
     /// Names of frames and files.
     SetExportNames(ExportNames),
     /// Where exports go; `None` is `exports` in the session.
@@ -275,7 +275,10 @@ pub enum Event {
     /// The session is now like this, on the disk.
     Document(Box<SessionState>),
     /// Another session is open.
-    SessionOpened,
+    SessionOpened {
+        /// Whether its folder has files of exports that are younger than its last change.
+        exported: bool,
+    },
     /// A session could not be begun, opened or copied.
     SessionFailed {
         /// Why.

@@ -242,7 +242,12 @@ impl App {
                     self.model.frame = Some(LiveFrame { info, images });
                 }
             }
-            Event::Detection(detection) => self.model.detection = Some(*detection),
+            Event::Detection(detection) => {
+                if detection.corners.is_some() {
+                    self.model.board_seen_s = Some(self.model.now_s);
+                }
+                self.model.detection = Some(*detection);
+            }
             Event::Moved { id, outcome } => self.moved(id, outcome),
             Event::Planned { id, views } => self.planned(id, views),
             Event::JogEnded { why } => self.jog_ended(why),
@@ -250,7 +255,7 @@ impl App {
             Event::CaptureRefused { number, refused } => self.capture_refused(number, refused),
             Event::Captured { number, id } => self.captured(number, id),
             Event::Document(state) => self.document_changed(*state),
-            Event::SessionOpened => self.session_opened(),
+            Event::SessionOpened { exported } => self.session_opened(exported),
             Event::SessionFailed { why } => self.session_failed(why),
             Event::Observed { id, target, observed } => self.observed(id, target, observed),
             Event::Review { id, images } => self.reviewed(id, images),

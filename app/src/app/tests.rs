@@ -53,7 +53,7 @@ fn commands_return_at_once_while_the_cell_never_answers() {
             Command::JogHeld(jog),
             Command::JogReleased,
             Command::Capture(CapturePurpose::Calibrate),
-            Command::GoToTaught("first".to_owned()),
+            Command::GoToTaught("P1".to_owned()),
             Command::Solve,
         ] {
             bench.app.apply(command);
@@ -269,7 +269,7 @@ fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_lea
     bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
     let sequence = bench.app.model().sequence.clone().expect("a sequence");
     assert!(bench.app.model().sequence_runs && !bench.app.model().planning);
-    assert_eq!(sequence.names, ["check 1", "check 2", "check 3"]);
+    assert_eq!(sequence.names, ["V1", "V2", "V3"]);
     assert_eq!(sequence.purpose, Some(CapturePurpose::Verify));
     assert!(matches!(bench.app.model().motion, Motion::Moving { .. }), "it is on its way to the first");
     bench.app.apply(Command::StopSequence);

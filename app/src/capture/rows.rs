@@ -10,7 +10,7 @@ use handeye_core::estimate::{CornerResidual, ViewResult, ViewStatus};
 use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
 
 use crate::model::{Model, Observed, Solved};
-use crate::scene;
+use crate::scene::{self, Standing};
 
 /// Cells of the image on which coverage is shown: as the findings judge it.
 pub const CELLS: (usize, usize) = (8, 6);
@@ -76,6 +76,16 @@ impl CaptureRow {
     /// Whether the answer is without it although it is meant to be in the fit.
     pub fn is_aside(&self) -> bool {
         self.aside.is_some() && !self.excluded && !self.verifies()
+    }
+
+    /// What it counts for.
+    pub fn standing(&self) -> Standing {
+        match (self.excluded, self.role) {
+            (true, _) => Standing::Excluded,
+            (false, Role::Verification) => Standing::Verification,
+            (false, Role::Calibration) if self.is_aside() => Standing::Aside,
+            (false, Role::Calibration) => Standing::Fit,
+        }
     }
 
     /// Its name for people: `7 · above left`.
@@ -154,6 +164,11 @@ pub fn table(ctx: &Context, model: &Model) -> Arc<CaptureTable> {
 }
 
 impl CaptureTable {
+    /// How many captures there are that count for something.
+    pub fn count(&self, standing: Standing) -> usize {
+        self.rows.iter().filter(|row| row.standing() == standing).count()
+    }
+
     fn new(model: &Model) -> Self {
         let document = model.document();
         let mut rows: Vec<CaptureRow> = document.captures.iter().map(|record| plain_row(model, record)).collect();

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::project::result::{CalibrationResult, MethodStatus, TransformEstimate, ViewRecordStatus};
 
@@ -151,7 +152,7 @@ fn details(out: &mut String, result: &CalibrationResult) {
         Some(n) if n < 1e5 => line!(out, "  noise levels on {n:.0} degrees of freedom"),
         _ => {}
     }
-    if let Some(widening) = estimate.widening.as_ref().filter(|w| w.factor > 1.0) {
+    if let Some(widening) = estimate.widening.as_ref().filter(|widening| widening.factor >= WIDENING_WORTH_SAYING) {
         line!(out, "  stated uncertainty widened {:.2} times, by {}", widening.factor, widening.by.replace('_', " "));
     }
     if let Some(board) = &estimate.board {
@@ -248,5 +249,26 @@ fn views(out: &mut String, result: &CalibrationResult) {
         let rms = view.rms_px.map_or_else(String::new, |v| format!("  {v:.4} px"));
         let influence = view.influence_mm.map_or_else(String::new, |v| format!("  influence {v:.3} mm"));
         line!(out, "  {:<24} {status}{rms}{influence}", view.name);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use handeye_core::project::result::WideningRecord;
+
+    use super::*;
+    use crate::gui::testing::sample;
+
+    #[test]
+    fn a_widening_that_changes_no_figure_is_not_said() {
+        let model = sample::solved();
+        let mut result = model.solve.current().expect("solved").result.clone();
+        let mut said = |factor| {
+            let widening = Some(WideningRecord { factor, by: "jackknife".to_owned() });
+            result.estimate.as_mut().expect("a joint estimate").widening = widening;
+            text(&result)
+        };
+        assert!(!said(1.01).contains("widened"));
+        assert!(said(1.1).contains("stated uncertainty widened 1.10 times, by jackknife"));
     }
 }

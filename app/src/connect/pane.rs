@@ -1,9 +1,11 @@
 //! Which cell the window works with, and how the connection is doing.
 
-use egui::{Button, ComboBox, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
+use egui::text::LayoutJob;
+use egui::{Align, Button, ComboBox, FontSelection, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::{Endpoint, LinkError};
 
 use crate::command::{Command, Outbox};
+use crate::connect::server_name;
 use crate::gui::status;
 use crate::gui::style::theme::{Palette, Tone};
 use crate::gui::style::{form, parts};
@@ -88,8 +90,18 @@ fn state_ui(ui: &mut Ui, model: &Model) {
         ] {
             let (tone, words) = words(model, model.link(link));
             let palette = Palette::of(ui);
-            ui.label(RichText::new(name).color(palette.weak));
-            ui.label(RichText::new(words.say(language)).color(palette.tone(tone)));
+            // As one, so that both are in one line.
+            let mut both = LayoutJob::default();
+            let (style, font) = (ui.style(), FontSelection::Default);
+            RichText::new(format!("{name} ")).color(palette.weak).append_to(
+                &mut both,
+                style,
+                font.clone(),
+                Align::Center,
+            );
+            let words = RichText::new(words.say(language)).color(palette.tone(tone));
+            words.append_to(&mut both, style, font, Align::Center);
+            ui.add(Label::new(both).extend());
             ui.add_space(10.0);
         }
     });
@@ -100,7 +112,7 @@ fn words(model: &Model, state: &LinkState) -> (Tone, Text) {
     match state {
         LinkState::StartingCell { .. } => (Tone::Busy, text!("starting")),
         LinkState::Searching { attempt, .. } => (Tone::Busy, text!("searching, try {attempt}", attempt = attempt)),
-        LinkState::Connected { server, .. } => (Tone::Good, Text::verbatim(server.clone())),
+        LinkState::Connected { server, .. } => (Tone::Good, server_name(&model.source, server)),
         LinkState::Lost { since_s, .. } => {
             (Tone::Warning, text!("lost {ago} ago", ago = status::duration(model.now_s - since_s)))
         }

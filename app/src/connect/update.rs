@@ -3,6 +3,7 @@
 use std::thread::Builder;
 
 use crate::app::App;
+use crate::connect::server_name;
 use crate::model::{BoardMotion, CellFacts, CellSource, Link, LinkState, Motion, Severity, Trail};
 use crate::worker::{CameraTask, ControlTask, Request, Workers};
 use crate::{shortfall, text};
@@ -109,6 +110,7 @@ impl App {
         }
         match (self.model.link(link).clone(), before.is_connected()) {
             (LinkState::Connected { server, address }, false) => {
+                let server = server_name(&self.model.source, &server);
                 let text = match link {
                     Link::Control => {
                         text!("Robot connected to {server} at {address}", server = server, address = address)

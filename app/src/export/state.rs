@@ -15,12 +15,14 @@ pub struct ExportState {
     pub names: ExportNames,
     /// Where to; `None` is `exports` in the session.
     pub folder: Option<PathBuf>,
-    /// The format whose text is shown.
-    pub shown: String,
+    /// The format whose text is shown below its name.
+    pub shown: Option<String>,
     /// The text of every format for the present result and names.
     pub previews: BTreeMap<String, Preview>,
     /// How the last writing went.
     pub written: Option<Written>,
+    /// Whether files of the present captures are there, written now or when the session was open before.
+    pub is_present: bool,
     /// Whether files are being written.
     pub writing: bool,
 }
@@ -31,9 +33,10 @@ impl Default for ExportState {
             chosen: ["json", "ros_camera_info", "opencv_yaml", "easy_handeye2"].map(str::to_owned).into(),
             names: ExportNames::default(),
             folder: None,
-            shown: "json".to_owned(),
+            shown: None,
             previews: BTreeMap::new(),
             written: None,
+            is_present: false,
             writing: false,
         }
     }

@@ -51,6 +51,7 @@ impl App {
         self.model.export.writing = false;
         match &written.files {
             Ok(files) => {
+                self.model.export.is_present = true;
                 let count = files.len();
                 let said = text!("{count} files written, read back and compared", count = count);
                 self.say_in(Pane::Export, Severity::Info, said);

@@ -99,7 +99,7 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
             command: connected.then_some(Command::Capture(CapturePurpose::Calibrate)),
         },
         Action {
-            name: tr!(language, "Capture a check pose"),
+            name: tr!(language, "Capture for verification"),
             group: Group::Work,
             keys: &[],
             command: connected.then_some(Command::Capture(CapturePurpose::Verify)),

@@ -4,6 +4,7 @@ use handeye_core::estimate::GOOD_VIEWS;
 use handeye_core::estimate::handeye::motion::MIN_VIEWS;
 use handeye_core::project::session::Role;
 
+use super::status::STALE_AFTER_S;
 use crate::model::{Model, Step};
 use crate::text;
 use crate::text::Text;
@@ -40,8 +41,10 @@ pub struct Facts {
     pub lost: bool,
     /// An image has come.
     pub frame_seen: bool,
-    /// The board was found in the newest image, or in a capture.
-    pub board_seen: bool,
+    /// The board is in the live image.
+    pub board_in_view: bool,
+    /// It was found in a capture.
+    pub board_captured: bool,
     /// Captures that enter the fit.
     pub captures_in_use: usize,
     /// The solver is at work.
@@ -50,8 +53,8 @@ pub struct Facts {
     pub solved: bool,
     /// Its expected error \[m\], 95 %.
     pub expected_error_m: Option<f64>,
-    /// Captures that test the answer.
-    pub check_captures: usize,
+    /// Captures for verification.
+    pub verifying: usize,
     /// They were compared with the answer.
     pub verified: bool,
     /// Files of the present answer were written.
@@ -67,22 +70,23 @@ impl Facts {
     pub fn of(model: &Model) -> Self {
         let connected = model.control.is_connected() && model.camera.is_connected();
         let document = model.document();
-        let seen_now = model.detection.as_ref().is_some_and(|detection| detection.corners.is_some());
-        let seen_before = model.observed.values().flatten().any(|observed| observed.corners.is_some());
+        // Not image by image: a blurred one says nothing.
+        let seen_now = model.board_seen_s.is_some_and(|seen_s| model.now_s - seen_s < STALE_AFTER_S);
+        let captured = model.observed.values().flatten().any(|observed| observed.corners.is_some());
         let current = model.solve.current();
-        let written = model.export.written.as_ref().is_some_and(|written| written.files.is_ok());
         Self {
             connected,
             lost: !connected && model.frame.is_some(),
             frame_seen: model.frame.is_some(),
-            board_seen: seen_now || seen_before,
+            board_in_view: connected && seen_now,
+            board_captured: captured,
             captures_in_use: document.in_use().count(),
             solving: model.solve.is_running(),
             solved: current.is_some(),
             expected_error_m: current.and_then(|solved| solved.result.quality.tip_error_95_mm).map(|mm| mm * 1e-3),
-            check_captures: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
+            verifying: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
             verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
-            exported: written && current.is_some(),
+            exported: model.export.is_present && current.is_some(),
             tracking: model.track.on,
             out_of_sight: model.track.newest.as_ref().is_some_and(|newest| newest.update.estimate.is_none()),
         }
@@ -110,9 +114,13 @@ fn judged(facts: &Facts) -> [StepStatus; 7] {
     })
 }
 
-/// The first step that can be done and is not.
+/// The first step that can be done and is not. Nobody needs the board in view after the captures.
 pub fn next(steps: &[StepStatus]) -> Option<Step> {
-    steps.iter().find(|status| status.state == StepState::Now).map(|status| status.step)
+    let is_done = |step| steps.iter().any(|status| status.step == step && status.state == StepState::Done);
+    let comes_next = |status: &&StepStatus| {
+        status.state == StepState::Now && !(status.step == Step::Target && is_done(Step::Capture))
+    };
+    steps.iter().find(comes_next).map(|status| status.step)
 }
 
 fn connect(facts: &Facts) -> (StepState, Text) {
@@ -125,12 +133,12 @@ fn connect(facts: &Facts) -> (StepState, Text) {
 }
 
 fn target(facts: &Facts) -> (StepState, Text) {
-    if facts.board_seen {
-        (StepState::Done, text!("Board in view"))
-    } else if facts.frame_seen {
-        (StepState::Now, text!("Board not seen yet"))
-    } else {
-        (StepState::Blocked, text!("Needs an image"))
+    match (facts.board_in_view, facts.connected && facts.frame_seen, facts.board_captured) {
+        (true, ..) => (StepState::Done, text!("Board in view")),
+        (false, true, true) => (StepState::Now, text!("Board out of view")),
+        (false, false, true) => (StepState::Done, text!("Board in the captures")),
+        (false, true, false) => (StepState::Now, text!("Board not seen yet")),
+        (false, false, false) => (StepState::Blocked, text!("Needs an image")),
     }
 }
 
@@ -138,7 +146,7 @@ fn capture(facts: &Facts) -> (StepState, Text) {
     let Facts { captures_in_use: count, .. } = *facts;
     if count >= GOOD_VIEWS {
         (StepState::Done, text!("{count} poses", count = count))
-    } else if count > 0 || facts.board_seen {
+    } else if count > 0 || facts.board_in_view || facts.board_captured {
         (StepState::Now, text!("{count} of {wanted} poses", count = count, wanted = GOOD_VIEWS))
     } else {
         (StepState::Blocked, text!("Needs the board"))
@@ -160,10 +168,11 @@ fn solve(facts: &Facts) -> (StepState, Text) {
 }
 
 fn verify(facts: &Facts) -> (StepState, Text) {
-    match (facts.solved, facts.verified, facts.check_captures) {
+    match (facts.solved, facts.verified, facts.verifying) {
         (false, ..) => (StepState::Blocked, text!("Needs a calibration")),
-        (true, true, count) => (StepState::Done, text!("Check poses: {count}", count = count)),
-        (true, false, _) => (StepState::Now, text!("No check poses yet")),
+        (true, true, 1) => (StepState::Done, text!("1 capture")),
+        (true, true, count) => (StepState::Done, text!("{count} captures", count = count)),
+        (true, false, _) => (StepState::Now, text!("Not verified yet")),
     }
 }
 
@@ -206,7 +215,7 @@ mod tests {
 
     #[test]
     fn captures_are_counted_towards_what_is_wanted() {
-        let mut facts = Facts { connected: true, frame_seen: true, board_seen: true, ..Facts::default() };
+        let mut facts = Facts { connected: true, frame_seen: true, board_in_view: true, ..Facts::default() };
         facts.captures_in_use = 7;
         assert_eq!(said(&facts)[2], (StepState::Now, "7 of 10 poses".to_owned()));
         assert_eq!(said(&facts)[3].0, StepState::Now, "three poses are enough to solve");
@@ -216,14 +225,14 @@ mod tests {
 
     #[test]
     fn captures_on_the_disk_can_be_solved_without_a_connection() {
-        let facts = Facts { captures_in_use: 12, board_seen: true, ..Facts::default() };
+        let facts = Facts { captures_in_use: 12, board_in_view: true, ..Facts::default() };
         assert_eq!(said(&facts)[0].0, StepState::Now);
         assert_eq!(said(&facts)[3].0, StepState::Now);
     }
 
     #[test]
     fn an_answer_is_told_by_its_expected_error_and_opens_the_steps_after_it() {
-        let mut facts = Facts { captures_in_use: 10, board_seen: true, solved: true, ..Facts::default() };
+        let mut facts = Facts { captures_in_use: 10, board_in_view: true, solved: true, ..Facts::default() };
         facts.expected_error_m = Some(0.000_42);
         assert_eq!(said(&facts)[3], (StepState::Done, "±0.42 mm (95 %)".to_owned()));
         assert_eq!((said(&facts)[4].0, said(&facts)[5].0), (StepState::Now, StepState::Now));
@@ -233,7 +242,7 @@ mod tests {
 
     #[test]
     fn tracking_needs_a_calibration_and_a_connection_and_a_board_that_is_lost_is_to_be_found() {
-        let mut facts = Facts { captures_in_use: 10, board_seen: true, ..Facts::default() };
+        let mut facts = Facts { captures_in_use: 10, board_in_view: true, ..Facts::default() };
         assert_eq!(said(&facts)[6], (StepState::Blocked, "Needs a calibration".to_owned()));
         facts.solved = true;
         assert_eq!(said(&facts)[6], (StepState::Blocked, "Needs a connection".to_owned()));
@@ -247,8 +256,20 @@ mod tests {
 
     #[test]
     fn a_broken_connection_is_no_longer_done() {
-        let facts = Facts { lost: true, frame_seen: true, board_seen: true, ..Facts::default() };
+        let facts = Facts { lost: true, frame_seen: true, board_in_view: true, ..Facts::default() };
         assert_eq!(said(&facts)[0], (StepState::Now, "Connection lost".to_owned()));
+    }
+
+    #[test]
+    fn a_board_that_left_the_view_is_not_ticked_and_called_for_only_while_captures_are_missing() {
+        let mut facts = Facts { connected: true, frame_seen: true, board_captured: true, ..Facts::default() };
+        facts.captures_in_use = 4;
+        assert_eq!(said(&facts)[1], (StepState::Now, "Board out of view".to_owned()));
+        assert_eq!(next(&judged(&facts)), Some(Step::Target));
+        facts.captures_in_use = 10;
+        assert_eq!(next(&judged(&facts)), Some(Step::Solve));
+        facts.connected = false;
+        assert_eq!(said(&facts)[1], (StepState::Done, "Board in the captures".to_owned()));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use handeye_core::targets::TargetSpec;
 use super::*;
 use crate::command::Event;
 use crate::gui::testing::{Silent, connected, frame, robot};
-use crate::model::{CellSource, ImagePoint, Link, LinkState, Pane, RotationFormat, Simulation, Step};
+use crate::model::{CellSource, ImagePoint, Link, LinkState, Model, Pane, RotationFormat, Simulation, Step};
 use crate::text::{Language, Text};
 
 #[test]
@@ -85,7 +85,6 @@ fn the_robot_is_shown_in_millimetres_and_degrees() {
     assert!(silent.sees("Tip in base, roll pitch yaw [deg]: 0.00 0.00 0.00"));
     assert!(silent.sees("Joints 1 to 6 [deg]: 0.0 45.0 −57.3 0.0 0.0 0.0"));
     assert!(silent.sees("Simulation: 12.35 s"));
-    assert!(silent.sees("Dropped: 7"));
     silent.harness.get_by_label("quat").click();
     silent.steps();
     assert_eq!(silent.app().model().view.rotation, RotationFormat::Quaternion);
@@ -164,7 +163,7 @@ fn nothing_is_cut_off_at_the_smallest_size() {
         let tr = |english| crate::text::Catalogue::translation(language, english).unwrap_or(english).to_owned();
         let mut labels: Vec<_> =
             ["STOP", "Menu", "Undo", "Redo", "Full range", "Colour image", "Depth image"].into_iter().map(tr).collect();
-        labels.push(format!("{}: 7", tr("Dropped")));
+        labels.push(format!("{}: 0.0 s", tr("Image age")));
         labels.extend(Pane::ALL.map(|pane| shell::title(pane, language).to_owned()));
         for label in labels {
             let nodes: Vec<_> = silent.harness.query_all_by_label(&label).collect();
@@ -411,4 +410,60 @@ fn why_there_is_no_capture_is_on_the_screen_once_and_the_table_keeps_it() {
     }
     silent.show_model(model);
     assert_eq!(count(&silent), 1, "in the table");
+}
+
+#[test]
+fn the_line_at_the_bottom_says_what_is_under_way_and_old_news_no_more() {
+    let mut silent = Silent::live();
+    let news = "the sequence has ended";
+    let mut model = crate::gui::testing::sample::solved();
+    let now_s = model.now_s;
+    let say = |model: &mut Model, at_s| {
+        model.messages.say(crate::model::Severity::Info, crate::text::Text::verbatim(news), at_s);
+    };
+    let mut old = model.clone();
+    say(&mut old, now_s - 60.0);
+    silent.show_model(old);
+    assert!(!silent.sees(news));
+    say(&mut model, now_s);
+    silent.show_model(model.clone());
+    assert!(silent.sees(news));
+    model.planning = true;
+    silent.show_model(model);
+    assert!(!silent.sees(news) && silent.sees("Planning poses that are not in the fit"));
+}
+
+#[test]
+fn the_board_counts_as_in_view_until_it_was_not_found_for_a_while() {
+    let mut silent = Silent::live();
+    let mut model = crate::gui::testing::sample::connected();
+    let mut detection = model.detection.clone().expect("seen");
+    let now_s = model.now_s;
+    model.board_seen_s = None;
+    silent.show_model(model);
+    let is_in_view = |silent: &Silent| silent.sees("(Board in view)");
+    assert!(!is_in_view(&silent));
+    silent.absorb(Event::Detection(Box::new(detection.clone())));
+    detection.corners = None;
+    silent.absorb(Event::Detection(Box::new(detection)));
+    assert!(is_in_view(&silent), "a blurred image says nothing");
+    let mut model = silent.app().model().clone();
+    model.board_seen_s = Some(now_s - 2.0);
+    silent.show_model(model);
+    assert!(!is_in_view(&silent));
+}
+
+#[test]
+fn exports_of_the_captures_that_are_there_are_done_and_others_are_not() {
+    let mut silent = Silent::live();
+    silent.show_model(crate::gui::testing::sample::solved());
+    assert!(!silent.sees("(Files written)"));
+    silent.absorb(Event::SessionOpened { exported: true });
+    assert!(silent.sees("(Files written)"));
+    let mut state = silent.app().model().session.clone();
+    let mut document = (*state.document).clone();
+    document.captures[0].excluded = true;
+    state.document = Arc::new(document);
+    silent.absorb(Event::Document(Box::new(state)));
+    assert!(!silent.app().model().export.is_present, "another answer comes of these captures");
 }

@@ -23,13 +23,11 @@ pub struct Overlays {
     pub coverage: bool,
     /// Residuals as arrows.
     pub residuals: bool,
-    /// Factor by which residuals are exaggerated.
-    pub exaggeration: f64,
 }
 
 impl Default for Overlays {
     fn default() -> Self {
-        Self { corners: true, axes: true, predicted: true, coverage: false, residuals: true, exaggeration: 50.0 }
+        Self { corners: true, axes: true, predicted: true, coverage: false, residuals: true }
     }
 }
 

@@ -356,6 +356,8 @@ pub struct Model {
     pub addresses: Vec<String>,
     /// The board in the newest image that was searched.
     pub detection: Option<LiveDetection>,
+    /// When the board was last found in the live image.
+    pub board_seen_s: Option<f64>,
     /// The capture that is under way.
     pub capture: Option<CaptureUnderWay>,
     /// Why there was no capture the last time.
@@ -433,6 +435,7 @@ impl Model {
             messages: Messages::default(),
             addresses: Vec::new(),
             detection: None,
+            board_seen_s: None,
             capture: None,
             refused: None,
             sequence: None,

@@ -138,8 +138,12 @@ impl App {
         if old.meta.target != new.meta.target || another {
             self.model.observed.clear();
         }
+        if old.captures != new.captures || old.meta != new.meta {
+            self.model.export.is_present = false;
+        }
         if another {
             self.forget_solve();
+            self.model.export.written = None;
             self.model.picked = None;
             // Its poses are those of the other session.
             self.model.sequence = None;
@@ -171,8 +175,9 @@ impl App {
         self.model.recent.insert(0, RecentSession { folder, captures });
     }
 
-    pub(crate) fn session_opened(&mut self) {
+    pub(crate) fn session_opened(&mut self, exported: bool) {
         self.model.opening = false;
+        self.model.export.is_present = exported;
         self.model.selection.clear();
         self.model.review = None;
         if matches!(self.model.dialog, Some(Dialog::Open | Dialog::SaveAs | Dialog::New)) {

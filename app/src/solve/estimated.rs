@@ -1,5 +1,6 @@
 //! What the joint estimate decided and found out besides the answer, in words with units.
 
+use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_core::estimate::{Calibration, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
 
 use crate::text;
@@ -100,9 +101,10 @@ fn view_noise(joint: &JointFit) -> Option<EstimatedValue> {
 fn widening(joint: &JointFit) -> Option<EstimatedValue> {
     let widening = &joint.widening;
     let by = widening.by?;
-    Some(EstimatedValue {
+    let times = widening.factor.sqrt();
+    (times >= WIDENING_WORTH_SAYING).then(|| EstimatedValue {
         what: text!("Uncertainty widened"),
-        value: text!("{times} times", times = format!("{:.1}", widening.factor.sqrt())),
+        value: text!("{times} times", times = format!("{times:.1}")),
         meaning: text!(
             "The stated errors are so many times what independent noise explains, because the data show more than that"
         ),
@@ -182,6 +184,17 @@ mod tests {
         assert_eq!(lines.len(), 1, "{lines:?}");
         assert_eq!(lines[0].0, "Noise levels");
         assert!(lines[0].1.ends_with(" degrees of freedom"), "{lines:?}");
+    }
+
+    #[test]
+    fn a_widening_that_changes_no_figure_is_not_said() {
+        let widened =
+            |times: f64| Widening { factor: times * times, by: Some(Evidence::Neighbours), checks: Vec::new() };
+        let is_said = |times| {
+            let lines = said(|calibration| calibration.joint.as_mut().expect("joint").widening = widened(times));
+            lines.iter().any(|(what, _)| what == "Uncertainty widened")
+        };
+        assert!(!is_said(1.01) && is_said(1.1));
     }
 
     #[test]

@@ -83,7 +83,7 @@ impl App {
         self.model.planning = false;
         match views {
             Ok(joints) => self.begin_sequence(PoseSequence {
-                names: (1..=joints.len()).map(|number| format!("check {number}")).collect(),
+                names: (1..=joints.len()).map(|number| format!("V{number}")).collect(),
                 planned: Some(joints),
                 purpose: Some(CapturePurpose::Verify),
                 outcomes: Vec::new(),

@@ -151,24 +151,19 @@ fn what_is_written_reads_back() {
 
 #[test]
 fn a_defect_is_one_line_with_the_file_the_row_and_the_pose() {
-    let third = SEED10.lines().position(|l| l.contains("\"third\"")).expect("a third") + 1;
+    let third = SEED10.lines().position(|l| l.contains("\"P3\"")).expect("a third") + 1;
     let row = |n: usize| format!("seed10.toml, row {n}");
-    let pose_row = format!("{}, pose \"third\"", row(third - 1));
+    let pose_row = format!("{}, pose \"P3\"", row(third - 1));
     let cases = [
         ("handeye-poses", "handeye-session", row(5), "format"),
         ("version = 1", "version = 2", row(6), "version is 2"),
         ("-60.0", "nan", row(7), "start_joints_deg is not finite"),
         ("tip_jerk = 1.0", "tip_jerk = 0", row(9), "tip_jerk must be"),
         ("tip_jerk = 1.0 ", "tip_jork = 1.0 ", row(15), "tip_jerk"),
-        ("\"third\"", "\"second\"", format!("{}, pose \"second\"", row(third - 1)), "same name"),
-        ("\"third\"\nbase_from_tip", "\"third\"\njoints_deg = [1.0, 2.0]\nbase_from_tip", pose_row.clone(), "either"),
-        (
-            "\"third\"\n",
-            "\"third\"\njoints_deg = [1.0]\n#",
-            pose_row.clone(),
-            "1 joint angles, others in this file have 6",
-        ),
-        ("\"third\"\n", "\"third\"\n#", pose_row.clone(), "either base_from_tip or joints_deg"),
+        ("\"P3\"", "\"P2\"", format!("{}, pose \"P2\"", row(third - 1)), "same name"),
+        ("\"P3\"\nbase_from_tip", "\"P3\"\njoints_deg = [1.0, 2.0]\nbase_from_tip", pose_row.clone(), "either"),
+        ("\"P3\"\n", "\"P3\"\njoints_deg = [1.0]\n#", pose_row.clone(), "1 joint angles, others in this file have 6"),
+        ("\"P3\"\n", "\"P3\"\n#", pose_row.clone(), "either base_from_tip or joints_deg"),
         ("0.7932754374087434", "0.8", pose_row.clone(), "rotation_xyzw has length 1.00"),
         ("0.7932754374087434", "inf", pose_row, "rotation_xyzw is not finite"),
         ("rotation_xyzw", "rotation_wxyz", row(19), "rotation_wxyz"),

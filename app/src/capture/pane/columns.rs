@@ -68,6 +68,10 @@ impl Column {
         Self::Flags,
     ];
 
+    /// What a narrow table does without, first what is missed least; the row under the pointer says it in words.
+    const DISPENSABLE: [Self; 6] =
+        [Self::Noise, Self::Turn, Self::Correction, Self::Influence, Self::Image, Self::Purpose];
+
     /// Least width in points.
     fn width(self) -> f32 {
         match self {
@@ -96,7 +100,8 @@ impl Column {
         matches!(self, Self::Rms | Self::Correction | Self::Turn | Self::Influence | Self::Noise)
     }
 
-    fn name(self, language: Language) -> &'static str {
+    /// What stands over it.
+    pub fn name(self, language: Language) -> &'static str {
         match self {
             Self::Image => "",
             Self::Name => tr!(language, "Pose"),
@@ -111,7 +116,8 @@ impl Column {
         }
     }
 
-    fn unit(self) -> &'static str {
+    /// Of its numbers.
+    pub fn unit(self) -> &'static str {
         match self {
             Self::Rms | Self::Noise => "px",
             Self::Correction | Self::Influence => "mm",
@@ -142,22 +148,57 @@ impl Column {
         }
     }
 
-    /// The places of all columns in a row of this width, as distances from its left edge.
-    pub fn places(room: f32) -> [(Self, egui::Rangef); 10] {
-        let least: f32 = Self::ALL.iter().map(|column| column.width()).sum();
-        let shares: f32 = Self::ALL.iter().map(|column| column.stretch()).sum();
-        let spare = (room - least).max(0.0);
+    /// The columns that a row of this width has room for.
+    fn shown(room: f32) -> Vec<Self> {
+        let mut shown = Self::ALL.to_vec();
+        for column in Self::DISPENSABLE {
+            if Self::least_width(&shown) <= room {
+                break;
+            }
+            shown.retain(|&other| other != column);
+        }
+        shown
+    }
+
+    /// The columns that it has none for.
+    pub fn hidden(room: f32) -> impl Iterator<Item = Self> {
+        let shown = Self::shown(room);
+        Self::ALL.into_iter().filter(move |column| !shown.contains(column))
+    }
+
+    /// The places of the columns in a row of this width, as distances from its left edge.
+    pub fn places(room: f32) -> Vec<(Self, egui::Rangef)> {
+        let shown = Self::shown(room);
+        let shares: f32 = shown.iter().map(|column| column.stretch()).sum();
+        let spare = (room - Self::least_width(&shown)).max(0.0);
         let mut x = 0.0;
-        Self::ALL.map(|column| {
+        let place = |column: Self| {
             let from = x;
             x += column.width() + spare * column.stretch() / shares;
             (column, egui::Rangef::new(from, x))
-        })
+        };
+        shown.into_iter().map(place).collect()
     }
 
-    /// Below this width the table is moved sideways.
-    pub fn least_width() -> f32 {
-        Self::ALL.iter().map(|column| column.width()).sum()
+    fn least_width(columns: &[Self]) -> f32 {
+        columns.iter().map(|column| column.width()).sum()
+    }
+
+    /// What a row of the table says in a column of numbers.
+    pub fn number(self, row: &CaptureRow) -> Option<f64> {
+        match self {
+            Self::Rms => row.rms_px,
+            Self::Correction => row.correction_mm,
+            Self::Turn => row.correction_deg,
+            Self::Influence => row.influence_mm,
+            Self::Noise => row.corner_noise_px,
+            Self::Image | Self::Name | Self::Use | Self::Purpose | Self::Flags => None,
+        }
+    }
+
+    /// How many decimals its numbers have.
+    pub fn decimals(self) -> usize {
+        if self == Self::Turn { 4 } else { 3 }
     }
 }
 
@@ -165,15 +206,11 @@ impl Column {
 pub fn sorted(rows: &[CaptureRow], sort: Sort) -> Vec<usize> {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     let number = |row: &CaptureRow| match sort.column {
-        Column::Rms => row.rms_px,
-        Column::Correction => row.correction_mm,
-        Column::Turn => row.correction_deg,
-        Column::Influence => row.influence_mm,
-        Column::Noise => row.corner_noise_px,
+        column if column.is_number() => column.number(row),
         Column::Use => Some(f64::from(u8::from(row.excluded))),
         Column::Purpose => Some(f64::from(u8::from(row.verifies()))),
         Column::Flags => Some(-f64::from(super::flags::weight(row))),
-        Column::Image | Column::Name => Some(f64::from(row.id.0)),
+        _ => Some(f64::from(row.id.0)),
     };
     order.sort_by(|&a, &b| {
         let by_value = match (number(&rows[a]), number(&rows[b])) {

@@ -152,7 +152,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         flag(Some(Tone::Busy), tr!(language, "Influential"), why.to_owned());
     }
     if let Some(why) = why_corners_aside(row, language) {
-        flag(Some(Tone::Busy), tr!(language, "Corners aside"), why);
+        flag(Some(Tone::Busy), tr!(language, "Outlier corners"), why);
     }
     if row.excluded {
         let why = tr!(language, "It was taken out by hand and touches no number. Tick it to use it again.");

@@ -17,11 +17,15 @@ use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
 use crate::live::textures::Thumbnails;
 use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, PoseSequence};
+use crate::scene::Standing;
 use crate::taught::pane::sequence;
+use crate::text::Language;
 use crate::{text, tr};
 
 /// Most images that are averaged: more take longer than they help.
 const MOST_FRAMES: u32 = 64;
+/// A lower pane has lower buttons and rows, so that there is room for some.
+const LOW: f32 = 300.0;
 /// Height of the line at the bottom that says how captures go.
 const STATUS: f32 = 36.0;
 
@@ -29,8 +33,11 @@ const STATUS: f32 = 36.0;
 pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox: &mut Outbox) {
     let language = model.view.language;
     let table = rows::table(ui.ctx(), model);
+    let (button, row) = if ui.available_height() < LOW { (26.0, row::LOW_HEIGHT) } else { (32.0, row::HEIGHT) };
     Frame::new().inner_margin(Margin { left: 10, right: 10, top: 8, bottom: 4 }).show(ui, |ui| {
-        actions_ui(ui, model, &table, outbox);
+        ui.spacing_mut().interact_size.y = ui.spacing().interact_size.y.min(button);
+        ui.spacing_mut().item_spacing.y = 4.0;
+        actions_ui(ui, model, &table, button, outbox);
     });
     let room = ui.available_rect_before_wrap();
     let has_status = model.capture.is_some() || kept_refusal(model).is_some();
@@ -49,7 +56,7 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
             );
             marks::nothing_yet_ui(ui, tr!(language, "No captures yet"), detail);
         } else {
-            table::table_ui(ui, model, &table, thumbnails, outbox);
+            table::table_ui(ui, model, &table, row, thumbnails, outbox);
         }
     });
     if has_status {
@@ -58,7 +65,7 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
 }
 
 /// Buttons that take captures, and those for the selected ones.
-fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Outbox) {
+fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, height: f32, outbox: &mut Outbox) {
     let language = model.view.language;
     let hindrance = hindrance(model);
     ui.horizontal_wrapped(|ui| {
@@ -76,20 +83,20 @@ fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Out
         let name = tr!(language, "Capture");
         let words = RichText::new(name).strong().size(15.0).color(Marks::of(ui).on_accent);
         let key = RichText::new(tr!(language, "Space")).size(11.0).color(Marks::of(ui).on_accent.gamma_multiply(0.75));
-        let big = Button::new(words).fill(Palette::of(ui).accent).min_size(Vec2::new(130.0, 32.0)).shortcut_text(key);
+        let big = Button::new(words).fill(Palette::of(ui).accent).min_size(Vec2::new(130.0, height)).shortcut_text(key);
         let what = tr!(language, "Waits until robot and image stand still, then keeps image, depth and robot pose");
         capture_ui(ui, big, name, what, CapturePurpose::Calibrate);
         let name = tr!(language, "Capture for verification");
         let what = tr!(language, "This capture never enters the fit and tells how good the calibration is");
-        capture_ui(ui, Button::new(name).min_size(Vec2::new(0.0, 32.0)), name, what, CapturePurpose::Verify);
+        capture_ui(ui, Button::new(name).min_size(Vec2::new(0.0, height)), name, what, CapturePurpose::Verify);
         frames_ui(ui, model.view.capture, language, outbox);
-        sequence_ui(ui, model, hindrance, outbox);
+        sequence_ui(ui, model, hindrance, height, outbox);
         selected_ui(ui, model, table, outbox);
     });
 }
 
 /// The whole set from one click: what somebody wants who has never calibrated anything.
-fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outbox: &mut Outbox) {
+fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, height: f32, outbox: &mut Outbox) {
     let language = model.view.language;
     if model.sequence_runs {
         if ui.button(tr!(language, "Stop the sequence")).clicked() {
@@ -108,7 +115,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, outb
     }
     let name = text!("Run the {count} taught poses", count = count).say(language);
     let what = tr!(language, "Moves to one taught pose after the other and captures at each");
-    let button = ui.add_enabled(hindrance.is_none(), Button::new(name).min_size(Vec2::new(0.0, 32.0)));
+    let button = ui.add_enabled(hindrance.is_none(), Button::new(name).min_size(Vec2::new(0.0, height)));
     let button = match hindrance {
         Some(why) => button.on_disabled_hover_text(why),
         None => button.on_hover_text(what),
@@ -134,7 +141,7 @@ fn hindrance(model: &Model) -> Option<&'static str> {
     }
 }
 
-fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: crate::text::Language, outbox: &mut Outbox) {
+fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: Language, outbox: &mut Outbox) {
     let name = tr!(language, "Images to average");
     let mut frames = options.frames;
     let suffix = if frames == 1 { tr!(language, " image") } else { tr!(language, " images") };
@@ -156,27 +163,10 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
     let language = model.view.language;
     let ids: Vec<CaptureId> = model.selection.iter().copied().filter(|&id| table.row(id).is_some()).collect();
     if ids.is_empty() {
-        let (fit, verify) = table
-            .rows
-            .iter()
-            .filter(|row| !row.excluded)
-            .fold((0, 0), |(fit, verify), row| if row.verifies() { (fit, verify + 1) } else { (fit + 1, verify) });
-        let out = table.rows.len() - fit - verify;
-        let aside = table.rows.iter().filter(|row| row.is_aside()).count();
-        let words = if aside == 0 {
-            text!("{fit} in the fit · {verify} verify · {out} excluded", fit = fit, verify = verify, out = out)
-        } else {
-            text!(
-                "{fit} in the fit · {aside} outliers · {verify} verify · {out} excluded",
-                fit = fit - aside,
-                aside = aside,
-                verify = verify,
-                out = out
-            )
-        };
         if !table.rows.is_empty() {
             // As a whole on the next line when there is no room.
-            ui.add(egui::Label::new(RichText::new(words.say(language)).color(Palette::of(ui).weak)).extend());
+            let words = counted(table, language);
+            ui.add(egui::Label::new(RichText::new(words).color(Palette::of(ui).weak)).extend());
         }
         return;
     }
@@ -196,6 +186,19 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
     if ui.button(text!("Delete {count}", count = count).say(language)).on_hover_text(what).clicked() {
         outbox.send(Command::Delete(ids));
     }
+}
+
+/// How many captures there are of each kind that there is.
+fn counted(table: &CaptureTable, language: Language) -> String {
+    let fit = table.count(Standing::Fit);
+    let others = [
+        (table.count(Standing::Aside), tr!(language, "outliers")),
+        (table.count(Standing::Verification), tr!(language, "for verification")),
+        (table.count(Standing::Excluded), tr!(language, "excluded")),
+    ];
+    let mut parts = vec![format!("{fit} {}", tr!(language, "in the fit"))];
+    parts.extend(others.into_iter().filter(|(count, _)| *count > 0).map(|(count, kind)| format!("{count} {kind}")));
+    parts.join(" · ")
 }
 
 /// Why the last capture was refused, once the image no longer says so.

@@ -17,8 +17,10 @@ use crate::model::Model;
 use crate::text::Language;
 use crate::{text, tr};
 
-/// Height of a row.
+/// Height of a row with the pose below the number.
 pub const HEIGHT: f32 = 40.0;
+/// The same with both in one line.
+pub const LOW_HEIGHT: f32 = 28.0;
 
 /// Draws a row in its place; gives what the pointer does to it.
 pub fn row_ui(
@@ -67,7 +69,7 @@ pub fn row_ui(
             Column::Use => use_ui(ui, row, cell, language, outbox),
             Column::Purpose => {
                 let (words, colour) = if row.is_aside() {
-                    (tr!(language, "aside"), palette.warning)
+                    (tr!(language, "outlier"), palette.warning)
                 } else {
                     let words = if row.verifies() { tr!(language, "verify") } else { tr!(language, "fit") };
                     (words, marks::of_capture(Marks::of(ui), row.excluded, row.verifies()))
@@ -79,14 +81,25 @@ pub fn row_ui(
                 let flags = flags::flags(row, circumstances, language);
                 flags_ui(ui, row, cell, &flags);
             }
-            Column::Rms => number(ui, model, row, cell, row.rms_px, 3),
-            Column::Correction => number(ui, model, row, cell, row.correction_mm, 3),
-            Column::Turn => number(ui, model, row, cell, row.correction_deg, 4),
-            Column::Influence => number(ui, model, row, cell, row.influence_mm, 3),
-            Column::Noise => number(ui, model, row, cell, row.corner_noise_px, 3),
+            Column::Rms | Column::Correction | Column::Turn | Column::Influence | Column::Noise => {
+                number(ui, model, row, cell, column);
+            }
         }
     }
-    response
+    match hidden(row, place.width(), language) {
+        Some(words) => response.on_hover_text_at_pointer(words),
+        None => response,
+    }
+}
+
+/// What a row says in columns that it has no room for.
+fn hidden(row: &CaptureRow, width: f32, language: Language) -> Option<String> {
+    let said = |column: Column| {
+        let value = numbers::fixed(column.number(row)?, column.decimals(), 0);
+        Some(format!("{}: {value} {}", column.name(language), column.unit()))
+    };
+    let lines: Vec<String> = Column::hidden(width).filter_map(said).collect();
+    (!lines.is_empty()).then(|| lines.join("\n"))
 }
 
 fn spoken(row: &CaptureRow, name: &str, language: Language) -> String {
@@ -99,7 +112,7 @@ fn spoken(row: &CaptureRow, name: &str, language: Language) -> String {
 
 fn image(ui: &Ui, model: &Model, row: &CaptureRow, cell: Rect, thumbnails: &mut Thumbnails) {
     let palette = Palette::of(ui);
-    let frame = Rect::from_center_size(cell.center(), Vec2::new(44.0, 33.0));
+    let frame = Rect::from_center_size(cell.center(), Vec2::new(44.0, 33.0).min(cell.size() - Vec2::splat(4.0)));
     match model.observed(row.id) {
         None => {
             ui.painter().rect_filled(frame, CornerRadius::same(3), palette.well);
@@ -128,6 +141,10 @@ fn title(ui: &Ui, row: &CaptureRow, cell: Rect) {
             let at = Pos2::new(x, cell.center().y);
             painter.text(at, Align2::LEFT_CENTER, number, FontId::proportional(14.0), colour);
         }
+        Some(_) if cell.height() < HEIGHT => {
+            let at = Pos2::new(x, cell.center().y);
+            painter.text(at, Align2::LEFT_CENTER, row.title(), FontId::proportional(13.0), colour);
+        }
         Some(name) => {
             let at = Pos2::new(x, cell.center().y - 1.0);
             painter.text(at, Align2::LEFT_BOTTOM, number, FontId::proportional(14.0), colour);
@@ -148,12 +165,13 @@ fn use_ui(ui: &mut Ui, row: &CaptureRow, cell: Rect, language: Language, outbox:
     }
 }
 
-fn number(ui: &Ui, model: &Model, row: &CaptureRow, cell: Rect, value: Option<f64>, decimals: usize) {
+fn number(ui: &Ui, model: &Model, row: &CaptureRow, cell: Rect, column: Column) {
+    let value = column.number(row);
     let palette = Palette::of(ui);
     // What belongs to another set of captures is drawn like a memory.
     let is_current = model.solve.fresh && !row.excluded;
     let colour = if is_current && value.is_some() { palette.text } else { palette.weak };
-    let words = value.map_or_else(|| "–".to_owned(), |value| numbers::fixed(value, decimals, 0));
+    let words = value.map_or_else(|| "–".to_owned(), |value| numbers::fixed(value, column.decimals(), 0));
     let at = Pos2::new(cell.right() - 6.0, cell.center().y);
     ui.painter().text(at, Align2::RIGHT_CENTER, words, FontId::new(13.0, FontFamily::Monospace), colour);
 }

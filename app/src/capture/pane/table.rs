@@ -3,9 +3,9 @@
 use egui::{EventFilter, Id, Key, Modifiers, Rect, ScrollArea, Sense, Ui, Vec2, WidgetInfo, WidgetType};
 use handeye_core::project::session::{CaptureId, Role};
 
-use super::columns::{self, Column, HEAD, Sort};
+use super::columns::{self, HEAD, Sort};
 use super::flags::Circumstances;
-use super::row::{HEIGHT, row_ui};
+use super::row::row_ui;
 use super::selecting;
 use crate::capture::rows::{CaptureRow, CaptureTable};
 use crate::command::{Command, Outbox};
@@ -24,43 +24,48 @@ struct Look {
     in_view: Option<CaptureId>,
 }
 
-/// Heads and rows.
-pub fn table_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, thumbnails: &mut Thumbnails, outbox: &mut Outbox) {
+/// Heads, and rows of a height.
+pub fn table_ui(
+    ui: &mut Ui,
+    model: &Model,
+    table: &CaptureTable,
+    height: f32,
+    thumbnails: &mut Thumbnails,
+    outbox: &mut Outbox,
+) {
     let key = Id::new("look of the table of captures");
     let mut look: Look = ui.data(|data| data.get_temp(key)).unwrap_or_default();
-    ScrollArea::horizontal().id_salt("columns").auto_shrink(false).show(ui, |ui| {
-        let width = ui.available_width().max(Column::least_width());
-        ui.set_min_width(width);
-        ui.spacing_mut().item_spacing = Vec2::ZERO;
-        let (heads, _) = ui.allocate_exact_size(Vec2::new(width, HEAD), Sense::hover());
-        look.sort = columns::heads_ui(ui, heads, look.sort, model.view.language);
-        let order = columns::sorted(&table.rows, look.sort);
-        let ids: Vec<CaptureId> = order.iter().map(|&index| table.rows[index].id).collect();
-        keys_ui(ui, model, &ids, &mut look, outbox);
-        ScrollArea::vertical().id_salt("rows").auto_shrink(false).show_viewport(ui, |ui, viewport| {
-            ui.set_height(HEIGHT * order.len() as f32);
-            let top = ui.max_rect().top();
-            let left = ui.max_rect().left();
-            let place = |at: usize| {
-                let min = egui::pos2(left, top + HEIGHT * at as f32);
-                Rect::from_min_size(min, Vec2::new(width, HEIGHT))
-            };
-            bring_into_view(ui, model, &ids, &mut look, place);
-            let first = (viewport.top() / HEIGHT).floor().max(0.0) as usize;
-            let last = ((viewport.bottom() / HEIGHT).ceil().max(0.0) as usize).min(order.len());
-            for (at, &index) in order.iter().enumerate().take(last).skip(first) {
-                let row = &table.rows[index];
-                let circumstances =
-                    Circumstances { outlier_line_px: model.outlier_line_px, refused_here: refused_here(model, row.id) };
-                let response = row_ui(ui, model, row, place(at), circumstances, thumbnails, outbox);
-                if response.clicked() {
-                    let modifiers = ui.input(|input| input.modifiers);
-                    select(model, &ids, row.id, modifiers, &mut look, outbox);
-                    ui.memory_mut(|memory| memory.request_focus(focus_id()));
-                }
-                response.context_menu(|ui| menu_ui(ui, model, table, row, outbox));
+    // What the bar that scrolls the rows takes is no room for the last column.
+    let width = ui.available_width() - ui.spacing().scroll.allocated_width();
+    ui.spacing_mut().item_spacing = Vec2::ZERO;
+    let (heads, _) = ui.allocate_exact_size(Vec2::new(width, HEAD), Sense::hover());
+    look.sort = columns::heads_ui(ui, heads, look.sort, model.view.language);
+    let order = columns::sorted(&table.rows, look.sort);
+    let ids: Vec<CaptureId> = order.iter().map(|&index| table.rows[index].id).collect();
+    keys_ui(ui, model, &ids, &mut look, outbox);
+    ScrollArea::vertical().id_salt("rows").auto_shrink(false).show_viewport(ui, |ui, viewport| {
+        ui.set_height(height * order.len() as f32);
+        let top = ui.max_rect().top();
+        let left = ui.max_rect().left();
+        let place = |at: usize| {
+            let min = egui::pos2(left, top + height * at as f32);
+            Rect::from_min_size(min, Vec2::new(width, height))
+        };
+        bring_into_view(ui, model, &ids, &mut look, place);
+        let first = (viewport.top() / height).floor().max(0.0) as usize;
+        let last = ((viewport.bottom() / height).ceil().max(0.0) as usize).min(order.len());
+        for (at, &index) in order.iter().enumerate().take(last).skip(first) {
+            let row = &table.rows[index];
+            let circumstances =
+                Circumstances { outlier_line_px: model.outlier_line_px, refused_here: refused_here(model, row.id) };
+            let response = row_ui(ui, model, row, place(at), circumstances, thumbnails, outbox);
+            if response.clicked() {
+                let modifiers = ui.input(|input| input.modifiers);
+                select(model, &ids, row.id, modifiers, &mut look, outbox);
+                ui.memory_mut(|memory| memory.request_focus(focus_id()));
             }
-        });
+            response.context_menu(|ui| menu_ui(ui, model, table, row, outbox));
+        }
     });
     ui.data_mut(|data| data.insert_temp(key, look));
 }

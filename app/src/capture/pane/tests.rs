@@ -150,7 +150,7 @@ fn a_capture_that_was_set_aside_says_so_with_how_far_it_is_off_and_what_to_do() 
     assert_eq!(table.rows[first].id, sample::OUTLIER, "it is worth looking at before all others");
     let mut pane = pane(model);
     assert!(pane.sees("3: Outlier") && !pane.sees("4: Outlier"));
-    assert!(pane.sees("9 in the fit · 1 outliers · 2 verify · 0 excluded"));
+    assert!(pane.sees("9 in the fit · 1 outliers · 2 for verification"));
     assert!(pane.sees("Capture 3 · pose 3, outlier, 18.000 px"));
     change(pane.model(), |captures| captures[2].excluded = true);
     pane.steps();
@@ -165,7 +165,7 @@ fn corners_that_were_set_aside_are_counted() {
     model.solve.solved = Some(Arc::new(solved));
     let table = rows::table(&egui::Context::default(), &model);
     let flags = flags::flags(&table.rows[1], flags::Circumstances::default(), Language::English);
-    assert!(flags.iter().any(|flag| flag.name == "Corners aside" && flag.why.contains("without: 3.")), "{flags:?}");
+    assert!(flags.iter().any(|flag| flag.name == "Outlier corners" && flag.why.contains("without: 3.")), "{flags:?}");
 }
 
 #[test]
@@ -183,6 +183,26 @@ fn sorting_puts_the_largest_first_and_rows_without_a_number_last() {
     let second = table.rows[order[1]].id.0;
     let top = |id: u32| pane.rect(&row(&pane, id)).top();
     assert!(top(first) < top(second));
+}
+
+/// The pane in a tile of the smallest window, and in a large one.
+#[test]
+fn remarks_are_in_view_however_narrow_the_pane_is_and_what_has_no_room_is_under_the_pointer() {
+    for (width, height, rows, hides) in [(379.0, 246.0, 3, true), (260.0, 320.0, 3, true), (900.0, 420.0, 5, false)] {
+        let mut model = sample::solved();
+        change(&mut model, |captures| captures[0].excluded = true);
+        let mut pane = PaneHarness::new(model, vec2(width, height), |ui, state| {
+            let PaneState { model, textures, outbox, .. } = state;
+            poses_ui(ui, model, &mut textures.thumbnails, outbox);
+        });
+        let remark = pane.rect("1: Excluded");
+        assert!(remark.max.x <= width, "{width}: {remark:?}");
+        let seen = (1..=rows).filter(|&id| pane.rect(&row(&pane, id)).max.y <= height).count();
+        assert_eq!(seen, rows as usize, "{width}");
+        pane.harness.hover_at(pane.rect(&row(&pane, 2)).left_center() + vec2(20.0, 0.0));
+        pane.harness.run_steps(60);
+        assert_eq!(pane.sees("Influence: 0."), hides, "{width}");
+    }
 }
 
 #[test]

@@ -339,7 +339,9 @@ fn progress(tracked: &Tracked) -> String {
         let at = estimate.base_from_target.translation() * 1e3;
         format!(", at {:.2} {:.2} {:.2} mm", at.x, at.y, at.z)
     });
-    format!("{:.2} s: {state}{place}, {:.1} images/s", tracked.update.time_s, tracked.rate_hz)
+    // There is no rate before the second image.
+    let rate = if tracked.rate_hz > 0.0 { format!(", {:.1} images/s", tracked.rate_hz) } else { String::new() };
+    format!("{:.2} s: {state}{place}{rate}", tracked.update.time_s)
 }
 
 impl Summary {
@@ -362,8 +364,9 @@ impl Summary {
         median_high(self.latencies_s.iter().copied())
     }
 
-    fn rate_hz(&self) -> f64 {
-        if self.took_s > 0.0 { self.frames as f64 / self.took_s } else { 0.0 }
+    /// Images per second; `None` without two moments to count between.
+    fn rate_hz(&self) -> Option<f64> {
+        (self.frames > 0 && self.took_s > 0.0).then(|| self.frames as f64 / self.took_s)
     }
 
     /// Whether there is nothing to sum up.
@@ -388,12 +391,14 @@ impl Summary {
 
     /// For people.
     pub fn text(&self) -> String {
+        if self.is_empty() {
+            return "no image came: nothing was tracked\n".to_owned();
+        }
+        let rate = self.rate_hz().map_or_else(String::new, |hz| format!(", {hz:.1} images/s"));
+        let latency_ms = self.latency_s().unwrap_or_default() * 1e3;
+        let (tracked, frames) = (self.tracked, self.frames);
         let mut lines = vec![format!(
-            "tracked in {} of {} images, {:.1} images/s, {:.1} ms from image to pose (median)",
-            self.tracked,
-            self.frames,
-            self.rate_hz(),
-            self.latency_s().unwrap_or_default() * 1e3
+            "tracked in {tracked} of {frames} images{rate}, {latency_ms:.1} ms from image to pose (median)"
         )];
         if let (Some(m), Some(rad)) = (self.position.rms(), self.rotation.rms()) {
             let deg = rad.to_degrees();
@@ -406,5 +411,19 @@ impl Summary {
             lines.push(format!("the tip from its goal: {mm:.2} mm and {deg:.3}° RMS, the way there included"));
         }
         lines.join("\n") + "\n"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_images_there_is_no_rate() {
+        let none = Summary::default();
+        assert!(!none.text().contains("images/s"), "{}", none.text());
+        assert!(none.json()["rate_hz"].is_null(), "{:#}", none.json());
+        let some = Summary { frames: 20, took_s: 2.0, ..Summary::default() };
+        assert!(some.text().contains("10.0 images/s"), "{}", some.text());
     }
 }

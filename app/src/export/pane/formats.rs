@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use egui::{Align, Layout, Ui, WidgetInfo, WidgetType};
 use handeye_core::project::export::{self, Format};
 
+use super::preview;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::model::Model;
@@ -61,13 +62,16 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
             }
             outbox.send(Command::ChooseFormats(chosen));
         }
+        if refusal.is_some() {
+            return;
+        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let is_shown = model.export.shown == name;
+            let is_shown = model.export.shown.as_deref() == Some(name);
             let response = ui.selectable_label(is_shown, tr!(language, "Show"));
             let said = text!("Show {format}", format = name).say(language);
             response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, is_shown, &said));
-            if response.clicked() && !is_shown {
-                outbox.send(Command::ShowFormat(name.to_owned()));
+            if response.clicked() {
+                outbox.send(Command::ShowFormat((!is_shown).then(|| name.to_owned())));
             }
         });
     });
@@ -81,4 +85,7 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
             parts::caption_ui(ui, &format.description().say(language));
         }
     });
+    if model.export.shown.as_deref() == Some(name) {
+        preview::preview_ui(ui, model, name);
+    }
 }

@@ -30,7 +30,6 @@ pub fn export_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         written::written_ui(ui, model);
         formats::formats_ui(ui, model, outbox);
         names::names_ui(ui, model, outbox);
-        preview::preview_ui(ui, model);
     });
 }
 

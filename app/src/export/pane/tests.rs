@@ -52,15 +52,18 @@ fn a_format_that_cannot_hold_the_result_says_why_and_is_not_written() {
 #[test]
 fn the_text_of_a_format_is_read_before_it_is_written() {
     let mut pane = driven(model());
-    assert_eq!(pane.click("Show opencv_yaml"), [Command::ShowFormat("opencv_yaml".to_owned())]);
-    pane.model().export.shown = "opencv_yaml".to_owned();
+    assert_eq!(pane.click("Show opencv_yaml"), [Command::ShowFormat(Some("opencv_yaml".to_owned()))]);
+    pane.model().export.shown = Some("opencv_yaml".to_owned());
     pane.steps();
     let file = match pane.model().export.previews.get("opencv_yaml") {
         Some(Ok(files)) => files[0].clone(),
         other => panic!("{other:?}"),
     };
     let label = format!("Text of {}", file.name);
+    let row = pane.harness.get_by_label("opencv_yaml").rect();
     let field = pane.harness.get_by_label(&label);
+    let below = field.rect().min.y - row.max.y;
+    assert!((0.0..100.0).contains(&below), "{below} points below its name, with its description and file between");
     assert_eq!(field.value().as_deref(), Some(file.text.as_str()));
     let copy = format!("Copy {}", file.name);
     pane.harness.get_by_label(&copy).click();

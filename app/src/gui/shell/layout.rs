@@ -19,7 +19,7 @@ const TOOLS: [Pane; 8] =
     [Pane::Connect, Pane::Target, Pane::Jog, Pane::Taught, Pane::Result, Pane::Verify, Pane::Export, Pane::Track];
 
 /// Share of the height for the images.
-const UPPER: f32 = 0.56;
+const UPPER: f32 = 0.52;
 /// Share of the lower row's width for the records: the tabs of the tools all fit beside it in the smallest window.
 const LOWER_LEFT: f32 = 0.47;
 

@@ -1,4 +1,4 @@
-//! The bar at the bottom: the robot in numbers, the age of the images, the last thing that went as asked.
+//! The bar at the bottom: the robot in numbers, the age of the images, what is under way.
 
 use egui::{Button, Label, RichText, Sense, Ui, Vec2};
 
@@ -6,11 +6,16 @@ use crate::command::{Command, Outbox};
 use crate::gui::status::STALE_AFTER_S;
 use crate::gui::style::numbers;
 use crate::gui::style::theme::{CAPTION, Palette};
-use crate::model::{Model, RobotState, RotationFormat, Severity};
-use crate::tr;
+use crate::live::pane::waiting;
+use crate::model::{FollowStatus, Model, Motion, RobotState, RotationFormat, Severity};
+use crate::text::Text;
+use crate::{text, tr};
 
 /// Shown where a number is not known.
 const UNKNOWN: &str = "–";
+
+/// So long \[s\] something that went as asked is news.
+const FRESH_S: f64 = 30.0;
 
 /// The bar.
 pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -27,7 +32,7 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             tr!(language, "Tip in base, x y z [mm]"),
             &text(|robot| numbers::translation_mm(&robot.base_from_tip)),
-            "−888.8 −888.8 −888.8",
+            "−888.8  −888.8  −888.8",
             colour,
         );
         rotation_ui(ui, model, colour, outbox);
@@ -35,7 +40,7 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui,
             tr!(language, "Joints 1 to 6 [deg]"),
             &text(joints_deg),
-            "−888.8 −888.8 −888.8 −888.8 −888.8 −888.8",
+            "−888.8  −888.8  −888.8  −888.8  −888.8  −888.8",
             colour,
         );
         field_ui(
@@ -48,9 +53,6 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let stale = model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S);
         let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
         field_ui(ui, tr!(language, "Image age"), &age, "88.8 s", if stale { palette.warning } else { palette.text });
-        field_ui(ui, tr!(language, "Dropped"), &model.dropped_frames.to_string(), "88888", palette.text).on_hover_text(
-            tr!(language, "Images that arrived but were replaced by newer ones before the window could show them"),
-        );
     });
     ui.add_space(2.0);
     message_ui(ui, model);
@@ -80,15 +82,15 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
     let (caption, sample, next, name) = match model.view.rotation {
         RotationFormat::RollPitchYaw => (
             tr!(language, "Tip in base, roll pitch yaw [deg]"),
-            "−888.88 −888.88 −888.88",
+            "−888.88  −888.88  −888.88",
             RotationFormat::Quaternion,
-            "quat",
+            tr!(language, "quat"),
         ),
         RotationFormat::Quaternion => (
             tr!(language, "Tip in base, quaternion x y z w"),
-            "−8.8888 −8.8888 −8.8888 −8.8888",
+            "−8.8888  −8.8888  −8.8888  −8.8888",
             RotationFormat::RollPitchYaw,
-            "rpy",
+            tr!(language, "rpy"),
         ),
     };
     let value = model.robot.as_ref().map_or_else(
@@ -117,10 +119,50 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
     });
 }
 
+/// What is under way, or else what went as asked a moment ago. The log has all of it.
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
-    let said = model.messages.status_line().map(|message| message.text.say(model.view.language)).unwrap_or_default();
-    ui.add(Label::new(RichText::new(said).color(palette.severity(Severity::Info))).truncate());
+    let language = model.view.language;
+    let (colour, said) = if let Some(text) = under_way(model) {
+        (palette.busy, text.say(language))
+    } else {
+        let fresh = model.messages.status_line().filter(|message| model.now_s - message.at_s < FRESH_S);
+        (palette.severity(Severity::Info), fresh.map(|message| message.text.say(language)).unwrap_or_default())
+    };
+    ui.add(Label::new(RichText::new(said).color(colour)).truncate());
+}
+
+/// What the program does now, what was asked for before what comes of it.
+fn under_way(model: &Model) -> Option<Text> {
+    if model.planning {
+        return Some(text!("Planning poses that are not in the fit…"));
+    }
+    if let (true, Some(sequence)) = (model.sequence_runs, &model.sequence) {
+        let (number, of) = (sequence.outcomes.len() + 1, sequence.names.len());
+        return sequence.current().map(|name| text!("Pose {n} of {of}: {name}", n = number, of = of, name = name));
+    }
+    if let Some(capture) = &model.capture {
+        return Some(waiting(capture));
+    }
+    if model.export.writing {
+        return Some(text!("Files are being written"));
+    }
+    if model.opening {
+        return Some(text!("The session is being opened…"));
+    }
+    if model.solve.is_running() {
+        return Some(text!("Solving…"));
+    }
+    match (&model.motion, &model.track.follow) {
+        (_, FollowStatus::MakingRoom) => Some(text!("Moving to where the arm has room to follow…")),
+        (_, FollowStatus::Following { .. }) => Some(text!("The arm follows the board")),
+        (Motion::Moving { what, since_s, .. }, _) => {
+            let seconds = format!("{:.0}", (model.now_s - since_s).max(0.0));
+            Some(text!("Moving: {what} ({seconds} s)", what = what.clone(), seconds = seconds))
+        }
+        (Motion::Jogging(_), _) => Some(text!("Jogging")),
+        (Motion::Idle, _) => None,
+    }
 }
 
 fn joints_deg(robot: &RobotState) -> String {

@@ -80,7 +80,11 @@ fn frame_rate_ui(ui: &mut Ui, model: &Model) {
         _ => text!("{rate} fps", rate = format!("{:.0}", frame.info.rate_hz)).say(language),
     };
     ui.label(RichText::new("·").color(palette.weak));
-    ui.label(RichText::new(text).color(palette.weak)).on_hover_text(tr!(language, "Images that arrive per second"));
+    let what = text!(
+        "Images that arrive per second. The window draws the newest; {count} had a newer one behind them before their turn",
+        count = model.dropped_frames
+    );
+    ui.label(RichText::new(text).color(palette.weak)).on_hover_text(what.say(language));
 }
 
 fn session_ui(ui: &mut Ui, session: &SessionFacts, language: Language) {

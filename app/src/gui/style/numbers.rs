@@ -15,9 +15,10 @@ pub fn fixed(value: f64, decimals: usize, width: usize) -> String {
     format!("{}{text}", FIGURE_SPACE.repeat(padding))
 }
 
-/// Several numbers in a row.
+/// Several numbers in a row, so far apart that two which fill their width are still two.
 pub fn row(values: &[f64], decimals: usize, width: usize) -> String {
-    values.iter().map(|&value| fixed(value, decimals, width)).collect::<Vec<_>>().join(" ")
+    let between = format!("{FIGURE_SPACE} ");
+    values.iter().map(|&value| fixed(value, decimals, width)).collect::<Vec<_>>().join(&between)
 }
 
 /// Translation in millimetres.
@@ -60,8 +61,8 @@ mod tests {
         let quarter = std::f64::consts::FRAC_PI_4;
         let pose =
             Pose::<Base, Tip>::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, quarter.sin(), quarter.cos()]);
-        assert_eq!(plain(&translation_mm(&pose)), " 110.0  −16.0  847.0");
-        assert_eq!(plain(&rpy_deg(&pose)), "   0.00    0.00   90.00");
-        assert_eq!(plain(&quaternion(&pose)), " 0.0000  0.0000  0.7071  0.7071");
+        assert_eq!(plain(&translation_mm(&pose)), " 110.0   −16.0   847.0");
+        assert_eq!(plain(&rpy_deg(&pose)), "   0.00     0.00    90.00");
+        assert_eq!(plain(&quaternion(&pose)), " 0.0000   0.0000   0.7071   0.7071");
     }
 }

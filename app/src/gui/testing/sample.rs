@@ -150,6 +150,7 @@ pub fn connected() -> Model {
         base_from_target_true: Some(base_from_target()),
     };
     model.frame = Some(LiveFrame { info, images: Arc::new(images()) });
+    model.board_seen_s = Some(model.now_s);
     model.detection = Some(LiveDetection {
         frame: 1,
         corners: Some(corners(1)),

@@ -9,7 +9,7 @@ use egui::{
 use handeye_core::capture::Wait;
 use handeye_core::project::session::CaptureId;
 
-use super::{Shown, overlays};
+use super::Shown;
 use crate::capture::rows;
 use crate::command::{Command, Outbox};
 use crate::gui::status::STALE_AFTER_S;
@@ -26,20 +26,22 @@ const REFUSAL_S: f64 = 8.0;
 /// The flash of a capture \[s\].
 const FLASH_S: f64 = 0.35;
 
-/// Frame rate, age, what was dropped, zoom and exaggeration, in the corner of the image.
-pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, points_per_px: f32) {
+/// Frame rate, age, zoom and exaggeration, in the corner of the image.
+pub fn badges_ui(
+    ui: &mut Ui,
+    model: &Model,
+    room: Rect,
+    shown: &Shown<'_>,
+    points_per_px: f32,
+    exaggeration: Option<f64>,
+) {
     let language = model.view.language;
     let mut lines: Vec<(String, Color32)> = Vec::new();
     if let (None, Some(frame)) = (shown.capture, &model.frame) {
         let age_s = model.frame_age_s().unwrap_or_default();
         let stale = age_s > STALE_AFTER_S;
         let rate = if stale { 0.0 } else { frame.info.rate_hz };
-        let words = text!(
-            "{rate} fps · {age} s old · {dropped} dropped",
-            rate = format!("{rate:.0}"),
-            age = format!("{age_s:.1}"),
-            dropped = model.dropped_frames
-        );
+        let words = text!("{rate} fps · {age} s old", rate = format!("{rate:.0}"), age = format!("{age_s:.1}"));
         let colour = if stale { Marks::over_images().review } else { Color32::from_gray(215) };
         lines.push((words.say(language), colour));
         if frame.info.image_age_s > 0.0 {
@@ -51,9 +53,8 @@ pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, poin
     if shown.capture.is_none() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_none()) {
         lines.push((tr!(language, "Board not found").to_owned(), Marks::over_images().review));
     }
-    let overlays = model.view.overlays;
-    if overlays.residuals && has_residuals(model, shown) {
-        let words = text!("Residuals × {times}", times = format!("{:.0}", overlays.exaggeration));
+    if let Some(times) = exaggeration {
+        let words = text!("Residuals × {times}", times = format!("{times:.0}"));
         lines.push((words.say(language), Marks::over_images().residual));
     }
     if model.viewport.zoom > 1.0 {
@@ -65,13 +66,6 @@ pub fn badges_ui(ui: &mut Ui, model: &Model, room: Rect, shown: &Shown<'_>, poin
         let response = ui.interact(rect, ui.id().with(("badge", number)), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, &words));
         at.y = rect.bottom() + 4.0;
-    }
-}
-
-fn has_residuals(model: &Model, shown: &Shown<'_>) -> bool {
-    match shown.capture {
-        Some(id) => !rows::residuals(model, id).is_empty(),
-        None => overlays::has_live_residuals(model),
     }
 }
 

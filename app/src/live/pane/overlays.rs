@@ -1,7 +1,8 @@
 //! What is drawn over the colour image: corners, axes, the predicted board, coverage, residuals.
 
-use egui::{Color32, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
+use egui::{Color32, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 use handeye_core::geometry::frames::{Camera, Pose, Target};
+use handeye_core::geometry::statistics::median_high;
 use handeye_core::targets::TargetSpec;
 use handeye_core::targets::bent::{BoardPoints, BoardShape};
 use handeye_core::targets::observation::Corner;
@@ -16,6 +17,11 @@ use crate::model::Model;
 
 /// How far the axes reach, in squares of the board.
 const AXIS_SQUARES: f64 = 3.0;
+/// A large residual is drawn as long as corners are apart, within these bounds [points]: shorter it is not seen, and longer
+/// it covers the board.
+const LONG: std::ops::RangeInclusive<f64> = 6.0..=24.0;
+/// Factors that can be read off in the head. Nothing is drawn shorter than it is.
+const EXAGGERATIONS: [f64; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 /// What is left of a sight of the board that is some frames old.
 const OLD_SIGHT: f32 = 0.35;
 
@@ -27,8 +33,8 @@ struct ShownDetection<'a> {
     strength: f32,
 }
 
-/// Everything that is switched on.
-pub fn paint(ui: &Ui, painter: &Painter, model: &Model, shown: &Shown<'_>, place: &Place) {
+/// Everything that is switched on; gives how many times as long as they are the residuals are drawn, if they are.
+pub fn paint(ui: &Ui, painter: &Painter, model: &Model, shown: &Shown<'_>, place: &Place) -> Option<f64> {
     let overlays = model.view.overlays;
     if overlays.coverage {
         coverage(painter, &rows::table(ui.ctx(), model), place);
@@ -37,19 +43,18 @@ pub fn paint(ui: &Ui, painter: &Painter, model: &Model, shown: &Shown<'_>, place
     if overlays.predicted {
         predicted(painter, model, shown, target, place);
     }
-    let Some(sight) = sight(model, shown) else { return };
+    let sight = sight(model, shown)?;
     if overlays.corners {
         corners(painter, sight.corners, target, place, sight.strength);
     }
-    if overlays.residuals {
-        residuals(painter, model, shown, &sight, place);
-    }
+    let times = overlays.residuals.then(|| residuals(ui, painter, model, shown, &sight, place)).flatten();
     if let (true, Some(intrinsics), Some(camera_from_target)) =
         (overlays.axes, model.intrinsics(), sight.camera_from_target)
     {
         let projector = Projector { intrinsics: &intrinsics, camera_from_target, place };
         axes(painter, &projector, target, sight.strength);
     }
+    times
 }
 
 fn sight<'a>(model: &'a Model, shown: &Shown<'_>) -> Option<ShownDetection<'a>> {
@@ -203,20 +208,31 @@ pub fn live_chain(model: &Model) -> Option<Pose<Camera, Target>> {
     }
 }
 
-/// Whether the live image has residuals.
-pub fn has_live_residuals(model: &Model) -> bool {
-    live_chain(model).is_some() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_some())
-}
-
 /// Measured minus predicted, exaggerated: a recorded image has those of its fit or verification, the live one those of
-/// the bare chain, or of the pose of the tracked board.
-fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &ShownDetection<'_>, place: &Place) {
-    let exaggeration = model.view.overlays.exaggeration;
+/// the bare chain, or of the pose of the tracked board. Gives by how many times.
+fn residuals(
+    ui: &Ui,
+    painter: &Painter,
+    model: &Model,
+    shown: &Shown<'_>,
+    sight: &ShownDetection<'_>,
+    place: &Place,
+) -> Option<f64> {
+    let arrows: Vec<(Vector2<f64>, Vector2<f64>)> = match shown.capture {
+        Some(id) => rows::residuals(model, id).iter().map(|it| (it.px, it.residual_px)).collect(),
+        None => live_residuals(model, sight.corners),
+    };
+    // Without the zoom, so that they grow with the image.
+    let scale = f64::from(place.points_per_px() / model.viewport.zoom.max(1.0));
+    let key = Id::new("exaggeration of residuals");
+    let long = (apart_px(sight.corners) * scale).clamp(*LONG.start(), *LONG.end());
+    let times = exaggeration(arrows.iter().map(|(_, residual_px)| residual_px.norm() * scale), long, kept(ui, key))?;
+    ui.data_mut(|data| data.insert_temp(key, times));
     let colour = Marks::over_images().residual.gamma_multiply(sight.strength);
-    let arrow = |px: &Vector2<f64>, residual_px: &Vector2<f64>| {
-        let (from, to) = (screen(place, px), screen(place, &(px + residual_px * exaggeration)));
+    for (px, residual_px) in &arrows {
+        let (from, to) = (screen(place, px), screen(place, &(px + residual_px * times)));
         if !(to.x.is_finite() && to.y.is_finite()) {
-            return;
+            continue;
         }
         marks::outlined_line(painter, &[from, to], 1.4, colour);
         let along = to - from;
@@ -226,16 +242,33 @@ fn residuals(painter: &Painter, model: &Model, shown: &Shown<'_>, sight: &ShownD
                 painter.line_segment([to, to + back + side * 0.6], Stroke::new(1.4, colour));
             }
         }
-    };
-    if let Some(id) = shown.capture {
-        for residual in rows::residuals(model, id) {
-            arrow(&residual.px, &residual.residual_px);
-        }
-        return;
     }
-    for (px, residual_px) in live_residuals(model, sight.corners) {
-        arrow(&px, &residual_px);
+    Some(times)
+}
+
+fn kept(ui: &Ui, key: Id) -> Option<f64> {
+    ui.data(|data| data.get_temp(key))
+}
+
+/// How far neighbours in a row are apart; 0 without any.
+fn apart_px(corners: &[Corner]) -> f64 {
+    let neighbours = corners.windows(2).filter(|pair| pair[0].index + 1 == pair[1].index);
+    median_high(neighbours.map(|pair| (pair[1].px - pair[0].px).norm())).unwrap_or(0.0)
+}
+
+/// How many times as long as they are residuals of these lengths on the screen are drawn, so that nine of ten are no
+/// longer than `long`. The last factor is kept while it does about the same: in a live image it would not stand still
+/// otherwise. `None` without residuals.
+fn exaggeration(lengths: impl Iterator<Item = f64>, long: f64, kept: Option<f64>) -> Option<f64> {
+    let mut lengths: Vec<f64> = lengths.filter(|length| length.is_finite()).collect();
+    lengths.sort_by(f64::total_cmp);
+    let large = *lengths.get(lengths.len() * 9 / 10)?;
+    let suits = |times: f64| (long / 4.0..=long * 1.2).contains(&(large * times));
+    if let Some(kept) = kept.filter(|&kept| suits(kept)) {
+        return Some(kept);
     }
+    let fits = |times: &f64| large * times <= long;
+    Some(EXAGGERATIONS.into_iter().rev().find(fits).unwrap_or(1.0))
 }
 
 /// Corners of the live image, and measured minus predicted.
@@ -252,4 +285,27 @@ pub fn live_residuals(model: &Model, corners: &[Corner]) -> Vec<(Vector2<f64>, V
         Some((corner.px, corner.px - predicted_px))
     };
     corners.iter().filter(|corner| corner.index < board.len()).filter_map(residual).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_residuals_are_drawn_as_they_are_and_small_ones_so_that_they_can_be_seen() {
+        let times = |length: f64, kept| exaggeration((1..=20).map(|_| length), 24.0, kept);
+        assert_eq!(times(0.1, None), Some(200.0));
+        assert_eq!(times(0.5, None), Some(20.0));
+        assert_eq!(times(300.0, None), Some(1.0));
+        assert_eq!(times(0.0, None), Some(1000.0));
+        assert_eq!(times(0.13, Some(200.0)), Some(200.0), "it stands still while it does about the same");
+        assert_eq!(times(1.0, Some(200.0)), Some(20.0));
+        assert_eq!(exaggeration(std::iter::empty(), 24.0, Some(5.0)), None);
+    }
+
+    #[test]
+    fn one_wrong_corner_does_not_shrink_all_others() {
+        let lengths = || (1..=19).map(|_| 0.1).chain([500.0]);
+        assert_eq!(exaggeration(lengths(), 24.0, None), Some(200.0));
+    }
 }

@@ -1,14 +1,11 @@
 //! The lines over the images: what is drawn over the colours, and which colours depths have.
 
-use egui::{DragValue, RichText, Ui, WidgetInfo, WidgetType};
+use egui::{RichText, Ui};
 use handeye_core::depth::ColourMap;
 
 use crate::command::{Command, Outbox};
-use crate::model::{DepthScale, Model, Overlays};
+use crate::model::{DepthScale, Model};
 use crate::tr;
-
-/// Residuals are shown at least as they are, and never so large that a good one leaves the image.
-const EXAGGERATIONS: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
 /// A switch per overlay.
 pub fn overlays_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -48,7 +45,6 @@ pub fn overlays_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             tr!(language, "Residuals"),
             tr!(language, "From predicted to measured corners, exaggerated: of a capture after the fit, of the live image by robot and calibration alone, or by the board's pose in it while the board is tracked"),
         );
-        exaggeration_ui(ui, &mut now, tr!(language, "Exaggeration of residuals"));
     });
     if now != before {
         outbox.send(Command::SetOverlays(now));
@@ -60,17 +56,6 @@ fn switch_ui(ui: &mut Ui, on: &mut bool, name: &str, what: &str) {
     if response.clicked() {
         *on = !*on;
     }
-}
-
-fn exaggeration_ui(ui: &mut Ui, overlays: &mut Overlays, name: &str) {
-    if !overlays.residuals {
-        return;
-    }
-    let drag = DragValue::new(&mut overlays.exaggeration).range(EXAGGERATIONS).speed(1.0).max_decimals(0).prefix("× ");
-    let response = ui.add(drag).on_hover_text(name);
-    let value = overlays.exaggeration;
-    response
-        .widget_info(|| WidgetInfo { value: Some(value), ..WidgetInfo::labeled(WidgetType::DragValue, true, name) });
 }
 
 /// Colour map and range of the depth image.

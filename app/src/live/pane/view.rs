@@ -97,9 +97,8 @@ impl Image<'_> {
         let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
         let painter = ui.painter().with_clip_rect(place.visible.intersect(ui.clip_rect()));
         painter.image(texture.id(), place.image, uv, tint);
-        if self.with_overlays {
-            overlays::paint(ui, &painter, self.model, &self.shown, &place);
-        }
+        let exaggeration =
+            if self.with_overlays { overlays::paint(ui, &painter, self.model, &self.shown, &place) } else { None };
         if let Some(picked) = self.model.picked.as_ref().filter(|_| self.shown.capture.is_none()) {
             ring(&painter, &place, picked.pixel);
         }
@@ -111,7 +110,7 @@ impl Image<'_> {
             ui.painter().rect_stroke(room.shrink(1.5), 0.0, stroke, StrokeKind::Middle);
         }
         if self.with_overlays {
-            feedback::badges_ui(ui, self.model, room, &self.shown, place.points_per_px());
+            feedback::badges_ui(ui, self.model, room, &self.shown, place.points_per_px(), exaggeration);
         }
         feedback::capture_ui(ui, self.model, room, self.with_overlays, outbox);
         self.navigate(ui, &response, room, &place, outbox);

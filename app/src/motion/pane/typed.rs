@@ -92,7 +92,12 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
 fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
     let weak = Palette::of(ui).weak;
     let is_tip = typed.is_tip;
-    let names = if is_tip { ["x", "y", "z", "roll", "pitch", "yaw"] } else { ["J1", "J2", "J3", "J4", "J5", "J6"] };
+    let language = model.view.language;
+    let names = if is_tip {
+        ["x", "y", "z", tr!(language, "roll"), tr!(language, "pitch"), tr!(language, "yaw")]
+    } else {
+        ["J1", "J2", "J3", "J4", "J5", "J6"]
+    };
     let values = if is_tip { &mut typed.tip } else { &mut typed.joints_deg };
     Grid::new("typed goal").num_columns(6).spacing([6.0, 4.0]).min_col_width(0.0).show(ui, |ui| {
         for (index, (name, value)) in names.into_iter().zip(values).enumerate() {
@@ -113,7 +118,7 @@ fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
                 .max_decimals(2)
                 .suffix(if is_length { " mm" } else { "°" });
             let response = ui.add_sized([FIELD, ui.spacing().interact_size.y], field);
-            let said = text!("{name} of the goal", name = name).say(model.view.language);
+            let said = text!("{name} of the goal", name = name).say(language);
             response.widget_info(|| WidgetInfo { label: Some(said.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
             if index % 3 == 2 {
                 ui.end_row();

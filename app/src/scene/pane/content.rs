@@ -16,7 +16,7 @@ use crate::capture::rows::CaptureTable;
 use crate::gui::style::marks::Marks;
 use crate::gui::style::theme::Palette;
 use crate::model::Model;
-use crate::scene::{BoardItem, CameraItem, Known, Role, posed_arm};
+use crate::scene::{BoardItem, CameraItem, Known, Role, Standing, posed_arm};
 use crate::text::Language;
 use crate::{text, tr};
 
@@ -53,23 +53,55 @@ pub fn draw(canvas: &mut Canvas, ui: &Ui, model: &Model, table: &CaptureTable, p
     }
     live_camera(canvas, &known, language, palette, &mut entries);
     let spots = captures::captures(canvas, model, &known, palette, marks, pointed);
-    if !table.rows.is_empty() {
-        entries.push(Entry {
-            sign: Sign::Frustum,
-            colour: marks.fit,
-            name: tr!(language, "Capture poses").to_owned(),
-            what: tr!(
-                language,
-                "From where captures were taken. Those of the fit turn to the colour of a warning as their residual goes \
-                 to three times the median or over the outlier line, and have it when the estimate set them aside; \
-                 verifying and excluded ones have the colours of the charts. Click one to look at its image."
-            )
-            .to_owned(),
-        });
-    }
+    entries.extend(capture_entries(table, language, palette, marks));
     boards(canvas, &known, language, (palette, marks), &mut entries);
     entries.push(grid_entry(palette, language));
     Drawn { entries, spots }
+}
+
+/// One for each kind of capture that there is.
+fn capture_entries(
+    table: &CaptureTable,
+    language: Language,
+    palette: &Palette,
+    marks: &Marks,
+) -> impl Iterator<Item = Entry> {
+    let kinds = [
+        (
+            Standing::Fit,
+            marks.fit,
+            tr!(language, "Captures in the fit"),
+            tr!(
+                language,
+                "From where they were taken. They turn to the colour of a warning as their residual goes to three times the \
+                 median or over the outlier line. Click one to look at its image."
+            ),
+        ),
+        (
+            Standing::Aside,
+            palette.warning,
+            tr!(language, "Outliers"),
+            tr!(language, "Captures that do not fit the others, and which the answer is without"),
+        ),
+        (
+            Standing::Verification,
+            marks.verify,
+            tr!(language, "Captures for verification"),
+            tr!(language, "Captures that never enter the fit and test it"),
+        ),
+        (
+            Standing::Excluded,
+            marks.excluded,
+            tr!(language, "Excluded captures"),
+            tr!(language, "Captures that were taken out by hand"),
+        ),
+    ];
+    kinds.into_iter().filter(|(standing, ..)| table.count(*standing) > 0).map(|(_, colour, name, what)| Entry {
+        sign: Sign::Frustum,
+        colour,
+        name: name.to_owned(),
+        what: what.to_owned(),
+    })
 }
 
 fn grid_entry(palette: &Palette, language: Language) -> Entry {

@@ -130,7 +130,7 @@ fn what_is_drawn_is_named_by_where_it_comes_from() {
     let legend = |pane: &PaneHarness, name: &str| pane.harness.query_by_label(name).is_some();
     let calibrated = pane(sample::solved());
     assert!(legend(&calibrated, "Camera") && legend(&calibrated, "Board, calibrated"));
-    assert!(legend(&calibrated, "Capture poses") && legend(&calibrated, "Grid: 100 mm"));
+    assert!(legend(&calibrated, "Captures in the fit") && legend(&calibrated, "Grid: 100 mm"));
     assert!(legend(&calibrated, "Board, true"), "the cell of the sample says where its board is");
     assert!(!legend(&calibrated, "Board, tracked") && !legend(&calibrated, "Path of the tip"));
     let tracked = pane(sample::tracking());

@@ -34,7 +34,7 @@ impl Archive {
                 let folder = store.folder().display().to_string();
                 self.store = Some(store);
                 self.report_document();
-                self.outlet.report(Event::SessionOpened);
+                self.outlet.report(Event::SessionOpened { exported: false });
                 let text = text!("The data set was copied to the session {folder}", folder = folder);
                 self.outlet.notice(Severity::Info, text);
                 if outside > 0 {

@@ -1,5 +1,6 @@
 //! The archive: the one thread that writes the session. What it has reported is on the disk.
 
+mod exported;
 mod folders;
 mod import;
 
@@ -136,7 +137,7 @@ impl Archive {
             return;
         }
         if self.store.as_ref().is_some_and(|store| store.folder() == folder) {
-            self.outlet.report(Event::SessionOpened);
+            self.outlet.report(Event::SessionOpened { exported: exported::is_exported(folder) });
             return;
         }
         let opened = Store::open(folder);
@@ -177,9 +178,10 @@ impl Archive {
     fn take(&mut self, store: Result<Store, SessionError>, words: impl FnOnce(String) -> Text) {
         match store {
             Ok(store) => {
+                let exported = exported::is_exported(store.folder());
                 self.store = Some(store);
                 self.report_document();
-                self.outlet.report(Event::SessionOpened);
+                self.outlet.report(Event::SessionOpened { exported });
             }
             Err(error) => self.outlet.report(Event::SessionFailed { why: words(error.to_string()) }),
         }

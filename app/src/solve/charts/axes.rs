@@ -139,6 +139,12 @@ pub fn plot_rect(room: Rect) -> Rect {
     Rect::from_min_max(min, (room.max - egui::vec2(RIGHT, BOTTOM)).max(min + egui::vec2(1.0, 1.0)))
 }
 
+/// The room beside the name of the horizontal axis.
+pub fn beside_name(plot: Rect) -> Rect {
+    let bottom = plot.bottom() + BOTTOM;
+    Rect::from_x_y_ranges(plot.x_range(), bottom - CAPTION - 4.0..=bottom)
+}
+
 /// The height of a value on the screen.
 pub fn y(plot: Rect, scale: Scale, value: f64) -> f32 {
     plot.bottom() - (scale.part(value).clamp(-0.01, 1.02) as f32) * plot.height()

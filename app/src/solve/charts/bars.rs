@@ -1,12 +1,12 @@
 //! A bar per capture: residuals with the line between good and bad ones, and influence.
 
 use egui::{Align, Align2, Color32, CursorIcon, FontId, Layout, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2};
-use egui::{WidgetInfo, WidgetType};
+use egui::{UiBuilder, WidgetInfo, WidgetType};
 use handeye_core::geometry::statistics::median_high;
 use handeye_core::project::session::CaptureId;
 
 use super::axes::{self, Scale};
-use super::instead_ui;
+use super::{instead_ui, legend};
 use crate::capture::rows::{CaptureRow, CaptureTable};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::{self, Marks};
@@ -122,6 +122,8 @@ impl Bars {
         let ticks: Vec<(f32, String)> =
             table.rows.iter().enumerate().map(|(index, row)| (middle(index), row.id.to_string())).collect();
         axes::axes_ui(ui, plot, scale, self.y_name, tr!(language, "Capture"), &ticks);
+        let beside = UiBuilder::new().max_rect(axes::beside_name(plot)).layout(Layout::left_to_right(Align::Center));
+        ui.scope_builder(beside, |ui| legend::legend_ui(ui, table, language));
         let response = ui.interact(plot, ui.id().with(self.name), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, self.y_name));
         let index_at = |at: Pos2| {
@@ -170,7 +172,7 @@ impl Bars {
         let value = (self.value)(row).map_or_else(|| "–".to_owned(), |value| format!("{value:.3} {}", self.unit));
         let what = match (row.excluded, row.verifies()) {
             (true, _) => tr!(language, "excluded"),
-            (false, true) => tr!(language, "verifies the fit: error of the prediction"),
+            (false, true) => tr!(language, "for verification: error of the prediction"),
             (false, false) if row.is_aside() => tr!(language, "outlier"),
             (false, false) => tr!(language, "in the fit"),
         };

@@ -2,7 +2,7 @@
 
 use egui::{Pos2, Rect, RichText, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, WidgetType};
 
-use super::instead_ui;
+use super::{instead_ui, legend};
 use crate::capture::rows::CaptureTable;
 use crate::gui::style::marks::{self, Marks};
 use crate::gui::style::theme::Palette;
@@ -20,18 +20,7 @@ pub fn coverage_ui(ui: &mut Ui, model: &Model, table: &CaptureTable) {
     let covered = format!("{:.0}", coverage.covered() * 100.0);
     let words = text!("Corners in {covered} % of the cells of the image, in pixels", covered = covered).say(language);
     ui.label(RichText::new(words).color(palette.text));
-    ui.horizontal(|ui| {
-        let marks = Marks::of(ui);
-        for (colour, name) in [
-            (marks.fit, tr!(language, "in the fit")),
-            (marks.verify, tr!(language, "verifies")),
-            (marks.excluded, tr!(language, "excluded")),
-        ] {
-            let (rect, _) = ui.allocate_exact_size(Vec2::new(12.0, 12.0), Sense::hover());
-            ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(2.0, colour));
-            ui.label(RichText::new(name).small().color(palette.weak));
-        }
-    });
+    ui.horizontal(|ui| legend::legend_ui(ui, table, language));
 
     let room = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(room);

@@ -4,6 +4,7 @@ mod accuracy;
 pub(crate) mod axes;
 mod bars;
 mod coverage;
+mod legend;
 
 use egui::{Frame, Id, Margin, Rect, Ui, UiBuilder, Vec2};
 
@@ -33,10 +34,10 @@ impl Chart {
 
     fn name(self, language: Language) -> &'static str {
         match self {
-            Self::Residuals => tr!(language, "Residuals by capture"),
-            Self::Influence => tr!(language, "Influence by capture"),
+            Self::Residuals => tr!(language, "Residuals"),
+            Self::Influence => tr!(language, "Influence"),
             Self::Accuracy => tr!(language, "Expected error"),
-            Self::Coverage => tr!(language, "Covered image"),
+            Self::Coverage => tr!(language, "Coverage"),
         }
     }
 }

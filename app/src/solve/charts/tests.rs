@@ -106,16 +106,16 @@ fn the_expected_error_says_what_the_goal_takes() {
 fn every_chart_is_there_with_its_units_and_before_a_calibration_says_when_it_comes() {
     let mut pane = pane(sample::solved());
     for (tab, label) in [
-        ("Influence by capture", "Influence [mm]"),
+        ("Influence", "Influence [mm]"),
         ("Expected error", "Expected error by number of poses"),
-        ("Covered image", "Coverage of the image"),
+        ("Coverage", "Coverage of the image"),
     ] {
         pane.click(tab);
         assert!(pane.sees(label), "{label}");
     }
     assert!(pane.sees("% of the cells"));
     *pane.model() = sample::captured();
-    pane.click("Residuals by capture");
+    pane.click("Residuals");
     assert!(pane.sees("Residuals appear with the first calibration"));
     *pane.model() = sample::connected();
     pane.steps();

@@ -57,7 +57,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
         None => text!("All {of} poses were visited", of = of),
     }
     .say(language);
-    if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop sequence")) {
+    if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop the sequence")) {
         outbox.send(Command::StopSequence);
     }
 }

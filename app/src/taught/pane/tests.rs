@@ -122,7 +122,7 @@ fn a_sequence_says_how_each_pose_went_and_can_be_stopped() {
     assert!(pane.sees("Pose 3 of 3: right"));
     assert!(pane.sees("Skipped: the board was not found"));
     assert!(!pane.is_enabled("Remove front"));
-    assert_eq!(pane.click("Stop sequence"), [Command::StopSequence]);
+    assert_eq!(pane.click("Stop the sequence"), [Command::StopSequence]);
     pane.model().sequence_runs = false;
     pane.steps();
     assert!(pane.sees("Last sequence: 1 of 3 done, 1 skipped, 1 not visited"));

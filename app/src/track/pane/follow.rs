@@ -69,8 +69,16 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
         parts::hint_ui(ui, reason);
     }
     if let FollowStatus::Ended(why) = &model.track.follow {
-        let words = text!("The arm came to rest: {why}", why = why.clone()).say(language);
-        parts::notice_ui(ui, Tone::Warning, &words, |_| ());
+        let words = text!("The arm does not follow the board: {why}", why = why.clone()).say(language);
+        let again = parts::notice_ui(ui, Tone::Warning, &words, |ui| {
+            let what = tr!(language, "Follows as chosen above, from where the arm stands");
+            parts::gated_ui(ui, blocked.follow, Button::new(tr!(language, "Follow again")))
+                .on_hover_text(what)
+                .clicked()
+        });
+        if again {
+            outbox.send(Command::SetFollow(Some(choice.wish())));
+        }
     }
 }
 

@@ -76,7 +76,10 @@ fn estimate_ui(ui: &mut Ui, estimate: &Estimate, rotation: RotationFormat, langu
         .on_hover_text(exact);
     match rotation {
         RotationFormat::RollPitchYaw => {
-            parts::stated_ui(ui, tr!(language, "Roll pitch yaw [°]"), &format!(" {}", numbers::rpy_deg(pose)));
+            let (roll, pitch, yaw) = pose.rotation().euler_angles();
+            // In the columns of the other rows.
+            let deg = [roll, pitch, yaw].map(f64::to_degrees);
+            parts::stated_ui(ui, tr!(language, "roll pitch yaw [°]"), &numbers::row(&deg, 2, FIGURES));
         }
         RotationFormat::Quaternion => {
             parts::stated_ui(ui, tr!(language, "quaternion x y z w"), &numbers::quaternion(pose));

@@ -33,7 +33,7 @@ pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let what = tr!(
         language,
         "Plans a few poses with the whole board in view that differ from all captures, moves the arm to each, and captures \
-         there for verification. Stop sequence and STOP end it; what was captured is kept"
+         there for verification. Stop the sequence and STOP end it; what was captured is kept"
     );
     if parts::gated_ui(ui, blocked(model), button).on_hover_text(what).clicked() {
         outbox.send(Command::VerifyAtPlanned);

@@ -153,20 +153,20 @@ fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane
     pane.model().planning = false;
     pane.model().sequence_runs = true;
     pane.model().sequence = Some(PoseSequence {
-        names: vec!["check 1".to_owned(), "check 2".to_owned(), "check 3".to_owned()],
+        names: vec!["V1".to_owned(), "V2".to_owned(), "V3".to_owned()],
         planned: Some(vec![[0.0; 6]; 3]),
         purpose: Some(CapturePurpose::Verify),
         outcomes: vec![StopOutcome::Done, StopOutcome::Skipped(Text::verbatim("the board was not found"))],
         began_s: 90.0,
     });
     pane.steps();
-    assert!(pane.sees("Pose 3 of 3: check 3"));
-    assert_eq!(pane.click("Stop sequence"), [Command::StopSequence]);
+    assert!(pane.sees("Pose 3 of 3: V3"));
+    assert_eq!(pane.click("Stop the sequence"), [Command::StopSequence]);
     pane.model().sequence_runs = false;
     let why = Text::verbatim("it was broken off");
     pane.model().messages.say_at(Home::Pane(Pane::Verify), Severity::Warning, why, 99.0);
     pane.steps();
     assert!(pane.sees("Last sequence: 1 of 3 done, 1 skipped, 1 not visited"));
-    assert!(pane.sees("check 2 was skipped: the board was not found") && pane.sees("it was broken off"));
+    assert!(pane.sees("V2 was skipped: the board was not found") && pane.sees("it was broken off"));
     assert!(pane.is_enabled(PLANNED) && pane.nothing_is_cut_off());
 }

@@ -14,6 +14,7 @@ mod views;
 
 pub(crate) use finding::listed;
 pub use finding::{Finding, FindingCode, Severity};
+pub use outliers::WIDENING_WORTH_SAYING;
 use serde::Serialize;
 
 use crate::estimate::{Calibration, Observations};

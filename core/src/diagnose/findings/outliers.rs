@@ -10,6 +10,8 @@ use crate::wording::Text;
 const UNCLEAR: f64 = 0.5;
 /// A level that makes no more than this of what the corners' own noise does to a pose needs no telling apart.
 const NO_MATTER: f64 = 0.5;
+/// A stated uncertainty that was widened by fewer times is not worth a word: standard deviations are read to one figure.
+pub const WIDENING_WORTH_SAYING: f64 = 1.05;
 
 pub fn findings(calibration: &Calibration) -> Vec<Finding> {
     let mut found = Vec::new();
@@ -123,6 +125,9 @@ fn widened(calibration: &Calibration) -> Option<Finding> {
     let widening = &calibration.joint.as_ref()?.widening;
     let by = widening.by?;
     let times = widening.factor.sqrt();
+    if times < WIDENING_WORTH_SAYING {
+        return None;
+    }
     let text = text!(
         "The stated uncertainty is {times} times what independent noise explains, because {why}. It counts what the data \
          show; more poses in other places of the workspace help more than many in one.",

@@ -220,6 +220,11 @@ impl Clients {
         connection.calls
     }
 
+    /// Whether a client keeps passes from beginning.
+    pub fn holds_anything(&self, uuid: &str) -> bool {
+        self.records.get(uuid).is_some_and(Client::holds_anything)
+    }
+
     /// Forgets a client and gives back its calls.
     pub fn forget(&mut self, uuid: &str) -> Vec<Running> {
         self.records.remove(uuid);

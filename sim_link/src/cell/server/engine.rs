@@ -172,7 +172,10 @@ impl Engine {
     pub fn turn(&mut self, now: Duration) {
         self.cell.now = now;
         for uuid in self.clients.expired(now) {
-            tracing::info!(uuid, "a client was silent for too long and is forgotten");
+            // One that holds nothing is missed by nobody: a connection that waits for work is silent for long.
+            if self.clients.holds_anything(&uuid) {
+                tracing::info!(uuid, "a client that held the simulation is no longer heard of: it is released");
+            }
             self.forget(&uuid);
         }
         self.resume_calls();

@@ -45,7 +45,7 @@ fn to_and_fro(arm: &mut Arm, enough: &CancelToken) -> Result<f64, LinkError> {
         match arm.move_to_pose(&goal, &limits, &MotionTolerance::default(), enough) {
             Err(LinkError::Cancelled { .. }) => break,
             outcome => outcome?,
-        };
+        }
         travelled_m += (arm.base_from_tip()?.translation() - from).norm();
     }
     Ok(travelled_m)

@@ -1,7 +1,7 @@
 //! Commands whose simulation is paused or ended meanwhile, or whose server dies.
 
 use std::io::{BufReader, Read as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr};
 use std::time::{Duration, Instant};
 
@@ -16,6 +16,7 @@ use handeye_tests::CellProcess;
 use handeye_tests::process::{end_of, signal, start, until_said};
 use handeye_tests::workbench::Workbench;
 use serde_json::Value;
+use tempfile::TempDir;
 
 use crate::solved::copy_of_session;
 
@@ -42,6 +43,32 @@ fn end_after(cell: &mut CellProcess, child: Child, said: BufReader<ChildStderr>)
     rest
 }
 
+/// A cell, and the folder of the session that `auto` takes on it.
+struct Auto {
+    cell: CellProcess,
+    folder: TempDir,
+}
+
+impl Auto {
+    fn on_a_cell() -> Self {
+        Self { cell: CellProcess::start(&["--fast"]), folder: tempfile::tempdir().expect("a folder") }
+    }
+
+    fn start(&self, more: &[&str]) -> (Child, BufReader<ChildStderr>) {
+        let address = format!("tcp://127.0.0.1:{}", self.cell.port());
+        let out = self.out().display().to_string();
+        start(&[&["auto", "--rerun", "off", "--connect", &address, "--out", &out], more].concat())
+    }
+
+    fn out(&self) -> PathBuf {
+        self.folder.path().join("session")
+    }
+
+    fn captures(&self) -> usize {
+        Session::open(&self.out()).expect("a session").document.captures.len()
+    }
+}
+
 /// A person at the simulator.
 fn person(cell: &CellProcess) -> Arm {
     let options = ConnectionOptions::default();
@@ -50,21 +77,17 @@ fn person(cell: &CellProcess) -> Arm {
 
 #[test]
 fn auto_waits_out_a_pause_and_leaves_a_simulation_running_that_it_did_not_start() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("session");
-    let cell = CellProcess::start(&["--fast"]);
-    let mut person = person(&cell);
+    let auto = Auto::on_a_cell();
+    let mut person = person(&auto.cell);
     person.sim().start_simulation().expect("an answer");
-    let address = format!("tcp://127.0.0.1:{}", cell.port());
-    let (child, mut said) =
-        start(&["auto", "--rerun", "off", "--connect", &address, "--out", &out.display().to_string()]);
+    let (child, mut said) = auto.start(&[]);
     until_said(&mut said, "pose 2 of 10 captured");
     person.sim().pause_simulation().expect("an answer");
     until_said(&mut said, "the simulation is paused");
     person.sim().start_simulation().expect("an answer");
     let (code, rest) = end(child, said);
     assert_eq!(code, Some(0), "{rest}");
-    assert_eq!(Session::open(&out).expect("a session").document.captures.len(), 10, "{rest}");
+    assert_eq!(auto.captures(), 10, "{rest}");
     assert_eq!(person.sim().get_simulation_state(), Ok(SimulationState::Running));
 }
 
@@ -84,15 +107,10 @@ fn until_it_stands(person: &mut Arm, passes: u32) {
 
 #[test]
 fn auto_takes_a_capture_again_whose_images_a_pause_broke_off() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("session");
-    let cell = CellProcess::start(&["--fast"]);
-    let mut person = person(&cell);
-    let address = format!("tcp://127.0.0.1:{}", cell.port());
+    let auto = Auto::on_a_cell();
+    let mut person = person(&auto.cell);
     // With so many images to average the arm stands at a pose longer than it is on its way to it.
-    let out_text = out.display().to_string();
-    let (child, mut said) =
-        start(&["auto", "--rerun", "off", "--frames", "64", "--connect", &address, "--out", &out_text]);
+    let (child, mut said) = auto.start(&["--frames", "64"]);
     until_said(&mut said, "pose 1 of 10 captured");
     until_it_stands(&mut person, 20);
     person.sim().pause_simulation().expect("an answer");
@@ -100,7 +118,7 @@ fn auto_takes_a_capture_again_whose_images_a_pause_broke_off() {
     person.sim().start_simulation().expect("an answer");
     let (code, rest) = end(child, said);
     assert_eq!(code, Some(0), "{rest}");
-    assert_eq!(Session::open(&out).expect("a session").document.captures.len(), 10, "{rest}");
+    assert_eq!(auto.captures(), 10, "{rest}");
 }
 
 #[test]
@@ -185,13 +203,9 @@ fn following_that_loses_its_board_fails_and_says_why_and_what_was_asked_for_is_n
 
 #[test]
 fn a_simulation_that_is_ended_is_named_and_nobody_else_is_blamed() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("session");
-    let cell = CellProcess::start(&["--fast"]);
-    let mut person = person(&cell);
-    let address = format!("tcp://127.0.0.1:{}", cell.port());
-    let (child, mut said) =
-        start(&["auto", "--rerun", "off", "--connect", &address, "--out", &out.display().to_string()]);
+    let auto = Auto::on_a_cell();
+    let mut person = person(&auto.cell);
+    let (child, mut said) = auto.start(&[]);
     until_said(&mut said, "pose 2 of 10 captured");
     person.sim().stop_simulation().expect("an answer");
     let (code, rest) = end(child, said);
@@ -202,16 +216,12 @@ fn a_simulation_that_is_ended_is_named_and_nobody_else_is_blamed() {
 
 #[test]
 fn auto_ends_soon_after_its_server_and_keeps_what_it_captured() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("session");
-    let mut cell = CellProcess::start(&["--fast"]);
-    let address = format!("tcp://127.0.0.1:{}", cell.port());
-    let (child, mut said) =
-        start(&["auto", "--rerun", "off", "--connect", &address, "--out", &out.display().to_string()]);
+    let mut auto = Auto::on_a_cell();
+    let (child, mut said) = auto.start(&[]);
     until_said(&mut said, "pose 2 of 10 captured");
-    let rest = end_after(&mut cell, child, said);
+    let rest = end_after(&mut auto.cell, child, said);
     assert!(rest.contains("captures are kept in"), "{rest}");
-    assert!(Session::open(&out).expect("a session").document.captures.len() >= 2, "{rest}");
+    assert!(auto.captures() >= 2, "{rest}");
 }
 
 #[test]
