@@ -1,6 +1,6 @@
 //! Why a camera cannot be calibrated.
 
-use crate::geometry::camera::CameraError;
+use crate::geometry::camera::{CameraError, FoldsBack};
 use crate::geometry::planar_pose::PoseError;
 
 /// Why there is no calibration.
@@ -35,6 +35,9 @@ pub enum IntrinsicsError {
         #[from]
         source: CameraError,
     },
+    /// The lens that was given is none.
+    #[error("the known camera: {0}")]
+    FoldsBack(Box<FoldsBack>),
     /// The target has the same orientation to the camera in all views, which leaves the focal length undetermined.
     #[error(
         "the target is tilted the same way in all {views} views (within {spread_deg:.1}°), which leaves the focal length \

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::geometry::arm::ArmError;
+use crate::geometry::camera::FoldsBack;
 use crate::project::files::image_file::ImageFileError;
 
 /// What is wrong, in which file, and in which of its rows. One line of text: `FILE, row N: what, and what to do`.
@@ -261,6 +262,9 @@ pub enum DatasetProblem {
         /// Rows of the target.
         rows: usize,
     },
+    /// A camera that is none.
+    #[error("[camera] {0}")]
+    Camera(Box<FoldsBack>),
     /// A corner beside the image it is said to be in.
     #[error("({u_px}, {v_px}) is outside of the image of {} px", Size(*size))]
     OutsideImage {

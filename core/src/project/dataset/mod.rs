@@ -365,11 +365,13 @@ fn camera_input(
         let problem = DatasetProblem::MissingKey { table: "camera", key: "width", why };
         return Err(DatasetError::new(&description.path, row, problem));
     }
-    Ok(config.camera.as_ref().map(|camera| CameraInput {
-        fixed: camera.fixed,
-        intrinsics: image_size.and_then(|size| camera.intrinsics(size)),
-        model: camera.distortion,
-    }))
+    let Some(camera) = &config.camera else { return Ok(None) };
+    let intrinsics = image_size.and_then(|size| camera.intrinsics(size));
+    // A start is estimated anew.
+    if let Some(Err(problem)) = intrinsics.filter(|_| camera.fixed).map(|k| k.check_fold()) {
+        return Err(DatasetError::new(&description.path, Some(camera.row), DatasetProblem::Camera(Box::new(problem))));
+    }
+    Ok(Some(CameraInput { fixed: camera.fixed, intrinsics, model: camera.distortion }))
 }
 
 #[cfg(test)]

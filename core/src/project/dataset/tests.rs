@@ -239,6 +239,33 @@ fn all_camera_models_are_read() {
 }
 
 #[test]
+fn a_known_camera_whose_lens_folds_back_is_refused_with_its_file_and_the_radius() {
+    let folder = Folder::new(TARGET, "", &["a.png"]);
+    let pinhole = "fx = 5\nfy = 5\ncx = 3.5\ncy = 2.5\n";
+    for (model, distortion) in [
+        ("brown_conrady", "[-0.5, 0, 0, 0, 0]"),
+        ("rational", "[-0.5, 0, 0, 0, 0, 0, 0, 0]"),
+        ("fisheye", "[-0.5, 0, 0, 0]"),
+    ] {
+        let camera = |fixed| {
+            let stated = format!("fixed = {fixed}\nmodel = \"{model}\"\n{pinhole}distortion = {distortion}\n");
+            folder.write("dataset.toml", format!("{TARGET}[camera]\n{stated}"));
+        };
+        camera(true);
+        let error = folder.error();
+        // It turns back at r = 1 / √1.5, where it has 2 / 3 of it: 2.7 px.
+        for part in
+            ["dataset.toml", model, "[-0.5", "folds back 3 px from the principal point", "estimate the camera again"]
+        {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        // A start is estimated anew.
+        camera(false);
+        assert!(folder.read().camera.is_some());
+    }
+}
+
+#[test]
 fn the_input_hash_is_what_sha256sum_gives_and_does_not_depend_on_the_place() {
     let poses = "image,x,y,z,qx,qy,qz,qw\na.png,0,0,0,0,0,0,1\n";
     let make = || Folder::new(&format!("{TARGET}{ROBOT}"), poses, &["a.png"]);
