@@ -13,6 +13,7 @@ mod pairs;
 mod refine;
 mod residuals;
 mod to_result;
+mod two_poses;
 pub mod uncertainty;
 mod wrong_corners;
 
