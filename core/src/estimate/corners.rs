@@ -38,7 +38,7 @@ pub fn calibrate(
     let Some(mode) = observations.mode else { return Ok(calibration) };
 
     let (mut views, mut pairs) = with_robot(mode, &seen, &lens)?;
-    check_motion(&pairs)?;
+    check_motion(mode, &pairs)?;
     calibration.methods = closed_forms(&pairs, work)?;
     let board = BoardPoints::new(&observations.target.points());
     let mut alternatives = lens.alternatives.clone();
