@@ -6,16 +6,19 @@ use super::refine::{self, Judged, Refined};
 use super::residuals::{residuals, squared_residuals};
 use super::{
     CalibrateError, CalibratedCamera, Calibration, JointFit, LinkCovariances, Method, Observations, Options,
-    ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
+    ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
+use crate::estimate::handeye::consensus::half_turn_about;
 use crate::estimate::handeye::joint::{JointProblem, camera_from_target};
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::estimate::handeye::{HandEye, Mode, PosePair};
+use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::statistics::median_high;
 use crate::progress::Work;
+use crate::targets::TargetSpec;
 use crate::targets::bent::BoardPoints;
-use crate::targets::observation::View;
+use crate::targets::observation::{self, View};
 
 pub fn calibrate(
     observations: &Observations,
@@ -35,23 +38,30 @@ pub fn calibrate(
     let Some(mode) = observations.mode else { return Ok(calibration) };
 
     let (mut views, mut pairs) = with_robot(mode, &seen, &lens)?;
-    check_motion(&pairs)?;
+    check_motion(mode, &pairs)?;
     calibration.methods = closed_forms(&pairs, work)?;
     let board = BoardPoints::new(&observations.target.points());
-    let problem = JointProblem::new(mode, &board, &views);
-    let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods);
-    let turned: &[usize] = begin.as_ref().map_or(&[], |begin| &begin.turned);
-    let mut own = lens.camera_from_target.clone();
-    refine::renumber(&mut views, &mut own, turned, &observations.target);
-    if !turned.is_empty() {
-        for (pair, camera_from_target) in pairs.iter_mut().zip(&own) {
-            pair.camera_from_target = *camera_from_target;
+    let mut alternatives = lens.alternatives.clone();
+    let mut rounds = 0;
+    let begin = loop {
+        let problem = JointProblem::new(mode, &board, &views);
+        let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods);
+        let Ok(found) = &begin else { break begin };
+        for i in &found.turned {
+            renumber(&mut views[*i], &mut pairs[*i], &mut alternatives[*i], &observations.target);
+            let view = &mut calibration.views[seen[*i].index];
+            view.renumbered = !view.renumbered;
+        }
+        let changed = two_poses::take_agreeing(&mut pairs, &mut alternatives, &found.solution);
+        if !changed && found.turned.is_empty() {
+            break begin;
         }
         calibration.methods = closed_forms(&pairs, work)?;
-        for i in turned {
-            calibration.views[seen[*i].index].renumbered = true;
+        rounds += 1;
+        if rounds == ROUNDS {
+            break begin;
         }
-    }
+    };
     let problem = JointProblem::new(mode, &board, &views);
     match method {
         Method::ClosedForm(name) => {
@@ -59,6 +69,7 @@ pub fn calibrate(
             take_closed_form(&mut calibration, &solution, &problem, &seen, &lens);
         }
         Method::Joint => {
+            let own: Vec<_> = pairs.iter().map(|pair| pair.camera_from_target).collect();
             let mut refined = refine::refine(&problem, &own, &lens, &begin?, options, work)?;
             let kept = refined.screened.kept_views();
             if kept.len() < pairs.len() {
@@ -73,6 +84,18 @@ pub fn calibrate(
         }
     }
     Ok(calibration)
+}
+
+/// Rounds of a start and of the poses that agree with it: a better start may find more of them.
+const ROUNDS: usize = 5;
+
+/// Numbers the corners of a view from the other end of the target, and its poses with them.
+fn renumber(view: &mut View, pair: &mut PosePair, alternative: &mut Option<Pose<Camera, Target>>, target: &TargetSpec) {
+    observation::renumber(&mut view.corners, target);
+    let half_turn = half_turn_about(&target.centre());
+    for pose in std::iter::once(&mut pair.camera_from_target).chain(alternative) {
+        *pose = Pose::from_isometry(pose.isometry() * half_turn);
+    }
 }
 
 /// How many times the typical residual of a view's own pose a view may have before its corners are taken as wrong: a target

@@ -1,14 +1,18 @@
 //! The camera, and the target's pose in every view that goes with it.
 
+use nalgebra::Vector2;
+
 use super::{CalibrateError, CameraFit, CameraKnowledge, Observations};
 use crate::estimate::detected_view::DetectedView;
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::intrinsics::{self, Bend, IntrinsicsError, Options, Screened};
+use crate::estimate::handeye::joint::equations::ViewInput;
+use crate::estimate::intrinsics::{self, Bend, Found, IntrinsicsError, Options, Screened};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Camera, Pose, Target};
-use crate::geometry::planar_pose;
+use crate::geometry::planar_pose::{self, PlanarPose, Solution};
+use crate::geometry::statistics::median;
 use crate::progress::{Stage, Work};
-use crate::targets::bent::BoardShape;
+use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
 
 /// Camera and target poses.
@@ -19,7 +23,10 @@ pub struct Lens {
     pub shape: BoardShape,
     /// What the corners say of an estimated camera; `None` where it was given.
     pub fit: Option<CameraFit>,
+    /// The pose of each view that fits its corners best.
     pub camera_from_target: Vec<Pose<Camera, Target>>,
+    /// The other pose that the corners leave possible.
+    pub alternatives: Vec<Option<Pose<Camera, Target>>>,
     pub rms_px: Vec<f64>,
     /// Wrong corners of each view, by the index of their point, ascending.
     pub aside: Vec<Vec<usize>>,
@@ -50,12 +57,14 @@ impl Lens {
                 if work.is_cancelled() {
                     return Err(HandEyeError::Cancelled.into());
                 }
+                let alternatives = alternatives(observations, seen, &found, &aside);
                 Ok(Self {
                     intrinsics: found.intrinsics,
                     free: true,
                     shape: found.shape,
                     fit: Some(CameraFit::of(&found)),
                     camera_from_target: found.camera_from_target,
+                    alternatives,
                     rms_px: found.rms_px,
                     aside,
                 })
@@ -69,19 +78,27 @@ impl Lens {
         seen: &[DetectedView<'_>],
         work: &Work<'_>,
     ) -> Result<Self, CalibrateError> {
-        let mut camera_from_target = Vec::with_capacity(seen.len());
-        let mut rms_px = Vec::with_capacity(seen.len());
+        intrinsics.validate().map_err(IntrinsicsError::from)?;
+        check_fold(&intrinsics, seen)?;
+        let mut poses = Vec::with_capacity(seen.len());
         for (done, s) in seen.iter().enumerate() {
             if work.is_cancelled() {
                 return Err(HandEyeError::Cancelled.into());
             }
             work.report(Stage::TargetPoses, done, seen.len());
-            let pose = planar_pose::solve(s.corners, &observations.target, &intrinsics)?.best;
-            camera_from_target.push(pose.camera_from_target);
-            rms_px.push(pose.rms_px);
+            poses.push(planar_pose::solve(s.corners, &observations.target, &intrinsics)?);
         }
-        let aside = vec![Vec::new(); seen.len()];
-        Ok(Self { intrinsics, free: false, shape: BoardShape::FLAT, fit: None, camera_from_target, rms_px, aside })
+        let corners: Vec<usize> = seen.iter().map(|s| s.corners.len()).collect();
+        Ok(Self {
+            intrinsics,
+            free: false,
+            shape: BoardShape::FLAT,
+            fit: None,
+            camera_from_target: poses.iter().map(|pose| pose.best.camera_from_target).collect(),
+            alternatives: possible(&poses, &corners),
+            rms_px: poses.iter().map(|pose| pose.best.rms_px).collect(),
+            aside: vec![Vec::new(); seen.len()],
+        })
     }
 
     /// Whether the corners show a bent target.
@@ -91,6 +108,52 @@ impl Lens {
 
     /// The corners of a view that the camera was found from.
     pub fn corners_left(&self, view: usize, corners: &[Corner]) -> Vec<Corner> {
-        corners.iter().filter(|corner| self.aside[view].binary_search(&corner.index).is_err()).copied().collect()
+        left(corners, &self.aside[view])
     }
+}
+
+/// A corner beyond a fold of the lens has no ray, or that of another corner. A fold farther out does no harm here; a
+/// finding names it.
+fn check_fold(intrinsics: &Intrinsics, seen: &[DetectedView<'_>]) -> Result<(), IntrinsicsError> {
+    let Err(fold) = intrinsics.check_fold() else { return Ok(()) };
+    let centre = Vector2::new(intrinsics.cx, intrinsics.cy);
+    let corners = seen.iter().flat_map(|s| s.corners);
+    let seen_px = corners.map(|corner| (corner.px - centre).norm()).fold(0.0, f64::max);
+    if fold.radius_px > seen_px {
+        return Ok(());
+    }
+    Err(IntrinsicsError::FoldsBack { fold: Box::new(fold), seen_px })
+}
+
+/// The alternatives that are possible by the noise of a typical view, which the corners of a single one know badly.
+fn possible(poses: &[PlanarPose], corners: &[usize]) -> Vec<Option<Pose<Camera, Target>>> {
+    let own = poses.iter().zip(corners).map(|(pose, corners)| pose.sigma_px(*corners));
+    let sigma_px = median(own).unwrap_or(0.0);
+    let views = poses.iter().zip(corners);
+    views.map(|(pose, n)| pose.possible_alternative(*n, sigma_px).map(|a| a.camera_from_target)).collect()
+}
+
+/// The other pose of every view with the camera and the target as they were found.
+fn alternatives(
+    observations: &Observations,
+    seen: &[DetectedView<'_>],
+    found: &Found,
+    aside: &[Vec<usize>],
+) -> Vec<Option<Pose<Camera, Target>>> {
+    let board = BoardPoints::new(&observations.target.points());
+    let kept: Vec<Vec<Corner>> = seen.iter().zip(aside).map(|(s, aside)| left(s.corners, aside)).collect();
+    let poses: Vec<PlanarPose> = (kept.iter().zip(&found.camera_from_target).zip(&found.rms_px))
+        .map(|((corners, pose), rms_px)| {
+            let (intrinsics, shape) = (&found.intrinsics, &found.shape);
+            let view = ViewInput { intrinsics, board: &board, shape, corners, sqrt_weights: &[] };
+            let best = Solution { camera_from_target: *pose, rms_px: *rms_px };
+            PlanarPose { best, alternative: planar_pose::other(&view, &best) }
+        })
+        .collect();
+    possible(&poses, &kept.iter().map(Vec::len).collect::<Vec<_>>())
+}
+
+/// The corners of a view without some.
+fn left(corners: &[Corner], aside: &[usize]) -> Vec<Corner> {
+    corners.iter().filter(|corner| aside.binary_search(&corner.index).is_err()).copied().collect()
 }

@@ -13,6 +13,7 @@ mod pairs;
 mod refine;
 mod residuals;
 mod to_result;
+mod two_poses;
 pub mod uncertainty;
 mod wrong_corners;
 
@@ -23,7 +24,8 @@ use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::outliers::Distance;
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{Free, Noise, RobotField, SmallSample};
-use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, subset};
+use crate::estimate::handeye::one_axis::PartialHandEye;
+use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, one_axis, subset};
 use crate::estimate::intrinsics::IntrinsicsError;
 use crate::estimate::uncertainty::quality;
 use crate::estimate::uncertainty::widening::Widening;
@@ -239,6 +241,9 @@ pub enum CalibrateError {
     /// The hand-eye solve failed.
     #[error(transparent)]
     HandEye(#[from] HandEyeError),
+    /// The robot turned about one axis only: five of the six numbers of the hand-eye transform, and which one is open.
+    #[error("{0}")]
+    OneAxis(Box<PartialHandEye>),
     /// A view of a hand-eye set has no robot pose.
     #[error("view {name:?} has no robot pose")]
     NoRobotPose {
@@ -523,9 +528,17 @@ pub fn calibrate_with<'a>(
 
 /// A robot that never turned is better named than a singular matrix. Works on the same choice of views as
 /// [`closed_forms`].
-fn check_motion(pairs: &[PosePair]) -> Result<(), HandEyeError> {
+///
+/// # Errors
+/// What [`motion::analyse`] finds, or what turns about one axis determine all the same.
+fn check_motion(mode: Mode, pairs: &[PosePair]) -> Result<(), CalibrateError> {
     let poses: Vec<_> = pairs.iter().map(|pair| pair.anchor_from_mount).collect();
-    motion::analyse(&poses).map(drop)
+    let Err(error) = motion::analyse(&poses) else { return Ok(()) };
+    let partial = match error {
+        HandEyeError::ParallelAxes { axis, .. } => one_axis::solve(mode, pairs, axis.into()),
+        _ => None,
+    };
+    Err(partial.map_or_else(|| error.into(), |partial| CalibrateError::OneAxis(Box::new(partial))))
 }
 
 /// Runs every closed form, on [`subset::MOST_VIEWS`] views at most.

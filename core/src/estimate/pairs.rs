@@ -22,7 +22,7 @@ pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -
             _ => Err(CalibrateError::NothingObserved { name: view.name.clone() }),
         })
         .collect::<Result<_, _>>()?;
-    check_motion(&pairs)?;
+    check_motion(mode, &pairs)?;
     let methods = closed_forms(&pairs, work)?;
     let mut calibration = Calibration {
         camera: match observations.camera {

@@ -19,7 +19,7 @@ use crate::estimate::uncertainty::{quality, widening};
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::progress::Work;
 use crate::targets::TargetSpec;
-use crate::targets::observation::{self, View};
+use crate::targets::observation::View;
 
 /// Joint offsets are taken when they lower the error on held-out views by so much of it.
 const JOINTS_GAIN: f64 = 0.05;
@@ -71,15 +71,6 @@ fn sampled(view: &View) -> View {
 
 /// Residual \[px\] at which a corner counts as simply wrong when starts are ranked, so that one bad view does not decide.
 const CAP_PX: f64 = 50.0;
-
-/// Numbers the corners of some views from the other end of the target.
-pub fn renumber(views: &mut [View], own: &mut [Pose<Camera, Target>], turned: &[usize], target: &TargetSpec) {
-    let half_turn = half_turn_about(&target.centre());
-    for &i in turned {
-        observation::renumber(&mut views[i].corners, target);
-        own[i] = Pose::from_isometry(own[i].isometry() * half_turn);
-    }
-}
 
 /// The joint estimate from a start.
 pub fn refine(

@@ -1,5 +1,7 @@
 //! Simulated sessions: chains of robot, camera and board whose links are known, and what is seen along them.
 
+use std::ops::Range;
+
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3, Vector6};
 use rand::{Rng, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -80,12 +82,28 @@ pub fn add_field(rng: &mut impl Rng, noise: &Noise, views: &mut [View]) {
     }
 }
 
+/// A target that is small in the image.
+pub const SMALL_TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 4, rows: 3, square_m: 0.015 });
+
+/// How [`SMALL_TARGET`] is looked at: from 0.5 m to the farthest, tilted by up to an angle.
+#[derive(Debug, Clone, Copy)]
+pub struct SmallTarget {
+    /// Largest distance, metres.
+    pub farthest_m: f64,
+    /// Largest tilt, degrees.
+    pub tilt_deg: f64,
+}
+
 /// `camera_from_target` with the middle of [`BOARD`] at `place` \[m\] in the camera's frame, tilted about an axis at
 /// `azimuth` in the image after a turn by `roll` about its normal \[rad\].
-pub fn board_at(place: Vector3<f64>, [tilt, azimuth, roll]: [f64; 3]) -> Isometry3<f64> {
+pub fn board_at(place: Vector3<f64>, angles: [f64; 3]) -> Isometry3<f64> {
+    target_at(&BOARD, place, angles)
+}
+
+fn target_at(target: &TargetSpec, place: Vector3<f64>, [tilt, azimuth, roll]: [f64; 3]) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)
         * UnitQuaternion::from_scaled_axis(Vector3::z() * roll);
-    Isometry3::from_parts(place.into(), turn) * Isometry3::from(-BOARD.centre().coords)
+    Isometry3::from_parts(place.into(), turn) * Isometry3::from(-target.centre().coords)
 }
 
 /// The tip pose from which the camera sees the target so.
@@ -109,20 +127,39 @@ pub fn noisy(rng: &mut impl Rng, px: &Vector2<f64>, noise_px: f64) -> Vector2<f6
 
 /// Views on a 35° cone with ±60° of roll at 0.4 to 0.6 m: the geometry of the published Monte-Carlo tables.
 pub fn trial(mode: Mode, views: usize, noise: &Noise, intrinsics: Intrinsics, seed: u64) -> Trial {
+    trial_of(BOARD, (35.0, 0.4..0.6, 0.03), mode, views, noise, intrinsics, seed)
+}
+
+/// Views of [`SMALL_TARGET`] with ±60° of roll.
+pub fn small_target_trial(mode: Mode, views: usize, noise: &Noise, how: SmallTarget, seed: u64) -> Trial {
+    trial_of(SMALL_TARGET, (how.tilt_deg, 0.5..how.farthest_m, 0.1), mode, views, noise, camera(), seed)
+}
+
+/// Views of a target on a cone of so many degrees, at distances \[m\], and so far \[m\] beside the axis.
+fn trial_of(
+    target: TargetSpec,
+    (cone_deg, distances, beside): (f64, Range<f64>, f64),
+    mode: Mode,
+    views: usize,
+    noise: &Noise,
+    intrinsics: Intrinsics,
+    seed: u64,
+) -> Trial {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let points = BOARD.points();
+    let points = target.points();
     let mount_from_camera = Pose::from_isometry(se3::exp(&Vector6::new(0.05, 0.01, 0.06, 0.1, -0.2, 1.4)));
     let anchor_from_target: Pose<Anchor, Target> =
         Pose::from_isometry(se3::exp(&Vector6::new(0.5, 0.1, 0.2, 0.4, 0.2, -0.3)));
     let mut out = Vec::new();
     let mut true_camera_from_target = Vec::new();
     while out.len() < views {
-        let tilt = 35f64.to_radians() * rng.random::<f64>().sqrt();
+        let tilt = cone_deg.to_radians() * rng.random::<f64>().sqrt();
         let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
         let roll = rng.random_range(-60f64..60.0).to_radians();
-        let distance = rng.random_range(0.4..0.6);
-        let place = Vector3::new(rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), distance);
-        let camera_from_target: Pose<Camera, Target> = Pose::from_isometry(board_at(place, [tilt, azimuth, roll]));
+        let distance = rng.random_range(distances.clone());
+        let place = Vector3::new(rng.random_range(-beside..beside), rng.random_range(-beside..beside), distance);
+        let camera_from_target: Pose<Camera, Target> =
+            Pose::from_isometry(target_at(&target, place, [tilt, azimuth, roll]));
         let true_tip = base_from_tip(mode, &mount_from_camera, &anchor_from_target, &camera_from_target);
         let error = robot_error(&mut rng, noise);
         let reported = Pose::from_isometry(true_tip.isometry() * error.inverse());

@@ -203,11 +203,12 @@ fn check(
     let name = || view.name.clone();
     let no_pose = |source| VerifyError::NoPose { name: name(), source };
     // This checks the corners, so every index below is a point of the target.
-    let flat = planar_pose::camera_from_target(&view.corners, target, &calibrated.intrinsics).map_err(no_pose)?;
+    let poses = planar_pose::solve(&view.corners, target, &calibrated.intrinsics).map_err(no_pose)?;
+    let predicted = calibrated.camera_from_target(base_from_tip);
+    let flat = poses.nearer_to(&predicted, view.corners.len()).camera_from_target;
     let seen = calibrated
         .seen(board, &view.corners, &flat)
         .ok_or_else(|| no_pose(PoseError::NoPose { corners: view.corners.len() }))?;
-    let predicted = calibrated.camera_from_target(base_from_tip);
     let points = board.points(&calibrated.shape);
     let residuals_at = |camera_from_target: &Pose<Camera, Target>| -> Result<Vec<CornerResidual>, CameraError> {
         let residual = |corner: &Corner| {

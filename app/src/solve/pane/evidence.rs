@@ -48,6 +48,8 @@ fn called(name: &'static str, language: Language) -> &'static str {
         "median_correction_angle" => tr!(language, "median correction of the angle"),
         "heldout_rms" => tr!(language, "held-out RMS"),
         "heldout_rms_corrected" => tr!(language, "held-out RMS, corrected"),
+        "fold_radius" => tr!(language, "radius of the fold"),
+        "image_reach" => tr!(language, "reach of the image"),
         "field_sigma" => tr!(language, "σ of errors by place"),
         "field_sigma_angle" => tr!(language, "σ of errors of the angle by place"),
         "explained_rms" => tr!(language, "explained RMS"),

@@ -28,8 +28,6 @@ const WRONG_PX: f64 = 1.0;
 const WRONG_PART: f64 = 0.2;
 /// Rounds of leaving the worst corners out and fitting again.
 const ROUNDS: usize = 6;
-/// A mirrored pose counts as possible when its residual is less than so many times that of the best.
-const AMBIGUOUS: f64 = 2.0;
 /// A view whose corners are noisier than this many times the typical one is weighted by its own noise.
 const NOISY: f64 = 2.0;
 
@@ -49,7 +47,7 @@ pub(super) struct SessionView {
     pub row: usize,
     pub base_from_tip: Pose<Base, Tip>,
     pub camera_from_target: Isometry3<f64>,
-    /// The mirrored pose, where the corners hardly tell.
+    /// The other pose of the target, where the corners leave it possible.
     pub alternative: Option<Isometry3<f64>>,
     /// Covariance of the target's pose by corner noise, right perturbation; zero where the pose was given.
     pub covariance: Matrix6<f64>,
@@ -215,13 +213,13 @@ impl SessionViews {
                 (equations.form.view((0, 0), (count, count)) - by_pose.transpose() * &by_form) / variance;
             self.form_gradient +=
                 (equations.form_gradient.rows(0, count) - by_form.transpose() * equations.pose_gradient) / variance;
-            let ambiguous = fit.pose.alternative.filter(|a| a.rms_px < AMBIGUOUS * fit.pose.best.rms_px);
+            let possible = fit.pose.possible_alternative(fit.corners.len(), variance.sqrt());
             self.views.push(SessionView {
                 name: view.name.clone(),
                 row: *row,
                 base_from_tip,
                 camera_from_target: pose,
-                alternative: ambiguous.map(|a| *a.camera_from_target.isometry()),
+                alternative: possible.map(|a| *a.camera_from_target.isometry()),
                 covariance: inverse * variance,
                 by_form: DMatrix::from_iterator(6, count, by_form.iter().copied()),
                 tip_by_joint: view.tip_by_joint.clone(),
@@ -241,9 +239,7 @@ impl SessionViews {
 impl Fit {
     /// Variance of a corner per axis by the residuals of the view.
     fn variance_px2(&self) -> f64 {
-        let numbers = 2.0 * self.corners.len() as f64;
-        let squared = self.pose.best.rms_px.powi(2) * self.corners.len() as f64;
-        squared / (numbers - 6.0).max(1.0)
+        self.pose.sigma_px(self.corners.len()).powi(2)
     }
 }
 

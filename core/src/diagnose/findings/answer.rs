@@ -36,6 +36,7 @@ pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Find
     found.extend(residuals(&used));
     found.extend(corrections(calibration, &used));
     found.extend(prediction(calibration));
+    found.extend(lens_folds(calibration));
     found.extend(robot_field(calibration));
     found.extend(robot_noise(calibration));
     found.extend(closed_forms(calibration));
@@ -137,6 +138,19 @@ fn prediction(calibration: &Calibration) -> Option<Finding> {
     );
     let finding = Finding::new(FindingCode::PoorPrediction, Severity::Warning, text);
     Some(finding.with("heldout_rms", heldout, "px").with("explained_rms", expected, "px"))
+}
+
+fn lens_folds(calibration: &Calibration) -> Option<Finding> {
+    let fold = calibration.intrinsics()?.check_fold().err()?;
+    let text = text!(
+        "The lens model folds back {radius} px from the principal point, and the image reaches {reach} px: farther out than \
+         {radius} px it is no lens, and pixels there have no ray. Capture the target out to the edges of the image, or \
+         estimate a lens model of fewer coefficients.",
+        radius = format!("{:.0}", fold.radius_px),
+        reach = format!("{:.0}", fold.reach_px)
+    );
+    let finding = Finding::new(FindingCode::LensFolds, Severity::Advice, text);
+    Some(finding.with("fold_radius", fold.radius_px, "px").with("image_reach", fold.reach_px, "px"))
 }
 
 fn robot_field(calibration: &Calibration) -> Option<Finding> {

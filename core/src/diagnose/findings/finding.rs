@@ -78,6 +78,8 @@ pub enum FindingCode {
     PoorPrediction,
     /// The robot's noise, not the corners', limits the answer.
     RobotNoise,
+    /// The lens model folds back within the image, beyond where the target was seen.
+    LensFolds,
     /// The robot's errors depend on where it stands.
     RobotField,
     /// The closed forms do not agree.

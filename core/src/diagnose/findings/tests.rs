@@ -3,7 +3,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::Noise;
-use crate::estimate::{Method, Options, calibrate, calibrate_with};
+use crate::estimate::{CameraKnowledge, Method, Options, calibrate, calibrate_with};
+use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::Pose;
 use crate::progress::CancelToken;
 use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
@@ -262,4 +263,25 @@ fn codes_are_snake_case_in_json() {
     let finding = Finding::new(FindingCode::TooFewViews, Severity::Advice, Text::default());
     let json = serde_json::to_value(&finding).expect("JSON");
     assert_eq!((json["code"].as_str(), json["severity"].as_str()), (Some("too_few_views"), Some("advice")));
+}
+
+#[test]
+fn a_lens_that_folds_back_is_named_beyond_the_target_and_refused_within_it() {
+    // It turns back at r = 1 / √(3 · 0.35), where it has two thirds of it: 378 px of the 400 that the image has.
+    let barrel = Intrinsics { distortion: Distortion::BrownConrady([-0.35, 0.0, 0.0, 0.0, 0.0]), ..camera() };
+    let t = trial(Mode::EyeInHand, 10, &REALISTIC, barrel, 87);
+    let found = of_trial(&t, false, &FindingOptions::default());
+    let finding = find(&found, FindingCode::LensFolds).expect("it folds");
+    assert!((finding.value("fold_radius").expect("a radius") - 378.0).abs() < 3.0, "{finding}");
+    assert!(find(&of_trial(&set(10, 87), false, &FindingOptions::default()), FindingCode::LensFolds).is_none());
+
+    // With −1 it turns back at 224 px, and the target was seen farther out.
+    let mut observations = set(10, 87).observations(false);
+    let folding = Intrinsics { distortion: Distortion::BrownConrady([-1.0, 0.0, 0.0, 0.0, 0.0]), ..camera() };
+    observations.camera = CameraKnowledge::Fixed(folding);
+    let error = calibrate(&observations, Method::Joint, &CancelToken::default()).expect_err("no lens");
+    let error = error.to_string();
+    for part in ["the known camera", "[-1.0", "folds back 224 px", "the target was seen as far as"] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
 }

@@ -6,7 +6,7 @@
 //!
 //! Reference: Strobl & Hirzinger 2006, "Optimal hand-eye calibration", with the weights re-estimated from residuals.
 
-use nalgebra::{Cholesky, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Cholesky, Matrix6, SMatrix, SVector, Unit, Vector3, Vector6};
 
 use super::closed_form::ClosedFormSolution;
 use super::motion::MIN_VIEWS;
@@ -46,6 +46,30 @@ const LEVEL_FLOOR: f64 = 1e-12;
 /// # Errors
 /// [`HandEyeError::TooFewViews`], [`HandEyeError::NoSolution`] for a singular system.
 pub fn refine(pairs: &[PosePair], start: &ClosedFormSolution) -> Result<PoseGraphSolution, HandEyeError> {
+    refine_with(pairs, start, None)
+}
+
+/// Standard deviation of the open component of a camera's place beforehand, metres: farther than any camera is from the
+/// origin of what carries it.
+const OPEN_M: f64 = 10.0;
+/// Least information on it as a part of the largest: what rounding leaves of exact data.
+const LEAST_INFORMATION: f64 = 1e-9;
+
+/// As [`refine`] where all turns are about `axis` of the mount, so that the camera's place along it is open. It has a prior
+/// of 10 m about the origin of the mount, and the covariance says so; everything else comes with what its lack costs.
+pub(super) fn refine_one_axis(
+    pairs: &[PosePair],
+    start: &ClosedFormSolution,
+    axis: &Unit<Vector3<f64>>,
+) -> Result<PoseGraphSolution, HandEyeError> {
+    refine_with(pairs, start, Some(axis))
+}
+
+fn refine_with(
+    pairs: &[PosePair],
+    start: &ClosedFormSolution,
+    open: Option<&Unit<Vector3<f64>>>,
+) -> Result<PoseGraphSolution, HandEyeError> {
     if pairs.len() < MIN_VIEWS {
         return Err(HandEyeError::TooFewViews { got: pairs.len(), need: MIN_VIEWS });
     }
@@ -66,6 +90,13 @@ pub fn refine(pairs: &[PosePair], start: &ClosedFormSolution) -> Result<PoseGrap
             let weighted = Matrix6::from_diagonal(&weight) * jacobian;
             normal += jacobian.transpose() * weighted;
             gradient += weighted.transpose() * residual;
+        }
+        if let Some(axis) = open {
+            let mut along = SVector::<f64, 12>::zeros();
+            along.fixed_rows_mut::<3>(0).copy_from(&(x.rotation().inverse() * axis.into_inner()));
+            let precision = OPEN_M.powi(-2).max(LEAST_INFORMATION * normal.diagonal().max());
+            normal += along * along.transpose() * precision;
+            gradient += along * (precision * axis.dot(&x.translation()));
         }
         let factor = Cholesky::new(normal).ok_or(HandEyeError::NoSolution {
             method: "the pose graph",

@@ -1,12 +1,11 @@
 //! Levenberg–Marquardt on lens, shape and all poses, the poses eliminated view by view.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
 use super::{IntrinsicsError, SeenView};
 use crate::estimate::handeye::joint::equations::{FreeParameters, MAX_FORM, PoseEquations, ViewInput};
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::planar_pose::mirror::mirrored;
-use crate::geometry::planar_pose::refine::refine;
+use crate::geometry::planar_pose::mirror;
 use crate::geometry::se3;
 use crate::progress::CancelToken;
 use crate::targets::bent::{BoardPoints, BoardShape};
@@ -236,9 +235,7 @@ pub(super) fn mirror_poses(problem: &Problem<'_>, estimate: &mut Estimate) -> Re
     for (view, pose) in problem.views.iter().zip(poses.iter_mut()) {
         problem.check_cancel()?;
         let seen = seen(view, problem.board, shape, intrinsics);
-        let sum: Vector3<f64> = view.corners.iter().map(|c| problem.board.point(c.index, shape).coords).sum();
-        let Some(start) = mirrored(pose, &(sum / view.corners.len() as f64)) else { continue };
-        let Some(other) = refine(&seen, &start, MIRROR_STEPS) else { continue };
+        let Some(other) = mirror::refined(&seen, pose, MIRROR_STEPS) else { continue };
         let Ok(own) = PoseEquations::new(&seen, pose, FreeParameters::default()) else { continue };
         if other.squared_px < (1.0 - WORTHWHILE) * own.squared_px {
             *pose = other.pose;

@@ -1,6 +1,6 @@
 //! Why a camera cannot be calibrated.
 
-use crate::geometry::camera::CameraError;
+use crate::geometry::camera::{CameraError, FoldsBack};
 use crate::geometry::planar_pose::PoseError;
 
 /// Why there is no calibration.
@@ -34,6 +34,14 @@ pub enum IntrinsicsError {
         /// What the model says.
         #[from]
         source: CameraError,
+    },
+    /// The lens that was given folds back where the target was seen.
+    #[error("the known camera: {fold}; the target was seen as far as {seen_px:.0} px from the principal point")]
+    FoldsBack {
+        /// The fold.
+        fold: Box<FoldsBack>,
+        /// Distance of the farthest corner from the principal point, pixels.
+        seen_px: f64,
     },
     /// The target has the same orientation to the camera in all views, which leaves the focal length undetermined.
     #[error(

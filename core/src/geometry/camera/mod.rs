@@ -4,11 +4,13 @@
 //! Coefficient orders are OpenCV's. Parameters as a vector are `[fx fy cx cy, distortion…]`.
 
 mod distortion;
+mod fold;
 
 use nalgebra::{Matrix2x3, Point3, SMatrix, Unit, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 pub use distortion::Distortion;
+pub use fold::FoldsBack;
 
 /// The most parameters any model has: four of the pinhole and eight of the rational distortion.
 pub const MAX_PARAMETERS: usize = 12;

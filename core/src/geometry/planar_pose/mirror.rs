@@ -2,6 +2,9 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use super::refine::{Minimum, refine};
+use crate::estimate::handeye::joint::equations::ViewInput;
+
 /// Normals nearer to the line of sight than this angle \[rad\] are their own mirror image.
 const HEAD_ON: f64 = 1e-3;
 
@@ -20,4 +23,11 @@ pub(crate) fn mirrored(pose: &Isometry3<f64>, middle: &Vector3<f64>) -> Option<I
     }
     let rotation = UnitQuaternion::rotation_between(&normal, &other)? * pose.rotation;
     Some(Isometry3::from_parts(Translation3::from(in_camera - rotation * middle), rotation))
+}
+
+/// Where the descent from the mirror image of a pose ends, in at most so many steps: the other minimum of the reprojection
+/// error, or `pose` again where there is no other. `None` where there is no such start.
+pub(crate) fn refined(seen: &ViewInput<'_>, pose: &Isometry3<f64>, steps: usize) -> Option<Minimum> {
+    let sum: Vector3<f64> = seen.corners.iter().map(|c| seen.board.point(c.index, seen.shape).coords).sum();
+    refine(seen, &mirrored(pose, &(sum / seen.corners.len() as f64))?, steps)
 }

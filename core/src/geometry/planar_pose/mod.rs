@@ -38,8 +38,17 @@ pub const MIN_CORNERS: usize = 4;
 const MIN_FLATNESS: f64 = 1e-4;
 /// Steps of one descent: a few usually, and hundreds along the valley between two minima that are about to merge.
 const MAX_STEPS: usize = 500;
+/// Minima whose errors per corner differ by less than this, pixels, differ by rounding.
+const SAME_ERROR_PX: f64 = 1e-9;
 /// Two solutions closer than this angle \[rad\] are one: a tenth of what corner noise of 0.1 px does to a pose.
 const SAME_ROTATION: f64 = 1e-4;
+
+/// Excess of the squared error of one minimum over the other, in units of the noise of a corner, up to which both are
+/// possible. Let the true minimum be `D` better without noise; with it the difference has mean `D` and deviation `2 √D`, so
+/// that the true one is worse by more than `x` with the probability `Φ(−(x + D) / (2 √D))`, at most `Φ(−√x)` whatever `D`.
+/// This `x` makes it one view in a million when corners err independently, and one in a thousand where what they share
+/// makes the noise of a pose one and a half times as large.
+const POSSIBLE_EXCESS: f64 = 4.75 * 4.75;
 
 /// Why corners have no pose.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -105,6 +114,15 @@ pub struct Solution {
     pub rms_px: f64,
 }
 
+impl Solution {
+    fn new(minimum: &refine::Minimum, corners: usize) -> Self {
+        Self {
+            camera_from_target: Pose::from_isometry(minimum.pose),
+            rms_px: (minimum.squared_px / corners as f64).sqrt(),
+        }
+    }
+}
+
 /// The poses that a flat target may have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanarPose {
@@ -122,9 +140,48 @@ impl PlanarPose {
         // Two perfect solutions cannot be told apart.
         self.alternative.map(|a| if a.rms_px > 0.0 { self.best.rms_px / a.rms_px } else { 1.0 })
     }
+
+    /// The alternative, where so many corners with noise of `sigma_px` per axis leave it possible that it is the pose, and
+    /// not `best`: whoever knows more of the view than its corners has to choose. At most one true pose in a million is
+    /// missed.
+    pub fn possible_alternative(&self, corners: usize, sigma_px: f64) -> Option<Solution> {
+        let excess = |a: &Solution| corners as f64 * (a.rms_px.powi(2) - self.best.rms_px.powi(2));
+        // Corners without noise have minima apart by rounding.
+        let least = (SAME_ERROR_PX * SAME_ERROR_PX) * corners as f64;
+        self.alternative.filter(|a| excess(a) <= (POSSIBLE_EXCESS * sigma_px * sigma_px).max(least))
+    }
+
+    /// Noise of a corner per axis by the residuals of `best`, pixels.
+    pub fn sigma_px(&self, corners: usize) -> f64 {
+        sigma_px(self.best.rms_px, corners)
+    }
+
+    /// Of the poses that the corners leave possible, by their own noise, the one turned less from `expected`.
+    pub fn nearer_to(&self, expected: &Pose<Camera, Target>, corners: usize) -> Solution {
+        match self.possible_alternative(corners, self.sigma_px(corners)) {
+            Some(other) if is_nearer(&other.camera_from_target, &self.best.camera_from_target, expected) => other,
+            _ => self.best,
+        }
+    }
 }
 
-/// The best of [`solve`], for callers to whom ambiguity does not matter.
+/// Noise of a corner per axis by the residuals of a view whose pose was fitted to its corners, pixels.
+pub(crate) fn sigma_px(rms_px: f64, corners: usize) -> f64 {
+    let numbers = 2.0 * corners as f64;
+    rms_px * (corners as f64 / (numbers - 6.0).max(1.0)).sqrt()
+}
+
+/// Whether a pose is turned less from the expected one than another: the two of a flat target differ in their rotation.
+pub(crate) fn is_nearer(
+    pose: &Pose<Camera, Target>,
+    than: &Pose<Camera, Target>,
+    expected: &Pose<Camera, Target>,
+) -> bool {
+    let turned = |pose: &Pose<Camera, Target>| pose.rotation().angle_to(&expected.rotation());
+    turned(pose) < turned(than)
+}
+
+/// The best of [`solve`] by the corners alone, where nothing else is known of the view.
 ///
 /// # Errors
 /// As [`solve`].
@@ -157,10 +214,7 @@ pub fn solve(corners: &[Corner], target: &TargetSpec, intrinsics: &Intrinsics) -
         .iter()
         .flatten()
         .filter_map(|start| refine::refine(&seen, start, MAX_STEPS))
-        .map(|minimum| Solution {
-            camera_from_target: Pose::from_isometry(minimum.pose),
-            rms_px: (minimum.squared_px / corners.len() as f64).sqrt(),
-        })
+        .map(|minimum| Solution::new(&minimum, corners.len()))
         .collect();
     solutions.sort_by(|a, b| a.rms_px.total_cmp(&b.rms_px));
     let mut solutions = solutions.into_iter();
@@ -169,6 +223,13 @@ pub fn solve(corners: &[Corner], target: &TargetSpec, intrinsics: &Intrinsics) -
         other.camera_from_target.rotation().angle_to(&best.camera_from_target.rotation()) > SAME_ROTATION
     });
     Ok(PlanarPose { best, alternative })
+}
+
+/// The other minimum of the reprojection error of a view, from one of them; `None` where there is only one.
+pub(crate) fn other(seen: &ViewInput<'_>, best: &Solution) -> Option<Solution> {
+    let minimum = mirror::refined(seen, best.camera_from_target.isometry(), MAX_STEPS)?;
+    let is_other = minimum.pose.rotation.angle_to(&best.camera_from_target.rotation()) > SAME_ROTATION;
+    is_other.then(|| Solution::new(&minimum, seen.corners.len()))
 }
 
 /// Checks that the corners of view `view` are points of the target, are numbers and span a plane.
