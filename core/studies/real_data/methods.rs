@@ -42,7 +42,8 @@ const FIELD: &str = "joint, field in the model";
 const APPLIED: &str = "joint, field applied";
 
 /// Variants of it that free more.
-const VARIANTS: [(&str, Free); 4] = [
+const VARIANTS: [(&str, Free); 5] = [
+    (FIELD, Free { field: true, ..FIXED }),
     ("joint, scale free", Free { scale: true, ..FIXED }),
     ("joint, camera free", Free { intrinsics: true, ..FIXED }),
     ("joint, camera and warp free", Free { intrinsics: true, warp: true, ..FIXED }),
@@ -66,7 +67,7 @@ pub fn names(set: &Set) -> Vec<&'static str> {
         names.push("reprojection, exact robot");
         names.extend(variants(set).map(|(name, _)| name));
         names.push("joint, all views kept");
-        names.extend([FIELD, APPLIED]);
+        names.push(APPLIED);
     }
     names.push(OURS);
     names
@@ -99,21 +100,23 @@ impl Choice {
         Self { views, pairs }
     }
 
-    /// The joint estimate from the first closed form that has an answer, outlier views left out.
+    /// The joint estimate from the first closed form that has an answer, outlier views left out; with the robot's field, if
+    /// that is free, where these views show one.
     pub fn joint(&self, set: &Set, free: Free) -> Option<Kept> {
-        let problem = JointProblem { free, ..JointProblem::new(set.mode, &set.board, &self.views) };
+        let problem = JointProblem {
+            free: Free { field: false, ..free },
+            ..JointProblem::new(set.mode, &set.board, &self.views)
+        };
         let own: Vec<_> = self.pairs.iter().map(|pair| pair.camera_from_target).collect();
-        let screened = estimate_screened(&problem, &self.start(set)?, &own, &CancelToken::default()).ok()?;
-        Some(Kept { views: screened.kept_views(), solution: screened.solution })
-    }
-
-    /// The same with the robot's field where these views show one.
-    fn joint_with_field(&self, set: &Set) -> Option<JointSolution> {
-        let kept = self.joint(set, FIXED)?;
         let cancel = CancelToken::default();
-        let problem = JointProblem::new(set.mode, &set.board, &self.views);
-        let with = with_shown_field(&problem, &kept.views, &kept.solution, &cancel).ok()?;
-        Some(with.unwrap_or(kept.solution))
+        let screened = estimate_screened(&problem, &self.start(set)?, &own, &cancel).ok()?;
+        let (views, mut solution) = (screened.kept_views(), screened.solution);
+        if free.field
+            && let Some(with) = with_shown_field(&problem, &views, &solution, &cancel).ok()?
+        {
+            solution = with;
+        }
+        Some(Kept { views, solution })
     }
 
     /// The same with all views kept.
@@ -161,7 +164,7 @@ impl Choice {
         let exact = Noise { corner_px: 1.0, robot_m: 1e-9, robot_rad: 1e-9, ..Noise::EXACT };
         let solution = match name {
             OURS => self.joint(set, FIXED)?.solution,
-            FIELD | APPLIED => self.joint_with_field(set)?,
+            APPLIED => self.joint(set, Free { field: true, ..FIXED })?.solution,
             "joint, all views kept" => self.joint_of_all(set, None)?,
             "reprojection, exact robot" => self.joint_of_all(set, Some(exact))?,
             _ => self.joint(set, VARIANTS.iter().find(|(variant, _)| *variant == name)?.1)?.solution,
