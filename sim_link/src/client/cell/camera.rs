@@ -89,7 +89,7 @@ impl CameraFeed {
     /// [`LinkError::MixedInstants`] when the simulation is never still for long enough; otherwise as for any call.
     pub fn grab(&mut self) -> Result<Frame, LinkError> {
         if let Some(held) = self.hold.acquire(&mut self.sim)? {
-            let outcome = self.renew().and_then(|image_age_s| self.read(image_age_s));
+            let outcome = self.read_held();
             return held.release(&mut self.sim, outcome);
         }
         for _ in 0..ATTEMPTS {
@@ -99,6 +99,26 @@ impl CameraFeed {
             }
         }
         Err(LinkError::MixedInstants { attempts: ATTEMPTS })
+    }
+
+    /// All of one instant while time stands. Requests of other clients are served meanwhile, so one that moves the arm may
+    /// put a joint elsewhere between image and pose: then it is done once more.
+    fn read_held(&mut self) -> Result<Frame, LinkError> {
+        for _ in 0..ATTEMPTS {
+            let before = if self.renews { Some(self.base_from_tip()?) } else { None };
+            let image_age_s = self.renew()?;
+            let frame = self.read(image_age_s)?;
+            // Images that cannot be asked for, or that come with what they show, are as old as they say.
+            let Some(before) = before.filter(|_| self.renews) else { return Ok(frame) };
+            if frame.base_from_tip == before && self.base_from_tip()? == before {
+                return Ok(frame);
+            }
+        }
+        Err(LinkError::MixedInstants { attempts: ATTEMPTS })
+    }
+
+    fn base_from_tip(&mut self) -> Result<Pose<Base, Tip>, LinkError> {
+        self.sim.get_object_pose(self.objects.tip, ObjectHandle::WORLD)
     }
 
     /// Has the sensors take their images; returns how much older than the pose they may be even so.
@@ -147,7 +167,7 @@ impl CameraFeed {
         Ok(Frame {
             image_age_s,
             sim_time_s: self.sim.get_simulation_time()?,
-            base_from_tip: self.sim.get_object_pose(self.objects.tip, ObjectHandle::WORLD)?,
+            base_from_tip: self.base_from_tip()?,
             joints: read_joint_angles(&mut self.sim, &self.objects.joints)?,
             rgb: self.sim.get_vision_sensor_image(self.objects.camera)?,
             depth: self.sim.get_vision_sensor_depth(self.objects.depth)?,

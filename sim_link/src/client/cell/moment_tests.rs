@@ -61,6 +61,20 @@ fn coppeliasim_is_not_asked_what_its_images_show() {
 }
 
 #[test]
+fn an_image_that_another_client_moved_the_arm_after_is_taken_again() {
+    let mut cell = cell(world());
+    edit(&cell.world, |w| w.moved_when_handled = 2);
+    let frame = cell.client.camera().grab().expect("a frame");
+    assert_eq!(cell.world().handled, 3);
+    assert_eq!(cell.world().held, 0);
+    let there = cell.world().base_from_tip;
+    assert_eq!((frame.base_from_tip, frame.image_age_s), (there, 0.0));
+    edit(&cell.world, |w| w.moved_when_handled = u32::MAX);
+    assert_eq!(cell.client.camera().grab(), Err(LinkError::MixedInstants { attempts: 10 }));
+    assert_eq!(cell.world().held, 0);
+}
+
+#[test]
 fn a_moment_that_cannot_be_computed_with_is_an_error_and_leaves_nothing_held() {
     let bad = [("joints", wire::floats([0.0; 5])), ("tip", wire::floats([0.0; 7])), ("tip", Value::from("here"))];
     for (key, value) in bad {

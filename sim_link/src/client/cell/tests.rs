@@ -39,6 +39,8 @@ struct World {
     motion_state: Option<Vec<u8>>,
     /// Times that the sensors were handled.
     handled: u32,
+    /// Times that another client moves the arm just after that.
+    moved_when_handled: u32,
     die_in: Option<&'static str>,
     steps: u32,
     held: i32,
@@ -74,6 +76,7 @@ fn world() -> Shared {
         stuck: None,
         motion_state: None,
         handled: 0,
+        moved_when_handled: 0,
         die_in: None,
         steps: 0,
         held: 0,
@@ -129,6 +132,11 @@ impl World {
                 // A motion on the other connection may hold it too.
                 assert!(args[0].integer() == Some(-3) && self.held > 0, "all, while time stands");
                 self.handled += 1;
+                if self.moved_when_handled > 0 {
+                    self.moved_when_handled -= 1;
+                    let further = nalgebra::Isometry3::translation(0.01, 0.0, 0.0) * self.base_from_tip.isometry();
+                    self.base_from_tip = Pose::from_isometry(further);
+                }
                 ret([Value::from(0)])
             }
             "sim.setObjectPose" | "zmqRemoteApi.require" => ret([]),

@@ -72,7 +72,7 @@ fn a_sequence_ended_by(signal: &str) {
     let mut desktop = Desktop::start((1440, 900), &shots, &["--connect", &address], &[]);
     desktop.until_seen("Board in view");
     desktop.click("Run the 10 taught poses");
-    desktop.until_seen("Capture 2 is kept");
+    desktop.until_seen("Use capture 2");
     witness.until_moving();
 
     let (status, took) = desktop.end_by(signal);
