@@ -116,16 +116,19 @@ pub fn refine(
         } else {
             estimate_screened(&problem, &with_field.as_start(), own, work.cancel)?
         };
-        if let Some(joints) = joints.as_mut().filter(|joints| joints.accepted) {
-            joints.offsets_rad.clone_from(&screened.solution.joint_offsets_rad);
-            joints.sigma_rad = screened.solution.joint_offsets_sigma();
-        }
+    }
+    let kept = screened.kept_views();
+    let fitted = kept_problem(&problem, &kept, &screened.solution);
+    screened.solution = joint::with_stated_error(&fitted, screened.solution, work.cancel)?;
+    if let Some(joints) = joints.as_mut().filter(|joints| joints.accepted) {
+        joints.offsets_rad.clone_from(&screened.solution.joint_offsets_rad);
+        joints.sigma_rad = screened.solution.joint_offsets_sigma();
     }
     Ok(Refined { screened, weights, joints })
 }
 
 fn keep_all(problem: &JointProblem<'_>, start: &JointStart, work: Work<'_>) -> Result<Screened, HandEyeError> {
-    let solution = joint::estimate(problem, start, work)?;
+    let solution = joint::fit(problem, start, work)?;
     Ok(Screened {
         solution,
         kept: (0..problem.views.len()).collect(),
@@ -178,7 +181,7 @@ fn offsets(
     }
     let without = kept_problem(problem, &views, &screened.solution);
     let with = JointProblem { free: Free { joints: true, ..without.free }, ..without };
-    let solution = match joint::estimate(&with, &screened.solution.as_start(), work.cancel) {
+    let solution = match joint::fit(&with, &screened.solution.as_start(), work.cancel) {
         Ok(solution) => solution,
         Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
         Err(_) => return Ok(None),

@@ -116,6 +116,8 @@ impl Choice {
         {
             solution = with;
         }
+        let fitted = JointProblem { free: solution.free, views: &views, ..problem };
+        let solution = estimate(&fitted, &solution.as_start(), &cancel).ok()?;
         Some(Kept { views, solution })
     }
 

@@ -17,7 +17,7 @@
 //! Levenberg–Marquardt with analytic Jacobians; the corrections are eliminated view by view (Schur complement), so the
 //! cost grows linearly with the number of views. The noise levels maximise the restricted likelihood (REML) of the
 //! linearised model ([`variance`]); both steps alternate until the levels stand still. What estimated levels do to the
-//! covariance is in [`freedom`].
+//! covariance is in [`integrated`], and what a cost does that is no parabola in [`curvature`].
 //!
 //! # Reference
 //! Triggs et al. 2000, "Bundle adjustment — a modern synthesis", §6; Patterson & Thompson 1971, "Recovery of
@@ -25,10 +25,12 @@
 //! calibration" (robot poses as observations).
 
 pub(crate) mod chain;
+mod curvature;
 pub(crate) mod equations;
 pub(crate) mod field;
-mod freedom;
 mod gram;
+mod information;
+mod integrated;
 pub(crate) mod normal;
 pub(crate) mod optimise;
 pub mod outliers;
@@ -51,14 +53,17 @@ use super::HandEyeError;
 use super::motion::MIN_VIEWS;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::Pose;
-use crate::progress::{Stage, Work};
+use crate::progress::{CancelToken, Stage, Work};
 use crate::targets::observation::Corner;
 
 pub use chain::{MAX_JOINTS, base_from_tip_by_joints, camera_from_target};
 pub use field::{RobotField, corrected_base_from_tip};
-pub use freedom::SmallSample;
+pub use integrated::SmallSample;
 pub use weights::CornerWeights;
 
+use curvature::Optimum;
+use integrated::Integrated;
+use state::State;
 use variance::Levels;
 
 /// Standard deviation of a joint's offset before any data: a robot that is a degree off is a broken one, and without a
@@ -86,10 +91,21 @@ pub fn estimate<'a>(
     work: impl Into<Work<'a>>,
 ) -> Result<JointSolution, HandEyeError> {
     let work = work.into();
+    let solution = fit(problem, start, work)?;
+    with_stated_error(problem, solution, work.cancel)
+}
+
+/// The same without what estimated noise levels and a curved cost do to the covariance: for fits whose answer alone counts.
+pub(crate) fn fit<'a>(
+    problem: &JointProblem<'_>,
+    start: &JointStart,
+    work: impl Into<Work<'a>>,
+) -> Result<JointSolution, HandEyeError> {
+    let work = work.into();
     if problem.views.len() < MIN_VIEWS {
         return Err(HandEyeError::TooFewViews { got: problem.views.len(), need: MIN_VIEWS });
     }
-    let mut state = state::State::new(problem, start);
+    let mut state = State::new(problem, start);
     let mut noise = problem.noise.or(start.noise).unwrap_or_else(|| variance::starting_noise(problem, &state));
     let mut levels = Levels { view: false, field: state.field.is_some() };
     if problem.noise.is_none() {
@@ -125,10 +141,9 @@ pub fn estimate<'a>(
     if levels.view && noise.view_px < NO_VIEW_NOISE * noise.corner_px {
         // It was asked for on the way and is not needed at the end.
         noise.view_px = 0.0;
-        levels.view = false;
     }
     let (system, steps) = optimise::minimise(problem, &mut state, &noise, work.cancel)?;
-    let solution = finish(problem, &state, &system, noise, levels, &work)?;
+    let solution = finish(problem, &state, &system, noise, &work)?;
     Ok(JointSolution { iterations: iterations + steps, deviance, ..solution })
 }
 
@@ -141,22 +156,40 @@ const NO_VIEW_NOISE: f64 = 0.05;
 /// poses share can look like it and gain up to nine in sessions of fifteen views.
 const VIEW_NOISE_GAIN: f64 = 9.55;
 
+/// A solution of [`fit`] with the covariance that may be stated.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
+pub(crate) fn with_stated_error(
+    problem: &JointProblem<'_>,
+    solution: JointSolution,
+    cancel: &CancelToken,
+) -> Result<JointSolution, HandEyeError> {
+    let problem = &JointProblem { free: solution.free, ..*problem };
+    let (state, noise) = (State::of(&solution), &solution.noise);
+    let system = normal::System::new(problem, &state, cancel)?;
+    let reduced = system.reduce(noise)?;
+    let plain = reduced.inverse();
+    let integrated = if problem.noise.is_some() {
+        Integrated { covariance: plain.clone(), small_sample: SmallSample::KNOWN }
+    } else {
+        let levels = Levels { view: noise.view_px > 0.0, field: state.field.is_some() };
+        integrated::integrate(&system, noise, levels, plain.clone(), &solution.reference_point)?
+    };
+    let optimum = Optimum { problem, state: &state, system: &system, noise, reduced: &reduced, covariance: &plain };
+    let covariance = optimum.widened(integrated.covariance, &solution.reference_point)?;
+    Ok(JointSolution { covariance, small_sample: integrated.small_sample, ..solution })
+}
+
 fn finish(
     problem: &JointProblem<'_>,
-    state: &state::State,
+    state: &State,
     system: &normal::System,
     noise: Noise,
-    levels: Levels,
     work: &Work<'_>,
 ) -> Result<JointSolution, HandEyeError> {
     let reduced = system.reduce(&noise)?;
     let reference_point = state.mean_target_centre(problem);
-    let plain = reduced.inverse();
-    let adjusted = if problem.noise.is_some() {
-        freedom::Adjusted { covariance: plain, small_sample: SmallSample::KNOWN }
-    } else {
-        freedom::adjust(system, &noise, levels, plain)?
-    };
     let points = problem.board.points(&state.shape);
     let mut views = Vec::with_capacity(problem.views.len());
     let (mut squared_px, mut corners) = (0.0, 0usize);
@@ -182,8 +215,8 @@ fn finish(
         joint_offsets_rad: state.joints_rad.clone(),
         field: state.field.clone(),
         deviance: None,
-        covariance: adjusted.covariance,
-        small_sample: adjusted.small_sample,
+        covariance: reduced.inverse(),
+        small_sample: SmallSample::KNOWN,
         free: problem.free,
         noise,
         views,

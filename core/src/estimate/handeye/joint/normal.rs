@@ -89,6 +89,14 @@ impl System {
         (squares.max(0.0), expected)
     }
 
+    /// What the rests of the views say of the shared unknowns, for corners of a noise of one pixel.
+    pub fn rest_information(&self) -> DMatrix<f64> {
+        let (n, f) = (self.layout.count(), self.layout.form);
+        let mut out = DMatrix::zeros(n, n);
+        out.view_mut((Layout::FORM_AT, Layout::FORM_AT), (f, f)).copy_from(&self.rest.form.view((0, 0), (f, f)));
+        out
+    }
+
     pub fn residual_count(&self) -> usize {
         2 * self.blocks.iter().map(ViewBlock::corner_count).sum::<usize>()
     }
@@ -261,7 +269,13 @@ pub struct Reduced {
 }
 
 impl Reduced {
-    fn solve(&self, rhs: &DVector<f64>) -> DVector<f64> {
+    /// Length of a step of the shared unknowns in units of their standard deviation.
+    pub fn length(&self, step: &DVector<f64>) -> f64 {
+        (self.factor.l().tr_mul(&step.component_div(&self.scale))).norm()
+    }
+
+    /// The covariance of the shared unknowns times a vector.
+    pub fn solve(&self, rhs: &DVector<f64>) -> DVector<f64> {
         self.factor.solve(&rhs.component_mul(&self.scale)).component_mul(&self.scale)
     }
 
@@ -280,6 +294,13 @@ impl Reduced {
     /// Inverse of the reduced matrix: the covariance of the shared unknowns when the system is undamped.
     pub fn inverse(&self) -> DMatrix<f64> {
         scaled_inverse(&self.factor, &self.scale)
+    }
+
+    /// The reduced matrix itself.
+    pub fn information(&self) -> DMatrix<f64> {
+        let lower = self.factor.l();
+        let scaled = &lower * lower.transpose();
+        DMatrix::from_fn(scaled.nrows(), scaled.ncols(), |i, j| scaled[(i, j)] / (self.scale[i] * self.scale[j]))
     }
 
     /// Log-determinant of the whole normal matrix, shared unknowns and corrections.

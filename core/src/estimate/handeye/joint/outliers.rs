@@ -25,7 +25,7 @@ use super::equations::{FreeParameters, PoseEquations, ViewInput};
 use super::field;
 use super::normal::System;
 use super::view_block::{MAX_SHARED, prior_weight};
-use super::{JointProblem, JointSolution, JointStart, estimate};
+use super::{JointProblem, JointSolution, JointStart, fit};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::motion::MIN_VIEWS;
@@ -95,8 +95,10 @@ impl Screened {
 ///
 /// With fewer than six views, or when too many would have to go, all are kept.
 ///
+/// The covariance is that of noise levels as if they were known.
+///
 /// # Errors
-/// As [`estimate`].
+/// As [`estimate`](super::estimate).
 pub fn estimate_screened<'a>(
     problem: &JointProblem<'_>,
     start: &JointStart,
@@ -111,7 +113,7 @@ pub fn estimate_screened<'a>(
     let misfits = misfits(problem, start, &views, own);
     let judge = |fit: &Fit| distances(problem, &views, fit, own, cancel);
     let core = || core_fit(problem, start, &views, &misfits, cancel);
-    let fit_all = || estimate(&JointProblem { views: &views, ..*problem }, start, work);
+    let fit_all = || fit(&JointProblem { views: &views, ..*problem }, start, work);
     let of_all = |solution: JointSolution| Fit { solution, kept: all.clone() };
     let mut fit = if views.len() < NEED {
         of_all(fit_all()?)
@@ -243,7 +245,7 @@ fn fit_of(
     let chosen: Vec<View> = kept.iter().map(|&i| views[i].clone()).collect();
     // Noise levels of other views are no start: their likelihood may have another maximum near them.
     let start = JointStart { noise: None, ..*start };
-    let solution = estimate(&JointProblem { views: &chosen, ..*problem }, &start, cancel)?;
+    let solution = fit(&JointProblem { views: &chosen, ..*problem }, &start, cancel)?;
     Ok(Fit { solution, kept })
 }
 

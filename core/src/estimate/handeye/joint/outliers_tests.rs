@@ -50,7 +50,7 @@ fn wrong_views_are_set_aside_and_the_answer_is_that_of_the_others() {
             assert_eq!(found.kept, expected, "{mode:?} {views} {wrong} {seed}");
             let clean: Vec<View> = found.kept.iter().map(|&i| t.views[i].clone()).collect();
             let problem = JointProblem { views: &clean, ..t.problem(false, None) };
-            let alone = estimate(&problem, &t.start(), &CancelToken::default()).expect("solves");
+            let alone = fit(&problem, &t.start(), &CancelToken::default()).expect("solves");
             let (metres, _) =
                 alone.hand_eye.mount_from_camera().distance_to(&found.solution.hand_eye.mount_from_camera());
             // Where a noise level is small its likelihood is flat, and two starts end a few percent of it apart.

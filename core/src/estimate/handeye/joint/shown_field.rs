@@ -1,7 +1,7 @@
 //! Whether the data show errors of the robot that depend on where it stands.
 
 use super::field::Places;
-use super::{Free, JointProblem, JointSolution, JointStart, estimate};
+use super::{Free, JointProblem, JointSolution, JointStart, fit};
 use crate::estimate::handeye::HandEyeError;
 use crate::progress::{CancelToken, Work};
 use crate::targets::observation::View;
@@ -61,7 +61,7 @@ fn estimated(
     start: &JointStart,
     cancel: &CancelToken,
 ) -> Result<Option<JointSolution>, HandEyeError> {
-    match estimate(problem, start, cancel) {
+    match fit(problem, start, cancel) {
         Ok(solution) => Ok(Some(solution)),
         Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
         Err(_) => Ok(None),

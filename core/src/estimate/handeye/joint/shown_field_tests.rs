@@ -10,7 +10,7 @@ const FIELD: Noise = Noise { field_m: 2e-3, field_rad: 0.2 * std::f64::consts::P
 fn of_session(session: &Trial, board: &BoardPoints) -> (JointSolution, Option<JointSolution>) {
     let cancel = CancelToken::default();
     let problem = JointProblem { board, ..session.problem(false, None) };
-    let without = estimate(&problem, &session.start(), &cancel).expect("solves");
+    let without = fit(&problem, &session.start(), &cancel).expect("solves");
     let with = with_shown_field(&problem, &session.views, &without, &cancel).expect("not cancelled");
     (without, with)
 }

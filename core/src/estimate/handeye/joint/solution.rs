@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
 
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::field::{RobotField, corrected_base_from_tip};
-use crate::estimate::handeye::joint::freedom::SmallSample;
+use crate::estimate::handeye::joint::integrated::SmallSample;
 use crate::estimate::handeye::joint::problem::{Free, JointStart, Noise};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};

@@ -6,10 +6,11 @@
 //! the familiar `count - expected sum of squares`, the fixed point of the EM iteration; Newton on the logs gets there in a
 //! few steps where EM crawls when the robot is nearly exact.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::field::HALF;
-use super::normal::System;
+use super::information::information;
+use super::normal::{Reduced, System};
 use super::view_block::prior_weight;
 use super::{JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
@@ -48,6 +49,29 @@ impl Levels {
             _ => self.field,
         })
     }
+
+    /// Numbers per level, with those of the poses' part added to those of the corners where the two are one level.
+    pub fn folded(self, mut of_levels: Logs) -> Logs {
+        if !self.view {
+            of_levels[0] += of_levels[3];
+            of_levels[3] = 0.0;
+        }
+        of_levels
+    }
+
+    /// The same of a matrix with rows and columns per level; those of a level that is not estimated are zero.
+    pub fn folded_matrix(self, of_levels: &Matrix6<f64>) -> Matrix6<f64> {
+        let mut fold = Matrix6::identity();
+        if !self.view {
+            fold[(3, 3)] = 0.0;
+            fold[(0, 3)] = 1.0;
+        }
+        if !self.field {
+            fold[(4, 4)] = 0.0;
+            fold[(5, 5)] = 0.0;
+        }
+        fold * of_levels * fold.transpose()
+    }
 }
 
 /// Number of levels.
@@ -56,7 +80,7 @@ pub const LEVELS: usize = 6;
 /// Logs of the variances of a corner, of the robot's position and orientation, of the part of a view that looks like a
 /// pose, and of the field's position and orientation. The fourth follows the first where it is not estimated, and the last
 /// two mean nothing then.
-type Logs = Vector6<f64>;
+pub type Logs = Vector6<f64>;
 
 /// Rough levels for the first round: the robot is taken to explain the start's misfit with generous room.
 pub fn starting_noise(problem: &JointProblem<'_>, state: &State) -> Noise {
@@ -88,10 +112,19 @@ pub fn change(a: &Noise, b: &Noise) -> f64 {
         .max(relative(a.field_rad, b.field_rad, NO_FIELD * a.robot_rad))
 }
 
-/// Minus twice the restricted log-likelihood and its gradient by the log-variances.
-struct Likelihood {
-    value: f64,
+/// Minus twice the restricted log-likelihood at some levels, and what goes with it.
+pub struct Likelihood {
+    pub value: f64,
+    /// By the log-variances.
     gradient: Logs,
+    /// What the data say of each level, in numbers: how many they were if nothing else were known, less those that the
+    /// unknowns use up and those that are lost in the noise of the other levels.
+    pub counts: Logs,
+    pub reduced: Reduced,
+    /// Of the shared unknowns.
+    pub covariance: DMatrix<f64>,
+    /// Of the shared unknowns, from the point of linearisation to the optimum at these levels.
+    pub step: DVector<f64>,
 }
 
 fn to_noise(logs: &Logs, levels: Levels) -> Noise {
@@ -107,7 +140,7 @@ fn to_noise(logs: &Logs, levels: Levels) -> Noise {
     }
 }
 
-fn to_logs(noise: &Noise) -> Logs {
+pub fn to_logs(noise: &Noise) -> Logs {
     let together = noise.corner_px.powi(2) + noise.view_px.powi(2);
     let log = |level: f64| 2.0 * level.ln();
     Logs::new(
@@ -121,7 +154,7 @@ fn to_logs(noise: &Noise) -> Logs {
 }
 
 /// Keeps the logs in their range, and the pose's part no smaller than what independent corners make of it.
-fn kept(mut logs: Logs, levels: Levels) -> Logs {
+pub fn kept(mut logs: Logs, levels: Levels) -> Logs {
     let (low, high) = (to_logs(&LOWEST), to_logs(&HIGHEST));
     for i in [0, 1, 2, 4, 5] {
         logs[i] = logs[i].clamp(low[i], high[i]);
@@ -130,7 +163,8 @@ fn kept(mut logs: Logs, levels: Levels) -> Logs {
     logs
 }
 
-fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, HandEyeError> {
+/// Evaluates the restricted likelihood.
+pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, HandEyeError> {
     let noise = to_noise(logs, levels);
     let reduced = system.reduce(&noise)?;
     let prior = prior_weight(&noise);
@@ -139,10 +173,10 @@ fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, 
     let in_rest = system.residual_count() as f64 - in_poses;
     let least_cost = system.cost(&noise) - reduced.decrease();
 
-    let shared_covariance = reduced.inverse();
-    let n = shared_covariance.nrows();
-    let shared_step = reduced.shared_step();
-    let steps = reduced.own_steps(&shared_step);
+    let covariance = reduced.inverse();
+    let n = covariance.nrows();
+    let step = reduced.shared_step();
+    let steps = reduced.own_steps(&step);
 
     // Expected sums of squares of the corrections: estimate plus posterior variance.
     let mut squares = Vector6::zeros();
@@ -153,24 +187,23 @@ fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, 
         }
         let estimate = correction + step;
         squares += estimate.component_mul(&estimate);
-        variances += own.variances(&shared_covariance);
+        variances += own.variances(&covariance);
     }
-    let prior_cost = squares.dot(&prior);
-    let prior_trace = variances.dot(&prior);
-    let unknowns = n as f64 + 6.0 * views;
+    let (squares, traces) = (squares.component_mul(&prior), variances.component_mul(&prior));
+    let unknowns = n as f64 + in_poses;
     // tr(H H⁻¹) counts the unknowns; what the priors do not take of it is the corners' share.
-    let known_cost = system.prior_cost(&noise, Some(&shared_step));
-    let known_trace = system.prior_trace(&noise, &shared_covariance);
-    let corner_squares = (least_cost - prior_cost - known_cost) + (unknowns - prior_trace - known_trace);
-    let (rest, rest_expected) = system.rest_squares(&shared_step, &shared_covariance);
-    let rest_squares = (rest + rest_expected) / noise.corner_px.powi(2);
-    let expected = squares + variances;
-    let robot_m = expected.fixed_rows::<3>(0).sum() * prior[0];
-    let robot_rad = expected.fixed_rows::<3>(3).sum() * prior[3];
-    let mut of_field = [0.0; 2];
+    let known_cost = system.prior_cost(&noise, Some(&step));
+    let known_trace = system.prior_trace(&noise, &covariance);
+    let corner_squares = least_cost - squares.sum() - known_cost;
+    let corner_trace = unknowns - traces.sum() - known_trace;
+    let rest = system.rest_squares(&step, &covariance);
+    let (rest_squares, rest_trace) = (rest.0 / noise.corner_px.powi(2), rest.1 / noise.corner_px.powi(2));
+    let (mut field_squares, mut field_traces) = ([0.0; 2], [0.0; 2]);
+    let variance = [noise.field_m.powi(2), noise.field_rad.powi(2)];
     for (k, slope) in system.slopes.iter().enumerate() {
-        let index = system.layout.field_at() + k;
-        of_field[k / HALF] += (slope + shared_step[index]).powi(2) + shared_covariance[(index, index)];
+        let (index, half) = (system.layout.field_at() + k, k / HALF);
+        field_squares[half] += (slope + step[index]).powi(2) / variance[half];
+        field_traces[half] += covariance[(index, index)] / variance[half];
     }
     let slopes = if levels.field { HALF as f64 } else { 0.0 };
     let value = in_rest * logs[0]
@@ -179,58 +212,66 @@ fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, 
         + 3.0 * views * (logs[1] + logs[2])
         + reduced.log_determinant()
         + least_cost;
-    let by_rest = in_rest - rest_squares;
-    let by_poses = in_poses - (corner_squares - rest_squares);
-    let (by_rest, by_poses) = if levels.view { (by_rest, by_poses) } else { (by_rest + by_poses, 0.0) };
-    let [field_m, field_rad] = if levels.field {
-        [slopes - of_field[0] / noise.field_m.powi(2), slopes - of_field[1] / noise.field_rad.powi(2)]
-    } else {
-        [0.0; 2]
-    };
-    let (robot_m, robot_rad) = (3.0 * views - robot_m, 3.0 * views - robot_rad);
-    let gradient = Logs::new(by_rest, robot_m, robot_rad, by_poses, field_m, field_rad);
-    Ok(Likelihood { value, gradient })
+    let [m, rad] = [0, 3].map(|at| (squares.fixed_rows::<3>(at).sum(), traces.fixed_rows::<3>(at).sum()));
+    let counts = Logs::new(
+        in_rest - rest_trace,
+        3.0 * views - m.1,
+        3.0 * views - rad.1,
+        in_poses - (corner_trace - rest_trace),
+        slopes - field_traces[0],
+        slopes - field_traces[1],
+    );
+    let squares =
+        Logs::new(rest_squares, m.0, rad.0, corner_squares - rest_squares, field_squares[0], field_squares[1]);
+    let gradient = levels.folded(counts - squares);
+    Ok(Likelihood { value, gradient, counts, reduced, covariance, step })
 }
 
-/// Second derivatives of minus twice the restricted log-likelihood by the log-variances; those of a level that is not
-/// estimated are zero.
-pub fn curvature(system: &System, noise: &Noise, levels: Levels) -> Result<Matrix6<f64>, HandEyeError> {
-    let logs = kept(to_logs(noise), levels);
-    let at = evaluate(system, &logs, levels)?;
-    hessian(system, &logs, &at, levels)
+/// The most likely noise levels of a linearised system, and what goes with them.
+pub struct MostLikely {
+    pub logs: Logs,
+    pub at: Likelihood,
+    /// About half the second derivatives of what was minimised, by the log-variances; zero for a level that is not
+    /// estimated.
+    pub information: Matrix6<f64>,
 }
 
-fn hessian(system: &System, logs: &Logs, at: &Likelihood, levels: Levels) -> Result<Matrix6<f64>, HandEyeError> {
-    const DIFFERENCE: f64 = 1e-4;
-    let high = to_logs(&HIGHEST);
-    let mut hessian = Matrix6::zeros();
-    for i in levels.estimated() {
-        let mut shifted = *logs;
-        // Towards the inside, so that the clamp in `to_noise` cannot flatten the difference.
-        let h = if shifted[i] + DIFFERENCE > high[i] { -DIFFERENCE } else { DIFFERENCE };
-        shifted[i] += h;
-        if i == 0 && !levels.view {
-            shifted[3] += h;
-        }
-        hessian.set_column(i, &((evaluate(system, &shifted, levels)?.gradient - at.gradient) / h));
-    }
-    Ok(0.5 * (hessian + hessian.transpose()))
+/// What is minimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aim {
+    /// Minus twice the restricted log-likelihood.
+    Likelihood,
+    /// The same less twice the log of the prior of [`prior`].
+    Posterior,
 }
 
-/// The noise levels that maximise the restricted likelihood of a linearised system, from `start`, and minus twice its log.
-pub fn restricted_likelihood(system: &System, start: &Noise, levels: Levels) -> Result<(Noise, f64), HandEyeError> {
-    let mut logs = kept(to_logs(start), levels);
+/// Minus twice the log of the prior density of the log-variances: proportional to [`Likelihood::counts`]. It is flat where
+/// a level is seen well, as Jeffreys' prior of a variance is, so that a level which only a few numbers tell gives Student's
+/// distribution; and it falls with the variance itself below what the noise of the other levels lets be seen, so that a
+/// level of nothing takes the place that it has among the others and no more.
+///
+/// # Reference
+/// Berger & Deely 1988, "A Bayesian approach to ranking and selection of related means", JASA 83, 364–373 (the prior for
+/// one level; it is Jeffreys' up to a constant where all views are alike).
+pub fn prior(at: &Likelihood, levels: Levels) -> f64 {
+    let counts = levels.folded(at.counts);
+    -2.0 * levels.estimated().map(|k| counts[k].max(f64::MIN_POSITIVE).ln()).sum::<f64>()
+}
+
+/// Finds the levels where `aim` is least, beginning at `start`.
+pub fn most_likely(system: &System, start: Logs, levels: Levels, aim: Aim) -> Result<MostLikely, HandEyeError> {
+    let aimed = |at: &Likelihood| at.value + if aim == Aim::Posterior { prior(at, levels) } else { 0.0 };
+    let mut logs = kept(start, levels);
     let mut at = evaluate(system, &logs, levels)?;
     let mut damping = 1e-3;
     for _ in 0..MAX_STEPS {
-        let hessian = hessian(system, &logs, &at, levels)?;
+        let (gradient, curvature) = slope(system, &logs, &at, levels, aim);
         let mut improved = false;
         while damping < 1e9 {
-            let step = newton_step(&hessian, &at.gradient, damping);
-            let next_logs = kept(logs + step, levels);
+            let next_logs = kept(logs + newton_step(&curvature, &gradient, damping), levels);
             let next = evaluate(system, &next_logs, levels)?;
-            if next.value < at.value {
-                let gain = at.value - next.value;
+            let gain = aimed(&at) - aimed(&next);
+            if gain > 0.0 {
                 (logs, at) = (next_logs, next);
                 damping = (damping * 0.2).max(1e-9);
                 improved = gain > GAIN_TOLERANCE;
@@ -242,7 +283,32 @@ pub fn restricted_likelihood(system: &System, start: &Noise, levels: Levels) -> 
             break;
         }
     }
-    Ok((to_noise(&logs, levels), at.value))
+    let (_, curvature) = slope(system, &logs, &at, levels, aim);
+    Ok(MostLikely { logs, at, information: 0.5 * curvature })
+}
+
+/// Derivatives of what is minimised, the second ones as expected.
+fn slope(system: &System, logs: &Logs, at: &Likelihood, levels: Levels, aim: Aim) -> (Logs, Matrix6<f64>) {
+    let information = information(system, &to_noise(logs, levels), at, levels);
+    let (mut gradient, mut curvature) = (at.gradient, 2.0 * information);
+    if aim == Aim::Posterior {
+        let counts = levels.folded(at.counts);
+        for k in levels.estimated() {
+            // The count of a level grows with its own variance and shrinks with that of the others, which hide it.
+            let count = counts[k].max(f64::MIN_POSITIVE);
+            gradient[k] -= 2.0;
+            gradient += information.column(k) * (4.0 / count);
+            let seen = (2.0 * information[(k, k)] / count).clamp(0.0, 1.0);
+            curvature[(k, k)] += 2.0 * seen * (1.0 - seen);
+        }
+    }
+    (gradient, curvature)
+}
+
+/// The noise levels that maximise the restricted likelihood of a linearised system, from `start`, and minus twice its log.
+pub fn restricted_likelihood(system: &System, start: &Noise, levels: Levels) -> Result<(Noise, f64), HandEyeError> {
+    let found = most_likely(system, to_logs(start), levels, Aim::Likelihood)?;
+    Ok((to_noise(&found.logs, levels), found.at.value))
 }
 
 /// A step down even where the likelihood is not convex in the logs: eigenvalues are taken by their absolute value.

@@ -302,15 +302,20 @@ impl Own {
         out
     }
 
-    /// The variances of the correction when the shared unknowns have the covariance `shared`.
-    pub fn variances(&self, shared: &DMatrix<f64>) -> Vector6<f64> {
-        let n = shared.nrows();
-        let mut variances = self.factor.inverse().diagonal();
-        // Rows of `L⁻ᵀ whitened`: how the correction follows the shared unknowns.
+    /// How the correction follows each of `n` shared unknowns, with the opposite sign.
+    pub fn follows(&self, n: usize) -> SixByShared {
         let mut follows = self.whitened;
         for column in follows.as_mut_slice().chunks_exact_mut(6).take(n) {
             backward(self.factor.l_dirty(), column);
         }
+        follows
+    }
+
+    /// The variances of the correction when the shared unknowns have the covariance `shared`.
+    pub fn variances(&self, shared: &DMatrix<f64>) -> Vector6<f64> {
+        let n = shared.nrows();
+        let mut variances = self.factor.inverse().diagonal();
+        let follows = self.follows(n);
         for j in 0..n {
             let mut through = Vector6::zeros();
             for i in 0..n {

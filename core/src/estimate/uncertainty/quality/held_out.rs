@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::equations::ViewInput;
 use crate::estimate::handeye::joint::{
-    JointProblem, JointSolution, JointStart, base_from_tip_by_joints, camera_from_target, estimate,
+    JointProblem, JointSolution, JointStart, base_from_tip_by_joints, camera_from_target, fit,
 };
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
@@ -64,7 +64,7 @@ pub fn held_out<'a>(
         let (held, used): (Vec<_>, Vec<_>) =
             problem.views.iter().cloned().enumerate().partition(|(i, _)| i % folds == fold);
         let used: Vec<View> = used.into_iter().map(|(_, view)| view).collect();
-        let fit = match estimate(&JointProblem { views: &used, ..*problem }, start, work.cancel) {
+        let fit = match fit(&JointProblem { views: &used, ..*problem }, start, work.cancel) {
             Ok(fit) => fit,
             Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
             Err(_) => return Ok(None),

@@ -10,16 +10,22 @@ use crate::estimate::handeye::joint::{JointSolution, SmallSample};
 use crate::geometry::se3::skew;
 
 pub use held_out::{HeldOut, board_error_m, held_out, held_out_rms_px, pose_of_view};
-pub use radius::{radius_95, radius_95_t};
+pub use radius::{radius_95, radius_95_mixture, radius_95_t};
 pub use tip_box::{BoxError, TipBox, tip_error_95_over};
 
 /// Covariance in the camera frame of where `point` (camera coordinates, metres) is said to be, given the covariance
 /// `[t; r]` of the hand-eye transform (right perturbation).
 pub fn point_covariance(hand_eye: &Matrix6<f64>, point: &Point3<f64>) -> Matrix3<f64> {
+    let by_pose = point_by_hand_eye(point);
+    by_pose * hand_eye * by_pose.transpose()
+}
+
+/// How a `point` (camera coordinates, metres) moves with the hand-eye transform `[t; r]`, right perturbation.
+pub fn point_by_hand_eye(point: &Point3<f64>) -> SMatrix<f64, 3, 6> {
     let mut by_pose = SMatrix::<f64, 3, 6>::zeros();
     by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
     by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(&point.coords));
-    by_pose * hand_eye * by_pose.transpose()
+    by_pose
 }
 
 /// Expected error of a point that the camera measures, at the place where it saw the target: 95 % of errors are below

@@ -46,9 +46,7 @@ pub fn radius_95_t(covariance: &Matrix3<f64>, degrees: f64) -> f64 {
     if !covariance.iter().all(|c| c.is_finite()) {
         return f64::NAN;
     }
-    let mut variances = covariance.symmetric_eigenvalues().map(|v| v.max(0.0));
-    let longest = variances.imax();
-    variances.swap_rows(longest, 2);
+    let variances = sorted(covariance);
     let largest = variances[2];
     if largest == 0.0 {
         return 0.0;
@@ -56,13 +54,45 @@ pub fn radius_95_t(covariance: &Matrix3<f64>, degrees: f64) -> f64 {
     if degrees.is_nan() || degrees <= 0.0 {
         return f64::INFINITY;
     }
-    let law = Length::new(degrees);
-    let scales = scales(&(variances / largest));
+    radius_of(&scales(&(variances / largest)), &Length::new(degrees)) * largest.sqrt()
+}
+
+/// The length that an error vector stays under with a probability of 95 % when it is Gaussian with one of several
+/// covariances, each with a weight; the weights sum to 1.
+///
+/// Not a number when a covariance is not finite, zero where all are zero.
+pub fn radius_95_mixture(covariances: &[(f64, Matrix3<f64>)]) -> f64 {
+    if !covariances.iter().all(|(weight, c)| weight.is_finite() && c.iter().all(|c| c.is_finite())) {
+        return f64::NAN;
+    }
+    let variances: Vec<(f64, Vector3<f64>)> = covariances.iter().map(|(weight, c)| (*weight, sorted(c))).collect();
+    // The smallest of the longest axes: the first guess must not lie beyond the answer.
+    let unit = variances.iter().map(|(_, v)| v[2]).filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min);
+    if !unit.is_finite() {
+        return 0.0;
+    }
+    let scales: Vec<(f64, f64)> = variances
+        .iter()
+        .flat_map(|(of_all, v)| scales(&(v / unit)).map(|(scale, weight)| (scale, weight * of_all)))
+        .collect();
+    radius_of(&scales, &Length::new(f64::INFINITY)) * unit.sqrt()
+}
+
+/// Variances along the principal axes, the largest last.
+fn sorted(covariance: &Matrix3<f64>) -> Vector3<f64> {
+    let mut variances = covariance.symmetric_eigenvalues().map(|v| v.max(0.0));
+    let longest = variances.imax();
+    variances.swap_rows(longest, 2);
+    variances
+}
+
+/// The radius for scales and weights on the unit sphere.
+fn radius_of(scales: &[(f64, f64)], law: &Length) -> f64 {
     // Square root of the 95 % quantile of chi-square with one degree of freedom.
     let mut radius = 1.959_963;
     for _ in 0..MAX_STEPS {
         let (mut probability, mut density) = (0.0, 0.0);
-        for (scale, weight) in &scales {
+        for (scale, weight) in scales {
             let squared = radius * radius / scale.max(f64::MIN_POSITIVE);
             probability += weight * law.below(squared);
             density += weight * law.density(squared) * 2.0 * radius / scale.max(f64::MIN_POSITIVE);
@@ -76,7 +106,7 @@ pub fn radius_95_t(covariance: &Matrix3<f64>, degrees: f64) -> f64 {
             break;
         }
     }
-    radius * largest.sqrt()
+    radius
 }
 
 /// `uᵀ C u` at the nodes on the unit sphere, with weights that sum to 1; the last variance is the largest.

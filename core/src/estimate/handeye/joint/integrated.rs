@@ -1,0 +1,309 @@
+//! The covariance with the noise levels integrated out, and on how many degrees of freedom it rests.
+//!
+//! At levels `θ` the answer is Gaussian with mean `x(θ)` and covariance `C(θ)`. The levels are known as well as the views
+//! show them: their posterior is the restricted likelihood times a weak prior ([`variance::prior`]). The error of the answer
+//! is a mixture over it, which is what is stated, in the shape of a multivariate t:
+//!
+//! - the shape is `E[C⁻¹]⁻¹ + E[(x(θ) − x) (x(θ) − x)ᵀ]` (the first is exact for a t, whose covariances differ by factors);
+//! - the degrees of freedom `m` are those of a variance whose log scatters as that of the error at the reference point:
+//!   `ψ'(m / 2) = Var(ln v)`;
+//! - its size is such that the 95 % radius at the reference point is that of the mixture;
+//! - `scale` makes the 95 % region of all six numbers that of the mixture, too.
+//!
+//! The mixture has a fixed number of points: a low-discrepancy sequence through Student's t about the most likely levels,
+//! along the axes of the information and with a width of its own on either side, weighed by the posterior over the
+//! density of the points.
+//!
+//! # Reference
+//! Rue, Martino & Chopin 2009, "Approximate Bayesian inference for latent Gaussian models by using integrated nested
+//! Laplace approximations", JRSS B 71, 319–392 (§3: exploring the levels); Geweke 1989, "Bayesian inference in
+//! econometric models using Monte Carlo integration", Econometrica 57 (split t); Roberts 2018, "The unreasonable
+//! effectiveness of quasirandom sequences" (the sequence).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix6, Point3, Vector6};
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, StudentsT};
+use statrs::function::gamma::gamma_lr;
+
+use super::Noise;
+use super::normal::System;
+use super::variance::{self, Aim, Levels, Likelihood, Logs, MostLikely};
+use crate::estimate::handeye::HandEyeError;
+use crate::estimate::uncertainty::quality;
+
+/// Points of the mixture.
+const POINTS: usize = 128;
+/// Degrees of freedom of the points' density: tails that no level of three numbers or more exceeds by much.
+const TAILS: f64 = 5.0;
+/// Where the width on a side is taken, in units of the one that the information gives.
+const PROBE: f64 = 2.0;
+/// Widths on a side in those units: beyond them the posterior is no hill.
+const WIDTHS: (f64, f64) = (0.3, 4.0);
+/// Points of less weight than this part of the largest are left out.
+const NO_WEIGHT: f64 = 1e-6;
+/// Views above which the levels count as known: they add less than one part in three hundred.
+const MANY_VIEWS: usize = 300;
+/// Degrees of freedom above which nothing changes.
+const MANY: f64 = 1e6;
+
+/// A covariance with the noise levels integrated out.
+pub struct Integrated {
+    pub covariance: DMatrix<f64>,
+    pub small_sample: SmallSample,
+}
+
+/// The distribution of the error of the hand-eye transform in units of its covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SmallSample {
+    /// Degrees of freedom of the error of a point; infinite when the noise levels were given.
+    pub degrees_of_freedom: f64,
+    /// `λ`: the squared distance `eᵀ C⁻¹ e` of all six numbers times this has the 95 % quantile of
+    /// `6 F(6, degrees_of_freedom)`.
+    pub scale: f64,
+    /// Relative standard deviations of the estimated levels of corners, robot position and robot orientation.
+    pub level_sigma: [f64; 3],
+}
+
+impl SmallSample {
+    /// Of a Gaussian: the noise levels are known.
+    pub const KNOWN: Self = Self { degrees_of_freedom: f64::INFINITY, scale: 1.0, level_sigma: [0.0; 3] };
+}
+
+/// Integrates the noise levels out. `noise` are the most likely ones, at which the system was linearised, and `covariance`
+/// that of the shared unknowns there.
+pub fn integrate(
+    system: &System,
+    noise: &Noise,
+    levels: Levels,
+    covariance: DMatrix<f64>,
+    reference_point: &Point3<f64>,
+) -> Result<Integrated, HandEyeError> {
+    let start = lifted(system, noise, levels)?;
+    let found = variance::most_likely(system, start, levels, Aim::Posterior)?;
+    let axes = Axes::new(&found, levels);
+    let level_sigma = |logs: &Matrix6<f64>| [0, 1, 2].map(|k| 0.5 * logs[(k, k)].max(0.0).sqrt());
+    if system.blocks.len() > MANY_VIEWS {
+        let small_sample = SmallSample { level_sigma: level_sigma(&axes.covariance()), ..SmallSample::KNOWN };
+        return Ok(Integrated { covariance, small_sample });
+    }
+    let points = points(system, &found, axes, levels)?;
+    let mixture = Mixture::new(&points, reference_point);
+    let Some(shape) = mixture.shape(&points) else {
+        return Ok(Integrated { covariance, small_sample: SmallSample::KNOWN });
+    };
+    let hand_eye = |m: &DMatrix<f64>| -> Matrix6<f64> { m.fixed_view::<6, 6>(0, 0).into_owned() };
+    let degrees_of_freedom = mixture.degrees_of_freedom();
+    let of_point = quality::point_covariance(&hand_eye(&shape), reference_point);
+    let size = quality::radius_95_mixture(&mixture.of_point) / quality::radius_95_t(&of_point, degrees_of_freedom);
+    let covariance = if size.is_finite() && size > 0.0 { shape * size.powi(2) } else { shape };
+    let scale = mixture.region_scale(&hand_eye(&covariance), degrees_of_freedom).unwrap_or(1.0);
+    let small_sample = SmallSample { degrees_of_freedom, scale, level_sigma: level_sigma(&scatter(&points)) };
+    Ok(Integrated { covariance, small_sample })
+}
+
+/// The most likely levels, with those that are nothing lifted to where the noise of the others begins to hide them: the
+/// search for the most likely ones under the prior would come from far below.
+fn lifted(system: &System, noise: &Noise, levels: Levels) -> Result<Logs, HandEyeError> {
+    /// Part of all numbers of a level that is seen where it starts.
+    const SEEN: f64 = 0.2;
+    let mut logs = variance::kept(variance::to_logs(noise), levels);
+    let counts = variance::evaluate(system, &logs, levels)?.counts;
+    let views = system.blocks.len() as f64;
+    for (k, all) in [(1, 3.0 * views), (2, 3.0 * views), (4, 9.0), (5, 9.0)] {
+        let seen = (counts[k] / all).clamp(1e-12, 1.0);
+        if seen < SEEN {
+            logs[k] += (SEEN / seen).ln();
+        }
+    }
+    Ok(logs)
+}
+
+/// Axes of the levels' posterior about its top, with a width on either side.
+struct Axes {
+    /// The levels that are estimated.
+    places: Vec<usize>,
+    /// One column per axis, as long as its width by the information.
+    columns: DMatrix<f64>,
+    /// Widths below and above in units of the column.
+    widths: Vec<[f64; 2]>,
+}
+
+impl Axes {
+    fn new(found: &MostLikely, levels: Levels) -> Self {
+        let places: Vec<usize> = levels.estimated().collect();
+        let n = places.len();
+        let information = DMatrix::from_fn(n, n, |i, j| found.information[(places[i], places[j])]);
+        let eigen = information.symmetric_eigen();
+        // A level is known to a factor of e⁴ even where the information at one point says nothing.
+        let width = eigen.eigenvalues.map(|v| v.max(0.25).sqrt().recip());
+        Self { places, columns: &eigen.eigenvectors * DMatrix::from_diagonal(&width), widths: vec![[1.0; 2]; n] }
+    }
+
+    fn covariance(&self) -> Matrix6<f64> {
+        let within = &self.columns * self.columns.transpose();
+        let mut out = Matrix6::zeros();
+        for (i, &k) in self.places.iter().enumerate() {
+            for (j, &l) in self.places.iter().enumerate() {
+                out[(k, l)] = within[(i, j)];
+            }
+        }
+        out
+    }
+
+    /// The levels at a place in units of the columns.
+    fn at(&self, top: &Logs, place: &DVector<f64>) -> Logs {
+        let step = &self.columns * place;
+        let mut logs = *top;
+        for (i, &k) in self.places.iter().enumerate() {
+            logs[k] += step[i];
+        }
+        logs
+    }
+}
+
+/// One point of the mixture.
+struct Point {
+    weight: f64,
+    logs: Logs,
+    at: Likelihood,
+}
+
+fn points(
+    system: &System,
+    found: &MostLikely,
+    mut axes: Axes,
+    levels: Levels,
+) -> Result<Vec<Point>, HandEyeError> {
+    let posterior = |logs: &Logs| -> Result<(f64, Likelihood), HandEyeError> {
+        let at = variance::evaluate(system, logs, levels)?;
+        Ok((at.value + variance::prior(&at, levels), at))
+    };
+    let n = axes.places.len();
+    let top = found.at.value + variance::prior(&found.at, levels);
+    for axis in 0..n {
+        for (side, sign) in [(0, -1.0), (1, 1.0)] {
+            let mut place = DVector::zeros(n);
+            place[axis] = sign * PROBE;
+            let logs = variance::kept(axes.at(&found.logs, &place), levels);
+            let fall = posterior(&logs)?.0 - top;
+            axes.widths[axis][side] = (PROBE / fall.max(1e-3).sqrt()).clamp(WIDTHS.0, WIDTHS.1);
+        }
+    }
+    let law = StudentsT::new(0.0, 1.0, TAILS).expect("positive degrees of freedom");
+    let ratio = golden_ratio(n);
+    let mut points = Vec::with_capacity(POINTS);
+    for k in 0..POINTS {
+        let mut place = DVector::zeros(n);
+        let mut log_density = 0.0;
+        for axis in 0..n {
+            let uniform = (0.5 + (k as f64 + 1.0) * ratio.powi(-(axis as i32 + 1))).fract();
+            let t = law.inverse_cdf(uniform.clamp(1e-6, 1.0 - 1e-6));
+            let width = axes.widths[axis][usize::from(t > 0.0)];
+            place[axis] = width * t;
+            log_density -= width.ln() + 0.5 * (TAILS + 1.0) * (t * t / TAILS).ln_1p();
+        }
+        let wanted = axes.at(&found.logs, &place);
+        let logs = variance::kept(wanted, levels);
+        let (value, at) = posterior(&logs)?;
+        points.push(Point { weight: -0.5 * (value - top) - log_density, logs, at });
+    }
+    let most = points.iter().map(|point| point.weight).fold(f64::NEG_INFINITY, f64::max);
+    for point in &mut points {
+        point.weight = (point.weight - most).exp();
+    }
+    points.retain(|point| point.weight > NO_WEIGHT);
+    let sum: f64 = points.iter().map(|point| point.weight).sum();
+    for point in &mut points {
+        point.weight /= sum;
+    }
+    Ok(points)
+}
+
+/// The number above one whose power of `dimensions + 1` is itself plus one.
+fn golden_ratio(dimensions: usize) -> f64 {
+    let power = 1.0 / (dimensions as f64 + 1.0);
+    (0..64).fold(2.0, |x: f64, _| (1.0 + x).powf(power))
+}
+
+/// Covariance of the log-variances.
+fn scatter(points: &[Point]) -> Matrix6<f64> {
+    let mean: Logs = points.iter().map(|point| point.logs * point.weight).sum();
+    points.iter().map(|point| (point.logs - mean) * (point.logs - mean).transpose() * point.weight).sum()
+}
+
+/// What the points say of the hand-eye transform.
+struct Mixture {
+    /// Weight and covariance of the error at the reference point, the shift of the mean in it.
+    of_point: Vec<(f64, Matrix3<f64>)>,
+    /// Weight, covariance and shift of the hand-eye transform.
+    of_hand_eye: Vec<(f64, Matrix6<f64>, Vector6<f64>)>,
+}
+
+impl Mixture {
+    fn new(points: &[Point], reference_point: &Point3<f64>) -> Self {
+        let of_hand_eye: Vec<_> = points
+            .iter()
+            .map(|point| {
+                let covariance: Matrix6<f64> = point.at.covariance.fixed_view::<6, 6>(0, 0).into_owned();
+                let shift: Vector6<f64> = point.at.step.fixed_rows::<6>(0).into_owned();
+                (point.weight, covariance, shift)
+            })
+            .collect();
+        let moved = |covariance: &Matrix6<f64>, shift: &Vector6<f64>| {
+            quality::point_covariance(&(covariance + shift * shift.transpose()), reference_point)
+        };
+        let of_point = of_hand_eye.iter().map(|(weight, c, shift)| (*weight, moved(c, shift))).collect();
+        Self { of_point, of_hand_eye }
+    }
+
+    /// The shape of the t, before its size is known; `None` where the covariances have no inverse.
+    fn shape(&self, points: &[Point]) -> Option<DMatrix<f64>> {
+        let n = points.first()?.at.covariance.nrows();
+        let (mut information, mut shifts) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+        for Point { weight, at, .. } in points {
+            information += at.reduced.information() * *weight;
+            shifts += &at.step * at.step.transpose() * *weight;
+        }
+        Some(super::normal::covariance_of(&information)? + shifts)
+    }
+
+    fn degrees_of_freedom(&self) -> f64 {
+        let log = |covariance: &Matrix3<f64>| covariance.trace().max(f64::MIN_POSITIVE).ln();
+        let mean: f64 = self.of_point.iter().map(|(weight, c)| weight * log(c)).sum();
+        let variance: f64 = self.of_point.iter().map(|(weight, c)| weight * (log(c) - mean).powi(2)).sum();
+        // ψ'(m / 2) is 2 / m + 2 / m² and less than a tenth more from two degrees of freedom on.
+        ((1.0 + (1.0 + 2.0 * variance).sqrt()) / variance.max(1.0 / MANY)).min(MANY)
+    }
+
+    /// 6 F(6, m) at 95 % over the 95 % quantile of the squared distance of the mixture.
+    fn region_scale(&self, covariance: &Matrix6<f64>, degrees_of_freedom: f64) -> Option<f64> {
+        let factor = Cholesky::new(*covariance)?;
+        let laws: Vec<(f64, f64, f64)> = self
+            .of_hand_eye
+            .iter()
+            .map(|(weight, c, shift)| {
+                let relative = factor.solve(c);
+                let moved = factor.solve(shift);
+                let mean = relative.trace() + shift.dot(&moved);
+                let variance = 2.0 * (relative * relative).trace() + 4.0 * moved.dot(&(c * moved));
+                // A gamma distribution of the same mean and variance.
+                (*weight, 0.5 * mean, mean * mean / variance)
+            })
+            .collect();
+        let below = |squared: f64| -> f64 {
+            laws.iter().map(|(weight, half_mean, shape)| weight * gamma_lr(*shape, shape * squared / (2.0 * half_mean))).sum()
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        while below(high) < LEVEL && high < 1e9 {
+            (low, high) = (high, 2.0 * high);
+        }
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if below(middle) < LEVEL { low = middle } else { high = middle }
+        }
+        let wanted = 6.0 * FisherSnedecor::new(6.0, degrees_of_freedom).ok()?.inverse_cdf(LEVEL);
+        Some(wanted / high).filter(|scale| scale.is_finite() && *scale > 0.0)
+    }
+}
+
+/// Share of errors within what is stated.
+const LEVEL: f64 = 0.95;
