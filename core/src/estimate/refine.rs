@@ -12,7 +12,7 @@ use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{
     self, CornerWeights, Free, JointProblem, JointSolution, JointStart, with_shown_field,
 };
-use crate::estimate::handeye::{HandEyeError, PosePair, subset};
+use crate::estimate::handeye::{HandEyeError, PosePair};
 use crate::estimate::residuals::squared_residuals;
 use crate::estimate::uncertainty::widening::Widening;
 use crate::estimate::uncertainty::{quality, widening};
@@ -186,9 +186,8 @@ fn offsets(
         Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
         Err(_) => return Ok(None),
     };
-    let held_out = |problem: &JointProblem<'_>, solution: &JointSolution| {
-        quality::held_out_rms_px(problem, &solution.as_start(), work.cancel)
-    };
+    let held_out =
+        |problem: &JointProblem<'_>, solution: &JointSolution| quality::held_out_rms_px(problem, solution, work.cancel);
     let before = held_out(&without, &screened.solution)?;
     let after = held_out(&with, &solution)?;
     let (Some(before_px), Some(after_px)) = (before, after) else { return Ok(None) };
@@ -222,11 +221,7 @@ pub fn judge(
     solution: &mut JointSolution,
     work: &Work<'_>,
 ) -> Result<Judged, HandEyeError> {
-    // Leaving out a fifth of so many views changes their noise levels by a few percent, and finding them again would
-    // take longer than everything else.
-    let known = (problem.views.len() > subset::MOST_VIEWS).then_some(solution.noise);
-    let folds = JointProblem { noise: known, ..*problem };
-    let heldout = quality::held_out(&folds, &solution.as_start(), *work)?;
+    let heldout = quality::held_out(problem, solution, *work)?;
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
     let widening = widening::check(problem, solution, work.cancel)?;
     solution.widen(widening.factor);

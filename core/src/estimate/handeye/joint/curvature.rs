@@ -85,7 +85,13 @@ impl Optimum<'_> {
         for direction in directions.column_iter() {
             for sign in [-DIFFERENCE, DIFFERENCE] {
                 let step: DVector<f64> = direction * sign;
-                let own = self.reduced.own_steps(&step).iter().zip(&at_rest).map(|(own, rest)| own - rest).collect::<Vec<_>>();
+                let own = self
+                    .reduced
+                    .own_steps(&step)
+                    .iter()
+                    .zip(&at_rest)
+                    .map(|(own, rest)| own - rest)
+                    .collect::<Vec<_>>();
                 let Some(system) = self.linearised(&self.state.stepped(self.problem, &step, &own))? else {
                     return Ok(None);
                 };
@@ -126,7 +132,11 @@ impl Optimum<'_> {
             if (rise / RISE - 1.0).abs() < NEAR {
                 break;
             }
-            if rise < RISE { inside = place } else { outside = place }
+            if rise < RISE {
+                inside = place
+            } else {
+                outside = place
+            }
             let by_parabola = place * (RISE / rise.max(f64::MIN_POSITIVE)).sqrt();
             let between = by_parabola > inside && by_parabola < outside;
             place = if between { by_parabola } else { 0.5 * (inside + outside) }.min(FARTHEST);

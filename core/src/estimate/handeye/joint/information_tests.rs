@@ -1,6 +1,6 @@
 use super::*;
 use crate::estimate::handeye::Mode;
-use crate::estimate::handeye::joint::optimise;
+use crate::estimate::handeye::joint::optimise::{self, Descent};
 use crate::estimate::handeye::joint::problem::Free;
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::variance::{evaluate, to_logs};
@@ -23,7 +23,10 @@ fn counts_change_with_the_levels_as_the_information_says() {
         let plain = t.problem(true, Some(noise));
         let problem = JointProblem { free: Free { field: levels.field, warp: true, ..plain.free }, ..plain };
         let mut state = State::new(&problem, &t.start());
-        let (system, _) = optimise::minimise(&problem, &mut state, &noise, &CancelToken::default()).expect("solves");
+        let cancel = CancelToken::default();
+        let start = System::new(&problem, &state, &cancel).expect("regular");
+        let descent = Descent::new(&problem, &noise, optimise::FAR);
+        let (system, _) = optimise::minimise(descent, &mut state, start, &cancel).expect("solves");
         let logs = to_logs(&noise);
         let at = evaluate(&system, &logs, levels).expect("regular");
         let found = information(&system, &noise, &at, levels);
@@ -41,7 +44,11 @@ fn counts_change_with_the_levels_as_the_information_says() {
             let own = levels.folded(at.counts);
             for k in levels.estimated() {
                 let expected = f64::from(k == l) * own[k] - 2.0 * found[(k, l)];
-                assert!((slope[k] - expected).abs() < 1e-5 * own[k].max(1.0), "{levels:?} {k} {l}: {} {expected}", slope[k]);
+                assert!(
+                    (slope[k] - expected).abs() < 1e-5 * own[k].max(1.0),
+                    "{levels:?} {k} {l}: {} {expected}",
+                    slope[k]
+                );
             }
         }
     }

@@ -167,12 +167,7 @@ struct Point {
     at: Likelihood,
 }
 
-fn points(
-    system: &System,
-    found: &MostLikely,
-    mut axes: Axes,
-    levels: Levels,
-) -> Result<Vec<Point>, HandEyeError> {
+fn points(system: &System, found: &MostLikely, mut axes: Axes, levels: Levels) -> Result<Vec<Point>, HandEyeError> {
     let posterior = |logs: &Logs| -> Result<(f64, Likelihood), HandEyeError> {
         let at = variance::evaluate(system, logs, levels)?;
         Ok((at.value + variance::prior(&at, levels), at))
@@ -290,7 +285,9 @@ impl Mixture {
             })
             .collect();
         let below = |squared: f64| -> f64 {
-            laws.iter().map(|(weight, half_mean, shape)| weight * gamma_lr(*shape, shape * squared / (2.0 * half_mean))).sum()
+            laws.iter()
+                .map(|(weight, half_mean, shape)| weight * gamma_lr(*shape, shape * squared / (2.0 * half_mean)))
+                .sum()
         };
         let (mut low, mut high) = (0.0, 1.0);
         while below(high) < LEVEL && high < 1e9 {

@@ -63,6 +63,7 @@ pub use weights::CornerWeights;
 
 use curvature::Optimum;
 use integrated::Integrated;
+use optimise::Descent;
 use state::State;
 use variance::Levels;
 
@@ -116,9 +117,13 @@ pub(crate) fn fit<'a>(
         }
     }
     let (mut iterations, mut deviance) = (0, None);
+    let mut system = normal::System::new(problem, &state, work.cancel)?;
     for round in 0..MAX_ROUNDS {
         work.report(Stage::Joint, round, MAX_ROUNDS);
-        let (system, steps) = optimise::minimise(problem, &mut state, &noise, work.cancel)?;
+        let damping = if round == 0 { optimise::FAR } else { optimise::NEAR };
+        let descent = Descent::new(problem, &noise, damping);
+        let (found, steps) = optimise::minimise(descent, &mut state, system, work.cancel)?;
+        system = found;
         iterations += steps;
         if problem.noise.is_some() {
             break;
@@ -142,7 +147,8 @@ pub(crate) fn fit<'a>(
         // It was asked for on the way and is not needed at the end.
         noise.view_px = 0.0;
     }
-    let (system, steps) = optimise::minimise(problem, &mut state, &noise, work.cancel)?;
+    let descent = Descent::new(problem, &noise, optimise::NEAR);
+    let (system, steps) = optimise::minimise(descent, &mut state, system, work.cancel)?;
     let solution = finish(problem, &state, &system, noise, &work)?;
     Ok(JointSolution { iterations: iterations + steps, deviance, ..solution })
 }

@@ -1,6 +1,6 @@
 //! The normal equations of all views and their reduction to the unknowns that these share.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, SMatrix, SVector, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, Vector6};
 
 use super::equations::{PoseEquations, ViewInput};
 use super::field::HALF;
@@ -55,22 +55,46 @@ impl System {
             slopes: state.field.as_ref().map_or_else(Vec::new, |field| field.slopes().to_vec()),
             shared: SharedMatrix::zeros(),
             shared_gradient: SharedVector::zeros(),
-            rest: Rest { form: SMatrix::zeros(), gradient: SVector::zeros(), squared_px: 0.0 },
+            rest: Rest::nothing(),
             cancel: cancel.clone(),
         };
         for index in 0..problem.views.len() {
             if cancel.is_cancelled() {
                 return Err(HandEyeError::Cancelled);
             }
-            let block = linearise(problem, state, index)?;
-            block.add_shared(layout, &mut system.shared);
-            system.shared_gradient += block.shared_gradient;
-            system.rest.form += block.rest.form;
-            system.rest.gradient += block.rest.gradient;
-            system.rest.squared_px += block.rest.squared_px;
-            system.blocks.push(block);
+            system.add(linearise(problem, state, index)?);
         }
         Ok(system)
+    }
+
+    fn add(&mut self, block: ViewBlock) {
+        block.add_shared(self.layout, &mut self.shared);
+        self.shared_gradient += block.shared_gradient;
+        self.rest.form += block.rest.form;
+        self.rest.gradient += block.rest.gradient;
+        self.rest.squared_px += block.rest.squared_px;
+        self.blocks.push(block);
+    }
+
+    /// The same with the views alone that are asked for.
+    pub fn of_views(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept = |index: &usize| keep(*index);
+        let corrections = (0..self.blocks.len()).filter(kept).map(|i| self.corrections[i]).collect();
+        let mut system = Self {
+            blocks: Vec::with_capacity(self.blocks.len()),
+            corrections,
+            layout: self.layout,
+            priors: self.priors.clone(),
+            slopes: self.slopes.clone(),
+            shared: SharedMatrix::zeros(),
+            shared_gradient: SharedVector::zeros(),
+            rest: Rest::nothing(),
+            cancel: self.cancel.clone(),
+        };
+        for index in (0..self.blocks.len()).filter(kept) {
+            system.add(self.blocks[index].clone());
+        }
+        system
     }
 
     /// Weighted squares of the rests after a step of the shared unknowns, and their expectation on top of it when these

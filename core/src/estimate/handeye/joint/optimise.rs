@@ -10,22 +10,40 @@ use crate::progress::CancelToken;
 const MAX_STEPS: usize = 100;
 /// Ends when the quadratic model promises less than this part of the cost.
 const COST_TOLERANCE: f64 = 1e-12;
-/// First damping relative to the diagonal.
-const FIRST_DAMPING: f64 = 1e-4;
+/// Damping of the first step from a start that may be far off, relative to the diagonal.
+pub const FAR: f64 = 1e-4;
+/// And of one from near the optimum, where damping only holds the weak directions back.
+pub const NEAR: f64 = 1e-10;
 /// Past this damping a step is too small to matter.
 const LARGEST_DAMPING: f64 = 1e12;
 
-/// Minimises the cost from `state`, which holds the best point found afterwards. Returns the system at that point and the
-/// number of steps.
+/// What is minimised, and from how far.
+#[derive(Clone, Copy)]
+pub struct Descent<'a> {
+    pub problem: &'a JointProblem<'a>,
+    pub noise: &'a Noise,
+    /// First damping.
+    pub damping: f64,
+    /// Ends when the quadratic model promises less than this part of the cost.
+    pub tolerance: f64,
+}
+
+impl<'a> Descent<'a> {
+    /// To the optimum itself.
+    pub fn new(problem: &'a JointProblem<'a>, noise: &'a Noise, damping: f64) -> Self {
+        Self { problem, noise, damping, tolerance: COST_TOLERANCE }
+    }
+}
+
+/// Minimises the cost from `state`, which holds the best point found afterwards; `system` is linearised there. Returns the
+/// system at that point and the number of steps.
 pub fn minimise(
-    problem: &JointProblem<'_>,
+    Descent { problem, noise, mut damping, tolerance }: Descent<'_>,
     state: &mut State,
-    noise: &Noise,
+    mut system: System,
     cancel: &CancelToken,
 ) -> Result<(System, usize), HandEyeError> {
-    let mut system = System::new(problem, state, cancel)?;
     let mut cost = system.cost(noise);
-    let mut damping = FIRST_DAMPING;
     for step in 0..MAX_STEPS {
         loop {
             let trial = system.reduce_damped(noise, damping).map(|reduced| {
@@ -42,7 +60,7 @@ pub fn minimise(
                     continue;
                 }
             };
-            if promised <= COST_TOLERANCE * cost.max(f64::MIN_POSITIVE) {
+            if promised <= tolerance * cost.max(f64::MIN_POSITIVE) {
                 return Ok((system, step));
             }
             // A step that puts the target behind the camera is as bad as one that raises the cost.

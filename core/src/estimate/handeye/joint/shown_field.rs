@@ -1,7 +1,10 @@
 //! Whether the data show errors of the robot that depend on where it stands.
 
 use super::field::Places;
-use super::{Free, JointProblem, JointSolution, JointStart, fit};
+use super::normal::System;
+use super::state::State;
+use super::variance::{self, Levels};
+use super::{Free, JointProblem, JointSolution, JointStart, Noise, fit};
 use crate::estimate::handeye::HandEyeError;
 use crate::progress::{CancelToken, Work};
 use crate::targets::observation::View;
@@ -10,6 +13,9 @@ use crate::targets::observation::View;
 /// hundred. Both its levels are at the edge of what they can be, so a quarter of all healthy sessions gains nothing, one
 /// half follows chi-square with one degree of freedom and the last quarter with two (Self & Liang 1987).
 const GAIN: f64 = 7.29;
+/// Part of the gain that the linearised equations have to show for a fit with the field: these differ from it in the second
+/// order.
+const NEARLY: f64 = 0.8;
 /// Standard deviation of the size of a target over the stated one, before any data: printers scale to fit, and rulers are
 /// read to half a millimetre on a square of some twenty.
 const SIZE_SIGMA: f64 = 0.03;
@@ -34,6 +40,9 @@ pub fn with_shown_field<'a>(
     let cancel = work.into().cancel;
     let problem = JointProblem { free: without.free, views, ..*problem };
     let with = JointProblem { free: Free { field: true, ..problem.free }, ..problem };
+    if !gains(&with, without, cancel)? {
+        return Ok(None);
+    }
     let Some(with) = estimated(&with, &without.as_start(), cancel)? else { return Ok(None) };
     let Some((plain, field)) = without.deviance.zip(with.deviance) else { return Ok(None) };
     if plain - field < GAIN {
@@ -47,6 +56,22 @@ pub fn with_shown_field<'a>(
         }
     }
     Ok(Some(with))
+}
+
+/// Whether the likelihood gains enough by the equations linearised without the field, which spares most sessions the fit with
+/// it.
+fn gains(with: &JointProblem<'_>, without: &JointSolution, cancel: &CancelToken) -> Result<bool, HandEyeError> {
+    let Some(plain) = without.deviance else { return Ok(false) };
+    let state = State { field: with.field(), ..State::of(without) };
+    let system = System::new(with, &state, cancel)?;
+    let Noise { robot_m: field_m, robot_rad: field_rad, .. } = without.noise;
+    let start = Noise { field_m, field_rad, ..without.noise };
+    let levels = Levels { view: start.view_px > 0.0, field: true };
+    match variance::restricted_likelihood(&system, &start, levels) {
+        Ok((_, field)) => Ok(plain - field >= NEARLY * GAIN),
+        Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
+        Err(_) => Ok(false),
+    }
 }
 
 /// Minus twice the log-likelihood of an estimate whose target may be of another size, to compare with one whose may not:

@@ -79,6 +79,13 @@ pub struct Rest {
     pub squared_px: f64,
 }
 
+impl Rest {
+    /// Of no view.
+    pub fn nothing() -> Self {
+        Self { form: SMatrix::zeros(), gradient: SVector::zeros(), squared_px: 0.0 }
+    }
+}
+
 /// One view, linearised: `r` are its pixel residuals, `s` the shared unknowns, `d` its correction, `p` its own pose.
 ///
 /// The residuals are split into the six numbers that a pose of the view could explain and the rest, because errors that
