@@ -20,8 +20,8 @@
 
 mod answer;
 mod bound;
+mod level_scatter;
 mod scene;
-mod small_sample;
 mod tables;
 mod tally;
 
@@ -132,7 +132,7 @@ fn main() -> Result<(), String> {
         summaries.push(run_cell(*cell, &arguments));
         eprintln!("{} of {} cells after {:.0} s", done + 1, arguments.cells.len(), began.elapsed().as_secs_f64());
     }
-    for table in [tables::errors, tables::coverage, tables::levels, tables::recipes] {
+    for table in [tables::errors, tables::coverage, tables::levels, tables::pooled] {
         println!("{}", table(&summaries));
     }
     let failures = tables::failures(&summaries);

@@ -14,12 +14,16 @@ fn mode(cell: &Cell) -> &'static str {
     }
 }
 
+fn robot(cell: &Cell) -> String {
+    if cell.noise.robot_m == 0.0 {
+        return "exact".to_owned();
+    }
+    let field = if cell.noise.field_m > 0.0 { ", affine field" } else { "" };
+    format!("{:.1} mm, {:.2}°{field}", cell.noise.robot_m * 1e3, cell.noise.robot_rad.to_degrees())
+}
+
 fn lead(cell: &Cell) -> String {
-    let robot = if cell.noise.robot_m == 0.0 {
-        "exact".to_owned()
-    } else {
-        format!("{:.1} mm, {:.2}°", cell.noise.robot_m * 1e3, cell.noise.robot_rad.to_degrees())
-    };
+    let robot = robot(cell);
     let lens = if cell.free_intrinsics { "unknown" } else { "known" };
     format!("| {} | {lens} | {} | {robot} | {:.2} px |", mode(cell), cell.poses, cell.noise.corner_px)
 }
@@ -115,15 +119,29 @@ pub fn levels(summaries: &[Summary]) -> String {
     out
 }
 
-/// Coverage of regions for estimated noise levels, by the recipes that `docs/maths/uncertainty.md` derives.
-pub fn recipes(summaries: &[Summary]) -> String {
-    let mut out = format!(
-        "{LEAD} Gaussian % | F by axes % | Kenward–Roger with edge % | Kenward–Roger % | tip, Gaussian % | tip, F by axes % | tip, F by its own % | median degrees of freedom |\n{LEAD_RULE}{}\n",
-        " --- |".repeat(8)
-    );
-    for s in summaries {
-        let shares = joined(s.estimated.recipes.iter().map(|share| format!(" {:.1} |", share * 100.0)));
-        append!(out, "{}{shares} {:.0} |\n", lead(&s.cell), s.estimated.median_degrees_of_freedom);
+/// Coverage with estimated noise levels over all cells of a lens, a robot and a number of views, with its standard error
+/// and how many cells there are.
+pub fn pooled(summaries: &[Summary]) -> String {
+    let mut out = "| lens | robot | poses | cells | region % | tip % | cells with a tip beyond 93 to 97 % |\n| --- | --- | --- | --- | --- | --- | --- |\n".to_owned();
+    let lens = |s: &Summary| if s.cell.free_intrinsics { "unknown" } else { "known" };
+    let key = |s: &Summary| (lens(s), robot(&s.cell), s.cell.poses);
+    let mut rows: Vec<(&str, String, usize)> = Vec::new();
+    for summary in summaries {
+        if !rows.contains(&key(summary)) {
+            rows.push(key(summary));
+        }
+    }
+    for row in rows {
+        let cells: Vec<&Summary> = summaries.iter().filter(|s| key(s) == row).collect();
+        let trials: f64 = cells.iter().map(|s| s.trials as f64).sum();
+        let pooled = |of: fn(&Performance) -> f64| {
+            let share = cells.iter().map(|s| of(&s.estimated) * s.trials as f64).sum::<f64>() / trials;
+            format!("{:.1} ± {:.1}", share * 100.0, (share * (1.0 - share) / trials).sqrt() * 100.0)
+        };
+        let beyond = cells.iter().filter(|s| !(0.93..=0.97).contains(&s.estimated.tip_covered)).count();
+        let (lens, robot, poses) = row;
+        let (region, tip) = (pooled(|p| p.covered), pooled(|p| p.tip_covered));
+        append!(out, "| {lens} | {robot} | {poses} | {} | {region} | {tip} | {beyond} |\n", cells.len());
     }
     out
 }

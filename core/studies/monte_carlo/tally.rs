@@ -1,18 +1,19 @@
 //! What is counted over the trials of a cell.
 
 use handeye_core::estimate::handeye::closed_form;
-use handeye_core::geometry::statistics::median_high;
 use nalgebra::{Isometry3, Matrix6, Vector6};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
 use super::answer::{self, Answer};
 use super::bound::{self, Normals};
+use super::level_scatter::level_scatter;
 use super::scene::{Cell, Trial};
-use super::small_sample::{self, Correction};
 
 /// Components of a hand-eye transform.
 const COMPONENTS: f64 = 6.0;
 const PROBABILITY: f64 = 0.95;
+/// Degrees of freedom that count as infinite: quantiles differ by less than one part in a thousand.
+const MANY: f64 = 1e4;
 /// Times the bound beyond which an estimate is not a matter of noise.
 const FAR: f64 = 8.0;
 
@@ -44,59 +45,9 @@ pub struct Judged {
     pub tip_covered: bool,
     /// Outlier views, less those that are wrong.
     pub aside: f64,
-    /// What the recipes of [`Correction`] make of the estimated noise levels; `None` where they are given or no recipe
-    /// has an answer.
-    pub recipes: Option<Recipes>,
     /// Estimated over true noise levels: corner, robot in translation and in rotation; the levels themselves in µm and
     /// millidegrees where the robot is exact.
     pub noise: [f64; 3],
-}
-
-/// Whether regions and tip errors for estimated noise levels hold the truth, by recipe.
-#[expect(clippy::struct_excessive_bools, reason = "each is a question of its own")]
-#[derive(Debug, Clone, Copy)]
-pub struct Recipes {
-    /// Chi-square with the covariance as if the noise levels were true.
-    pub gaussian: bool,
-    /// F with that covariance and the degrees of freedom of its axes.
-    pub by_directions: bool,
-    /// Kenward and Roger, levels at the edge counted as uncertain.
-    pub with_edge: bool,
-    /// Kenward and Roger, levels at the edge counted as known.
-    pub kenward_roger: bool,
-    /// The tip error by a Gaussian, and with Kenward and Roger's covariance by the degrees of freedom of the axes and by
-    /// those of the tip itself.
-    pub tip: [bool; 3],
-    /// Degrees of freedom of the axes.
-    pub degrees_of_freedom: f64,
-}
-
-impl Recipes {
-    fn new(normals: &Normals, answer: &Answer, error: &Vector6<f64>, at_point_m: f64) -> Option<Self> {
-        let small = Correction::new(normals, &answer.noise, false)?;
-        let with_edge = Correction::new(normals, &answer.noise, true)?;
-        let plain2 = mahalanobis2(&small.covariance, error)?;
-        let kenward_roger = |of: &Correction| -> Option<bool> {
-            let (scale, dof) = of.kenward_roger()?;
-            Some(scale * mahalanobis2(&of.inflated, error)? <= limit(dof)?)
-        };
-        let point = &answer.reference_point;
-        let tip = |covariance, dof| small_sample::tip_probability(covariance, dof, point, at_point_m);
-        let of_tip = small.tip_degrees_of_freedom(point);
-        let degrees_of_freedom = small.by_directions();
-        Some(Self {
-            gaussian: plain2 <= limit(f64::INFINITY)?,
-            by_directions: plain2 <= limit(degrees_of_freedom)?,
-            with_edge: kenward_roger(&with_edge)?,
-            kenward_roger: kenward_roger(&small)?,
-            tip: [
-                tip(&small.covariance, f64::INFINITY)? <= PROBABILITY,
-                tip(&small.inflated, degrees_of_freedom)? <= PROBABILITY,
-                tip(&small.inflated, of_tip)? <= PROBABILITY,
-            ],
-            degrees_of_freedom,
-        })
-    }
 }
 
 /// `eᵀ C⁻¹ e`; `None` when the covariance is singular.
@@ -108,7 +59,7 @@ fn mahalanobis2(covariance: &Matrix6<f64>, error: &Vector6<f64>) -> Option<f64> 
 }
 
 impl Judged {
-    fn new(trial: &Trial, normals: &Normals, answer: &Answer, given: bool) -> Option<Self> {
+    fn new(trial: &Trial, answer: &Answer) -> Option<Self> {
         let (truth, estimate) = (trial.mount_from_camera.isometry(), answer.mount_from_camera.isometry());
         let error = bound::error_twist(truth, estimate);
         let mahalanobis2 = mahalanobis2(&answer.covariance, &error)?;
@@ -121,7 +72,6 @@ impl Judged {
             aside: answer.aside as f64 - trial.wrong.iter().filter(|wrong| **wrong).count() as f64,
             covered: answer.small_sample.scale * mahalanobis2 <= limit(answer.small_sample.degrees_of_freedom)?,
             tip_covered: at_point.norm() <= answer.tip_error_95_m,
-            recipes: if given { None } else { Recipes::new(normals, answer, &error, at_point.norm()) },
             noise: [
                 level(found.corner_px, true_noise.corner_px, 1.0),
                 level(found.robot_m, true_noise.robot_m, 1e-6),
@@ -134,7 +84,7 @@ impl Judged {
 /// The squared Mahalanobis distance that 95 % of errors stay under: six times the F quantile, or chi-square's where the
 /// covariance counts as known.
 fn limit(degrees_of_freedom: f64) -> Option<f64> {
-    if degrees_of_freedom < small_sample::MANY {
+    if degrees_of_freedom < MANY {
         return Some(COMPONENTS * FisherSnedecor::new(COMPONENTS, degrees_of_freedom).ok()?.inverse_cdf(PROBABILITY));
     }
     Some(ChiSquared::new(COMPONENTS).ok()?.inverse_cdf(PROBABILITY))
@@ -156,15 +106,13 @@ pub fn run(cell: &Cell, seed: u64, number: u64, product: bool) -> Result<Outcome
     let trial = super::scene::trial(cell, seed, number);
     let normals = Normals::new(&trial);
     let bound = bound::hand_eye(&normals, &cell.noise).ok_or("the bound is singular")?;
-    let judged = |answer: Result<Answer, String>, given: bool| {
-        answer.and_then(|a| {
-            Judged::new(&trial, &normals, &a, given).ok_or_else(|| "the covariance is singular".to_owned())
-        })
+    let judged = |answer: Result<Answer, String>| {
+        answer.and_then(|a| Judged::new(&trial, &a).ok_or_else(|| "the covariance is singular".to_owned()))
     };
     let start = answer::start(&trial);
     let from = |noise_given| start.as_ref().map_err(Clone::clone).and_then(|s| answer::joint(&trial, s, noise_given));
-    let given = judged(from(true), true);
-    let estimated = judged(if product { answer::product(&trial) } else { from(false) }, false);
+    let given = judged(from(true));
+    let estimated = judged(if product { answer::product(&trial) } else { from(false) });
     let truth = trial.mount_from_camera.isometry();
     let closed_forms = start.as_ref().map_or_else(
         |_| vec![None; closed_form::all().len()],
@@ -173,8 +121,7 @@ pub fn run(cell: &Cell, seed: u64, number: u64, product: bool) -> Result<Outcome
             s.closed_forms.iter().map(|c| c.as_ref().map(deviation)).collect()
         },
     );
-    let level_scatter = Correction::new(&normals, &cell.noise, true).map(|s| s.level_scatter(&cell.noise));
-    Ok(Outcome { bound, given, estimated, closed_forms, level_scatter })
+    Ok(Outcome { bound, given, estimated, closed_forms, level_scatter: level_scatter(&normals, &cell.noise) })
 }
 
 /// Root mean square error over the bound's, with the standard error of that ratio.
@@ -203,9 +150,6 @@ pub struct Performance {
     pub mean_mahalanobis2: f64,
     /// Mean number of views left out as an outlier, less those that are wrong.
     pub aside: f64,
-    /// Shares of [`Recipes`] in its order: four regions and three tip errors.
-    pub recipes: [f64; 7],
-    pub median_degrees_of_freedom: f64,
     /// Root mean squares of [`Judged::noise`], and its standard deviations.
     pub noise: [f64; 3],
     pub noise_scatter: [f64; 3],
@@ -232,21 +176,8 @@ impl Performance {
         let pairs = |of: fn(&Deviation) -> f64, which: fn(&(f64, f64)) -> f64| -> Vec<(f64, f64)> {
             good.iter().map(|(level, j)| (of(&j.deviation), which(level).powi(2))).collect()
         };
-        let known: Vec<Recipes> = good.iter().filter_map(|(_, j)| j.recipes).collect();
-        let by = |is: fn(&Recipes) -> bool| known.iter().filter(|r| is(r)).count() as f64 / known.len().max(1) as f64;
-        let recipes = [
-            by(|r| r.gaussian),
-            by(|r| r.by_directions),
-            by(|r| r.with_edge),
-            by(|r| r.kenward_roger),
-            by(|r| r.tip[0]),
-            by(|r| r.tip[1]),
-            by(|r| r.tip[2]),
-        ];
         let noise_mean: [f64; 3] = std::array::from_fn(|i| mean(&|j| j.noise[i]));
         Self {
-            recipes,
-            median_degrees_of_freedom: median_high(known.iter().map(|r| r.degrees_of_freedom)).unwrap_or_default(),
             translation: Ratio::of(&pairs(|d| d.metres2, |l| l.0)),
             rotation: Ratio::of(&pairs(|d| d.radians2, |l| l.1)),
             covered: share(|j| j.covered),

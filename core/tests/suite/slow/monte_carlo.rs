@@ -4,10 +4,10 @@
 mod answer;
 #[path = "../../../studies/monte_carlo/bound.rs"]
 mod bound;
+#[path = "../../../studies/monte_carlo/level_scatter.rs"]
+mod level_scatter;
 #[path = "../../../studies/monte_carlo/scene.rs"]
 mod scene;
-#[path = "../../../studies/monte_carlo/small_sample.rs"]
-mod small_sample;
 #[expect(dead_code, reason = "the study prints more than is tested here")]
 #[path = "../../../studies/monte_carlo/tally.rs"]
 mod tally;
@@ -17,7 +17,6 @@ use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::joint::Noise;
 use nalgebra::{DMatrix, Matrix6};
 use scene::{Cell, Trial};
-use small_sample::Correction;
 use tally::Summary;
 
 const EXACT: Noise = Noise { corner_px: 0.1, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
@@ -95,7 +94,6 @@ fn tiny(noise: Noise) -> Trial {
 fn information_of_the_noise_levels_is_that_of_the_dense_projector() {
     let trial = tiny(GOOD);
     let normals = Normals::new(&trial);
-    let small = Correction::new(&normals, &GOOD, true).expect("determined");
     // The dense model: square roots of the blocks stand in for the derivatives themselves, of which only products count.
     let blocks: Vec<_> = normals.blocks().collect();
     let width = normals.shared + 6;
@@ -141,51 +139,4 @@ fn information_of_the_noise_levels_is_that_of_the_dense_projector() {
         let expected = 0.5 * dense[(k, k)].sqrt();
         assert!((by_blocks[k] / expected - 1.0).abs() < 1e-4, "level {k}: {} of {expected}", by_blocks[k]);
     }
-}
-
-#[test]
-fn kenward_and_rogers_covariance_is_minus_the_weighted_curvature() {
-    // Φ_A = Φ − Σ W_kl ∂²Φ/∂θ_k∂θ_l, the curvature by differences of the bound: another way to the same number.
-    const STEP: f64 = 0.02;
-    let trial = tiny(GOOD);
-    let normals = Normals::new(&trial);
-    let small = Correction::new(&normals, &GOOD, true).expect("determined");
-    let levels = [GOOD.corner_px, GOOD.robot_m, GOOD.robot_rad];
-    let at = |factors: [f64; 3]| {
-        let [corner_px, robot_m, robot_rad] = std::array::from_fn(|k| levels[k] * factors[k].sqrt());
-        bound::hand_eye(&normals, &Noise { corner_px, robot_m, robot_rad, ..Noise::EXACT }).expect("determined")
-    };
-    let mut curvature = Matrix6::zeros();
-    for k in 0..3 {
-        for l in 0..3 {
-            let shifted = |a: f64, b: f64| {
-                let mut factors = [1.0; 3];
-                factors[k] += a * STEP;
-                factors[l] += b * STEP;
-                at(factors)
-            };
-            let second = (shifted(1.0, 1.0) - shifted(1.0, -1.0) - shifted(-1.0, 1.0) + shifted(-1.0, -1.0))
-                / (4.0 * STEP * STEP);
-            curvature += second * small.relative_covariance(&GOOD)[(k, l)];
-        }
-    }
-    assert!(worst_difference(&small.covariance, &at([1.0; 3])) < 1e-6);
-    let expected = small.covariance - curvature;
-    let difference = worst_difference(&expected, &small.inflated);
-    // Second differences over two hundredths are good to their square.
-    assert!(difference < 2e-3, "{difference}");
-    assert!(worst_difference(&small.covariance, &small.inflated) > 0.02, "five views are few enough to tell");
-}
-
-#[test]
-fn without_a_robot_the_covariance_rests_on_all_residuals() {
-    let trial = scene::trial(&cell(Mode::EyeToHand, 6, EXACT, false), 2, 0);
-    let normals = Normals::new(&trial);
-    let small = Correction::new(&normals, &EXACT, false).expect("determined");
-    let expected = (6 * 140 - 12) as f64;
-    // F from the axes: each has n − p degrees of freedom, and the combination keeps them.
-    assert!((small.by_directions() / expected - 1.0).abs() < 1e-6, "{}", small.by_directions());
-    let (scale, dof) = small.kenward_roger().expect("determined");
-    assert!((dof / expected - 1.0).abs() < 1e-6 && (scale - 1.0).abs() < 1e-6, "{scale} {dof}");
-    assert!(worst_difference(&small.covariance, &small.inflated) < 1e-9);
 }

@@ -188,3 +188,7 @@ fn enlarged(covariance: DMatrix<f64>, addition: &DMatrix<f64>) -> DMatrix<f64> {
     let grown = &root * &eigen.eigenvectors;
     &covariance + &grown * DMatrix::from_diagonal(&added) * grown.transpose()
 }
+
+#[cfg(test)]
+#[path = "curvature_tests.rs"]
+mod tests;

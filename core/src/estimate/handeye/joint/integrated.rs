@@ -304,3 +304,7 @@ impl Mixture {
 
 /// Share of errors within what is stated.
 const LEVEL: f64 = 0.95;
+
+#[cfg(test)]
+#[path = "integrated_tests.rs"]
+mod tests;

@@ -162,6 +162,8 @@ impl Length {
 
 #[cfg(test)]
 mod tests {
+    use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
     use super::*;
 
     #[test]
@@ -187,6 +189,18 @@ mod tests {
         }
         let c = Matrix3::from_diagonal(&Vector3::new(1.0, 0.2, 0.01));
         assert!((radius_95_t(&c, 9.9e5) / radius_95(&c) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_mixture_of_one_is_a_gaussian_and_one_over_variances_is_a_t() {
+        let c = Matrix3::from_diagonal(&Vector3::new(1.0, 0.2, 0.01));
+        assert!((radius_95_mixture(&[(0.3, c), (0.7, c)]) / radius_95(&c) - 1.0).abs() < 1e-9);
+        // The variance of a t of eight degrees of freedom is eight over a chi-square of eight, taken at 2,000 quantiles.
+        let chi = ChiSquared::new(8.0).expect("positive");
+        let parts: Vec<(f64, Matrix3<f64>)> =
+            (0..2000).map(|k| (1.0 / 2000.0, c * (8.0 / chi.inverse_cdf((f64::from(k) + 0.5) / 2000.0)))).collect();
+        let ratio = radius_95_mixture(&parts) / radius_95_t(&c, 8.0);
+        assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
     }
 
     #[test]
