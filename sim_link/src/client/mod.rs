@@ -24,7 +24,7 @@ mod transport;
 
 pub use callback::{CallbackName, CallbackScope};
 pub use connection::Connection;
-pub use endpoint::{DEFAULT_PORT, Endpoint};
+pub use endpoint::{BadEndpoint, DEFAULT_PORT, Endpoint};
 pub use error::LinkError;
 pub use handeye_core::progress::CancelToken;
 pub use options::{CallOptions, ConnectionOptions};
