@@ -16,7 +16,7 @@ use handeye_core::estimate::handeye::closed_form;
 use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
 use handeye_core::geometry::planar_pose;
 use handeye_core::progress::CancelToken;
-use handeye_core::testing::sessions::camera;
+use handeye_core::testing::sessions::{GRID, camera};
 use handeye_core::wording::Catalogue;
 
 use handeye_core::targets::TargetSpec;
@@ -216,10 +216,10 @@ fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice()
 fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor() {
     // Circles look the same from both ends.
     let mut observations = session(&Setup::new(Mode::EyeInHand, 16, 720));
-    observations.target = TargetSpec::Circles(sim::GRID);
+    observations.target = TargetSpec::Circles(GRID);
     for n in [2, 3, 9, 13] {
         let corners = observations.views[n].corners.as_mut().expect("seen");
-        handeye_core::targets::observation::renumber(corners, &TargetSpec::Circles(sim::GRID));
+        handeye_core::targets::observation::renumber(corners, &TargetSpec::Circles(GRID));
     }
     let cancel = CancelToken::default();
     let (true_mount_from_camera, _) = sim::links(Mode::EyeInHand);
