@@ -151,7 +151,7 @@ fn the_weakest_direction_is_named_where_tilts_are_small() {
 fn claimed(observations: &Observations) -> Calibration {
     let cancel = CancelToken::default();
     let mut calibration = calibrate(observations, Method::Joint, &cancel).expect("an answer, right or wrong");
-    diagnose(observations, Some(&mut calibration), &FindingOptions { goal_mm: Some(1.0) }, &cancel);
+    diagnose(observations, Some(&mut calibration), &FindingOptions::with_goal_mm(Some(1.0)), &cancel);
     calibration
 }
 
@@ -205,7 +205,7 @@ fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice()
     let mut calibration = calibrate(&observations, Method::Joint, &cancel).expect("an answer");
     // The noise alone would reach it.
     let goal_mm = 1.1e3 * calibration.modelled_error_95_m().expect("stated");
-    let options = FindingOptions { goal_mm: Some(goal_mm) };
+    let options = FindingOptions::with_goal_mm(Some(goal_mm));
     let found = diagnose(&observations, Some(&mut calibration), &options, &cancel).findings;
     let goal = found.iter().find(|f| f.code == FindingCode::GoalNotReached).expect("it is not reached");
     assert!(goal.to_string().contains("More views do not help"), "{goal}");
