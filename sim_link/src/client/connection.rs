@@ -189,11 +189,6 @@ impl Connection {
         CallbackName(name)
     }
 
-    /// Forgets a callback.
-    pub fn unregister_callback(&mut self, name: &CallbackName) {
-        self.callbacks.remove(&name.0);
-    }
-
     /// Has the server forget this client, its stepping mode and its locks, and goes on as a new one.
     pub fn renew(&mut self) {
         self.contacted |= self.transport.connected();
