@@ -14,6 +14,7 @@ pub mod messages;
 pub mod model;
 pub mod motion;
 pub mod observe;
+mod report;
 pub mod rerun_log;
 mod scene;
 pub mod session;

@@ -1,4 +1,4 @@
-//! Depth images: samples, deprojection, colours, and the encoding in the three channels of a colour image.
+//! Depth images: samples, deprojection, colours.
 
 use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
@@ -145,25 +145,6 @@ impl DepthImage {
         })
     }
 
-    /// Packs the depths into colours, see [`RgbDepth`].
-    ///
-    /// # Errors
-    /// [`DepthError::BadRange`] for a scale that is not positive, [`DepthError::WrongLength`].
-    pub fn to_rgb(&self, encoding: RgbDepth) -> Result<RgbImage, DepthError> {
-        encoding.check()?;
-        self.image(|depth| encoding.encode(depth))
-    }
-
-    /// Unpacks what [`Self::to_rgb`] made. Black is [`DepthSample::Invalid`].
-    ///
-    /// # Errors
-    /// [`DepthError::BadRange`] for a scale that is not positive.
-    pub fn from_rgb(image: &RgbImage, encoding: RgbDepth) -> Result<Self, DepthError> {
-        encoding.check()?;
-        let metres = image.pixels().map(|p| encoding.decode(p.0)).collect();
-        Self::new(image.width(), image.height(), metres)
-    }
-
     fn image(&self, colour: impl Fn(f32) -> [u8; 3]) -> Result<RgbImage, DepthError> {
         let (width, height) = (self.width, self.height);
         let need = width as usize * height as usize;
@@ -271,61 +252,6 @@ const VIRIDIS: [[u8; 3]; 17] = [
     [213, 226, 26],
     [253, 231, 37],
 ];
-
-/// Packing of depths into 24 bits over the three channels of a colour image:
-/// `v = floor(depth · per_metre + 0.5)` clipped to 0 … 2²⁴ − 1, red the high byte of `v`, green the middle, blue the
-/// low one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RgbDepth {
-    /// Units of the packed number per metre.
-    pub per_metre: f64,
-    /// Whether the low byte is left out (blue is 0), which makes the steps 256 times coarser.
-    pub drop_blue: bool,
-}
-
-impl Default for RgbDepth {
-    /// 256 000 per metre: blue counts 1/256 mm and green whole millimetres, up to 65.5 m.
-    fn default() -> Self {
-        Self { per_metre: 256_000.0, drop_blue: false }
-    }
-}
-
-impl RgbDepth {
-    const MAX: f64 = 16_777_215.0;
-
-    /// The encoding whose unit is `range_m` times finer than the default's, as scripts use it that scale by the
-    /// sensor's range as well: 256 · 1000 · 3.5 = 896 000 per metre for a range of 3.5 m, which clips beyond 18.7 m.
-    pub fn scaled_by_range(range_m: f64) -> Self {
-        Self { per_metre: 256_000.0 * range_m, drop_blue: false }
-    }
-
-    /// Depths beyond this are clipped, metres.
-    pub fn max_m(&self) -> f64 {
-        Self::MAX / self.per_metre
-    }
-
-    /// The colour of a depth in metres; what is no depth is black, like 0.
-    pub fn encode(&self, depth_m: f32) -> [u8; 3] {
-        let value = (f64::from(depth_m) * self.per_metre + 0.5).floor();
-        // A NaN clamps to NaN and converts to 0.
-        let [_, red, green, blue] = (value.clamp(0.0, Self::MAX) as u32).to_be_bytes();
-        [red, green, if self.drop_blue { 0 } else { blue }]
-    }
-
-    /// The depth of a colour in metres; blue is ignored when it is dropped.
-    pub fn decode(&self, [red, green, blue]: [u8; 3]) -> f32 {
-        let value = u32::from_be_bytes([0, red, green, if self.drop_blue { 0 } else { blue }]);
-        (f64::from(value) / self.per_metre) as f32
-    }
-
-    fn check(&self) -> Result<(), DepthError> {
-        if self.per_metre.is_finite() && self.per_metre > 0.0 {
-            Ok(())
-        } else {
-            Err(DepthError::BadRange { what: "the scale of the depth encoding", low: 0.0, high: self.per_metre })
-        }
-    }
-}
 
 #[cfg(test)]
 #[path = "depth_tests.rs"]

@@ -1,7 +1,6 @@
 use super::DepthSample::{Far, Invalid, Metres};
 use super::*;
 use crate::geometry::camera::Distortion;
-use proptest::prelude::*;
 
 const FAR_M: f32 = 3.5;
 
@@ -25,7 +24,6 @@ fn a_wrong_number_of_samples_is_refused() {
     assert_eq!(error, DepthError::WrongLength { width: 4, height: 3, got: 11, need: 12 });
     let broken = DepthImage { width: 4, height: 3, metres: vec![] };
     assert!(broken.colours(ColourMap::Grey, 0.0, 1.0, FAR_M).is_err());
-    assert!(broken.to_rgb(RgbDepth::default()).is_err());
     assert_eq!(broken.sample(0, 0, FAR_M), DepthSample::Invalid);
 }
 
@@ -89,63 +87,6 @@ fn an_image_spans_the_range_and_marks_what_is_no_depth() {
     for (near, far) in [(1.0, 1.0), (2.0, 1.0), (f32::NAN, 1.0), (0.0, f32::INFINITY)] {
         assert!(matches!(image.colours(ColourMap::Turbo, near, far, FAR_M), Err(DepthError::BadRange { .. })));
     }
-}
-
-#[test]
-fn depths_are_packed_into_the_exact_bytes() {
-    let plain = RgbDepth::default();
-    // 1 m = 256 000 = 0x03E800; 1 mm = 256; 1.2345 m = 316 032 = 0x04D280.
-    assert_eq!(plain.encode(1.0), [0x03, 0xE8, 0x00]);
-    assert_eq!(plain.encode(0.001), [0, 1, 0]);
-    assert_eq!(plain.encode(1.2345), [0x04, 0xD2, 0x80]);
-    // Half a unit rounds up.
-    assert_eq!(plain.encode(0.5 / 256_000.0), [0, 0, 1]);
-    assert_eq!(plain.encode(0.49 / 256_000.0), [0, 0, 0]);
-
-    let scaled = RgbDepth::scaled_by_range(3.5);
-    assert_eq!(scaled.per_metre, 896_000.0);
-    // 1 m = 896 000 = 0x0DAC00; 3.5 m = 3 136 000 = 0x2FDA00.
-    assert_eq!(scaled.encode(1.0), [0x0D, 0xAC, 0x00]);
-    assert_eq!(scaled.encode(3.5), [0x2F, 0xDA, 0x00]);
-}
-
-#[test]
-fn depths_beyond_the_packed_range_clip() {
-    let scaled = RgbDepth::scaled_by_range(3.5);
-    assert!((scaled.max_m() - 18.7246).abs() < 1e-4);
-    // 18.5 m = 16 576 000 = 0xFCEE00.
-    assert_eq!(scaled.encode(18.5), [0xFC, 0xEE, 0x00]);
-    assert_eq!(scaled.encode(18.8), [0xFF; 3]);
-    assert_eq!(scaled.encode(f32::INFINITY), [0xFF; 3]);
-    assert_eq!(scaled.encode(-1.0), [0; 3]);
-    assert_eq!(scaled.encode(f32::NAN), [0; 3]);
-}
-
-#[test]
-fn without_blue_the_steps_are_whole_millimetres() {
-    let coarse = RgbDepth { drop_blue: true, ..RgbDepth::default() };
-    assert_eq!(coarse.encode(1.2345), [0x04, 0xD2, 0x00]);
-    assert_eq!(coarse.decode([0x04, 0xD2, 0x80]), 1.234);
-    assert_eq!(coarse.decode([0x04, 0xD2, 0x00]), 1.234);
-}
-
-proptest! {
-    #[test]
-    fn packing_loses_at_most_half_a_step(depth_m in 0.0..18.0f32) {
-        let encoding = RgbDepth::scaled_by_range(3.5);
-        let back = encoding.decode(encoding.encode(depth_m));
-        // Half a step and the rounding of the f32 itself.
-        prop_assert!((back - depth_m).abs() <= (0.5 / 896_000.0) as f32 + depth_m * f32::EPSILON);
-    }
-}
-
-#[test]
-fn a_whole_image_survives_packing() {
-    let image = DepthImage::new(2, 2, vec![0.25, 1.0, 2.0, 3.5]).expect("four");
-    let back = DepthImage::from_rgb(&image.to_rgb(RgbDepth::default()).expect("packs"), RgbDepth::default());
-    assert_eq!(back, Ok(image.clone()));
-    let bad = RgbDepth { per_metre: 0.0, drop_blue: false };
-    assert!(matches!(image.to_rgb(bad), Err(DepthError::BadRange { .. })));
 }
 
 #[test]

@@ -12,6 +12,10 @@ const MAX_DEPTH: usize = 32;
 /// Largest message accepted: a 4k RGB image and room to spare.
 pub const MAX_MESSAGE_BYTES: usize = 64 << 20;
 
+/// Longest reply that a client reads. A little over the limit of a message is still read, and refused with its length;
+/// far over it is not worth the memory.
+pub(crate) const MAX_REPLY_BYTES: usize = 2 * MAX_MESSAGE_BYTES;
+
 /// Bytes that are not one CBOR item, or an item of the wrong shape.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -156,10 +156,7 @@ impl Desktop {
         let mut at = self.place_of(label);
         loop {
             // A pane that has just come to the front moves its widgets for a frame or two.
-            self.watch.forget();
-            for _ in 0..CHANGES_OF_A_FRAME {
-                self.watch.changes_within(LOOK);
-            }
+            self.frame_drawn();
             let next = self.place_of(label);
             if next == at {
                 break;
@@ -169,6 +166,14 @@ impl Desktop {
         let (x, y) = at;
         self.mouse(&["mousemove", &format!("{x:.0}"), &format!("{y:.0}"), "click", "1"]);
         self.clicks += 1;
+    }
+
+    /// Waits until another frame was drawn, but not for long: a window in which nothing changes is not drawn again.
+    fn frame_drawn(&self) {
+        self.watch.forget();
+        for _ in 0..CHANGES_OF_A_FRAME {
+            self.watch.changes_within(LOOK);
+        }
     }
 
     /// Where the middle of a button is that can be pressed; waits for it.
@@ -207,10 +212,11 @@ impl Desktop {
 
     /// An image of the screen, `NAME.png`; the pointer is moved out of the way first, and what it opened closes.
     pub fn photograph(&self, name: &str) {
-        self.watch.forget();
         self.mouse(&["mousemove", "700", "12"]);
-        // The window is drawn again without what the pointer was over, then without what hung there.
-        self.watch.changes_within(LOOK);
+        // The window is drawn again without what the pointer was over, then without what hung there. The list of widgets is
+        // written before its frame is on the screen, so that one more has to begin.
+        self.frame_drawn();
+        self.frame_drawn();
         let deadline = Instant::now() + PATIENCE;
         while self.widgets().iter().any(|widget| widget.role == "Tooltip") && Instant::now() < deadline {
             self.watch.changes_within(LOOK);

@@ -39,7 +39,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
             None
         }
     };
-    let options = FindingOptions { goal_mm: args.goal };
+    let options = FindingOptions::with_goal_mm(args.goal);
     let diagnosis = diagnose(&observations, calibration.as_mut(), &options, &cancel);
     if cancel.is_cancelled() {
         return Err(Failure::failed(HandEyeError::Cancelled));

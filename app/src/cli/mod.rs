@@ -13,7 +13,6 @@ mod gate;
 mod out;
 mod output;
 mod record;
-pub(crate) mod report;
 pub mod rerun_arg;
 mod solve;
 mod target;

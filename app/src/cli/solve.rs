@@ -16,9 +16,10 @@ use handeye_core::project::session::{
 };
 
 use super::output::Output;
-use super::{Failure, out, report};
+use super::{Failure, out};
 use crate::model::{Goal, JobId, Observed, Solved, Step, Truth};
 use crate::observe::{ObserveError, observe, observe_session};
+use crate::report;
 use crate::rerun_log::{Entry, Recorder};
 use crate::session::start;
 use crate::worker::{self, SolveJob};
@@ -119,7 +120,7 @@ impl Solution {
 
     /// All of it for a person. It ends with a newline.
     fn report(&self) -> String {
-        report::text(self.result()) + &report::verification(&self.solved)
+        report::page(&self.solved)
     }
 
     /// Writes the JSON where it is wanted and prints the report, unless the JSON is printed in its place.

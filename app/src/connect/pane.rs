@@ -2,7 +2,7 @@
 
 use egui::text::LayoutJob;
 use egui::{Align, Button, ComboBox, FontSelection, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
-use handeye_sim_link::client::{Endpoint, LinkError};
+use handeye_sim_link::client::{BadEndpoint, Endpoint};
 
 use crate::command::{Command, Outbox};
 use crate::connect::server_name;
@@ -142,7 +142,7 @@ fn connect_button_ui(ui: &mut Ui, model: &Model, wanted: Option<&CellSource>, ou
 }
 
 /// The field for the address; the cell when it is a good one.
-fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Result<CellSource, LinkError> {
+fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Result<CellSource, BadEndpoint> {
     let language = model.view.language;
     let mut address = draft.address.clone().unwrap_or_else(|| match (&model.source, model.addresses.first()) {
         (CellSource::Address(address), _) | (CellSource::BuiltIn, Some(address)) => address.clone(),

@@ -4,11 +4,22 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Pane, Severity};
+use crate::model::workflow::Pane;
 use crate::text::Text;
 
 /// Messages that are kept: a long day of work, and not a leak.
 const KEPT: usize = 2000;
+
+/// How much a message matters, least first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Severity {
+    /// It went as asked.
+    Info,
+    /// Not as asked, or soon not.
+    Warning,
+    /// It failed.
+    Error,
+}
 
 /// Where a message stands. The log has all of them; besides that each stands in one place, so that nothing is said twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

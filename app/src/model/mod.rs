@@ -3,19 +3,17 @@
 //! Only [`crate::app::App::apply`] and [`crate::app::App::absorb`] change a [`Model`]; panes read it. Times are seconds
 //! on the clock that the application was started with.
 
-mod workflow;
+pub(crate) mod workflow;
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::depth::{ColourMap, DepthImage, DepthSample};
+use handeye_core::depth::ColourMap;
 use handeye_core::estimate::Method;
 use handeye_core::estimate::handeye::HandEye;
 use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::image::RgbImage;
+use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::verify::Predictor;
 use handeye_sim_link::client::cell::JointAngles;
@@ -25,8 +23,10 @@ pub use crate::capture::state::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
 pub use crate::export::state::{ExportState, Preview, PreviewFile, Written};
-pub use crate::live::state::{Overlays, PickedPoint, SceneView, Viewport, exports_of};
-pub use crate::messages::state::{Home, Message, Messages};
+pub use crate::live::state::{
+    FrameImages, FrameInfo, ImagePoint, LiveFrame, Overlays, PickedPoint, SceneView, Viewport, exports_of,
+};
+pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{
     Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
@@ -148,88 +148,6 @@ pub struct RobotState {
     pub simulation: Simulation,
 }
 
-/// What is known about a frame besides its pixels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FrameInfo {
-    /// Counts the frames since the start of the program; grows with every frame that the camera worker takes.
-    pub number: u64,
-    /// Simulated time of the images \[s\].
-    pub sim_time_s: f64,
-    /// How much older than pose and joints they may be \[s\] of simulated time: nothing where all is of one instant.
-    pub image_age_s: f64,
-    /// When they arrived.
-    pub received_s: f64,
-    /// Frames per second that arrive.
-    pub rate_hz: f64,
-    /// Depths \[m\] at the two ends of the colour map.
-    pub depth_range_m: [f32; 2],
-    /// The sensor's far plane \[m\]: depths there are no surface.
-    pub far_plane_m: f32,
-    /// The tip as the controller reported it at the instant of the images.
-    pub base_from_tip: Pose<Base, Tip>,
-    /// The joints at the same instant \[rad\].
-    pub joints_rad: JointAngles,
-    /// Where the board was at that instant, if the cell publishes it; only ever compared with.
-    pub base_from_target_true: Option<Pose<Base, Target>>,
-}
-
-/// The pixels of a frame.
-#[derive(Clone, PartialEq)]
-pub struct FrameImages {
-    /// Colour, row 0 on top.
-    pub rgb: RgbImage,
-    /// Depth in metres, row 0 on top.
-    pub depth: DepthImage,
-    /// Depth as the window shows it, same size as `depth`.
-    pub depth_coloured: RgbImage,
-}
-
-/// Sizes only: a million pixels say nothing in a log.
-impl fmt::Debug for FrameImages {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { rgb, depth, depth_coloured: _ } = self;
-        let depth = (depth.width, depth.height);
-        f.debug_struct("FrameImages").field("rgb", &rgb.dimensions()).field("depth", &depth).finish()
-    }
-}
-
-impl FrameImages {
-    /// Colour of a pixel; `None` outside.
-    pub fn rgb_at(&self, point: ImagePoint) -> Option<[u8; 3]> {
-        self.rgb.get_pixel_checked(point.column, point.row).map(|pixel| pixel.0)
-    }
-
-    /// Depth at a pixel of the colour image; the depth image may have another size.
-    pub fn depth_at(&self, point: ImagePoint, far_plane_m: f32) -> DepthSample {
-        let (width, height) = self.rgb.dimensions();
-        if point.column >= width || point.row >= height {
-            return DepthSample::Invalid;
-        }
-        let scaled = |at: u32, of: u32, to: u32| (u64::from(at) * u64::from(to) / u64::from(of)) as u32;
-        let column = scaled(point.column, width, self.depth.width);
-        let row = scaled(point.row, height, self.depth.height);
-        self.depth.sample(column, row, far_plane_m)
-    }
-}
-
-/// A pair of images with its circumstances.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LiveFrame {
-    /// When, how often, which range.
-    pub info: FrameInfo,
-    /// The pixels.
-    pub images: Arc<FrameImages>,
-}
-
-/// A pixel of the colour image; (0, 0) is the top left one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ImagePoint {
-    /// Column from the left.
-    pub column: u32,
-    /// Row from the top.
-    pub row: u32,
-}
-
 /// Which depths the colour map covers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -307,17 +225,6 @@ impl Default for Goal {
     fn default() -> Self {
         Self(0.5e-3)
     }
-}
-
-/// How much a message matters, least first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Severity {
-    /// It went as asked.
-    Info,
-    /// Not as asked, or soon not.
-    Warning,
-    /// It failed.
-    Error,
 }
 
 /// Everything that the window shows.

@@ -25,7 +25,6 @@ mod pump;
 mod queue;
 pub(crate) mod recorded;
 mod recorder;
-mod report;
 mod reports;
 pub mod scene;
 mod serving;

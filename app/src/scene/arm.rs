@@ -2,8 +2,8 @@
 
 use std::sync::LazyLock;
 
+use handeye_core::geometry::arm::ur5::forward;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::cell::kinematics::forward;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::cell::{ArmChain, JOINTS, JointAngles};
 use nalgebra::Isometry3;

@@ -9,7 +9,8 @@ use handeye_core::targets::observation::Corner;
 use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{CapturePurpose, FrameImages};
+use crate::capture::state::CapturePurpose;
+use crate::live::state::FrameImages;
 use crate::text::Text;
 
 /// A document as it is on the disk, and what undo and redo would do.

@@ -79,7 +79,7 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
 /// [`CalibrateError`].
 pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> {
     let mut calibration = estimate::calibrate_with(&job.observations, job.method, job.options, work)?;
-    let goal = FindingOptions { goal_mm: Some(job.goal_m * 1e3) };
+    let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3));
     let findings = doctor::diagnose(&job.observations, Some(&mut calibration), &goal, work.cancel).findings;
     let options = start::solve_options(job.method, job.options, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);

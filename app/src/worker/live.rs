@@ -6,7 +6,9 @@ use std::sync::{Mutex, PoisonError};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
-use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState};
+use handeye_sim_link::client::{
+    BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState,
+};
 
 use super::cell_error::{check, check_arm, port_error};
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
@@ -40,7 +42,7 @@ impl LiveConnector {
                 }
             }
         };
-        address.parse().map_err(|error: LinkError| PortError::Hopeless(Text::verbatim(error.to_string())))
+        address.parse().map_err(|error: BadEndpoint| PortError::Hopeless(Text::verbatim(error.to_string())))
     }
 
     /// Makes one connection.

@@ -1,9 +1,9 @@
 use nalgebra::{Isometry3, Vector2, Vector3};
 
-use super::synthetic::{Board, Instant, image};
 use super::{Machine, Plan, Progress, Refusal, Wait};
 use crate::geometry::frames::Pose;
 use crate::targets::observation::Corner;
+use crate::testing::flat_board::{Board, Instant, image};
 
 /// When the capture is asked for; image 0 arrives at 100 s and one every 0.05 s after.
 const REQUESTED_S: f64 = 100.0;

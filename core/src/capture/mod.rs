@@ -59,5 +59,3 @@ pub struct Shot<'a> {
 mod machine_tests;
 #[cfg(test)]
 mod parts_tests;
-#[cfg(test)]
-mod synthetic;

@@ -4,10 +4,11 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 
-use super::synthetic::{Board, GRID, image};
 use super::{Average, EdgeBlur, MAX_BLUR_SHARE, Scatter};
 use crate::depth::DepthImage;
 use crate::targets::observation::Corner;
+use crate::testing::flat_board::{Board, image};
+use crate::testing::sessions::GRID;
 
 #[test]
 fn colours_are_averaged_and_rounded_and_depths_leave_holes_out() {

@@ -12,7 +12,6 @@ mod lens;
 mod pairs;
 mod refine;
 mod residuals;
-mod to_result;
 mod two_poses;
 pub mod uncertainty;
 mod wrong_corners;
@@ -33,7 +32,6 @@ use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::geometry::planar_pose::PoseError;
 use crate::progress::{Stage, Work};
-use crate::project::dataset::CameraInput;
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardShape;
 use crate::targets::observation::{Corner, View};
@@ -111,17 +109,6 @@ pub enum CameraKnowledge {
 impl CameraKnowledge {
     /// What is known when nothing is stated: intrinsics are estimated with [`DEFAULT_MODEL`].
     pub const NOTHING: Self = Self::Estimate { model: DEFAULT_MODEL, start: None };
-
-    /// What a data set or a session says of its camera.
-    pub fn of(camera: Option<&CameraInput>) -> Self {
-        match camera {
-            None => Self::NOTHING,
-            Some(input) => match input.intrinsics {
-                Some(intrinsics) if input.fixed => Self::Fixed(intrinsics),
-                start => Self::Estimate { model: input.model, start },
-            },
-        }
-    }
 }
 
 /// Views of a good session: the noise levels rest on as many numbers, and with ten they are known to a fifth.
@@ -260,6 +247,7 @@ pub enum CalibrateError {
 
 /// A finished calibration.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Calibration {
     /// Both rigid links; `None` without a robot.
     pub hand_eye: Option<HandEye>,
@@ -334,6 +322,7 @@ pub struct CalibratedCamera {
 
 /// How well the corners alone determine an estimated camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct CameraFit {
     /// Standard deviations of fx, fy, cx, cy in pixels, see [`Stated`](intrinsics::Stated); `None` where there are no more
     /// residuals than unknowns.
@@ -369,6 +358,7 @@ impl CameraFit {
 
 /// What the joint estimate knows beyond the links and the camera.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct JointFit {
     /// What was estimated besides the links.
     pub free: Free,

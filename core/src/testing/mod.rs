@@ -6,7 +6,11 @@
 mod board_views;
 mod drawn;
 mod exact;
+#[cfg(test)]
+pub(crate) mod flat_board;
 mod machine;
+#[cfg(test)]
+pub(crate) mod moving_board;
 mod scene;
 pub mod sessions;
 mod views;

@@ -19,8 +19,11 @@ use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::{Corner, View};
 use crate::targets::{Grid, TargetSpec};
 
+/// The inner corners of the board of the reference cell.
+pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
+
 /// The board of the reference cell.
-pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
+pub const BOARD: TargetSpec = TargetSpec::Chessboard(GRID);
 
 /// Noise of a good robot and a good camera.
 pub const REALISTIC: Noise =

@@ -2,7 +2,8 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::geometry::frames::Target;
-use crate::track::stage::{self, FAR_M, GRID, Watch, board_at, error};
+use crate::testing::moving_board::{self, FAR_M, Watch, board_at, error};
+use crate::testing::sessions::GRID;
 
 fn board() -> Pose<Base, Target> {
     board_at(Vector3::zeros(), Vector3::new(0.3, -0.2, 0.1))
@@ -29,9 +30,9 @@ fn measured(change: impl Fn(u32, u32, &mut f32)) -> Option<ByDepth> {
         rms_px: 0.0,
     };
     let grey = image::GrayImage::new(640, 480);
-    let base_from_tip = stage::base_from_tip();
+    let base_from_tip = moving_board::base_from_tip();
     let image = Image { time_s: 0.0, grey: &grey, depth: Some(&depth), far_plane_m: FAR_M, base_from_tip };
-    by_depth(&image, &depth, &seen, &stage::calibrated(), &TargetSpec::Chessboard(GRID))
+    by_depth(&image, &depth, &seen, &moving_board::calibrated(), &TargetSpec::Chessboard(GRID))
 }
 
 #[test]

@@ -104,7 +104,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::track::stage::{GRID, Stage, Watch, board_at};
+    use crate::testing::moving_board::{Stage, Watch, board_at};
+    use crate::testing::sessions::GRID;
 
     #[test]
     fn an_image_without_board_shows_none_and_one_with_a_board_may() {

@@ -1,7 +1,8 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::*;
-use crate::track::stage::{GRID, base_from_tip, board_at, calibrated, tip_from_camera};
+use crate::testing::moving_board::{base_from_tip, board_at, calibrated, tip_from_camera};
+use crate::testing::sessions::GRID;
 
 fn estimate() -> Estimate {
     Estimate {

@@ -22,8 +22,6 @@ mod goal;
 mod motion;
 mod noise;
 mod pose;
-#[cfg(test)]
-mod stage;
 #[cfg(feature = "opencv")]
 mod tracker;
 

@@ -6,8 +6,9 @@ use crate::estimate::handeye::HandEye;
 use crate::geometry::camera::CameraError;
 use crate::geometry::frames::Target;
 use crate::targets::Grid;
+use crate::testing::moving_board::{self, Cover, PERIOD_S, Watch, board_at, error, rms};
+use crate::testing::sessions::GRID;
 use crate::track::MotionModel;
-use crate::track::stage::{self, Cover, GRID, PERIOD_S, Watch, board_at, error, rms};
 
 fn still() -> Pose<Base, Target> {
     board_at(Vector3::zeros(), Vector3::zeros())
@@ -66,9 +67,9 @@ fn the_velocity_of_a_board_that_moves_evenly_is_found() {
     let start = still();
     let at = |time_s: f64| {
         let turn = UnitQuaternion::from_scaled_axis(spin * time_s);
-        let middle = start.isometry() * stage::centre() + velocity * time_s;
+        let middle = start.isometry() * moving_board::centre() + velocity * time_s;
         let rotation = turn * start.rotation();
-        let origin = middle.coords - rotation * stage::centre().coords;
+        let origin = middle.coords - rotation * moving_board::centre().coords;
         Pose::<Base, Target>::from_isometry(Isometry3::from_parts(origin.into(), rotation))
     };
     let mut last = None;
@@ -98,7 +99,7 @@ fn a_board_half_covered_is_followed_by_the_corners_that_are_seen() {
     for _ in 0..30 {
         let now = round(watch.time_s + PERIOD_S);
         // Everything to the right of the board's middle.
-        let middle = watch.camera_from_target(&now) * stage::centre();
+        let middle = watch.camera_from_target(&now) * moving_board::centre();
         let low = Vector2::new(watch.stage.camera.project(&middle).expect("in front").x, 0.0);
         watch.stage.covers = vec![Cover { low, high: Vector2::new(640.0, 480.0) }];
         let update = watch.see(Some(&now));
@@ -194,8 +195,8 @@ fn a_board_that_is_moved_suddenly_is_found_again_within_three_images() {
 
 #[test]
 fn a_camera_beside_the_robot_follows_the_board_whatever_the_tip_does() {
-    let mut setup = stage::setup();
-    let base_from_camera = stage::base_from_tip() * stage::tip_from_camera();
+    let mut setup = moving_board::setup();
+    let base_from_camera = moving_board::base_from_tip() * moving_board::tip_from_camera();
     setup.calibrated.hand_eye = HandEye::EyeToHand { base_from_camera, tip_from_target: Pose::identity() };
     let mut watch = Watch::with(setup);
     for i in 0..10 {
@@ -212,7 +213,7 @@ fn a_board_that_stands_stands_while_the_camera_moves() {
     for i in 0..15 {
         let t = f64::from(i) * PERIOD_S;
         let step = Isometry3::new(Vector3::new(0.15 * t, 0.05 * t, 0.0), Vector3::new(0.0, 0.1 * t, 0.3 * t));
-        watch.base_from_tip = Pose::from_isometry(stage::base_from_tip().isometry() * step);
+        watch.base_from_tip = Pose::from_isometry(moving_board::base_from_tip().isometry() * step);
         let update = watch.see(Some(&still()));
         assert_eq!(corners_of(&update), 70);
         assert!(error(&estimate_of(&update).base_from_target, &still()).0 < 0.5e-3);
@@ -237,9 +238,10 @@ fn depths_and_corners_agree_on_where_the_board_is() {
 
 #[test]
 fn images_of_another_size_and_poses_that_are_no_numbers_are_refused() {
-    let mut tracker = Tracker::new(stage::setup()).expect("a good set-up");
+    let mut tracker = Tracker::new(moving_board::setup()).expect("a good set-up");
     let grey = GrayImage::new(320, 240);
-    let good = Image { time_s: 1.0, grey: &grey, depth: None, far_plane_m: 3.5, base_from_tip: stage::base_from_tip() };
+    let good =
+        Image { time_s: 1.0, grey: &grey, depth: None, far_plane_m: 3.5, base_from_tip: moving_board::base_from_tip() };
     let error = tracker.see(&good).expect_err("refused");
     assert!(matches!(error, TrackError::OtherSize { what: "image", width: 320, camera_width: 640, .. }), "{error}");
     let grey = GrayImage::new(640, 480);
@@ -260,7 +262,7 @@ fn images_of_another_size_and_poses_that_are_no_numbers_are_refused() {
 #[test]
 fn set_ups_that_cannot_be_worked_with_are_refused() {
     let refused = |change: &dyn Fn(&mut Setup)| {
-        let mut setup = stage::setup();
+        let mut setup = moving_board::setup();
         change(&mut setup);
         Tracker::new(setup).map(|_| ()).expect_err("refused")
     };
@@ -294,7 +296,7 @@ fn a_step_back_in_time_starts_anew_and_an_image_shown_twice_counts_once() {
 fn a_sharp_image_of_exact_coverage_is_followed() {
     use crate::geometry::camera::Intrinsics;
     use crate::testing::Scene;
-    let mut setup = stage::setup();
+    let mut setup = moving_board::setup();
     setup.calibrated.intrinsics = Intrinsics::pinhole(640, 480, 581.0);
     let mut watch = Watch::with(setup);
     for blur_px in [0.0, 0.7] {

@@ -7,9 +7,8 @@ use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView};
 use handeye_core::geometry::camera::Distortion;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3;
-use handeye_core::targets::Grid;
 use handeye_core::targets::observation::Corner;
-use handeye_core::testing::sessions::{BOARD, board_at, camera, noise_twist, noisy, normal};
+use handeye_core::testing::sessions::{BOARD, GRID, board_at, camera, noise_twist, noisy, normal};
 use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -117,8 +116,6 @@ impl fmt::Display for Setup {
         write!(f, "warp {:.1} mm", self.fault.warp_m * 1e3)
     }
 }
-
-pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 
 fn pose(x: f64, y: f64, z: f64, rotation: Vector3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_scaled_axis(rotation))

@@ -16,7 +16,7 @@ use handeye_core::estimate::handeye::closed_form;
 use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
 use handeye_core::geometry::planar_pose;
 use handeye_core::progress::CancelToken;
-use handeye_core::testing::sessions::camera;
+use handeye_core::testing::sessions::{GRID, camera};
 use handeye_core::wording::Catalogue;
 
 use handeye_core::targets::TargetSpec;
@@ -151,7 +151,7 @@ fn the_weakest_direction_is_named_where_tilts_are_small() {
 fn claimed(observations: &Observations) -> Calibration {
     let cancel = CancelToken::default();
     let mut calibration = calibrate(observations, Method::Joint, &cancel).expect("an answer, right or wrong");
-    diagnose(observations, Some(&mut calibration), &FindingOptions { goal_mm: Some(1.0) }, &cancel);
+    diagnose(observations, Some(&mut calibration), &FindingOptions::with_goal_mm(Some(1.0)), &cancel);
     calibration
 }
 
@@ -205,7 +205,7 @@ fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice()
     let mut calibration = calibrate(&observations, Method::Joint, &cancel).expect("an answer");
     // The noise alone would reach it.
     let goal_mm = 1.1e3 * calibration.modelled_error_95_m().expect("stated");
-    let options = FindingOptions { goal_mm: Some(goal_mm) };
+    let options = FindingOptions::with_goal_mm(Some(goal_mm));
     let found = diagnose(&observations, Some(&mut calibration), &options, &cancel).findings;
     let goal = found.iter().find(|f| f.code == FindingCode::GoalNotReached).expect("it is not reached");
     assert!(goal.to_string().contains("More views do not help"), "{goal}");
@@ -216,10 +216,10 @@ fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice()
 fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor() {
     // Circles look the same from both ends.
     let mut observations = session(&Setup::new(Mode::EyeInHand, 16, 720));
-    observations.target = TargetSpec::Circles(sim::GRID);
+    observations.target = TargetSpec::Circles(GRID);
     for n in [2, 3, 9, 13] {
         let corners = observations.views[n].corners.as_mut().expect("seen");
-        handeye_core::targets::observation::renumber(corners, &TargetSpec::Circles(sim::GRID));
+        handeye_core::targets::observation::renumber(corners, &TargetSpec::Circles(GRID));
     }
     let cancel = CancelToken::default();
     let (true_mount_from_camera, _) = sim::links(Mode::EyeInHand);

@@ -1,6 +1,5 @@
 //! The built-in simulated cell: a UR5 with an RGB-D camera and a board, served over the ZeroMQ remote API.
 
-pub mod kinematics;
 pub mod motion;
 pub mod planning;
 pub mod recorded;

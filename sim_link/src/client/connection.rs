@@ -1,18 +1,16 @@
-//! One conversation with a remote API server: calls, callbacks, time limits, recovery.
+//! One conversation with a remote API server: calls, time limits, recovery.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use ciborium::Value;
 
-use super::callback::{Callback, CallbackName, CallbackScope};
 use super::endpoint::Endpoint;
 use super::error::LinkError;
 use super::options::{CallOptions, ConnectionOptions};
 use super::protocol::{
-    self, CALLBACK_SUFFIX, ClientIds, END, EXECUTED, ProtocolVersion, REPEAT, REQUIRE, ReplyError, Sender,
-    ServerMessage, UNKNOWN_FUNCTION, WAIT,
+    self, ClientIds, END, EXECUTED, ProtocolVersion, REPEAT, REQUIRE, ReplyError, Sender, ServerMessage,
+    UNKNOWN_FUNCTION, WAIT,
 };
 use super::returned::Returned;
 use super::transport::{Transport, TransportFault, ZmqTransport};
@@ -45,10 +43,6 @@ pub struct Connection {
     version: Option<ProtocolVersion>,
     contacted: bool,
     epoch: u64,
-    callbacks: BTreeMap<String, Callback>,
-    registered: u64,
-    depth: u32,
-    broken: Option<LinkError>,
 }
 
 /// A call under way.
@@ -103,10 +97,6 @@ impl Connection {
             version: None,
             contacted: false,
             epoch: 0,
-            callbacks: BTreeMap::new(),
-            registered: 0,
-            depth: 0,
-            broken: None,
         }
     }
 
@@ -164,34 +154,11 @@ impl Connection {
             cancelled_at: Cell::new(None),
             asked: false,
         };
-        if self.depth == 0 {
-            self.broken = None;
-            // Between two calls it went without a word: the server may have forgotten this client since.
-            if self.transport.ended() {
-                self.drop_exchange();
-            }
+        // Between two calls it went without a word: the server may have forgotten this client since.
+        if self.transport.ended() {
+            self.drop_exchange();
         }
         self.converse(&mut exchange, args).map(|values| Returned::new(func, values))
-    }
-
-    /// Makes a closure callable by the server, under a name to be passed as an argument of a call.
-    ///
-    /// The closure gets the server's arguments and a scope for further calls, and returns the callback's results. Its
-    /// error does not reach the server, which gets no results and carries on; the call returns it when it ends.
-    pub fn register_callback(
-        &mut self,
-        name: &str,
-        callback: impl FnMut(&mut CallbackScope<'_>, &[Value]) -> Result<Vec<Value>, LinkError> + Send + 'static,
-    ) -> CallbackName {
-        self.registered += 1;
-        let name = format!("{name}_{:x}", self.registered);
-        self.callbacks.insert(name.clone(), Box::new(callback));
-        CallbackName(name)
-    }
-
-    /// Forgets a callback.
-    pub fn unregister_callback(&mut self, name: &CallbackName) {
-        self.callbacks.remove(&name.0);
     }
 
     /// Has the server forget this client, its stepping mode and its locks, and goes on as a new one.
@@ -215,7 +182,6 @@ impl Connection {
     /// Servers after CoppeliaSim 4.10 know names of the module only once some client has had it loaded, and forget that
     /// when they are started again. So a name that is not known is asked for once more with the module loaded.
     fn converse(&mut self, exchange: &mut Exchange<'_>, args: Vec<Value>) -> Result<Vec<Value>, LinkError> {
-        let mut callback_error = None;
         // Kept for a server that turns out to speak the other version by now.
         let mut retry = (self.version == Some(ProtocolVersion::V1)).then(|| args.clone());
         let mut message = self.request(exchange.func, args);
@@ -235,7 +201,7 @@ impl Connection {
                 ServerMessage::Returned { values, version } => {
                     self.version = Some(version);
                     self.loaded |= unloaded.is_some();
-                    return callback_error.map_or(Ok(values), Err);
+                    return Ok(values);
                 }
                 ServerMessage::Failed { message: text, version: ProtocolVersion::V2 }
                     if unloaded.is_some() && text.starts_with(UNKNOWN_FUNCTION) =>
@@ -245,7 +211,7 @@ impl Connection {
                 }
                 // What a server says that does not know what it was asked to go on with.
                 ServerMessage::Failed { message: text, .. } if exchange.asked && text.contains(EXECUTED) => {
-                    return Err(self.note(LinkError::Forgotten { call: exchange.func.to_owned() }));
+                    return Err(LinkError::Forgotten { call: exchange.func.to_owned() });
                 }
                 ServerMessage::Failed { message, version } => {
                     self.version = Some(version);
@@ -261,15 +227,13 @@ impl Connection {
                     self.introduced = false;
                     message = self.request(exchange.func, args);
                 }
-                ServerMessage::Ask { func, .. } if func == REPEAT => exchange.asked = true,
-                ServerMessage::Ask { func, .. } if func == WAIT => {
+                ServerMessage::Ask { func } if func == REPEAT => exchange.asked = true,
+                ServerMessage::Ask { func } => {
+                    if func != WAIT {
+                        tracing::debug!(callback = func, "the server asked for a callback, and there is none here");
+                    }
                     exchange.asked = true;
                     message = self.request(EXECUTED, Vec::new());
-                }
-                ServerMessage::Ask { func, args } => {
-                    exchange.asked = true;
-                    let results = self.run_callback(exchange, &func, &args, &mut callback_error)?;
-                    message = self.request(EXECUTED, results);
                 }
                 ServerMessage::Nothing => {
                     return Err(self.unexpected(exchange, "a result", "an empty map".to_owned()));
@@ -280,7 +244,7 @@ impl Connection {
 
     /// Sends one message and waits for its reply.
     fn exchange(&mut self, exchange: &Exchange<'_>, message: &[u8]) -> Result<ServerMessage, LinkError> {
-        self.check_limits(exchange, exchange.asked || self.depth > 0)?;
+        self.check_limits(exchange, exchange.asked)?;
         if let Err(fault) = self.transport.send(message) {
             return Err(self.fault(exchange, fault));
         }
@@ -325,7 +289,7 @@ impl Connection {
             // The server may still be busy with the call, a motion say: with this client's record, the call ends.
             self.renew();
         }
-        Err(self.note(error))
+        Err(error)
     }
 
     fn read(&mut self, exchange: &Exchange<'_>, bytes: &[u8]) -> Result<ServerMessage, LinkError> {
@@ -343,39 +307,6 @@ impl Connection {
             }
         };
         Err(self.give_up(exchange, error))
-    }
-
-    fn run_callback(
-        &mut self,
-        exchange: &Exchange<'_>,
-        name: &str,
-        args: &[Value],
-        first_error: &mut Option<LinkError>,
-    ) -> Result<Vec<Value>, LinkError> {
-        // Out of the map while it runs, so that it can be given the connection. It cannot be entered again meanwhile,
-        // which also bounds the nesting.
-        let Some(mut callback) = self.callbacks.remove(name) else {
-            tracing::debug!(callback = name, "the server asked for a callback that is not here, or runs already");
-            return Ok(Vec::new());
-        };
-        let left = exchange.total_timeout.saturating_sub(exchange.started.elapsed());
-        let options = CallOptions {
-            reply_timeout: Some(exchange.reply_timeout),
-            total_timeout: Some(left),
-            cancel: exchange.cancel.cloned(),
-            grace: exchange.grace,
-        };
-        self.depth += 1;
-        let result = callback(&mut CallbackScope::new(self, options), args);
-        self.depth -= 1;
-        self.callbacks.insert(name.to_owned(), callback);
-        if let Some(broken) = &self.broken {
-            return Err(broken.clone());
-        }
-        Ok(result.unwrap_or_else(|error| {
-            first_error.get_or_insert(error);
-            Vec::new()
-        }))
     }
 
     fn request(&mut self, func: &str, args: Vec<Value>) -> Vec<u8> {
@@ -416,7 +347,7 @@ impl Connection {
             // Whatever comes back on that address may be a new server, of another version.
             self.version = None;
             self.drop_exchange();
-            return self.note(error);
+            return error;
         }
         self.give_up(exchange, error)
     }
@@ -428,24 +359,18 @@ impl Connection {
 
     /// Leaves a call that the server may not have left.
     fn give_up(&mut self, exchange: &Exchange<'_>, error: LinkError) -> LinkError {
-        if exchange.asked || self.depth > 0 {
+        if exchange.asked {
             self.renew();
         } else {
             self.drop_exchange();
         }
-        self.note(error)
+        error
     }
 
     fn drop_exchange(&mut self) {
         self.transport.reset();
         (self.introduced, self.loaded) = (false, false);
         self.epoch += 1;
-    }
-
-    /// Remembers that the conversation broke, for the calls that this one is nested in.
-    fn note(&mut self, error: LinkError) -> LinkError {
-        self.broken.get_or_insert_with(|| error.clone());
-        error
     }
 }
 
@@ -455,13 +380,6 @@ impl Drop for Connection {
             let farewell = protocol::request(END, Vec::new(), &self.sender(None));
             self.transport.send_last(&farewell);
         }
-    }
-}
-
-impl CallbackName {
-    /// The argument that stands for the callback in a call.
-    pub fn to_argument(&self) -> Value {
-        Value::from(format!("{}{CALLBACK_SUFFIX}", self.0))
     }
 }
 

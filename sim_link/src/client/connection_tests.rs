@@ -120,35 +120,6 @@ fn a_repeated_first_request_is_the_same_request() {
 }
 
 #[test]
-fn a_callback_gets_its_arguments_and_may_call_back() {
-    let mut turn = 0;
-    let (mut connection, log) = connection(move |request| {
-        turn += 1;
-        match turn {
-            1 => {
-                let name =
-                    args(request)[0].text().and_then(|t| t.strip_suffix("@func")).expect("a callback").to_owned();
-                Answer::Say(wire::map([
-                    ("func", Value::from(name)),
-                    ("args", Value::Array(vec![Value::from(20), Value::from(1)])),
-                ]))
-            }
-            2 => ret([Value::from(0.5)]),
-            3 => ret([args(request)[0].clone()]),
-            _ => panic!("{request:?}"),
-        }
-    });
-    let name = connection.register_callback("moved", |scope, args| {
-        let joint = args[0].clone();
-        let position = scope.call("sim.getJointPosition", vec![joint])?.number(0)?;
-        Ok(vec![Value::Float(position * 2.0)])
-    });
-    let done = connection.call("sim.testCB", vec![name.to_argument()]).expect("done");
-    assert_eq!(done.number(0), Ok(1.0));
-    assert_eq!(log.functions(), ["sim.testCB", "sim.getJointPosition", EXECUTED]);
-}
-
-#[test]
 fn an_unknown_callback_is_answered_with_nothing() {
     let mut turn = 0;
     let (mut connection, log) = connection(move |_| {
@@ -157,50 +128,6 @@ fn an_unknown_callback_is_answered_with_nothing() {
     });
     connection.call("sim.x", vec![]).expect("done");
     assert!(args(&log.requests()[1]).is_empty());
-}
-
-#[test]
-fn an_error_in_a_callback_does_not_strand_the_server() {
-    let mut turn = 0;
-    let (mut connection, log) = connection(move |_| {
-        turn += 1;
-        if turn == 1 { ask("failing_1") } else { ret([]) }
-    });
-    connection.register_callback("failing", |_, _| Err(LinkError::MixedInstants { attempts: 3 }));
-    let error = connection.call("sim.x", vec![]).expect_err("the callback failed");
-    assert_eq!(error, LinkError::MixedInstants { attempts: 3 });
-    assert_eq!(log.functions(), ["sim.x", EXECUTED]);
-}
-
-#[test]
-fn a_callback_cannot_hide_that_the_conversation_broke() {
-    let mut turn = 0;
-    let (mut connection, log) = connection(move |_| {
-        turn += 1;
-        match turn {
-            1 => ask("careless_1"),
-            2 => Answer::Silence,
-            _ => ret([]),
-        }
-    });
-    connection.register_callback("careless", |scope, _| {
-        let _ignored = scope.call("sim.y", vec![]);
-        Ok(vec![])
-    });
-    let error = connection.call("sim.x", vec![]).expect_err("broke inside");
-    assert!(matches!(&error, LinkError::Timeout { call, .. } if call == "sim.y"), "{error}");
-    assert_eq!(ended(&log), 1, "the server waits for the callback's answer: it has to be told");
-    connection.call("sim.z", vec![]).expect("the next call works");
-}
-
-#[test]
-fn a_callback_that_runs_is_not_entered_again() {
-    let (mut connection, _log) = connection(|request| match func(request) {
-        "sim.again" => ask("again_1"),
-        _ => ret([]),
-    });
-    connection.register_callback("again", |scope, _| scope.call("sim.again", vec![]).map(|_| vec![]));
-    connection.call("sim.again", vec![]).map(drop).expect("ends");
 }
 
 #[test]

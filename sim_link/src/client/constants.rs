@@ -9,15 +9,6 @@ pub const HANDLE_ALL_EXCEPT_EXPLICIT: i64 = -3;
 /// Stands for the parent of the object as a reference frame.
 pub const HANDLE_PARENT: i64 = -11;
 
-/// Object type: shape.
-pub const OBJECT_SHAPE: i64 = 0;
-/// Object type: joint.
-pub const OBJECT_JOINT: i64 = 1;
-/// Object type: dummy.
-pub const OBJECT_DUMMY: i64 = 4;
-/// Object type: vision sensor.
-pub const OBJECT_VISION_SENSOR: i64 = 9;
-
 /// Simulation state: stopped.
 pub const SIMULATION_STOPPED: i64 = 0;
 /// Simulation state: paused.
@@ -39,18 +30,9 @@ pub const DEPTH_IN_METRES: i64 = 1;
 
 /// Integer parameter: version, 41000 is 4.10.0.
 pub const INT_PROGRAM_VERSION: i64 = 1;
-/// String parameter: path of the scene file.
-pub const STRING_SCENE_PATH: i64 = 14;
 
 /// Mode of a joint that forces move and a controller holds; in the others it is where it is put.
 pub const JOINT_MODE_DYNAMIC: i64 = 5;
-
-/// Log level: errors. The simulator also raises one.
-pub const LOG_ERRORS: i64 = 420;
-/// Log level: warnings.
-pub const LOG_WARNINGS: i64 = 430;
-/// Log level: information.
-pub const LOG_INFOS: i64 = 450;
 
 /// Result of a motion step: not there yet.
 pub const MOTION_RUNNING: i64 = 0;

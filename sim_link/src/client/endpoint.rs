@@ -3,10 +3,18 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::error::LinkError;
-
 /// Port of CoppeliaSim's remote API unless another was chosen.
 pub const DEFAULT_PORT: u16 = 23000;
+
+/// An address that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{text:?} is not an address of a server: {reason}; write HOST:PORT, for example 127.0.0.1:23000")]
+pub struct BadEndpoint {
+    /// What was given.
+    pub text: String,
+    /// What is wrong with it.
+    pub reason: &'static str,
+}
 
 /// A TCP address of a remote API server.
 ///
@@ -21,9 +29,9 @@ impl Endpoint {
     /// From a host name or address, IPv6 without brackets, and a port.
     ///
     /// # Errors
-    /// [`LinkError::BadEndpoint`] when the host is empty or has characters that no host name has, or the port is 0.
-    pub fn new(host: &str, port: u16) -> Result<Self, LinkError> {
-        let bad = |reason| Err(LinkError::BadEndpoint { text: format!("{host}:{port}"), reason });
+    /// [`BadEndpoint`] when the host is empty or has characters that no host name has, or the port is 0.
+    pub fn new(host: &str, port: u16) -> Result<Self, BadEndpoint> {
+        let bad = |reason| Err(BadEndpoint { text: format!("{host}:{port}"), reason });
         if host.is_empty() {
             return bad("the host is missing");
         }
@@ -73,10 +81,10 @@ impl fmt::Display for Endpoint {
 }
 
 impl FromStr for Endpoint {
-    type Err = LinkError;
+    type Err = BadEndpoint;
 
-    fn from_str(text: &str) -> Result<Self, LinkError> {
-        let bad = |reason| LinkError::BadEndpoint { text: text.to_owned(), reason };
+    fn from_str(text: &str) -> Result<Self, BadEndpoint> {
+        let bad = |reason| BadEndpoint { text: text.to_owned(), reason };
         let rest = match text.trim().split_once("://") {
             Some(("tcp", rest)) => rest,
             Some(_) => return Err(bad("only tcp:// is spoken")),
@@ -121,8 +129,7 @@ mod tests {
     fn an_address_that_cannot_work_is_refused_with_its_text() {
         for text in ["", "tcp://", "http://localhost:80", "host:0", "host:port", "host:99999", "::1", "a b:1", "x\0:1"]
         {
-            let error = text.parse::<Endpoint>().expect_err(text);
-            assert!(matches!(&error, LinkError::BadEndpoint { .. }), "{text}: {error}");
+            assert!(text.parse::<Endpoint>().is_err(), "{text}");
         }
     }
 }

@@ -3,22 +3,17 @@
 use std::time::Duration;
 
 use super::convert::ConvertError;
-use super::endpoint::Endpoint;
+use super::endpoint::{BadEndpoint, Endpoint};
 use super::sim::SimulationState;
-use crate::wire::{MAX_MESSAGE_BYTES, WireError};
+use crate::wire::{MAX_MESSAGE_BYTES, MAX_REPLY_BYTES, WireError};
 
 /// Why a call, or a task made of calls, has no result. Each message says what to do next.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
     /// The address cannot be used.
-    #[error("{text:?} is not an address of a server: {reason}; write HOST:PORT, for example 127.0.0.1:23000")]
-    BadEndpoint {
-        /// What was given.
-        text: String,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
+    #[error(transparent)]
+    BadEndpoint(#[from] BadEndpoint),
     /// The operating system or the socket library refused.
     #[error("no socket to {endpoint}: {reason}; check the address and the number of open files of this process")]
     Socket {
@@ -334,7 +329,7 @@ fn advice_on_bytes(has_spoken: bool) -> &'static str {
 fn length(bytes: Option<&usize>) -> String {
     match bytes {
         Some(bytes) => format!("has {bytes} bytes"),
-        None => format!("has more than {} MiB, or breaks the rules of ZeroMQ", super::transport::MAX_REPLY_BYTES >> 20),
+        None => format!("has more than {} MiB, or breaks the rules of ZeroMQ", MAX_REPLY_BYTES >> 20),
     }
 }
 

@@ -3,11 +3,10 @@
 //! | layer | what it knows |
 //! | --- | --- |
 //! | [`Transport`] | one request, one reply, and when the server is gone |
-//! | [`Connection`] | calls, callbacks, both protocol versions, time limits, recovery |
+//! | [`Connection`] | calls, both protocol versions, time limits, recovery |
 //! | [`Sim`] | functions of `sim.*` with their types; CoppeliaSim's conventions end in [`convert`] |
 //! | [`cell`] | an arm with a camera: move, stop, look, and the truth of a simulated cell |
 
-mod callback;
 pub mod cell;
 mod connection;
 pub mod constants;
@@ -22,9 +21,8 @@ mod sim;
 mod testing;
 mod transport;
 
-pub use callback::{CallbackName, CallbackScope};
 pub use connection::Connection;
-pub use endpoint::{DEFAULT_PORT, Endpoint};
+pub use endpoint::{BadEndpoint, DEFAULT_PORT, Endpoint};
 pub use error::LinkError;
 pub use handeye_core::progress::CancelToken;
 pub use options::{CallOptions, ConnectionOptions};

@@ -23,8 +23,6 @@ pub(super) const UNKNOWN_FUNCTION: &str = "No such function";
 pub(super) const NO_SUCH_OBJECT: &str = "object does not exist";
 /// Part of the error text of a version 2 server for a request of version 1.
 const OTHER_VERSION: &str = "version does not match";
-/// Ending that makes a text argument a callback.
-pub(super) const CALLBACK_SUFFIX: &str = "@func";
 
 /// Which version of the remote API a server speaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -79,8 +77,8 @@ pub(super) enum ServerMessage {
     Failed { message: String, version: ProtocolVersion },
     /// A version 2 server found no client id in the request.
     OtherVersion { message: String },
-    /// The client shall run a callback, wait, or repeat.
-    Ask { func: String, args: Vec<Value> },
+    /// The client shall run a callback, wait, or repeat; with what arguments does not matter.
+    Ask { func: String },
     /// An empty map: the reply to a farewell.
     Nothing,
 }
@@ -125,8 +123,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<ServerMessage, ReplyError> {
     }
     if let Some(func) = take("func") {
         let func = text(func, "text in `func`")?;
-        let args = take("args").map_or(Ok(Vec::new()), |args| list(args, "an array in `args`"))?;
-        return Ok(ServerMessage::Ask { func, args });
+        return Ok(ServerMessage::Ask { func });
     }
     if let Some(err) = take("err") {
         return Ok(ServerMessage::Failed { message: text(err, "text in `err`")?, version: ProtocolVersion::V2 });

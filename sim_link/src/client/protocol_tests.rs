@@ -137,7 +137,7 @@ fn recorded_errors_keep_their_text() {
 #[test]
 fn recorded_requests_of_the_server_are_read() {
     let wait = parse(&bytes("a2 6466756e63 68 5f2a776169742a5f 6461726773 a0"));
-    assert_eq!(wait, Ok(ServerMessage::Ask { func: WAIT.to_owned(), args: Vec::new() }));
+    assert_eq!(wait, Ok(ServerMessage::Ask { func: WAIT.to_owned() }));
     assert_eq!(parse(&[0xa0]), Ok(ServerMessage::Nothing));
 }
 

@@ -4,15 +4,11 @@ use std::time::{Duration, Instant};
 
 use super::endpoint::Endpoint;
 use super::error::LinkError;
-use crate::wire::MAX_MESSAGE_BYTES;
+use crate::wire::MAX_REPLY_BYTES;
 
 /// How long a last message may keep a closing socket alive. A server on this machine takes it in under a millisecond,
 /// on a busy one in a tenth of a second; one that has gone must not hold up the end of the program.
 const FAREWELL: Duration = Duration::from_millis(500);
-
-/// Longest reply that is read. A little over the limit of a message is still read, and refused with its length; far over
-/// it is not worth the memory.
-pub(super) const MAX_REPLY_BYTES: usize = 2 * MAX_MESSAGE_BYTES;
 
 /// When a connection breaks, the library says at once that it tries again, unless it has ended the connection itself,
 /// over a message that is too long. Nothing but its thread has to run for that.

@@ -484,35 +484,6 @@ fn a_request_that_the_server_could_not_take_is_repeated_unchanged() {
 }
 
 #[test]
-fn a_callback_runs_and_may_call_the_server_meanwhile() {
-    let (endpoint, server) = serve(|peer| {
-        let (to, request) = peer.next();
-        let argument = request.get("args").and_then(|args| args.list()).expect("arguments")[0].clone();
-        let name = argument.text().and_then(|text| text.strip_suffix("@func")).expect("a callback").to_owned();
-        peer.say(&to, &wire::map([("func", Value::from(name)), ("args", Value::Array(vec![Value::from(40)]))]));
-        let (to, nested) = peer.next();
-        assert_eq!(func(&nested), "sim.getSimulationTime");
-        peer.say(&to, &ret(vec![Value::from(2)]));
-        let (to, executed) = peer.next();
-        assert_eq!(func(&executed), "_*executed*_");
-        let result = executed.get("args").and_then(|args| args.list()).expect("results")[0].clone();
-        peer.say(&to, &ret(vec![result]));
-    });
-    let mut connection = connect(&endpoint, options());
-    let (seen, was_seen) = pair();
-    let callback = connection.register_callback("watch", move |scope, args| {
-        let time_s = scope.call("sim.getSimulationTime", vec![])?.number(0)?;
-        seen.send(()).expect("the test listens");
-        Ok(vec![Value::Float(args[0].number().unwrap_or(f64::NAN) + time_s)])
-    });
-    let reply = connection.call("sim.testCB", vec![callback.to_argument()]).expect("done");
-    assert_eq!(reply.number(0), Ok(42.0));
-    done(&was_seen);
-    drop(connection);
-    join(server);
-}
-
-#[test]
 fn an_old_server_is_spoken_to_in_its_version() {
     let (endpoint, server) = serve(|peer| {
         let (to, first) = peer.next();

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_core::depth::{ColourMap, DepthImage};
-use handeye_core::diagnose::findings::{self, FindingOptions};
+use handeye_core::diagnose::findings::{self, Finding, FindingOptions};
 use handeye_core::estimate::handeye::joint::outliers::Distance;
 use handeye_core::estimate::handeye::{HandEye, Mode};
 use handeye_core::estimate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
+use handeye_core::geometry::arm::ur5::{JointLimits, inverse_nearest};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::{Rgb, RgbImage};
@@ -17,7 +18,6 @@ use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_core::targets::observation::{Corner, View};
 use handeye_core::track::{BoardDetection, ByDepth, Estimate, State, Update};
 use handeye_core::verify::{self, CheckCapture, Predictor};
-use handeye_sim_link::cell::kinematics::{JointLimits, inverse_nearest};
 use handeye_sim_link::client::cell::{ArmChain, JointAngles, Support};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
@@ -179,7 +179,7 @@ pub fn captured() -> Model {
 }
 
 /// What is to be reached.
-const FINDINGS: FindingOptions = FindingOptions { goal_mm: Some(0.5) };
+const FINDINGS: FindingOptions = FindingOptions::with_goal_mm(Some(0.5));
 
 /// What was seen in the captures of the fit.
 fn observations() -> Observations {
@@ -223,6 +223,15 @@ pub fn solved() -> Model {
     model
 }
 
+/// The same with its answer changed.
+pub fn with_answer(change: impl FnOnce(&mut Solved)) -> Model {
+    let mut model = solved();
+    let mut solved = Solved::clone(model.solve.solved.as_ref().expect("solved"));
+    change(&mut solved);
+    model.solve.solved = Some(Arc::new(solved));
+    model
+}
+
 /// The capture that does not fit the others in [`with_an_outlier`].
 pub const OUTLIER: CaptureId = CaptureId(3);
 
@@ -240,6 +249,7 @@ pub fn with_an_outlier() -> Model {
     solved.result = solved.calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
     solved.result.truth = truth;
     solved.findings = findings::findings(&observations(), Some(&solved.calibration), &FINDINGS);
+    solved.result.findings = solved.findings.iter().map(Finding::to_record).collect();
     model.solve.solved = Some(Arc::new(solved));
     model
 }

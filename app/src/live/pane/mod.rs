@@ -2,6 +2,7 @@
 
 mod feedback;
 mod overlays;
+mod place;
 mod project;
 mod readout;
 mod shown;
@@ -46,7 +47,7 @@ pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &m
             return None;
         }
     };
-    let image = crate::live::pane::view::Image {
+    let image = view::Image {
         texture: textures.rgb.as_ref(),
         name: tr!(language, "Colour image"),
         model,
@@ -71,7 +72,7 @@ pub fn depth_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mu
         marks::nothing_yet_ui(ui, tr!(language, "No depth image yet"), detail);
         return None;
     };
-    let image = crate::live::pane::view::Image {
+    let image = view::Image {
         texture: textures.depth.as_ref(),
         name: tr!(language, "Depth image"),
         model,

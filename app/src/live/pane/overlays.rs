@@ -9,8 +9,8 @@ use handeye_core::targets::observation::Corner;
 use nalgebra::{Point3, Vector2};
 
 use super::Shown;
+use super::place::Place;
 use super::project::{Projector, board_lines};
-use super::view::Place;
 use crate::capture::rows::{self, CaptureTable};
 use crate::gui::style::marks::{self, Marks};
 use crate::model::Model;

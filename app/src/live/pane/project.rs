@@ -6,7 +6,7 @@ use handeye_core::geometry::frames::{Camera, Pose, Target};
 use handeye_core::targets::TargetSpec;
 use nalgebra::Point3;
 
-use super::view::Place;
+use super::place::Place;
 
 /// Pieces of a line of the length of a board.
 const PIECES: usize = 12;

@@ -8,7 +8,7 @@ use handeye_core::project::session::CaptureId;
 use handeye_core::verify::Predictor;
 use nalgebra::{Point3, Vector2};
 
-use super::view::Place;
+use super::place::Place;
 use super::*;
 use crate::command::Command;
 use crate::gui::testing::pane_harness::{PaneHarness, PaneState};

@@ -10,7 +10,7 @@ use super::paths::{self, below};
 use super::pen::Pen;
 use super::style;
 use crate::model::Solved;
-use crate::rerun_log::report;
+use crate::report;
 use crate::scene::Known;
 
 /// Names of the series, for all times.

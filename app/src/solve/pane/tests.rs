@@ -9,27 +9,17 @@ use handeye_core::progress::{CancelToken, Stage};
 use handeye_core::project::result::TruthComparison;
 use handeye_core::targets::bent::BoardShape;
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 use super::*;
 use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
-use crate::model::{Goal, JobId, SolveStatus, Solved};
+use crate::model::{Goal, JobId, SolveStatus};
 use crate::session::start::BOARD;
 use crate::text::{Language, Text};
 
 fn driven(model: Model) -> Driven {
     Driven::new(result_ui, model)
-}
-
-/// The sample with its answer changed.
-fn changed(change: impl FnOnce(&mut Solved)) -> Model {
-    let mut model = sample::solved();
-    let mut solved = Solved::clone(model.solve.solved.as_ref().expect("solved"));
-    change(&mut solved);
-    model.solve.solved = Some(Arc::new(solved));
-    model
 }
 
 #[test]
@@ -46,7 +36,7 @@ fn without_an_answer_it_says_what_is_missing() {
 
 #[test]
 fn the_headline_is_the_expected_error_and_not_a_residual() {
-    let model = changed(|solved| {
+    let model = sample::with_answer(|solved| {
         solved.result.quality.tip_error_95_mm = Some(0.213);
         solved.result.quality.rms_px = Some(0.07);
     });
@@ -72,7 +62,7 @@ fn the_goal_is_typed_in_millimetres_and_sent_in_metres() {
 
 #[test]
 fn the_camera_in_the_tip_is_in_millimetres_with_its_uncertainty() {
-    let model = changed(|solved| {
+    let model = sample::with_answer(|solved| {
         solved.result.truth = Some(TruthComparison {
             translation_error_mm: Some(0.0415),
             rotation_error_deg: Some(0.0123),
@@ -122,7 +112,7 @@ fn an_answer_of_earlier_captures_is_marked() {
 
 #[test]
 fn another_method_is_chosen_from_the_comparison() {
-    let model = changed(|solved| {
+    let model = sample::with_answer(|solved| {
         let failed = solved.calibration.methods.iter_mut().find(|method| method.name == "andreff");
         failed.expect("andreff").outcome =
             Err(HandEyeError::NoSolution { method: "andreff", views: 10, reason: "a test says so" });
@@ -169,7 +159,7 @@ fn with_everything_found(calibration: &mut handeye_core::estimate::Calibration) 
 
 #[test]
 fn what_the_estimate_found_out_is_stated_with_units() {
-    let pane = driven(changed(|solved| with_everything_found(&mut solved.calibration)));
+    let pane = driven(sample::with_answer(|solved| with_everything_found(&mut solved.calibration)));
     for line in [
         "Outlier views: 2 of 10",
         "Outlier corners: 2, in 1 of 10 views",
@@ -182,7 +172,7 @@ fn what_the_estimate_found_out_is_stated_with_units() {
         assert!(pane.sees(line), "{line}");
     }
     assert!(pane.nothing_is_cut_off());
-    let plain = driven(changed(|solved| {
+    let plain = driven(sample::with_answer(|solved| {
         solved.calibration.joint = None;
     }));
     assert!(!plain.sees("What the estimate found out"), "there is nothing to say");
@@ -190,7 +180,7 @@ fn what_the_estimate_found_out_is_stated_with_units() {
 
 #[test]
 fn a_camera_beside_the_robot_is_shown_in_the_base() {
-    let model = changed(|solved| {
+    let model = sample::with_answer(|solved| {
         let hand_eye = solved.calibration.hand_eye.expect("a hand-eye");
         solved.calibration.hand_eye = Some(handeye_core::estimate::handeye::HandEye::new(
             Mode::EyeToHand,
@@ -225,7 +215,7 @@ fn every_finding() -> Vec<findings::Finding> {
     let mut judge = |observations: &Observations, change: &dyn Fn(&mut handeye_core::estimate::Calibration), goal| {
         let mut calibration = calibration.clone();
         change(&mut calibration);
-        found.extend(findings::findings(observations, Some(&calibration), &FindingOptions { goal_mm: Some(goal) }));
+        found.extend(findings::findings(observations, Some(&calibration), &FindingOptions::with_goal_mm(Some(goal))));
     };
     let turned = |views: usize, axes: &dyn Fn(usize) -> [f64; 3]| {
         let mut observations = good.clone();

@@ -8,21 +8,12 @@ use super::*;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, Pane, PickedPoint, PoseSequence, Severity, Solved,
-    StopOutcome,
+    CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, Pane, PickedPoint, PoseSequence, Severity, StopOutcome,
 };
 use crate::text::Text;
 
 fn driven(model: Model) -> Driven {
     Driven::new(verify_ui, model)
-}
-
-fn changed(change: impl FnOnce(&mut Solved)) -> Model {
-    let mut model = sample::solved();
-    let mut solved = Solved::clone(model.solve.solved.as_ref().expect("solved"));
-    change(&mut solved);
-    model.solve.solved = Some(Arc::new(solved));
-    model
 }
 
 #[test]
@@ -47,7 +38,7 @@ fn a_capture_for_verification_is_asked_for_and_cancelled() {
 
 #[test]
 fn errors_are_stated_in_millimetres_degrees_and_pixels_and_judged() {
-    let mut pane = driven(changed(|solved| {
+    let mut pane = driven(sample::with_answer(|solved| {
         if let Some(Ok(verification)) = &mut solved.verification {
             verification.centre_rms_m = 0.000_123;
             verification.orientation_rms_rad = 0.1_f64.to_radians();
@@ -66,7 +57,7 @@ fn errors_are_stated_in_millimetres_degrees_and_pixels_and_judged() {
 
 #[test]
 fn errors_that_are_too_large_are_said_to_be() {
-    let pane = driven(changed(|solved| {
+    let pane = driven(sample::with_answer(|solved| {
         if let Some(Ok(verification)) = &mut solved.verification {
             verification.consistency.as_mut().expect("stated").ratio = 50.0;
         }
@@ -77,7 +68,7 @@ fn errors_that_are_too_large_are_said_to_be() {
 
 #[test]
 fn a_verification_without_an_answer_says_why() {
-    let pane = driven(changed(|solved| {
+    let pane = driven(sample::with_answer(|solved| {
         solved.verification = Some(Err(VerifyError::PredictedBehind { name: "images/0011.png".to_owned() }));
     }));
     assert!(pane.sees("behind the camera"));
@@ -85,7 +76,7 @@ fn a_verification_without_an_answer_says_why() {
 
 #[test]
 fn it_says_why_there_is_no_verification() {
-    let mut model = changed(|solved| solved.verification = None);
+    let mut model = sample::with_answer(|solved| solved.verification = None);
     model.solve.fresh = false;
     let mut pane = driven(model);
     assert!(pane.sees("The captures for verification are being evaluated"));

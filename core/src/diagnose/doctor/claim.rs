@@ -3,8 +3,9 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::effect::Effect;
-use super::judge::{Candidate, Judged};
+use super::judge::Judged;
 use super::model::{Fit, State};
+use super::screen::Candidate;
 use super::select::Selection;
 use crate::estimate::claim::{Alternative, Claim};
 use crate::estimate::{Calibration, ViewStatus};

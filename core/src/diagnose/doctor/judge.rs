@@ -5,8 +5,7 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, StudentsT};
 
 use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
-use super::screen::view_score;
-use super::views::SessionViews;
+use super::screen::{Candidate, view_score};
 use crate::geometry::statistics::outliers;
 
 /// Probability of a false alarm per hypothesis, after allowance for the alternatives among which the best was picked.
@@ -33,14 +32,6 @@ const LEAST_FOCAL: f64 = 3e-3;
 const LEAST_MOVED_M: f64 = 2e-4;
 /// Zero of a joint, radians: two hundredths of a degree, about what controllers are calibrated to.
 const LEAST_JOINT_RAD: f64 = 3.5e-4;
-
-/// What is tested.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Candidate {
-    Effect(Effect),
-    /// These views contradict the others.
-    Views(Vec<usize>),
-}
 
 /// A hypothesis and what it does.
 pub(super) struct Judged {
@@ -124,14 +115,9 @@ pub(super) fn alternatives(model: &Model<'_>, effect: Effect) -> f64 {
     let views = model.sight.views.len() as f64;
     match effect {
         Effect::BoardMoved(_) | Effect::CameraMoved(_) => views.ln(),
-        Effect::Joint(_) => (joints(model.sight).max(1) as f64).ln(),
+        Effect::Joint(_) => (model.sight.joints().max(1) as f64).ln(),
         _ => 0.0,
     }
-}
-
-/// Joints that are known in every view.
-pub(super) fn joints(sight: &SessionViews) -> usize {
-    sight.views.iter().map(|v| v.tip_by_joint.len()).min().unwrap_or(0)
 }
 
 pub(super) fn is_significant(wald: f64, numbers: usize, freedom: f64, ln_alternatives: f64) -> bool {

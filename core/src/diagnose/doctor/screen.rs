@@ -3,11 +3,19 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::effect::Effect;
-use super::judge::{Candidate, joints};
 use super::model::{Fit, Model, State, inverse};
 
 /// Effects taken in at the most; more than two faults at once are rare.
 const MOST_EFFECTS: usize = 3;
+
+/// What is tested.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Candidate {
+    Effect(Effect),
+    /// These views contradict the others.
+    Views(Vec<usize>),
+}
+
 /// The most promising hypothesis of every kind, by a test with the noise levels that are at hand.
 pub(super) fn screened(model: &Model<'_>, state: &State, fit: &Fit, room: usize) -> Vec<Candidate> {
     let count = model.sight.views.len();
@@ -22,7 +30,7 @@ pub(super) fn screened(model: &Model<'_>, state: &State, fit: &Fit, room: usize)
         }
         found.extend(singles.into_iter().filter(|e| !state.effects.contains(e)).map(Candidate::Effect));
         let taken = |e: &Effect| state.effects.contains(e);
-        let joints = (0..joints(model.sight)).map(Effect::Joint).filter_map(|e| {
+        let joints = (0..model.sight.joints()).map(Effect::Joint).filter_map(|e| {
             let mut score = Score::new(1, fit.width());
             (0..count).filter(|i| !state.aside.contains(i)).for_each(|i| score.add(fit, i, &e.columns(model, i)));
             Some((e, score.statistic(fit)?))

@@ -2,9 +2,9 @@
 //! judged anew beside it.
 
 use super::agreement::Agreement;
-use super::judge::{Candidate, Judged, alternatives, is_significant, judge};
+use super::judge::{Judged, alternatives, is_significant, judge};
 use super::model::{Fit, Levels, Model, State};
-use super::screen::screened;
+use super::screen::{Candidate, screened};
 use super::views::SessionViews;
 use crate::estimate::handeye::joint::field::Places;
 use crate::progress::Work;

@@ -113,6 +113,11 @@ struct Fit {
 }
 
 impl SessionViews {
+    /// Joints that are known in every view.
+    pub fn joints(&self) -> usize {
+        self.views.iter().map(|v| v.tip_by_joint.len()).min().unwrap_or(0)
+    }
+
     /// Looks at all views in the fit that have a robot pose and the target. `Err` says why nothing can be tested.
     pub fn new(observations: &Observations) -> Result<Self, String> {
         let Some(mode) = observations.mode else { return Err("there are no robot poses".to_owned()) };

@@ -32,9 +32,17 @@ pub struct Evidence {
 
 /// What the user wants.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct FindingOptions {
     /// The expected error to reach (95 %, see [`Calibration::tip_error_95_m`]), millimetres; `None` for no goal.
     pub goal_mm: Option<f64>,
+}
+
+impl FindingOptions {
+    /// With an error to reach (95 %), millimetres; `None` for no goal.
+    pub const fn with_goal_mm(goal_mm: Option<f64>) -> Self {
+        Self { goal_mm }
+    }
 }
 
 /// Everything found, the most severe first, in the order of [`FindingCode`] within a severity. Views out of the fit

@@ -21,6 +21,7 @@
 mod error;
 mod model;
 mod placement;
+pub mod ur5;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -49,13 +50,20 @@ pub struct DhRow {
 }
 
 impl DhRow {
+    /// From `[a, alpha, d, theta]`, metres and radians.
+    pub const fn new([a_m, alpha_rad, d_m, theta_offset_rad]: [f64; 4]) -> Self {
+        Self { a_m, alpha_rad, d_m, theta_offset_rad }
+    }
+
     /// The transform of the joint turned by `joint_rad`.
     fn transform(&self, joint_rad: f64) -> Isometry3<f64> {
-        let about = |axis, angle| UnitQuaternion::from_axis_angle(&axis, angle);
-        let turned = about(Vector3::z_axis(), joint_rad + self.theta_offset_rad);
-        let link =
-            Isometry3::from_parts(Translation3::new(self.a_m, 0.0, self.d_m), about(Vector3::x_axis(), self.alpha_rad));
-        turned * link
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), joint_rad + self.theta_offset_rad) * self.link()
+    }
+
+    /// What follows the turn of the joint: the shift along its axis, the common normal and the twist about that.
+    fn link(&self) -> Isometry3<f64> {
+        let twist = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.alpha_rad);
+        Isometry3::from_parts(Translation3::new(self.a_m, 0.0, self.d_m), twist)
     }
 }
 

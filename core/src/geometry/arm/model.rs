@@ -2,13 +2,19 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{Arm, ArmError, DhRow};
+use super::{Arm, ArmError, DhRow, ur5};
 
-/// Twists between the joints of a UR arm, radians.
-const UR_ALPHA: [f64; 6] = [FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2, 0.0];
+/// Universal Robots, "DH parameters for calculations of kinematics and dynamics", UR5.
+const UR5: [DhRow; 6] = [
+    DhRow::new([0.0, FRAC_PI_2, 0.089_159, 0.0]),
+    DhRow::new([-0.425, 0.0, 0.0, 0.0]),
+    DhRow::new([-0.392_25, 0.0, 0.0, 0.0]),
+    DhRow::new([0.0, FRAC_PI_2, 0.109_15, 0.0]),
+    DhRow::new([0.0, -FRAC_PI_2, 0.094_65, 0.0]),
+    DhRow::new([0.0, 0.0, 0.0823, 0.0]),
+];
 
 /// An arm as a data set or a session names it: `{"kind": "ur5"}` or `{"dh": [[a, alpha, d, theta], …]}`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,39 +59,16 @@ impl ArmModel {
     pub fn arm(&self) -> Result<Arm, ArmError> {
         match self {
             Self::Kind(kind) => kind.arm(),
-            Self::Dh(rows) => Arm::new(rows.iter().map(|&row| DhRow::from(row)).collect()),
+            Self::Dh(rows) => Arm::new(rows.iter().map(|&row| DhRow::new(row)).collect()),
         }
     }
 }
 
 impl ArmKind {
     fn arm(self) -> Result<Arm, ArmError> {
-        let quarter_back = Isometry3::from_parts(
-            Translation3::identity(),
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -FRAC_PI_2),
-        );
         match self {
-            // Universal Robots, "DH parameters for calculations of kinematics and dynamics", UR5.
-            Self::Ur5 => Arm::new(ur_rows([0.089_159, 0.109_15, 0.094_65, 0.0823], [-0.425, -0.392_25], [0.0; 6])),
-            // Fitted to the model without residual.
-            Self::Ur5Coppeliasim => {
-                let zero = [0.0, -FRAC_PI_2, 0.0, -FRAC_PI_2, 0.0, 0.0];
-                let rows = ur_rows([0.074_55, 0.11, 0.094_75, 0.074_95], [-0.4251, -0.392_15], zero);
-                Ok(Arm::new(rows)?.mounted(quarter_back, quarter_back))
-            }
+            Self::Ur5 => Arm::new(UR5.to_vec()),
+            Self::Ur5Coppeliasim => Ok(Arm::new(ur5::ROWS.to_vec())?.mounted(ur5::end_turn(), ur5::end_turn())),
         }
-    }
-}
-
-/// The rows of a UR arm from its d₁ d₄ d₅ d₆, its a₂ a₃, and its zero.
-fn ur_rows([d1, d4, d5, d6]: [f64; 4], [a2, a3]: [f64; 2], theta_offset_rad: [f64; 6]) -> Vec<DhRow> {
-    let (a, d) = ([0.0, a2, a3, 0.0, 0.0, 0.0], [d1, 0.0, 0.0, d4, d5, d6]);
-    (0..6).map(|i| DhRow::from([a[i], UR_ALPHA[i], d[i], theta_offset_rad[i]])).collect()
-}
-
-impl From<[f64; 4]> for DhRow {
-    /// From `[a, alpha, d, theta]`, metres and radians.
-    fn from([a_m, alpha_rad, d_m, theta_offset_rad]: [f64; 4]) -> Self {
-        Self { a_m, alpha_rad, d_m, theta_offset_rad }
     }
 }

@@ -47,6 +47,7 @@ use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::natural_order;
 use crate::project::files::digest::Listing;
 use crate::project::files::image_file::{self, ImageFileError};
+pub use crate::project::files::own_folder::DESCRIPTION;
 use crate::targets::TargetSpec;
 
 use config::{Config, PoseDirection};
@@ -57,9 +58,6 @@ use outside::Outside;
 use poses::PoseRow;
 use target_table::TargetPoseDirection;
 use text::TextFile;
-
-/// Name of the description in a dataset folder.
-pub const DESCRIPTION: &str = "dataset.toml";
 
 /// A dataset folder, read and checked. The images are not in memory: see [`Dataset::load_rgb`].
 #[derive(Debug, Clone)]

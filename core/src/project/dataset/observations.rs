@@ -1,8 +1,21 @@
 //! The one way from a dataset folder to what a calibration is made from.
 
-use super::Dataset;
+use super::{CameraInput, Dataset};
 use crate::estimate::{CameraKnowledge, Observations, ObservedView};
 use crate::targets::observation::Corner;
+
+impl CameraInput {
+    /// What a data set or a session with this table, or without one, knows of its camera.
+    pub fn knowledge(camera: Option<&Self>) -> CameraKnowledge {
+        match camera {
+            None => CameraKnowledge::NOTHING,
+            Some(input) => match input.intrinsics {
+                Some(intrinsics) if input.fixed => CameraKnowledge::Fixed(intrinsics),
+                start => CameraKnowledge::Estimate { model: input.model, start },
+            },
+        }
+    }
+}
 
 impl Dataset {
     /// What was observed. Where the data set has a corner table, its corners count; elsewhere `detected` gives those of
@@ -24,7 +37,7 @@ impl Dataset {
             target: self.target,
             // Only pose pairs come without a size, and they need none.
             image_size: self.image_size.unwrap_or_default(),
-            camera: CameraKnowledge::of(self.camera.as_ref()),
+            camera: CameraInput::knowledge(self.camera.as_ref()),
             views: views.collect(),
         }
     }

@@ -4,7 +4,7 @@ use std::path::{Component, Path};
 
 use super::error::{DatasetError, DatasetProblem, shown};
 use super::text::TextFile;
-use crate::project::session::Session;
+use crate::project::files::own_folder::is_session;
 
 /// Whether a tidied path in a data set lies outside of it.
 pub(super) fn leaves(path: &Path) -> bool {
@@ -20,7 +20,7 @@ pub(super) struct Outside {
 
 impl Outside {
     pub fn of(folder: &Path) -> Self {
-        Self { is_session: Session::is_session(folder), names: Vec::new() }
+        Self { is_session: is_session(folder), names: Vec::new() }
     }
 
     /// Looks at the file that a row names; `path` is it in the data set, tidied.

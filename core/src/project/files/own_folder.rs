@@ -5,10 +5,17 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use crate::project::{dataset, session};
+/// Name of the description in a dataset folder.
+pub const DESCRIPTION: &str = "dataset.toml";
+/// Name of the document in a session folder.
+pub const DOCUMENT: &str = "session.json";
+/// Name of the journal in a session folder.
+pub const JOURNAL: &str = "journal.jsonl";
 
-/// What makes a folder a session or a data set.
-const MARKS: [&str; 3] = [session::DOCUMENT, session::JOURNAL, dataset::DESCRIPTION];
+/// Whether a folder claims to be a session.
+pub fn is_session(folder: &Path) -> bool {
+    [DOCUMENT, JOURNAL].iter().any(|name| folder.join(name).is_file())
+}
 
 /// The session or data set that a path lies in, the nearest above it; `None` when it lies in none.
 pub fn root_of(path: &Path) -> Option<PathBuf> {
@@ -64,7 +71,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 fn is_root(folder: &Path) -> bool {
-    MARKS.iter().any(|mark| fs::symlink_metadata(folder.join(mark)).is_ok())
+    [DOCUMENT, JOURNAL, DESCRIPTION].iter().any(|mark| fs::symlink_metadata(folder.join(mark)).is_ok())
 }
 
 fn is_link(path: &Path) -> bool {

@@ -7,6 +7,7 @@
 mod check;
 mod estimate;
 mod file;
+mod of_calibration;
 
 use std::fmt;
 

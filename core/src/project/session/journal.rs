@@ -21,11 +21,10 @@ use super::document::Document;
 use super::edit::Edit;
 use super::error::{SessionError, SessionProblem};
 use super::history::History;
+use crate::project::files::atomic_file;
 use crate::project::files::image_file::one_line;
-use crate::project::files::{atomic_file, own_folder};
+use crate::project::files::own_folder::{self, JOURNAL};
 
-/// Name of the journal in a session folder.
-pub const JOURNAL: &str = "journal.jsonl";
 /// What `format` says in the first entry.
 const FORMAT: &str = "handeye-journal";
 /// The layout: a reader refuses another one.

@@ -5,10 +5,11 @@ use std::path::Path;
 
 use image::RgbImage;
 
+use super::JOURNAL;
 use super::document::{CaptureRecord, Document};
 use super::error::{SessionError, SessionProblem};
 use super::history::History;
-use super::journal::{self, JOURNAL, Replayed};
+use super::journal::{self, Replayed};
 use super::session_file::{self, SessionFile};
 use super::{DOCUMENT, depth};
 use crate::depth::DepthImage;

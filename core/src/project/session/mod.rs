@@ -49,17 +49,16 @@ pub use edit::Edit;
 pub use edit_error::{EditError, TaughtChange};
 pub use error::{SessionError, SessionProblem};
 pub use history::{History, UNDO_STEPS};
-pub use journal::JOURNAL;
 pub use lock::FolderLock;
 pub use observations::SessionObservations;
 pub use session_file::{FORMAT, MAJOR_VERSION, MINOR_VERSION};
 pub use store::Store;
 
-use crate::depth::DepthImage;
-use crate::project::files::image_file;
+pub use crate::project::files::own_folder::{DOCUMENT, JOURNAL};
 
-/// Name of the document in a session folder.
-pub const DOCUMENT: &str = "session.json";
+use crate::depth::DepthImage;
+use crate::project::files::{image_file, own_folder};
+
 /// Name of the result in a session folder.
 pub const RESULT: &str = "result.json";
 
@@ -75,7 +74,7 @@ pub struct Session {
 impl Session {
     /// Whether a folder claims to be a session.
     pub fn is_session(folder: &Path) -> bool {
-        [DOCUMENT, JOURNAL].iter().any(|name| folder.join(name).is_file())
+        own_folder::is_session(folder)
     }
 
     /// Reads a session, also while another program writes it; nothing in the folder is changed. The image of every

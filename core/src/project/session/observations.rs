@@ -6,8 +6,9 @@ use nalgebra::Vector6;
 
 use super::capture_id::CaptureId;
 use super::document::{Document, Role};
-use crate::estimate::{CameraKnowledge, Observations, ObservedView};
+use crate::estimate::{Observations, ObservedView};
 use crate::geometry::arm::ArmError;
+use crate::project::dataset::CameraInput;
 use crate::targets::observation::{Corner, View};
 
 /// What was observed in a session.
@@ -39,7 +40,7 @@ impl Document {
                 mode: Some(self.meta.mode),
                 target: self.meta.target,
                 image_size,
-                camera: CameraKnowledge::of(self.meta.camera.as_ref()),
+                camera: CameraInput::knowledge(self.meta.camera.as_ref()),
                 views: Vec::new(),
             },
             captures: Vec::new(),

@@ -4,10 +4,10 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::JOURNAL;
 use super::capture::DEPTH;
 use super::derived::Derived;
 use super::error::{SessionError, SessionProblem};
-use super::journal::JOURNAL;
 use super::lock::{FolderLock, LOCK};
 use super::session_file::IMAGES;
 use super::store::make_folder;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use image::RgbImage;
 
+use super::JOURNAL;
 use super::capture::{Capture, DEPTH};
 use super::capture_id::CaptureId;
 use super::derived::{self, Derived};
@@ -15,7 +16,7 @@ use super::document::{CaptureRecord, Document, SessionMeta};
 use super::edit::Edit;
 use super::error::{SessionError, SessionProblem};
 use super::history::History;
-use super::journal::{Entry, JOURNAL, Journal};
+use super::journal::{Entry, Journal};
 use super::load::{self, Loaded};
 use super::lock::{FolderLock, LOCK};
 use super::session_file::IMAGES;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::cell::kinematics::{ArmPose, JointAngles, forward};
+use handeye_core::geometry::arm::ur5::{ArmPose, JointAngles, forward};
 
 /// How far the upper arm runs beside the plane through the shoulder, along the shoulder axis.
 const UPPER_ARM_BESIDE_M: f64 = 0.136;

@@ -9,9 +9,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::kinematics::{JointAngles, JointLimits, inverse_nearest};
 use super::scene::ResolvedScene;
 pub use clearance::{Arm, Obstacle};
+use handeye_core::geometry::arm::ur5::{JointAngles, JointLimits, inverse_nearest};
 
 /// Largest joint step between two checks of a path: a tool 1 m away moves by 5 cm, half the size of a link.
 const PATH_STEP_RAD: f64 = 0.05;

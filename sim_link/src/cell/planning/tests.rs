@@ -99,7 +99,7 @@ fn an_obstacle_is_driven_around_between_all_views() {
                     let joints: JointAngles =
                         std::array::from_fn(|k| from.joints[k] + part * (to.joints[k] - from.joints[k]));
                     let tip = setup.arm.world_from_arm
-                        * crate::cell::kinematics::forward(&joints).arm_from_connection
+                        * handeye_core::geometry::arm::ur5::forward(&joints).arm_from_connection
                         * setup.arm.connection_from_tip;
                     [tip, tip * setup.arm.tip_from_camera].iter().any(|place| {
                         let beside = (rod.world_from_centre.inverse() * place).translation.vector.abs();
@@ -116,7 +116,7 @@ fn an_obstacle_is_driven_around_between_all_views() {
 }
 
 fn assert_keeps_away(setup: &ViewSetup, joints: &JointAngles) {
-    let connection = setup.arm.world_from_arm * crate::cell::kinematics::forward(joints).arm_from_connection;
+    let connection = setup.arm.world_from_arm * handeye_core::geometry::arm::ur5::forward(joints).arm_from_connection;
     let tip = connection * setup.arm.connection_from_tip;
     let camera = tip * setup.arm.tip_from_camera;
     for place in [tip, camera] {

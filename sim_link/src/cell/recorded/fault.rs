@@ -9,8 +9,8 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::Moment;
-use crate::cell::kinematics::{JOINTS, JointAngles};
 use crate::cell::scene::Scene;
+use handeye_core::geometry::arm::ur5::{JOINTS, JointAngles};
 
 /// Random numbers of a fault, apart from those of scene and corners.
 const FAULT_STREAM: u64 = 4;

@@ -20,9 +20,9 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::kinematics::JointAngles;
 use super::planning::{PlanError, PlannedView, ViewOptions, ViewSetup, random_poses_looking_at};
 use super::scene::{ResolvedScene, Scene, SceneError};
+use handeye_core::geometry::arm::ur5::JointAngles;
 
 pub use fault::{Fault, UnknownFault};
 
@@ -222,7 +222,7 @@ impl RecordedSession {
             1,
         );
         let rows = self.views.iter().map(|view| (view.name.as_str(), &view.base_from_tip, &view.joints_rad[..]));
-        let poses = write::pose_table_with_joints(super::kinematics::JOINTS, rows);
+        let poses = write::pose_table_with_joints(handeye_core::geometry::arm::ur5::JOINTS, rows);
         for (name, text) in
             [(dataset::DESCRIPTION, description), (write::POSE_TABLE, poses), ("corners.csv", self.corner_table())]
         {

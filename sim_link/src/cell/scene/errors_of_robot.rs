@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::RobotSpec;
-use crate::cell::kinematics::{JointAngles, forward};
+use handeye_core::geometry::arm::ur5::{JointAngles, forward};
 use handeye_core::geometry::se3;
 
 /// First stream of random numbers that belongs to settled positions; the ones below are the scene's own.

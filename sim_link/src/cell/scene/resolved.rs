@@ -13,7 +13,7 @@ use super::spec::{
     BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo,
     SimulationSpec, SlipSpec, SolidSpec,
 };
-use crate::cell::kinematics::{JointAngles, JointLimits, forward};
+use handeye_core::geometry::arm::ur5::{JointAngles, JointLimits, forward};
 
 const CAMERA_STREAM: u64 = 1;
 const BOARD_STREAM: u64 = 2;

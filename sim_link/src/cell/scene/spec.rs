@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::board_motion::BoardMotionSpec;
-use crate::cell::kinematics::JointAngles;
+use handeye_core::geometry::arm::ur5::JointAngles;
 
 /// cos 45° = sin 45°, for quaternions of quarter and half turns.
 const HALF_SQRT: f64 = std::f64::consts::FRAC_1_SQRT_2;

@@ -1,8 +1,8 @@
 use super::*;
 use crate::axes::sensor_from_camera;
-use crate::cell::kinematics::{forward, inverse_nearest};
 use crate::cell::motion::Course;
 use crate::cell::planning::ViewSetup;
+use handeye_core::geometry::arm::ur5::{forward, inverse_nearest};
 use handeye_core::geometry::frames::{Base, PointIn, Pose, Tip};
 use nalgebra::{Point3, Vector2, Vector3};
 

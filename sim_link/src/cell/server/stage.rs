@@ -4,13 +4,13 @@ use std::cell::RefCell;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::cell::kinematics::{JOINTS, JointAngles, forward};
 use crate::cell::motion::Course;
 use crate::cell::render::{Finish, Shape, Solid, props};
 use crate::cell::scene::{JointModeSpec, RelativeTo, ResolvedScene, RobotErrors, Scene, SlipSpec};
 use crate::cell::world::{
     Carrier, Chain, Faults, Handle, Joint, JointMode, Kind, Tree, VisionSensor, World, WorldError, turn_z,
 };
+use handeye_core::geometry::arm::ur5::{JOINTS, JointAngles, forward};
 
 /// Handles of the objects that the cell itself has to find again.
 #[derive(Debug, Clone)]

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::super::follow_goal::Workspace;
 use super::*;
-use crate::cell::kinematics::JointLimits;
+use handeye_core::geometry::arm::ur5::JointLimits;
 
 const DT_S: f64 = 0.05;
 

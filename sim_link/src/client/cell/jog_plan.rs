@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::reach::ArmKinematics;
 use super::{JOINTS, JointAngles};
-use crate::cell::kinematics::{IkError, JointLimits};
+use handeye_core::geometry::arm::ur5::{IkError, JointLimits};
 
 /// Fastest jog of a joint [rad/s]: two thirds of what the model of the arm allows its joints by default.
 pub const JOINT_SPEED: f64 = 60.0 * std::f64::consts::PI / 180.0;

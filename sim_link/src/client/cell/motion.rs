@@ -394,7 +394,7 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
-    use crate::cell::kinematics::JointLimits;
+    use handeye_core::geometry::arm::ur5::JointLimits;
 
     /// A tip whose line leads through the column of the arm strays, and a stop does not take it back to its line first.
     #[test]

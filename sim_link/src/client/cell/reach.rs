@@ -5,9 +5,9 @@ use nalgebra::{Isometry3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{Arm, CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles};
-use crate::cell::kinematics::{self, DlsOptions, IkError, JointLimits};
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
+use handeye_core::geometry::arm::ur5::{self, DlsOptions, IkError, JointLimits};
 
 /// How far an axis of a joint may be from where the built-in kinematics has it \[m\]. The model and the manufacturer's
 /// table differ by 7 mm; a physics engine holds its joints together to a tenth of a millimetre.
@@ -39,7 +39,7 @@ pub struct ArmChain {
 impl ArmChain {
     /// Where the tip is with the joints at `joints` (rad).
     pub fn tip(&self, joints: &JointAngles) -> Pose<Base, Tip> {
-        let arm_from_connection = kinematics::forward(joints).arm_from_connection;
+        let arm_from_connection = ur5::forward(joints).arm_from_connection;
         Pose::from_isometry(self.base_from_arm * arm_from_connection * self.connection_from_tip)
     }
 
@@ -132,13 +132,13 @@ impl ArmKinematics {
         }
         let ArmChain { base_from_arm, connection_from_tip } = &self.chain;
         let arm_from_connection = base_from_arm.inverse() * goal.isometry() * connection_from_tip.inverse();
-        kinematics::inverse_nearest(&arm_from_connection, seed, limits)
+        ur5::inverse_nearest(&arm_from_connection, seed, limits)
     }
 
     /// The joint positions (rad), found from `seed` on, that take the tip as near to `goal` as the arm can.
     pub(super) fn towards(&self, goal: &Pose<Base, Tip>, seed: &JointAngles) -> JointAngles {
         let arm_from_tip = self.chain.base_from_arm.inverse() * goal.isometry();
-        kinematics::towards(&arm_from_tip, &self.chain.connection_from_tip, seed, &DlsOptions::default(), &self.limits)
+        ur5::towards(&arm_from_tip, &self.chain.connection_from_tip, seed, &DlsOptions::default(), &self.limits)
     }
 }
 
@@ -205,7 +205,7 @@ fn measure(sim: &mut Sim, objects: &CellObjects, arm: ObjectHandle) -> Result<Op
 
 impl Measured {
     fn kinematics(&self, info: &CellInfo) -> Result<ArmKinematics, UnknownKinematics> {
-        let expected = kinematics::forward(&self.joints);
+        let expected = ur5::forward(&self.joints);
         for (index, (found, expected)) in self.arm_from_joint.iter().zip(&expected.arm_from_joint).enumerate() {
             let axis = expected.rotation * Vector3::z();
             let angle_rad = (found.rotation * Vector3::z()).angle(&axis);

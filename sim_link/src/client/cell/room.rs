@@ -12,9 +12,9 @@ use super::JointAngles;
 use super::jog_plan::nearest;
 use super::reach::ArmKinematics;
 use super::views::BoardInView;
-use crate::cell::kinematics::jacobian_at;
 use crate::cell::planning::{self, PlannedView, ViewOptions};
 use crate::client::cell::follow_goal::FollowLimits;
+use handeye_core::geometry::arm::ur5::jacobian_at;
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.
@@ -103,19 +103,8 @@ pub struct NoPlace {
 }
 
 impl ArmKinematics {
-    /// The least share of its limits that the tip can have in every direction from these joints, wherever the board goes
-    /// within `reach` while its view is kept. 0 where some of it cannot be followed at all.
-    pub fn room_to_follow(
-        &self,
-        limits: &FollowLimits,
-        board: &BoardInView,
-        reach: &BoardReach,
-        joints: &JointAngles,
-    ) -> f64 {
-        self.room_over(limits, board, reach, joints, 0.0)
-    }
-
-    /// Whether [`Self::room_to_follow`] is enough for a board at a usual speed.
+    /// Whether the tip can follow the board at a usual speed from these joints, wherever it goes within `reach` while its
+    /// view is kept.
     pub fn has_room_to_follow(
         &self,
         limits: &FollowLimits,
@@ -172,7 +161,9 @@ impl ArmKinematics {
         best.ok_or(NoPlace { tried: views.len() })
     }
 
-    /// As [`Self::room_to_follow`], but given up with any smaller value as soon as it is below `wanted`.
+    /// The least share of its limits that the tip can have in every direction from these joints, wherever the board goes
+    /// within `reach` while its view is kept; 0 where some of it cannot be followed at all. Given up with any smaller value
+    /// as soon as it is below `wanted`.
     fn room_over(
         &self,
         limits: &FollowLimits,

@@ -149,22 +149,6 @@ impl Sim {
         self.call("sim.getInt32Param", vec![Value::from(id)])?.integer(0)
     }
 
-    /// Changes an integer setting of the simulator.
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn set_int_param(&mut self, id: i64, value: i64) -> Result<(), LinkError> {
-        self.call("sim.setInt32Param", vec![Value::from(id), Value::from(value)]).map(drop)
-    }
-
-    /// A text setting of the simulator.
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn get_string_param(&mut self, id: i64) -> Result<String, LinkError> {
-        Ok(self.call("sim.getStringParam", vec![Value::from(id)])?.text(0)?.to_owned())
-    }
-
     /// Version of the simulator: 41000 is 4.10.0.
     ///
     /// # Errors

@@ -4,8 +4,9 @@ use nalgebra::Vector6;
 
 use super::super::Hypothesis;
 use super::super::effect::Effect;
-use super::super::judge::{Candidate, Judged, moved_m};
+use super::super::judge::{Judged, moved_m};
 use super::super::model::Model;
+use super::super::screen::Candidate;
 use super::super::select::Selection;
 use super::{estimate, evidence};
 use crate::diagnose::findings::{Evidence, Finding, FindingCode, Severity, listed};

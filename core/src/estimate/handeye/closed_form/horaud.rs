@@ -1,9 +1,6 @@
 //! Horaud & Dornaika: the rotation as the eigenvector of a 4×4 matrix of quaternions.
 
-use nalgebra::{Matrix4, Quaternion, SymmetricEigen, UnitQuaternion, Vector4};
-
-use super::linear::RANK_TOLERANCE;
-use super::pairing::{self, Motion};
+use super::pairing;
 use super::{ClosedForm, ClosedFormSolution};
 use crate::estimate::handeye::{HandEyeError, PosePair};
 
@@ -37,49 +34,6 @@ impl ClosedForm for Horaud {
     }
 
     fn solve(&self, pairs: &[PosePair]) -> Result<ClosedFormSolution, HandEyeError> {
-        pairing::rotation_first(self.name(), pairs, rotation)
+        pairing::rotation_first(self.name(), pairs, pairing::rotation)
     }
-}
-
-/// Rotation of `mount_from_camera`; `None` when two rotations fit equally well within [`RANK_TOLERANCE`].
-pub(super) fn rotation(motions: &[Motion]) -> Option<UnitQuaternion<f64>> {
-    let cost: Matrix4<f64> = motions
-        .iter()
-        .map(|m| {
-            let difference = times_from_left(&m.mount.rotation()) - times_from_right(&m.camera.rotation());
-            difference.transpose() * difference
-        })
-        .sum();
-    let eigen = SymmetricEigen::new(cost);
-    let mut order = [0, 1, 2, 3];
-    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    let [best, second, .., worst] = order.map(|k| eigen.eigenvalues[k]);
-    if second - best <= RANK_TOLERANCE * worst {
-        return None;
-    }
-    let q = eigen.eigenvectors.column(order[0]);
-    Some(UnitQuaternion::from_quaternion(Quaternion::from_parts(q[0], nalgebra::Vector3::new(q[1], q[2], q[3]))))
-}
-
-/// The matrix with `M x = q x` for quaternions as columns `w, x, y, z`.
-fn times_from_left(q: &Quaternion<f64>) -> Matrix4<f64> {
-    columns(|unit| q * unit)
-}
-
-/// The matrix with `M x = x q` for quaternions as columns `w, x, y, z`.
-fn times_from_right(q: &Quaternion<f64>) -> Matrix4<f64> {
-    columns(|unit| unit * q)
-}
-
-fn columns(product: impl Fn(Quaternion<f64>) -> Quaternion<f64>) -> Matrix4<f64> {
-    let units = [
-        Quaternion::new(1.0, 0.0, 0.0, 0.0),
-        Quaternion::new(0.0, 1.0, 0.0, 0.0),
-        Quaternion::new(0.0, 0.0, 1.0, 0.0),
-        Quaternion::new(0.0, 0.0, 0.0, 1.0),
-    ];
-    Matrix4::from_columns(&units.map(|unit| {
-        let p = product(unit);
-        Vector4::new(p.w, p.i, p.j, p.k)
-    }))
 }

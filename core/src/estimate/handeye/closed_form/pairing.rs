@@ -1,9 +1,9 @@
 //! The relative motions of all pairs of views, as robot and camera saw them, and what the `A X = X B` methods share.
 
-use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix4, Quaternion, SMatrix, SymmetricEigen, UnitQuaternion, Vector3, Vector4};
 
-use super::linear::Rows;
-use super::{ClosedFormSolution, Method, PosePair, check, horaud, with_mean_target};
+use super::linear::{RANK_TOLERANCE, Rows};
+use super::{ClosedFormSolution, Method, PosePair, check, with_mean_target};
 use crate::estimate::handeye::{HandEyeError, motion};
 use crate::geometry::frames::{Camera, Mount, Pose};
 
@@ -109,7 +109,7 @@ pub(super) fn aligned_motions(method: &Method, views: &[PosePair]) -> Result<Vec
     if !spans_two_axes(&clear) {
         return Err(ambiguous());
     }
-    let rotation = horaud::rotation(&clear).ok_or_else(ambiguous)?;
+    let rotation = rotation(&clear).ok_or_else(ambiguous)?;
     for motion in motions.iter_mut().filter(|m| m.is_half_turn()) {
         let ax = motion.mount.rotation().into_inner() * rotation.into_inner();
         let xb = rotation.into_inner() * motion.camera.rotation().into_inner();
@@ -127,6 +127,50 @@ pub(super) fn spans_two_axes(motions: &[Motion]) -> bool {
         axes.add(&motion.mount.rotation());
     }
     axes.spans_two_axes()
+}
+
+/// Rotation of `mount_from_camera` by [`Horaud`](super::Horaud)'s eigenvector; `None` when two rotations fit equally well
+/// within [`RANK_TOLERANCE`].
+pub(super) fn rotation(motions: &[Motion]) -> Option<UnitQuaternion<f64>> {
+    let cost: Matrix4<f64> = motions
+        .iter()
+        .map(|m| {
+            let difference = times_from_left(&m.mount.rotation()) - times_from_right(&m.camera.rotation());
+            difference.transpose() * difference
+        })
+        .sum();
+    let eigen = SymmetricEigen::new(cost);
+    let mut order = [0, 1, 2, 3];
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let [best, second, .., worst] = order.map(|k| eigen.eigenvalues[k]);
+    if second - best <= RANK_TOLERANCE * worst {
+        return None;
+    }
+    let q = eigen.eigenvectors.column(order[0]);
+    Some(UnitQuaternion::from_quaternion(Quaternion::from_parts(q[0], Vector3::new(q[1], q[2], q[3]))))
+}
+
+/// The matrix with `M x = q x` for quaternions as columns `w, x, y, z`.
+fn times_from_left(q: &Quaternion<f64>) -> Matrix4<f64> {
+    columns(|unit| q * unit)
+}
+
+/// The matrix with `M x = x q` for quaternions as columns `w, x, y, z`.
+fn times_from_right(q: &Quaternion<f64>) -> Matrix4<f64> {
+    columns(|unit| unit * q)
+}
+
+fn columns(product: impl Fn(Quaternion<f64>) -> Quaternion<f64>) -> Matrix4<f64> {
+    let units = [
+        Quaternion::new(1.0, 0.0, 0.0, 0.0),
+        Quaternion::new(0.0, 1.0, 0.0, 0.0),
+        Quaternion::new(0.0, 0.0, 1.0, 0.0),
+        Quaternion::new(0.0, 0.0, 0.0, 1.0),
+    ];
+    Matrix4::from_columns(&units.map(|unit| {
+        let p = product(unit);
+        Vector4::new(p.w, p.i, p.j, p.k)
+    }))
 }
 
 /// Translation of `mount_from_camera` once its rotation is known: least squares of

@@ -5,7 +5,6 @@ use nalgebra::Isometry3;
 
 use super::move_to_config::{keep, motion_cleanup, motion_step};
 use super::{Call, Outcome, Table};
-use crate::cell::kinematics::{DlsOptions, JointAngles, JointLimits, damped_least_squares};
 use crate::cell::motion::{MotionLimits, PoseMotion, PoseStep};
 use crate::cell::server::args::{ApiError, Fields};
 use crate::cell::server::cell::Cell;
@@ -15,6 +14,7 @@ use crate::cell::server::plans::{
 use crate::cell::server::task::Answer;
 use crate::cell::world::{Chain, Flagged, Handle, poses};
 use crate::wire::{self, Reader};
+use handeye_core::geometry::arm::ur5::{DlsOptions, JointAngles, JointLimits, damped_least_squares};
 
 pub(super) const FUNCTIONS: Table = &[
     ("moveToPose", move_to_pose),

@@ -5,8 +5,8 @@ use handeye_core::geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
 use nalgebra::{Matrix2, Point3, Vector2};
 
 use super::*;
-use crate::cell::kinematics::JointAngles;
 use crate::cell::scene::ResolvedScene;
+use handeye_core::geometry::arm::ur5::JointAngles;
 
 /// Grey levels of an image, row 0 on top.
 struct Grey {

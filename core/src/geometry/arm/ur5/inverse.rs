@@ -8,8 +8,9 @@ use std::fmt;
 
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 
-use super::forward::{forward, jacobian, link_tail, turn_z};
-use super::{JOINTS, JointAngles, JointLimits, dh};
+use super::forward::{forward, jacobian};
+use super::{END_TURN, JOINTS, JointAngles, JointLimits, ROWS, turn_z};
+use crate::geometry::se3;
 
 /// Sine of the fifth angle below which the fourth and sixth axes count as parallel: the sixth joint is then free.
 const PARALLEL_WRIST: f64 = 1e-10;
@@ -138,25 +139,6 @@ pub fn inverse_nearest(
         .ok_or_else(|| least_violation(&branches, seed, limits))
 }
 
-/// All configurations within the limits that differ from `joints` by whole turns.
-pub fn expand_limits(joints: &JointAngles, limits: &JointLimits) -> Vec<JointAngles> {
-    let mut all = vec![*joints];
-    for i in 0..JOINTS {
-        let values: Vec<f64> = turns(joints[i], limits, i).collect();
-        all = all
-            .iter()
-            .flat_map(|base| {
-                values.iter().map(|&value| {
-                    let mut shifted = *base;
-                    shifted[i] = value;
-                    shifted
-                })
-            })
-            .collect();
-    }
-    all
-}
-
 /// Values of joint `i` that differ from `value` by whole turns and are within the limits.
 fn turns(value: f64, limits: &JointLimits, i: usize) -> impl Iterator<Item = f64> + '_ {
     let lowest = ((limits.min_rad[i] - value) / TAU - REACH_SLACK).ceil();
@@ -208,7 +190,7 @@ fn solve(arm_from_connection: &Isometry3<f64>, free_wrist_rad: f64) -> Result<Ve
     if !finite {
         return Err(IkError::NotFinite);
     }
-    let base_from_flange = turn_z(-dh::END_TURN) * arm_from_connection * turn_z(-dh::END_TURN);
+    let base_from_flange = turn_z(-END_TURN) * arm_from_connection * turn_z(-END_TURN);
     let mut found: Vec<JointAngles> = Vec::with_capacity(8);
     let mut nearest_miss: Option<Obstacle> = None;
     for pan in pan_angles(&base_from_flange).map_err(|obstacle| IkError::Unreachable { obstacle })? {
@@ -217,7 +199,7 @@ fn solve(arm_from_connection: &Isometry3<f64>, free_wrist_rad: f64) -> Result<Ve
                 Ok(arms) => {
                     for [lift, elbow, pitch] in arms {
                         let angles = [pan, lift, elbow, pitch, wrist, roll];
-                        let raw = std::array::from_fn(|i| wrap(angles[i] - dh::OFFSET[i]));
+                        let raw = std::array::from_fn(|i| wrap(angles[i] - ROWS[i].theta_offset_rad));
                         let (polished, miss) = polish(raw, arm_from_connection);
                         if miss < ACCEPT && !found.iter().any(|known| same_branch(known, &polished)) {
                             found.push(polished);
@@ -237,7 +219,7 @@ fn solve(arm_from_connection: &Isometry3<f64>, free_wrist_rad: f64) -> Result<Ve
 }
 
 fn edge_of_reach() -> Obstacle {
-    let reach_m = dh::A[1].abs() + dh::A[2].abs();
+    let reach_m = ROWS[1].a_m.abs() + ROWS[2].a_m.abs();
     Obstacle::TooFar { needed_m: reach_m, reach_m }
 }
 
@@ -253,12 +235,12 @@ fn easier(a: Obstacle, b: Obstacle) -> Obstacle {
 
 /// First angle: the fifth frame's origin must be `d4` beside the plane of the arm.
 fn pan_angles(base_from_flange: &Isometry3<f64>) -> Result<[f64; 2], Obstacle> {
-    let wrist = base_from_flange * Point3::new(0.0, 0.0, -dh::D[5]);
+    let wrist = base_from_flange * Point3::new(0.0, 0.0, -ROWS[5].d_m);
     let distance_m = wrist.x.hypot(wrist.y);
-    if distance_m * (1.0 + REACH_SLACK) < dh::D[3] {
-        return Err(Obstacle::InColumn { distance_m, least_m: dh::D[3] });
+    if distance_m * (1.0 + REACH_SLACK) < ROWS[3].d_m {
+        return Err(Obstacle::InColumn { distance_m, least_m: ROWS[3].d_m });
     }
-    let ratio = dh::D[3] / distance_m;
+    let ratio = ROWS[3].d_m / distance_m;
     let towards = wrist.y.atan2(wrist.x) + FRAC_PI_2;
     let side = ratio.min(1.0).acos();
     Ok([towards + side, towards - side])
@@ -276,11 +258,11 @@ fn wrist_angles(base_from_flange: &Isometry3<f64>, pan: f64, free_wrist_rad: f64
 
 /// Second, third and fourth angle: the planar arm of two links, and what is left of the rotation.
 fn elbow_angles(base_from_flange: &Isometry3<f64>, pan: f64, wrist: f64, roll: f64) -> Result<[[f64; 3]; 2], Obstacle> {
-    let base_from_shoulder = turn_z(pan) * link_tail(0);
-    let pitch_from_flange = turn_z(wrist) * link_tail(4) * turn_z(roll) * link_tail(5);
+    let base_from_shoulder = turn_z(pan) * ROWS[0].link();
+    let pitch_from_flange = turn_z(wrist) * ROWS[4].link() * turn_z(roll) * ROWS[5].link();
     let shoulder_from_pitch = base_from_shoulder.inverse() * base_from_flange * pitch_from_flange.inverse();
-    let wrist_point = shoulder_from_pitch * Point3::new(0.0, -dh::D[3], 0.0);
-    let (upper, lower) = (dh::A[1], dh::A[2]);
+    let wrist_point = shoulder_from_pitch * Point3::new(0.0, -ROWS[3].d_m, 0.0);
+    let (upper, lower) = (ROWS[1].a_m, ROWS[2].a_m);
     let needed_m = wrist_point.x.hypot(wrist_point.y);
     let cosine = (needed_m * needed_m - upper * upper - lower * lower) / (2.0 * upper * lower);
     if cosine > 1.0 + REACH_SLACK {
@@ -321,7 +303,7 @@ fn polish(start: JointAngles, goal: &Isometry3<f64>) -> (JointAngles, f64) {
 /// Displacement and rotation vector from `actual` to `goal`, both in the axes of the arm.
 pub(super) fn pose_error(actual: &Isometry3<f64>, goal: &Isometry3<f64>) -> Vector6<f64> {
     let shift = goal.translation.vector - actual.translation.vector;
-    let turn = handeye_core::geometry::se3::rotation_vector(&(goal.rotation * actual.rotation.inverse()));
+    let turn = se3::rotation_vector(&(goal.rotation * actual.rotation.inverse()));
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::cell::kinematics::inverse::{pose_error, wrap};
+use crate::geometry::arm::ur5::inverse::{pose_error, wrap};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -261,19 +261,6 @@ fn a_joint_range_of_its_own_is_filled_by_a_full_turn() {
     seed[5] = 5.0;
     let found = inverse_nearest(&goal, &seed, &limits).unwrap();
     assert!((found[5] - (TAU - 0.7)).abs() < 1e-9, "{found:?}");
-}
-
-#[test]
-fn expansion_lists_every_full_turn_within_the_limits() {
-    let all = expand_limits(&[0.5, 0.5, 0.5, 0.5, 0.5, 0.5], &JointLimits::default());
-    assert_eq!(all.len(), 2usize.pow(6));
-    // At zero both ends of the range are a full turn away and allowed.
-    assert_eq!(expand_limits(&[0.0; 6], &JointLimits::default()).len(), 3usize.pow(6));
-    let goal = forward(&[0.5; 6]).arm_from_connection;
-    for joints in all {
-        assert!(JointLimits::default().contains(&joints));
-        assert!(miss(&joints, &goal) < ROUNDING);
-    }
 }
 
 /// One pass of the simulation moves the goal by little; the arm must keep up with it in a few iterations.

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use nalgebra::Matrix3;
 
-use super::claim::Claim;
-use super::handeye::joint::RobotField;
-use super::uncertainty::widening::Evidence;
-use super::{Calibration, CameraFit, JointFit, ShapeEstimate, ViewStatus};
-use crate::project::result::{
-    self, BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, Provenance,
-    Quality, RobotFieldEstimate, WideningRecord,
+use super::{
+    BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, MethodRecord,
+    Provenance, Quality, RobotFieldEstimate, ViewRecord, ViewRecordStatus, WideningRecord,
 };
+use crate::estimate::claim::Claim;
+use crate::estimate::handeye::joint::RobotField;
+use crate::estimate::uncertainty::widening::Evidence;
+use crate::estimate::{Calibration, CameraFit, JointFit, MethodResult, ShapeEstimate, ViewResult, ViewStatus};
 
 impl Calibration {
     /// The result document. `options` are what the answer depends on besides the input.
@@ -111,21 +111,21 @@ fn board(estimate: ShapeEstimate) -> BoardEstimate {
     }
 }
 
-fn method(method: &super::MethodResult) -> result::MethodRecord {
+fn method(method: &MethodResult) -> MethodRecord {
     match &method.outcome {
-        Ok(solution) => result::MethodRecord::solved(method.name, &solution.mount_from_camera),
-        Err(error) => result::MethodRecord::failed(method.name, error),
+        Ok(solution) => MethodRecord::solved(method.name, &solution.mount_from_camera),
+        Err(error) => MethodRecord::failed(method.name, error),
     }
 }
 
-fn view(view: &super::ViewResult) -> result::ViewRecord {
-    result::ViewRecord {
+fn view(view: &ViewResult) -> ViewRecord {
+    ViewRecord {
         name: view.name.clone(),
         status: match view.status {
-            ViewStatus::Used => result::ViewRecordStatus::Used,
-            ViewStatus::Excluded => result::ViewRecordStatus::Excluded,
-            ViewStatus::Outlier => result::ViewRecordStatus::Outlier,
-            ViewStatus::NoTarget => result::ViewRecordStatus::NoTarget,
+            ViewStatus::Used => ViewRecordStatus::Used,
+            ViewStatus::Excluded => ViewRecordStatus::Excluded,
+            ViewStatus::Outlier => ViewRecordStatus::Outlier,
+            ViewStatus::NoTarget => ViewRecordStatus::NoTarget,
         },
         rms_px: view.rms_px,
         influence_mm: view.influence_m.map(|m| m * 1e3),

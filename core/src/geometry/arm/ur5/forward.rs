@@ -1,8 +1,8 @@
 //! Joint values to poses and velocities.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
-use super::{JOINTS, JointAngles, dh};
+use super::{END_TURN, JOINTS, JointAngles, ROWS, turn_z};
 
 /// Where every part of the arm is for one configuration, in the arm frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,18 +15,6 @@ pub struct ArmPose {
     pub arm_from_connection: Isometry3<f64>,
 }
 
-pub(super) fn turn_z(angle: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle))
-}
-
-/// What follows the rotation of joint `i` in the convention: the shift along z, then the common normal and its twist.
-pub(super) fn link_tail(i: usize) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::new(dh::A[i], 0.0, dh::D[i]),
-        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), dh::ALPHA[i]),
-    )
-}
-
 /// Poses of joints, links and connection for the given joint values in radians.
 ///
 /// # Frames and units
@@ -35,13 +23,13 @@ pub(super) fn link_tail(i: usize) -> Isometry3<f64> {
 pub fn forward(joints: &JointAngles) -> ArmPose {
     let mut arm_from_joint = [Isometry3::identity(); JOINTS];
     let mut arm_from_link = [Isometry3::identity(); JOINTS];
-    let mut arm_from_axis = turn_z(dh::END_TURN);
+    let mut arm_from_axis = turn_z(END_TURN);
     for i in 0..JOINTS {
-        arm_from_joint[i] = arm_from_axis * turn_z(dh::OFFSET[i]);
+        arm_from_joint[i] = arm_from_axis * turn_z(ROWS[i].theta_offset_rad);
         arm_from_link[i] = arm_from_joint[i] * turn_z(joints[i]);
-        arm_from_axis = arm_from_link[i] * link_tail(i);
+        arm_from_axis = arm_from_link[i] * ROWS[i].link();
     }
-    ArmPose { arm_from_joint, arm_from_link, arm_from_connection: arm_from_axis * turn_z(dh::END_TURN) }
+    ArmPose { arm_from_joint, arm_from_link, arm_from_connection: arm_from_axis * turn_z(END_TURN) }
 }
 
 /// Geometric Jacobian at the connection: velocity (rows 0 to 2, m/s) and angular velocity (rows 3 to 5, rad/s) of the

@@ -6,19 +6,18 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-#[cfg(feature = "opencv")]
-use super::{Image, Tracker, Update};
-use super::{MotionModel, Setup};
+use super::sessions::{BOARD, GRID};
 use crate::depth::DepthImage;
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::SmallSample;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::targets::bent::BoardShape;
-use crate::targets::{Grid, TargetSpec};
+#[cfg(feature = "opencv")]
+use crate::track::{Image, Tracker, Update};
+use crate::track::{MotionModel, Setup};
 use crate::verify::Predictor;
 
-pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 /// Seconds between images.
 pub const PERIOD_S: f64 = 1.0 / 30.0;
 pub const FAR_M: f32 = 3.5;
@@ -168,11 +167,11 @@ pub fn calibrated() -> Predictor {
 }
 
 pub fn setup() -> Setup {
-    Setup { target: TargetSpec::Chessboard(GRID), calibrated: calibrated(), motion: MotionModel::default() }
+    Setup { target: BOARD, calibrated: calibrated(), motion: MotionModel::default() }
 }
 
 pub fn centre() -> Point3<f64> {
-    TargetSpec::Chessboard(GRID).centre()
+    BOARD.centre()
 }
 
 /// A board whose centre is at `centre` (relative to the middle of the camera's view) and which is tilted by `tilt`.

@@ -12,8 +12,14 @@ mod inverse;
 mod iterative;
 
 pub use forward::{ArmPose, forward, jacobian, jacobian_at};
-pub use inverse::{IkError, Obstacle, expand_limits, inverse_all, inverse_nearest};
+pub use inverse::{IkError, Obstacle, inverse_all, inverse_nearest};
 pub use iterative::{DlsOptions, damped_least_squares, towards};
+
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use super::DhRow;
 
 /// Number of joints.
 pub const JOINTS: usize = 6;
@@ -62,22 +68,26 @@ impl JointLimits {
     }
 }
 
-/// Geometry of the arm in Denavit and Hartenberg's classic convention, in the universal-robots arrangement:
-/// link twists (π/2, 0, 0, π/2, −π/2, 0).
-mod dh {
-    use super::{JOINTS, JointAngles};
-    use std::f64::consts::FRAC_PI_2;
+/// The arm in Denavit and Hartenberg's convention: `[a, alpha, d, theta]`, fitted to the model without residual.
+pub(super) const ROWS: [DhRow; JOINTS] = [
+    DhRow::new([0.0, FRAC_PI_2, 0.074_55, 0.0]),
+    DhRow::new([-0.4251, 0.0, 0.0, -FRAC_PI_2]),
+    DhRow::new([-0.392_15, 0.0, 0.0, 0.0]),
+    DhRow::new([0.0, FRAC_PI_2, 0.11, -FRAC_PI_2]),
+    DhRow::new([0.0, -FRAC_PI_2, 0.094_75, 0.0]),
+    DhRow::new([0.0, 0.0, 0.074_95, 0.0]),
+];
+/// Turn about z between the arm frame and the convention's base, and between its flange and the connection.
+const END_TURN: f64 = -FRAC_PI_2;
 
-    /// Offset along the joint axis, per joint.
-    pub const D: [f64; JOINTS] = [0.07455, 0.0, 0.0, 0.11, 0.09475, 0.07495];
-    /// Length of the common normal, per joint.
-    pub const A: [f64; JOINTS] = [0.0, -0.4251, -0.39215, 0.0, 0.0, 0.0];
-    /// Twist about the common normal, per joint.
-    pub const ALPHA: [f64; JOINTS] = [FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2, 0.0];
-    /// What is added to a joint value of the model to get the angle of the convention.
-    pub const OFFSET: JointAngles = [0.0, -FRAC_PI_2, 0.0, -FRAC_PI_2, 0.0, 0.0];
-    /// Turn about z between the arm frame and the convention's base, and between its flange and the connection.
-    pub const END_TURN: f64 = -FRAC_PI_2;
+/// A turn about z.
+fn turn_z(angle: f64) -> Isometry3<f64> {
+    Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle))
+}
+
+/// That turn as a motion.
+pub(super) fn end_turn() -> Isometry3<f64> {
+    turn_z(END_TURN)
 }
 
 #[cfg(test)]

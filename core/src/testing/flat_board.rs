@@ -6,12 +6,10 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 
-use super::Shot;
+use super::sessions::GRID;
+use crate::capture::Shot;
 use crate::depth::DepthImage;
-use crate::targets::Grid;
 use crate::targets::observation::Corner;
-
-pub const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
 
 /// A board seen straight on.
 #[derive(Debug, Clone, Copy)]
