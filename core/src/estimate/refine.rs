@@ -25,6 +25,7 @@ use crate::targets::observation::View;
 const JOINTS_GAIN: f64 = 0.05;
 
 /// A joint estimate and what was decided on the way.
+#[derive(Clone)]
 pub struct Refined {
     pub screened: Screened,
     pub weights: Option<CornerWeights>,
@@ -116,12 +117,27 @@ pub fn refine(
         } else {
             estimate_screened(&problem, &with_field.as_start(), own, work.cancel)?
         };
-        if let Some(joints) = joints.as_mut().filter(|joints| joints.accepted) {
-            joints.offsets_rad.clone_from(&screened.solution.joint_offsets_rad);
-            joints.sigma_rad = screened.solution.joint_offsets_sigma();
-        }
+        state_again(joints.as_mut(), &screened.solution);
     }
     Ok(Refined { screened, weights, joints })
+}
+
+/// The offsets of the joints where an estimate was made anew with them.
+fn state_again(joints: Option<&mut JointOffsets>, solution: &JointSolution) {
+    if let Some(joints) = joints.filter(|joints| joints.accepted) {
+        joints.offsets_rad.clone_from(&solution.joint_offsets_rad);
+        joints.sigma_rad = solution.joint_offsets_sigma();
+    }
+}
+
+impl Refined {
+    /// Made anew from where it ended, with the same views and unknowns: `problem` is of those.
+    pub fn again(&self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
+        let mut next = self.clone();
+        next.screened.solution = joint::estimate(problem, &self.screened.solution.as_start(), work.cancel)?;
+        state_again(next.joints.as_mut(), &next.screened.solution);
+        Ok(next)
+    }
 }
 
 fn keep_all(problem: &JointProblem<'_>, start: &JointStart, work: Work<'_>) -> Result<Screened, HandEyeError> {

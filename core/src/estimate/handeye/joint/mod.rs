@@ -34,6 +34,7 @@ pub(crate) mod optimise;
 pub mod outliers;
 pub mod prediction;
 mod problem;
+pub(crate) mod shared_lens;
 mod shown_field;
 mod solution;
 pub(crate) mod state;

@@ -1,5 +1,7 @@
 //! What the joint estimate is given.
 
+use nalgebra::DMatrix;
+
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::chain::MAX_JOINTS;
 use crate::estimate::handeye::joint::field::{Places, RobotField};
@@ -63,8 +65,9 @@ impl Free {
 pub struct LensPrior<'a> {
     /// The expected intrinsics.
     pub expected: Intrinsics,
-    /// Standard deviations in the order of [`Intrinsics::parameters`]; one that is not finite and positive says nothing.
-    pub sigma: &'a [f64],
+    /// Inverse of their covariance, in the order of [`Intrinsics::parameters`] and of their size; a direction of which
+    /// nothing is known has none.
+    pub information: &'a DMatrix<f64>,
 }
 
 /// The data and what is known beforehand.

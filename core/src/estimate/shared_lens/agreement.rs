@@ -1,0 +1,106 @@
+//! Whether sessions have one lens, by the lens of each alone.
+//!
+//! The lens `ℓ_i` of a session alone and `ℓ_o` of all others together are independent, so `(ℓ_i − ℓ_o)ᵀ (C_i + C_o)⁻¹
+//! (ℓ_i − ℓ_o)` of `k` lens parameters follows chi-square with `k` degrees of freedom; with covariances from estimated noise
+//! levels `k F(k, ν)`, with the degrees of freedom of the session (of its hand-eye transform, which has fewer than the lens,
+//! so that the false alarms are at most as many as stated). The session that differs most is judged first, at a level that
+//! counts for the number of sessions; where it is another lens the rest are judged without it.
+
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+
+use super::{Fit, NamedSession};
+use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::joint::normal::covariance_of;
+use crate::estimate::handeye::joint::shared_lens::{Fitted, LensEstimate, difference};
+
+/// Sets of sessions of one lens that are taken for sessions of several.
+const FALSE_ALARM: f64 = 1e-3;
+/// Degrees of freedom that are as good as infinitely many.
+const MANY: f64 = 1e6;
+
+/// A session whose lens is not that of the others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OddSession {
+    /// Its name.
+    pub name: String,
+    /// Its focal length fx by itself, pixels.
+    pub focal_px: f64,
+    /// That of the others, pixels.
+    pub others_focal_px: f64,
+    /// Standard deviation of the difference, pixels.
+    pub sigma_px: f64,
+}
+
+/// What the lenses of all sessions, each alone, say of each other.
+pub(super) struct Agreement {
+    /// Probability of a difference as large as the largest if the lens is one.
+    pub p_value: f64,
+    /// In the order of the sessions; empty where the lens is one.
+    pub odd: Vec<OddSession>,
+}
+
+/// How a session differs from others.
+struct Differs {
+    session: usize,
+    /// `T²/k`
+    ratio: f64,
+    p_value: f64,
+    odd: OddSession,
+}
+
+/// Judges sessions by their fits without each other.
+///
+/// # Errors
+/// [`HandEyeError::NoSolution`] when a lens is not determined.
+pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Fit>]) -> Result<Agreement, HandEyeError> {
+    let mut rest: Vec<usize> = (0..alone.len()).collect();
+    let (mut p_value, mut odd) = (None, Vec::new());
+    while rest.len() > 1 {
+        let mut differ = Vec::with_capacity(rest.len());
+        for &session in &rest {
+            differ.push(differs(sessions, alone, session, &rest)?);
+        }
+        differ.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
+        // Of two, either differs from the other as much: one comparison, and nobody knows which of them it is.
+        let (comparisons, out) = if rest.len() > 2 { (rest.len(), 1) } else { (1, 2) };
+        let worst = (differ[0].p_value * comparisons as f64).min(1.0);
+        p_value.get_or_insert(worst);
+        if worst >= FALSE_ALARM {
+            break;
+        }
+        differ.truncate(out);
+        rest.retain(|session| differ.iter().all(|it| it.session != *session));
+        odd.extend(differ);
+    }
+    odd.sort_by_key(|it: &Differs| it.session);
+    Ok(Agreement { p_value: p_value.unwrap_or(1.0), odd: odd.into_iter().map(|it| it.odd).collect() })
+}
+
+/// How a session differs from those of `rest` besides it.
+fn differs(
+    sessions: &[NamedSession<'_>],
+    alone: &[Fitted<Fit>],
+    session: usize,
+    rest: &[usize],
+) -> Result<Differs, HandEyeError> {
+    let undetermined =
+        || HandEyeError::NoSolution { method: "comparing lenses", views: 0, reason: "a lens is not determined" };
+    let own = LensEstimate::by([&alone[session].says])?;
+    let others = LensEstimate::by(rest.iter().filter(|other| **other != session).map(|other| &alone[*other].says))?;
+    let covariance =
+        own.covariance().ok_or_else(undetermined)? + others.covariance().ok_or_else(undetermined)?;
+    let information = covariance_of(&covariance).ok_or_else(undetermined)?;
+    let off = difference(&own.intrinsics, &others.intrinsics);
+    let count = off.len() as f64;
+    let ratio = off.dot(&(&information * &off)) / count;
+    let freedom = alone[session].fit.refined.screened.solution.small_sample.degrees_of_freedom.min(MANY);
+    // Both numbers are positive, so the distribution exists; without it no session is called odd.
+    let p_value = FisherSnedecor::new(count, freedom).map_or(1.0, |law| law.sf(ratio));
+    let odd = OddSession {
+        name: sessions[session].name.to_owned(),
+        focal_px: own.intrinsics.fx,
+        others_focal_px: others.intrinsics.fx,
+        sigma_px: covariance[(0, 0)].max(0.0).sqrt(),
+    };
+    Ok(Differs { session, ratio, p_value, odd })
+}
