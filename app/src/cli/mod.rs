@@ -15,6 +15,7 @@ mod output;
 mod record;
 pub(crate) mod report;
 pub mod rerun_arg;
+mod shared;
 mod solve;
 mod target;
 mod track;
@@ -52,8 +53,8 @@ enum Command {
     /// Drive the robot through poses, capture, solve, and write a session with its exports.
     #[command(after_help = "Example:\n  handeye auto --poses seed10 --out session --json result.json")]
     Auto(auto::AutoArgs),
-    /// Solve a session or a dataset folder.
-    #[command(after_help = "Example:\n  handeye calibrate my_robot_images --json result.json")]
+    /// Solve a session or a dataset folder, or several of one camera together.
+    #[command(after_help = calibrate::EXAMPLES)]
     Calibrate(calibrate::CalibrateArgs),
     /// Say what is wrong with a session or a dataset folder, and what to do about it.
     #[command(after_help = "Example:\n  handeye doctor my_robot_images --json diagnosis.json")]

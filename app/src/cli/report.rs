@@ -8,6 +8,13 @@ use handeye_core::project::result::{CalibrationResult, MethodStatus, TransformEs
 
 use crate::model::Solved;
 
+/// Writing into a `String` cannot fail.
+macro_rules! line {
+    ($out:expr, $($arg:tt)*) => {{
+        let _infallible = writeln!($out, $($arg)*);
+    }};
+}
+
 /// The report. It ends with a newline.
 pub fn text(result: &CalibrationResult) -> String {
     let mut out = String::new();
@@ -25,11 +32,21 @@ pub fn text(result: &CalibrationResult) -> String {
     out
 }
 
-/// Writing into a `String` cannot fail.
-macro_rules! line {
-    ($out:expr, $($arg:tt)*) => {{
-        let _infallible = writeln!($out, $($arg)*);
-    }};
+/// One session of several: what it is worth and what was found, under its `name`. It ends with a newline.
+pub fn of_session(name: &str, result: &CalibrationResult) -> String {
+    let mut out = String::new();
+    line!(out, "{name}");
+    headline(&mut out, result);
+    findings(&mut out, result);
+    out
+}
+
+/// The lens that sessions share, from the result of one of them. It ends with a newline.
+pub fn shared_camera(sessions: usize, views: usize, result: &CalibrationResult) -> String {
+    let mut out = String::new();
+    line!(out, "one lens by {views} views of {sessions} sessions");
+    camera(&mut out, result);
+    out
 }
 
 fn headline(out: &mut String, result: &CalibrationResult) {

@@ -126,12 +126,7 @@ impl Session<'_> {
     }
 
     /// The problem of the `kept` views that a joint estimate solved.
-    pub fn problem<'p>(
-        &'p self,
-        refined: &Refined,
-        kept: &'p [View],
-        lens: Option<LensPrior<'p>>,
-    ) -> JointProblem<'p> {
+    pub fn problem<'p>(&'p self, refined: &Refined, kept: &'p [View], lens: Option<LensPrior<'p>>) -> JointProblem<'p> {
         let all = JointProblem::new(self.mode, &self.board, kept);
         let problem = JointProblem { weights: refined.weights, lens_prior: lens, ..all };
         refine::kept_problem(&problem, kept, &refined.screened.solution)

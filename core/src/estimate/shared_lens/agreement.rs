@@ -15,10 +15,13 @@ use crate::estimate::handeye::joint::shared_lens::{Fitted, LensEstimate, differe
 
 /// Sets of sessions of one lens that are taken for sessions of several.
 const FALSE_ALARM: f64 = 1e-3;
+/// Part of the focal length from which a difference is that of another focus, zoom or camera: that from which intrinsics
+/// that were given count as wrong, too.
+const ANOTHER: f64 = 3e-3;
 /// Degrees of freedom that are as good as infinitely many.
 const MANY: f64 = 1e6;
 
-/// A session whose lens is not that of the others.
+/// A session whose lens differs from that of the others by more than chance explains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OddSession {
     /// Its name.
@@ -29,6 +32,17 @@ pub struct OddSession {
     pub others_focal_px: f64,
     /// Standard deviation of the difference, pixels.
     pub sigma_px: f64,
+    /// Distance of its principal point from that of the others, pixels.
+    pub centre_apart_px: f64,
+}
+
+impl OddSession {
+    /// Whether it is another lens, and not the same one that the model does not follow: that shifts focal length and
+    /// principal point by parts in a thousand of the focal length, by other parts where the views cover others of the image.
+    pub fn is_another_lens(&self) -> bool {
+        let apart = (self.focal_px - self.others_focal_px).abs().max(self.centre_apart_px);
+        apart > ANOTHER * self.others_focal_px
+    }
 }
 
 /// What the lenses of all sessions, each alone, say of each other.
@@ -87,8 +101,7 @@ fn differs(
         || HandEyeError::NoSolution { method: "comparing lenses", views: 0, reason: "a lens is not determined" };
     let own = LensEstimate::by([&alone[session].says])?;
     let others = LensEstimate::by(rest.iter().filter(|other| **other != session).map(|other| &alone[*other].says))?;
-    let covariance =
-        own.covariance().ok_or_else(undetermined)? + others.covariance().ok_or_else(undetermined)?;
+    let covariance = own.covariance().ok_or_else(undetermined)? + others.covariance().ok_or_else(undetermined)?;
     let information = covariance_of(&covariance).ok_or_else(undetermined)?;
     let off = difference(&own.intrinsics, &others.intrinsics);
     let count = off.len() as f64;
@@ -101,6 +114,7 @@ fn differs(
         focal_px: own.intrinsics.fx,
         others_focal_px: others.intrinsics.fx,
         sigma_px: covariance[(0, 0)].max(0.0).sqrt(),
+        centre_apart_px: (own.intrinsics.cx - others.intrinsics.cx).hypot(own.intrinsics.cy - others.intrinsics.cy),
     };
     Ok(Differs { session, ratio, p_value, odd })
 }

@@ -45,10 +45,17 @@ pub struct SharedLens {
     pub views: usize,
     /// Probability that sessions of one lens differ as much as these; of the worst, for the number of sessions.
     pub p_value: f64,
-    /// Sessions whose lens is another one; empty where all agree.
+    /// Sessions whose lens differs by more than chance explains; empty where all agree.
     pub odd: Vec<OddSession>,
     /// The hand-eye transform with the lens of its own session alone.
     pub with_own_lens: Alternative,
+}
+
+impl SharedLens {
+    /// Whether there is more than one lens, see [`OddSession::is_another_lens`].
+    pub fn has_others(&self) -> bool {
+        self.odd.iter().any(OddSession::is_another_lens)
+    }
 }
 
 /// Why sessions are not calibrated together.
@@ -101,7 +108,9 @@ pub enum SharedLensError {
         first_model: &'static str,
     },
     /// No hand-eye transform to estimate.
-    #[error("{session} has no robot poses: sessions share their lens in a hand-eye calibration, a camera alone does not")]
+    #[error(
+        "{session} has no robot poses: sessions share their lens in a hand-eye calibration, a camera alone does not"
+    )]
     NoRobot {
         /// Which session.
         session: String,

@@ -1,4 +1,7 @@
 use super::*;
+use crate::diagnose::doctor::diagnose;
+use crate::diagnose::findings::{FindingCode, FindingOptions, Severity};
+use crate::estimate::claim::Claim;
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::Noise;
 use crate::estimate::{Method, calibrate};
@@ -77,9 +80,46 @@ fn a_session_with_another_focal_length_is_named_and_of_two_both() {
         assert_eq!(names(calibration), ["B"]);
         let odd = &known(calibration).odd[0];
         assert!((odd.focal_px - odd.others_focal_px - 11.6).abs() < 5.0 * odd.sigma_px, "{odd:?}");
-        assert!(known(calibration).p_value < 1e-3);
+        assert!(known(calibration).p_value < 1e-3 && known(calibration).has_others());
     }
     assert_eq!(names(&shared(&sessions[..2]).expect("solves")[0]), ["A", "B"]);
+}
+
+/// The finding, and what may be stated.
+fn diagnosed(session: &Observations, mut calibration: Calibration) -> (Option<(Severity, String)>, Claim) {
+    let options = FindingOptions::default();
+    let diagnosis = diagnose(session, Some(&mut calibration), &options, &CancelToken::default());
+    let finding = diagnosis.findings.iter().find(|finding| finding.code == FindingCode::LensesDiffer);
+    (finding.map(|finding| (finding.severity, finding.to_string())), calibration.claim)
+}
+
+#[test]
+fn another_lens_is_a_warning_that_the_stated_error_counts_and_one_that_hardly_differs_is_advice() {
+    let zoomed = Intrinsics::pinhole(640, 480, 581.0 * 1.02);
+    let sessions = [hand(13), session(Mode::EyeInHand, 10, &REALISTIC, zoomed, 14), hand(15)];
+    let mut together = shared(&sessions).expect("solves");
+    let first = &mut together[0];
+    let (finding, claim) = diagnosed(&sessions[0], first.clone());
+    let (severity, text) = finding.expect("said");
+    assert_eq!(severity, Severity::Warning);
+    assert!(text.starts_with("The sessions do not have one lens: B (focal length 59"), "{text}");
+    let own = known(first).with_own_lens.clone();
+    assert!(matches!(&claim, Claim::Moved(all) if all.contains(&own)), "{claim:?}");
+    let modelled = first.modelled_error_95_m().expect("stated");
+    let moved = own.moved_m(&first.joint.as_ref().expect("joint").reference_point);
+    first.claim = claim;
+    assert!(first.tip_error_95_m().expect("stated") >= modelled + moved && moved > 0.0);
+
+    // Two thousandths are no other lens.
+    first.claim = Claim::AsModelled;
+    for odd in &mut first.shared_lens.as_mut().expect("shared").odd {
+        (odd.focal_px, odd.centre_apart_px) = (odd.others_focal_px * 1.002, 1.0);
+    }
+    let (finding, claim) = diagnosed(&sessions[0], first.clone());
+    assert_eq!(finding.expect("said").0, Severity::Advice);
+    assert!(!matches!(&claim, Claim::Moved(all) if all.contains(&own)), "{claim:?}");
+    first.shared_lens.as_mut().expect("shared").odd.clear();
+    assert_eq!(diagnosed(&sessions[0], first.clone()).0, None);
 }
 
 #[test]

@@ -154,20 +154,36 @@ fn the_rounds_end_at_the_optimum_of_all_unknowns_together_with_its_covariance() 
 }
 
 #[test]
-fn what_a_session_says_of_its_lens_does_not_hang_on_the_prior_that_it_was_estimated_with() {
+fn what_a_session_says_of_its_lens_is_without_what_the_prior_adds() {
     let sessions = sessions();
+    let (session, noise) = &sessions[0];
     let alone = fitted(&sessions[0], None, None).expect("solves");
-    let other = fitted(&sessions[1], None, None).expect("solves");
-    let others = LensEstimate::by([&other.says]).expect("determined");
-    let with = fitted(&sessions[0], Some(&alone.fit), Some(others.as_prior())).expect("solves");
-    let moved = difference(&with.fit.intrinsics, &alone.fit.intrinsics);
-    let own = LensEstimate::by([&alone.says]).expect("determined");
-    let again = LensEstimate::by([&with.says]).expect("determined");
-    let in_sigmas = |off: DVector<f64>| off.dot(&(&own.information * &off)).sqrt();
-    // The prior moves the lens by some standard deviations; what the session says comes back to its own optimum, but for
-    // the curvature of so short a way.
-    let off = difference(&again.intrinsics, &own.intrinsics);
-    let (moved, off) = (in_sigmas(moved), in_sigmas(off));
-    println!("moved by {moved:.2} standard deviations, says a lens {off:.3} off its own");
-    assert!(moved > 0.5 && off < 0.05 * moved, "{moved} {off}");
+    let other = LensEstimate::by([&fitted(&sessions[1], None, None).expect("solves").says]).expect("determined");
+    let problem = JointProblem { lens_prior: Some(other.as_prior()), ..session.problem(true, Some(*noise)) };
+    let says = LensInformation::of(&problem, &alone.fit, &CancelToken::default()).expect("determined");
+    let with = LensEstimate::by([&says]).expect("determined");
+    let without = LensEstimate::by([&alone.says]).expect("determined");
+    // The same to what inverting a matrix twice leaves: scaled, its condition is below 1e8 of 1e16.
+    assert!(without.distance(&with.intrinsics) < 1e-5, "{}", without.distance(&with.intrinsics));
+    let ratio = with.information.diagonal().component_div(&without.information.diagonal());
+    assert!(ratio.iter().all(|r| (r - 1.0).abs() < 1e-6), "{ratio}");
+    // And a fit with the prior lies between both.
+    let shared = fitted(&sessions[0], Some(&alone.fit), Some(other.as_prior())).expect("solves");
+    let (moved, way) = (without.distance(&shared.fit.intrinsics), without.distance(&other.intrinsics));
+    assert!(moved > 0.1 && moved < way, "{moved} of {way}");
+}
+
+#[test]
+fn a_widened_session_counts_for_less_by_as_much() {
+    let sessions = sessions();
+    let says: Vec<LensInformation> =
+        sessions.iter().map(|session| fitted(session, None, None).expect("solves").says).collect();
+    let [a, b, _] = says.as_slice() else { panic!("three sessions") };
+    let by = |all: &[&LensInformation]| LensEstimate::by(all.iter().copied()).expect("determined");
+    let widened = a.clone().widened(4.0);
+    let together = by(&[&widened, b]);
+    let expected = by(&[a]).information / 4.0 + by(&[b]).information;
+    assert!((&together.information - &expected).norm() < 1e-12 * expected.norm());
+    let to_b = |lens: &LensEstimate| by(&[b]).distance(&lens.intrinsics);
+    assert!(to_b(&together) < to_b(&by(&[a, b])), "the mean moves to the one that counts for more");
 }
