@@ -131,9 +131,11 @@ fn state_again(joints: Option<&mut JointOffsets>, solution: &JointSolution) {
 }
 
 impl Refined {
-    /// Made anew from where it ended, with the same views and unknowns: `problem` is of those.
+    /// Made anew from where it ended, with the same views, unknowns and kinds of noise: `problem` is of those views.
     pub fn again(&self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let mut next = self.clone();
+        let view_noise = Some(self.screened.solution.noise.view_px > 0.0);
+        let problem = &JointProblem { view_noise, ..*problem };
         next.screened.solution = joint::estimate(problem, &self.screened.solution.as_start(), work.cancel)?;
         state_again(next.joints.as_mut(), &next.screened.solution);
         Ok(next)

@@ -9,7 +9,6 @@
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::{Fit, NamedSession};
-use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::normal::covariance_of;
 use crate::estimate::handeye::joint::shared_lens::{Fitted, LensEstimate, difference};
 
@@ -62,11 +61,8 @@ struct Differs {
     odd: OddSession,
 }
 
-/// Judges sessions by their fits without each other.
-///
-/// # Errors
-/// [`HandEyeError::NoSolution`] when a lens is not determined.
-pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Fit>]) -> Result<Agreement, HandEyeError> {
+/// Judges sessions by their fits without each other; `None` when a lens is not determined.
+pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Fit>]) -> Option<Agreement> {
     let mut rest: Vec<usize> = (0..alone.len()).collect();
     let (mut p_value, mut odd) = (None, Vec::new());
     while rest.len() > 1 {
@@ -87,22 +83,15 @@ pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Fit>]) -> Resu
         odd.extend(differ);
     }
     odd.sort_by_key(|it: &Differs| it.session);
-    Ok(Agreement { p_value: p_value.unwrap_or(1.0), odd: odd.into_iter().map(|it| it.odd).collect() })
+    Some(Agreement { p_value: p_value.unwrap_or(1.0), odd: odd.into_iter().map(|it| it.odd).collect() })
 }
 
 /// How a session differs from those of `rest` besides it.
-fn differs(
-    sessions: &[NamedSession<'_>],
-    alone: &[Fitted<Fit>],
-    session: usize,
-    rest: &[usize],
-) -> Result<Differs, HandEyeError> {
-    let undetermined =
-        || HandEyeError::NoSolution { method: "comparing lenses", views: 0, reason: "a lens is not determined" };
+fn differs(sessions: &[NamedSession<'_>], alone: &[Fitted<Fit>], session: usize, rest: &[usize]) -> Option<Differs> {
     let own = LensEstimate::by([&alone[session].says])?;
     let others = LensEstimate::by(rest.iter().filter(|other| **other != session).map(|other| &alone[*other].says))?;
-    let covariance = own.covariance().ok_or_else(undetermined)? + others.covariance().ok_or_else(undetermined)?;
-    let information = covariance_of(&covariance).ok_or_else(undetermined)?;
+    let covariance = own.covariance()? + others.covariance()?;
+    let information = covariance_of(&covariance)?;
     let off = difference(&own.intrinsics, &others.intrinsics);
     let count = off.len() as f64;
     let ratio = off.dot(&(&information * &off)) / count;
@@ -116,5 +105,5 @@ fn differs(
         sigma_px: covariance[(0, 0)].max(0.0).sqrt(),
         centre_apart_px: (own.intrinsics.cx - others.intrinsics.cx).hypot(own.intrinsics.cy - others.intrinsics.cy),
     };
-    Ok(Differs { session, ratio, p_value, odd })
+    Some(Differs { session, ratio, p_value, odd })
 }

@@ -129,24 +129,23 @@ pub enum SharedLensError {
         /// Why.
         error: CalibrateError,
     },
-    /// The sessions together cannot.
-    #[error(transparent)]
-    Together(#[from] HandEyeError),
+    /// The sessions together have no lens.
+    #[error(
+        "the sessions together do not come to one lens: calibrate them one by one, compare their lenses, and leave out those \
+         whose lens is another one or hardly known"
+    )]
+    NoLens,
 }
 
 impl SharedLensError {
     /// Whether the work was cancelled.
     pub fn is_cancelled(&self) -> bool {
-        matches!(
-            self,
-            Self::Together(HandEyeError::Cancelled)
-                | Self::Session { error: CalibrateError::HandEye(HandEyeError::Cancelled), .. }
-        )
+        matches!(self, Self::Session { error: CalibrateError::HandEye(HandEyeError::Cancelled), .. })
     }
 
     /// Whether the sessions as they are described do not go together, whatever the views show.
     pub fn is_usage(&self) -> bool {
-        !matches!(self, Self::Session { .. } | Self::Together(_))
+        !matches!(self, Self::Session { .. } | Self::NoLens)
     }
 }
 
@@ -183,7 +182,7 @@ pub fn calibrate_sharing_lens<'a>(
         let refined = prepared.refine(None, options, work).map_err(|error| session.fails(error))?;
         alone.push(fitted(prepared, refined, None, None, work).map_err(|error| session.fails(error))?);
     }
-    let agreement = agreement::test(sessions, &alone)?;
+    let agreement = agreement::test(sessions, &alone).ok_or(SharedLensError::NoLens)?;
     let refit = |i: usize, round: usize, last: &Fit, others: LensEstimate| {
         let (session, prepared) = (&sessions[i], &prepared[i]);
         let others = others.times(last.factor);
@@ -198,14 +197,15 @@ pub fn calibrate_sharing_lens<'a>(
         };
         again().map_err(|error| session.fails(error))
     };
-    let (shared, lens) = shared_lens::share(alone.clone(), DECIDING, refit)?;
+    let shared = shared_lens::share(alone.clone(), DECIDING, refit)?;
+    let (shared, lens) = shared.ok_or(SharedLensError::NoLens)?;
     let sigma = lens.covariance().map(|covariance| covariance.diagonal().map(|v| v.max(0.0).sqrt()));
     let views = shared.iter().map(|session| session.fit.refined.screened.kept.len()).sum();
     let mut calibrations = Vec::with_capacity(sessions.len());
     for (i, prepared) in prepared.into_iter().enumerate() {
         let Fit { mut refined, factor } = shared[i].fit.clone();
-        let others = shared_lens::by_others(&shared, i)?.times(factor);
-        // From within a thousandth of a standard deviation of it.
+        let others = shared_lens::by_others(&shared, i).ok_or(SharedLensError::NoLens)?.times(factor);
+        // Rounds end with every session within some thousandths of a standard deviation of it.
         refined.screened.solution.intrinsics = lens.intrinsics;
         let solution = refined.screened.solution.clone();
         let finished = prepared.finish(refined, Some(others.as_prior()), work);

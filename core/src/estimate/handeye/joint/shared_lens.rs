@@ -28,8 +28,8 @@ use crate::progress::CancelToken;
 const METHOD: &str = "the shared lens";
 /// Rounds at the most; a handful is usual.
 const MAX_ROUNDS: usize = 30;
-/// Distance of a session's lens from that of all, in standard deviations of the latter, below which they are one: noise
-/// levels settle to a thousandth, too.
+/// Way of the lens of all sessions in a round, in its standard deviations, below which it stands still: noise levels settle
+/// to a thousandth, too.
 const TOLERANCE: f64 = 1e-3;
 
 /// What the fit of one session says of its lens: its least cost as a function of the lens, to second order.
@@ -89,21 +89,18 @@ pub struct LensEstimate {
 }
 
 impl LensEstimate {
-    /// By what several sessions say together: the lens with the least sum of their costs, to second order.
-    ///
-    /// # Errors
-    /// [`HandEyeError::NoSolution`] when they leave it undetermined, as none do.
-    pub fn by<'a>(all: impl IntoIterator<Item = &'a LensInformation>) -> Result<Self, HandEyeError> {
-        let fails = || HandEyeError::NoSolution { method: METHOD, views: 0, reason: "the lens is not determined" };
+    /// By what several sessions say together: the lens with the least sum of their costs, to second order. `None` when they
+    /// leave it undetermined, as none do.
+    pub fn by<'a>(all: impl IntoIterator<Item = &'a LensInformation>) -> Option<Self> {
         let mut all = all.into_iter();
-        let LensInformation { at, mut gradient, mut information } = all.next().ok_or_else(fails)?.clone();
+        let LensInformation { at, mut gradient, mut information } = all.next()?.clone();
         for other in all {
             gradient += &other.gradient + &other.information * difference(&at, &other.at);
             information += &other.information;
         }
-        let step = covariance_of(&information).ok_or_else(fails)? * -gradient;
+        let step = covariance_of(&information)? * -gradient;
         let parameters: Vec<f64> = at.parameters().iter().zip(&step).map(|(p, step)| p + step).collect();
-        Ok(Self { intrinsics: at.with_parameters(&parameters), information })
+        Some(Self { intrinsics: at.with_parameters(&parameters), information })
     }
 
     /// As a prior for another session.
@@ -146,39 +143,40 @@ pub struct Fitted<S> {
     pub says: LensInformation,
 }
 
-/// The lens by all sessions but one.
-///
-/// # Errors
-/// As [`LensEstimate::by`].
-pub fn by_others<S>(sessions: &[Fitted<S>], one: usize) -> Result<LensEstimate, HandEyeError> {
+/// The lens by all sessions but one; `None` when they leave it undetermined.
+pub fn by_others<S>(sessions: &[Fitted<S>], one: usize) -> Option<LensEstimate> {
     LensEstimate::by(sessions.iter().enumerate().filter(|(j, _)| *j != one).map(|(_, other)| &other.says))
 }
 
-/// Rounds from fits of two or more sessions, each by itself, until all state the lens that is returned with the last fits.
-/// `refit` makes a new fit of a session in a round (from 0) from its last one, with what the others say of the lens; it may
-/// decide anew what belongs to the model in the first `deciding` rounds.
+/// Rounds from fits of two or more sessions, each by itself, until the lens that they state together stands still; it is
+/// returned with the last fits. `None` when the lens is undetermined or does not settle. `refit` makes a new fit of a session in a round (from 0) from its
+/// last one, with what the others say of the lens; it may decide anew what belongs to the model in the first `deciding`
+/// rounds.
 ///
 /// # Errors
-/// Those of `refit`; [`HandEyeError::NoSolution`] when the rounds do not come to an end.
-pub fn share<S, E: From<HandEyeError>>(
+/// Those of `refit`.
+#[expect(clippy::type_complexity, reason = "the last fits and their lens")]
+pub fn share<S, E>(
     mut sessions: Vec<Fitted<S>>,
     deciding: usize,
     mut refit: impl FnMut(usize, usize, &S, LensEstimate) -> Result<Fitted<S>, E>,
-) -> Result<(Vec<Fitted<S>>, LensEstimate), E> {
+) -> Result<Option<(Vec<Fitted<S>>, LensEstimate)>, E> {
+    let mut last: Option<LensEstimate> = None;
     for round in 0..MAX_ROUNDS {
         let mut next = Vec::with_capacity(sessions.len());
         for (i, session) in sessions.iter().enumerate() {
-            next.push(refit(i, round, &session.fit, by_others(&sessions, i)?)?);
+            let Some(others) = by_others(&sessions, i) else { return Ok(None) };
+            next.push(refit(i, round, &session.fit, others)?);
         }
         sessions = next;
-        let lens = LensEstimate::by(sessions.iter().map(|session| &session.says))?;
-        let are_one = sessions.iter().all(|session| lens.distance(&session.says.at) < TOLERANCE);
-        if are_one && round >= deciding {
-            return Ok((sessions, lens));
+        let Some(lens) = LensEstimate::by(sessions.iter().map(|session| &session.says)) else { return Ok(None) };
+        let stands = last.is_some_and(|last| lens.distance(&last.intrinsics) < TOLERANCE);
+        if stands && round >= deciding {
+            return Ok(Some((sessions, lens)));
         }
+        last = Some(lens);
     }
-    let reason = "the lens of the sessions does not settle: calibrate them one by one and compare their lenses";
-    Err(HandEyeError::NoSolution { method: METHOD, views: 0, reason }.into())
+    Ok(None)
 }
 
 #[cfg(test)]

@@ -125,6 +125,7 @@ fn the_rounds_end_at_the_optimum_of_all_unknowns_together_with_its_covariance() 
     let (shared, lens) = share(alone, 0, |i, _, last: &JointSolution, others: LensEstimate| {
         fitted(&sessions[i], Some(last), Some(others.as_prior()))
     })
+    .expect("solves")
     .expect("one lens");
     let (dense, covariance) = Dense::at_truth(&sessions).solved();
     // Rounds end at a thousandth of a standard deviation; the last one brings it far below.
