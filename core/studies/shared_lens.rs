@@ -108,7 +108,7 @@ fn percent(part: usize, of: usize) -> f64 {
 }
 
 /// RMS error \[mm\], mean stated error \[mm\], share that is covered and share of pairs that cover each other.
-fn columns<'a>(groups: impl Iterator<Item = &'a Vec<Answer>> + Clone) -> String {
+fn columns<'a>(groups: &(impl Iterator<Item = &'a Vec<Answer>> + Clone)) -> String {
     let all = || groups.clone().flatten();
     let count = all().count();
     let rms = (all().map(|a| a.off_m.norm_squared()).sum::<f64>() / count as f64).sqrt() * 1e3;
@@ -150,8 +150,8 @@ fn main() -> Result<(), String> {
         println!(
             "| {} | {groups} | {sessions} | {views} | {} | {} | {:.1} % | {odd} | {last} |",
             lens.name(),
-            columns(all.iter().map(|group| &group.own)),
-            columns(all.iter().map(|group| &group.shared)),
+            columns(&all.iter().map(|group| &group.own)),
+            columns(&all.iter().map(|group| &group.shared)),
             percent(small, groups)
         );
     }

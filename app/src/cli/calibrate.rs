@@ -16,6 +16,7 @@ pub const EXAMPLES: &str = "Example:
   handeye calibrate monday tuesday wednesday --share-intrinsics --out results";
 
 /// Options of `handeye calibrate`.
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 #[derive(Debug, Args)]
 pub struct CalibrateArgs {
     /// Session or dataset folder: images, a pose table and dataset.toml. With `--share-intrinsics` two or more.
