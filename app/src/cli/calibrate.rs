@@ -1,4 +1,4 @@
-//! `handeye calibrate`: solves a session or a dataset folder.
+//! `handeye calibrate`: solves a session or a dataset folder, or several of one camera together.
 
 use std::path::PathBuf;
 
@@ -7,21 +7,32 @@ use handeye_core::estimate::{Method, Options};
 
 use super::gate::{self, Gate};
 use super::output::Output;
-use super::{Failure, RerunArg, rerun_arg, solve};
+use super::{Failure, RerunArg, rerun_arg, shared, solve};
 use crate::rerun_log::{Pace, RerunChoice};
 
+/// At the end of its help.
+pub const EXAMPLES: &str = "Example:
+  handeye calibrate my_robot_images --json result.json
+  handeye calibrate monday tuesday wednesday --share-intrinsics --out results";
+
 /// Options of `handeye calibrate`.
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 #[derive(Debug, Args)]
 pub struct CalibrateArgs {
-    /// Session or dataset folder: images, a pose table and dataset.toml.
-    path: PathBuf,
+    /// Session or dataset folder: images, a pose table and dataset.toml. With `--share-intrinsics` two or more.
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Calibrate sessions of one camera together: one lens for all of them, links and noise levels of each. There is a
+    /// result for every folder, and `--json` writes an array of them.
+    #[arg(long)]
+    share_intrinsics: bool,
     /// Write the result as JSON to this file; `-` for standard output instead of the report.
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
     /// Which answer: the joint estimate, or one closed form.
     #[arg(long, value_name = "NAME", default_value = "joint", value_parser = Method::names())]
     method: String,
-    /// Write the result and its exports into this folder.
+    /// Write the result and its exports into this folder; of several sessions into a folder each in it, by their names.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Keep views and corners that do not fit the others; without it they are left out as outliers and named.
@@ -50,9 +61,13 @@ impl CalibrateArgs {
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     let method = Method::by_name(&args.method)
         .ok_or_else(|| Failure::unusable(anyhow::anyhow!("no method {:?}", args.method)))?;
+    let path = match args.paths.as_slice() {
+        [path] if !args.share_intrinsics => path,
+        paths => return several(args, paths, method),
+    };
     let cancel = solve::cancel_on_ctrl_c();
     let recorder = args.rerun.start(RerunChoice::Off, Pace::Everything, false)?;
-    let solution = solve::folder(&args.path, method, args.options(), None, &cancel)?;
+    let solution = solve::folder(path, method, args.options(), None, &cancel)?;
     let result = solution.result();
     if let Some(folder) = &args.out {
         solve::write_exports(folder, result)?;
@@ -60,6 +75,46 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     solution.publish(args.json.as_ref())?;
     solution.note(&recorder);
     rerun_arg::finish(recorder, &cancel)?;
-    let failures = gate::failures(&args.gate, result);
+    passed(&gate::failures(&args.gate, result))
+}
+
+/// Sessions of one camera.
+fn several(args: &CalibrateArgs, paths: &[PathBuf], method: Method) -> Result<(), Failure> {
+    let unusable = |message: &str| Err(Failure::unusable(anyhow::anyhow!("{message}")));
+    if !args.share_intrinsics {
+        return unusable(
+            "several folders: `--share-intrinsics` calibrates sessions of one camera together; without it give one folder",
+        );
+    }
+    if paths.len() < 2 {
+        return unusable(
+            "`--share-intrinsics` takes the folders of two or more sessions; one is calibrated without it",
+        );
+    }
+    if method != Method::Joint {
+        return unusable(
+            "`--share-intrinsics` is for the joint estimate: closed forms estimate no lens, leave `--method` out",
+        );
+    }
+    if args.rerun.choice(RerunChoice::Off) != RerunChoice::Off {
+        return unusable("`--rerun` shows one session: leave it out, or calibrate the sessions one by one");
+    }
+    let cancel = solve::cancel_on_ctrl_c();
+    let solutions = shared::folders(paths, args.options(), &cancel)?;
+    if let Some(folder) = &args.out {
+        shared::write_exports(folder, &solutions)?;
+    }
+    shared::publish(&solutions, args.json.as_ref())?;
+    let failures: Vec<String> = solutions
+        .iter()
+        .flat_map(|solution| {
+            let failures = gate::failures(&args.gate, solution.result());
+            failures.into_iter().map(|failure| format!("{}: {failure}", solution.folder().display()))
+        })
+        .collect();
+    passed(&failures)
+}
+
+fn passed(failures: &[String]) -> Result<(), Failure> {
     if failures.is_empty() { Ok(()) } else { Err(Failure::failed(anyhow::anyhow!("{}", failures.join("; ")))) }
 }

@@ -14,6 +14,7 @@ mod out;
 mod output;
 mod record;
 pub mod rerun_arg;
+mod shared;
 mod solve;
 mod target;
 mod track;
@@ -51,8 +52,8 @@ enum Command {
     /// Drive the robot through poses, capture, solve, and write a session with its exports.
     #[command(after_help = "Example:\n  handeye auto --poses seed10 --out session --json result.json")]
     Auto(auto::AutoArgs),
-    /// Solve a session or a dataset folder.
-    #[command(after_help = "Example:\n  handeye calibrate my_robot_images --json result.json")]
+    /// Solve a session or a dataset folder, or several of one camera together.
+    #[command(after_help = calibrate::EXAMPLES)]
     Calibrate(calibrate::CalibrateArgs),
     /// Say what is wrong with a session or a dataset folder, and what to do about it.
     #[command(after_help = "Example:\n  handeye doctor my_robot_images --json diagnosis.json")]

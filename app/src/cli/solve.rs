@@ -10,7 +10,7 @@ use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::template::{CHOICE, template};
 use handeye_core::project::dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
 use handeye_core::project::export::{self, ExportInput, ExportNames};
-use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::result::{CalibrationResult, ViewRecordStatus};
 use handeye_core::project::session::{
     self, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations,
 };
@@ -113,9 +113,25 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Of a folder by what was read and found in it.
+    pub fn new(folder: &Path, input: Input, mut solved: Solved) -> Self {
+        solved.result.provenance.input_sha256 = Some(input.sha256.clone());
+        Self { folder: folder.to_path_buf(), input, solved: Arc::new(solved) }
+    }
+
     /// The document that is written.
     pub fn result(&self) -> &CalibrationResult {
         &self.solved.result
+    }
+
+    /// The folder as it was given.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// How many views are in the fit.
+    pub fn views(&self) -> usize {
+        self.result().views.iter().filter(|view| view.status == ViewRecordStatus::Used).count()
     }
 
     /// All of it for a person. It ends with a newline.
@@ -166,24 +182,20 @@ pub fn folder(
     cancel: &CancelToken,
 ) -> Result<Solution, Failure> {
     let input = read(path, cancel)?;
+    let job = SolveJob { truth, ..job(&input, method, options) };
+    let solved = worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path))?;
+    Ok(Solution::new(path, input, solved))
+}
+
+/// What is asked about a folder that was read.
+pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
     let SessionObservations { observations, captures, verification } = input.seen.clone();
-    let job = SolveJob {
-        id: JobId(0),
-        observations,
-        captures,
-        verification,
-        method,
-        options,
-        goal_m: Goal::default().0,
-        truth,
-    };
-    let mut solved = worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path))?;
-    solved.result.provenance.input_sha256 = Some(input.sha256.clone());
-    Ok(Solution { folder: path.to_path_buf(), input, solved: Arc::new(solved) })
+    let goal_m = Goal::default().0;
+    SolveJob { id: JobId(0), observations, captures, verification, method, options, goal_m, truth: None }
 }
 
 /// Where there is no answer the data may be at fault, and the doctor says which.
-fn unsolved(error: CalibrateError, folder: &Path) -> Failure {
+pub fn unsolved(error: CalibrateError, folder: &Path) -> Failure {
     match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
         error => Failure::failed(anyhow!("{error}; `handeye doctor {}` examines the data", folder.display())),

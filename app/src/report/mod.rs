@@ -10,7 +10,7 @@ use handeye_core::project::result::{
 };
 
 pub use markdown::markdown;
-pub use page::page;
+pub use page::{of_session, page, shared_camera};
 
 use crate::model::Solved;
 

@@ -1,11 +1,28 @@
 //! The report as a page of text.
 
-use super::{Line, Section, sections};
+use handeye_core::project::result::CalibrationResult;
+
+use super::{Line, Section, camera, findings, headline, sections};
 use crate::model::Solved;
 
 /// The page. It ends with a newline.
 pub fn page(solved: &Solved) -> String {
-    let lines: Vec<String> = sections(solved).iter().flat_map(lines).collect();
+    text(&sections(solved))
+}
+
+/// One session of several: what it is worth and what was found, under its `name`. It ends with a newline.
+pub fn of_session(name: &str, result: &CalibrationResult) -> String {
+    format!("{name}\n{}", text(&[headline(result), findings(result)]))
+}
+
+/// The lens that sessions share, from the result of one of them. It ends with a newline.
+pub fn shared_camera(sessions: usize, views: usize, result: &CalibrationResult) -> String {
+    let by = format!("one lens by {views} views of {sessions} sessions\n");
+    camera(result).map_or(by.clone(), |camera| by + &text(&[camera]))
+}
+
+fn text(sections: &[Section]) -> String {
+    let lines: Vec<String> = sections.iter().flat_map(lines).collect();
     lines.join("\n") + "\n"
 }
 

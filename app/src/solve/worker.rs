@@ -7,7 +7,7 @@ use std::sync::Arc;
 use handeye_core::diagnose::doctor;
 use handeye_core::diagnose::findings::{Finding, FindingOptions};
 use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::{self, CalibrateError, Method, Observations, Options};
+use handeye_core::estimate::{self, CalibrateError, Calibration, Method, Observations, Options};
 use handeye_core::progress::{CancelToken, Progress, Work};
 use handeye_core::project::result::VerificationSummary;
 use handeye_core::project::session::CaptureId;
@@ -78,7 +78,15 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
 /// # Errors
 /// [`CalibrateError`].
 pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> {
-    let mut calibration = estimate::calibrate_with(&job.observations, job.method, job.options, work)?;
+    let calibration = estimate::calibrate_with(&job.observations, job.method, job.options, work)?;
+    examined(job, calibration, work)
+}
+
+/// All that is said about the calibration of a job.
+///
+/// # Errors
+/// When the work was cancelled.
+pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) -> Result<Solved, CalibrateError> {
     let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3));
     let findings = doctor::diagnose(&job.observations, Some(&mut calibration), &goal, work.cancel).findings;
     let options = start::solve_options(job.method, job.options, &job.observations.target);

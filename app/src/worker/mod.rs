@@ -45,7 +45,7 @@ pub use crate::motion::worker::MotionLook;
 pub use crate::session::archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};
 pub use crate::session::desk::SessionThreads;
 pub use crate::solve::observer::ObserveJob;
-pub use crate::solve::worker::{SolveJob, answer};
+pub use crate::solve::worker::{SolveJob, answer, examined};
 pub use crate::track::follow_line::FollowLine;
 pub use crate::track::worker::{TrackedImage, Tracking};
 pub use files::{ExportJob, FileTask};

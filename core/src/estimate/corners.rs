@@ -9,10 +9,10 @@ use super::{
     ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
-use crate::estimate::handeye::consensus::half_turn_about;
-use crate::estimate::handeye::joint::{JointProblem, camera_from_target};
+use crate::estimate::handeye::consensus::{Consensus, half_turn_about};
+use crate::estimate::handeye::joint::{JointProblem, LensPrior, camera_from_target};
 use crate::estimate::handeye::motion::MIN_VIEWS;
-use crate::estimate::handeye::{HandEye, Mode, PosePair};
+use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair};
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::statistics::median_high;
 use crate::progress::Work;
@@ -26,64 +26,131 @@ pub fn calibrate(
     options: Options,
     work: &Work<'_>,
 ) -> Result<Calibration, CalibrateError> {
-    let seen: Vec<DetectedView<'_>> = observations.views.iter().enumerate().filter_map(DetectedView::new).collect();
-    if seen.len() < MIN_VIEWS {
-        return Err(too_few(observations, seen.len()));
-    }
-    let (seen, wrong, lens) = believable(observations, seen, options, work)?;
-    let mut calibration = without_hand_eye(observations, &seen, &lens);
-    for index in wrong {
-        calibration.views[index].status = ViewStatus::Outlier;
-    }
-    let Some(mode) = observations.mode else { return Ok(calibration) };
-
-    let (mut views, mut pairs) = with_robot(mode, &seen, &lens)?;
-    check_motion(mode, &pairs)?;
-    calibration.methods = closed_forms(&pairs, work)?;
-    let board = BoardPoints::new(&observations.target.points());
-    let mut alternatives = lens.alternatives.clone();
-    let mut rounds = 0;
-    let begin = loop {
-        let problem = JointProblem::new(mode, &board, &views);
-        let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods);
-        let Ok(found) = &begin else { break begin };
-        for i in &found.turned {
-            renumber(&mut views[*i], &mut pairs[*i], &mut alternatives[*i], &observations.target);
-            let view = &mut calibration.views[seen[*i].index];
-            view.renumbered = !view.renumbered;
-        }
-        let changed = two_poses::take_agreeing(&mut pairs, &mut alternatives, &found.solution);
-        if !changed && found.turned.is_empty() {
-            break begin;
-        }
-        calibration.methods = closed_forms(&pairs, work)?;
-        rounds += 1;
-        if rounds == ROUNDS {
-            break begin;
-        }
+    let session = match Prepared::new(observations, options, work)? {
+        Prepared::Camera(calibration) => return Ok(*calibration),
+        Prepared::HandEye(session) => *session,
     };
-    let problem = JointProblem::new(mode, &board, &views);
     match method {
-        Method::ClosedForm(name) => {
-            let solution = chosen(&calibration.methods, name)?;
-            take_closed_form(&mut calibration, &solution, &problem, &seen, &lens);
-        }
+        Method::ClosedForm(name) => session.closed_form(name),
         Method::Joint => {
-            let own: Vec<_> = pairs.iter().map(|pair| pair.camera_from_target).collect();
-            let mut refined = refine::refine(&problem, &own, &lens, &begin?, options, work)?;
-            let kept = refined.screened.kept_views();
-            if kept.len() < pairs.len() {
-                // For comparison on the same views.
-                let kept: Vec<PosePair> = refined.screened.kept.iter().map(|i| pairs[*i]).collect();
-                calibration.methods = closed_forms(&kept, work)?;
-            }
-            let problem = JointProblem { weights: refined.weights, ..JointProblem::new(mode, &board, &kept) };
-            let problem = refine::kept_problem(&problem, &kept, &refined.screened.solution);
-            let judged = refine::judge(&problem, &mut refined.screened.solution, work)?;
-            take_joint(&mut calibration, &problem, &refined, judged, &seen);
+            let refined = session.refine(None, options, work)?;
+            session.finish(refined, None, work)
         }
     }
-    Ok(calibration)
+}
+
+/// What comes before the hand-eye transform.
+pub enum Prepared<'a> {
+    /// Without a robot that is all.
+    Camera(Box<Calibration>),
+    /// All that the joint estimate begins with.
+    HandEye(Box<Session<'a>>),
+}
+
+impl<'a> Prepared<'a> {
+    /// Camera, views, closed forms and a start.
+    pub fn new(observations: &'a Observations, options: Options, work: &Work<'_>) -> Result<Self, CalibrateError> {
+        let seen: Vec<DetectedView<'_>> = observations.views.iter().enumerate().filter_map(DetectedView::new).collect();
+        if seen.len() < MIN_VIEWS {
+            return Err(too_few(observations, seen.len()));
+        }
+        let (seen, wrong, lens) = believable(observations, seen, options, work)?;
+        let mut calibration = without_hand_eye(observations, &seen, &lens);
+        for index in wrong {
+            calibration.views[index].status = ViewStatus::Outlier;
+        }
+        let Some(mode) = observations.mode else { return Ok(Self::Camera(Box::new(calibration))) };
+
+        let (mut views, mut pairs) = with_robot(mode, &seen, &lens)?;
+        check_motion(mode, &pairs)?;
+        calibration.methods = closed_forms(&pairs, work)?;
+        let board = BoardPoints::new(&observations.target.points());
+        let mut alternatives = lens.alternatives.clone();
+        let mut rounds = 0;
+        let begin = loop {
+            let problem = JointProblem::new(mode, &board, &views);
+            let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods);
+            let Ok(found) = &begin else { break begin };
+            for i in &found.turned {
+                renumber(&mut views[*i], &mut pairs[*i], &mut alternatives[*i], &observations.target);
+                let view = &mut calibration.views[seen[*i].index];
+                view.renumbered = !view.renumbered;
+            }
+            let changed = two_poses::take_agreeing(&mut pairs, &mut alternatives, &found.solution);
+            if !changed && found.turned.is_empty() {
+                break begin;
+            }
+            calibration.methods = closed_forms(&pairs, work)?;
+            rounds += 1;
+            if rounds == ROUNDS {
+                break begin;
+            }
+        };
+        Ok(Self::HandEye(Box::new(Session { seen, lens, calibration, mode, board, views, pairs, begin })))
+    }
+}
+
+/// A session with a robot, up to the joint estimate.
+pub struct Session<'a> {
+    seen: Vec<DetectedView<'a>>,
+    lens: Lens,
+    /// What is known so far.
+    calibration: Calibration,
+    mode: Mode,
+    board: BoardPoints,
+    views: Vec<View>,
+    pairs: Vec<PosePair>,
+    begin: Result<Consensus, HandEyeError>,
+}
+
+impl Session<'_> {
+    /// The answer of a closed form.
+    fn closed_form(mut self, name: &str) -> Result<Calibration, CalibrateError> {
+        let solution = chosen(&self.calibration.methods, name)?;
+        let problem = JointProblem::new(self.mode, &self.board, &self.views);
+        take_closed_form(&mut self.calibration, &solution, &problem, &self.seen, &self.lens);
+        Ok(self.calibration)
+    }
+
+    /// The joint estimate with what is known of the lens beforehand.
+    pub fn refine(
+        &self,
+        lens: Option<LensPrior<'_>>,
+        options: Options,
+        work: &Work<'_>,
+    ) -> Result<Refined, CalibrateError> {
+        let begin = self.begin.as_ref().map_err(Clone::clone)?;
+        let problem = JointProblem { lens_prior: lens, ..JointProblem::new(self.mode, &self.board, &self.views) };
+        let own: Vec<_> = self.pairs.iter().map(|pair| pair.camera_from_target).collect();
+        refine::refine(&problem, &own, &self.lens, begin, options, work)
+    }
+
+    /// The problem of the `kept` views that a joint estimate solved.
+    pub fn problem<'p>(&'p self, refined: &Refined, kept: &'p [View], lens: Option<LensPrior<'p>>) -> JointProblem<'p> {
+        let all = JointProblem::new(self.mode, &self.board, kept);
+        let problem = JointProblem { weights: refined.weights, lens_prior: lens, ..all };
+        refine::kept_problem(&problem, kept, &refined.screened.solution)
+    }
+
+    /// The calibration with a joint estimate that was made with what is known of the lens.
+    pub fn finish(
+        mut self,
+        mut refined: Refined,
+        lens: Option<LensPrior<'_>>,
+        work: &Work<'_>,
+    ) -> Result<Calibration, CalibrateError> {
+        let kept = refined.screened.kept_views();
+        if kept.len() < self.pairs.len() {
+            // For comparison on the same views.
+            let kept: Vec<PosePair> = refined.screened.kept.iter().map(|i| self.pairs[*i]).collect();
+            self.calibration.methods = closed_forms(&kept, work)?;
+        }
+        let mut calibration = std::mem::take(&mut self.calibration);
+        let problem = self.problem(&refined, &kept, lens);
+        let judged = refine::judge(&problem, &mut refined.screened.solution, work)?;
+        take_joint(&mut calibration, &problem, &refined, judged, &self.seen);
+        Ok(calibration)
+    }
 }
 
 /// Rounds of a start and of the poses that agree with it: a better start may find more of them.

@@ -12,6 +12,7 @@ mod lens;
 mod pairs;
 mod refine;
 mod residuals;
+pub mod shared_lens;
 mod two_poses;
 pub mod uncertainty;
 mod wrong_corners;
@@ -26,6 +27,7 @@ use crate::estimate::handeye::joint::{Free, Noise, RobotField, SmallSample};
 use crate::estimate::handeye::one_axis::PartialHandEye;
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, one_axis, subset};
 use crate::estimate::intrinsics::IntrinsicsError;
+use crate::estimate::shared_lens::SharedLens;
 use crate::estimate::uncertainty::quality;
 use crate::estimate::uncertainty::widening::Widening;
 use crate::geometry::camera::{Distortion, Intrinsics};
@@ -268,6 +270,8 @@ pub struct Calibration {
     pub views: Vec<ViewResult>,
     /// Which error may be stated; [`diagnose`](crate::diagnose::doctor::diagnose) finds out.
     pub claim: Claim,
+    /// The sessions that share the lens; `None` for a session by itself.
+    pub shared_lens: Option<SharedLens>,
 }
 
 impl Calibration {

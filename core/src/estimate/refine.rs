@@ -25,6 +25,7 @@ use crate::targets::observation::View;
 const JOINTS_GAIN: f64 = 0.05;
 
 /// A joint estimate and what was decided on the way.
+#[derive(Clone)]
 pub struct Refined {
     pub screened: Screened,
     pub weights: Option<CornerWeights>,
@@ -120,11 +121,28 @@ pub fn refine(
     let kept = screened.kept_views();
     let fitted = kept_problem(&problem, &kept, &screened.solution);
     screened.solution = joint::with_stated_error(&fitted, screened.solution, work.cancel)?;
-    if let Some(joints) = joints.as_mut().filter(|joints| joints.accepted) {
-        joints.offsets_rad.clone_from(&screened.solution.joint_offsets_rad);
-        joints.sigma_rad = screened.solution.joint_offsets_sigma();
-    }
+    state_again(joints.as_mut(), &screened.solution);
     Ok(Refined { screened, weights, joints })
+}
+
+/// The offsets of the joints where an estimate was made anew with them.
+fn state_again(joints: Option<&mut JointOffsets>, solution: &JointSolution) {
+    if let Some(joints) = joints.filter(|joints| joints.accepted) {
+        joints.offsets_rad.clone_from(&solution.joint_offsets_rad);
+        joints.sigma_rad = solution.joint_offsets_sigma();
+    }
+}
+
+impl Refined {
+    /// Made anew from where it ended, with the same views, unknowns and kinds of noise: `problem` is of those views.
+    pub fn again(&self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
+        let mut next = self.clone();
+        let view_noise = Some(self.screened.solution.noise.view_px > 0.0);
+        let problem = &JointProblem { view_noise, ..*problem };
+        next.screened.solution = joint::estimate(problem, &self.screened.solution.as_start(), work.cancel)?;
+        state_again(next.joints.as_mut(), &next.screened.solution);
+        Ok(next)
+    }
 }
 
 fn keep_all(problem: &JointProblem<'_>, start: &JointStart, work: Work<'_>) -> Result<Screened, HandEyeError> {

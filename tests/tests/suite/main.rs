@@ -11,6 +11,7 @@ mod renderer_truth;
 mod rerun_doors;
 mod restart;
 mod sessions;
+mod shared_intrinsics;
 mod solved;
 #[cfg(unix)]
 mod streams;

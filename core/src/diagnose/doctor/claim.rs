@@ -53,6 +53,17 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Cla
     Claim::Moved(alternatives)
 }
 
+/// What may be stated where sessions share a lens and have several: the answer may be off by what its own would move it.
+pub(super) fn with_own_lens(claim: Claim, calibration: &Calibration) -> Claim {
+    let shared = calibration.shared_lens.as_ref().filter(|shared| shared.has_others());
+    let Some(own) = shared.map(|shared| shared.with_own_lens.clone()) else { return claim };
+    match claim {
+        Claim::Nothing => Claim::Nothing,
+        Claim::AsModelled => Claim::Moved(vec![own]),
+        Claim::Moved(alternatives) => Claim::Moved(alternatives.into_iter().chain([own]).collect()),
+    }
+}
+
 /// Whether the answer is estimated with an effect.
 fn counts_on(calibration: &Calibration, effect: Effect) -> bool {
     let Some(joint) = &calibration.joint else { return false };

@@ -139,6 +139,9 @@ pub fn diagnose<'a>(
     if let Err(why) = examine(observations, calibration.as_deref_mut(), &mut diagnosis, &work) {
         diagnosis.untested = Some(why);
     }
+    if let Some(calibration) = calibration.as_deref_mut() {
+        calibration.claim = claim::with_own_lens(std::mem::take(&mut calibration.claim), calibration);
+    }
     if let Some(calibration) = calibration.as_deref_mut()
         && diagnosis.findings.iter().any(|finding| finding.severity == Severity::Problem)
     {

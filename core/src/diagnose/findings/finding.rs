@@ -46,6 +46,8 @@ pub enum FindingCode {
     WrongScale,
     /// The intrinsics given do not fit the images.
     WrongIntrinsics,
+    /// Sessions that are calibrated with one lens differ in it.
+    LensesDiffer,
     /// The target moved during the session.
     BoardMoved,
     /// The camera moved on its mount during the session.

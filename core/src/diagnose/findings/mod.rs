@@ -10,6 +10,7 @@ mod answer;
 mod direction;
 mod finding;
 pub(crate) mod outliers;
+mod shared_lens;
 mod views;
 
 pub(crate) use finding::listed;
@@ -58,6 +59,7 @@ pub fn findings(
     if let Some(calibration) = calibration {
         found.extend(answer::findings(calibration, options));
         found.extend(direction::finding(calibration));
+        found.extend(shared_lens::finding(calibration));
         found.extend(crate::diagnose::findings::outliers::findings(calibration));
     }
     sort(&mut found);

@@ -134,7 +134,7 @@ fn information_of_the_noise_levels_is_that_of_the_dense_projector() {
         0.5 * product.trace() * theta[i] * theta[j]
     });
     let dense = information.try_inverse().expect("regular");
-    let by_blocks = small.level_scatter(&GOOD);
+    let by_blocks = level_scatter::level_scatter(&normals, &GOOD).expect("determined");
     for k in 0..3 {
         let expected = 0.5 * dense[(k, k)].sqrt();
         assert!((by_blocks[k] / expected - 1.0).abs() < 1e-4, "level {k}: {} of {expected}", by_blocks[k]);

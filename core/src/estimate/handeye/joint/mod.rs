@@ -36,6 +36,7 @@ pub(crate) mod optimise;
 pub mod outliers;
 pub mod prediction;
 mod problem;
+pub(crate) mod shared_lens;
 mod shown_field;
 mod solution;
 pub(crate) mod state;
@@ -108,10 +109,12 @@ pub(crate) fn fit<'a>(
     }
     let mut state = State::new(problem, start);
     let mut noise = problem.noise.or(start.noise).unwrap_or_else(|| variance::starting_noise(problem, &state));
-    let mut levels = Levels { view: false, field: state.field.is_some() };
+    let mut levels = Levels { view: problem.view_noise == Some(true), field: state.field.is_some() };
     if problem.noise.is_none() {
         // Whether the corners of a view share noise is decided by these views alone, not by where the fit began.
-        noise.view_px = 0.0;
+        if !levels.view {
+            noise.view_px = 0.0;
+        }
         if levels.field && noise.field_m == 0.0 {
             (noise.field_m, noise.field_rad) = (noise.robot_m, noise.robot_rad);
         }
@@ -130,7 +133,7 @@ pub(crate) fn fit<'a>(
         }
         let (mut next, likelihood) = variance::restricted_likelihood(&system, &noise, levels)?;
         let mut settled = variance::change(&noise, &next) < ROUND_TOLERANCE;
-        if settled && !levels.view {
+        if settled && !levels.view && problem.view_noise.is_none() {
             let start = Noise { view_px: next.corner_px, ..next };
             let with_view = Levels { view: true, ..levels };
             let (found, larger) = variance::restricted_likelihood(&system, &start, with_view)?;

@@ -26,13 +26,22 @@ struct SharedPrior {
     precision: f64,
 }
 
+/// What is known of the lens beforehand.
+#[derive(Clone)]
+struct KnownLens {
+    /// Current values minus those expected.
+    offset: DVector<f64>,
+    information: DMatrix<f64>,
+}
+
 /// All views linearised at one estimate.
 pub struct System {
     pub blocks: Vec<ViewBlock>,
     pub corrections: Vec<Vector6<f64>>,
     pub layout: Layout,
-    /// Of all but the robot's field, whose priors are its noise levels.
+    /// Of all but the lens and the robot's field, whose priors are its noise levels.
     priors: Vec<SharedPrior>,
+    known_lens: Option<KnownLens>,
     /// Slopes of the field.
     pub slopes: Vec<f64>,
     /// Sum of `Jsᵀ Js` over the poses' parts of the views, upper triangle.
@@ -51,7 +60,8 @@ impl System {
             blocks: Vec::with_capacity(problem.views.len()),
             corrections: state.corrections.clone(),
             layout,
-            priors: priors(problem, state, layout),
+            priors: priors(state, layout),
+            known_lens: known_lens(problem, state),
             slopes: state.field.as_ref().map_or_else(Vec::new, |field| field.slopes().to_vec()),
             shared: SharedMatrix::zeros(),
             shared_gradient: SharedVector::zeros(),
@@ -85,6 +95,7 @@ impl System {
             corrections,
             layout: self.layout,
             priors: self.priors.clone(),
+            known_lens: self.known_lens.clone(),
             slopes: self.slopes.clone(),
             shared: SharedMatrix::zeros(),
             shared_gradient: SharedVector::zeros(),
@@ -147,7 +158,15 @@ impl System {
 
     /// The cost of what is known beforehand of the shared unknowns, after a step of them.
     pub fn prior_cost(&self, noise: &Noise, step: Option<&DVector<f64>>) -> f64 {
-        self.known(noise).map(|p| p.precision * (p.offset + step.map_or(0.0, |s| s[p.index])).powi(2)).sum()
+        let single = self.known(noise).map(|p| p.precision * (p.offset + step.map_or(0.0, |s| s[p.index])).powi(2));
+        let of_lens = self.known_lens.as_ref().map_or(0.0, |known| {
+            let at = step.map_or_else(
+                || known.offset.clone(),
+                |step| &known.offset + step.rows(Layout::FORM_AT, known.offset.len()),
+            );
+            at.dot(&(&known.information * &at))
+        });
+        single.sum::<f64>() + of_lens
     }
 
     /// What is known beforehand, as an information matrix.
@@ -157,12 +176,20 @@ impl System {
         for p in self.known(noise) {
             known[(p.index, p.index)] += p.precision;
         }
+        if let Some(KnownLens { information, .. }) = &self.known_lens {
+            let mut of_lens = known.view_mut((Layout::FORM_AT, Layout::FORM_AT), information.shape());
+            of_lens += information;
+        }
         known
     }
 
     /// The part of the unknowns that is known beforehand: `tr(C P)` over the priors of the shared unknowns.
     pub fn prior_trace(&self, noise: &Noise, covariance: &DMatrix<f64>) -> f64 {
-        self.known(noise).map(|p| p.precision * covariance[(p.index, p.index)]).sum()
+        let of_lens = self.known_lens.as_ref().map_or(0.0, |known| {
+            let at = (Layout::FORM_AT, Layout::FORM_AT);
+            known.information.dot(&covariance.view(at, known.information.shape()))
+        });
+        self.known(noise).map(|p| p.precision * covariance[(p.index, p.index)]).sum::<f64>() + of_lens
     }
 
     /// Eliminates the corrections.
@@ -182,6 +209,15 @@ impl System {
         for p in self.known(noise) {
             matrix[(p.index, p.index)] += p.precision;
             gradient[p.index] += p.precision * p.offset;
+        }
+        if let Some(KnownLens { offset, information }) = &self.known_lens {
+            let pull = information * offset;
+            for j in 0..offset.len() {
+                gradient[Layout::FORM_AT + j] += pull[j];
+                for i in 0..=j {
+                    matrix[(Layout::FORM_AT + i, Layout::FORM_AT + j)] += information[(i, j)];
+                }
+            }
         }
         for i in 0..n {
             matrix[(i, i)] *= 1.0 + damping;
@@ -213,7 +249,7 @@ impl System {
 /// Prior of a joint whose offset cannot be told: as good as none.
 const HELD_JOINT_RAD: f64 = 1e-8;
 
-fn priors(problem: &JointProblem<'_>, state: &State, layout: Layout) -> Vec<SharedPrior> {
+fn priors(state: &State, layout: Layout) -> Vec<SharedPrior> {
     // The target takes up an offset of the first joint, and the hand-eye or the target one of the last: freeing them adds
     // nothing but the width of their prior.
     let last = state.joints_rad.len().saturating_sub(1);
@@ -223,15 +259,14 @@ fn priors(problem: &JointProblem<'_>, state: &State, layout: Layout) -> Vec<Shar
         offset: *offset,
         precision: sigma(j).powi(-2),
     });
-    let known = problem.lens_prior.filter(|_| problem.free.intrinsics);
-    let lens = known.iter().flat_map(|prior| {
-        let (now, expected) = (state.intrinsics.parameters(), prior.expected.parameters());
-        let known = now.into_iter().zip(expected).zip(prior.sigma).enumerate();
-        known.filter(|(_, (_, sigma))| sigma.is_finite() && **sigma > 0.0).map(|(i, ((now, expected), sigma))| {
-            SharedPrior { index: Layout::FORM_AT + i, offset: now - expected, precision: sigma.powi(-2) }
-        })
-    });
-    joints.chain(lens).collect()
+    joints.collect()
+}
+
+fn known_lens(problem: &JointProblem<'_>, state: &State) -> Option<KnownLens> {
+    let prior = problem.lens_prior.filter(|_| problem.free.intrinsics)?;
+    let (now, expected) = (state.intrinsics.parameters(), prior.expected.parameters());
+    let offset = DVector::from_iterator(now.len(), now.iter().zip(&expected).map(|(now, expected)| now - expected));
+    Some(KnownLens { offset, information: prior.information.clone() })
 }
 
 fn linearise(problem: &JointProblem<'_>, state: &State, index: usize) -> Result<ViewBlock, HandEyeError> {

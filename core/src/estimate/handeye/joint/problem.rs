@@ -1,5 +1,7 @@
 //! What the joint estimate is given.
 
+use nalgebra::DMatrix;
+
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::chain::MAX_JOINTS;
 use crate::estimate::handeye::joint::field::{Places, RobotField};
@@ -63,8 +65,9 @@ impl Free {
 pub struct LensPrior<'a> {
     /// The expected intrinsics.
     pub expected: Intrinsics,
-    /// Standard deviations in the order of [`Intrinsics::parameters`]; one that is not finite and positive says nothing.
-    pub sigma: &'a [f64],
+    /// Inverse of their covariance, in the order of [`Intrinsics::parameters`] and of their size; a direction of which
+    /// nothing is known has none.
+    pub information: &'a DMatrix<f64>,
 }
 
 /// The data and what is known beforehand.
@@ -84,12 +87,23 @@ pub struct JointProblem<'a> {
     pub weights: Option<CornerWeights>,
     /// Noise levels when they are known; otherwise they are estimated.
     pub noise: Option<Noise>,
+    /// Whether the corners of a view share noise ([`Noise::view_px`]), where that is decided; otherwise these views decide.
+    pub view_noise: Option<bool>,
 }
 
 impl<'a> JointProblem<'a> {
     /// Both links from these views, with known intrinsics and a flat target, all corners alike, noise levels estimated.
     pub fn new(mode: Mode, board: &'a BoardPoints, views: &'a [View]) -> Self {
-        Self { mode, board, views, free: Free::default(), lens_prior: None, weights: None, noise: None }
+        Self {
+            mode,
+            board,
+            views,
+            free: Free::default(),
+            lens_prior: None,
+            weights: None,
+            noise: None,
+            view_noise: None,
+        }
     }
 
     /// Number of joint offsets that are estimated: none unless all views know their joints.
