@@ -19,7 +19,6 @@ use nalgebra::{DMatrix, Matrix6};
 use scene::{Cell, Trial};
 use tally::Summary;
 
-const EXACT: Noise = Noise { corner_px: 0.1, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
 /// 0.1 mm and 0.02°: a good robot.
 const GOOD: Noise = Noise { corner_px: 0.1, robot_m: 1e-4, robot_rad: 3.5e-4, ..Noise::EXACT };
 

@@ -132,11 +132,7 @@ impl Optimum<'_> {
             if (rise / RISE - 1.0).abs() < NEAR {
                 break;
             }
-            if rise < RISE {
-                inside = place
-            } else {
-                outside = place
-            }
+            *(if rise < RISE { &mut inside } else { &mut outside }) = place;
             let by_parabola = place * (RISE / rise.max(f64::MIN_POSITIVE)).sqrt();
             let between = by_parabola > inside && by_parabola < outside;
             place = if between { by_parabola } else { 0.5 * (inside + outside) }.min(FARTHEST);

@@ -25,7 +25,7 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, StudentsT};
 use statrs::function::gamma::gamma_lr;
 
 use super::Noise;
-use super::normal::System;
+use super::normal::{self, System};
 use super::variance::{self, Aim, Levels, Likelihood, Logs, MostLikely};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::uncertainty::quality;
@@ -87,7 +87,7 @@ pub fn integrate(
     }
     let points = points(system, &found, axes, levels)?;
     let mixture = Mixture::new(&points, reference_point);
-    let Some(shape) = mixture.shape(&points) else {
+    let Some(shape) = shape(&points) else {
         return Ok(Integrated { covariance, small_sample: SmallSample::KNOWN });
     };
     let hand_eye = |m: &DMatrix<f64>| -> Matrix6<f64> { m.fixed_view::<6, 6>(0, 0).into_owned() };
@@ -225,6 +225,17 @@ fn scatter(points: &[Point]) -> Matrix6<f64> {
     points.iter().map(|point| (point.logs - mean) * (point.logs - mean).transpose() * point.weight).sum()
 }
 
+/// The shape of the t, before its size is known; `None` where the covariances have no inverse.
+fn shape(points: &[Point]) -> Option<DMatrix<f64>> {
+    let n = points.first()?.at.covariance.nrows();
+    let (mut information, mut shifts) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+    for Point { weight, at, .. } in points {
+        information += at.reduced.information() * *weight;
+        shifts += &at.step * at.step.transpose() * *weight;
+    }
+    Some(normal::covariance_of(&information)? + shifts)
+}
+
 /// What the points say of the hand-eye transform.
 struct Mixture {
     /// Weight and covariance of the error at the reference point, the shift of the mean in it.
@@ -248,17 +259,6 @@ impl Mixture {
         };
         let of_point = of_hand_eye.iter().map(|(weight, c, shift)| (*weight, moved(c, shift))).collect();
         Self { of_point, of_hand_eye }
-    }
-
-    /// The shape of the t, before its size is known; `None` where the covariances have no inverse.
-    fn shape(&self, points: &[Point]) -> Option<DMatrix<f64>> {
-        let n = points.first()?.at.covariance.nrows();
-        let (mut information, mut shifts) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
-        for Point { weight, at, .. } in points {
-            information += at.reduced.information() * *weight;
-            shifts += &at.step * at.step.transpose() * *weight;
-        }
-        Some(super::normal::covariance_of(&information)? + shifts)
     }
 
     fn degrees_of_freedom(&self) -> f64 {
