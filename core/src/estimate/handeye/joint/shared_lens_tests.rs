@@ -3,7 +3,7 @@ use nalgebra::Vector6;
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::chain::correction_transform;
-use crate::estimate::handeye::joint::{Noise, camera_from_target, estimate};
+use crate::estimate::handeye::joint::{Noise, camera_from_target, fit};
 use crate::geometry::camera::Distortion;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::se3;
@@ -29,7 +29,7 @@ fn fitted(
     let cancel = CancelToken::default();
     let problem = JointProblem { lens_prior, ..trial.problem(true, Some(*noise)) };
     let start = solution.map_or_else(|| trial.start(), JointSolution::as_start);
-    let fit = estimate(&problem, &start, &cancel)?;
+    let fit = fit(&problem, &start, &cancel)?;
     let says = LensInformation::of(&problem, &fit, &cancel)?;
     Ok(Fitted { fit, says })
 }
