@@ -42,6 +42,8 @@ const WIDTHS: (f64, f64) = (0.3, 4.0);
 const NO_WEIGHT: f64 = 1e-6;
 /// Views above which the levels count as known: they add less than one part in three hundred.
 const MANY_VIEWS: usize = 300;
+/// Degrees of freedom where the levels cannot be integrated: those of one level that three views tell.
+const FEWEST: f64 = 3.0;
 /// Degrees of freedom above which nothing changes.
 const MANY: f64 = 1e6;
 
@@ -88,7 +90,8 @@ pub fn integrate(
     let points = points(system, &found, axes, levels)?;
     let mixture = Mixture::new(&points, reference_point);
     let Some(shape) = shape(&points) else {
-        return Ok(Integrated { covariance, small_sample: SmallSample::KNOWN });
+        let small_sample = SmallSample { degrees_of_freedom: FEWEST, ..SmallSample::KNOWN };
+        return Ok(Integrated { covariance, small_sample });
     };
     let hand_eye = |m: &DMatrix<f64>| -> Matrix6<f64> { m.fixed_view::<6, 6>(0, 0).into_owned() };
     let degrees_of_freedom = mixture.degrees_of_freedom();
@@ -168,9 +171,9 @@ struct Point {
 }
 
 fn points(system: &System, found: &MostLikely, mut axes: Axes, levels: Levels) -> Result<Vec<Point>, HandEyeError> {
-    let posterior = |logs: &Logs| -> Result<(f64, Likelihood), HandEyeError> {
-        let at = variance::evaluate(system, logs, levels)?;
-        Ok((at.value + variance::prior(&at, levels), at))
+    let posterior = |logs: &Logs| -> Result<Option<(f64, Likelihood)>, HandEyeError> {
+        let at = variance::determined(variance::evaluate(system, logs, levels))?;
+        Ok(at.map(|at| (at.value + variance::prior(&at, levels), at)))
     };
     let n = axes.places.len();
     let top = found.at.value + variance::prior(&found.at, levels);
@@ -179,7 +182,7 @@ fn points(system: &System, found: &MostLikely, mut axes: Axes, levels: Levels) -
             let mut place = DVector::zeros(n);
             place[axis] = sign * PROBE;
             let logs = variance::kept(axes.at(&found.logs, &place), levels);
-            let fall = posterior(&logs)?.0 - top;
+            let fall = posterior(&logs)?.map_or(f64::INFINITY, |(value, _)| value - top);
             axes.widths[axis][side] = (PROBE / fall.max(1e-3).sqrt()).clamp(WIDTHS.0, WIDTHS.1);
         }
     }
@@ -198,7 +201,7 @@ fn points(system: &System, found: &MostLikely, mut axes: Axes, levels: Levels) -
         }
         let wanted = axes.at(&found.logs, &place);
         let logs = variance::kept(wanted, levels);
-        let (value, at) = posterior(&logs)?;
+        let Some((value, at)) = posterior(&logs)? else { continue };
         points.push(Point { weight: -0.5 * (value - top) - log_density, logs, at });
     }
     let most = points.iter().map(|point| point.weight).fold(f64::NEG_INFINITY, f64::max);

@@ -269,9 +269,9 @@ pub fn most_likely(system: &System, start: Logs, levels: Levels, aim: Aim) -> Re
         let mut improved = false;
         while damping < 1e9 {
             let next_logs = kept(logs + newton_step(&curvature, &gradient, damping), levels);
-            let next = evaluate(system, &next_logs, levels)?;
-            let gain = aimed(&at) - aimed(&next);
-            if gain > 0.0 {
+            let next = determined(evaluate(system, &next_logs, levels))?;
+            let gain = next.as_ref().map_or(f64::NEG_INFINITY, |next| aimed(&at) - aimed(next));
+            if let (Some(next), true) = (next, gain > 0.0) {
                 (logs, at) = (next_logs, next);
                 damping = (damping * 0.2).max(1e-9);
                 improved = gain > GAIN_TOLERANCE;
@@ -285,6 +285,18 @@ pub fn most_likely(system: &System, start: Logs, levels: Levels, aim: Aim) -> Re
     }
     let (_, curvature) = slope(system, &logs, &at, levels, aim);
     Ok(MostLikely { logs, at, information: 0.5 * curvature })
+}
+
+/// What was evaluated; `None` at levels that leave the answer undetermined, which are not the ones that were looked for.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`].
+pub fn determined(at: Result<Likelihood, HandEyeError>) -> Result<Option<Likelihood>, HandEyeError> {
+    match at {
+        Ok(at) => Ok(Some(at)),
+        Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
+        Err(_) => Ok(None),
+    }
 }
 
 /// Derivatives of what is minimised, the second ones as expected.
