@@ -4,6 +4,7 @@ use handeye_core::estimate::ViewStatus;
 use handeye_core::estimate::handeye::HandEye;
 use handeye_core::estimate::uncertainty::quality::{self, BoxError, TipBox};
 use handeye_core::geometry::frames::{Base, Camera, Pose};
+use handeye_core::geometry::point_error;
 use handeye_core::project::session::Document;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -49,7 +50,7 @@ pub fn judge_box(chosen: Option<WorkBox>, solved: &Solved, document: &Document) 
     let (from, to) = (Point3::from(work_box.from_m), Point3::from(work_box.to_m));
     let middle = nalgebra::center(&from, &to);
     let variance = |camera_from_base: &Pose<Camera, Base>| {
-        quality::point_covariance(&covariance, &(camera_from_base.isometry() * middle)).trace()
+        point_error::covariance(&covariance, &(camera_from_base.isometry() * middle)).trace()
     };
     let worst =
         views_of_base(&hand_eye, solved, document).into_iter().max_by(|a, b| variance(a).total_cmp(&variance(b)))?;

@@ -13,10 +13,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::bridge_for_tests::{camera_matrix, coefficients, isometry, numbers, to_points2d, to_points3d};
-use crate::estimate::handeye::joint::equations::ViewInput;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::planar_pose::refine::refine;
 use crate::geometry::planar_pose::{PlanarPose, Solution, solve};
+use crate::geometry::view_equations::ViewInput;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};

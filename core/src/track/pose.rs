@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix6, Point3, Vector2, Vector6};
 
-use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::geometry::planar_pose::mirror::mirrored;
 use crate::geometry::planar_pose::refine::{Minimum, refine};
 use crate::geometry::se3;
 use crate::geometry::statistics::median_high;
+use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::targets::observation::Corner;
 
 /// Residuals beyond this many standard deviations have no weight (Tukey's, 95 % efficient at 4.7).

@@ -13,9 +13,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
 use super::{CaptureCheck, Predictor, Uncertainty};
 use crate::estimate::handeye::joint::chain::Chain;
-use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::estimate::handeye::joint::field::{self, SLOPES};
 use crate::geometry::se3;
+use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::targets::bent::BoardPoints;
 use crate::targets::observation::View;
 

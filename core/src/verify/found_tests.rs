@@ -8,7 +8,6 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::estimate::handeye::joint::{Noise, SmallSample};
 use crate::estimate::handeye::{HandEye, Mode};
-use crate::estimate::uncertainty::quality;
 use crate::estimate::{self, Calibration, CameraKnowledge, Method, Observations, ObservedView, Options};
 use crate::geometry::arm::{ArmKind, ArmModel};
 use crate::geometry::camera::Intrinsics;
@@ -156,7 +155,7 @@ fn the_error_of_a_measured_point_follows_the_law_of_the_calibration() {
     let point = calibrated.point_at_depth(&t.views[0].base_from_tip, &px, reference.z).expect("a point");
     let (here, stated) = (point.error_95_m().expect("stated"), calibration.tip_error_95_m().expect("stated"));
     assert!((here / stated - 1.0).abs() < 1e-6, "{here} here, {stated} in the result");
-    let gaussian = quality::radius_95(&point.covariance_in_base.expect("stated"));
+    let gaussian = crate::geometry::point_error::radius_95(&point.covariance_in_base.expect("stated"));
     println!(
         "{:.1} degrees of freedom: {:.3} mm, Gaussian {:.3} mm",
         law.degrees_of_freedom,

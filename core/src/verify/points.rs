@@ -4,9 +4,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
 
 use super::{Predictor, VerifyError};
 use crate::estimate::handeye::joint::SmallSample;
-use crate::estimate::uncertainty::quality;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
+use crate::geometry::point_error;
 
 /// A point that the camera measured.
 #[derive(Debug, Clone, Copy)]
@@ -31,7 +31,7 @@ impl MeasuredPoint {
     /// The length that its error stays under with a probability of 95 %, metres; of the same part of the error, and by
     /// the same law as the expected error of the calibration.
     pub fn error_95_m(&self) -> Option<f64> {
-        self.covariance_in_base.as_ref().map(|covariance| quality::point_error_95(covariance, self.small_sample))
+        self.covariance_in_base.as_ref().map(|covariance| self.small_sample.radius_95(covariance))
     }
 }
 
@@ -76,7 +76,7 @@ impl Predictor {
         let covariance_in_base = self
             .hand_eye_covariance
             .as_ref()
-            .map(|c| rotation * quality::point_covariance(c, &in_camera) * rotation.transpose());
+            .map(|c| rotation * point_error::covariance(c, &in_camera) * rotation.transpose());
         let in_camera = PointIn::new(in_camera);
         let in_base = base_from_camera * in_camera;
         MeasuredPoint { in_camera, in_base, covariance_in_base, small_sample: self.small_sample }

@@ -1,6 +1,6 @@
 //! The board as it is tracked.
 
-use handeye_core::estimate::uncertainty::quality;
+use handeye_core::geometry::point_error;
 use rerun::{Points3D, Radius};
 
 use super::camera::lens;
@@ -44,6 +44,6 @@ fn write_estimate(pen: Pen<'_>, known: &Known, tracked: &Tracked) -> Result<(), 
     let covariance = of_position(&estimate.covariance);
     let shape = ellipsoid(&covariance, style::TRACK_UNCERTAINTY_FACTOR, style::TRACKED);
     pen.write(&below(paths::TRACKED_BOARD, paths::TRACK_UNCERTAINTY), &shape)?;
-    number(pen, paths::PLOT_TRACK_SIGMA, Some(quality::radius_95(&covariance) * 1e3))?;
+    number(pen, paths::PLOT_TRACK_SIGMA, Some(point_error::radius_95(&covariance) * 1e3))?;
     number(pen, paths::PLOT_TRACK_SPEED, Some(estimate.velocity_m_s.norm() * 1e3))
 }

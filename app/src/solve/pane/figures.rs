@@ -3,8 +3,8 @@
 use handeye_core::estimate::claim::Claim;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::joint::SmallSample;
-use handeye_core::estimate::uncertainty::quality;
 use handeye_core::geometry::frames::{Camera, Mount, Pose};
+use handeye_core::geometry::point_error;
 use handeye_core::geometry::se3;
 use nalgebra::{Cholesky, Matrix3, Matrix6, Vector3};
 
@@ -30,7 +30,7 @@ impl Within95 {
         let translation = rotation * covariance.fixed_view::<3, 3>(0, 0) * rotation.transpose();
         // 1.96 standard deviations when the levels are known, and more the fewer degrees of freedom they have.
         let one_axis = Matrix3::from_diagonal(&Vector3::new(1.0 / law.scale, 0.0, 0.0));
-        let sigmas = quality::radius_95_t(&one_axis, law.degrees_of_freedom);
+        let sigmas = point_error::radius_95_t(&one_axis, law.degrees_of_freedom);
         let within = |variance: f64| sigmas * variance.max(0.0).sqrt();
         Self {
             translation_m: std::array::from_fn(|i| within(translation[(i, i)])),

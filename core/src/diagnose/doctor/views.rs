@@ -4,7 +4,6 @@ use std::cmp::Ordering;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
 
-use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::estimate::handeye::{Mode, subset};
 use crate::estimate::intrinsics::{self, Options, SeenView};
 use crate::estimate::{CameraKnowledge, Observations, ObservedView};
@@ -13,6 +12,7 @@ use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::planar_pose::{self, PlanarPose};
 use crate::geometry::se3::skew;
 use crate::geometry::statistics::median;
+use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::natural_order;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;

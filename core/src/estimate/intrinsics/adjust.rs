@@ -3,10 +3,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
 use super::{IntrinsicsError, SeenView};
-use crate::estimate::handeye::joint::equations::{FreeParameters, MAX_FORM, PoseEquations, ViewInput};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::planar_pose::mirror;
 use crate::geometry::se3;
+use crate::geometry::view_equations::{FreeParameters, MAX_FORM, PoseEquations, ViewInput};
 use crate::progress::CancelToken;
 use crate::targets::bent::{BoardPoints, BoardShape};
 

@@ -25,10 +25,10 @@ use super::IntrinsicsError;
 use super::adjust::{Estimate, Problem, seen};
 use super::information::inverse;
 use crate::estimate::bend::Deflection;
-use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations};
 use crate::estimate::handeye::joint::view_block::own_pose_eliminated;
 use crate::geometry::planar_pose::PoseError;
 use crate::geometry::statistics::median;
+use crate::geometry::view_equations::{FreeParameters, PoseEquations};
 
 /// Deflection of a board before any corner is seen, one standard deviation, as a part of its longer side: the most bent one
 /// that we met, on purpose, has a 42nd. It says nothing where corners say anything, and keeps finite what a bend that nobody

@@ -34,11 +34,11 @@ use nalgebra::DMatrix;
 pub use screened::{Screened, solve_screened};
 pub use seen_view::SeenView;
 
-use crate::estimate::handeye::joint::equations::FreeParameters;
 use crate::geometry::camera::Distortion;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::planar_pose;
+use crate::geometry::view_equations::FreeParameters;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};

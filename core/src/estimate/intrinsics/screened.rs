@@ -6,9 +6,9 @@ use nalgebra::{Isometry3, Matrix2};
 
 use super::{Found, IntrinsicsError, Options, SeenView, solve};
 use crate::estimate::handeye::joint::CornerWeights;
-use crate::estimate::handeye::joint::equations::ViewInput;
 use crate::estimate::wrong_corners;
 use crate::geometry::planar_pose::refine::refine;
+use crate::geometry::view_equations::ViewInput;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardPoints;

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::refine::{Minimum, refine};
-use crate::estimate::handeye::joint::equations::ViewInput;
+use crate::geometry::view_equations::ViewInput;
 
 /// Normals nearer to the line of sight than this angle \[rad\] are their own mirror image.
 const HEAD_ON: f64 = 1e-3;

@@ -25,9 +25,9 @@ pub(crate) mod start;
 
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
 
-use crate::estimate::handeye::joint::equations::ViewInput;
 use crate::geometry::camera::{CameraError, Intrinsics};
 use crate::geometry::frames::{Camera, Pose, Target};
+use crate::geometry::view_equations::ViewInput;
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use crate::estimate::handeye::joint::equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::geometry::se3;
+use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
 
 /// A step whose rotation \[rad\] and translation [part of the distance] are below this ends the descent: rounding.
 const CONVERGED: f64 = 1e-12;

@@ -5,8 +5,8 @@ use nalgebra::{
 };
 
 use super::homography::{homography, jacobian, mapped};
-use crate::estimate::handeye::joint::equations::ViewInput;
 use crate::geometry::camera::CameraError;
+use crate::geometry::view_equations::ViewInput;
 use crate::targets::observation::Corner;
 
 /// Smallest cosine to the optical axis of the rays that start a pose: the plane z = 1 has no room for more.

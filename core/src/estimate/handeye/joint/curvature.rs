@@ -22,7 +22,7 @@ use super::normal::{Reduced, System};
 use super::state::State;
 use super::{JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::uncertainty::quality;
+use crate::geometry::point_error;
 use crate::geometry::se3;
 
 /// Views above which the cost is a parabola as far as it matters: both effects fall with the number of views, and at ten
@@ -105,8 +105,8 @@ impl Optimum<'_> {
     /// Stretches a covariance to the ends of the profile along the axes of the error at a point.
     fn stretched(&self, mut covariance: DMatrix<f64>, point: &Point3<f64>) -> Result<DMatrix<f64>, HandEyeError> {
         let hand_eye: Matrix6<f64> = self.covariance.fixed_view::<6, 6>(0, 0).into_owned();
-        let axes = quality::point_covariance(&hand_eye, point).symmetric_eigen();
-        let by_hand_eye = quality::point_by_hand_eye(point);
+        let axes = point_error::covariance(&hand_eye, point).symmetric_eigen();
+        let by_hand_eye = point_error::by_hand_eye(point);
         let longest = axes.eigenvalues.max();
         for (axis, variance) in axes.eigenvectors.column_iter().zip(&axes.eigenvalues) {
             if *variance <= SHORT * longest {

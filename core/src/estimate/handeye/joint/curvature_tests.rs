@@ -17,7 +17,7 @@ fn variances(views: usize, free_lens: bool, seed: u64) -> (f64, f64) {
     let plain = fit(&problem, &t.start(), &cancel).expect("solves");
     let stated = estimate(&problem, &t.start(), &cancel).expect("solves");
     let of = |s: &crate::estimate::handeye::joint::JointSolution| {
-        quality::point_covariance(&s.hand_eye_covariance(), &s.reference_point).trace()
+        point_error::covariance(&s.hand_eye_covariance(), &s.reference_point).trace()
     };
     (of(&plain), of(&stated))
 }

@@ -28,7 +28,7 @@ use super::Noise;
 use super::normal::{self, System};
 use super::variance::{self, Aim, Levels, Likelihood, Logs, MostLikely};
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::uncertainty::quality;
+use crate::geometry::point_error;
 
 /// Points of the mixture.
 const POINTS: usize = 128;
@@ -68,6 +68,11 @@ pub struct SmallSample {
 impl SmallSample {
     /// Of a Gaussian: the noise levels are known.
     pub const KNOWN: Self = Self { degrees_of_freedom: f64::INFINITY, scale: 1.0, level_sigma: [0.0; 3] };
+
+    /// The length that the error of a point stays under with a probability of 95 %, from its covariance, in its unit.
+    pub fn radius_95(&self, covariance: &Matrix3<f64>) -> f64 {
+        point_error::radius_95_t(&(covariance / self.scale), self.degrees_of_freedom)
+    }
 }
 
 /// Integrates the noise levels out. `noise` are the most likely ones, at which the system was linearised, and `covariance`
@@ -95,8 +100,9 @@ pub fn integrate(
     };
     let hand_eye = |m: &DMatrix<f64>| -> Matrix6<f64> { m.fixed_view::<6, 6>(0, 0).into_owned() };
     let degrees_of_freedom = mixture.degrees_of_freedom();
-    let of_point = quality::point_covariance(&hand_eye(&shape), reference_point);
-    let size = quality::radius_95_mixture(&mixture.of_point) / quality::radius_95_t(&of_point, degrees_of_freedom);
+    let of_point = point_error::covariance(&hand_eye(&shape), reference_point);
+    let size =
+        point_error::radius_95_mixture(&mixture.of_point) / point_error::radius_95_t(&of_point, degrees_of_freedom);
     let covariance = if size.is_finite() && size > 0.0 { shape * size.powi(2) } else { shape };
     let scale = mixture.region_scale(&hand_eye(&covariance), degrees_of_freedom).unwrap_or(1.0);
     let small_sample = SmallSample { degrees_of_freedom, scale, level_sigma: level_sigma(&scatter(&points)) };
@@ -258,7 +264,7 @@ impl Mixture {
             })
             .collect();
         let moved = |covariance: &Matrix6<f64>, shift: &Vector6<f64>| {
-            quality::point_covariance(&(covariance + shift * shift.transpose()), reference_point)
+            point_error::covariance(&(covariance + shift * shift.transpose()), reference_point)
         };
         let of_point = of_hand_eye.iter().map(|(weight, c, shift)| (*weight, moved(c, shift))).collect();
         Self { of_point, of_hand_eye }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::{Free, JointProblem, estimate, fit};
+use crate::estimate::uncertainty::quality;
 use crate::progress::CancelToken;
 use crate::testing::sessions::{Trial, camera, trial};
 

@@ -26,9 +26,7 @@
 
 pub(crate) mod chain;
 mod curvature;
-pub(crate) mod equations;
 pub(crate) mod field;
-mod gram;
 mod information;
 mod integrated;
 pub(crate) mod normal;

@@ -2,7 +2,6 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, Vector6};
 
-use super::equations::{PoseEquations, ViewInput};
 use super::field::HALF;
 use super::view_block::{
     Layout, Own, PixelWeights, Rest, SharedMatrix, SharedVector, ViewBlock, add_form, add_form_gradient, prior_weight,
@@ -11,6 +10,7 @@ use super::{JOINT_PRIOR_RAD, JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::geometry::se3::skew;
+use crate::geometry::view_equations::{PoseEquations, ViewInput};
 use crate::progress::CancelToken;
 
 /// Name of the method in errors.

@@ -21,7 +21,6 @@
 use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, SMatrix, Vector6};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::equations::{FreeParameters, PoseEquations, ViewInput};
 use super::field;
 use super::normal::System;
 use super::view_block::{MAX_SHARED, prior_weight};
@@ -33,6 +32,7 @@ use crate::estimate::wrong_corners;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::se3;
 use crate::geometry::statistics::{median, outliers};
+use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::progress::{CancelToken, Work};
 use crate::targets::observation::{Corner, View};
 

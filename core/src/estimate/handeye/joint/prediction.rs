@@ -9,7 +9,7 @@ use super::{JointProblem, JointSolution};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::motion::MIN_VIEWS;
-use crate::estimate::uncertainty::quality;
+use crate::geometry::point_error;
 use crate::progress::{Stage, Work};
 
 /// Points of a curve at the most: enough for any chart, and a thousand views cost no more than a few hundred.
@@ -20,7 +20,7 @@ const MOST_POINTS: usize = 100;
 pub struct ErrorPoint {
     /// Number of views.
     pub views: usize,
-    /// Expected error as in [`quality::tip_error_95_m`], metres; `None` where so few views leave a direction of the
+    /// Expected error as in [`tip_error_95_m`](crate::estimate::uncertainty::quality::tip_error_95_m), metres; `None` where so few views leave a direction of the
     /// answer free, or so weak that the error would exceed the distance of the board.
     pub tip_error_95_m: Option<f64>,
 }
@@ -93,7 +93,7 @@ pub fn error_by_views<'a>(
             let covariance = covariance_of(&(&information + &known));
             let error_m = covariance.map(|c| {
                 let hand_eye: Matrix6<f64> = c.fixed_view::<6, 6>(0, 0).into_owned();
-                quality::radius_95(&quality::point_covariance(&hand_eye, &solution.reference_point))
+                point_error::radius_95(&point_error::covariance(&hand_eye, &solution.reference_point))
             });
             // Repeated views are not quite singular, by the rounding and the corrections of their poses; an error beyond
             // the distance of the board says as little, because no derivative holds so far.
@@ -103,7 +103,9 @@ pub fn error_by_views<'a>(
     }
     // What estimated noise levels add to the whole they add to every part of it alike.
     let plain = gathered.last().and_then(|p: &ErrorPoint| p.tip_error_95_m).filter(|e| *e > 0.0);
-    let added = plain.map_or(1.0, |e| quality::tip_error_95_m(solution) / e);
+    let of_point = point_error::covariance(&solution.hand_eye_covariance(), &solution.reference_point);
+    let stated = solution.small_sample.radius_95(&of_point);
+    let added = plain.map_or(1.0, |e| stated / e);
     for point in &mut gathered {
         point.tip_error_95_m = point.tip_error_95_m.map(|e| e * added);
     }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::{JointSolution, estimate};
+use crate::estimate::uncertainty::quality;
 use crate::progress::CancelToken;
 use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 
@@ -35,8 +36,8 @@ fn with_the_first_views_the_curve_says_what_a_solve_of_them_alone_says() {
             let first = JointProblem { views: &t.views[..k], ..known };
             let alone = estimate(&first, &t.start(), &CancelToken::default()).expect("solves");
             // Stated at the reference point of the whole, as the curve is.
-            let covariance = quality::point_covariance(&alone.hand_eye_covariance(), &solution.reference_point);
-            let stated = quality::radius_95(&covariance);
+            let covariance = point_error::covariance(&alone.hand_eye_covariance(), &solution.reference_point);
+            let stated = point_error::radius_95(&covariance);
             let point = curve.gathered.iter().find(|p| p.views == k).expect("every number of views");
             let predicted = point.tip_error_95_m.expect("determined");
             assert!((predicted / stated - 1.0).abs() < 0.02, "{mode:?} {k}: {predicted} {stated}");

@@ -55,8 +55,8 @@ pub struct Free {
 }
 
 impl Free {
-    pub(crate) fn form(self) -> super::equations::FreeParameters {
-        super::equations::FreeParameters { lens: self.intrinsics, warp: self.warp, scale: self.scale }
+    pub(crate) fn form(self) -> crate::geometry::view_equations::FreeParameters {
+        crate::geometry::view_equations::FreeParameters { lens: self.intrinsics, warp: self.warp, scale: self.scale }
     }
 }
 

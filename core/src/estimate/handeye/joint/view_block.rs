@@ -8,8 +8,8 @@ use nalgebra::{Cholesky, Const, DMatrix, Matrix6, SMatrix, SVector, Vector3, Vec
 
 use super::Noise;
 use super::chain::{Chain, MAX_JOINTS};
-use super::equations::{MAX_FORM, PoseEquations};
 use super::field::{self, SLOPES};
+use crate::geometry::view_equations::{MAX_FORM, PoseEquations};
 
 /// Most shared unknowns.
 pub const MAX_SHARED: usize = 12 + MAX_FORM + MAX_JOINTS + SLOPES;

@@ -3,7 +3,6 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::handeye::joint::equations::ViewInput;
 use crate::estimate::handeye::joint::normal::System;
 use crate::estimate::handeye::joint::optimise::{self, Descent};
 use crate::estimate::handeye::joint::state::State;
@@ -14,6 +13,7 @@ use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::planar_pose::refine::refine;
+use crate::geometry::view_equations::ViewInput;
 use crate::progress::{Stage, Work};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::{Corner, View};

@@ -1,11 +1,13 @@
 //! The least-squares equations of one view in the target's pose, the lens and the shape of the target.
 
+mod gram;
+
 use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
 
-use super::gram::{Gram, Pair, Products};
 use crate::geometry::camera::{CameraError, Intrinsics, MAX_PARAMETERS};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
+use gram::{Gram, Pair, Products};
 
 /// Unknowns of a pose.
 const POSE: usize = 6;
@@ -170,5 +172,4 @@ impl PoseEquations {
 }
 
 #[cfg(test)]
-#[path = "equations_tests.rs"]
 mod tests;
