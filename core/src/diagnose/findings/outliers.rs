@@ -141,17 +141,20 @@ fn widened(calibration: &Calibration) -> Option<Finding> {
 fn unclear(calibration: &Calibration) -> Option<Finding> {
     let JointFit { small_sample: sample, noise, robot_effect_px: robot_px, .. } = *calibration.joint.as_ref()?;
     let [_, position, orientation] = sample.level_sigma;
+    let [_, mm, deg] = sample.level_range;
+    let (mm, deg) = (mm.map(|m| m * 1e3), deg.map(f64::to_degrees));
     let unclear = position.max(orientation);
     if unclear < UNCLEAR || robot_px < NO_MATTER * noise.corner_px {
         return None;
     }
     let text = text!(
-        "Robot and corner noise can hardly be told apart: the robot's {mm} mm is known to ± {mm_percent} % and its {deg}° to \
-         ± {deg_percent} %. The expected error allows for it. More views, or better images, tell them apart.",
-        mm = format!("{:.3}", noise.robot_m * 1e3),
-        mm_percent = format!("{:.0}", position * 100.0),
-        deg = format!("{:.3}", noise.robot_rad.to_degrees()),
-        deg_percent = format!("{:.0}", orientation * 100.0)
+        "Robot and corner noise can hardly be told apart: the robot's noise per axis is between {mm_low} and {mm_high} mm and \
+         between {deg_low}° and {deg_high}° (95 %). The expected error allows for it. More views, or better images, tell them \
+         apart.",
+        mm_low = format!("{:.3}", mm[0]),
+        mm_high = format!("{:.3}", mm[1]),
+        deg_low = format!("{:.4}", deg[0]),
+        deg_high = format!("{:.4}", deg[1])
     );
     let finding = Finding::new(FindingCode::NoiseUnclear, Severity::Info, text);
     Some(finding.with("position", position * 100.0, "%").with("orientation", orientation * 100.0, "%"))

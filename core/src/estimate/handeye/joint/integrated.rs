@@ -63,11 +63,15 @@ pub struct SmallSample {
     pub scale: f64,
     /// Relative standard deviations of the estimated levels of corners, robot position and robot orientation.
     pub level_sigma: [f64; 3],
+    /// Where those levels are with a probability of 95 %, lowest and highest: pixels, metres, radians. Empty when they were
+    /// given.
+    pub level_range: [[f64; 2]; 3],
 }
 
 impl SmallSample {
     /// Of a Gaussian: the noise levels are known.
-    pub const KNOWN: Self = Self { degrees_of_freedom: f64::INFINITY, scale: 1.0, level_sigma: [0.0; 3] };
+    pub const KNOWN: Self =
+        Self { degrees_of_freedom: f64::INFINITY, scale: 1.0, level_sigma: [0.0; 3], level_range: [[0.0; 2]; 3] };
 
     /// The length that the error of a point stays under with a probability of 95 %, from its covariance, in its unit.
     pub fn radius_95(&self, covariance: &Matrix3<f64>) -> f64 {
@@ -89,7 +93,9 @@ pub fn integrate(
     let axes = Axes::new(&found, levels);
     let level_sigma = |logs: &Matrix6<f64>| [0, 1, 2].map(|k| 0.5 * logs[(k, k)].max(0.0).sqrt());
     if system.blocks.len() > MANY_VIEWS {
-        let small_sample = SmallSample { level_sigma: level_sigma(&axes.covariance()), ..SmallSample::KNOWN };
+        let level_sigma = level_sigma(&axes.covariance());
+        let around = |k: usize| [-1.96, 1.96].map(|times: f64| (0.5 * found.logs[k] + times * level_sigma[k]).exp());
+        let small_sample = SmallSample { level_sigma, level_range: [0, 1, 2].map(around), ..SmallSample::KNOWN };
         return Ok(Integrated { covariance, small_sample });
     }
     let points = points(system, &found, axes, levels)?;
@@ -105,7 +111,9 @@ pub fn integrate(
         point_error::radius_95_mixture(&mixture.of_point) / point_error::radius_95_t(&of_point, degrees_of_freedom);
     let covariance = if size.is_finite() && size > 0.0 { shape * size.powi(2) } else { shape };
     let scale = mixture.region_scale(&hand_eye(&covariance), degrees_of_freedom).unwrap_or(1.0);
-    let small_sample = SmallSample { degrees_of_freedom, scale, level_sigma: level_sigma(&scatter(&points)) };
+    let level_range = [0, 1, 2].map(|k| range(&points, k));
+    let small_sample =
+        SmallSample { degrees_of_freedom, scale, level_sigma: level_sigma(&scatter(&points)), level_range };
     Ok(Integrated { covariance, small_sample })
 }
 
@@ -232,6 +240,21 @@ fn golden_ratio(dimensions: usize) -> f64 {
 fn scatter(points: &[Point]) -> Matrix6<f64> {
     let mean: Logs = points.iter().map(|point| point.logs * point.weight).sum();
     points.iter().map(|point| (point.logs - mean) * (point.logs - mean).transpose() * point.weight).sum()
+}
+
+/// Where a level is with a probability of 95 %.
+fn range(points: &[Point], level: usize) -> [f64; 2] {
+    let mut sorted: Vec<(f64, f64)> = points.iter().map(|point| (point.logs[level], point.weight)).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let below = |share: f64| {
+        let mut sum = 0.0;
+        let reached = sorted.iter().find(|(_, weight)| {
+            sum += weight;
+            sum >= share
+        });
+        reached.or(sorted.last()).map_or(0.0, |(log, _)| (0.5 * log).exp())
+    };
+    [below(0.5 * (1.0 - LEVEL)), below(0.5 * (1.0 + LEVEL))]
 }
 
 /// The shape of the t, before its size is known; `None` where the covariances have no inverse.

@@ -18,18 +18,23 @@ fn miss(t: &Trial, found: &crate::estimate::handeye::joint::JointSolution) -> f6
 /// 160 sessions at 95 % fewer than 143 are inside by chance one time in two thousand.
 #[test]
 fn the_error_of_four_views_is_covered() {
-    let (mut inside, mut by_gaussian) = (0, 0);
+    let (mut inside, mut by_gaussian, mut levels) = (0, 0, [0; 2]);
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         for seed in 0..80 {
             let t = trial(mode, 4, &ROBOT, camera(), 4_000 + seed);
             let cancel = CancelToken::default();
             let found = estimate(&t.problem(false, None), &t.start(), &cancel).expect("solves");
             inside += usize::from(miss(&t, &found) <= quality::tip_error_95_m(&found));
+            for (k, level) in [ROBOT.robot_m, ROBOT.robot_rad].into_iter().enumerate() {
+                let [low, high] = found.small_sample.level_range[1 + k];
+                levels[k] += usize::from((low..=high).contains(&level));
+            }
             let plain = fit(&t.problem(false, None), &t.start(), &cancel).expect("solves");
             by_gaussian += usize::from(miss(&t, &plain) <= quality::tip_error_95_m(&plain));
         }
     }
-    println!("inside: {inside} of 160, by a Gaussian {by_gaussian}");
+    println!("inside: {inside} of 160, by a Gaussian {by_gaussian}; levels {levels:?}");
+    assert!(levels.iter().all(|inside| *inside >= 143), "{levels:?}");
     assert!(inside >= 143, "{inside}");
     assert!(by_gaussian < 143, "{by_gaussian}: the test does not tell");
 }
