@@ -4,7 +4,7 @@
 //! The lens that all sessions share, and for each what [`calibrate`](super::calibrate) estimates besides: both links, the
 //! corrections of its robot poses, its noise levels, and where its data show them a bent target and the robot's field. The
 //! result is the optimum of all sessions together, found in rounds over the sessions
-//! ([`joint::shared_lens`]).
+//! (`handeye/joint/shared_lens.rs`).
 //!
 //! A session counts for as much less as its own data refute its covariance ([`widening`]).
 //!
