@@ -10,6 +10,7 @@ mod exact;
 pub(crate) mod flat_board;
 mod machine;
 #[cfg(test)]
+#[cfg_attr(not(feature = "opencv"), allow(dead_code, reason = "without the tracker only goals of the TCP use it"))]
 pub(crate) mod moving_board;
 mod scene;
 pub mod sessions;
