@@ -167,3 +167,47 @@ pub fn pose_of_view(
     let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights: &[] };
     refine(&seen, start.isometry(), STEPS).map(|minimum| Pose::from_isometry(minimum.pose))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimate::handeye::Mode;
+    use crate::estimate::handeye::joint::{Noise, estimate, fit};
+    use crate::progress::CancelToken;
+    use crate::testing::sessions::{camera, trial};
+
+    /// Views that stayed in the fit would be predicted too well, and nobody would see it.
+    #[test]
+    fn views_held_out_are_predicted_as_by_fits_that_never_saw_them() {
+        let noise = Noise { corner_px: 0.1, robot_m: 5e-4, robot_rad: 1.7e-3, ..Noise::EXACT };
+        let cancel = CancelToken::default();
+        for (views, folds) in [(6, 6), (12, 5)] {
+            for free_lens in [false, true] {
+                let t = trial(Mode::EyeInHand, views, &noise, camera(), 21);
+                let problem = t.problem(free_lens, None);
+                let solution = estimate(&problem, &t.start(), &cancel).expect("solves");
+                let found = held_out(&problem, &solution, &cancel).expect("solves").expect("enough views");
+                let (mut squares, mut inside, mut corners) = (0.0, 0.0, 0);
+                for fold in 0..folds {
+                    let rest: Vec<View> =
+                        (0..views).filter(|i| i % folds != fold).map(|i| problem.views[i].clone()).collect();
+                    let alone = JointProblem { views: &rest, noise: Some(solution.noise), ..problem };
+                    let alone = fit(&alone, &solution.as_start(), &cancel).expect("solves");
+                    for view in (0..views).filter(|i| i % folds == fold).map(|i| &problem.views[i]) {
+                        let of = |s| prediction_squares(&problem, &State::of(s), view).expect("in front").px;
+                        squares += of(&alone);
+                        inside += of(&solution);
+                        corners += view.corners.len();
+                    }
+                }
+                let [expected, seen] = [squares, inside].map(|sum| f64::sqrt(sum / corners as f64));
+                let found = found.rms_px;
+                println!(
+                    "{views} views, free lens {free_lens}: {found:.4} px, by fits {expected:.4}, in the fit {seen:.4}"
+                );
+                assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+                assert!(found > 1.05 * seen, "{found} {seen}: the test does not tell");
+            }
+        }
+    }
+}
