@@ -108,7 +108,7 @@ pub fn refine(
             estimate_screened(&problem, &bent.as_start(), own, work.cancel)?
         };
     }
-    let mut joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };
+    let joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };
     if let Some(with_field) = with_shown_field(&problem, &screened.kept_views(), &screened.solution, *work)? {
         // An error that all views of a place share makes them look like outliers to a model without it.
         let problem = JointProblem { free: with_field.free, ..problem };
@@ -120,28 +120,29 @@ pub fn refine(
     }
     let kept = screened.kept_views();
     let fitted = kept_problem(&problem, &kept, &screened.solution);
-    screened.solution = joint::with_stated_error(&fitted, screened.solution, work.cancel)?;
-    state_again(joints.as_mut(), &screened.solution);
-    Ok(Refined { screened, weights, joints })
-}
-
-/// The offsets of the joints where an estimate was made anew with them.
-fn state_again(joints: Option<&mut JointOffsets>, solution: &JointSolution) {
-    if let Some(joints) = joints.filter(|joints| joints.accepted) {
-        joints.offsets_rad.clone_from(&solution.joint_offsets_rad);
-        joints.sigma_rad = solution.joint_offsets_sigma();
-    }
+    Ok(Refined { screened, weights, joints }.stated(&fitted, work)?)
 }
 
 impl Refined {
-    /// Made anew from where it ended, with the same views, unknowns and kinds of noise: `problem` is of those views.
+    /// Made anew from where it ended, with the same views, unknowns and kinds of noise: `problem` is of those views. The
+    /// error that may be stated is that of [`Self::stated`].
     pub fn again(&self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let mut next = self.clone();
         let view_noise = Some(self.screened.solution.noise.view_px > 0.0);
         let problem = &JointProblem { view_noise, ..*problem };
-        next.screened.solution = joint::estimate(problem, &self.screened.solution.as_start(), work.cancel)?;
-        state_again(next.joints.as_mut(), &next.screened.solution);
+        next.screened.solution = joint::fit(problem, &self.screened.solution.as_start(), work.cancel)?;
         Ok(next)
+    }
+
+    /// The same with the error that may be stated.
+    pub fn stated(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
+        let solution = self.screened.solution.clone();
+        self.screened.solution = joint::with_stated_error(problem, solution, work.cancel)?;
+        if let Some(joints) = self.joints.as_mut().filter(|joints| joints.accepted) {
+            joints.offsets_rad.clone_from(&self.screened.solution.joint_offsets_rad);
+            joints.sigma_rad = self.screened.solution.joint_offsets_sigma();
+        }
+        Ok(self)
     }
 }
 

@@ -205,6 +205,9 @@ pub fn calibrate_sharing_lens<'a>(
     for (i, prepared) in prepared.into_iter().enumerate() {
         let Fit { mut refined, factor } = shared[i].fit.clone();
         let others = shared_lens::by_others(&shared, i).ok_or(SharedLensError::NoLens)?.times(factor);
+        let kept = refined.screened.kept_views();
+        let problem = prepared.problem(&refined, &kept, Some(others.as_prior()));
+        refined = refined.stated(&problem, work).map_err(|error| sessions[i].fails(error))?;
         // Rounds end with every session within some thousandths of a standard deviation of it.
         refined.screened.solution.intrinsics = lens.intrinsics;
         let solution = refined.screened.solution.clone();
