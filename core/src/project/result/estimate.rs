@@ -19,9 +19,11 @@ pub struct EstimateDetails {
     pub moved_mm: Option<f64>,
     /// Where the expected error is stated: camera coordinates, metres.
     pub reference_point_m: Option<[f64; 3]>,
-    /// Degrees of freedom of the noise levels; `None` when they were given, and the errors are Gaussian.
+    /// Degrees of freedom that the stated error of a point rests on, because the noise levels are estimated; `None` when they
+    /// were given, and the errors are Gaussian.
     pub degrees_of_freedom: Option<f64>,
-    /// The squared distance `eᵀ C⁻¹ e` of the hand-eye's error times this follows `6 F(6, degrees_of_freedom)`.
+    /// The squared distance `eᵀ C⁻¹ e` of the hand-eye's error times this has the 95 % quantile of
+    /// `6 F(6, degrees_of_freedom)`.
     pub region_scale: Option<f64>,
     /// Noise that all corners of a view share, pixels; zero where the data ask for none.
     pub view_sigma_px: Option<f64>,

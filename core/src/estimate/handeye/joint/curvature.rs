@@ -5,7 +5,7 @@
 //! effects of second order make the covariance too small:
 //!
 //! - The covariance is taken at the estimate, and not at the truth. By a Taylor series its mean is off by
-//!   `½ Σ ∂²C / ∂u_k²` over directions `u_k` of the lens that are one standard deviation long; that much is taken off again.
+//!   `½ Σ ∂²C / ∂u_k²` over directions `u_k` of lens and target that are one standard deviation long; that much is taken off again.
 //! - Along each principal axis of the error at a point the point is moved, all other unknowns follow to their optimum (the
 //!   profile of the likelihood), and where minus twice its log has risen by the 95 % quantile of chi-square with one degree
 //!   of freedom is the true end of the interval. The covariance is stretched along the axis to the farther of both ends.
@@ -20,13 +20,14 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Point3, Vector6};
 
 use super::normal::{Reduced, System};
 use super::state::State;
+use super::view_block::Layout;
 use super::{JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
 use crate::geometry::point_error;
 use crate::geometry::se3;
 
-/// Views above which the cost is a parabola as far as it matters: both effects fall with the number of views, and at ten
-/// with 0.3 px they are a tenth of the variance.
+/// Views above which the cost is a parabola as far as it matters: with 0.3 px the two effects add a third to the variance at
+/// ten views, a fifth at twenty and a twentieth at forty.
 const MANY_VIEWS: usize = 40;
 /// Standard deviations of the lens over which second differences are taken.
 const DIFFERENCE: f64 = 0.5;
@@ -75,11 +76,11 @@ impl Optimum<'_> {
     /// By how much the mean covariance at an estimate differs from that at the truth; `None` where the series has no terms.
     fn off_by_place(&self) -> Result<Option<DMatrix<f64>>, HandEyeError> {
         let form = self.system.layout.form;
-        let lens = self.covariance.view((12, 12), (form, form)).into_owned();
+        let lens = self.covariance.view((Layout::FORM_AT, Layout::FORM_AT), (form, form)).into_owned();
         let Some(root) = Cholesky::new(lens).map(|factor| factor.l()) else { return Ok(None) };
         // All unknowns follow the lens as the covariance says.
         let Some(inverse) = root.clone().try_inverse() else { return Ok(None) };
-        let directions = self.covariance.columns(12, form) * inverse.transpose();
+        let directions = self.covariance.columns(Layout::FORM_AT, form) * inverse.transpose();
         let at_rest = self.reduced.own_steps(&DVector::zeros(self.covariance.nrows()));
         let mut sum = DMatrix::zeros(self.covariance.nrows(), self.covariance.ncols());
         for direction in directions.column_iter() {
@@ -132,7 +133,11 @@ impl Optimum<'_> {
             if (rise / RISE - 1.0).abs() < NEAR {
                 break;
             }
-            *(if rise < RISE { &mut inside } else { &mut outside }) = place;
+            if rise < RISE {
+                inside = place;
+            } else {
+                outside = place;
+            }
             let by_parabola = place * (RISE / rise.max(f64::MIN_POSITIVE)).sqrt();
             let between = by_parabola > inside && by_parabola < outside;
             place = if between { by_parabola } else { 0.5 * (inside + outside) }.min(FARTHEST);

@@ -313,13 +313,11 @@ impl Mixture {
                 let mean = relative.trace() + shift.dot(&moved);
                 let variance = 2.0 * (relative * relative).trace() + 4.0 * moved.dot(&(c * moved));
                 // A gamma distribution of the same mean and variance.
-                (*weight, 0.5 * mean, mean * mean / variance)
+                (*weight, mean, mean * mean / variance)
             })
             .collect();
         let below = |squared: f64| -> f64 {
-            laws.iter()
-                .map(|(weight, half_mean, shape)| weight * gamma_lr(*shape, shape * squared / (2.0 * half_mean)))
-                .sum()
+            laws.iter().map(|(weight, mean, shape)| weight * gamma_lr(*shape, shape * squared / mean)).sum()
         };
         let (mut low, mut high) = (0.0, 1.0);
         while below(high) < LEVEL && high < 1e9 {

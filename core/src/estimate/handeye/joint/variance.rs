@@ -117,8 +117,9 @@ pub struct Likelihood {
     pub value: f64,
     /// By the log-variances.
     gradient: Logs,
-    /// What the data say of each level, in numbers: how many they were if nothing else were known, less those that the
-    /// unknowns use up and those that are lost in the noise of the other levels.
+    /// How many residuals tell each level: all that it makes, less those that the unknowns use up and those that are lost in
+    /// the noise of the other levels. Those of the corners' rest and of the poses' part are apart, also where the two are one
+    /// level.
     pub counts: Logs,
     pub reduced: Reduced,
     /// Of the shared unknowns.
@@ -140,6 +141,7 @@ fn to_noise(logs: &Logs, levels: Levels) -> Noise {
     }
 }
 
+/// The levels as logs of variances; the poses' part is that of corners and view together.
 pub fn to_logs(noise: &Noise) -> Logs {
     let together = noise.corner_px.powi(2) + noise.view_px.powi(2);
     let log = |level: f64| 2.0 * level.ln();
@@ -163,7 +165,10 @@ pub fn kept(mut logs: Logs, levels: Levels) -> Logs {
     logs
 }
 
-/// Evaluates the restricted likelihood.
+/// The restricted likelihood of a linearised system at some levels.
+///
+/// # Errors
+/// [`HandEyeError::NoSolution`] where the levels leave the answer undetermined, [`HandEyeError::Cancelled`].
 pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, HandEyeError> {
     let noise = to_noise(logs, levels);
     let reduced = system.reduce(&noise)?;
