@@ -193,6 +193,9 @@ fn details(estimate: &EstimateDetails) -> Vec<String> {
         let (mm, deg) = (field.typical_mm, field.typical_deg);
         out.push(format!("robot errors that depend on its place: {mm:.3} mm and {deg:.4}° per axis, typically{with}"));
     }
+    if let Some(distortion) = &estimate.residual_distortion {
+        out.push(format!("lens beyond its model: {:.4} px RMS over the corners", distortion.rms_px));
+    }
     if let Some(joints) = &estimate.joint_offsets {
         let each: Vec<String> =
             joints.offsets_deg.iter().zip(&joints.sigma_deg).map(|(o, s)| format!("{o:.4} ± {s:.4}°")).collect();

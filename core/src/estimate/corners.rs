@@ -33,7 +33,7 @@ pub fn calibrate(
     match method {
         Method::ClosedForm(name) => session.closed_form(name),
         Method::Joint => {
-            let refined = session.refine(None, options, work)?;
+            let refined = session.alone(options, work)?;
             session.finish(refined, None, work)
         }
     }
@@ -123,6 +123,17 @@ impl Session<'_> {
         let problem = JointProblem { lens_prior: lens, ..JointProblem::new(self.mode, &self.board, &self.views) };
         let own: Vec<_> = self.pairs.iter().map(|pair| pair.camera_from_target).collect();
         refine::refine(&problem, &own, &self.lens, begin, options, work)
+    }
+
+    /// The joint estimate of the session by itself, with the error that may be stated.
+    pub fn alone(&self, options: Options, work: &Work<'_>) -> Result<Refined, CalibrateError> {
+        let refined = self.refine(None, options, work)?;
+        let kept = refined.screened.kept_views();
+        let problem = self.problem(&refined, &kept, None);
+        let refined = refined.with_distortion(&problem, work)?;
+        let kept = refined.screened.kept_views();
+        let problem = self.problem(&refined, &kept, None);
+        Ok(refined.stated(&problem, work)?)
     }
 
     /// The problem of the `kept` views that a joint estimate solved.
@@ -294,6 +305,7 @@ fn take_joint(
         heldout_rms_px: judged.heldout.map(|held| held.rms_px),
         heldout_links_rms_px: judged.heldout.map(|held| held.links_rms_px),
         field: solution.field.clone(),
+        residual_distortion: refined.distortion.clone(),
         expected_heldout_rms_px: judged.expected_heldout_rms_px,
         robot_effect_px: judged.robot_effect_px,
         shape: estimated.then(|| ShapeEstimate {
@@ -321,6 +333,12 @@ fn take_joint(
             ),
         };
         view.residuals = residuals(&solution.intrinsics, &pose, &points, corners);
+        if let Some(distortion) = &refined.distortion {
+            for residual in &mut view.residuals {
+                // It was taken off, and shifts a corner by too little to be another one where it was measured.
+                residual.px += distortion.field.at(&residual.px);
+            }
+        }
         view.camera_from_target = Some(pose);
         if let Some(fit) = fit {
             view.rms_px = Some(fit.rms_px);

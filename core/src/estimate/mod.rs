@@ -23,7 +23,7 @@ use crate::estimate::claim::Claim;
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::outliers::Distance;
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
-use crate::estimate::handeye::joint::{Free, Noise, RobotField, SmallSample};
+use crate::estimate::handeye::joint::{Free, Noise, RobotField, ShownDistortion, SmallSample};
 use crate::estimate::handeye::one_axis::PartialHandEye;
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, one_axis, subset};
 use crate::estimate::intrinsics::IntrinsicsError;
@@ -386,6 +386,8 @@ pub struct JointFit {
     pub heldout_links_rms_px: Option<f64>,
     /// Errors of the robot that depend on where it stands, where the data show them.
     pub field: Option<RobotField>,
+    /// What the lens does beyond its model, where the data show it; residuals are with it.
+    pub residual_distortion: Option<ShownDistortion>,
     /// What [`heldout_rms_px`](Self::heldout_rms_px) should be if the model and its noise levels are true, pixels.
     pub expected_heldout_rms_px: f64,
     /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow

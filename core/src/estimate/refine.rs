@@ -9,8 +9,9 @@ use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::{Consensus, consensus, half_turn_about};
 use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
+use crate::estimate::handeye::joint::residual_distortion::{corrected, with_its_error, with_shown_distortion};
 use crate::estimate::handeye::joint::{
-    self, CornerWeights, Free, JointProblem, JointSolution, JointStart, with_shown_field,
+    self, CornerWeights, Free, JointProblem, JointSolution, JointStart, ShownDistortion, with_shown_field,
 };
 use crate::estimate::handeye::{HandEyeError, PosePair};
 use crate::estimate::residuals::squared_residuals;
@@ -31,6 +32,8 @@ pub struct Refined {
     pub weights: Option<CornerWeights>,
     /// What an attempt at joint offsets gave; `None` when there was none.
     pub joints: Option<JointOffsets>,
+    /// What the lens does beyond its model, where the data show it; it is taken off the corners of the views.
+    pub distortion: Option<ShownDistortion>,
 }
 
 /// The start that most views agree with, and the views numbered from the other end.
@@ -118,9 +121,7 @@ pub fn refine(
             estimate_screened(&problem, &with_field.as_start(), own, work.cancel)?
         };
     }
-    let kept = screened.kept_views();
-    let fitted = kept_problem(&problem, &kept, &screened.solution);
-    Ok(Refined { screened, weights, joints }.stated(&fitted, work)?)
+    Ok(Refined { screened, weights, joints, distortion: None })
 }
 
 impl Refined {
@@ -134,10 +135,25 @@ impl Refined {
         Ok(next)
     }
 
-    /// The same with the error that may be stated.
+    /// The same with what the lens does beyond its model, where the data show it; `problem` is of the views in the fit.
+    pub fn with_distortion(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
+        let shown = with_shown_distortion(problem, &self.screened.solution, work.cancel)?;
+        if let Some((distortion, solution)) = shown {
+            self.screened.views = corrected(&self.screened.views, &distortion.field);
+            self.screened.solution = solution;
+            self.distortion = Some(distortion);
+        }
+        Ok(self)
+    }
+
+    /// The same with the error that may be stated: that of a session by itself, if its lens does more than its model.
     pub fn stated(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let solution = self.screened.solution.clone();
         self.screened.solution = joint::with_stated_error(problem, solution, work.cancel)?;
+        if let Some(shown) = &self.distortion {
+            let solution = self.screened.solution.clone();
+            self.screened.solution = with_its_error(problem, solution, shown, work.cancel)?;
+        }
         if let Some(joints) = self.joints.as_mut().filter(|joints| joints.accepted) {
             joints.offsets_rad.clone_from(&self.screened.solution.joint_offsets_rad);
             joints.sigma_rad = self.screened.solution.joint_offsets_sigma();

@@ -38,6 +38,7 @@ pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Find
     found.extend(prediction(calibration));
     found.extend(lens_folds(calibration));
     found.extend(robot_field(calibration));
+    found.extend(residual_distortion(calibration));
     found.extend(robot_noise(calibration));
     found.extend(closed_forms(calibration));
     found.extend(options.goal_mm.and_then(|goal_mm| goal(calibration, goal_mm)));
@@ -171,6 +172,18 @@ fn robot_field(calibration: &Calibration) -> Option<Finding> {
     let finding = Finding::new(FindingCode::RobotField, Severity::Advice, text);
     let finding = finding.with("field_sigma", mm, "mm").with("field_sigma_angle", deg, "°");
     Some(finding.with("heldout_rms", without, "px").with("heldout_rms_corrected", with, "px"))
+}
+
+fn residual_distortion(calibration: &Calibration) -> Option<Finding> {
+    let shown = calibration.joint.as_ref()?.residual_distortion.as_ref()?;
+    let text = text!(
+        "The lens does more than its model: corners are displaced by {px} px RMS, smoothly with their place in the image. The \
+         answer and its expected error count on it, and the result has it as an optional correction of image points. A lens \
+         model with more coefficients may follow the lens further; views that cover the whole image show how it goes on.",
+        px = format!("{:.3}", shown.rms_px)
+    );
+    let finding = Finding::new(FindingCode::ResidualDistortion, Severity::Advice, text);
+    Some(finding.with("displacement_rms", shown.rms_px, "px").with("log_likelihood_gain", 0.5 * shown.gain, ""))
 }
 
 fn robot_noise(calibration: &Calibration) -> Option<Finding> {

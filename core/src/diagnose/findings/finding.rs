@@ -84,6 +84,8 @@ pub enum FindingCode {
     LensFolds,
     /// The robot's errors depend on where it stands.
     RobotField,
+    /// The lens does more than its model.
+    ResidualDistortion,
     /// The closed forms do not agree.
     ClosedFormsDisagree,
     /// The expected error is below the goal.

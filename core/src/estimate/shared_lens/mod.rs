@@ -16,6 +16,7 @@
 //! Source: `docs/maths/shared_intrinsics.md`.
 
 mod agreement;
+mod distortion;
 
 use nalgebra::DVector;
 
@@ -31,6 +32,8 @@ use crate::geometry::se3;
 use crate::progress::Work;
 
 pub use agreement::OddSession;
+
+use distortion::Together;
 
 /// Rounds in which outliers, the shape of the target, the robot's field and the widening are decided anew: in the first the
 /// lens is near its end, and the second decides with it.
@@ -179,41 +182,41 @@ pub fn calibrate_sharing_lens<'a>(
     }
     let mut alone = Vec::with_capacity(sessions.len());
     for (session, prepared) in sessions.iter().zip(&prepared) {
-        let refined = prepared.refine(None, options, work).map_err(|error| session.fails(error))?;
+        let refined = prepared.alone(options, work).map_err(|error| session.fails(error))?;
         alone.push(fitted(prepared, refined, None, None, work).map_err(|error| session.fails(error))?);
     }
     let agreement = agreement::test(sessions, &alone).ok_or(SharedLensError::NoLens)?;
     let refit = |i: usize, round: usize, last: &Fit, others: LensEstimate| {
         let (session, prepared) = (&sessions[i], &prepared[i]);
-        let others = others.times(last.factor);
-        let prior = others.as_prior();
-        let again = || -> Result<Fitted<Fit>, CalibrateError> {
-            if round < DECIDING {
-                return fitted(prepared, prepared.refine(Some(prior), options, work)?, Some(prior), None, work);
-            }
-            let kept = last.refined.screened.kept_views();
-            let problem = prepared.problem(&last.refined, &kept, Some(prior));
-            fitted(prepared, last.refined.again(&problem, work)?, Some(prior), Some(last.factor), work)
+        let anew = || -> Result<Fitted<Fit>, CalibrateError> {
+            let others = others.clone().times(last.factor);
+            let refined = prepared.refine(Some(others.as_prior()), options, work)?;
+            fitted(prepared, refined, Some(others.as_prior()), None, work)
         };
-        again().map_err(|error| session.fails(error))
+        let next = if round < DECIDING { anew() } else { distortion::again(prepared, last, &others, work) };
+        next.map_err(|error| session.fails(error))
     };
     let shared = shared_lens::share(alone.clone(), DECIDING, refit)?;
     let (shared, lens) = shared.ok_or(SharedLensError::NoLens)?;
+    let together = Together::new(sessions, &prepared, shared, lens, work)?;
+    let (shared, lens) = (&together.sessions, &together.lens);
     let sigma = lens.covariance().map(|covariance| covariance.diagonal().map(|v| v.max(0.0).sqrt()));
     let views = shared.iter().map(|session| session.fit.refined.screened.kept.len()).sum();
     let mut calibrations = Vec::with_capacity(sessions.len());
     for (i, prepared) in prepared.into_iter().enumerate() {
         let Fit { mut refined, factor } = shared[i].fit.clone();
-        let others = shared_lens::by_others(&shared, i).ok_or(SharedLensError::NoLens)?.times(factor);
+        let others = shared_lens::by_others(shared, i).ok_or(SharedLensError::NoLens)?.times(factor);
         let kept = refined.screened.kept_views();
         let problem = prepared.problem(&refined, &kept, Some(others.as_prior()));
         refined = refined.stated(&problem, work).map_err(|error| sessions[i].fails(error))?;
+        refined.screened.solution = together.with_error(i, refined.screened.solution);
+        refined.distortion = together.shown().cloned();
         // Rounds end with every session within some thousandths of a standard deviation of it.
         refined.screened.solution.intrinsics = lens.intrinsics;
         let solution = refined.screened.solution.clone();
         let finished = prepared.finish(refined, Some(others.as_prior()), work);
         let mut calibration = finished.map_err(|error| sessions[i].fails(error))?;
-        if let Some(camera) = &mut calibration.camera {
+        if let Some(camera) = calibration.camera.as_mut().filter(|_| together.shown().is_none()) {
             camera.sigma_px = sigma.as_ref().and_then(four);
         }
         calibration.shared_lens = Some(SharedLens {
@@ -257,7 +260,13 @@ fn fitted(
         Some(factor) => factor,
         None => widening::check(&problem, solution, work.cancel)?.factor,
     };
-    let says = LensInformation::of(&problem, solution, work.cancel)?.widened(factor);
+    // What the lens does beyond its model makes it less known than the curvature of the cost says.
+    let stated = refined.distortion.as_ref().and_then(|_| LensInformation::stated(solution));
+    let says = match stated {
+        Some(stated) => stated,
+        None => LensInformation::of(&problem, solution, work.cancel)?,
+    };
+    let says = says.widened(factor);
     Ok(Fitted { fit: Fit { refined, factor }, says })
 }
 

@@ -5,12 +5,14 @@
 
 mod distortion;
 mod fold;
+pub(crate) mod residual_distortion;
 
 use nalgebra::{Matrix2x3, Point3, SMatrix, Unit, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 pub use distortion::Distortion;
 pub use fold::FoldsBack;
+pub use residual_distortion::ResidualDistortion;
 
 /// The most parameters any model has: four of the pinhole and eight of the rational distortion.
 pub const MAX_PARAMETERS: usize = 12;

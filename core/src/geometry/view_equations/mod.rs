@@ -2,15 +2,17 @@
 
 mod gram;
 
-use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
 use crate::geometry::camera::{CameraError, Intrinsics, MAX_PARAMETERS};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
-use gram::{Gram, Pair, Products};
+use gram::{Gram, Products};
+
+pub(crate) use gram::Pair;
 
 /// Unknowns of a pose.
-const POSE: usize = 6;
+pub(crate) const POSE: usize = 6;
 
 /// Most unknowns of lens and target shape.
 pub(crate) const MAX_FORM: usize = MAX_PARAMETERS + 3;
@@ -98,50 +100,12 @@ impl PoseEquations {
         camera_from_target: &Isometry3<f64>,
         free: FreeParameters,
     ) -> Result<Self, CameraError> {
-        let ViewInput { intrinsics, board, shape, corners, sqrt_weights } = *seen;
-        let rotation: Matrix3<f64> = camera_from_target.rotation.to_rotation_matrix().into_inner();
-        let translation = camera_from_target.translation.vector;
-        let lens_count = free.lens_count(intrinsics);
-        let count = free.count(intrinsics);
+        let rows = Rows::new(seen, camera_from_target, free);
         let mut gram = Gram::<QUADS>::new();
-        for (i, corner) in corners.iter().enumerate() {
-            let point = board.point(corner.index, shape);
-            let projection = intrinsics.linearise(&(rotation * point.coords + translation))?;
-            let [a, b, c] = projection.by_point;
-            let by_target_point: [Pair; 3] = std::array::from_fn(|k| {
-                let axis = rotation.column(k);
-                [0, 1].map(|row| a[row] * axis[0] + b[row] * axis[1] + c[row] * axis[2])
-            });
-            let [bx, by, bz] = by_target_point;
-            let Point3 { coords: p } = point;
-            let columns = gram.next();
-            columns[..3].copy_from_slice(&by_target_point);
-            // Rows of `-by_target_point [p]×` are `p × row`.
-            columns[3] = [0, 1].map(|row| p.y * bz[row] - p.z * by[row]);
-            columns[4] = [0, 1].map(|row| p.z * bx[row] - p.x * bz[row]);
-            columns[5] = [0, 1].map(|row| p.x * by[row] - p.y * bx[row]);
-            columns[POSE..POSE + lens_count].copy_from_slice(&projection.by_parameters[..lens_count]);
-            if free.warp || free.scale {
-                let (by_warp, by_scale) = board.derivatives(corner.index, shape);
-                if free.warp {
-                    let at = POSE + free.warp_at(intrinsics);
-                    columns[at] = bz.map(|d| d * by_warp[0]);
-                    columns[at + 1] = bz.map(|d| d * by_warp[1]);
-                }
-                if free.scale {
-                    columns[POSE + free.scale_at(intrinsics)] =
-                        [0, 1].map(|row| bx[row] * by_scale.x + by[row] * by_scale.y + bz[row] * by_scale.z);
-                }
-            }
-            columns[POSE + count] = [projection.px[0] - corner.px.x, projection.px[1] - corner.px.y];
-            if let Some(w) = sqrt_weights.get(i) {
-                for column in &mut columns[..=POSE + count] {
-                    let [x, y] = *column;
-                    *column = [w.m11 * x + w.m12 * y, w.m21 * x + w.m22 * y];
-                }
-            }
+        for (i, corner) in seen.corners.iter().enumerate() {
+            rows.fill(i, corner, gram.next())?;
         }
-        Ok(Self::from_products(&gram.finish(), count, corners.len()))
+        Ok(Self::from_products(&gram.finish(), rows.count, seen.corners.len()))
     }
 
     fn from_products<const QUADS: usize>(products: &Products<QUADS>, count: usize, corners: usize) -> Self {
@@ -168,6 +132,73 @@ impl PoseEquations {
             squared_px: products.at(residual, residual),
             corners,
         }
+    }
+}
+
+/// The rows of a view's equations.
+pub(crate) struct Rows<'a> {
+    seen: &'a ViewInput<'a>,
+    rotation: Matrix3<f64>,
+    translation: Vector3<f64>,
+    free: FreeParameters,
+    lens_count: usize,
+    /// Columns of the form.
+    pub count: usize,
+}
+
+impl<'a> Rows<'a> {
+    pub fn new(seen: &'a ViewInput<'a>, camera_from_target: &Isometry3<f64>, free: FreeParameters) -> Self {
+        Self {
+            seen,
+            rotation: camera_from_target.rotation.to_rotation_matrix().into_inner(),
+            translation: camera_from_target.translation.vector,
+            free,
+            lens_count: free.lens_count(seen.intrinsics),
+            count: free.count(seen.intrinsics),
+        }
+    }
+
+    /// The two rows of corner `i`: six columns of the pose, those of the form, and the residual; times the whitener of the
+    /// corner.
+    #[inline(always)]
+    pub fn fill(&self, i: usize, corner: &Corner, columns: &mut [Pair]) -> Result<(), CameraError> {
+        let Self { seen: ViewInput { intrinsics, board, shape, sqrt_weights, .. }, rotation, free, .. } = self;
+        let (lens_count, count) = (self.lens_count, self.count);
+        let point = board.point(corner.index, shape);
+        let projection = intrinsics.linearise(&(rotation * point.coords + self.translation))?;
+        let [a, b, c] = projection.by_point;
+        let by_target_point: [Pair; 3] = std::array::from_fn(|k| {
+            let axis = rotation.column(k);
+            [0, 1].map(|row| a[row] * axis[0] + b[row] * axis[1] + c[row] * axis[2])
+        });
+        let [bx, by, bz] = by_target_point;
+        let Point3 { coords: p } = point;
+        columns[..3].copy_from_slice(&by_target_point);
+        // Rows of `-by_target_point [p]×` are `p × row`.
+        columns[3] = [0, 1].map(|row| p.y * bz[row] - p.z * by[row]);
+        columns[4] = [0, 1].map(|row| p.z * bx[row] - p.x * bz[row]);
+        columns[5] = [0, 1].map(|row| p.x * by[row] - p.y * bx[row]);
+        columns[POSE..POSE + lens_count].copy_from_slice(&projection.by_parameters[..lens_count]);
+        if free.warp || free.scale {
+            let (by_warp, by_scale) = board.derivatives(corner.index, shape);
+            if free.warp {
+                let at = POSE + free.warp_at(intrinsics);
+                columns[at] = bz.map(|d| d * by_warp[0]);
+                columns[at + 1] = bz.map(|d| d * by_warp[1]);
+            }
+            if free.scale {
+                columns[POSE + free.scale_at(intrinsics)] =
+                    [0, 1].map(|row| bx[row] * by_scale.x + by[row] * by_scale.y + bz[row] * by_scale.z);
+            }
+        }
+        columns[POSE + count] = [projection.px[0] - corner.px.x, projection.px[1] - corner.px.y];
+        if let Some(w) = sqrt_weights.get(i) {
+            for column in &mut columns[..=POSE + count] {
+                let [x, y] = *column;
+                *column = [w.m11 * x + w.m12 * y, w.m21 * x + w.m22 * y];
+            }
+        }
+        Ok(())
     }
 }
 

@@ -1,7 +1,11 @@
 //! What the types of a result do not say: finite, unit length, the frames of the mode.
 
-use super::{CalibrationResult, EstimateDetails, FORMAT, IntrinsicsEstimate, MethodStatus, TransformEstimate, VERSION};
+use super::{
+    CalibrationResult, EstimateDetails, FORMAT, IntrinsicsEstimate, MethodStatus, ResidualDistortionEstimate,
+    TransformEstimate, VERSION,
+};
 use crate::estimate::handeye::Mode;
+use crate::geometry::camera::residual_distortion::{MOST_DEGREES, functions};
 
 /// How far from 1 the length of a quaternion may be: far above rounding, far below the nine digits that other
 /// programs print.
@@ -138,6 +142,14 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
         all_finite(field.position_slopes.as_flattened(), "estimate.robot_field.position_slopes")?;
         let orientation = field.orientation_slopes_rad_per_m.as_flattened();
         all_finite(orientation, "estimate.robot_field.orientation_slopes_rad_per_m")?;
+    }
+    if let Some(distortion) = &estimate.residual_distortion {
+        let ResidualDistortionEstimate { degree, x_px, y_px, .. } = distortion;
+        require(*degree <= MOST_DEGREES, "estimate.residual_distortion.degree", "is more than any image shows")?;
+        for (px, key) in [(x_px, "estimate.residual_distortion.x_px"), (y_px, "estimate.residual_distortion.y_px")] {
+            all_finite(px, key)?;
+            require(px.len() == functions(*degree), key, "must have a coefficient for each polynomial of the degree")?;
+        }
     }
     let Some(joints) = &estimate.joint_offsets else { return Ok(()) };
     all_finite(&joints.offsets_deg, "estimate.joint_offsets.offsets_deg")?;

@@ -36,6 +36,9 @@ pub struct EstimateDetails {
     /// Errors of the robot that depend on where it stands, where the data show them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot_field: Option<RobotFieldEstimate>,
+    /// What the lens does beyond its model, where the data show it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_distortion: Option<ResidualDistortionEstimate>,
 }
 
 /// A widened covariance.
@@ -107,6 +110,24 @@ impl RobotFieldEstimate {
         let (position, orientation) = (matrix(&self.position_slopes), matrix(&self.orientation_slopes_rad_per_m));
         RobotField::new(self.origin_m.into(), self.reach_m, &position, &orientation)
     }
+}
+
+/// What the lens does beyond its model, as an optional correction of image points.
+///
+/// A point that is measured at pixel `(u, v)` lies at `(u, v) - f(u, v)` by the lens model. Along x
+/// `f = sum of x_px[k] P_i(a) P_j(b)`, along y likewise, over all `i + j` up to `degree`, in rising `i + j` and then rising `i`;
+/// `a = (u + 1/2) / (width / 2) - 1` and `b = (v + 1/2) / (height / 2) - 1`, kept from -1 to 1, and `P_n` is `sqrt(2 n + 1)` times
+/// Legendre's polynomial.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResidualDistortionEstimate {
+    /// Highest total degree of the polynomials.
+    pub degree: usize,
+    /// Coefficients of the displacement along x, pixels.
+    pub x_px: Vec<f64>,
+    /// Along y.
+    pub y_px: Vec<f64>,
+    /// RMS of the displacement over the corners of the fit, both axes together, pixels.
+    pub rms_px: f64,
 }
 
 /// Findings as they stand in the document.

@@ -21,7 +21,8 @@ use crate::geometry::frames::{Camera, Frame, Mount, Pose};
 
 pub use check::BadResult;
 pub use estimate::{
-    BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, RobotFieldEstimate, WideningRecord,
+    BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, ResidualDistortionEstimate, RobotFieldEstimate,
+    WideningRecord,
 };
 pub use file::{ResultError, ResultProblem};
 

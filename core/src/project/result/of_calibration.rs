@@ -6,10 +6,10 @@ use nalgebra::Matrix3;
 
 use super::{
     BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, MethodRecord,
-    Provenance, Quality, RobotFieldEstimate, ViewRecord, ViewRecordStatus, WideningRecord,
+    Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate, ViewRecord, ViewRecordStatus, WideningRecord,
 };
 use crate::estimate::claim::Claim;
-use crate::estimate::handeye::joint::RobotField;
+use crate::estimate::handeye::joint::{RobotField, ShownDistortion};
 use crate::estimate::uncertainty::widening::Evidence;
 use crate::estimate::{Calibration, CameraFit, JointFit, MethodResult, ShapeEstimate, ViewResult, ViewStatus};
 
@@ -71,6 +71,7 @@ impl Calibration {
                 accepted: j.accepted,
             }),
             robot_field: joint.field.as_ref().map(|field| robot_field(field, joint)),
+            residual_distortion: joint.residual_distortion.as_ref().map(residual_distortion),
         }
     }
 }
@@ -99,6 +100,17 @@ fn robot_field(field: &RobotField, joint: &JointFit) -> RobotFieldEstimate {
         typical_mm: joint.noise.field_m * 1e3,
         typical_deg: joint.noise.field_rad.to_degrees(),
         heldout_rms_px: joint.heldout_rms_px,
+    }
+}
+
+fn residual_distortion(shown: &ShownDistortion) -> ResidualDistortionEstimate {
+    let coefficients = shown.field.coefficients();
+    let (along_x, along_y) = coefficients.split_at(coefficients.len() / 2);
+    ResidualDistortionEstimate {
+        degree: shown.field.degree(),
+        x_px: along_x.to_vec(),
+        y_px: along_y.to_vec(),
+        rms_px: shown.rms_px,
     }
 }
 

@@ -75,6 +75,12 @@ pub(crate) fn golden() -> CalibrationResult {
             typical_deg: 0.03,
             heldout_rms_px: Some(0.6),
         }),
+        residual_distortion: Some(ResidualDistortionEstimate {
+            degree: 1,
+            x_px: vec![0.01, -0.02, 0.03],
+            y_px: vec![0.0, 0.04, -0.05],
+            rms_px: 0.06,
+        }),
     });
     result.findings = vec![crate::diagnose::record::FindingRecord {
         code: "large_residual".to_owned(),

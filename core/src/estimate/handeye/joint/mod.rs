@@ -34,6 +34,7 @@ pub(crate) mod optimise;
 pub mod outliers;
 pub mod prediction;
 mod problem;
+pub(crate) mod residual_distortion;
 pub(crate) mod shared_lens;
 mod shown_field;
 mod solution;
@@ -44,6 +45,7 @@ mod weights;
 
 use nalgebra::Point3;
 pub use problem::{Free, JointProblem, JointStart, LensPrior, Noise};
+pub use residual_distortion::ShownDistortion;
 pub use shown_field::with_shown_field;
 pub use solution::{JointSolution, ViewFit};
 

@@ -70,6 +70,13 @@ impl LensInformation {
         Ok(Self { at: solution.intrinsics, gradient, information })
     }
 
+    /// Of a solution by itself, as its covariance states it; `None` when the lens is not determined.
+    pub fn stated(solution: &JointSolution) -> Option<Self> {
+        let (at, count) = (Layout::FORM_AT, solution.intrinsics.parameter_count());
+        let information = covariance_of(&solution.covariance.view((at, at), (count, count)).into_owned())?;
+        Some(Self { at: solution.intrinsics, gradient: DVector::zeros(count), information })
+    }
+
     /// The same from a session whose variances are all so many times as large.
     #[must_use]
     pub fn widened(mut self, factor: f64) -> Self {

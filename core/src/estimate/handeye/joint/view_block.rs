@@ -4,7 +4,7 @@
 //! the robot's field]`.
 //! Blocks are kept without the noise levels, so that these can be varied cheaply.
 
-use nalgebra::{Cholesky, Const, DMatrix, Matrix6, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Cholesky, Const, DMatrix, Matrix6, Matrix6xX, SMatrix, SVector, Vector3, Vector6};
 
 use super::Noise;
 use super::chain::{Chain, MAX_JOINTS};
@@ -257,9 +257,9 @@ pub fn own_pose_eliminated(equations: &mut PoseEquations) -> Option<Rest> {
 pub struct Own {
     pub factor: Cholesky<f64, Const<6>>,
     /// Weighted `Jdᵀ Js` times the inverse of the lower factor.
-    whitened: SixByShared,
+    pub whitened: SixByShared,
     /// The weighted gradient, whitened alike.
-    whitened_gradient: Vector6<f64>,
+    pub whitened_gradient: Vector6<f64>,
 }
 
 impl Own {
@@ -300,6 +300,14 @@ impl Own {
                 matrix[(i, j)] -= dot6(&columns[6 * i..6 * i + 6], b);
             }
         }
+    }
+
+    /// Other columns, weighted and times those of the correction, times the inverse of the lower factor.
+    pub fn whiten(&self, mut cross: Matrix6xX<f64>) -> Matrix6xX<f64> {
+        for column in cross.as_mut_slice().chunks_exact_mut(6) {
+            forward(self.factor.l_dirty(), column);
+        }
+        cross
     }
 
     /// The step of the correction that goes with a shared step.

@@ -1,0 +1,164 @@
+//! Whether the data show that the lens does more than its model, and what that does to the answer.
+//!
+//! The [field](ResidualDistortion) is linear in its coefficients `c`, which are random effects: independent, with one
+//! standard deviation `s`. All other unknowns are eliminated from the normal equations of an optimum, so that the cost as a
+//! function of `c` is `cᵀ S c − 2 hᵀ c`; with the eigenvalues `a_k` of `S` and `h` in its axes, twice the logarithm of the
+//! restricted likelihood gains
+//!
+//! `Σ s² h_k² / (1 + s² a_k) − ln (1 + s² a_k)`
+//!
+//! over a lens that is of its model. The degree of the polynomials and `s` are those that gain most. Corners with the field
+//! `(S + s⁻²)⁻¹ h` taken off are estimated again until it stands still; the covariance of the answer has that of the
+//! coefficients added.
+//!
+//! Source: Henderson 1975, "Best linear unbiased estimation and prediction under a selection model"; Patterson & Thompson
+//! 1971 (restricted likelihood). `docs/maths/residual_distortion.md`.
+
+mod equations;
+pub mod shared;
+
+use nalgebra::DMatrix;
+
+use super::{JointProblem, JointSolution, fit};
+use crate::estimate::handeye::HandEyeError;
+use crate::geometry::camera::{Intrinsics, ResidualDistortion};
+use crate::progress::CancelToken;
+use crate::targets::observation::{Corner, View};
+
+pub use equations::Equations;
+
+/// Degrees that are tried: what a lens model leaves has more bends than the model's own terms, and beyond the highest the
+/// corners of a usual board are too far apart to see one.
+pub const DEGREES: [usize; 3] = [3, 5, 8];
+/// Gain of twice the log-likelihood from which the field is taken into the model: by chance at most one session in a
+/// hundred. Its level is at the edge of what it can be, so half of all healthy sessions gain nothing and the rest follows
+/// chi-square with one degree of freedom (Self & Liang 1987); three degrees are tried.
+const GAIN: f64 = 7.36;
+/// Rounds of field and fit at the most.
+const MAX_ROUNDS: usize = 8;
+/// Square of the way of the field in a round, in its standard deviations, below which it stands still.
+const STILL: f64 = 1e-4;
+
+/// A field that the data show, with what its estimate rests on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShownDistortion {
+    /// The field itself.
+    pub field: ResidualDistortion,
+    /// Standard deviation of a coefficient, pixels.
+    pub level_px: f64,
+    /// RMS of the field over the corners of the fit, both axes together, pixels.
+    pub rms_px: f64,
+    /// Gain of twice the log-likelihood over the lens model alone.
+    pub gain: f64,
+    /// Part of the residuals that is left once the numbers that the field takes up are off.
+    pub used_up: f64,
+}
+
+/// The views with a field taken off their corners.
+pub fn corrected(views: &[View], field: &ResidualDistortion) -> Vec<View> {
+    let corrected = |corner: &Corner| Corner { px: corner.px - field.at(&corner.px), ..*corner };
+    views.iter().map(|view| View { corners: view.corners.iter().map(corrected).collect(), ..view.clone() }).collect()
+}
+
+/// The estimate with the residual distortion that the views of a problem show; `without` is that without it. `None` also when
+/// the lens is given.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`].
+pub fn with_shown_distortion(
+    problem: &JointProblem<'_>,
+    without: &JointSolution,
+    cancel: &CancelToken,
+) -> Result<Option<(ShownDistortion, JointSolution)>, HandEyeError> {
+    if !without.free.intrinsics || problem.noise.is_some() {
+        return Ok(None);
+    }
+    let views = problem.views;
+    let [.., most] = DEGREES;
+    let Some(all) = Equations::new(problem, without, most, cancel)? else { return Ok(None) };
+    let mut last = None;
+    let shown = settled(&without.intrinsics, &all, views, |field, degree| {
+        let corrected = corrected(views, field);
+        let problem = JointProblem { views: &corrected, ..*problem };
+        let solution = match fit(&problem, &without.as_start(), cancel) {
+            Ok(solution) => solution,
+            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
+            Err(_) => return Ok(None),
+        };
+        let equations = Equations::new(&problem, &solution, degree, cancel)?;
+        last = Some(solution);
+        Ok(equations)
+    })?;
+    Ok(shown.zip(last))
+}
+
+/// Rounds of field and fit, from the equations `all` of an optimum without a field. `fit` makes a new optimum of the corners
+/// with a field of some degree taken off. `None` where the data show none, or none that settles; else the last fit goes with
+/// the field that is returned.
+pub fn settled<'v, E>(
+    intrinsics: &Intrinsics,
+    all: &Equations,
+    views: impl IntoIterator<Item = &'v View>,
+    mut fit: impl FnMut(&ResidualDistortion, usize) -> Result<Option<Equations>, E>,
+) -> Result<Option<ShownDistortion>, E> {
+    let tried = DEGREES.iter().filter_map(|degree| all.up_to(*degree).most_likely().map(|level| (*degree, level)));
+    let Some((degree, mut level)) = tried.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)) else { return Ok(None) };
+    if level.gain < GAIN {
+        return Ok(None);
+    }
+    let (gain, size) = (level.gain, (intrinsics.width, intrinsics.height));
+    for _ in 0..MAX_ROUNDS {
+        let coefficients = level.coefficients;
+        let field = ResidualDistortion::new(size, degree, coefficients.as_slice().to_vec());
+        let Some(equations) = fit(&field, degree)? else { return Ok(None) };
+        let used_up = 1.0 - level.freedom / equations.residuals;
+        if used_up <= 0.0 {
+            return Ok(None);
+        }
+        let spectrum = equations.from(&coefficients).times(used_up).spectrum();
+        level = spectrum.most_likely();
+        if spectrum.length(&(&level.coefficients - &coefficients), level.level_px) < STILL {
+            let rms_px = rms(views, &field);
+            return Ok(Some(ShownDistortion { field, level_px: level.level_px, rms_px, gain, used_up }));
+        }
+    }
+    Ok(None)
+}
+
+fn rms<'v>(views: impl IntoIterator<Item = &'v View>, field: &ResidualDistortion) -> f64 {
+    let squares = views.into_iter().flat_map(|view| &view.corners).map(|corner| field.at(&corner.px).norm_squared());
+    let (sum, count) = squares.fold((0.0, 0usize), |(sum, count), square| (sum + square, count + 1));
+    (sum / count.max(1) as f64).sqrt()
+}
+
+/// A solution of corners with a field taken off, with the field's uncertainty in its covariance.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
+pub fn with_its_error(
+    problem: &JointProblem<'_>,
+    solution: JointSolution,
+    shown: &ShownDistortion,
+    cancel: &CancelToken,
+) -> Result<JointSolution, HandEyeError> {
+    let Some(equations) = Equations::new(problem, &solution, shown.field.degree(), cancel)? else {
+        return Ok(solution);
+    };
+    let follow = equations.follow.clone();
+    Ok(with_variances(solution, &follow, equations, shown))
+}
+
+/// A solution whose unknowns follow the coefficients of these equations, with their uncertainty.
+fn with_variances(
+    mut solution: JointSolution,
+    follow: &DMatrix<f64>,
+    equations: Equations,
+    shown: &ShownDistortion,
+) -> JointSolution {
+    solution.covariance /= shown.used_up;
+    solution.noise.corner_px /= shown.used_up.sqrt();
+    let spectrum = equations.times(shown.used_up).spectrum();
+    let follow = follow * &spectrum.axes;
+    solution.covariance += &follow * DMatrix::from_diagonal(&spectrum.variances(shown.level_px)) * follow.transpose();
+    solution
+}

@@ -1,0 +1,102 @@
+//! What the lens of all sessions does beyond its model.
+
+use super::{Fit, NamedSession, SharedLensError, fitted};
+use crate::estimate::corners::Session;
+use crate::estimate::handeye::joint::residual_distortion::shared::{Share, together, with_shared_error};
+use crate::estimate::handeye::joint::residual_distortion::{DEGREES, Equations, corrected, settled};
+use crate::estimate::handeye::joint::shared_lens::{self, Fitted, LensEstimate};
+use crate::estimate::handeye::joint::{JointSolution, ShownDistortion};
+use crate::progress::Work;
+use crate::targets::observation::View;
+
+/// Sessions with one lens, and with what it does beyond its model where they show it.
+pub struct Together {
+    pub sessions: Vec<Fitted<Fit>>,
+    pub lens: LensEstimate,
+    shown: Option<(ShownDistortion, Vec<Share>, Equations)>,
+}
+
+impl Together {
+    /// From the sessions with their lens and nothing beyond.
+    pub fn new(
+        names: &[NamedSession<'_>],
+        prepared: &[Session<'_>],
+        sessions: Vec<Fitted<Fit>>,
+        lens: LensEstimate,
+        work: &Work<'_>,
+    ) -> Result<Self, SharedLensError> {
+        let plain: Vec<Vec<View>> = sessions.iter().map(|session| session.fit.refined.screened.views.clone()).collect();
+        let [.., most] = DEGREES;
+        let mut now = Self { sessions, lens, shown: None };
+        let Some((_, all)) = now.equations(names, prepared, most, work)? else { return Ok(now) };
+        let kept: Vec<View> = now.sessions.iter().flat_map(|it| it.fit.refined.screened.kept_views()).collect();
+        let intrinsics = now.lens.intrinsics;
+        let mut next = Self { sessions: now.sessions.clone(), lens: now.lens.clone(), shown: None };
+        let mut last = None;
+        let shown = settled(&intrinsics, &all, &kept, |field, degree| {
+            for (session, plain) in next.sessions.iter_mut().zip(&plain) {
+                session.fit.refined.screened.views = corrected(plain, field);
+            }
+            let refit = |i: usize, _round: usize, last: &Fit, others: LensEstimate| {
+                again(&prepared[i], last, &others, work).map_err(|error| names[i].fails(error))
+            };
+            let Some((sessions, lens)) = shared_lens::share(next.sessions.clone(), 0, refit)? else { return Ok(None) };
+            (next.sessions, next.lens) = (sessions, lens);
+            let Some((shares, equations)) = next.equations(names, prepared, degree, work)? else { return Ok(None) };
+            last = Some((shares, equations.clone()));
+            Ok(Some(equations))
+        })?;
+        if let Some((shown, (shares, equations))) = shown.zip(last) {
+            next.shown = Some((shown, shares, equations));
+            now = next;
+        }
+        Ok(now)
+    }
+
+    /// What every session says of the coefficients up to a degree, and all together; `None` where they say nothing.
+    fn equations(
+        &self,
+        names: &[NamedSession<'_>],
+        prepared: &[Session<'_>],
+        degree: usize,
+        work: &Work<'_>,
+    ) -> Result<Option<(Vec<Share>, Equations)>, SharedLensError> {
+        let mut shares = Vec::with_capacity(self.sessions.len());
+        for (i, Fitted { fit: Fit { refined, factor }, .. }) in self.sessions.iter().enumerate() {
+            let Some(others) = shared_lens::by_others(&self.sessions, i) else { return Ok(None) };
+            let (kept, others) = (refined.screened.kept_views(), others.times(*factor));
+            let problem = prepared[i].problem(refined, &kept, Some(others.as_prior()));
+            let share = Share::new(&problem, &refined.screened.solution, degree, *factor, work.cancel);
+            let Some(share) = share.map_err(|error| names[i].fails(error))? else { return Ok(None) };
+            shares.push(share);
+        }
+        let together = together(&shares, &self.lens);
+        Ok(together.map(|together| (shares, together)))
+    }
+
+    /// What the lens does beyond its model.
+    pub fn shown(&self) -> Option<&ShownDistortion> {
+        self.shown.as_ref().map(|(shown, _, _)| shown)
+    }
+
+    /// A solution of session `i` with the uncertainty of what the lens does beyond its model.
+    pub fn with_error(&self, i: usize, solution: JointSolution) -> JointSolution {
+        match &self.shown {
+            Some((shown, shares, equations)) => with_shared_error(solution, shares, i, equations, shown),
+            None => solution,
+        }
+    }
+}
+
+/// A session fitted anew with what the others say of the lens, with the same views, unknowns and widening.
+pub fn again(
+    prepared: &Session<'_>,
+    last: &Fit,
+    others: &LensEstimate,
+    work: &Work<'_>,
+) -> Result<Fitted<Fit>, crate::estimate::CalibrateError> {
+    let others = others.clone().times(last.factor);
+    let kept = last.refined.screened.kept_views();
+    let problem = prepared.problem(&last.refined, &kept, Some(others.as_prior()));
+    fitted(prepared, last.refined.again(&problem, work)?, Some(others.as_prior()), Some(last.factor), work)
+}
