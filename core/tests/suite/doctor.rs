@@ -37,6 +37,7 @@ struct Wordless;
 impl Catalogue for Wordless {
     fn translation(self, english: &str) -> Option<&'static str> {
         let values = english.split('{').skip(1).filter_map(|part| part.split_once('}'));
+        let values = values.filter(|(name, _)| !name.contains('|'));
         let alone: Vec<String> = values.map(|(name, _)| format!("{{{name}}}")).collect();
         Some(alone.join(" ").leak())
     }
