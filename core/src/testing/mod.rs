@@ -20,4 +20,4 @@ mod views;
 pub use board_views::{BoardViews, SharedErrors};
 pub use machine::{Need, data_folder, programs, python, skip};
 pub use scene::Scene;
-pub use views::{looking_at, looking_at_point, seen_corners};
+pub use views::{looking_at, looking_at_point};
