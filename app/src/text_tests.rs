@@ -12,6 +12,15 @@ fn a_text_is_said_in_the_language_with_its_values() {
     assert_eq!(kept, text);
 }
 
+#[test]
+fn a_noun_is_singular_where_its_count_is_one_and_chinese_has_one_form() {
+    for (count, english) in [(0, "0 captures"), (1, "1 capture"), (2, "2 captures"), (11, "11 captures")] {
+        let text = crate::text!("{count} {count|capture|captures}", count = count);
+        assert_eq!(text.say(Language::English), english);
+        assert_eq!(text.say(Language::Chinese), format!("{count} 次采集"));
+    }
+}
+
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder of sources") {
         let path = entry.expect("an entry").path();
@@ -70,7 +79,11 @@ fn texts() -> BTreeMap<String, PathBuf> {
 }
 
 fn placeholders(text: &str) -> BTreeSet<&str> {
-    text.split('{').skip(1).filter_map(|part| part.split_once('}')).map(|(name, _)| name).collect()
+    text.split('{')
+        .skip(1)
+        .filter_map(|part| part.split_once('}'))
+        .map(|(name, _)| name.split('|').next().unwrap_or_default())
+        .collect()
 }
 
 #[test]

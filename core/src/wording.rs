@@ -3,6 +3,9 @@
 //! The English sentence is the template. `text!("{n} degrees of freedom", n = 12)` makes a [`Text`] that can be kept, sent
 //! between threads and logged; whoever shows it has a [`Catalogue`]. What a library or the cell says in its own words
 //! stays as it is.
+//!
+//! `{n|degree|degrees}` in a template is the first word where the value of `n` is 1, and the second otherwise. A language
+//! whose nouns have one form does without.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -106,10 +109,14 @@ impl Text {
         while let Some((before, after)) = rest.split_once('{') {
             said.push_str(before);
             let (name, after) = after.split_once('}').unwrap_or((after, ""));
+            let (name, forms) =
+                name.split_once('|').map_or((name, None), |(name, forms)| (name, forms.split_once('|')));
             let value = self.values.iter().find(|(known, _)| known == name);
             debug_assert!(value.is_some(), "{template:?} has no value {name}");
             match value {
-                Some((_, Value::Plain(plain))) => said.push_str(plain),
+                Some((_, Value::Plain(plain))) => {
+                    said.push_str(forms.map_or(plain, |(one, many)| if plain == "1" { one } else { many }));
+                }
                 Some((_, Value::Text(text))) => said.push_str(&text.say(language)),
                 None => {}
             }

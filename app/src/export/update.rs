@@ -53,7 +53,7 @@ impl App {
             Ok(files) => {
                 self.model.export.is_present = true;
                 let count = files.len();
-                let said = text!("{count} files written, read back and compared", count = count);
+                let said = text!("{count} {count|file|files} written, read back and compared", count = count);
                 self.say_in(Pane::Export, Severity::Info, said);
             }
             Err(why) => {

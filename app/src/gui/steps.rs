@@ -170,8 +170,7 @@ fn solve(facts: &Facts) -> (StepState, Text) {
 fn verify(facts: &Facts) -> (StepState, Text) {
     match (facts.solved, facts.verified, facts.verifying) {
         (false, ..) => (StepState::Blocked, text!("Needs a calibration")),
-        (true, true, 1) => (StepState::Done, text!("1 capture")),
-        (true, true, count) => (StepState::Done, text!("{count} captures", count = count)),
+        (true, true, count) => (StepState::Done, text!("{count} {count|capture|captures}", count = count)),
         (true, false, _) => (StepState::Now, text!("Not verified yet")),
     }
 }

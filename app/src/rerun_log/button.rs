@@ -62,7 +62,10 @@ fn hint_ui(ui: &mut Ui, rerun: &RerunState, language: Language) {
         ui.label(text!("Recorded into {file}", file = file.display()).say(language));
     }
     if rerun.left_out > 0 {
-        let text = text!("{count} live entries were left out: the viewer or the disk is slow", count = rerun.left_out);
+        let text = text!(
+            "{count} live {count|entry was|entries were} left out: the viewer or the disk is slow",
+            count = rerun.left_out
+        );
         ui.label(text.say(language));
     }
 }

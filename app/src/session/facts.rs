@@ -36,9 +36,13 @@ fn name_of(edit: &Edit) -> Text {
         Edit::AddCapture(capture) => text!("capture {id}", id = capture.id),
         Edit::DeleteCaptures(ids) if ids.len() == 1 => text!("delete capture {id}", id = ids[0]),
         Edit::DeleteCaptures(ids) => text!("delete {count} captures", count = ids.len()),
-        Edit::SetExcluded { ids, excluded: true } => text!("exclude {count} captures", count = ids.len()),
-        Edit::SetExcluded { ids, excluded: false } => text!("include {count} captures", count = ids.len()),
-        Edit::SetRole { ids, .. } => text!("purpose of {count} captures", count = ids.len()),
+        Edit::SetExcluded { ids, excluded: true } => {
+            text!("exclude {count} {count|capture|captures}", count = ids.len())
+        }
+        Edit::SetExcluded { ids, excluded: false } => {
+            text!("include {count} {count|capture|captures}", count = ids.len())
+        }
+        Edit::SetRole { ids, .. } => text!("purpose of {count} {count|capture|captures}", count = ids.len()),
         Edit::SetTarget(_) => text!("change of the target"),
         Edit::SetMode(_) => text!("change of where the camera sits"),
         Edit::SetCamera(_) => text!("change of what is known of the camera"),

@@ -6,8 +6,8 @@ use handeye_core::estimate::{Calibration, JointFit, JointOffsets, ShapeEstimate,
 use crate::text;
 use crate::text::Text;
 
-/// From so many degrees of freedom on the noise levels count as known: the normal law is as good.
-const KNOWN: f64 = 1e5;
+/// From so many degrees of freedom on the normal law is as good.
+const GAUSSIAN: f64 = 1e5;
 
 /// One thing to say.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -114,13 +114,17 @@ fn widening(joint: &JointFit) -> Option<EstimatedValue> {
 
 fn freedom(joint: &JointFit) -> EstimatedValue {
     let degrees = joint.small_sample.degrees_of_freedom;
-    let value =
-        if degrees > KNOWN { text!("known") } else { text!("{n} degrees of freedom", n = format!("{degrees:.1}")) };
+    let value = if degrees > GAUSSIAN {
+        text!("Gaussian")
+    } else {
+        text!("{n} degrees of freedom", n = format!("{degrees:.1}"))
+    };
     EstimatedValue {
-        what: text!("Noise levels"),
+        what: text!("Stated error of a point"),
         value,
         meaning: text!(
-            "The fewer degrees of freedom the noise levels have, the wider the stated error is for the same noise"
+            "The fewer degrees of freedom it rests on, the wider it is for the same noise, because the noise levels are \
+             estimated"
         ),
         why: None,
     }
@@ -182,7 +186,7 @@ mod tests {
     fn nothing_is_said_of_what_is_as_usual() {
         let lines = said(|_| ());
         assert_eq!(lines.len(), 1, "{lines:?}");
-        assert_eq!(lines[0].0, "Noise levels");
+        assert_eq!(lines[0].0, "Stated error of a point");
         assert!(lines[0].1.ends_with(" degrees of freedom"), "{lines:?}");
     }
 
@@ -227,7 +231,7 @@ mod tests {
             ("Size of the board", "100.100 ± 0.020 %"),
             ("Noise of views", "0.120 px"),
             ("Uncertainty widened", "2.0 times"),
-            ("Noise levels", "known"),
+            ("Stated error of a point", "Gaussian"),
             ("Offsets of the joints", "1: +1.000 ± 0.010°, 2: -0.500 ± 0.010°"),
         ] {
             assert!(has(&lines, what, value), "{what}: {value} in {lines:?}");

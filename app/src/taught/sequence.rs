@@ -130,7 +130,8 @@ impl App {
         self.model.sequence_runs = false;
         let severity = if done == of { Severity::Info } else { Severity::Warning };
         let took = format!("{took_s:.0}");
-        let said = text!("Sequence ended: {done} of {of} poses in {took} s", done = done, of = of, took = took);
+        let said =
+            text!("Sequence ended: {done} of {of} {of|pose|poses} in {took} s", done = done, of = of, took = took);
         match severity {
             Severity::Info => self.say(severity, said),
             _ => self.say_in(pane, severity, said),

@@ -17,7 +17,7 @@ use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::progress::CancelToken;
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};
-use crate::testing::{data_folder, seen_corners};
+use crate::testing::{BoardViews, data_folder};
 
 const SQUARE_M: f64 = 1.0 / 32.0;
 
@@ -35,7 +35,8 @@ impl Set {
     /// 15 views of 70 corners with 0.1 px of noise.
     fn simulated(camera: &Intrinsics, seed: u64) -> Self {
         let grid = Grid { columns: 10, rows: 7, square_m: SQUARE_M };
-        let views = seen_corners(&grid, camera, 15, (0.2, 0.7), 0.1, seed)
+        let views = BoardViews::new(*camera, grid, 0.1)
+            .corners(15, seed)
             .into_iter()
             .map(|view| view.into_iter().map(|corner| Self::single(corner.index, corner.px)).collect())
             .collect();

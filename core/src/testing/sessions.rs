@@ -59,11 +59,11 @@ pub fn noise_twist(rng: &mut impl Rng, metres: f64, radians: f64) -> Vector6<f64
     Vector6::from_fn(|i, _| normal(rng) * if i < 3 { metres } else { radians })
 }
 
-/// The error of a robot: a translation, and a rotation vector about the place moved to.
-pub fn robot_error(rng: &mut impl Rng, noise: &Noise) -> Isometry3<f64> {
-    let twist = noise_twist(rng, noise.robot_m, noise.robot_rad);
-    let turn = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());
-    Isometry3::from_parts(twist.fixed_rows::<3>(0).into_owned().into(), turn)
+/// The tip pose that a robot reports which is really at another. The true pose is the reported one times the robot's error,
+/// as the model has it.
+pub fn reported(rng: &mut impl Rng, base_from_tip: &Pose<Base, Tip>, noise: &Noise) -> Pose<Base, Tip> {
+    let error = correction_transform(&noise_twist(rng, noise.robot_m, noise.robot_rad));
+    Pose::from_isometry(base_from_tip.isometry() * error.inverse())
 }
 
 /// Gives reported tip poses errors that depend on where they are, by a field drawn with the levels of `noise`.
@@ -97,6 +97,41 @@ pub struct SmallTarget {
     pub tilt_deg: f64,
 }
 
+/// How a target lies before the camera in views that are drawn at random.
+#[derive(Debug, Clone)]
+pub struct Cone {
+    /// Largest tilt, degrees.
+    pub tilt_deg: f64,
+    /// Largest turn about the normal either way, degrees.
+    pub roll_deg: f64,
+    /// Distances of the target's middle, metres.
+    pub distance_m: Range<f64>,
+    /// How far that is beside the optical axis along x and y at the most, metres.
+    pub beside_m: f64,
+}
+
+impl Cone {
+    /// That of the published Monte-Carlo tables.
+    pub const PUBLISHED: Self = Self { tilt_deg: 35.0, roll_deg: 60.0, distance_m: 0.4..0.6, beside_m: 0.03 };
+
+    /// `camera_from_target` of a view of [`BOARD`].
+    pub fn draw(&self, rng: &mut impl Rng) -> Isometry3<f64> {
+        let (angles, [x, y]) = (self.angles(rng), self.beside(rng));
+        board_at(Vector3::new(x, y, rng.random_range(self.distance_m.clone())), angles)
+    }
+
+    /// Tilt, azimuth and roll, radians.
+    fn angles(&self, rng: &mut impl Rng) -> [f64; 3] {
+        let tilt = self.tilt_deg.to_radians() * rng.random::<f64>().sqrt();
+        let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
+        [tilt, azimuth, rng.random_range(-self.roll_deg..self.roll_deg).to_radians()]
+    }
+
+    fn beside(&self, rng: &mut impl Rng) -> [f64; 2] {
+        std::array::from_fn(|_| rng.random_range(-self.beside_m..self.beside_m))
+    }
+}
+
 /// `camera_from_target` with the middle of [`BOARD`] at `place` \[m\] in the camera's frame, tilted about an axis at
 /// `azimuth` in the image after a turn by `roll` about its normal \[rad\].
 pub fn board_at(place: Vector3<f64>, angles: [f64; 3]) -> Isometry3<f64> {
@@ -128,20 +163,37 @@ pub fn noisy(rng: &mut impl Rng, px: &Vector2<f64>, noise_px: f64) -> Vector2<f6
     Vector2::new(px.x + normal(rng) * noise_px, px.y + normal(rng) * noise_px)
 }
 
-/// Views on a 35° cone with ±60° of roll at 0.4 to 0.6 m: the geometry of the published Monte-Carlo tables.
+/// The corners of a view with noise per axis, and with further errors by their index; `None` where one is out of sight.
+pub fn seen(
+    rng: &mut impl Rng,
+    intrinsics: &Intrinsics,
+    camera_from_target: &Isometry3<f64>,
+    points: &[Point3<f64>],
+    noise_px: f64,
+    further_px: impl Fn(usize) -> Vector2<f64>,
+) -> Option<Vec<Corner>> {
+    let corner = |(index, point): (usize, &Point3<f64>)| {
+        let px = intrinsics.project(&(camera_from_target * point)).ok()?;
+        let px = noisy(rng, &px, noise_px) + further_px(index);
+        intrinsics.contains(&px).then_some(Corner::new(index, px))
+    };
+    points.iter().enumerate().map(corner).collect()
+}
+
+/// Views with the geometry of [`Cone::PUBLISHED`].
 pub fn trial(mode: Mode, views: usize, noise: &Noise, intrinsics: Intrinsics, seed: u64) -> Trial {
-    trial_of(BOARD, (35.0, 0.4..0.6, 0.03), mode, views, noise, intrinsics, seed)
+    trial_of(BOARD, &Cone::PUBLISHED, mode, views, noise, intrinsics, seed)
 }
 
 /// Views of [`SMALL_TARGET`] with ±60° of roll.
 pub fn small_target_trial(mode: Mode, views: usize, noise: &Noise, how: SmallTarget, seed: u64) -> Trial {
-    trial_of(SMALL_TARGET, (how.tilt_deg, 0.5..how.farthest_m, 0.1), mode, views, noise, camera(), seed)
+    let cone = Cone { tilt_deg: how.tilt_deg, distance_m: 0.5..how.farthest_m, beside_m: 0.1, ..Cone::PUBLISHED };
+    trial_of(SMALL_TARGET, &cone, mode, views, noise, camera(), seed)
 }
 
-/// Views of a target on a cone of so many degrees, at distances \[m\], and so far \[m\] beside the axis.
 fn trial_of(
     target: TargetSpec,
-    (cone_deg, distances, beside): (f64, Range<f64>, f64),
+    cone: &Cone,
     mode: Mode,
     views: usize,
     noise: &Noise,
@@ -156,25 +208,16 @@ fn trial_of(
     let mut out = Vec::new();
     let mut true_camera_from_target = Vec::new();
     while out.len() < views {
-        let tilt = cone_deg.to_radians() * rng.random::<f64>().sqrt();
-        let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
-        let roll = rng.random_range(-60f64..60.0).to_radians();
-        let distance = rng.random_range(distances.clone());
-        let place = Vector3::new(rng.random_range(-beside..beside), rng.random_range(-beside..beside), distance);
+        let angles = cone.angles(&mut rng);
+        // The distance before the place beside the axis: the figures of the documentation were drawn so.
+        let distance_m = rng.random_range(cone.distance_m.clone());
+        let [x, y] = cone.beside(&mut rng);
         let camera_from_target: Pose<Camera, Target> =
-            Pose::from_isometry(target_at(&target, place, [tilt, azimuth, roll]));
+            Pose::from_isometry(target_at(&target, Vector3::new(x, y, distance_m), angles));
         let true_tip = base_from_tip(mode, &mount_from_camera, &anchor_from_target, &camera_from_target);
-        let error = robot_error(&mut rng, noise);
-        let reported = Pose::from_isometry(true_tip.isometry() * error.inverse());
-        let corners: Option<Vec<Corner>> = points
-            .iter()
-            .enumerate()
-            .map(|(index, p)| {
-                let px = intrinsics.project(&(camera_from_target.isometry() * p)).ok()?;
-                let seen = noisy(&mut rng, &px, noise.corner_px);
-                intrinsics.contains(&seen).then_some(Corner::new(index, seen))
-            })
-            .collect();
+        let reported = reported(&mut rng, &true_tip, noise);
+        let no_more = |_| Vector2::zeros();
+        let corners = seen(&mut rng, &intrinsics, camera_from_target.isometry(), &points, noise.corner_px, no_more);
         if let Some(corners) = corners {
             true_camera_from_target.push(camera_from_target);
             out.push(View::new(format!("{}", out.len()), reported, corners));

@@ -2,10 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
 
-use super::BoardViews;
 use crate::geometry::camera::Intrinsics;
 use crate::targets::Grid;
-use crate::targets::observation::Corner;
 
 /// `camera_from_target` with the camera `distance_m` from the board's middle, looked at from `tilt` off its normal
 /// in the direction `azimuth`, then turned by `roll` around the optical axis; the board's middle is imaged
@@ -38,17 +36,4 @@ pub fn looking_at_point(
     let at = Vector3::new(offset_px.x / camera.fx, offset_px.y / camera.fy, 1.0) * distance_m;
     Isometry3::from_parts(Translation3::from(at), UnitQuaternion::from_rotation_matrix(&rotation))
         * Translation3::from(-centre.coords)
-}
-
-/// Corners of a board in views tilted by `tilt` (least and most, radians) in directions all around, 0.5 to 0.8 m away,
-/// with Gaussian noise of `noise_px` per axis.
-pub fn seen_corners(
-    grid: &Grid,
-    camera: &Intrinsics,
-    count: usize,
-    tilt: (f64, f64),
-    noise_px: f64,
-    seed: u64,
-) -> Vec<Vec<Corner>> {
-    BoardViews { tilt, ..BoardViews::new(*camera, *grid, noise_px) }.corners(count, seed)
 }

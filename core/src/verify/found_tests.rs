@@ -1,7 +1,7 @@
 //! Verification with what a calibration finds out beside the links: the size of the board and offsets of the joints; and
 //! the law of measured points.
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -13,7 +13,7 @@ use crate::geometry::arm::{ArmKind, ArmModel};
 use crate::geometry::camera::Intrinsics;
 use crate::progress::CancelToken;
 use crate::targets::bent::BoardShape;
-use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, noise_twist, noisy, trial};
+use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, noise_twist, seen, trial};
 
 /// A print that is so much larger than stated, as one that a printer "fits to the page".
 const SCALE: f64 = 1.024;
@@ -102,13 +102,10 @@ fn views_of_an_arm_with_offsets(count: usize, noise: &Noise, intrinsics: &Intrin
         let really: Vec<f64> = reported.iter().zip(OFFSETS_DEG).map(|(q, deg)| q + deg.to_radians()).collect();
         let camera_from_target =
             (arm.forward(&really).expect("six joints") * tip_from_camera).inverse() * base_from_target;
-        let corners: Option<Vec<Corner>> = (BOARD.points().iter().enumerate())
-            .map(|(index, point)| {
-                let px = intrinsics.project(&(camera_from_target.isometry() * point)).ok()?;
-                let px = noisy(&mut rng, &px, noise.corner_px);
-                intrinsics.contains(&px).then_some(Corner::new(index, px))
-            })
-            .collect();
+        let corners =
+            seen(&mut rng, intrinsics, camera_from_target.isometry(), &BOARD.points(), noise.corner_px, |_| {
+                Vector2::zeros()
+            });
         let error = noise_twist(&mut rng, noise.robot_m, noise.robot_rad);
         let base_from_tip = arm.forward(&reported).expect("six joints").perturbed(&error);
         let tip_by_joint = arm.tip_by_joint_at(&base_from_tip, &reported).expect("six joints");

@@ -10,7 +10,7 @@ use handeye_core::geometry::planar_pose;
 use handeye_core::testing::sessions::{GRID, camera};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
-use super::sim::{Fault, Setup, changed, session, session_of};
+use handeye_core::testing::faulty::{Fault, Setup, changed, session, session_of};
 
 pub struct Case {
     pub name: &'static str,

@@ -5,12 +5,11 @@ use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions, Sev
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::{Method, Observations, ObservedView, calibrate};
 use handeye_core::progress::CancelToken;
+use handeye_core::testing::faulty::{ArmError, Fault, Setup, changed, session};
 use handeye_core::testing::sessions::normal;
 use nalgebra::{Isometry3, SMatrix, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-
-use super::sim::{ArmError, Fault, Setup, changed, session};
 
 /// The diagnosis with the calibration beside it, as the command line makes it.
 pub fn examined(observations: &Observations) -> Diagnosis {

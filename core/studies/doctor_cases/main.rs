@@ -4,10 +4,8 @@
 //! `… -- TEXT` for the whole report on every case whose name has that text; `… -- as-met [SESSIONS] [FIRST]` for the healthy
 //! sessions with an arm whose error depends on where it stands; one alone with its report.
 
-mod arm;
 mod cases;
 mod faults;
-mod sim;
 
 use std::collections::BTreeMap;
 

@@ -5,7 +5,7 @@ use handeye_core::estimate::handeye::joint::Noise;
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use handeye_core::targets::observation::{Corner, View};
-use handeye_core::testing::sessions::{BOARD, add_field, base_from_tip, board_at, noisy, normal, robot_error};
+use handeye_core::testing::sessions::{BOARD, Cone, add_field, base_from_tip, noisy, normal, reported};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector2, Vector3};
 use rand::seq::SliceRandom as _;
 use rand::{Rng, RngExt as _, SeedableRng as _};
@@ -71,16 +71,6 @@ fn direction(rng: &mut impl Rng) -> UnitVector3<f64> {
     UnitVector3::new_normalize(Vector3::from_fn(|_, _| normal(rng)))
 }
 
-/// A camera pose on a cone of 35° about the board's axis, rolled by up to 60°, 0.4 to 0.6 m away and aimed to within
-/// 30 mm of the board's middle.
-fn random_view(rng: &mut impl Rng) -> Pose<Camera, Target> {
-    let tilt = 35f64.to_radians() * rng.random::<f64>().sqrt();
-    let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
-    let roll = rng.random_range(-60f64..60.0).to_radians();
-    let place = Vector3::new(rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), rng.random_range(0.4..0.6));
-    Pose::from_isometry(board_at(place, [tilt, azimuth, roll]))
-}
-
 /// The pixels of all points, `None` when one is not well inside the image.
 fn true_pixels(
     intrinsics: &Intrinsics,
@@ -104,7 +94,7 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
     let (mount_from_camera, anchor_from_target) = truth(cell.mode);
     let (mut true_base_from_tip, mut pixels) = (Vec::new(), Vec::new());
     while pixels.len() < cell.poses {
-        let camera_from_target = random_view(&mut rng);
+        let camera_from_target = Pose::from_isometry(Cone::PUBLISHED.draw(&mut rng));
         if let Some(px) = true_pixels(&intrinsics, &points, &camera_from_target) {
             true_base_from_tip.push(base_from_tip(
                 cell.mode,
@@ -118,9 +108,7 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
     let noise = &cell.noise;
     let mut views = Vec::with_capacity(cell.poses);
     for (index, (true_pose, px)) in true_base_from_tip.iter().zip(&pixels).enumerate() {
-        // The true pose is the reported one times this error, as the model has it.
-        let error = robot_error(&mut rng, noise);
-        let reported = Pose::from_isometry(true_pose.isometry() * error.inverse());
+        let reported = reported(&mut rng, true_pose, noise);
         let seen = |(i, px): (usize, &Vector2<f64>)| Corner::new(i, noisy(&mut rng, px, noise.corner_px));
         views.push(View::new(format!("view {index}"), reported, px.iter().enumerate().map(seen).collect()));
     }

@@ -113,7 +113,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
     if count == 0 || !model.document().captures.is_empty() {
         return;
     }
-    let name = text!("Run the {count} taught poses", count = count).say(language);
+    let name = text!("Run the {count} taught {count|pose|poses}", count = count).say(language);
     let what = tr!(language, "Moves to one taught pose after the other and captures at each");
     let button = ui.add_enabled(hindrance.is_none(), Button::new(name).min_size(Vec2::new(0.0, height)));
     let button = match hindrance {

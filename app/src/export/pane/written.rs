@@ -33,11 +33,7 @@ pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 None
             }
         });
-        let name = if chosen == 1 {
-            tr!(language, "Export 1 format").to_owned()
-        } else {
-            text!("Export {count} formats", count = chosen).say(language)
-        };
+        let name = text!("Export {count} {count|format|formats}", count = chosen).say(language);
         if parts::gated_ui(ui, reason, Button::new(RichText::new(name).strong())).clicked() {
             outbox.send(Command::Export);
         }

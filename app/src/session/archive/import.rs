@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use handeye_core::project::dataset::{Dataset, DatasetError};
-use handeye_core::project::session::{Capture, Document, Role, SessionError, Store};
+use handeye_core::project::dataset::Dataset;
+use handeye_core::project::session::{Capture, Document, Role, Store};
 
 use super::{Archive, free_folder, timestamp_rfc3339};
 use crate::command::Event;
@@ -12,23 +12,14 @@ use crate::session::start;
 use crate::text;
 use crate::text::Text;
 
-/// Why a data set did not become a session.
-#[derive(Debug, thiserror::Error)]
-enum ImportError {
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    #[error(transparent)]
-    Session(#[from] SessionError),
-    #[error("row {row} ({name}) has no {what}: solve this data set with `handeye calibrate` instead")]
-    Lacks { row: usize, name: String, what: &'static str },
+/// What a library says of a file, in its own words.
+fn said_by(error: impl std::error::Error) -> Text {
+    Text::verbatim(error.to_string())
 }
 
 impl Archive {
     pub(super) fn import(&mut self, dataset: &Path) {
-        let imported = self.copy(dataset).map_err(|error| {
-            let why: Text = text!("The data set was not opened: {error}", error = error);
-            why
-        });
+        let imported = self.copy(dataset).map_err(|why| text!("The data set was not opened: {why}", why = why));
         match imported {
             Ok((store, outside)) => {
                 let folder = store.folder().display().to_string();
@@ -38,7 +29,10 @@ impl Archive {
                 let text = text!("The data set was copied to the session {folder}", folder = folder);
                 self.outlet.notice(Severity::Info, text);
                 if outside > 0 {
-                    let text = text!("{count} files of the data set lie outside of its folder", count = outside);
+                    let text = text!(
+                        "{count} {count|file of the data set lies|files of the data set lie} outside of its folder",
+                        count = outside
+                    );
                     self.outlet.notice(Severity::Warning, text);
                 }
             }
@@ -47,8 +41,8 @@ impl Archive {
     }
 
     /// The session, and how many files of the data set lie outside of its folder.
-    fn copy(&self, folder: &Path) -> Result<(Store, usize), ImportError> {
-        let dataset = Dataset::read(folder)?;
+    fn copy(&self, folder: &Path) -> Result<(Store, usize), Text> {
+        let dataset = Dataset::read(folder).map_err(said_by)?;
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let target_folder = free_folder(&self.sessions, &name);
         let mut meta = start::meta(None, timestamp_rfc3339());
@@ -61,17 +55,27 @@ impl Archive {
         // Everything is read before anything is written, so that a bad row leaves nothing behind.
         let mut captures = Vec::with_capacity(dataset.entries.len());
         for (index, entry) in dataset.entries.iter().enumerate() {
-            let lacks = |what| ImportError::Lacks { row: index + 1, name: entry.name.clone(), what };
-            let base_from_tip = entry.base_from_tip.ok_or_else(|| lacks("robot pose"))?;
+            let (row, name) = (index + 1, &entry.name);
+            let Some(base_from_tip) = entry.base_from_tip else {
+                return Err(text!(
+                    "row {row} ({name}) has no robot pose: solve this data set with “handeye calibrate” instead",
+                    row = row,
+                    name = name
+                ));
+            };
             if entry.image_path.is_none() {
-                return Err(lacks("image"));
+                return Err(text!(
+                    "row {row} ({name}) has no image: solve this data set with “handeye calibrate” instead",
+                    row = row,
+                    name = name
+                ));
             }
             captures.push((entry, base_from_tip));
         }
-        let mut store = Store::create_with(&target_folder, Document::new(meta))?;
+        let mut store = Store::create_with(&target_folder, Document::new(meta)).map_err(said_by)?;
         for (entry, base_from_tip) in captures {
-            let image = dataset.load_rgb(entry)?;
-            store.add_capture(&Capture {
+            let image = dataset.load_rgb(entry).map_err(said_by)?;
+            let added = store.add_capture(&Capture {
                 image: &image,
                 depth_m: None,
                 base_from_tip,
@@ -82,8 +86,47 @@ impl Archive {
                 corner_noise_px: None,
                 settled_s: None,
                 pose_name: Some(&entry.name),
-            })?;
+            });
+            added.map_err(said_by)?;
         }
         Ok((store, dataset.outside.len()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::text::Language;
+    use crate::worker::link::Outlet;
+
+    #[test]
+    fn a_data_set_without_images_is_refused_in_the_language_of_the_window_and_leaves_nothing_behind() {
+        let home = tempfile::tempdir().expect("a folder");
+        let (dataset, sessions) = (home.path().join("tuesday"), home.path().join("sessions"));
+        fs::create_dir(&dataset).expect("made");
+        let described = "mode = \"eye_in_hand\"\n\
+            [target]\nkind = \"chessboard\"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\ncorners = \"corners.csv\"\n\
+            [robot]\nposes = \"poses.csv\"\nlength_unit = \"m\"\nrotation = \"quaternion_xyzw\"\npose = \"base_from_tip\"\n\
+            [camera]\nfixed = false\nwidth = 640\nheight = 480\nmodel = \"none\"\n";
+        let poses = "image,x,y,z,qx,qy,qz,qw\n1.png,0.4,0,0.3,0,0,0,1\n";
+        let corners = "image,column,row,u,v\n1.png,0,0,10,20\n";
+        for (name, text) in [("dataset.toml", described), ("poses.csv", poses), ("corners.csv", corners)] {
+            fs::write(dataset.join(name), text).expect("written");
+        }
+        let (events, reported) = crossbeam_channel::unbounded();
+        let outlet = Outlet { events, waker: Arc::new(|| {}), clock: Arc::new(|| 0.0) };
+        Archive::new(sessions.clone(), outlet).import(&dataset);
+        let Ok(Event::SessionFailed { why }) = reported.try_recv() else { panic!("it was opened") };
+        assert_eq!(
+            why.say(Language::English),
+            "The data set was not opened: row 1 (1.png) has no image: solve this data set with “handeye calibrate” \
+             instead"
+        );
+        let chinese = why.say(Language::Chinese);
+        assert!(chinese.contains("第 1 行（1.png）没有图像") && !chinese.contains("has no"), "{chinese}");
+        assert!(!sessions.exists(), "nothing was begun");
     }
 }

@@ -30,7 +30,7 @@ pub fn recent_ui(ui: &mut Ui, model: &Model, state: &mut State, outbox: &mut Out
         let path = recent.folder.display().to_string();
         ui.horizontal(|ui| {
             let response = ui.selectable_label(state.typed == path, name.as_ref()).on_hover_text(&path);
-            let captures = text!("{count} captures", count = recent.captures).say(language);
+            let captures = text!("{count} {count|capture|captures}", count = recent.captures).say(language);
             parts::caption_ui(ui, &captures);
             if response.clicked() {
                 state.selected = None;

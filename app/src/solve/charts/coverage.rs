@@ -76,7 +76,7 @@ pub fn coverage_ui(ui: &mut Ui, model: &Model, table: &CaptureTable) {
         let (column, row) = (part.x.max(0.0) as usize, part.y.max(0.0) as usize);
         let words = match coverage.count(column, row) {
             0 => text!("No corner was ever seen here: bring the board there"),
-            count => text!("{count} corners seen here", count = count),
+            count => text!("{count} {count|corner|corners} seen here", count = count),
         };
         response.on_hover_text_at_pointer(words.say(language));
     }

@@ -54,7 +54,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     let (done, of) = (sequence.outcomes.len(), sequence.names.len());
     let said = match sequence.current() {
         Some(name) => text!("Pose {n} of {of}: {name}", n = done + 1, of = of, name = name),
-        None => text!("All {of} poses were visited", of = of),
+        None => text!("{of} {of|pose was|poses were} visited", of = of),
     }
     .say(language);
     if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop the sequence")) {

@@ -12,7 +12,7 @@ use crate::{text, tr};
 pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
     let language = model.view.language;
     let count = verification.captures.len();
-    let title = text!("Errors of prediction over {count} captures, RMS", count = count);
+    let title = text!("Errors of prediction over {count} {count|capture|captures}, RMS", count = count);
     parts::section_ui(ui, &title.say(language));
     let mm = |metres: f64| format!("{:.3} mm", metres * 1e3);
     parts::stated_ui(ui, tr!(language, "Middle of the board"), &mm(verification.centre_rms_m))

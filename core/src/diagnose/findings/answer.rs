@@ -281,10 +281,6 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
     };
     // The curve's error equals the stated one but for rounding, so one more is the least that can help.
     let more = needed.saturating_sub(views).max(1);
-    let advice = if more == 1 {
-        text!("About {more} more view like those gathered will reach it.")
-    } else {
-        text!("About {more} more views like those gathered will reach it.")
-    };
-    Some(not_reached(advice.with("more", more)).with("more_views", more as f64, ""))
+    let advice = text!("About {more} more {more|view|views} like those gathered will reach it.", more = more);
+    Some(not_reached(advice).with("more_views", more as f64, ""))
 }

@@ -52,12 +52,12 @@ fn outliers(calibration: &Calibration) -> Option<Finding> {
             )
         },
     );
-    let what = if names.len() == 1 {
-        text!("{count} outlier view, the answer is without: {list} ({how_far}).")
-    } else {
-        text!("{count} outlier views, the answer is without: {list} ({how_far}).")
-    };
-    let what = what.with("count", names.len()).with("list", listed(&names)).with("how_far", how_far);
+    let what = text!(
+        "{count} outlier {count|view|views}, the answer is without: {list} ({how_far}).",
+        count = names.len(),
+        list = listed(&names),
+        how_far = how_far
+    );
     let advice = text!(
         "The arm may still have moved, the board may have been touched, or another pose was written down; capture again, or \
          keep all views to see the difference."
@@ -77,12 +77,11 @@ fn corners(calibration: &Calibration) -> Option<Finding> {
         return None;
     }
     let count: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
-    let what = if count == 1 {
-        text!("{count} outlier corner, far from where the rest of the view puts them: in {list}.")
-    } else {
-        text!("{count} outlier corners, far from where the rest of the view puts them: in {list}.")
-    };
-    let what = what.with("count", count).with("list", listed(&names));
+    let what = text!(
+        "{count} outlier {count|corner|corners}, far from where the rest of the view puts {count|it|them}: in {list}.",
+        count = count,
+        list = listed(&names)
+    );
     let text = Text::sentences([what, text!("Look for reflections and things in front of the target.")]);
     let finding = Finding::new(FindingCode::OutlierCorners, Severity::Info, text).with("corners", count as f64, "");
     Some(with_views(finding, &names))

@@ -69,11 +69,6 @@ impl PartialHandEye {
             Mode::EyeToHand => "base",
         }
     }
-
-    /// The point of the line on which the camera is that is nearest to the origin of the mount, metres.
-    pub fn nearest_place_m(&self) -> Vector3<f64> {
-        self.across.iter().zip(self.place_m).map(|(axis, m)| axis.into_inner() * m).sum()
-    }
 }
 
 impl fmt::Display for PartialHandEye {

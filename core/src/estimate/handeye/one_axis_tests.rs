@@ -119,7 +119,8 @@ fn a_calibration_about_one_axis_is_refused_with_what_it_determines_in_both_modes
         assert!(place.norm() < 1e-7 && turn.norm() < 1e-7, "{place} {turn}");
         assert_eq!(found.mode, mode);
         assert!(found.open_axis.dot(&session.axis).abs() > 1.0 - 1e-12);
-        assert!(found.nearest_place_m().dot(&found.open_axis).abs() < 1e-12, "nothing is said along the axis");
+        let is_across = |axis: &Unit<Vector3<f64>>| axis.dot(&found.open_axis).abs() < 1e-12;
+        assert!(found.across.iter().all(is_across), "nothing is said along the axis");
         let text = error.to_string();
         let mount = if mode == Mode::EyeInHand { "tip" } else { "base" };
         assert!(text.contains(&format!("of the {mount}: the place of the camera along it stays open")), "{text}");

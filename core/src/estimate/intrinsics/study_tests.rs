@@ -2,7 +2,7 @@ use super::*;
 use crate::geometry::planar_pose::PoseError;
 use crate::targets::Grid;
 use crate::targets::observation::Corner;
-use crate::testing::seen_corners;
+use crate::testing::BoardViews;
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
 const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);
@@ -15,7 +15,7 @@ fn camera(distortion: Distortion) -> Intrinsics {
 
 /// Views tilted by up to `tilt` around directions all around.
 fn views(camera: &Intrinsics, count: usize, tilt: (f64, f64), noise_px: f64, seed: u64) -> Vec<Vec<Corner>> {
-    seen_corners(&GRID, camera, count, tilt, noise_px, seed)
+    BoardViews { tilt, ..BoardViews::new(*camera, GRID, noise_px) }.corners(count, seed)
 }
 
 fn calibrate(views: &[Vec<Corner>], model: Distortion, start: Option<Intrinsics>) -> Result<Found, IntrinsicsError> {

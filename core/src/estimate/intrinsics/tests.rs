@@ -1,8 +1,4 @@
-use nalgebra::Matrix2;
-use nalgebra::{Isometry3, Rotation3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Normal};
+use nalgebra::{Isometry3, Matrix2, Vector2, Vector3};
 
 use super::*;
 use crate::geometry::planar_pose::PoseError;
@@ -10,6 +6,7 @@ use crate::geometry::planar_pose::mirror::mirrored;
 use crate::geometry::planar_pose::refine::refine;
 use crate::targets::Grid;
 use crate::targets::observation::Corner;
+use crate::testing::BoardViews;
 
 const SIZE: (u32, u32) = (640, 480);
 const BROWN: Distortion = Distortion::BrownConrady([-0.21, 0.12, 0.001, -0.002, -0.02]);
@@ -18,50 +15,17 @@ fn camera(distortion: Distortion) -> Intrinsics {
     Intrinsics { distortion, fy: 575.0, cx: 322.4, cy: 236.1, ..Intrinsics::pinhole(640, 480, 581.0) }
 }
 
-const TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.03 });
+const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
+const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);
 
 fn board() -> BoardPoints {
     BoardPoints::new(&TARGET.points())
 }
 
-struct Scene {
-    camera: Intrinsics,
-    shape: BoardShape,
-    tilt: (f64, f64),
-    distance_m: (f64, f64),
-    noise_px: f64,
-}
-
-impl Scene {
-    fn new(distortion: Distortion, noise_px: f64) -> Self {
-        let shape = BoardShape::default();
-        Self { camera: camera(distortion), shape, tilt: (0.2, 0.7), distance_m: (0.5, 0.8), noise_px }
-    }
-
-    fn views(&self, count: usize, seed: u64) -> Vec<Vec<Corner>> {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let noise = Normal::new(0.0, self.noise_px).expect("a deviation");
-        let board = board();
-        (0..count)
-            .map(|i| {
-                let azimuth = i as f64 * 2.4;
-                let axis = Unit::new_normalize(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0));
-                let tilt = Rotation3::from_axis_angle(&axis, rng.random_range(self.tilt.0..=self.tilt.1));
-                let roll = Rotation3::from_axis_angle(&Vector3::z_axis(), rng.random_range(-1.0..1.0));
-                let at = Vector3::new(rng.random_range(-0.15..0.15), rng.random_range(-0.1..0.1), 1.0)
-                    * rng.random_range(self.distance_m.0..=self.distance_m.1);
-                let rotation = UnitQuaternion::from_rotation_matrix(&(roll * tilt));
-                let pose = Isometry3::from_parts(Translation3::from(at), rotation)
-                    * Translation3::from(Vector3::new(-0.135, -0.09, 0.0));
-                (0..board.len())
-                    .map(|index| {
-                        let px = self.camera.project(&(pose * board.point(index, &self.shape))).expect("in front");
-                        Corner::new(index, px + Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng)))
-                    })
-                    .collect()
-            })
-            .collect()
-    }
+/// Views over most of the image.
+fn scene(camera: Intrinsics, noise_px: f64) -> BoardViews {
+    let offset_px = (0.15 * camera.fx, 0.1 * camera.fy);
+    BoardViews { offset_px, ..BoardViews::new(camera, GRID, noise_px) }
 }
 
 fn solved(views: &[Vec<Corner>], options: &Options) -> Result<Found, IntrinsicsError> {
@@ -78,7 +42,7 @@ fn off_in_sigmas(a: &Found, b: &Found) -> f64 {
 #[test]
 fn the_order_of_the_views_changes_nothing_but_rounding() {
     for distortion in [BROWN, Distortion::Fisheye([-0.02, 0.004, -0.003, 0.0005])] {
-        let mut views = Scene::new(distortion, 0.1).views(12, 3);
+        let mut views = scene(camera(distortion), 0.1).corners(12, 3);
         let a = solved(&views, &Options::new(distortion)).expect("solves");
         assert_eq!(a, solved(&views, &Options::new(distortion)).expect("solves"), "the same input gives the same bits");
         views.reverse();
@@ -94,7 +58,7 @@ fn where_it_starts_does_not_matter() {
     // From three views and from many, with noise enough to make the homographies poor.
     for (count, noise_px) in [(3, 0.1), (4, 0.5), (8, 0.5)] {
         for seed in 0..10 {
-            let views = Scene::new(Distortion::None, noise_px).views(count, 100 + seed);
+            let views = scene(camera(Distortion::None), noise_px).corners(count, 100 + seed);
             let blind = solved(&views, &Options::new(Distortion::None)).expect("solves");
             let guided = Options { start: Some(camera(Distortion::None)), ..Options::new(Distortion::None) };
             let guided = solved(&views, &guided).expect("solves");
@@ -108,9 +72,9 @@ fn a_wide_fisheye_is_found_without_a_start() {
     // 150° of view along the diagonal, with the target out to its rim.
     let distortion = Distortion::Fisheye([0.05, -0.01, 0.004, -0.001]);
     let truth = Intrinsics { fx: 300.0, fy: 300.0, ..camera(distortion) };
-    let mut scene = Scene::new(distortion, 0.1);
+    let mut scene = scene(camera(distortion), 0.1);
     (scene.camera, scene.distance_m) = (truth, (0.15, 0.3));
-    let found = solved(&scene.views(20, 5), &Options::new(distortion)).expect("solves");
+    let found = solved(&scene.corners(20, 5), &Options::new(distortion)).expect("solves");
     let covariance = found.covariance();
     for (i, (got, want)) in found.intrinsics.parameters().iter().zip(truth.parameters()).enumerate() {
         let sigma = covariance[(i, i)].sqrt();
@@ -121,9 +85,9 @@ fn a_wide_fisheye_is_found_without_a_start() {
 
 #[test]
 fn a_bent_target_misleads_a_flat_model_and_not_one_that_is_free_to_bend() {
-    let mut scene = Scene::new(BROWN, 0.1);
+    let mut scene = scene(camera(BROWN), 0.1);
     scene.shape = BoardShape { warp_m: [0.002, -0.001], scale: 1.0 };
-    let views = scene.views(20, 7);
+    let views = scene.corners(20, 7);
     let options = Options { bend: Bend::Always, ..Options::new(BROWN) };
     let (flat, bent) = (solved(&views, &Options::new(BROWN)).expect("flat"), solved(&views, &options).expect("bent"));
     assert!(flat.cost > 1.5 * bent.cost, "{} {}", flat.cost, bent.cost);
@@ -142,9 +106,9 @@ fn a_bent_target_misleads_a_flat_model_and_not_one_that_is_free_to_bend() {
 
 #[test]
 fn what_a_bend_would_do_is_known_without_a_fit_that_has_it() {
-    let mut scene = Scene::new(BROWN, 0.1);
+    let mut scene = scene(camera(BROWN), 0.1);
     scene.shape = BoardShape { warp_m: [0.0002, -0.0001], scale: 1.0 };
-    let views = scene.views(12, 21);
+    let views = scene.corners(12, 21);
     let flat = solved(&views, &Options::new(BROWN)).expect("flat");
     let bent = solved(&views, &Options { bend: Bend::Always, ..Options::new(BROWN) }).expect("bent");
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
@@ -176,7 +140,7 @@ fn independent_corners_scatter_as_much_as_expected() {
     const SESSIONS: u64 = 20;
     let (mut ratio, mut freedom) = (0.0, 0.0);
     for seed in 0..SESSIONS {
-        let views = Scene::new(BROWN, 0.1).views(8, 60 + seed);
+        let views = scene(camera(BROWN), 0.1).corners(8, 60 + seed);
         let found = solved(&views, &Options { bend: Bend::IfShown, ..Options::new(BROWN) }).expect("solves");
         assert_eq!(found.shape, BoardShape::FLAT);
         ratio += found.stated.ratio / SESSIONS as f64;
@@ -190,7 +154,7 @@ fn independent_corners_scatter_as_much_as_expected() {
 
 #[test]
 fn corners_seen_in_part_of_the_views_are_enough() {
-    let mut views = Scene::new(BROWN, 0.1).views(15, 8);
+    let mut views = scene(camera(BROWN), 0.1).corners(15, 8);
     for (i, view) in views.iter_mut().enumerate() {
         view.retain(|c| (c.index + i) % 3 != 0 && c.index % 10 < 4 + i % 7);
     }
@@ -205,7 +169,7 @@ fn corners_seen_in_part_of_the_views_are_enough() {
 
 #[test]
 fn a_corner_of_little_weight_counts_little_and_one_of_none_not_at_all() {
-    let mut views = Scene::new(Distortion::None, 0.1).views(8, 9);
+    let mut views = scene(camera(Distortion::None), 0.1).corners(8, 9);
     let options = Options::new(Distortion::None);
     let without: Vec<Vec<Corner>> = views.iter().map(|v| v[1..].to_vec()).collect();
     for view in &mut views {
@@ -223,9 +187,9 @@ fn a_corner_of_little_weight_counts_little_and_one_of_none_not_at_all() {
 
 #[test]
 fn a_pose_that_began_as_its_mirror_image_is_turned_round() {
-    let mut scene = Scene::new(Distortion::None, 0.2);
+    let mut scene = scene(camera(Distortion::None), 0.2);
     scene.distance_m = (1.5, 2.0);
-    let views = scene.views(10, 10);
+    let views = scene.corners(10, 10);
     let found = solved(&views, &Options::new(Distortion::None)).expect("solves");
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
     let (board, cancel) = (board(), CancelToken::default());
@@ -250,7 +214,7 @@ fn a_pose_that_began_as_its_mirror_image_is_turned_round() {
 
 #[test]
 fn unusable_input_is_refused_by_name() {
-    let views = Scene::new(Distortion::None, 0.1).views(5, 11);
+    let views = scene(camera(Distortion::None), 0.1).corners(5, 11);
     let options = Options::new(Distortion::None);
     assert_eq!(solved(&views[..2], &options), Err(IntrinsicsError::TooFewViews { got: 2, need: 3 }));
     let with = |change: &dyn Fn(&mut Vec<Corner>)| {

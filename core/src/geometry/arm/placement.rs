@@ -49,12 +49,8 @@ impl Placement {
 
     /// Root mean square of the distances, metres.
     pub fn rms_m(&self) -> f64 {
-        rms(self.misses.iter().map(|miss| miss.0))
-    }
-
-    /// Root mean square of the angles, radians.
-    pub fn rms_rad(&self) -> f64 {
-        rms(self.misses.iter().map(|miss| miss.1))
+        let count = self.misses.len().max(1) as f64;
+        (self.misses.iter().map(|miss| miss.0 * miss.0).sum::<f64>() / count).sqrt()
     }
 
     /// Whether every view is within [`DISTANCE_LIMIT_M`] and [`ROTATION_LIMIT_RAD`].
@@ -80,11 +76,6 @@ impl Placement {
             _ => Ok(()),
         }
     }
-}
-
-fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len().max(1) as f64;
-    (values.map(|v| v * v).sum::<f64>() / count).sqrt()
 }
 
 /// Finds where the arm stands and where its tip is: `base_from_first` and `flange_from_tip` with

@@ -134,13 +134,6 @@ pub struct PlanarPose {
 }
 
 impl PlanarPose {
-    /// Error of the best solution over that of the alternative: near 0 the pose is certain, near 1 it is a guess
-    /// (small or distant targets seen almost head-on). `None` without alternative.
-    pub fn ambiguity(&self) -> Option<f64> {
-        // Two perfect solutions cannot be told apart.
-        self.alternative.map(|a| if a.rms_px > 0.0 { self.best.rms_px / a.rms_px } else { 1.0 })
-    }
-
     /// The alternative, where so many corners with noise of `sigma_px` per axis leave it possible that it is the pose, and
     /// not `best`: whoever knows more of the view than its corners has to choose. At most one true pose in a million is
     /// missed.

@@ -57,8 +57,8 @@ impl Format for EasyHandeye {
         let [x, y, z] = transform.translation().map(Leaf::Number);
         let [qx, qy, qz, qw] = transform.xyzw().map(Leaf::Number);
         Yaml::parse(&file.text)?.compare(&[
-            ("parameters.eye_on_hand", Leaf::text((transform.mode == Mode::EyeInHand).to_string())),
-            ("parameters.freehand_robot_movement", Leaf::text("true")),
+            ("parameters.eye_on_hand", Leaf::Flag(transform.mode == Mode::EyeInHand)),
+            ("parameters.freehand_robot_movement", Leaf::Flag(true)),
             ("parameters.move_group", Leaf::text("manipulator")),
             ("parameters.move_group_namespace", Leaf::text("/")),
             ("parameters.namespace", Leaf::text(format!("/{}/", namespace(input, transform.mode)))),

@@ -60,7 +60,7 @@ impl Format for EasyHandeye2 {
             ("parameters.robot_effector_frame", Leaf::text(&names.effector_frame)),
             ("parameters.tracking_base_frame", Leaf::text(transform.child)),
             ("parameters.tracking_marker_frame", Leaf::text(&names.target_frame)),
-            ("parameters.freehand_robot_movement", Leaf::text("true")),
+            ("parameters.freehand_robot_movement", Leaf::Flag(true)),
             ("parameters.move_group_namespace", Leaf::text("/")),
             ("parameters.move_group", Leaf::text("manipulator")),
             ("transform.translation.x", x),

@@ -66,7 +66,7 @@ fn opencv_yaml_is_as_other_programs_write_it() {
     assert_eq!(lines[..2], ["%YAML:1.0", "---"]);
     assert!(lines[2].starts_with("# T_tool0_camera_color_optical_frame: "), "{}", lines[2]);
     let yaml = yaml::Yaml::parse(&text).expect("YAML");
-    let numbers = |path| yaml.numbers(path).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    let numbers = |path| yaml.numbers(path).unwrap_or_else(|e| panic!("{e}\n{text}")).to_vec();
     let mut rows = Vec::new();
     for (row, t) in MATRIX.iter().zip(GOLDEN_TRANSLATION_M) {
         rows.extend([row[0], row[1], row[2], t]);

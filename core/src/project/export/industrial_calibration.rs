@@ -77,7 +77,7 @@ impl Format for IndustrialCalibration {
     fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {
         let yaml = Yaml::parse(&file.text)?;
         let mut expected: Vec<(String, Leaf)> = vec![
-            ("converged".into(), Leaf::text("true")),
+            ("converged".into(), Leaf::Flag(true)),
             ("initial_cost_per_obs".into(), Leaf::Number(f64::NAN)),
             ("final_cost_per_obs".into(), Leaf::Number(final_cost(input))),
         ];

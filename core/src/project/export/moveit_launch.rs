@@ -3,6 +3,8 @@
 //! MoveIt prints Eigen's `eulerAngles(0, 1, 2)`, which are R = Rx · Ry · Rz, into its comment; in a URDF they are
 //! another rotation. The comment here has URDF's rpy.
 
+use roxmltree::Node;
+
 use super::input::NamedTransform;
 use super::text::{Rotation, about_transform, compare_numbers, compare_text, parse_exactly, spaced};
 use super::urdf::{compare_origin, origin};
@@ -37,10 +39,11 @@ impl Format for MoveitLaunch {
 
     fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {
         let transform = input.published(self.name()).map_err(|e| e.to_string())?;
-        let comment = file.text.lines().find(|line| line.contains("xyz=\"")).ok_or("no comment with xyz and rpy")?;
-        compare_origin(comment, &transform)?;
-        let text = xml::without_comments(&file.text)?;
-        let node = xml::start_tag(&text, "node")?;
+        let document = xml::parse(&file.text)?;
+        let mut comments = document.descendants().filter(Node::is_comment).filter_map(|comment| comment.text());
+        let origin = comments.find(|text| text.contains("xyz=\"")).ok_or("no comment with xyz and rpy")?;
+        compare_origin(xml::parse(&format!("<origin {origin}/>"))?.root_element(), &transform)?;
+        let node = xml::only(&document, "node")?;
         compare_text("pkg", xml::attribute(node, "pkg")?, "tf2_ros")?;
         compare_text("type", xml::attribute(node, "type")?, "static_transform_publisher")?;
         let words: Vec<&str> = xml::attribute(node, "args")?.split_whitespace().collect();

@@ -93,7 +93,7 @@ impl Format for RosCameraInfo {
             ("roi.y_offset", Leaf::Number(0.0)),
             ("roi.height", Leaf::Number(0.0)),
             ("roi.width", Leaf::Number(0.0)),
-            ("roi.do_rectify", Leaf::text("false")),
+            ("roi.do_rectify", Leaf::Flag(false)),
         ])
     }
 }

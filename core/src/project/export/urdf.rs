@@ -5,6 +5,7 @@
 //! Source: URDF XML specification (`origin`); REP 103 for the optical frame.
 
 use nalgebra::{Isometry3, Translation3};
+use roxmltree::Node;
 
 use super::input::NamedTransform;
 use super::text::{Rotation, about_transform, compare_isometry, compare_text, spaced};
@@ -23,10 +24,10 @@ pub(super) fn origin(transform: &NamedTransform<'_>) -> String {
     format!("xyz=\"{}\" rpy=\"{}\"", spaced(&transform.translation()), spaced(&transform.rpy()))
 }
 
-/// Compares the `xyz` and `rpy` of a tag as a URDF parser takes them.
-pub(super) fn compare_origin(tag: &str, transform: &NamedTransform<'_>) -> Result<(), String> {
-    let [x, y, z] = xml::numbers(tag, "xyz")?;
-    let rotation = rotation::from_rpy(xml::numbers(tag, "rpy")?);
+/// Compares the `xyz` and `rpy` of an element as a URDF parser takes them.
+pub(super) fn compare_origin(node: Node<'_, '_>, transform: &NamedTransform<'_>) -> Result<(), String> {
+    let [x, y, z] = xml::numbers(node, "xyz")?;
+    let rotation = rotation::from_rpy(xml::numbers(node, "rpy")?);
     let got = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
     compare_isometry("the origin", &got, &transform.isometry)
 }
@@ -58,12 +59,12 @@ impl Format for Urdf {
 
     fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {
         let transform = input.published(self.name()).map_err(|e| e.to_string())?;
-        let text = xml::without_comments(&file.text)?;
-        let attribute = |element, name| xml::start_tag(&text, element).and_then(|tag| xml::attribute(tag, name));
+        let document = xml::parse(&file.text)?;
+        let attribute = |element, name| xml::only(&document, element).and_then(|node| xml::attribute(node, name));
         compare_text("the joint's type", attribute("joint", "type")?, "fixed")?;
         compare_text("the joint's name", attribute("joint", "name")?, &joint_name(&transform))?;
         compare_text("the parent", attribute("parent", "link")?, transform.parent)?;
         compare_text("the child", attribute("child", "link")?, transform.child)?;
-        compare_origin(xml::start_tag(&text, "origin")?, &transform)
+        compare_origin(xml::only(&document, "origin")?, &transform)
     }
 }

@@ -102,14 +102,7 @@ impl Format for Visp {
         compare_text("the name of the pose file", &file.name, pose_file(&transform))?;
         let yaml = Yaml::parse(&file.text)?;
         compare_numbers("rows and cols", &[yaml.number("rows")?, yaml.number("cols")?], &[6.0, 1.0])?;
-        let mut values = [0.0; 6];
-        for (row, value) in values.iter_mut().enumerate() {
-            let [only] = yaml.numbers(&format!("data.{row}"))?[..] else {
-                return Err(format!("row {row} is no number"));
-            };
-            *value = only;
-        }
-        let [x, y, z, rx, ry, rz] = values;
+        let &[x, y, z, rx, ry, rz] = yaml.numbers("data")? else { return Err("data has not six numbers".into()) };
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz));
         let got = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
         compare_isometry("the pose", &got, &transform.isometry)
@@ -117,9 +110,9 @@ impl Format for Visp {
 }
 
 fn compare_camera(text: &str, k: &Intrinsics, name: &str) -> Result<(), String> {
-    let text = xml::without_comments(text)?;
-    compare_text("name", xml::element_text(&text, "name")?, name)?;
-    compare_text("type", xml::element_text(&text, "type")?, "perspectiveProjWithoutDistortion")?;
+    let document = xml::parse(text)?;
+    compare_text("name", xml::element_text(&document, "name")?, name)?;
+    compare_text("type", xml::element_text(&document, "type")?, "perspectiveProjWithoutDistortion")?;
     let expected = [
         ("image_width", k.width.into()),
         ("image_height", k.height.into()),
@@ -129,7 +122,7 @@ fn compare_camera(text: &str, k: &Intrinsics, name: &str) -> Result<(), String> 
         ("v0", k.cy),
     ];
     for (element, value) in expected {
-        let got = super::text::parse_number(element, xml::element_text(&text, element)?)?;
+        let got = super::text::parse_number(element, xml::element_text(&document, element)?)?;
         compare_numbers(element, &[got], &[value])?;
     }
     Ok(())

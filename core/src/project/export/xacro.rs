@@ -45,15 +45,15 @@ impl Format for Xacro {
 
     fn compare(&self, file: &ExportFile, input: &ExportInput<'_>) -> Result<(), String> {
         let transform = input.published(self.name()).map_err(|e| e.to_string())?;
-        let text = xml::without_comments(&file.text)?;
-        let attribute = |element, name| xml::start_tag(&text, element).and_then(|tag| xml::attribute(tag, name));
-        compare_text("the macro's name", attribute("xacro:macro", "name")?, &macro_name(input))?;
+        let document = xml::parse(&file.text)?;
+        let attribute = |element, name| xml::only(&document, element).and_then(|node| xml::attribute(node, name));
+        compare_text("the macro's name", attribute("macro", "name")?, &macro_name(input))?;
         let parameters = format!("parent:={}", transform.parent);
-        compare_text("the macro's parameters", attribute("xacro:macro", "params")?, &parameters)?;
+        compare_text("the macro's parameters", attribute("macro", "params")?, &parameters)?;
         compare_text("the joint's type", attribute("joint", "type")?, "fixed")?;
         compare_text("the parent", attribute("parent", "link")?, "${parent}")?;
         compare_text("the child", attribute("child", "link")?, transform.child)?;
         compare_text("the link", attribute("link", "name")?, transform.child)?;
-        compare_origin(xml::start_tag(&text, "origin")?, &transform)
+        compare_origin(xml::only(&document, "origin")?, &transform)
     }
 }

@@ -1,4 +1,6 @@
-//! The little of XML that the exports use, read back: attributes and texts of elements that are there once.
+//! XML of the exports: comments written, and elements read back by a reader that is not ours.
+
+use roxmltree::{Document, Node};
 
 use super::text::parse_exactly;
 
@@ -11,46 +13,27 @@ pub(super) fn comment(text: &str) -> String {
     format!("<!-- {text} -->")
 }
 
-/// The text without its comments.
-pub(super) fn without_comments(text: &str) -> Result<String, String> {
-    let mut out = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some((before, after)) = rest.split_once("<!--") {
-        out.push_str(before);
-        rest = after.split_once("-->").ok_or("a comment has no end")?.1;
-    }
-    out.push_str(rest);
-    Ok(out)
+pub(super) fn parse(text: &str) -> Result<Document<'_>, String> {
+    Document::parse(text).map_err(|e| format!("the file is no XML: {e}"))
 }
 
-/// The start tag of the only element of that name, without its brackets.
-pub(super) fn start_tag<'a>(text: &'a str, element: &str) -> Result<&'a str, String> {
-    let mut found = text.match_indices('<').filter_map(|(at, _)| {
-        let tag = text[at + 1..].split_once('>')?.0;
-        let name_end = tag.find(|c: char| c.is_ascii_whitespace() || c == '/').unwrap_or(tag.len());
-        (&tag[..name_end] == element).then_some(tag)
-    });
-    let tag = found.next().ok_or_else(|| format!("no element {element}"))?;
-    if found.next().is_some() { Err(format!("more than one element {element}")) } else { Ok(tag) }
+/// The only element of that name, in whatever namespace.
+pub(super) fn only<'a, 'input>(document: &'a Document<'input>, element: &str) -> Result<Node<'a, 'input>, String> {
+    let mut found = document.descendants().filter(|node| node.is_element() && node.tag_name().name() == element);
+    let node = found.next().ok_or_else(|| format!("no element {element}"))?;
+    if found.next().is_some() { Err(format!("more than one element {element}")) } else { Ok(node) }
 }
 
-/// An attribute in a start tag.
-pub(super) fn attribute<'a>(tag: &'a str, name: &str) -> Result<&'a str, String> {
-    let missing = || format!("no attribute {name} in <{tag}>");
-    let key = format!("{name}=\"");
-    let is_start = |at: usize| at > 0 && tag.as_bytes()[at - 1].is_ascii_whitespace();
-    let at = tag.match_indices(&key).map(|(at, _)| at).find(|at| is_start(*at)).ok_or_else(missing)?;
-    tag[at + key.len()..].split_once('"').map(|(value, _)| value).ok_or_else(missing)
+pub(super) fn attribute<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
+    node.attribute(name).ok_or_else(|| format!("no attribute {name} in <{}>", node.tag_name().name()))
 }
 
 /// Numbers in an attribute.
-pub(super) fn numbers<const N: usize>(tag: &str, name: &str) -> Result<[f64; N], String> {
-    parse_exactly(name, attribute(tag, name)?)
+pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, name: &str) -> Result<[f64; N], String> {
+    parse_exactly(name, attribute(node, name)?)
 }
 
 /// The text of the only element of that name.
-pub(super) fn element_text<'a>(text: &'a str, element: &str) -> Result<&'a str, String> {
-    start_tag(text, element)?;
-    let (_, after) = text.split_once(&format!("<{element}>")).ok_or_else(|| format!("{element} has attributes"))?;
-    after.split_once("</").map(|(value, _)| value.trim()).ok_or_else(|| format!("{element} has no end"))
+pub(super) fn element_text<'a>(document: &'a Document<'_>, element: &str) -> Result<&'a str, String> {
+    only(document, element)?.text().map(str::trim).ok_or_else(|| format!("{element} has no text"))
 }

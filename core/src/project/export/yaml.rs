@@ -1,19 +1,23 @@
-//! The little of YAML that the exports use, read back: nested maps by indentation, scalars, lists in brackets over one
-//! or more lines, items of lists behind `-`, `%` and `---` lines, comments, and OpenCV's tags.
+//! YAML of the exports read back, by a reader that is not ours, and compared.
 
 use std::collections::BTreeMap;
 
-use super::text::{compare_numbers, compare_text, parse_number};
+use saphyr::{LoadableYamlNode as _, Scalar, Yaml as Node};
 
-/// The scalars and lists of a document by their path, `transform.rotation.x`; an item of a list has its number as key.
+use super::text::{compare_numbers, compare_text};
+
+/// The scalars of a document and its lists of numbers, by their path, `transform.rotation.x`.
 #[derive(Debug)]
-pub(super) struct Yaml(BTreeMap<String, String>);
+pub(super) struct Yaml(BTreeMap<String, Leaf>);
 
-/// What a path has to hold.
+/// What a path holds.
+#[derive(Debug)]
 pub(super) enum Leaf {
     Number(f64),
+    /// The numbers of a list, those of lists in it one after the other.
     Numbers(Vec<f64>),
     Text(String),
+    Flag(bool),
 }
 
 impl Leaf {
@@ -24,56 +28,25 @@ impl Leaf {
 
 impl Yaml {
     pub fn parse(text: &str) -> Result<Self, String> {
-        let mut values: BTreeMap<String, String> = BTreeMap::new();
-        let mut open: Vec<(usize, String)> = Vec::new();
-        let mut lines = text.lines();
-        let mut items = 0;
-        while let Some(line) = lines.next() {
-            let content = line.trim();
-            if content.is_empty() || content.starts_with(['#', '%']) || content == "---" {
-                continue;
-            }
-            let indent = line.len() - line.trim_start().len();
-            let (key, value) = if let Some(item) = content.strip_prefix("- ") {
-                items += 1;
-                ((items - 1).to_string(), item)
-            } else if content.starts_with('[') {
-                // A list on the lines below its key.
-                let (outer, key) = open.pop().ok_or("a list without a key")?;
-                if outer >= indent {
-                    return Err(format!("the list of {key} is not indented"));
-                }
-                (key, content)
-            } else {
-                let (key, value) = content.split_once(':').ok_or_else(|| format!("no key in {content:?}"))?;
-                items = 0;
-                (key.to_owned(), value)
-            };
-            open.retain(|(outer, _)| *outer < indent);
-            open.push((indent, key));
-            let path = open.iter().map(|(_, key)| key.as_str()).collect::<Vec<_>>().join(".");
-            let mut value = value.trim().to_owned();
-            while value.starts_with('[') && value.matches('[').count() > value.matches(']').count() {
-                let more = lines.next().ok_or_else(|| format!("{path} has no end"))?;
-                value.push(' ');
-                value.push_str(more.trim());
-            }
-            let is_nested = value.is_empty() || value.starts_with("!!");
-            if !is_nested && values.insert(path.clone(), value).is_some() {
-                return Err(format!("{path} is there twice"));
-            }
-        }
-        Ok(Self(values))
+        let documents = Node::load_from_str(text).map_err(|e| format!("the file is no YAML: {e}"))?;
+        let [document] = documents.as_slice() else {
+            return Err(format!("the file has {} documents of YAML", documents.len()));
+        };
+        let mut leaves = BTreeMap::new();
+        collect(document, String::new(), &mut leaves)?;
+        Ok(Self(leaves))
     }
 
     /// Compares every value with what it has to be; nothing may be missing and nothing may be there besides.
     pub fn compare(&self, expected: &[(impl AsRef<str>, Leaf)]) -> Result<(), String> {
         for (path, leaf) in expected {
             let path = path.as_ref();
-            match leaf {
-                Leaf::Number(value) => compare_numbers(path, &[self.number(path)?], &[*value])?,
-                Leaf::Numbers(values) => compare_numbers(path, &self.numbers(path)?, values)?,
-                Leaf::Text(text) => compare_text(path, self.text(path)?, text)?,
+            match (self.leaf(path)?, leaf) {
+                (Leaf::Number(got), Leaf::Number(value)) => compare_numbers(path, &[*got], &[*value])?,
+                (Leaf::Numbers(got), Leaf::Numbers(values)) => compare_numbers(path, got, values)?,
+                (Leaf::Text(got), Leaf::Text(text)) => compare_text(path, got, text)?,
+                (Leaf::Flag(got), Leaf::Flag(flag)) if got == flag => {}
+                (got, leaf) => return Err(format!("{path} is {got:?}, not {leaf:?}")),
             }
         }
         let is_expected = |path: &str| expected.iter().any(|(known, _)| known.as_ref() == path);
@@ -83,22 +56,58 @@ impl Yaml {
             .map_or(Ok(()), |path| Err(format!("{path} does not belong there")))
     }
 
-    pub fn text(&self, path: &str) -> Result<&str, String> {
-        self.0.get(path).map(|v| v.trim_matches('"')).ok_or_else(|| format!("{path} is missing"))
+    fn leaf(&self, path: &str) -> Result<&Leaf, String> {
+        self.0.get(path).ok_or_else(|| format!("{path} is missing"))
     }
 
     pub fn number(&self, path: &str) -> Result<f64, String> {
-        match self.text(path)? {
-            ".nan" => Ok(f64::NAN),
-            text => parse_number(path, text),
+        match self.leaf(path)? {
+            Leaf::Number(number) => Ok(*number),
+            other => Err(format!("{path} is {other:?}, not a number")),
         }
     }
 
-    /// The numbers of a list, those of lists in it one after the other.
-    pub fn numbers(&self, path: &str) -> Result<Vec<f64>, String> {
-        let text = self.text(path)?;
-        let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']'));
-        let inner = inner.ok_or_else(|| format!("{path} is not a list"))?.replace(['[', ']'], " ");
-        inner.split(',').map(str::trim).filter(|e| !e.is_empty()).map(|e| parse_number(path, e)).collect()
+    pub fn numbers(&self, path: &str) -> Result<&[f64], String> {
+        match self.leaf(path)? {
+            Leaf::Numbers(numbers) => Ok(numbers),
+            other => Err(format!("{path} is {other:?}, not a list of numbers")),
+        }
     }
+}
+
+fn collect(node: &Node<'_>, path: String, leaves: &mut BTreeMap<String, Leaf>) -> Result<(), String> {
+    let leaf = match node {
+        Node::Mapping(entries) => {
+            for (key, value) in entries {
+                let key = key.as_str().ok_or_else(|| format!("a key in {path:?} is no text"))?;
+                let inner = if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+                collect(value, inner, leaves)?;
+            }
+            return Ok(());
+        }
+        // OpenCV's tag of a matrix.
+        Node::Tagged(_, inner) => return collect(inner, path, leaves),
+        Node::Sequence(_) => {
+            let mut values = Vec::new();
+            numbers_in(node, &path, &mut values)?;
+            Leaf::Numbers(values)
+        }
+        Node::Value(Scalar::String(text)) => Leaf::text(text.as_ref()),
+        Node::Value(Scalar::Boolean(flag)) => Leaf::Flag(*flag),
+        other => Leaf::Number(number(other).ok_or_else(|| format!("{path} is {other:?}"))?),
+    };
+    leaves.insert(path, leaf);
+    Ok(())
+}
+
+fn numbers_in(node: &Node<'_>, path: &str, values: &mut Vec<f64>) -> Result<(), String> {
+    if let Node::Sequence(items) = node {
+        return items.iter().try_for_each(|item| numbers_in(item, path, values));
+    }
+    values.push(number(node).ok_or_else(|| format!("{path} has {node:?} among its numbers"))?);
+    Ok(())
+}
+
+fn number(node: &Node<'_>) -> Option<f64> {
+    node.as_floating_point().or_else(|| node.as_integer().map(|integer| integer as f64))
 }

@@ -138,7 +138,8 @@ fn sensors_show_a_joint_that_was_moved_within_a_pass_when_they_are_handled() {
 fn explicitly_handled_sensors_wait_for_the_request() {
     let (mut world, _, sensor) = world();
     assert_eq!(world.handle_sensors(Sensors::One(sensor)), Err(WorldError::NotExplicitlyHandled));
-    world.tree.sensor_mut(sensor).expect("sensor").explicit = true;
+    let Kind::VisionSensor(handled) = &mut world.tree.get_mut(sensor).expect("there").kind else { panic!("a sensor") };
+    handled.explicit = true;
     world.start_simulation();
     world.run_pass();
     assert!(world.tree.sensor(sensor).expect("sensor").shown().is_none());

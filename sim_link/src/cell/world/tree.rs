@@ -217,17 +217,6 @@ impl Tree {
         }
     }
 
-    /// The vision sensor with this handle, to change.
-    ///
-    /// # Errors
-    /// No such object, or not a vision sensor.
-    pub fn sensor_mut(&mut self, handle: Handle) -> Result<&mut VisionSensor, WorldError> {
-        match &mut self.get_mut(handle)?.kind {
-            Kind::VisionSensor(sensor) => Ok(sensor),
-            _ => Err(WorldError::NotAVisionSensor),
-        }
-    }
-
     /// Removes an object; its children go to its parent and stay where they are in the world.
     ///
     /// # Errors

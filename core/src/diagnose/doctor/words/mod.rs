@@ -34,12 +34,11 @@ pub(super) fn not_finite(sight: &SessionViews) -> Option<Finding> {
         return None;
     }
     let count = names.len();
-    let what = if count == 1 {
-        text!("{count} view with a pose or a corner that is not a number ({list}).")
-    } else {
-        text!("{count} views with a pose or a corner that is not a number ({list}).")
-    };
-    let what = what.with("count", count).with("list", listed(names));
+    let what = text!(
+        "{count} {count|view|views} with a pose or a corner that is not a number ({list}).",
+        count = count,
+        list = listed(names)
+    );
     let text = Text::sentences([what, text!("Write the table anew, or leave them out.")]);
     let mut finding = Finding::new(FindingCode::NotFinite, Severity::Problem, text);
     finding.views.clone_from(names);

@@ -1,33 +1,44 @@
-//! Sessions of a simulated cell with known faults: poses and corners, no images.
+//! Simulated sessions with known faults: poses and corners, no images.
+
+mod arm;
 
 use std::fmt;
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView};
-use handeye_core::geometry::camera::Distortion;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::geometry::se3;
-use handeye_core::targets::observation::Corner;
-use handeye_core::testing::sessions::{BOARD, GRID, board_at, camera, noise_twist, noisy, normal};
-use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
-use rand::{RngExt as _, SeedableRng as _};
+use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
+use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::arm;
+use super::sessions::{BOARD, Cone, GRID, base_from_tip, camera, noise_twist, normal, seen};
+use crate::estimate::handeye::Mode;
+use crate::estimate::handeye::joint::camera_from_target;
+use crate::estimate::{CameraKnowledge, Observations, ObservedView};
+use crate::geometry::camera::Distortion;
+use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use crate::geometry::se3;
+use crate::targets::bent::{BoardPoints, BoardShape};
 
-/// How views are taken.
+pub use arm::LinkErrors;
+
+/// How views are taken, and what is wrong.
 #[derive(Clone)]
 pub struct Setup {
+    /// Where the camera is.
     pub mode: Mode,
+    /// Number of views.
     pub views: usize,
+    /// Largest tilt of the board, degrees.
     pub tilt_deg: f64,
+    /// Largest turn of the board about its normal either way, degrees.
     pub roll_deg: f64,
-    /// Noise of a corner in pixels, of the robot in metres and radians, per axis.
+    /// Noise of a corner per axis, pixels.
     pub corner_px: f64,
+    /// Noise of the robot per axis, metres.
     pub robot_m: f64,
+    /// And of its rotation, radians.
     pub robot_rad: f64,
     /// Whether intrinsics are estimated.
     pub estimated: bool,
+    /// Whether joint angles are known.
     pub joints: bool,
     /// Errors of the arm that depend on where it stands.
     pub arm_error: ArmError,
@@ -35,7 +46,9 @@ pub struct Setup {
     pub shared_px: f64,
     /// Views are taken level by level, each along a round, as a person or a plan does; otherwise in no order.
     pub by_level: bool,
+    /// Of the random numbers.
     pub seed: u64,
+    /// What is wrong.
     pub fault: Fault,
 }
 
@@ -48,7 +61,7 @@ pub enum ArmError {
     /// A twist of the tip that grows with its place in the base, per metre from [`WORKPLACE`].
     Affine(SMatrix<f64, 6, 3>),
     /// What is wrong with every link.
-    Links(arm::LinkErrors),
+    Links(LinkErrors),
 }
 
 /// The middle of where the tip is in both set-ups, metres in the base.
@@ -65,7 +78,7 @@ pub struct Fault {
     pub joint: Option<(usize, f64)>,
     /// True size of the target over the stated one, minus one.
     pub scale: f64,
-    /// Deflection of the target's middle, metres.
+    /// Deflection of the target's middle along x and along y, metres.
     pub warp_m: f64,
     /// Views taken in motion: the tip was elsewhere by a twist, and the corners are blurred.
     pub moving: Vec<(usize, Vector6<f64>)>,
@@ -74,12 +87,13 @@ pub struct Fault {
 }
 
 impl Setup {
+    /// A good robot and a good camera, which is given, with nothing wrong.
     pub fn new(mode: Mode, views: usize, seed: u64) -> Self {
         Self {
             mode,
             views,
-            tilt_deg: 35.0,
-            roll_deg: 60.0,
+            tilt_deg: Cone::PUBLISHED.tilt_deg,
+            roll_deg: Cone::PUBLISHED.roll_deg,
             corner_px: 0.1,
             robot_m: 1e-4,
             robot_rad: 0.02f64.to_radians(),
@@ -93,8 +107,15 @@ impl Setup {
         }
     }
 
+    /// The same with a fault.
+    #[must_use]
     pub fn with(self, fault: Fault) -> Self {
         Self { fault, ..self }
+    }
+
+    /// The shape of the target.
+    fn shape(&self) -> BoardShape {
+        BoardShape { warp_m: [self.fault.warp_m; 2], scale: 1.0 + self.fault.scale }
     }
 }
 
@@ -117,45 +138,39 @@ impl fmt::Display for Setup {
     }
 }
 
-fn pose(x: f64, y: f64, z: f64, rotation: Vector3<f64>) -> Isometry3<f64> {
-    Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_scaled_axis(rotation))
+fn pose<Dst, Src>(place: [f64; 3], rotation: [f64; 3]) -> Pose<Dst, Src> {
+    let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(rotation));
+    Pose::from_isometry(Isometry3::from_parts(Translation3::from(place), rotation))
 }
 
 /// The camera on its mount and the target on its anchor.
-pub fn links(mode: Mode) -> (Isometry3<f64>, Isometry3<f64>) {
+pub fn links(mode: Mode) -> (Pose<Mount, Camera>, Pose<Anchor, Target>) {
     let pi = std::f64::consts::PI;
     match mode {
         // Board on the table, face up; camera beside the flange, looking along it.
-        Mode::EyeInHand => (
-            pose(0.05, 0.01, 0.06, Vector3::new(0.1, -0.05, 1.4)),
-            pose(0.42, 0.06, 0.02, Vector3::new(pi - 0.04, 0.03, 0.05)),
-        ),
+        Mode::EyeInHand => {
+            (pose([0.05, 0.01, 0.06], [0.1, -0.05, 1.4]), pose([0.42, 0.06, 0.02], [pi - 0.04, 0.03, 0.05]))
+        }
         // Camera above the arm, looking down; board held by the flange, face up.
-        Mode::EyeToHand => (
-            pose(0.45, 0.05, 0.95, Vector3::new(pi - 0.1, 0.05, 0.1)),
-            pose(-0.06, -0.04, 0.03, Vector3::new(0.05, -0.1, 0.3)),
-        ),
+        Mode::EyeToHand => {
+            (pose([0.45, 0.05, 0.95], [pi - 0.1, 0.05, 0.1]), pose([-0.06, -0.04, 0.03], [0.05, -0.1, 0.3]))
+        }
     }
 }
 
-/// A random view of the board at 0.4 to 0.6 m.
-fn random_view(rng: &mut ChaCha8Rng, setup: &Setup) -> Isometry3<f64> {
-    let tilt = setup.tilt_deg.to_radians() * rng.random::<f64>().sqrt();
-    let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
-    let roll = setup.roll_deg.to_radians() * rng.random_range(-1.0..=1.0);
-    let jitter = Vector3::new(rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), rng.random_range(0.4..0.6));
-    board_at(jitter, [tilt, azimuth, roll])
-}
-
 /// Random views of the setup's geometry.
+///
+/// # Panics
+/// When hardly any view of it is in reach of the arm and in sight of the camera.
 pub fn session(setup: &Setup) -> Observations {
     let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+    let cone = Cone { tilt_deg: setup.tilt_deg, roll_deg: setup.roll_deg, ..Cone::PUBLISHED };
     let (mut views, mut planned) = (Vec::with_capacity(setup.views), Vec::new());
     let mut tries = 0;
     while views.len() < setup.views {
         tries += 1;
         assert!(tries < 100 * setup.views + 1000, "no such view is in reach");
-        let next = random_view(&mut rng, setup);
+        let next = cone.draw(&mut rng);
         if let Some(view) = observed(setup, &mut rng, views.len(), &next) {
             views.push(view);
             planned.push(next);
@@ -195,69 +210,68 @@ fn observations(setup: &Setup, views: Vec<ObservedView>) -> Observations {
 /// One view: the robot reports the pose planned, and is somewhere else by its noise and the faults.
 fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometry3<f64>) -> Option<ObservedView> {
     let (mount_from_camera, anchor_from_target) = links(setup.mode);
-    let anchor_from_mount = anchor_from_target * planned.inverse() * mount_from_camera.inverse();
-    let reported = if setup.mode == Mode::EyeInHand { anchor_from_mount } else { anchor_from_mount.inverse() };
+    let planned = Pose::from_isometry(*planned);
+    let reported = base_from_tip(setup.mode, &mount_from_camera, &anchor_from_target, &planned);
     let fault = &setup.fault;
+    let arm = arm::as_stated();
     let mut twists = Vec::new();
     let mut off = Isometry3::identity();
     if setup.joints || fault.joint.is_some() {
-        let joints = arm::joints_at(&reported)?;
-        twists = arm::tip_by_joint(&joints).to_vec();
+        let joints = arm::joints_at(&arm, reported.isometry())?;
+        twists = arm.tip_by_joint(&joints).ok()?;
         if let Some((joint, offset)) = fault.joint {
             let mut really = joints;
             really[joint] += offset;
-            off = reported.inverse() * arm::base_from_tip(&really);
+            off = reported.isometry().inverse() * arm::base_from_tip(&arm, &really);
         }
     }
     match &setup.arm_error {
         ArmError::None => {}
-        ArmError::Affine(per_metre) => off *= se3::exp(&(per_metre * (reported.translation.vector - WORKPLACE))),
+        ArmError::Affine(per_metre) => off *= se3::exp(&(per_metre * (reported.translation() - WORKPLACE))),
         ArmError::Links(errors) => {
-            off = off * reported.inverse() * arm::with_errors(&arm::joints_at(&reported)?, errors);
+            let joints = arm::joints_at(&arm, reported.isometry())?;
+            off = off * reported.isometry().inverse() * arm::base_from_tip(&arm::with_errors(errors), &joints);
         }
     }
     let noise = noise_twist(rng, setup.robot_m, setup.robot_rad);
-    let mut tip = reported * off * se3::exp(&noise);
+    let mut tip: Pose<Base, Tip> = Pose::from_isometry(reported.isometry() * off).perturbed(&noise);
     let moving = fault.moving.iter().find(|(view, _)| *view == index).map(|(_, twist)| twist);
     if let Some(twist) = moving {
-        tip *= se3::exp(twist);
+        tip = tip.perturbed(twist);
     }
     let after = |step: &Option<(usize, Vector6<f64>)>| match step {
-        Some((from, twist)) if index >= *from => se3::exp(twist),
-        _ => Isometry3::identity(),
+        Some((from, twist)) if index >= *from => *twist,
+        _ => Vector6::zeros(),
     };
-    let mount_from_camera = mount_from_camera * after(&fault.camera_moved);
-    let anchor_from_target = anchor_from_target * after(&fault.board_moved);
-    let mount_from_anchor = if setup.mode == Mode::EyeInHand { tip.inverse() } else { tip };
-    let camera_from_target = mount_from_camera.inverse() * mount_from_anchor * anchor_from_target;
+    let camera_from_target = camera_from_target(
+        setup.mode,
+        &tip,
+        &mount_from_camera.perturbed(&after(&fault.camera_moved)),
+        &anchor_from_target.perturbed(&after(&fault.board_moved)),
+    );
     let noise_px = if moving.is_some() { 3.0 * setup.corner_px } else { setup.corner_px };
-    let lens = camera();
     let mut shared = SMatrix::<f64, 2, 6>::zeros();
     if setup.shared_px > 0.0 {
         shared = SMatrix::from_fn(|_, _| normal(rng) * setup.shared_px);
     }
-    let corners: Vec<Corner> = (0..GRID.len())
-        .map(|i| {
-            let mut point = GRID.point(i);
-            let (u, v) = (2.0 * point.x / (9.0 * GRID.square_m) - 1.0, 2.0 * point.y / (6.0 * GRID.square_m) - 1.0);
-            let bend = shared * Vector6::new(1.0, u, v, u * v, u * u, v * v) / 2.0;
-            point.z += fault.warp_m * (2.0 - u * u - v * v);
-            point.coords *= 1.0 + fault.scale;
-            let px = lens.project(&(camera_from_target * point)).ok()?;
-            let seen = noisy(rng, &px, noise_px) + bend;
-            lens.contains(&seen).then_some(Corner::new(i, seen))
-        })
-        .collect::<Option<_>>()?;
+    let bend = |i: usize| -> Vector2<f64> {
+        let point = GRID.point(i);
+        let (u, v) = (2.0 * point.x / (9.0 * GRID.square_m) - 1.0, 2.0 * point.y / (6.0 * GRID.square_m) - 1.0);
+        shared * Vector6::new(1.0, u, v, u * v, u * u, v * v) / 2.0
+    };
+    let points = BoardPoints::new(&BOARD.points()).points(&setup.shape());
+    let corners = seen(rng, &camera(), camera_from_target.isometry(), &points, noise_px, bend)?;
     Some(ObservedView {
         tip_by_joint: if setup.joints { twists } else { Vec::new() },
-        ..ObservedView::new(format!("{index:03}"), Some(Pose::from_isometry(reported)), Some(corners))
+        ..ObservedView::new(format!("{index:03}"), Some(reported), Some(corners))
     })
 }
 
 /// Changes every robot pose.
+#[must_use]
 pub fn changed(mut observations: Observations, change: impl Fn(Isometry3<f64>) -> Isometry3<f64>) -> Observations {
     for view in &mut observations.views {
-        view.base_from_tip = view.base_from_tip.map(|p: Pose<Base, Tip>| Pose::from_isometry(change(*p.isometry())));
+        view.base_from_tip = view.base_from_tip.map(|p| Pose::from_isometry(change(*p.isometry())));
     }
     observations
 }

@@ -1,0 +1,63 @@
+//! The UR5 of the simulated sessions, whose links may have errors.
+
+use nalgebra::{Isometry3, Matrix6, SMatrix};
+
+use crate::geometry::arm::{Arm, ArmKind, ArmModel, DhRow};
+use crate::geometry::se3;
+
+/// Where the search for joint angles starts.
+const STARTS: [[f64; 6]; 3] =
+    [[0.0, -1.2, 1.6, -1.9, -1.5, 0.0], [0.4, -1.6, 2.0, -2.0, -1.6, 1.0], [-0.4, -1.0, 1.2, -1.7, -1.4, -1.0]];
+
+/// What every link has more than its data sheet says: `a`, `d` in metres, `alpha` and the joint's zero in radians.
+pub type LinkErrors = [[f64; 4]; 6];
+
+/// The arm of the data sheet.
+pub(super) fn as_stated() -> Arm {
+    ArmModel::Kind(ArmKind::Ur5).arm().expect("built in")
+}
+
+/// The same with errors of its links.
+pub(super) fn with_errors(errors: &LinkErrors) -> Arm {
+    let stated = as_stated();
+    let rows = stated.rows().iter().zip(errors).map(|(row, [a, d, alpha, zero])| DhRow {
+        a_m: row.a_m + a,
+        alpha_rad: row.alpha_rad + alpha,
+        d_m: row.d_m + d,
+        theta_offset_rad: row.theta_offset_rad + zero,
+    });
+    Arm::new(rows.collect()).expect("small errors")
+}
+
+/// The tip's pose at joint angles, radians.
+pub(super) fn base_from_tip(arm: &Arm, joints: &[f64; 6]) -> Isometry3<f64> {
+    *arm.forward(joints).expect("six joints").isometry()
+}
+
+/// Whether the arm stands as it does in a session that is moved through without turning over: in front of its base, the
+/// elbow up and the wrist to one side. The errors of its links are other ones on every branch.
+fn is_usual(joints: &[f64; 6]) -> bool {
+    let [base, shoulder, elbow, _, wrist, _] = joints.map(|angle| angle.sin().atan2(angle.cos()));
+    base.abs() < std::f64::consts::FRAC_PI_2 && shoulder < 0.0 && elbow > 0.0 && wrist < 0.0
+}
+
+/// Joint angles that reach a pose in the usual way; `None` when it is out of reach.
+pub(super) fn joints_at(arm: &Arm, target: &Isometry3<f64>) -> Option<[f64; 6]> {
+    STARTS.iter().find_map(|start| {
+        let mut joints = *start;
+        for _ in 0..60 {
+            let error = se3::log(&(base_from_tip(arm, &joints).inverse() * target));
+            if error.norm() < 1e-10 {
+                return is_usual(&joints).then_some(joints);
+            }
+            let jacobian: Matrix6<f64> = SMatrix::from_columns(&arm.tip_by_joint(&joints).ok()?);
+            let damped = jacobian.transpose() * jacobian + Matrix6::identity() * 1e-6;
+            let step = damped.try_inverse()? * jacobian.transpose() * error;
+            let length = step.amax().max(0.5) / 0.5;
+            for (q, s) in joints.iter_mut().zip(step.iter()) {
+                *q += s / length;
+            }
+        }
+        None
+    })
+}
