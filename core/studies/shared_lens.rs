@@ -12,8 +12,7 @@ use handeye_core::estimate::shared_lens::{NamedSession, calibrate_sharing_lens};
 use handeye_core::estimate::{self, Calibration, CameraKnowledge, Method, Observations, Options};
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::progress::CancelToken;
-use handeye_core::testing::sessions::{REALISTIC, Trial, camera, trial};
-use nalgebra::Vector2;
+use handeye_core::testing::sessions::{REALISTIC, Trial, add_waves, camera, trial};
 use rayon::prelude::*;
 
 /// A mild barrel lens, as in the Monte-Carlo study.
@@ -64,11 +63,7 @@ fn session(lens: Lens, views: usize, is_last: bool, seed: u64) -> (Trial, Observ
     let intrinsics = Intrinsics { distortion: DISTORTION, fx: focal_px, fy: focal_px, ..camera() };
     let mut trial = trial(Mode::EyeInHand, views, &REALISTIC, intrinsics, seed);
     if lens == Lens::Waves {
-        let turns = std::f64::consts::TAU / WAVE_LENGTH_PX;
-        for corner in trial.views.iter_mut().flat_map(|view| &mut view.corners) {
-            let wave = Vector2::new((corner.px.y * turns + 1.0).sin(), (corner.px.x * turns).sin());
-            corner.px += wave * WAVE_PX;
-        }
+        add_waves(&mut trial.views, WAVE_PX, WAVE_LENGTH_PX);
     }
     let free = CameraKnowledge::Estimate { model: Distortion::BrownConrady([0.0; 5]), start: None };
     let observations = Observations { camera: free, ..trial.observations(true) };

@@ -85,6 +85,15 @@ pub fn add_field(rng: &mut impl Rng, noise: &Noise, views: &mut [View]) {
     }
 }
 
+/// Displaces corners by waves across the image, which no lens model follows, of an amplitude and a length in pixels.
+pub fn add_waves(views: &mut [View], amplitude_px: f64, length_px: f64) {
+    let turns = std::f64::consts::TAU / length_px;
+    for corner in views.iter_mut().flat_map(|view| &mut view.corners) {
+        let wave = Vector2::new((corner.px.y * turns + 1.0).sin(), (corner.px.x * turns).sin());
+        corner.px += wave * amplitude_px;
+    }
+}
+
 /// A target that is small in the image.
 pub const SMALL_TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 4, rows: 3, square_m: 0.015 });
 

@@ -70,3 +70,38 @@ impl ResidualDistortion {
         Vector2::new(sum(along_x), sum(along_y))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_functions_are_orthogonal_over_the_image_and_those_of_a_lower_degree_come_first() {
+        let (size, degree) = ((160, 120), 5);
+        let count = functions(degree);
+        let mut products = vec![0.0; count * count];
+        for (x, y) in (0..160).flat_map(|x| (0..120).map(move |y| (x, y))) {
+            let at = basis(size, degree, &Vector2::new(f64::from(x), f64::from(y)));
+            assert_eq!(at[..functions(3)], basis(size, 3, &Vector2::new(f64::from(x), f64::from(y))));
+            for (k, product) in products.iter_mut().enumerate() {
+                *product += at[k / count] * at[k % count] / (160.0 * 120.0);
+            }
+        }
+        for (k, product) in products.iter().enumerate() {
+            let wanted = if k / count == k % count { 1.0 } else { 0.0 };
+            // The mean over pixels is not the integral: off by the square of 1 / 120 times the slope of a product.
+            assert!((product - wanted).abs() < 0.02, "{k}: {product}");
+        }
+    }
+
+    #[test]
+    fn a_field_is_the_documented_sum() {
+        let field = ResidualDistortion::new((640, 480), 1, vec![0.1, 0.2, 0.3, -0.1, 0.0, 0.5]);
+        let px = Vector2::new(100.0, 400.0);
+        let (a, b) = ((100.5) / 320.0 - 1.0, 400.5 / 240.0 - 1.0);
+        let root = 3.0f64.sqrt();
+        let wanted = Vector2::new(0.1 + 0.2 * root * b + 0.3 * root * a, -0.1 + 0.5 * root * a);
+        assert!((field.at(&px) - wanted).norm() < 1e-14);
+        assert_eq!(field.at(&Vector2::new(-50.0, 239.5)), field.at(&Vector2::new(-0.5, 239.5)), "as at the edge");
+    }
+}

@@ -162,3 +162,6 @@ fn with_variances(
     solution.covariance += &follow * DMatrix::from_diagonal(&spectrum.variances(shown.level_px)) * follow.transpose();
     solution
 }
+
+#[cfg(test)]
+mod tests;
