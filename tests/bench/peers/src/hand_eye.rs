@@ -55,9 +55,8 @@ fn solve(mode: &str, lens: Option<&[f64]>, file: &str) -> Result<Value, Box<dyn 
     };
     let of_link = |name: &str| {
         let covariance = covariance?;
-        let label = covariance.labels.iter().find(|label| {
-            label.ends_with(&format!(".{name}")) && !label.contains("target")
-        })?;
+        let label =
+            covariance.labels.iter().find(|label| label.ends_with(&format!(".{name}")) && !label.contains("target"))?;
         covariance.std_dev(label)
     };
     Ok(json!({
