@@ -1,49 +1,63 @@
-//! Held-out error of every method over five folds.
+//! Held-out error of every method over five folds, of scattered views and of neighbours.
 
 use handeye_core::estimate::uncertainty::quality;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::methods::{Answer, Choice, OURS, names};
+use crate::blocks;
+use crate::methods::{Answer, Choice, FIELD, OURS, names};
 use crate::sets::Set;
 
 const FOLDS: usize = 5;
 
-/// Errors of one method: per division and view, squared pixels (mean over the corners) and squared metres.
+/// Errors of every view in one division: squared pixels (mean over the corners) and squared metres.
+type ByView = Vec<(f64, f64)>;
+
+/// Errors of one method.
 struct Errors {
     name: &'static str,
-    by_division: Vec<Vec<(f64, f64)>>,
+    /// `i mod 5` first, then the random divisions.
+    scattered: Vec<ByView>,
+    /// Folds of neighbours, where the method has an answer without each of them.
+    blocked: Option<ByView>,
 }
 
 impl Errors {
-    fn rms(&self, division: usize) -> (f64, f64) {
-        let views = &self.by_division[division];
-        let (px, m) = views.iter().fold((0.0, 0.0), |(a, b), (px, m)| (a + px, b + m));
-        ((px / views.len() as f64).sqrt(), (m / views.len() as f64).sqrt())
-    }
-
-    /// Mean over the divisions of the squared errors of one view.
-    fn of_view(&self, view: usize) -> (f64, f64) {
-        let n = self.by_division.len() as f64;
-        self.by_division.iter().map(|d| d[view]).fold((0.0, 0.0), |(a, b), (px, m)| (a + px / n, b + m / n))
-    }
-
     /// By how many of its standard errors over the views the squared error is above that of `other`, px and metres.
     fn against(&self, other: &Self) -> (f64, f64) {
-        let views = self.by_division[0].len();
-        let z = |pick: &dyn Fn((f64, f64)) -> f64| {
-            let differences: Vec<f64> = (0..views).map(|v| pick(self.of_view(v)) - pick(other.of_view(v))).collect();
-            let mean = differences.iter().sum::<f64>() / views as f64;
-            let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (views as f64 - 1.0);
-            mean / (variance / views as f64).sqrt().max(f64::MIN_POSITIVE)
-        };
-        (z(&|(px, _)| px), z(&|(_, m)| m))
+        above(&over_divisions(&self.scattered), &over_divisions(&other.scattered))
+    }
+
+    fn blocked_against(&self, other: &Self) -> Option<(f64, f64)> {
+        Some(above(self.blocked.as_ref()?, other.blocked.as_ref()?))
     }
 }
 
+fn rms(views: &ByView) -> (f64, f64) {
+    let (px, m) = mean(views);
+    (px.sqrt(), m.sqrt())
+}
+
+/// Mean over the divisions of the squared errors of every view.
+fn over_divisions(divisions: &[ByView]) -> ByView {
+    let of_view = |view: usize| mean(&divisions.iter().map(|d| d[view]).collect::<Vec<_>>());
+    (0..divisions[0].len()).map(of_view).collect()
+}
+
+fn above(these: &ByView, others: &ByView) -> (f64, f64) {
+    let z = |pick: fn((f64, f64)) -> f64| {
+        let views = these.len() as f64;
+        let differences: Vec<f64> = these.iter().zip(others).map(|(a, b)| pick(*a) - pick(*b)).collect();
+        let mean = differences.iter().sum::<f64>() / views;
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (views - 1.0);
+        mean / (variance / views).sqrt().max(f64::MIN_POSITIVE)
+    };
+    (z(|(px, _)| px), z(|(_, m)| m))
+}
+
 /// Fold of every view: `i mod 5` first, then random ones.
-fn divisions(count: usize, random: usize) -> Vec<Vec<usize>> {
+fn scattered(count: usize, random: usize) -> Vec<Vec<usize>> {
     let fixed: Vec<usize> = (0..count).map(|i| i % FOLDS).collect();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut all = vec![fixed.clone()];
@@ -57,26 +71,70 @@ fn divisions(count: usize, random: usize) -> Vec<Vec<usize>> {
 
 pub fn run(set: &Set, random: usize) {
     let count = set.pairs.len();
+    let blocks = blocks::folds(set, FOLDS);
     let mut errors = Vec::new();
     for name in names(set) {
-        let by_division: Option<Vec<_>> =
-            divisions(count, random).iter().map(|folds| division(set, name, folds)).collect();
-        match by_division {
-            Some(by_division) => errors.push(Errors { name, by_division }),
+        let scattered: Option<Vec<_>> =
+            scattered(count, random).iter().map(|folds| division(set, name, folds)).collect();
+        match scattered {
+            Some(scattered) => errors.push(Errors { name, scattered, blocked: division(set, name, &blocks) }),
             None => println!("{}: {name} has no answer in some fold", set.name),
         }
     }
     println!("\n### {} ({count} views, {random} random divisions)\n", set.name);
-    println!("| method | i mod 5: px | mm | random: px | mm | above joint by standard errors: px | mm |");
-    println!("|---|---|---|---|---|---|---|");
+    println!(
+        "| method | i mod 5: px | mm | random: px | mm | above joint by standard errors: px | mm | blocks: px | mm | above joint by \
+         standard errors: px | mm |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
     let Some(ours) = errors.iter().find(|e| e.name == OURS) else { return };
     for method in &errors {
-        let (px, m) = method.rms(0);
-        let random: Vec<(f64, f64)> = (1..method.by_division.len()).map(|d| method.rms(d)).collect();
-        let (rpx, rm) = mean(&random);
-        let (zpx, zm) = method.against(ours);
-        let relative = if method.name == OURS { "| |".to_owned() } else { format!("| {zpx:+.1} | {zm:+.1} |") };
-        println!("| {} | {px:.3} | {:.4} | {rpx:.3} | {:.4} {relative}", method.name, m * 1e3, rm * 1e3);
+        let (fixed, random) = (&method.scattered[0], &method.scattered[1..]);
+        let other = method.name != OURS;
+        let cells = [
+            error_cells(set, Some(rms(fixed))),
+            error_cells(set, Some(mean(&random.iter().map(rms).collect::<Vec<_>>()))),
+            relative_cells(set, other.then(|| method.against(ours))),
+            error_cells(set, method.blocked.as_ref().map(rms)),
+            relative_cells(set, method.blocked_against(ours).filter(|_| other)),
+        ];
+        println!("| {} {}|", method.name, cells.concat());
+    }
+    for reference in [OURS, FIELD] {
+        let Some(reference) = errors.iter().find(|e| e.name == reference) else { continue };
+        let better: Vec<String> = errors.iter().filter_map(|method| where_better(set, method, reference)).collect();
+        let better = if better.is_empty() { "nothing".to_owned() } else { better.join("; ") };
+        println!("\nBelow `{}` by more than two standard errors: {better}.", reference.name);
+    }
+}
+
+/// Where a method is better than another by more than two standard errors, in words.
+fn where_better(set: &Set, method: &Errors, reference: &Errors) -> Option<String> {
+    let scattered = method.against(reference);
+    let blocked = method.blocked_against(reference).unwrap_or_default();
+    let of = [("px", scattered.0), ("mm", scattered.1), ("px in blocks", blocked.0), ("mm in blocks", blocked.1)];
+    let shown: Vec<String> = of
+        .iter()
+        .filter(|(name, z)| *z < -2.0 && (set.has_corners() || name.starts_with("mm")))
+        .map(|(name, z)| format!("{name} ({z:.1})"))
+        .collect();
+    (!shown.is_empty()).then(|| format!("{} in {}", method.name, shown.join(", ")))
+}
+
+/// Without corners there are no pixels.
+fn error_cells(set: &Set, errors: Option<(f64, f64)>) -> String {
+    match errors {
+        Some((px, m)) if set.has_corners() => format!("| {px:.3} | {:.4} ", m * 1e3),
+        Some((_, m)) => format!("| | {:.4} ", m * 1e3),
+        None => "| no answer | ".to_owned(),
+    }
+}
+
+fn relative_cells(set: &Set, by: Option<(f64, f64)>) -> String {
+    match by {
+        Some((px, m)) if set.has_corners() => format!("| {px:+.1} | {m:+.1} "),
+        Some((_, m)) => format!("| | {m:+.1} "),
+        None => "| | ".to_owned(),
     }
 }
 
@@ -86,7 +144,7 @@ fn mean(values: &[(f64, f64)]) -> (f64, f64) {
 }
 
 /// Errors of every view, each from the fit without its fold.
-fn division(set: &Set, name: &str, folds: &[usize]) -> Option<Vec<(f64, f64)>> {
+fn division(set: &Set, name: &str, folds: &[usize]) -> Option<ByView> {
     let mut errors = vec![(0.0, 0.0); folds.len()];
     for fold in 0..FOLDS {
         let used: Vec<usize> = (0..folds.len()).filter(|&i| folds[i] != fold).collect();

@@ -10,6 +10,7 @@
 //! The number is that of random divisions; names of sets may follow. The data sets are looked for in `$HANDEYE_DATA`, then
 //! in `../shared/data`. What came out is in `docs/real_data.md`.
 
+mod blocks;
 mod checks;
 mod folds;
 mod halves;

@@ -38,7 +38,7 @@ impl Answer {
 pub const OURS: &str = "joint";
 
 /// With the robot's field where the data show one: by the links alone, and with the field applied to the reported pose.
-const FIELD: &str = "joint, field in the model";
+pub const FIELD: &str = "joint, field in the model";
 const APPLIED: &str = "joint, field applied";
 
 /// Variants of it that free more.
