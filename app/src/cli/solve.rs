@@ -198,6 +198,7 @@ pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
 pub fn unsolved(error: CalibrateError, folder: &Path) -> Failure {
     match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
+        CalibrateError::NeedsCorners { .. } => Failure::unusable(error),
         error => Failure::failed(anyhow!("{error}; `handeye doctor {}` examines the data", folder.display())),
     }
 }

@@ -239,6 +239,15 @@ pub enum CalibrateError {
         /// Which view.
         name: String,
     },
+    /// An option that poses of the target alone cannot serve.
+    #[error(
+        "{what} is estimated from corners, and there are only poses of the target: leave that option out, or give images or \
+         corners"
+    )]
+    NeedsCorners {
+        /// What was to be estimated.
+        what: &'static str,
+    },
     /// Neither corners nor target poses.
     #[error("view {name:?} has neither corners nor a target pose")]
     NothingObserved {
@@ -516,6 +525,13 @@ pub fn calibrate_with<'a>(
     let used = || observations.views.iter().filter(|v| v.in_fit);
     let only_poses = used().all(|v| v.corners.is_none()) && used().any(|v| v.camera_from_target.is_some());
     if only_poses {
+        for (asked, what) in
+            [(options.free_scale, "the true size of the target"), (options.joint_offsets, "the offset of joints")]
+        {
+            if asked {
+                return Err(CalibrateError::NeedsCorners { what });
+            }
+        }
         pairs::calibrate(observations, method, &work)
     } else {
         corners::calibrate(observations, method, options, &work)
