@@ -160,6 +160,7 @@ impl<'a> Rows<'a> {
 
     /// The two rows of corner `i`: six columns of the pose, those of the form, and the residual; times the whitener of the
     /// corner.
+    #[expect(clippy::inline_always, reason = "the loop over the corners is the hot one, and has to see it")]
     #[inline(always)]
     pub fn fill(&self, i: usize, corner: &Corner, columns: &mut [Pair]) -> Result<(), CameraError> {
         let Self { seen: ViewInput { intrinsics, board, shape, sqrt_weights, .. }, rotation, free, .. } = self;

@@ -32,8 +32,8 @@ pub struct Equations {
     pub residuals: f64,
 }
 
-/// The level that a field most likely has.
-pub struct Level {
+/// A field at the level that it most likely has.
+pub struct MostLikely {
     pub level_px: f64,
     pub gain: f64,
     pub coefficients: DVector<f64>,
@@ -113,7 +113,7 @@ impl Equations {
     }
 
     /// The level with the largest gain; `None` where the score says that there is none to speak of.
-    pub fn most_likely(&self) -> Option<Level> {
+    pub fn most_likely(&self) -> Option<MostLikely> {
         let score = self.pull.norm_squared() - self.information.trace();
         let spread = (2.0 * self.information.norm_squared()).sqrt();
         if score <= 0.0 || (score / spread).powi(2) < NEARLY * GAIN {
@@ -151,7 +151,7 @@ impl Spectrum {
         self.information.iter().zip(&self.pull).map(of).sum()
     }
 
-    pub fn most_likely(&self) -> Level {
+    pub fn most_likely(&self) -> MostLikely {
         let (least, most, factor) = LEVELS;
         let (mut level_px, mut gain) = (least, self.gain(least));
         let mut tried = least;
@@ -164,7 +164,7 @@ impl Spectrum {
         }
         let variances = self.variances(level_px);
         let freedom = self.information.component_mul(&variances).sum();
-        Level { level_px, gain, coefficients: &self.axes * self.pull.component_mul(&variances), freedom }
+        MostLikely { level_px, gain, coefficients: &self.axes * self.pull.component_mul(&variances), freedom }
     }
 
     /// Of the coefficients along the axes.
