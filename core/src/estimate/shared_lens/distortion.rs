@@ -40,8 +40,8 @@ impl Together {
             let refit = |i: usize, _round: usize, last: &Fit, others: LensEstimate| {
                 again(&prepared[i], last, &others, work).map_err(|error| names[i].fails(error))
             };
-            let Some((sessions, lens)) = shared_lens::share(next.sessions.clone(), 0, refit)? else { return Ok(None) };
-            (next.sessions, next.lens) = (sessions, lens);
+            let shared = shared_lens::share(next.sessions.clone(), 0, refit)?;
+            (next.sessions, next.lens) = shared.ok_or(SharedLensError::NoLens)?;
             let Some((shares, equations)) = next.equations(names, prepared, degree, work)? else { return Ok(None) };
             last = Some((shares, equations.clone()));
             Ok(Some(equations))

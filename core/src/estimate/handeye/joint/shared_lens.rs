@@ -57,13 +57,20 @@ impl LensInformation {
         if !problem.free.intrinsics {
             return Err(fails("the lens is given, and not estimated"));
         }
-        let reduced = System::new(problem, &State::of(solution), cancel)?.reduce(&solution.noise)?;
+        let state = State::of(solution);
+        let reduced = |problem: &JointProblem<'_>| System::new(problem, &state, cancel)?.reduce(&solution.noise);
+        // Taken off what is known with it, a strong prior leaves rounding where the session alone says little.
+        let (reduced, prior) = match reduced(&JointProblem { lens_prior: None, ..*problem }) {
+            Ok(by_itself) => (by_itself, None),
+            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
+            Err(_) => (reduced(problem)?, problem.lens_prior),
+        };
         let count = solution.intrinsics.parameter_count();
         let at = Layout::FORM_AT;
         let covariance = reduced.inverse().view((at, at), (count, count)).into_owned();
         let mut information = covariance_of(&covariance).ok_or_else(|| fails("the lens is not determined"))?;
         let mut gradient = -(&information * reduced.shared_step().rows(at, count));
-        if let Some(prior) = problem.lens_prior {
+        if let Some(prior) = prior {
             gradient -= prior.information * difference(&solution.intrinsics, &prior.expected);
             information -= prior.information;
         }

@@ -37,7 +37,9 @@ const GAIN: f64 = 7.36;
 /// Rounds of field and fit at the most.
 const MAX_ROUNDS: usize = 8;
 /// Square of the way of the field in a round, in its standard deviations, below which it stands still.
-const STILL: f64 = 1e-4;
+const STILL: f64 = 1e-2;
+/// The same in the last round: what goes to and fro within its own uncertainty is counted by that.
+const AT_LAST: f64 = 1.0;
 
 /// A field that the data show, with what its estimate rests on.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,7 +109,7 @@ pub fn settled<'v, E>(
         return Ok(None);
     }
     let (gain, size) = (level.gain, (intrinsics.width, intrinsics.height));
-    for _ in 0..MAX_ROUNDS {
+    for round in 1..=MAX_ROUNDS {
         let coefficients = level.coefficients;
         let field = ResidualDistortion::new(size, degree, coefficients.as_slice().to_vec());
         let Some(equations) = fit(&field, degree)? else { return Ok(None) };
@@ -117,7 +119,8 @@ pub fn settled<'v, E>(
         }
         let spectrum = equations.from(&coefficients).times(used_up).spectrum();
         level = spectrum.most_likely();
-        if spectrum.length(&(&level.coefficients - &coefficients), level.level_px) < STILL {
+        let way = spectrum.length(&(&level.coefficients - &coefficients), level.level_px);
+        if way < if round < MAX_ROUNDS { STILL } else { AT_LAST } {
             let rms_px = rms(views, &field);
             return Ok(Some(ShownDistortion { field, level_px: level.level_px, rms_px, gain, used_up }));
         }
