@@ -160,7 +160,9 @@ fn what_a_session_says_of_its_lens_is_without_what_the_prior_adds() {
     let (session, noise) = &sessions[0];
     let alone = fitted(&sessions[0], None, None).expect("solves");
     let other = LensEstimate::by([&fitted(&sessions[1], None, None).expect("solves").says]).expect("determined");
-    let problem = JointProblem { lens_prior: Some(other.as_prior()), ..session.problem(true, Some(*noise)) };
+    // So strong that taking it off again would leave nothing but rounding.
+    let strong = other.clone().times(1e9);
+    let problem = JointProblem { lens_prior: Some(strong.as_prior()), ..session.problem(true, Some(*noise)) };
     let says = LensInformation::of(&problem, &alone.fit, &CancelToken::default()).expect("determined");
     let with = LensEstimate::by([&says]).expect("determined");
     let without = LensEstimate::by([&alone.says]).expect("determined");
