@@ -10,7 +10,7 @@ use super::{JOINT_PRIOR_RAD, JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::geometry::se3::skew;
-use crate::geometry::view_equations::{PoseEquations, ViewInput};
+use crate::geometry::view_equations::PoseEquations;
 use crate::progress::CancelToken;
 
 /// Name of the method in errors.
@@ -272,14 +272,8 @@ fn known_lens(problem: &JointProblem<'_>, state: &State) -> Option<KnownLens> {
 fn linearise(problem: &JointProblem<'_>, state: &State, index: usize) -> Result<ViewBlock, HandEyeError> {
     let view = &problem.views[index];
     let chain = state.chain(problem, view, &state.corrections[index]);
-    let sqrt_weights = problem.weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(&view.corners));
-    let seen = ViewInput {
-        intrinsics: &state.intrinsics,
-        board: problem.board,
-        shape: &state.shape,
-        corners: &view.corners,
-        sqrt_weights: &sqrt_weights,
-    };
+    let sqrt_weights = problem.sqrt_weights(view);
+    let seen = problem.seen(state, view, &sqrt_weights);
     let equations = PoseEquations::new(&seen, &chain.camera_from_target, problem.free.form()).map_err(|_behind| {
         HandEyeError::NoSolution {
             method: METHOD,

@@ -32,7 +32,7 @@ use crate::estimate::wrong_corners;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::se3;
 use crate::geometry::statistics::{median, outliers};
-use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
+use crate::geometry::view_equations::{FreeParameters, PoseEquations};
 use crate::progress::{CancelToken, Work};
 use crate::targets::observation::{Corner, View};
 
@@ -367,14 +367,8 @@ fn own_pose(
 ) -> Option<(Isometry3<f64>, PoseEquations)> {
     // From PnP with a lens that was a little different, two steps are exact to first order in what is left.
     const STEPS: usize = 2;
-    let sqrt_weights = problem.weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(&view.corners));
-    let seen = ViewInput {
-        intrinsics: &state.intrinsics,
-        board: problem.board,
-        shape: &state.shape,
-        corners: &view.corners,
-        sqrt_weights: &sqrt_weights,
-    };
+    let sqrt_weights = problem.sqrt_weights(view);
+    let seen = problem.seen(state, view, &sqrt_weights);
     let mut pose = *start.isometry();
     for _ in 0..STEPS {
         let equations = PoseEquations::new(&seen, &pose, FreeParameters::default()).ok()?;

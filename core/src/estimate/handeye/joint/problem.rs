@@ -1,13 +1,15 @@
 //! What the joint estimate is given.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix2};
 
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::chain::MAX_JOINTS;
 use crate::estimate::handeye::joint::field::{Places, RobotField};
+use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::weights::CornerWeights;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use crate::geometry::view_equations::ViewInput;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::View;
 
@@ -104,6 +106,27 @@ impl<'a> JointProblem<'a> {
             noise: None,
             view_noise: None,
         }
+    }
+
+    /// A view through the lens of a state, with the whiteners of its corners.
+    pub(super) fn seen<'v>(
+        &'v self,
+        state: &'v State,
+        view: &'v View,
+        sqrt_weights: &'v [Matrix2<f64>],
+    ) -> ViewInput<'v> {
+        ViewInput {
+            intrinsics: &state.intrinsics,
+            board: self.board,
+            shape: &state.shape,
+            corners: &view.corners,
+            sqrt_weights,
+        }
+    }
+
+    /// How the corners of a view count, see [`ViewInput::sqrt_weights`].
+    pub(super) fn sqrt_weights(&self, view: &View) -> Vec<Matrix2<f64>> {
+        self.weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(&view.corners))
     }
 
     /// Number of joint offsets that are estimated: none unless all views know their joints.

@@ -9,7 +9,7 @@ use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::view_block::{Layout, Own, PixelWeights, ViewBlock};
 use crate::estimate::handeye::joint::{JointProblem, JointSolution, Noise};
 use crate::geometry::camera::residual_distortion::{basis, functions};
-use crate::geometry::view_equations::{MAX_FORM, POSE, Pair, Rows, ViewInput};
+use crate::geometry::view_equations::{MAX_FORM, POSE, Pair, Rows};
 use crate::progress::CancelToken;
 
 /// Part of [`GAIN`] that the square of the score, which follows from one product, has to reach for the rest to be computed.
@@ -192,14 +192,8 @@ impl Products {
     fn new(problem: &JointProblem<'_>, state: &State, index: usize, degree: usize) -> Option<Self> {
         let view = &problem.views[index];
         let chain = state.chain(problem, view, &state.corrections[index]);
-        let sqrt_weights = problem.weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(&view.corners));
-        let seen = ViewInput {
-            intrinsics: &state.intrinsics,
-            board: problem.board,
-            shape: &state.shape,
-            corners: &view.corners,
-            sqrt_weights: &sqrt_weights,
-        };
+        let sqrt_weights = problem.sqrt_weights(view);
+        let seen = problem.seen(state, view, &sqrt_weights);
         let rows = Rows::new(&seen, &chain.camera_from_target, problem.free.form());
         let (n, f) = (view.corners.len(), functions(degree));
         let columns = POSE + rows.count + 1;
