@@ -2,7 +2,7 @@
 
     pip install kinhec
     cargo build --release -p handeye_app
-    python tests/bench/kinhec_tracks.py --ours target/release/handeye --data /tmp/kinhec_smoke
+    python tests/bench/kinhec_tracks.py --ours target/release/handeye --data target/kinhec_smoke
 
 KinHEC is a synthetic benchmark: streams of robot poses and of target poses with known truth. A tier that is not in --data is
 generated there by its own command, in about a minute for `smoke`. Every method gets what KinHEC's protocol gives to its
