@@ -2,7 +2,7 @@ use std::cell::RefCell;
 
 use super::*;
 use crate::progress::{CancelToken, Progress};
-use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
+use crate::testing::sessions::{REALISTIC, Trial, add_waves, camera, trial};
 
 fn solve(observations: &Observations, method: Method) -> Calibration {
     calibrate(observations, method, &CancelToken::default()).expect("solves")
@@ -47,6 +47,21 @@ fn a_view_left_out_changes_the_answer_as_if_it_were_not_there() {
     }
     let document = solve(&excluded, Method::Joint).to_result("0", None, std::collections::BTreeMap::new());
     assert_eq!(document.views[3].status, crate::project::result::ViewRecordStatus::Excluded);
+}
+
+#[test]
+fn residuals_stand_where_corners_were_measured_with_a_lens_beyond_its_model_too() {
+    let mut t = set(30, 49);
+    add_waves(&mut t.views, 0.2, 300.0);
+    let found = solve(&t.observations(true), Method::Joint);
+    let shown = found.joint.as_ref().and_then(|joint| joint.residual_distortion.as_ref()).expect("the waves are seen");
+    assert!(shown.rms_px > 0.1, "{shown:?}");
+    for (view, result) in t.views.iter().zip(&found.views) {
+        for (corner, residual) in view.corners.iter().zip(&result.residuals) {
+            // The field is taken a little beside the corner, and has a slope of 0.2 px in fifty.
+            assert!((corner.px - residual.px).norm() < 5e-3, "{corner:?} {residual:?}");
+        }
+    }
 }
 
 #[test]

@@ -1,8 +1,12 @@
 //! What the lens of all sessions does beyond its model.
 
+use nalgebra::DMatrix;
+
 use super::{Fit, NamedSession, SharedLensError, fitted};
 use crate::estimate::corners::Session;
-use crate::estimate::handeye::joint::residual_distortion::shared::{Share, together, with_shared_error};
+use crate::estimate::handeye::joint::residual_distortion::shared::{
+    Share, lens_covariance, together, with_shared_error,
+};
 use crate::estimate::handeye::joint::residual_distortion::{DEGREES, Equations, corrected, settled};
 use crate::estimate::handeye::joint::shared_lens::{self, Fitted, LensEstimate};
 use crate::estimate::handeye::joint::{JointSolution, ShownDistortion};
@@ -77,6 +81,14 @@ impl Together {
     /// What the lens does beyond its model.
     pub fn shown(&self) -> Option<&ShownDistortion> {
         self.shown.as_ref().map(|(shown, _, _)| shown)
+    }
+
+    /// Covariance of the lens; `None` where a direction is open.
+    pub fn lens_covariance(&self) -> Option<DMatrix<f64>> {
+        match &self.shown {
+            Some((shown, shares, equations)) => lens_covariance(&self.lens, shares, equations, shown),
+            None => self.lens.covariance(),
+        }
     }
 
     /// A solution of session `i` with the uncertainty of what the lens does beyond its model.

@@ -200,7 +200,7 @@ pub fn calibrate_sharing_lens<'a>(
     let (shared, lens) = shared.ok_or(SharedLensError::NoLens)?;
     let together = Together::new(sessions, &prepared, shared, lens, work)?;
     let (shared, lens) = (&together.sessions, &together.lens);
-    let sigma = lens.covariance().map(|covariance| covariance.diagonal().map(|v| v.max(0.0).sqrt()));
+    let sigma = together.lens_covariance().map(|covariance| covariance.diagonal().map(|v| v.max(0.0).sqrt()));
     let views = shared.iter().map(|session| session.fit.refined.screened.kept.len()).sum();
     let mut calibrations = Vec::with_capacity(sessions.len());
     for (i, prepared) in prepared.into_iter().enumerate() {
@@ -216,7 +216,7 @@ pub fn calibrate_sharing_lens<'a>(
         let solution = refined.screened.solution.clone();
         let finished = prepared.finish(refined, Some(others.as_prior()), work);
         let mut calibration = finished.map_err(|error| sessions[i].fails(error))?;
-        if let Some(camera) = calibration.camera.as_mut().filter(|_| together.shown().is_none()) {
+        if let Some(camera) = &mut calibration.camera {
             camera.sigma_px = sigma.as_ref().and_then(four);
         }
         calibration.shared_lens = Some(SharedLens {

@@ -117,7 +117,7 @@ pub fn settled<'v, E>(
         if used_up <= 0.0 {
             return Ok(None);
         }
-        let spectrum = equations.from(&coefficients).times(used_up).spectrum();
+        let spectrum = equations.beyond(&coefficients).times(used_up).spectrum();
         level = spectrum.most_likely();
         let way = spectrum.length(&(&level.coefficients - &coefficients), level.level_px);
         if way < if round < MAX_ROUNDS { STILL } else { AT_LAST } {
@@ -158,12 +158,22 @@ fn with_variances(
     equations: Equations,
     shown: &ShownDistortion,
 ) -> JointSolution {
-    solution.covariance /= shown.used_up;
     solution.noise.corner_px /= shown.used_up.sqrt();
+    solution.covariance = enlarged(&solution.covariance, follow, equations, shown);
+    solution
+}
+
+/// A covariance of unknowns that follow the coefficients of these equations, with that of the coefficients.
+fn enlarged(
+    covariance: &DMatrix<f64>,
+    follow: &DMatrix<f64>,
+    equations: Equations,
+    shown: &ShownDistortion,
+) -> DMatrix<f64> {
     let spectrum = equations.times(shown.used_up).spectrum();
     let follow = follow * &spectrum.axes;
-    solution.covariance += &follow * DMatrix::from_diagonal(&spectrum.variances(shown.level_px)) * follow.transpose();
-    solution
+    covariance / shown.used_up
+        + &follow * DMatrix::from_diagonal(&spectrum.variances(shown.level_px)) * follow.transpose()
 }
 
 #[cfg(test)]

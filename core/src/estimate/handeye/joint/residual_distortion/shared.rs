@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::Equations;
-use super::{ShownDistortion, with_variances};
+use super::{ShownDistortion, enlarged, with_variances};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::normal::{System, covariance_of};
 use crate::estimate::handeye::joint::shared_lens::LensEstimate;
@@ -73,6 +73,18 @@ pub fn together(shares: &[Share], lens: &LensEstimate) -> Option<Equations> {
 fn crossed(shares: &[Share], of: impl Fn(usize) -> bool) -> Option<DMatrix<f64>> {
     let some = shares.iter().enumerate().filter(|(j, _)| of(*j)).map(|(_, share)| &share.cross / share.factor);
     some.reduce(|sum, next| sum + next)
+}
+
+/// The covariance of the lens of all sessions with the uncertainty of the coefficients; `None` where a direction is open.
+pub fn lens_covariance(
+    lens: &LensEstimate,
+    shares: &[Share],
+    together: &Equations,
+    shown: &ShownDistortion,
+) -> Option<DMatrix<f64>> {
+    let covariance = lens.covariance()?;
+    let follow = &covariance * crossed(shares, |_| true)?;
+    Some(enlarged(&covariance, &follow, together.clone(), shown))
 }
 
 /// The solution of session `i` with the uncertainty of the coefficients in its covariance.
