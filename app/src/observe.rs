@@ -103,9 +103,6 @@ pub fn observe_session(
 }
 
 /// The corners of every image that there is, where the target is seen.
-///
-/// For a chessboard a quick look at all of them first: one of another size is then recognised in seconds. Images in which
-/// nothing was found are searched with all effort afterwards.
 fn corners_of(
     names: &[&str],
     image_of: impl Fn(usize) -> Result<Option<GrayImage>, ObserveError> + Sync,
@@ -113,27 +110,25 @@ fn corners_of(
     progress: Progress<'_>,
     cancel: &CancelToken,
 ) -> Result<Vec<Option<Vec<Corner>>>, ObserveError> {
-    let look = |index: usize, options: DetectOptions| -> Result<Look, ObserveError> {
+    let options = DetectOptions::thorough().cancelled_by(cancel);
+    let failed = |index: usize, source| match source {
+        VisionError::Cancelled => ObserveError::Cancelled,
+        source => ObserveError::Vision { name: names[index].to_owned(), source },
+    };
+    let look = |index: usize| -> Result<Look, ObserveError> {
         let Some(image) = image_of(index)? else { return Ok(Look::NoImage) };
-        let corners = detect::detect_with(&image, target, options)
-            .map_err(|source| ObserveError::Vision { name: names[index].to_owned(), source })?;
+        let corners = detect::detect_with(&image, target, &options).map_err(|source| failed(index, source))?;
         Ok(match (corners, target) {
             (Some(corners), _) => Look::Found(corners),
-            (None, TargetSpec::Chessboard(grid)) => Look::Missed(detect::chessboard_in_sight(&image, grid)),
+            (None, TargetSpec::Chessboard(grid)) => {
+                Look::Missed(detect::chessboard_in_sight(&image, grid, cancel).map_err(|source| failed(index, source))?)
+            }
             (None, _) => Look::Missed(None),
         })
     };
-    let all: Vec<usize> = (0..names.len()).collect();
-    let TargetSpec::Chessboard(grid) = target else {
-        let looks = of_each(&all, progress, cancel, |index| look(index, DetectOptions::thorough()))?;
-        return Ok(looks.into_iter().map(Look::corners).collect());
-    };
-    let mut looks = of_each(&all, progress, cancel, |index| look(index, DetectOptions::live()))?;
-    other_chessboard(&looks, grid)?;
-    let missed: Vec<usize> = all.into_iter().filter(|index| matches!(looks[*index], Look::Missed(_))).collect();
-    let again = of_each(&missed, progress, cancel, |index| look(index, DetectOptions::thorough()))?;
-    for (index, second) in missed.into_iter().zip(again) {
-        looks[index] = second;
+    let looks = of_each(names.len(), progress, cancel, look)?;
+    if let TargetSpec::Chessboard(grid) = target {
+        other_chessboard(&looks, grid)?;
     }
     Ok(looks.into_iter().map(Look::corners).collect())
 }
@@ -180,12 +175,12 @@ fn other_chessboard(looks: &[Look], grid: &Grid) -> Result<(), ObserveError> {
 }
 
 fn of_each<T: Send>(
-    indices: &[usize],
+    count: usize,
     progress: Progress<'_>,
     cancel: &CancelToken,
     work: impl Fn(usize) -> Result<T, ObserveError> + Sync,
 ) -> Result<Vec<T>, ObserveError> {
-    let (done, count) = (AtomicUsize::new(0), indices.len());
+    let done = AtomicUsize::new(0);
     let one = |index: usize| {
         if cancel.is_cancelled() {
             return Err(ObserveError::Cancelled);
@@ -195,6 +190,6 @@ fn of_each<T: Send>(
         result
     };
     // All of them before the first error: in parallel another one could come first.
-    let each: Vec<_> = indices.par_iter().with_max_len(1).map(|index| one(*index)).collect();
+    let each: Vec<_> = (0..count).into_par_iter().with_max_len(1).map(one).collect();
     each.into_iter().collect()
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use handeye_core::capture::{self, Machine, Plan, Progress, Shot, Sighting, Taken, Wait};
 use handeye_core::image::GrayImage;
+use handeye_core::progress::CancelToken;
 use handeye_core::targets::TargetSpec;
 use handeye_core::targets::observation::Corner;
 
@@ -87,11 +88,11 @@ impl Sequence {
         }
     }
 
-    /// Looks for the board in the average with all effort, which may take seconds when it is not there. `None` before
-    /// all images are there.
-    pub fn measure(&self) -> Option<Result<Measured, Why>> {
+    /// Looks for the target in the average with all effort; dots or markers that are not there may take seconds. `None`
+    /// before all images are there.
+    pub fn measure(&self, cancel: &CancelToken) -> Option<Result<Measured, Why>> {
         let (taken, last) = (self.machine.finish()?, self.last.as_ref()?);
-        Some(match capture::observe_image(&taken.rgb, &self.target) {
+        Some(match capture::observe_image(&taken.rgb, &self.target, cancel) {
             Err(error) => Err(refusal::not_searched(&error)),
             Ok(None) => Err(refusal::no_board(&self.target)),
             Ok(Some(Sighting { blur: Some(blur), .. })) if blur.is_too_blurred() => Err(refusal::blurred(&blur)),

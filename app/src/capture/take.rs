@@ -1,6 +1,7 @@
 //! A capture from the request to its end, for a thread that can wait.
 
 use handeye_core::detect::{DetectOptions, detect_with};
+use handeye_core::progress::CancelToken;
 use handeye_core::project::files::image_file::gray_from_rgb;
 use handeye_core::targets::TargetSpec;
 
@@ -36,7 +37,12 @@ pub enum CaptureEnd {
 ///
 /// # Errors
 /// Those of the images.
-pub fn take<P: Images>(request: CaptureRequest, target: &TargetSpec, images: &mut P) -> Result<CaptureEnd, P::Error> {
+pub fn take<P: Images>(
+    request: CaptureRequest,
+    target: &TargetSpec,
+    images: &mut P,
+    cancel: &CancelToken,
+) -> Result<CaptureEnd, P::Error> {
     let mut sequence = Sequence::new(request, *target, images.now_s());
     loop {
         let frame = images.next()?;
@@ -46,14 +52,14 @@ pub fn take<P: Images>(request: CaptureRequest, target: &TargetSpec, images: &mu
         // An image in which the quick search does not find the board tells nothing of its corners; whether it is there is
         // decided in the average.
         if sequence.compares_corners()
-            && let Ok(Some(corners)) = detect_with(&grey, target, DetectOptions::live())
+            && let Ok(Some(corners)) = detect_with(&grey, target, &DetectOptions::live().cancelled_by(cancel))
         {
             sequence.saw_board(number, &corners);
         }
         sequence.pass_time(received_s, Some(received_s));
         let ended = match sequence.state() {
             Err(why) => Err(why),
-            Ok(_waits) => match sequence.measure() {
+            Ok(_waits) => match sequence.measure(cancel) {
                 None => continue,
                 Some(measured) => measured,
             },

@@ -6,6 +6,8 @@ use std::sync::Arc;
 use handeye_core::depth::DepthImage;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
+use handeye_core::progress::CancelToken;
+use handeye_core::targets::TargetSpec;
 
 use super::drawn::{BOARD, board, brighter_board};
 use super::{CaptureEnd, CaptureRequest, Images, take};
@@ -65,6 +67,15 @@ fn request(frames: u32) -> CaptureRequest {
     }
 }
 
+/// A capture that nobody cancels.
+fn take_all<F: FnMut(u64) -> Result<RgbImage, &'static str>>(
+    request: CaptureRequest,
+    target: &TargetSpec,
+    reel: &mut Reel<F>,
+) -> Result<CaptureEnd, &'static str> {
+    take(request, target, reel, &CancelToken::default())
+}
+
 fn refused(end: Result<CaptureEnd, &'static str>) -> (RefusalKind, String) {
     match end.expect("images came") {
         CaptureEnd::Refused(refused) => (refused.kind, refused.why.say(Language::English)),
@@ -75,7 +86,7 @@ fn refused(end: Result<CaptureEnd, &'static str>) -> (RefusalKind, String) {
 #[test]
 fn four_images_show_that_everything_is_at_rest_and_the_next_ones_are_averaged() {
     let mut reel = Reel::new(|number| Ok(brighter_board(1, number as f64)));
-    let CaptureEnd::Good(measured, last) = take(request(3), &BOARD, &mut reel).expect("images") else {
+    let CaptureEnd::Good(measured, last) = take_all(request(3), &BOARD, &mut reel).expect("images") else {
         panic!("a capture")
     };
     assert_eq!((measured.frames, reel.number, last.info.number), (3, 6, 6), "images 4, 5 and 6");
@@ -90,14 +101,14 @@ fn four_images_show_that_everything_is_at_rest_and_the_next_ones_are_averaged() 
 
 #[test]
 fn what_is_no_good_is_refused_with_the_reason() {
-    let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(RgbImage::new(320, 240)))));
+    let (kind, why) = refused(take_all(request(1), &BOARD, &mut Reel::new(|_| Ok(RgbImage::new(320, 240)))));
     assert_eq!(kind, RefusalKind::NoBoard, "{why}");
     let blurred = board(6);
-    let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(|_| Ok(blurred.clone()))));
+    let (kind, why) = refused(take_all(request(1), &BOARD, &mut Reel::new(|_| Ok(blurred.clone()))));
     assert_eq!(kind, RefusalKind::Blurred, "{why}");
     let near = CaptureRequest { others: vec![(12, Pose::identity())], ..request(1) };
     let sharp = board(0);
-    let (kind, why) = refused(take(near, &BOARD, &mut Reel::new(|_| Ok(sharp.clone()))));
+    let (kind, why) = refused(take_all(near, &BOARD, &mut Reel::new(|_| Ok(sharp.clone()))));
     assert_eq!(kind, RefusalKind::TooSimilar, "{why}");
     // Only a part of the image: that of a lamp would be no change.
     let waving = |number: u64| {
@@ -105,7 +116,7 @@ fn what_is_no_good_is_refused_with_the_reason() {
         (0..480).for_each(|u| (300..360).for_each(|v| rgb.put_pixel(u, v, Rgb([90 * (number % 2) as u8; 3]))));
         Ok(rgb)
     };
-    let (kind, why) = refused(take(request(1), &BOARD, &mut Reel::new(waving)));
+    let (kind, why) = refused(take_all(request(1), &BOARD, &mut Reel::new(waving)));
     assert_eq!(kind, RefusalKind::NotSettled);
     assert!(why.contains("still changes after 10 s"), "{why}");
 }
@@ -115,7 +126,7 @@ fn a_simulation_without_time_ends_the_capture() {
     let sharp = board(0);
     for pass_s in [0.0, f64::NAN] {
         let mut reel = Reel { pass_s, ..Reel::new(|_| Ok(sharp.clone())) };
-        let (kind, why) = refused(take(request(1), &BOARD, &mut reel));
+        let (kind, why) = refused(take_all(request(1), &BOARD, &mut reel));
         assert_eq!(kind, RefusalKind::Paused);
         assert!(why.contains("paused"), "{why}");
         assert!(reel.number < 40, "{} images in {} s", reel.number, reel.now_s.get() - 100.0);
@@ -124,6 +135,7 @@ fn a_simulation_without_time_ends_the_capture() {
 
 #[test]
 fn the_error_of_a_camera_ends_the_capture() {
-    let end = take(request(1), &BOARD, &mut Reel::new(|number| if number < 3 { Ok(board(0)) } else { Err("gone") }));
+    let end =
+        take_all(request(1), &BOARD, &mut Reel::new(|number| if number < 3 { Ok(board(0)) } else { Err("gone") }));
     assert_eq!(end.expect_err("no third image"), "gone");
 }

@@ -30,7 +30,10 @@ pub fn observe(job: &ObserveJob, cancel: &CancelToken, outlet: &Outlet) {
         if cancel.is_cancelled() {
             return;
         }
-        let observed = look(job, capture);
+        let observed = look(job, capture, cancel);
+        if cancel.is_cancelled() {
+            return;
+        }
         if let Err(why) = &observed {
             let text = text!("Capture {id} cannot be read: {why}", id = capture.id, why = why);
             outlet.notice(Severity::Error, text);
@@ -43,10 +46,10 @@ fn report(id: CaptureId, target: TargetSpec, observed: Option<Observed>, outlet:
     outlet.report(Event::Observed { id, target, observed: observed.map(Arc::new) });
 }
 
-fn look(job: &ObserveJob, capture: &CaptureRecord) -> Result<Observed, String> {
+fn look(job: &ObserveJob, capture: &CaptureRecord, cancel: &CancelToken) -> Result<Observed, String> {
     let path = job.folder.join(&capture.image);
     let rgb = handeye_core::project::files::image_file::load_rgb(&path).map_err(|error| error.to_string())?;
-    let seen = observe_image(&rgb, &job.target).map_err(|error| error.to_string())?;
+    let seen = observe_image(&rgb, &job.target, cancel).map_err(|error| error.to_string())?;
     Ok(Observed {
         corners: seen.map(|seen| seen.corners),
         image_size: rgb.dimensions(),

@@ -3,7 +3,8 @@
 use image::{GrayImage, RgbImage};
 
 use super::EdgeBlur;
-use crate::detect::{self, VisionError};
+use crate::detect::{self, DetectOptions, VisionError};
+use crate::progress::CancelToken;
 use crate::project::files::image_file::gray_from_rgb;
 use crate::targets::TargetSpec;
 use crate::targets::observation::Corner;
@@ -19,20 +20,28 @@ pub struct Sighting {
 
 /// Finds the board with all effort and measures its blur. A capture and an image read from a file go through here, so
 /// that a session that is opened again gives the numbers that it had. `None` when the board is not in the image; a
-/// miss may take some seconds per megapixel.
+/// miss of dots or markers may take some seconds per megapixel.
 ///
 /// # Errors
-/// As [`detect::detect`].
-pub fn observe_image(rgb: &RgbImage, target: &TargetSpec) -> Result<Option<Sighting>, VisionError> {
-    observe_gray(&gray_from_rgb(rgb), target)
+/// As [`detect::detect_with`].
+pub fn observe_image(
+    rgb: &RgbImage,
+    target: &TargetSpec,
+    cancel: &CancelToken,
+) -> Result<Option<Sighting>, VisionError> {
+    observe_gray(&gray_from_rgb(rgb), target, cancel)
 }
 
 /// [`observe_image`] of an image in grey.
 ///
 /// # Errors
-/// As [`detect::detect`].
-pub fn observe_gray(grey: &GrayImage, target: &TargetSpec) -> Result<Option<Sighting>, VisionError> {
-    let found = detect::detect(grey, target)?;
+/// As [`detect::detect_with`].
+pub fn observe_gray(
+    grey: &GrayImage,
+    target: &TargetSpec,
+    cancel: &CancelToken,
+) -> Result<Option<Sighting>, VisionError> {
+    let found = detect::detect_with(grey, target, &DetectOptions::thorough().cancelled_by(cancel))?;
     Ok(found.map(|corners| {
         let blur = match target {
             TargetSpec::Chessboard(grid) => EdgeBlur::measure(grey, &corners, grid),

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{DetectOptions, VisionError, detect, detect_with};
 use crate::geometry::camera::Intrinsics;
+use crate::progress::CancelToken;
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};
 use crate::testing::Scene;
@@ -22,7 +23,7 @@ fn scene(columns: usize, rows: usize, angles: [f64; 3]) -> Scene {
 
 fn found(scene: &Scene) -> Vec<Corner> {
     let target = TargetSpec::Chessboard(scene.grid());
-    let corners = detect_with(&scene.render(1), &target, DetectOptions::live()).expect("searches").expect("found");
+    let corners = detect_with(&scene.render(1), &target, &DetectOptions::live()).expect("searches").expect("found");
     assert!(corners.iter().enumerate().all(|(i, c)| c.index == i));
     corners
 }
@@ -94,6 +95,18 @@ fn an_image_without_the_board_is_no_error() {
     let mut cut = scene(10, 7, [0.2, 0.7, 0.3]);
     cut.camera_from_target = looking_at(&cut.grid(), &cut.camera, 0.42, [0.2, 0.7, 0.3], Vector2::new(260.0, 0.0));
     assert_eq!(detect(&cut.render(1), &target), Ok(None));
+}
+
+#[test]
+fn a_cancelled_search_says_so_and_not_that_there_is_no_target() {
+    let cancel = CancelToken::default();
+    cancel.cancel();
+    let grid = Grid { columns: 5, rows: 4, square_m: 0.015 };
+    let image = GrayImage::from_pixel(320, 240, Luma([128]));
+    for target in [TargetSpec::Chessboard(grid), TargetSpec::Circles(grid), TargetSpec::AsymmetricCircles(grid)] {
+        let options = DetectOptions::thorough().cancelled_by(&cancel);
+        assert_eq!(detect_with(&image, &target, &options), Err(VisionError::Cancelled));
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use image::GrayImage;
 
 use super::circles::asymmetric;
+use super::error::go_on;
 use super::markers::{april, charuco};
 use super::options::{DetectOptions, check};
 use super::order::Ordered;
@@ -18,7 +19,7 @@ const MIN_SQUARE_PX: u32 = 3;
 /// # Errors
 /// As [`detect_with`].
 pub fn detect(image: &GrayImage, target: &TargetSpec) -> Result<Option<Vec<Corner>>, VisionError> {
-    detect_with(image, target, DetectOptions::default())
+    detect_with(image, target, &DetectOptions::default())
 }
 
 /// Finds the points of the target, to a few hundredths of a pixel; `None` when it is not in the image.
@@ -43,20 +44,24 @@ pub fn detect(image: &GrayImage, target: &TargetSpec) -> Result<Option<Vec<Corne
 /// # Errors
 /// [`VisionError::TargetTooSmall`] for a chessboard or a grid of dots below 3 points a side, [`VisionError::BadTarget`]
 /// for markers that cannot be, [`VisionError::OtherLayout`] for a `ChArUco` board of the other layout than stated,
-/// [`VisionError::BadImage`], [`VisionError::OpenCv`].
+/// [`VisionError::BadImage`], [`VisionError::Cancelled`], [`VisionError::OpenCv`].
 pub fn detect_with(
     image: &GrayImage,
     target: &TargetSpec,
-    options: DetectOptions,
+    options: &DetectOptions,
 ) -> Result<Option<Vec<Corner>>, VisionError> {
     check(image, target)?;
-    let effort = options.effort;
+    let DetectOptions { effort, cancel } = options;
+    go_on(cancel)?;
+    let effort = *effort;
     match target {
         TargetSpec::Chessboard(grid) if fits(image, grid) => {
-            Ok(checkerboard::find(image, grid, effort)?.as_ref().map(corners))
+            Ok(checkerboard::find(image, grid, cancel)?.as_ref().map(corners))
         }
-        TargetSpec::Circles(grid) if fits(image, grid) => Ok(circles::find(image, grid, effort)?.as_ref().map(corners)),
-        TargetSpec::AsymmetricCircles(grid) if fits(image, grid) => asymmetric::find(image, grid, effort),
+        TargetSpec::Circles(grid) if fits(image, grid) => {
+            Ok(circles::find(image, grid, effort, cancel)?.as_ref().map(corners))
+        }
+        TargetSpec::AsymmetricCircles(grid) if fits(image, grid) => asymmetric::find(image, grid, effort, cancel),
         TargetSpec::Chessboard(_) | TargetSpec::Circles(_) | TargetSpec::AsymmetricCircles(_) => Ok(None),
         TargetSpec::Charuco(board) => charuco::find(image, board, effort),
         TargetSpec::AprilGrid(board) => april::find(image, board, effort),

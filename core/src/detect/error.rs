@@ -1,5 +1,7 @@
 //! Why there is no detection.
 
+use crate::progress::CancelToken;
+
 /// Why there is no detection.
 ///
 /// A board that is simply not in the image is not an error: [`detect`](super::detect) returns `None`.
@@ -40,6 +42,9 @@ pub enum VisionError {
         /// Height in pixels.
         height: u32,
     },
+    /// The search was asked to end before it had an answer.
+    #[error("the search was cancelled")]
+    Cancelled,
     /// OpenCV refused or failed.
     #[error("OpenCV could not {operation}: {message}")]
     OpenCv {
@@ -48,4 +53,9 @@ pub enum VisionError {
         /// What it said.
         message: String,
     },
+}
+
+/// Nothing, or [`VisionError::Cancelled`].
+pub(super) fn go_on(cancel: &CancelToken) -> Result<(), VisionError> {
+    if cancel.is_cancelled() { Err(VisionError::Cancelled) } else { Ok(()) }
 }

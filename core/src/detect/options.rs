@@ -3,6 +3,7 @@
 use image::GrayImage;
 
 use crate::detect::VisionError;
+use crate::progress::CancelToken;
 use crate::targets::{Grid, TargetSpec};
 
 /// How long a detection may take.
@@ -10,28 +11,37 @@ use crate::targets::{Grid, TargetSpec};
 pub enum Effort {
     /// The quick methods, for every frame of a live stream: a miss costs a few times what a hit does.
     Live,
-    /// Every method, for images that are kept: a miss may take some seconds per megapixel.
+    /// Every method, for images that are kept: a miss of dots or markers may take some seconds per megapixel. Chessboards
+    /// have only one.
     #[default]
     Thorough,
 }
 
 /// Options of [`detect_with`](super::detect_with).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct DetectOptions {
     /// How long it may take.
     pub effort: Effort,
+    /// Ends the search early: of a chessboard within a row of the image, of others between two calls of OpenCV.
+    pub cancel: CancelToken,
 }
 
 impl DetectOptions {
     /// For every frame of a live stream.
     pub fn live() -> Self {
-        Self { effort: Effort::Live }
+        Self { effort: Effort::Live, ..Self::default() }
     }
 
     /// For images that are kept.
     pub fn thorough() -> Self {
-        Self { effort: Effort::Thorough }
+        Self { effort: Effort::Thorough, ..Self::default() }
+    }
+
+    /// The same with a token that ends the search.
+    #[must_use]
+    pub fn cancelled_by(self, cancel: &CancelToken) -> Self {
+        Self { cancel: cancel.clone(), ..self }
     }
 }
 

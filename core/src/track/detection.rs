@@ -213,7 +213,7 @@ impl Eye<'_> {
     /// Searches the whole image for the whole board. Where the pattern leaves a choice, the numbering nearer to
     /// `expected` counts.
     pub fn anywhere(&self, expected: Option<&Isometry3<f64>>) -> Result<Option<Board>, VisionError> {
-        let Some(mut corners) = detect_with(self.image, self.target, DetectOptions::live())? else { return Ok(None) };
+        let Some(mut corners) = detect_with(self.image, self.target, &DetectOptions::live())? else { return Ok(None) };
         if let Some(expected) = expected
             && self.target.is_symmetric()
         {

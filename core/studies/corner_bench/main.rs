@@ -1,13 +1,18 @@
 //! Chessboard detection on rendered boards and on the reference sets, beside OpenCV.
 //!
-//! `cargo run --release -p handeye_core --example corner_bench -- [VIEWS] [native]`: VIEWS rendered boards per case, 24
-//! unless told; with `native` without the detectors of OpenCV, which take most of the time. The sets are looked for in
-//! `$HANDEYE_DATA`, then in `../shared/data`.
+//! `cargo run --release -p handeye_core --example corner_bench -- [VIEWS] [native] [PART …]`: VIEWS rendered boards per case,
+//! 24 unless told; with `native` without the detectors of OpenCV, which take most of the time. The parts are `rendered`,
+//! `hard`, `absent` and `recorded`; all of them unless told. The sets are looked for in `$HANDEYE_DATA`, then in
+//! `../shared/data`.
 
+mod absent;
 mod opencv_detectors;
 mod real;
+mod recall;
 mod render;
+mod scenes;
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use handeye_core::detect::{DetectOptions, detect_with};
@@ -38,12 +43,31 @@ pub fn detectors() -> &'static [Detector] {
     if std::env::args().any(|argument| argument == "native") { &DETECTORS[..1] } else { &DETECTORS }
 }
 
-fn native(image: &GrayImage, grid: &Grid) -> Option<Vec<Corner>> {
-    detect_with(image, &TargetSpec::Chessboard(*grid), DetectOptions::live()).expect("the image can be searched")
+/// Our own search.
+pub fn native(image: &GrayImage, grid: &Grid) -> Option<Vec<Corner>> {
+    detect_with(image, &TargetSpec::Chessboard(*grid), &DetectOptions::live()).expect("the image can be searched")
 }
 
 fn main() {
-    let views = std::env::args().nth(1).map_or(24, |n| n.parse().expect("a number of views"));
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let views: u64 = words.iter().find_map(|word| word.parse().ok()).unwrap_or(24);
+    let all = words.iter().all(|word| word == "native" || word.parse::<u64>().is_ok());
+    let asked = |part: &str| all || words.iter().any(|word| word == part);
+    if asked("rendered") {
+        all_rendered(views);
+    }
+    if asked("hard") {
+        recall::all(views);
+    }
+    if asked("absent") {
+        absent::all(views.div_ceil(12));
+    }
+    if asked("recorded") {
+        real::all();
+    }
+}
+
+fn all_rendered(views: u64) {
     let at = Look::published;
     let mut cases: Vec<(String, Look)> =
         [(0.0, 0.0), (0.5, 0.0), (0.7, 2.0), (1.0, 2.0), (0.7, 5.0), (1.5, 2.0), (2.5, 2.0), (0.7, 10.0)]
@@ -67,11 +91,10 @@ fn main() {
             rendered(detector, &look, &images);
         }
     }
-    real::all();
 }
 
 fn rendered(detector: &Detector, look: &Look, images: &[Image]) {
-    let grid = Grid { columns: look.columns, rows: look.rows, square_m: 1.0 };
+    let grid = look.grid();
     // Of an odd size it does not have, the board is not there: as much texture, but nothing to find.
     let other = Grid { columns: look.columns + 1, ..grid };
     let (mut found, mut hit_ms, mut miss_ms) = (0, Vec::new(), Vec::new());
@@ -106,6 +129,19 @@ fn rendered(detector: &Detector, look: &Look, images: &[Image]) {
     );
 }
 
+/// The images of a folder in the order of their names.
+pub fn load(folder: &Path) -> Vec<GrayImage> {
+    let entries = std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == "png" || e == "jpg"));
+    paths.sort();
+    let open = |path: &PathBuf| handeye_core::image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    paths.iter().map(|path| open(path).to_luma8()).collect()
+}
+
+/// A search of more than this is timed once \[ms\].
+const LONG_MS: f64 = 1000.0;
+
 /// What is found, and the shortest of three times in milliseconds: the machine may do something else besides.
 pub fn timed(detector: &Detector, image: &GrayImage, grid: &Grid) -> (Option<Vec<Corner>>, f64) {
     let mut shortest = f64::INFINITY;
@@ -114,6 +150,9 @@ pub fn timed(detector: &Detector, image: &GrayImage, grid: &Grid) -> (Option<Vec
         let start = Instant::now();
         corners = (detector.find)(image, grid);
         shortest = shortest.min(start.elapsed().as_secs_f64() * 1e3);
+        if shortest > LONG_MS {
+            break;
+        }
     }
     (corners, shortest)
 }

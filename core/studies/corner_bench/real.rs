@@ -1,17 +1,15 @@
 //! Boards found in the reference sets, and how well a detector repeats itself on a robot that returns to one pose.
 
-use std::path::{Path, PathBuf};
-
 use handeye_core::geometry::statistics::median_high;
 use handeye_core::image::GrayImage;
 use handeye_core::targets::Grid;
 use handeye_core::targets::observation::Corner;
 use nalgebra::Vector2;
 
-use crate::{Detector, detectors, timed};
+use crate::{Detector, detectors, load, timed};
 
 /// Folder, columns and rows.
-const SETS: [(&str, usize, usize); 8] = [
+pub const SETS: [(&str, usize, usize); 8] = [
     ("visp_franka_eye_in_hand", 9, 6),
     ("rwhe_kuka_1_eye_in_hand/images", 28, 17),
     ("rwhe_cs_synthetic_3/images", 9, 6),
@@ -27,20 +25,11 @@ pub fn all() {
     let Some(data) = handeye_core::testing::data_folder() else { return };
     for (folder, columns, rows) in SETS {
         println!("{folder}");
-        let images: Vec<GrayImage> = images(&data.join(folder));
+        let images: Vec<GrayImage> = load(&data.join(folder));
         for detector in detectors() {
             one(detector, &images, &Grid { columns, rows, square_m: 1.0 }, folder.ends_with("/repeatability"));
         }
     }
-}
-
-fn images(folder: &Path) -> Vec<GrayImage> {
-    let entries = std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
-    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|e| e == "png" || e == "jpg"));
-    paths.sort();
-    let load = |path: &PathBuf| handeye_core::image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    paths.iter().map(|path| load(path).to_luma8()).collect()
 }
 
 fn one(detector: &Detector, images: &[GrayImage], grid: &Grid, repeats: bool) {

@@ -26,6 +26,8 @@ pub struct Look {
     pub light: f64,
     /// Change of the light across the width of the image, as a part of it.
     pub fall: f64,
+    /// Shift of the board to the right, in units of the focal length.
+    pub moved: f64,
 }
 
 impl Look {
@@ -44,7 +46,13 @@ impl Look {
             dark: 45.0,
             light: 205.0,
             fall: 0.0,
+            moved: 0.0,
         }
+    }
+
+    /// The board.
+    pub fn grid(&self) -> Grid {
+        Grid { columns: self.columns, rows: self.rows, square_m: 1.0 }
     }
 }
 
@@ -61,13 +69,13 @@ pub fn view(look: &Look, seed: u64) -> Image {
     let tilt = rng.random_range(0.0..look.max_tilt);
     let pi = std::f64::consts::PI;
     let turn = rng.random_range(-pi..pi);
-    let offset = Vector2::new(rng.random_range(-0.08..0.08), rng.random_range(-0.08..0.08));
+    let offset = Vector2::new(rng.random_range(-0.08..0.08) + look.moved, rng.random_range(-0.08..0.08));
     let distortion = match look.radial {
         0.0 => Distortion::None,
         k => Distortion::BrownConrady([k, 0.0, 0.0, 0.0, 0.0]),
     };
     let camera = Intrinsics { distortion, ..Intrinsics::pinhole(look.size.0, look.size.1, look.focal_px) };
-    let grid = Grid { columns: look.columns, rows: look.rows, square_m: 1.0 };
+    let grid = look.grid();
     let pose = looking_at(&grid, &camera, distance, [tilt, azimuth, turn], offset * look.focal_px);
     let mut scene = Scene::new(camera, grid, pose);
     (scene.blur_px, scene.noise) = (look.blur_px, look.noise);

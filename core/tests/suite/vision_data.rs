@@ -41,7 +41,7 @@ struct Found {
 }
 
 /// Detects in all images.
-fn detect_all(paths: &[PathBuf], target: &TargetSpec, options: DetectOptions) -> Vec<Found> {
+fn detect_all(paths: &[PathBuf], target: &TargetSpec, options: &DetectOptions) -> Vec<Found> {
     let detect_one = |path: &PathBuf| {
         let image = load(path);
         let start = Instant::now();
@@ -100,7 +100,7 @@ fn check(expected: &Expected) {
     let folder = data.join(expected.folder);
     let mut paths = images(&folder.join(expected.images));
     paths.retain(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(expected.prefix)));
-    let found = detect_all(&paths, &expected.target, DetectOptions::thorough());
+    let found = detect_all(&paths, &expected.target, &DetectOptions::thorough());
     let missed: Vec<&str> = found.iter().filter(|f| f.corners.is_none()).map(|f| f.name.as_str()).collect();
     assert_eq!((found.len(), missed), (expected.count, vec![]), "{}", expected.folder);
 
@@ -265,7 +265,7 @@ fn grids_of_dots_begin_at_the_larger_dot_in_every_view() {
         let number = |i: usize| fields[i].parse::<f64>().expect("a number");
         reference.entry(fields[1].to_owned()).or_default().push(Vector2::new(number(5), number(6)));
     }
-    for found in detect_all(&images(&folder.join("images")), &dots(), DetectOptions::live()) {
+    for found in detect_all(&images(&folder.join("images")), &dots(), &DetectOptions::live()) {
         let corners = found.corners.unwrap_or_else(|| panic!("{} missed by the live search", found.name));
         for corner in corners {
             let (column, row) = (corner.index % 10, corner.index / 10);
@@ -289,7 +289,7 @@ fn a_live_search_finds_all_boards_too() {
         ("visp_franka_eye_in_hand", chessboard(9, 6, 0.0236)),
         ("rwhe_cs_synthetic_3/images", chessboard(9, 6, 0.2)),
     ] {
-        let found = detect_all(&images(&data.join(folder)), &target, DetectOptions::live());
+        let found = detect_all(&images(&data.join(folder)), &target, &DetectOptions::live());
         let mut millis: Vec<f64> = found.iter().map(|f| f.millis).collect();
         millis.sort_by(f64::total_cmp);
         println!(

@@ -79,7 +79,7 @@ impl PoseSequence<'_> {
                     images: &mut images,
                     first: true,
                 };
-                match capture::take(request, &target, &mut eye)? {
+                match capture::take(request, &target, &mut eye, sequence.cancel)? {
                     // The next try waits for the simulation, and takes the capture from the beginning.
                     CaptureEnd::Refused(refused) if refused.kind == RefusalKind::Paused => {
                         Err(LinkError::NotRunning { task: "a capture", state: SimulationState::Paused })

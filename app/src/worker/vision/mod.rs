@@ -173,7 +173,7 @@ impl Vision {
             self.track_in(frame, &grey, dropped);
             return Ok(());
         }
-        let Some(detection) = self.search.live(frame, &grey, dropped) else { return Ok(()) };
+        let Some(detection) = self.search.live(frame, &grey, dropped, &self.shutdown) else { return Ok(()) };
         if let (Some(capture), Some(corners)) = (&mut self.capture, &detection.corners) {
             capture.sequence.saw_board(frame.info.number, corners);
         }
@@ -239,8 +239,8 @@ impl Vision {
         let complete = self.capture.as_ref().filter(|capture| capture.sequence.is_complete());
         let Some(number) = complete.map(|capture| capture.sequence.number()) else { return Ok(()) };
         self.tell(CaptureWait::Measuring);
-        let measured = self.capture.as_ref().and_then(|capture| capture.sequence.measure());
-        // The search may have taken seconds: what was asked for meanwhile comes first.
+        let measured = self.capture.as_ref().and_then(|capture| capture.sequence.measure(&self.shutdown));
+        // The search for dots or markers may have taken seconds: what was asked for meanwhile comes first.
         self.take_up_tasks()?;
         if self.capture.as_ref().is_none_or(|capture| capture.sequence.number() != number) {
             return Ok(());

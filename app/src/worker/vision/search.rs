@@ -6,6 +6,7 @@ use handeye_core::detect::{DetectOptions, detect_with};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::planar_pose;
 use handeye_core::image::GrayImage;
+use handeye_core::progress::CancelToken;
 use handeye_core::targets::TargetSpec;
 
 use crate::model::{LiveDetection, LiveFrame};
@@ -19,10 +20,16 @@ pub struct Search {
 
 impl Search {
     /// Looks for the board the quick way; `None` while there is no board to look for.
-    pub fn live(&self, frame: &LiveFrame, grey: &GrayImage, dropped: u64) -> Option<LiveDetection> {
+    pub fn live(
+        &self,
+        frame: &LiveFrame,
+        grey: &GrayImage,
+        dropped: u64,
+        cancel: &CancelToken,
+    ) -> Option<LiveDetection> {
         let target = self.target?;
         let began = Instant::now();
-        let (corners, problem) = match detect_with(grey, &target, DetectOptions::live()) {
+        let (corners, problem) = match detect_with(grey, &target, &DetectOptions::live().cancelled_by(cancel)) {
             Ok(corners) => (corners, None),
             Err(problem) => (None, Some(problem)),
         };

@@ -3,6 +3,7 @@ use handeye_core::detect::VisionError;
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
+use handeye_core::progress::CancelToken;
 use handeye_core::targets::{Grid, TargetSpec};
 
 use super::VisionTask;
@@ -65,7 +66,9 @@ fn what_a_capture_waits_for_is_told_when_it_changes() {
     assert_eq!(measured.thumbnail.dimensions(), (160, 120));
     assert_eq!(*measured.rgb, board(1), "nothing is drawn on it");
     assert_eq!(measured.pose_name.as_deref(), Some("view"));
-    let again = handeye_core::capture::observe_image(&measured.rgb, &BOARD).expect("searches").expect("the board");
+    let again = handeye_core::capture::observe_image(&measured.rgb, &BOARD, &CancelToken::default())
+        .expect("searches")
+        .expect("the board");
     assert_eq!(again.corners, measured.corners, "the kept image gives the same corners");
     let averaging = |done| (7, CaptureWait::Images(Wait::Averaging { done, of: 3 }));
     let told = [

@@ -5,9 +5,11 @@ use nalgebra::{Matrix3, Vector2};
 use opencv::calib3d;
 
 use super::dots;
+use crate::detect::error::go_on;
 use crate::detect::options::Effort;
 use crate::detect::{VisionError, circles};
 use crate::geometry::planar_pose::homography::{homography, jacobian, mapped};
+use crate::progress::CancelToken;
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};
 
@@ -22,6 +24,7 @@ pub(in crate::detect) fn find(
     image: &GrayImage,
     grid: &Grid,
     effort: Effort,
+    cancel: &CancelToken,
 ) -> Result<Option<Vec<Corner>>, VisionError> {
     const PLAIN: i32 = calib3d::CALIB_CB_ASYMMETRIC_GRID;
     const CLUSTERED: i32 = calib3d::CALIB_CB_ASYMMETRIC_GRID + calib3d::CALIB_CB_CLUSTERING;
@@ -32,6 +35,7 @@ pub(in crate::detect) fn find(
     let target = TargetSpec::AsymmetricCircles(*grid);
     let on_target: Vec<Vector2<f64>> = target.points().iter().map(|p| p.coords.xy()).collect();
     for &(dark, flags) in attempts {
+        go_on(cancel)?;
         let Some(centres) = circles::centres(image, grid, dark, flags)? else { continue };
         if let Some((points, map)) = numbered(&centres, &on_target, grid) {
             return Ok(refined(image, &points, &on_target, &map, grid, dark));

@@ -11,8 +11,10 @@ use opencv::core::{Point2f, Size, Vector};
 use super::VisionError;
 use super::bridge::{failed, from_points2f, mat_from_gray};
 use super::circles::dots::{Dot, quantile};
+use super::error::go_on;
 use super::options::Effort;
 use super::order::{Ordered, canonical};
+use crate::progress::CancelToken;
 use crate::targets::Grid;
 
 /// A dot counts as the larger one when its area is this many times the usual: drawn 1.5 times as wide it has 2.25
@@ -21,8 +23,13 @@ const LARGER_DOT: f64 = 1.5;
 /// Largest distance of a dot from the middle of its two neighbours, as a part of their distance.
 const MAX_BEND: f64 = 0.1;
 
-pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<Ordered>, VisionError> {
-    let Some((found, dark)) = search(image, grid, effort)? else { return Ok(None) };
+pub(super) fn find(
+    image: &GrayImage,
+    grid: &Grid,
+    effort: Effort,
+    cancel: &CancelToken,
+) -> Result<Option<Ordered>, VisionError> {
+    let Some((found, dark)) = search(image, grid, effort, cancel)? else { return Ok(None) };
     let dots: Vec<Option<Dot>> = (0..found.points.len())
         .map(|i| dots::measure(image, found.points[i], &found.steps(i % found.columns, i / found.columns), dark))
         .collect();
@@ -45,7 +52,12 @@ pub(super) fn find(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Opt
 }
 
 /// The points in some order, and whether the dots are dark on light.
-fn search(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<(Ordered, bool)>, VisionError> {
+fn search(
+    image: &GrayImage,
+    grid: &Grid,
+    effort: Effort,
+    cancel: &CancelToken,
+) -> Result<Option<(Ordered, bool)>, VisionError> {
     const PLAIN: i32 = calib3d::CALIB_CB_SYMMETRIC_GRID;
     const CLUSTERED: i32 = calib3d::CALIB_CB_SYMMETRIC_GRID + calib3d::CALIB_CB_CLUSTERING;
     let attempts: &[(bool, i32)] = match effort {
@@ -53,6 +65,7 @@ fn search(image: &GrayImage, grid: &Grid, effort: Effort) -> Result<Option<(Orde
         Effort::Thorough => &[(true, PLAIN), (true, CLUSTERED), (false, PLAIN), (false, CLUSTERED)],
     };
     for &(dark, flags) in attempts {
+        go_on(cancel)?;
         let Some(centres) = centres(image, grid, dark, flags)? else { continue };
         let order = Ordered::new(centres, grid);
         if order.is_regular() && order.is_smooth(MAX_BEND) {

@@ -7,11 +7,14 @@
 use nalgebra::{SMatrix, SVector, Vector2};
 
 use super::edge::{PIXEL_AREA, Profile};
-use super::fit::{Fit, Light, fit};
+use super::fit::{Fit, Light, SHARPEST_PX, fit};
 use super::patch::{BLUR, Patch, Window};
 use super::pyramid::Level;
+use crate::detect::VisionError;
+use crate::detect::error::go_on;
 use crate::detect::order::Ordered;
 use crate::geometry::statistics::median_high;
+use crate::progress::CancelToken;
 
 /// Part of a grid step up to which a pixel counts for the first fit, and the part tried when that fails: the outermost
 /// squares of some boards are cut narrow, and dirt or a shadow may lie on a square.
@@ -38,8 +41,6 @@ const MOST_FITS: usize = 3;
 /// the corner may be: a wide edge is felt from further away.
 const START_BLUR_PX: f64 = 1.0;
 const BLUR_PER_PX: f64 = 0.3;
-/// Least blur that a second fit starts from \[px\].
-const SHARPEST_PX: f64 = 0.4;
 /// Below this blur an edge is integrated over the pixels: beyond, a Gaussian is off by `2 · 0.55 / (24 · 120 σ⁴)` of the
 /// contrast at the most ([`super::edge`]), in full contrast less than the deviation of rounding to whole grey levels.
 const SHARP_PX: f64 = 0.64;
@@ -56,26 +57,34 @@ const MIN_LEVELS: usize = 12;
 
 /// Refines a board found to a pixel or so on `levels[depth]`, in pixels of that level. The result is in pixels of
 /// `levels[0]`, the image; corners whose image is not that of a corner stay and have no covariance.
-pub(super) fn refine(levels: &[Level], depth: usize, found: &Ordered) -> Ordered {
-    let (Some(image), Some(level)) = (levels.first(), levels.get(depth)) else { return found.clone() };
+pub(super) fn refine(
+    levels: &[Level],
+    depth: usize,
+    found: &Ordered,
+    cancel: &CancelToken,
+) -> Result<Ordered, VisionError> {
+    let (Some(image), Some(level)) = (levels.first(), levels.get(depth)) else { return Ok(found.clone()) };
     let scale = f64::from(1u32 << depth);
     let mut at = found.clone();
     for point in &mut at.points {
         *point = full_px(*point, scale);
     }
     let mut first: Vec<Option<Fit>> = vec![None; found.points.len()];
-    add_first_fits(level, found, 1.0, &mut first);
+    add_first_fits(level, found, 1.0, &mut first, cancel)?;
     if depth > 0 {
         first = first.into_iter().map(|fit| fit.map(|fit| enlarged(fit, scale))).collect();
         // Squares too small on the level may do in the image.
-        add_first_fits(image, &at, scale, &mut first);
+        add_first_fits(image, &at, scale, &mut first, cancel)?;
     }
     for (point, fit) in at.points.iter_mut().zip(&first) {
         *point = fit.map_or(*point, |fit| fit.px);
     }
     let (bends, fall) = (Bends::of(&at), Fall::over(&first));
     let mut out = at.clone();
+    // Blur changes slowly over a board.
+    let mut blur_px = None;
     for (index, start) in first.iter().enumerate() {
+        go_on(cancel)?;
         let Some(start) = start else { continue };
         let (column, row) = (index % at.columns, index / at.columns);
         let (along_x, along_y) = at.steps(column, row);
@@ -84,14 +93,20 @@ pub(super) fn refine(levels: &[Level], depth: usize, found: &Ordered) -> Ordered
         let gradient = fall.as_ref().and_then(|fall| fall.gradient(start.px));
         // Unless something else came into the larger window.
         let usual = 4.0 * start.covariance_px2.trace().sqrt() + USUAL_MOVE * scale;
-        let second = second_fit(image, &window, spacing, gradient, start);
-        let second = second.filter(|fit| (fit.px - start.px).norm() <= usual);
+        let from = |start: &Fit| {
+            let fit = second_fit(image, &window, spacing, gradient, start);
+            fit.filter(|fit| (fit.px - start.px).norm() <= usual)
+        };
+        // What a coarser level says about the blur is too much where edges are sharp.
+        let like_the_last = blur_px.filter(|_| depth > 0).map(|blur_px| Fit { blur_px, ..*start }.with_its_blur());
+        let second = like_the_last.and_then(|start| from(&start)).or_else(|| from(start));
+        blur_px = second.map(|fit| fit.blur_px).or(blur_px);
         // On a coarse level the first fit is not good enough to stand.
         let Some(fit) = second.or((depth == 0).then_some(*start)) else { continue };
         out.points[index] = fit.px;
         out.covariances_px2[index] = Some(fit.covariance_px2);
     }
-    out
+    Ok(out)
 }
 
 /// A coordinate u covers u − ½ … u + ½, so it is u + ½ that scales.
@@ -111,9 +126,16 @@ fn enlarged(fit: Fit, scale: f64) -> Fit {
 }
 
 /// Fits at the points of `found`, which are known to `within_px` or so, where there is none yet.
-fn add_first_fits(level: &Level, found: &Ordered, within_px: f64, fits: &mut [Option<Fit>]) {
+fn add_first_fits(
+    level: &Level,
+    found: &Ordered,
+    within_px: f64,
+    fits: &mut [Option<Fit>],
+    cancel: &CancelToken,
+) -> Result<(), VisionError> {
     let mut blur_px = START_BLUR_PX;
     for (index, (point, fit)) in found.points.iter().zip(fits).enumerate() {
+        go_on(cancel)?;
         if fit.is_some() {
             continue;
         }
@@ -127,6 +149,7 @@ fn add_first_fits(level: &Level, found: &Ordered, within_px: f64, fits: &mut [Op
         // Blur changes slowly over a board.
         blur_px = fit.map_or(blur_px, |fit| fit.blur_px.max(SHARPEST_PX));
     }
+    Ok(())
 }
 
 /// The window of the first fit on a plain chessboard.
@@ -139,8 +162,6 @@ fn plain(centre: Vector2<f64>, along: [Vector2<f64>; 2]) -> Window {
         reach_px: FIRST_REACH_PX,
         band_px: f64::INFINITY,
         meeting_px: 0.0,
-        clear_part: 1.0,
-        dark: true,
     }
 }
 

@@ -36,11 +36,16 @@ const MIN_FREEDOM: f64 = 6.0;
 const MAX_STEPS: usize = 12;
 /// Part of the sum of squares that the last step may take off.
 const LAST_GAIN: f64 = 0.05;
+/// Part of the corner's standard deviation that a fit may leave of its way: it adds 0.1 % to the RMS of the error.
+const LEFT_PART: f64 = 0.05;
 /// A step that changes the blur by as much as this \[px\] gains as much as rounding takes from one pixel.
 const SMALL_BLUR_PX: f64 = 0.1;
 /// Part of the blur of the lens that one step may leave, and what is left of it in the end \[px\].
 const LENS_PER_STEP: f64 = 0.25;
 const NO_LENS_PX: f64 = 0.05;
+/// Least blur of the Gaussian profile, and least that a fit over the area of pixels starts from \[px\]: of an edge that is
+/// sharper, samples a pixel apart see one at the most, and its blur is not told from its place.
+pub(super) const SHARPEST_PX: f64 = 0.4;
 /// At this blur \[px\] a fit has found something else than a corner.
 const MAX_BLUR_PX: f64 = 8.0;
 /// Least contrast (half the difference between dark and light) in grey levels.
@@ -76,8 +81,16 @@ pub(super) struct Fit {
     pub noise: f64,
 }
 
-/// Levenberg–Marquardt from `start`, until a step moves the corner by less than `converged_px`: each is several times
-/// shorter than the one before. `None` when it ends at something that is not a corner.
+impl Fit {
+    /// The same with its blur among the parameters that a further fit starts from.
+    pub fn with_its_blur(mut self) -> Self {
+        self.parameters[BLUR] = self.blur_px;
+        self
+    }
+}
+
+/// Levenberg–Marquardt from `start`, until a step moves the corner by less than `converged_px`, each being several times
+/// shorter than the one before, or leaves less of the way than noise. `None` when it ends at something that is not a corner.
 pub(super) fn fit(
     patch: &Patch,
     window: &Window,
@@ -86,7 +99,10 @@ pub(super) fn fit(
     start: Parameters,
     converged_px: f64,
 ) -> Option<Fit> {
-    let least_blur = PIXEL_AREA.sqrt();
+    let least_blur = match profile {
+        Profile::Blurred => SHARPEST_PX,
+        Profile::Pixels => PIXEL_AREA.sqrt(),
+    };
     let evaluate = |x: &Parameters, is_sharp: bool| {
         let mut sums = Sums::at(patch, x, window.bend.map(|c| c as f32), profile);
         // Sharp edges along the pixels may say nothing about a small change of the blur.
@@ -94,7 +110,7 @@ pub(super) fn fit(
         if let Some(light) = light {
             sums.expect(x, light);
         }
-        // No image is sharper than its pixels: a blur that would go below stays where it is.
+        // No image is sharper than its pixels, and samples of a Gaussian tell none that is narrower: a blur that would go below stays where it is.
         if x[BLUR] <= least_blur && (is_sharp || sums.gradient[BLUR] > 0.0) {
             sums.hold(BLUR);
         }
@@ -111,7 +127,8 @@ pub(super) fn fit(
         candidate[BLUR] = candidate[BLUR].clamp(least_blur_after(x[BLUR], profile), MAX_BLUR_PX);
         let gain = step.dot(&sums.gradient);
         // A step cut short by the damping is no sign of the end.
-        let ends = damping < 1e-2 && step[0].hypot(step[1]) < converged_px && gain < LAST_GAIN * sums.cost;
+        let is_last = step[0].hypot(step[1]) < converged_px || left_px(&x, &step) < LEFT_PART * sums.least_sd_px(gain);
+        let ends = damping < 1e-2 && is_last && gain < LAST_GAIN * sums.cost;
         if ends {
             // What the linear model says is left is as good as another look.
             sums.misfit = (sums.misfit - gain).max(0.0);
@@ -136,11 +153,20 @@ pub(super) fn fit(
     finished(window, &x, &sums)
 }
 
+/// How far from its end a Gauss–Newton step leaves the corner \[px\], to the leading order: half a turn turns the terms of
+/// second order in the corner alone into themselves, so that it is the product of its step with the relative change of
+/// contrast and profile, and the third power of the step.
+fn left_px(x: &Parameters, step: &Parameters) -> f64 {
+    let moved = step[0].hypot(step[1]);
+    let relative = |i: usize| (step[i] / x[i]).abs();
+    moved * (relative(BLUR) + relative(8) + (step[4].abs() + step[5].abs()) + (moved / x[BLUR]).powi(2))
+}
+
 /// Least blur that one step may lead to: as the blur of the lens goes, pixels stop to feel an edge that is not in them, so
 /// the corner has to be in its place before.
 fn least_blur_after(blur: f64, profile: Profile) -> f64 {
     match profile {
-        Profile::Blurred => PIXEL_AREA.sqrt(),
+        Profile::Blurred => SHARPEST_PX,
         Profile::Pixels => {
             let lens = (blur * blur - PIXEL_AREA).max(0.0).sqrt();
             if lens < NO_LENS_PX { PIXEL_AREA.sqrt() } else { (LENS_PER_STEP * lens).hypot(PIXEL_AREA.sqrt()) }
@@ -221,6 +247,13 @@ impl Sums {
         odd.solve_mut(&mut step.fixed_rows_mut::<ODD>(0));
         even.solve_mut(&mut step.fixed_rows_mut::<EVEN>(ODD));
         Some(step)
+    }
+
+    /// Standard deviation of the corner if all else were known \[px\], which is the least it can be, after a step that takes
+    /// `gain` off the squares.
+    fn least_sd_px(&self, gain: f64) -> f64 {
+        let noise = ((self.misfit - gain) / self.count).max(ROUNDING);
+        (noise / self.normal[(0, 0)].max(self.normal[(1, 1)])).sqrt()
     }
 
     /// `(JᵀJ)⁻¹` of the corner.

@@ -5,6 +5,9 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::Vector2;
 
 use super::saddles::Saddle;
+use crate::detect::VisionError;
+use crate::detect::error::go_on;
+use crate::progress::CancelToken;
 
 /// The grid of a board as found on a level of the pyramid.
 pub(super) struct Grown {
@@ -25,7 +28,7 @@ const NEAR: f64 = 0.3;
 /// Sine of the angle between a step and the edges at both of its ends: errors of the ring on squares of 5 px.
 const OFF_EDGE: f64 = 0.42;
 /// Part of the points that must be seen, in all and in every line: dirt and glare hide single ones.
-const MIN_SEEN: f64 = 0.85;
+pub(super) const MIN_SEEN: f64 = 0.85;
 const MIN_SEEN_IN_LINE: f64 = 0.6;
 /// A line beyond the board of which more than this part is seen makes it another board; less is clutter beside it.
 const MAX_BEYOND: f64 = 0.6;
@@ -40,14 +43,20 @@ type Node = (i32, i32);
 const DIRECTIONS: [Node; 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 
 /// The grid with `columns` × `rows` points among the candidates, in either orientation.
-pub(super) fn grow(saddles: &[Saddle], size: (usize, usize), columns: usize, rows: usize) -> Option<Grown> {
+pub(super) fn grow(
+    saddles: &[Saddle],
+    size: (usize, usize),
+    (columns, rows): (usize, usize),
+    cancel: &CancelToken,
+) -> Result<Option<Grown>, VisionError> {
     let need = (MIN_SEEN * (columns * rows) as f64).ceil() as usize;
     if saddles.len() < need {
-        return None;
+        return Ok(None);
     }
     let bins = Bins::new(saddles, size);
     let mut visited = vec![false; saddles.len()];
     for seed in 0..saddles.len() {
+        go_on(cancel)?;
         if visited[seed] {
             continue;
         }
@@ -59,19 +68,24 @@ pub(super) fn grow(saddles: &[Saddle], size: (usize, usize), columns: usize, row
         if lattice.nodes.len() >= need
             && let Some(grown) = lattice.board(columns, rows)
         {
-            return Some(grown);
+            return Ok(Some(grown));
         }
     }
-    None
+    Ok(None)
 }
 
 /// Points of the largest grid among the candidates along its sides, whatever grid is looked for; `None` where no grid has
 /// three by three.
-pub(super) fn largest(saddles: &[Saddle], size: (usize, usize)) -> Option<(usize, usize)> {
+pub(super) fn largest(
+    saddles: &[Saddle],
+    size: (usize, usize),
+    cancel: &CancelToken,
+) -> Result<Option<(usize, usize)>, VisionError> {
     let bins = Bins::new(saddles, size);
     let mut visited = vec![false; saddles.len()];
     let mut best = None;
     for seed in 0..saddles.len() {
+        go_on(cancel)?;
         if visited[seed] {
             continue;
         }
@@ -83,7 +97,7 @@ pub(super) fn largest(saddles: &[Saddle], size: (usize, usize)) -> Option<(usize
         let sides = lattice.whole_part();
         best = best.max(sides.map(|(width, height)| (width * height, width, height)));
     }
-    best.map(|(_, width, height)| (width, height))
+    Ok(best.map(|(_, width, height)| (width, height)))
 }
 
 /// Candidates by place.
@@ -146,22 +160,25 @@ fn seed_at(saddles: &[Saddle], bins: &Bins, centre: usize) -> Option<Seed> {
     let mut best = [(f64::INFINITY, usize::MAX); 4];
     for index in bins.around(here.px, SEED_REACH_PX) {
         let offset = saddles[index].px - here.px;
-        let distance = offset.norm();
-        if index == centre || distance > SEED_REACH_PX {
+        let squared = offset.norm_squared();
+        if index == centre || squared > SEED_REACH_PX * SEED_REACH_PX {
             continue;
         }
-        for (slot, direction) in [x, y, -x, -y].iter().enumerate() {
-            if distance < best[slot].0
-                && direction.dot(&offset) > 0.0
-                && direction.perp(&offset).abs() < SEED_CONE * distance
+        for (axis, direction) in [x, y].iter().enumerate() {
+            let off = direction.perp(&offset);
+            if off * off >= SEED_CONE * SEED_CONE * squared {
+                continue;
+            }
+            let slot = if direction.dot(&offset) > 0.0 { axis } else { axis + 2 };
+            if squared < best[slot].0
                 && saddles[index].is_dark(&diagonal) != dark
                 && saddles[index].off_edge(direction) < OFF_EDGE
             {
-                best[slot] = (distance, index);
+                best[slot] = (squared, index);
             }
         }
     }
-    let alike = |a: f64, b: f64| a.max(b) < SEED_RATIO * a.min(b);
+    let alike = |a: f64, b: f64| a.max(b) < SEED_RATIO * SEED_RATIO * a.min(b);
     let complete = best.iter().all(|(_, index)| *index != usize::MAX);
     (complete && alike(best[0].0, best[2].0) && alike(best[1].0, best[3].0))
         .then(|| Seed { centre, neighbours: best.map(|(_, index)| index) })

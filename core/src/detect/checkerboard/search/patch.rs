@@ -33,20 +33,14 @@ pub(super) struct Window {
     pub band_px: f64,
     /// Pixels closer than this to both edges \[px\] see both of them at once.
     pub meeting_px: f64,
-    /// Pixels in the light squares further than this part of a step from both edges do not count: there something is
-    /// printed.
-    pub clear_part: f64,
-    /// Whether the square between both steps is dark; needed with `clear_part`.
-    pub dark: bool,
 }
 
 /// Pixels around a corner, relative to the window's centre, filled up to whole groups with pixels of no weight.
-#[derive(Default)]
 pub(super) struct Patch {
+    /// Those with pixels that see both edges, among others, come first.
     pub groups: Vec<Group>,
-    count: usize,
-    /// Pixels that see both edges; they come first.
-    meeting: usize,
+    /// How many do.
+    both: usize,
 }
 
 #[derive(Clone, Copy)]
@@ -58,6 +52,58 @@ pub(super) struct Group {
 }
 
 const EMPTY: Group = Group { x: [0.0; LANES], y: [0.0; LANES], level: [0.0; LANES], weight: [0.0; LANES] };
+
+/// Pixels as they are collected.
+#[derive(Default)]
+struct Pixels {
+    groups: Vec<Group>,
+    count: usize,
+}
+
+impl Pixels {
+    #[inline]
+    fn push(&mut self, [x, y, level]: [f32; 3]) {
+        let lane = self.count % LANES;
+        if lane == 0 {
+            self.groups.push(EMPTY);
+        }
+        if let Some(group) = self.groups.last_mut() {
+            (group.x[lane], group.y[lane], group.level[lane], group.weight[lane]) = (x, y, level, 1.0);
+            self.count += 1;
+        }
+    }
+}
+
+/// Where on a row of the image something is so; empty where the ends are the wrong way round.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    from: f64,
+    to: f64,
+}
+
+impl Span {
+    /// Where `|across.0 · x + across.1 · y| ≤ limit`.
+    fn within(across: (f64, f64), y: f64, limit: f64) -> Self {
+        let (middle, half) = (-across.1 * y / across.0, limit / across.0.abs());
+        if middle.is_finite() && half.is_finite() {
+            return Self { from: middle - half, to: middle + half };
+        }
+        // The row runs along the edge: all of it or nothing.
+        let end = if (across.1 * y).abs() <= limit { f64::INFINITY } else { f64::NEG_INFINITY };
+        Self { from: -end, to: end }
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self { from: self.from.max(other.from), to: self.to.min(other.to) }
+    }
+
+    /// The pixels in it, of those before `end`, when pixel 0 is at `−origin`.
+    fn pixels(self, origin: f64, end: usize) -> std::ops::Range<usize> {
+        let (from, beyond) = ((self.from + origin).max(0.0), (self.to + origin + 1.0).min(end as f64));
+        // Casts round down; the ends of an empty span are infinite.
+        if from < beyond { from as usize + usize::from(from.fract() > 0.0)..beyond as usize } else { 0..0 }
+    }
+}
 
 impl Patch {
     /// The pixels of a window; `None` when too few or cut by the border of the image.
@@ -73,66 +119,44 @@ impl Patch {
         if !inside || !area.is_normal() {
             return None;
         }
-        // Distances from the edges are `a` and `b` times these.
-        let (from_y, from_x) = ((area / along_y.norm()).abs(), (area / along_x.norm()).abs());
-        let mut patch = Self { groups: Vec::with_capacity(40), ..Self::default() };
+        // Distances from both edges [px] are these times the place, and parts of a step the same over what a step is long.
+        let (length_x, length_y) = (along_x.norm(), along_y.norm());
+        let from_y = (along_y.y / length_y, -along_y.x / length_y);
+        let from_x = (-along_x.y / length_x, along_x.x / length_x);
+        let (part_a, part_b) = (window.part * area.abs() / length_y, window.part * area.abs() / length_x);
+        let (mut both, mut rest) = (Pixels::default(), Pixels::default());
         for v in low.y as usize..=high.y as usize {
             let row = level.pixels.get(v * width..(v + 1) * width)?;
-            let dy = v as f64 - window.centre.y;
-            for (u, grey) in row.iter().enumerate().take(high.x as usize + 1).skip(low.x as usize) {
-                let dx = u as f64 - window.centre.x;
-                let a = (dx * along_y.y - dy * along_y.x) / area;
-                let b = (along_x.x * dy - along_x.y * dx) / area;
-                let off = (a.abs() * from_y, b.abs() * from_x);
-                let counts = a.abs() <= window.part
-                    && b.abs() <= window.part
-                    && dx * dx + dy * dy <= window.reach_px * window.reach_px
-                    && off.0.min(off.1) <= window.band_px
-                    && (((a * b > 0.0) == window.dark) || a.abs().min(b.abs()) <= window.clear_part);
-                if counts {
-                    patch.push(dx as f32, dy as f32, f32::from(*grey));
-                    if off.0.max(off.1) < window.meeting_px {
-                        patch.last_sees_both();
-                    }
-                }
+            let y = v as f64 - window.centre.y;
+            let chord = (window.reach_px * window.reach_px - y * y).max(0.0).sqrt();
+            let all = Span::within(from_y, y, part_a)
+                .and(Span::within(from_x, y, part_b))
+                .and(Span { from: -chord, to: chord });
+            let near = |distance: f64| [from_y, from_x].map(|from| Span::within(from, y, distance).and(all));
+            let pixels = |span: Span| span.pixels(window.centre.x, width);
+            let [one, other] = near(window.band_px).map(pixels);
+            let [close, close_too] = near(window.meeting_px);
+            let meeting = pixels(close.and(close_too));
+            // What is near one edge and, before and after that, what is near the other.
+            let before = other.start..other.end.min(one.start.max(other.start));
+            let after = other.start.max(one.end)..other.end;
+            let parts = if one.is_empty() { [other, 0..0, 0..0] } else { [one, before, after] };
+            for u in parts.into_iter().flatten() {
+                let x = u as f64 - window.centre.x;
+                let pixel = [x as f32, y as f32, f32::from(row[u])];
+                if meeting.contains(&u) { both.push(pixel) } else { rest.push(pixel) }
             }
         }
-        (patch.count >= MIN_PIXELS).then_some(patch)
-    }
-
-    fn push(&mut self, dx: f32, dy: f32, level: f32) {
-        let lane = self.count % LANES;
-        if lane == 0 {
-            self.groups.push(EMPTY);
-        }
-        if let Some(group) = self.groups.last_mut() {
-            (group.x[lane], group.y[lane], group.level[lane], group.weight[lane]) = (dx, dy, level, 1.0);
-            self.count += 1;
-        }
-    }
-
-    /// Moves the last pixel to those that come first.
-    fn last_sees_both(&mut self) {
-        let (first, last) = (self.meeting, self.count - 1);
-        let (kept, moved) = (self.pixel(first), self.pixel(last));
-        self.put(first, moved);
-        self.put(last, kept);
-        self.meeting += 1;
-    }
-
-    fn pixel(&self, index: usize) -> [f32; 3] {
-        let (group, lane) = (&self.groups[index / LANES], index % LANES);
-        [group.x[lane], group.y[lane], group.level[lane]]
-    }
-
-    fn put(&mut self, index: usize, [x, y, level]: [f32; 3]) {
-        let (group, lane) = (&mut self.groups[index / LANES], index % LANES);
-        (group.x[lane], group.y[lane], group.level[lane]) = (x, y, level);
+        let count = both.count + rest.count;
+        let mut groups = both.groups;
+        let both = groups.len();
+        groups.append(&mut rest.groups);
+        (count >= MIN_PIXELS).then_some(Self { groups, both })
     }
 
     /// The groups with pixels that see both edges, among others, and those without.
     pub fn split(&self) -> (&[Group], &[Group]) {
-        self.groups.split_at(self.meeting.div_ceil(LANES))
+        self.groups.split_at(self.both)
     }
 
     /// Edges along the grid's own steps; levels from the mean intensity of the two pairs of opposite squares.

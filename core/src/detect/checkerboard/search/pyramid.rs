@@ -4,6 +4,10 @@ use std::borrow::Cow;
 
 use image::GrayImage;
 
+use crate::detect::VisionError;
+use crate::detect::error::go_on;
+use crate::progress::CancelToken;
+
 /// One level of the pyramid.
 pub(super) struct Level<'a> {
     pub width: usize,
@@ -21,13 +25,14 @@ impl<'a> Level<'a> {
     }
 
     /// The image and `halvings` levels, each the mean of 2×2 pixels of the one before.
-    pub fn pyramid(image: &'a GrayImage, halvings: usize) -> Vec<Self> {
+    pub fn pyramid(image: &'a GrayImage, halvings: usize, cancel: &CancelToken) -> Result<Vec<Self>, VisionError> {
         let mut all = vec![Self::full(image)];
         for _ in 0..halvings {
+            go_on(cancel)?;
             let Some(half) = all.last().and_then(Self::half) else { break };
             all.push(half);
         }
-        all
+        Ok(all)
     }
 
     pub fn size(&self) -> (usize, usize) {

@@ -3,6 +3,9 @@
 use nalgebra::Vector2;
 
 use super::pyramid::Level;
+use crate::detect::VisionError;
+use crate::detect::error::go_on;
+use crate::progress::CancelToken;
 
 /// A point with four alternating sectors around it.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +35,8 @@ impl Saddle {
 
 /// Pixels at the border without a response: two for the second differences, one for the box.
 const BORDER: usize = 4;
+/// Pixels that are looked at together.
+const CHUNK: usize = 16;
 /// Responses are stored in units of this power of two, so that the largest fits 16 bits.
 const RESPONSE_SHIFT: u32 = 6;
 /// Least response: that of a sharp corner with 8 grey levels between dark and light.
@@ -53,24 +58,27 @@ const MIN_ANGLE: f32 = 0.8;
 const MAX_KINK: f32 = 2.0;
 
 /// All candidates of a level, the strongest first.
-pub(super) fn find(level: &Level) -> Vec<Saddle> {
+pub(super) fn find(level: &Level, cancel: &CancelToken) -> Result<Vec<Saddle>, VisionError> {
     let (width, height) = level.size();
     if width <= 2 * BORDER || height <= 2 * BORDER {
-        return Vec::new();
+        return Ok(Vec::new());
     }
-    let boxes = box_sums(level);
-    let responses = responses(&boxes, width, height);
+    let boxes = box_sums(level, cancel)?;
+    let responses = responses(&boxes, width, height, cancel)?;
     let mut out = Vec::new();
     for y in BORDER..height - BORDER {
-        let row = &responses[y * width..(y + 1) * width];
-        for (chunk_index, chunk) in row.chunks(16).enumerate() {
+        go_on(cancel)?;
+        let row = &responses[y * width + BORDER..(y + 1) * width - BORDER];
+        for (chunk_index, chunk) in row.chunks(CHUNK).enumerate() {
             if chunk.iter().fold(0, |most, r| most.max(*r)) < MIN_RESPONSE {
                 continue;
             }
-            for (i, &strength) in chunk.iter().enumerate() {
-                let x = chunk_index * 16 + i;
+            let from = BORDER + chunk_index * CHUNK;
+            let around = largest_around(&responses, width, from, y);
+            for (i, (&strength, &most)) in chunk.iter().zip(&around).enumerate() {
+                let x = from + i;
                 if strength >= MIN_RESPONSE
-                    && (BORDER..width - BORDER).contains(&x)
+                    && strength == most
                     && is_peak(&responses, width, x, y, strength)
                     && let Some(saddle) = saddle_at(&boxes, width, height, x, y, strength)
                 {
@@ -81,15 +89,16 @@ pub(super) fn find(level: &Level) -> Vec<Saddle> {
     }
     out.sort_by_key(|saddle| std::cmp::Reverse(saddle.strength));
     out.truncate(MAX_SADDLES);
-    out
+    Ok(out)
 }
 
 /// Sums of 3×3 pixels: at most 2295.
-fn box_sums(level: &Level) -> Vec<i16> {
+fn box_sums(level: &Level, cancel: &CancelToken) -> Result<Vec<i16>, VisionError> {
     let (width, height) = level.size();
     let mut out = vec![0i16; width * height];
     let mut column = vec![0i16; width];
     for y in 1..height - 1 {
+        go_on(cancel)?;
         let rows = [y - 1, y, y + 1].map(|v| &level.pixels[v * width..(v + 1) * width]);
         // Nothing here can overflow; arithmetic without checks lets the compiler use vector instructions.
         for (((sum, a), b), c) in column.iter_mut().zip(rows[0]).zip(rows[1]).zip(rows[2]) {
@@ -100,14 +109,15 @@ fn box_sums(level: &Level) -> Vec<i16> {
             *sum = a.wrapping_add(*b).wrapping_add(*c);
         }
     }
-    out
+    Ok(out)
 }
 
 /// The determinant of the Hessian with the sign turned: positive at saddles, zero elsewhere.
-fn responses(boxes: &[i16], width: usize, height: usize) -> Vec<u16> {
+fn responses(boxes: &[i16], width: usize, height: usize, cancel: &CancelToken) -> Result<Vec<u16>, VisionError> {
     let mut out = vec![0u16; width * height];
     let count = width - 2 * BORDER;
     for y in BORDER..height - BORDER {
+        go_on(cancel)?;
         // Slices of equal length, so that the loop below needs no checks.
         let at = |dx: isize, dy: isize| {
             let start = ((y as isize + dy) * width as isize + BORDER as isize + dx) as usize;
@@ -125,7 +135,20 @@ fn responses(boxes: &[i16], width: usize, height: usize) -> Vec<u16> {
             target[i] = saddle.clamp(0, 65535) as u16;
         }
     }
-    out
+    Ok(out)
+}
+
+/// The largest response of 5×5 around every pixel of a chunk: all at once, since in noise every other pixel is a saddle.
+fn largest_around(responses: &[u16], width: usize, x: usize, y: usize) -> [u16; CHUNK] {
+    let mut columns = [0u16; CHUNK + 4];
+    for v in y - 2..=y + 2 {
+        // Beyond the end of a row are the borders of this and the next, and then what no pixel of the chunk needs.
+        let row = responses.get(v * width + x - 2..).unwrap_or_default();
+        for (most, response) in columns.iter_mut().zip(row) {
+            *most = (*most).max(*response);
+        }
+    }
+    std::array::from_fn(|i| columns[i..i + 5].iter().fold(0, |most, r| most.max(*r)))
 }
 
 /// Largest of 5×5; of equals the first.
@@ -168,10 +191,11 @@ fn ring(boxes: &[i16], width: usize, height: usize, cx: f32, cy: f32) -> Option<
         // Positive, see above: the cast rounds down.
         let (x, y) = (u as usize, v as usize);
         let (fx, fy) = (u - x as f32, v - y as f32);
-        let at = |x: usize, y: usize| f32::from(boxes[y * width + x]);
-        let upper = at(x, y) * (1.0 - fx) + at(x + 1, y) * fx;
-        let lower = at(x, y + 1) * (1.0 - fx) + at(x + 1, y + 1) * fx;
-        upper * (1.0 - fy) + lower * fy
+        let across = |y: usize| {
+            let pair = &boxes[y * width + x..y * width + x + 2];
+            f32::from(pair[0]) * (1.0 - fx) + f32::from(pair[1]) * fx
+        };
+        across(y) * (1.0 - fy) + across(y + 1) * fy
     }))
 }
 

@@ -15,6 +15,16 @@ fn rough(truth: &[Vector2<f64>]) -> Ordered {
     Ordered::new(truth.iter().map(|p| p.map(f64::round)).collect(), &Grid { columns: 10, rows: 7, square_m: 0.015 })
 }
 
+/// The search as it is when nobody cancels it.
+fn find(image: &GrayImage, grid: &Grid) -> Search {
+    super::find(image, grid, &CancelToken::default()).expect("is not cancelled")
+}
+
+/// Corners that are known to a pixel or so, refined in the image itself.
+fn refine(image: &GrayImage, found: &Ordered) -> Ordered {
+    board::refine(&[Level::full(image)], 0, found, &CancelToken::default()).expect("is not cancelled")
+}
+
 /// Errors of all corners over some rendered views.
 #[derive(Default)]
 struct Errors {
@@ -153,6 +163,109 @@ fn light_that_falls_off_across_the_board_does_not_pull_corners() {
     assert!(errors.rms() < 0.007 && errors.bias().amax() < 0.001, "{} {}", errors.rms(), errors.bias());
 }
 
+/// A view of the published scene that is changed, and the true corners.
+fn view(seed: u64, change: impl Fn(&mut Scene)) -> (GrayImage, Vec<Vector2<f64>>) {
+    let mut scene = Scene::random(&mut ChaCha8Rng::seed_from_u64(seed), 0.7, std::f64::consts::PI);
+    change(&mut scene);
+    (scene.render(seed), scene.truth())
+}
+
+const BOARD: Grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
+
+#[test]
+fn blurred_and_unevenly_lit_boards_are_found() {
+    // Blur [px] of squares of about 17 px, part of its middle by which the light changes over the image.
+    for (blur, fall) in [(3.5, 0.0), (5.0, 0.0), (0.7, 1.6), (3.5, 1.6)] {
+        for seed in 0..6 {
+            let (image, truth) = view(seed, |scene| (scene.blur_px, scene.noise, scene.fall) = (blur, 2.0, fall));
+            let board = find(&image, &BOARD).board.unwrap_or_else(|| panic!("blur {blur}, fall {fall}, view {seed}"));
+            // Every corner of the board is next to one of its own.
+            for true_px in &truth {
+                let errors = board.points.iter().map(|px| (px - true_px).norm());
+                let (index, error) = errors.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).expect("corners");
+                let spacing = board.spacing(index % board.columns, index / board.columns);
+                assert!(error < spacing / 4.0, "blur {blur}, fall {fall}, view {seed}: {error} px of {spacing}");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_corner_is_fitted_where_no_lattice_has_the_size_of_the_board() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let wall = Normal::new(128.0, 10.0).expect("a deviation");
+    let images = [
+        ("noise", GrayImage::from_fn(640, 480, |_, _| image::Luma([rng.random()]))),
+        ("a wall", GrayImage::from_fn(640, 480, |_, _| image::Luma([wall.sample(&mut rng) as u8]))),
+        ("another board", upright_scene(&mut rng, 0.2, 0.3).render(1)),
+    ];
+    for (name, image) in images {
+        let search = find(&image, &Grid { rows: 8, ..BOARD });
+        assert!(search.board.is_none() && search.fitted_levels == 0, "{name}: {search:?}");
+    }
+    // Where there is one, the first level that shows it is enough.
+    assert_eq!(find(&view(1, |_| {}).0, &BOARD).fitted_levels, 1);
+}
+
+#[test]
+fn a_board_with_a_glare_on_it_is_found() {
+    for seed in 0..16 {
+        let (mut image, truth) = view(seed, |scene| scene.noise = 2.0);
+        let glare = truth[(7 * seed as usize + 12) % truth.len()];
+        for (u, v, pixel) in image.enumerate_pixels_mut() {
+            let r2 = (Vector2::new(f64::from(u), f64::from(v)) - glare).norm_squared();
+            let light = 300.0 * (-r2 / (2.0 * 5.0 * 5.0)).exp();
+            pixel.0[0] = (f64::from(pixel.0[0]) + light).min(255.0) as u8;
+        }
+        assert!(find(&image, &BOARD).board.is_some(), "view {seed}");
+    }
+}
+
+#[test]
+fn a_hidden_corner_lies_between_its_neighbours_and_says_how_little_is_known_of_it() {
+    let (image, truth) = view(3, |scene| scene.noise = 2.0);
+    let board = find(&image, &BOARD).board.expect("in sight");
+    // One in the middle, one at a side and one at an end of the board.
+    let hidden = [33, 4, 69];
+    let mut seen = vec![true; board.points.len()];
+    let mut partly = board.clone();
+    for index in hidden {
+        (seen[index], partly.covariances_px2[index]) = (false, None);
+        // Where a lattice on a coarser level may put it.
+        partly.points[index] += Vector2::new(1.5, -1.0);
+    }
+    let stated = Hidden::of(partly.clone(), &seen).stated().expect("enough is left");
+    for index in hidden {
+        let sd = stated.covariances_px2[index].expect("stated")[(0, 0)].sqrt();
+        let true_px =
+            truth.iter().min_by(|a, b| (*a - board.points[index]).norm().total_cmp(&(*b - board.points[index]).norm()));
+        let error = (stated.points[index] - true_px.expect("corners")).norm();
+        assert!(sd > 0.5 && error < 3.0 * sd, "corner {index}: {error} px off, stated {sd} px");
+    }
+    // More than 15 % of the corners.
+    for index in 0..11 {
+        (seen[index], partly.covariances_px2[index]) = (false, None);
+    }
+    assert!(Hidden::of(partly, &seen).stated().is_none());
+}
+
+#[test]
+fn every_stage_of_a_search_ends_when_it_is_cancelled() {
+    let (go, stop) = (CancelToken::default(), CancelToken::default());
+    stop.cancel();
+    let cancelled = Some(VisionError::Cancelled);
+    let (image, truth) = view(1, |_| {});
+    assert_eq!(super::find(&image, &BOARD, &stop).err(), cancelled);
+    assert_eq!(largest(&image, &BOARD, &stop).err(), cancelled);
+    assert_eq!(Level::pyramid(&image, 2, &stop).err(), cancelled);
+    let level = Level::full(&image);
+    assert_eq!(saddles::find(&level, &stop).err(), cancelled);
+    let saddles = saddles::find(&level, &go).expect("is not cancelled");
+    assert_eq!(lattice::grow(&saddles, level.size(), (10, 7), &stop).err(), cancelled);
+    assert_eq!(lattice::largest(&saddles, level.size(), &stop).err(), cancelled);
+    assert_eq!(board::refine(&[level], 0, &rough(&truth), &stop).err(), cancelled);
+}
+
 mod slow {
     use super::*;
 
@@ -213,7 +326,7 @@ mod slow {
                 let mut scene = upright_scene(&mut rng, f64::to_radians(off_deg), f64::to_radians(leaning_deg));
                 (scene.blur_px, scene.noise) = (lens, noise);
                 // Searched for: the board is found on a coarser level, where a sharp edge can look blurred.
-                let found = find(&through_a_lens(&scene, view), &scene.grid()).expect("in sight");
+                let found = find(&through_a_lens(&scene, view), &scene.grid()).board.expect("in sight");
                 errors.add_unordered(&found, &scene.truth());
             }
             let rms = errors.rms();
