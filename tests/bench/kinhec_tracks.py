@@ -31,7 +31,7 @@ from kinhec.camera import CAMERAS, TARGETS
 from kinhec.config import SequenceConfig
 
 POSES = 'ours'
-LEFT_OUT = 'ours, named outliers left out'
+SCALED = 'ours, unit of the target poses free'
 CORNERS = 'ours, from corners'
 # Their x runs along columns, y along rows, z to the viewer, origin in the middle; ours has z into the board and the origin in
 # a corner, so our rows run against theirs.
@@ -139,10 +139,11 @@ def inside(link, estimate, true):
     return bool(delta @ np.linalg.solve(np.array(link['covariance']) * scale, delta) <= limit)
 
 
-def calibrate(ours, folder):
+def calibrate(ours, folder, *options):
     """Its result, or why there is none."""
     path = os.path.join(folder, 'result.json')
-    done = subprocess.run([ours, 'calibrate', folder, '--quiet', '--json', path], capture_output=True, text=True)
+    command = [ours, 'calibrate', folder, '--quiet', '--json', path, *options]
+    done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode == 0:
         with open(path) as file:
             return json.load(file), None
@@ -177,13 +178,8 @@ def ours_on(ours, sequence, offset, folder):
     if result is None:
         return {POSES: why}
     out = {POSES: compared(sequence, result, False)}
-    named = {view for finding in result['findings'] if finding['code'] == 'outlier_view' for view in finding['views']}
-    out[LEFT_OUT] = out[POSES]
-    if named:
-        keep = [i for i, frame in enumerate(frames) if f'{frame:05}.png' not in named]
-        write_folder(os.path.join(folder, 'kept'), sequence, frames[keep], robot[keep], target[keep], None)
-        result, why = calibrate(ours, os.path.join(folder, 'kept'))
-        out[LEFT_OUT] = why if result is None else compared(sequence, result, False)
+    result, why = calibrate(ours, os.path.join(folder, 'poses'), '--free-scale')
+    out[SCALED] = why if result is None else compared(sequence, result, False)
     # Outliers of KinHEC are put into the target poses, not into the corners.
     if sequence.manifest['camera_noise_model'] == 'pnp' and sequence.manifest['outlier_fraction'] == 0:
         write_folder(os.path.join(folder, 'corners'), sequence, frames, robot, target, corners_of(sequence))
@@ -229,7 +225,7 @@ def print_track(title, results):
     if answered:
         print('| method | X ° | mm | worst X ° | mm | Y ° | mm | hand-eye in its 95 % region | other link |')
         print('|---|---|---|---|---|---|---|---|---|')
-        methods = [*benchmark.SOLVERS, CORNERS, LEFT_OUT, POSES]
+        methods = [*benchmark.SOLVERS, CORNERS, SCALED, POSES]
         order = {}
         for method in methods:
             found = [of[method] for of in answered.values() if isinstance(of.get(method), dict)]
@@ -239,7 +235,7 @@ def print_track(title, results):
         for line in order.values():
             print(line)
     for sequence, of in results.items():
-        for method in (POSES, LEFT_OUT, CORNERS):
+        for method in (POSES, SCALED, CORNERS):
             if isinstance(of.get(method), str):
                 shipped = [(of[name]['x'][1], name) for name in benchmark.SOLVERS if isinstance(of[name], dict)]
                 least, best = min(shipped)

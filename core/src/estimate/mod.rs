@@ -21,10 +21,10 @@ use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
 
 use crate::estimate::claim::Claim;
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
-use crate::estimate::handeye::joint::outliers::Distance;
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{Free, Noise, RobotField, ShownDistortion, SmallSample};
 use crate::estimate::handeye::one_axis::PartialHandEye;
+use crate::estimate::handeye::screening::Distance;
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, one_axis, subset};
 use crate::estimate::intrinsics::IntrinsicsError;
 use crate::estimate::shared_lens::SharedLens;
@@ -157,7 +157,8 @@ impl Method {
 pub struct Options {
     /// Keep views and corners that do not fit the others; without it they are left out as outliers and named.
     pub keep_outliers: bool,
-    /// Estimate the true size of the target, which the robot's translations tell.
+    /// Estimate the true size of the target, or with poses of the target alone the unit of their translations; the robot's
+    /// translations tell it.
     pub free_scale: bool,
     /// Try constant offsets of the robot's joints, and take them when held-out views say so.
     pub joint_offsets: bool,
@@ -269,6 +270,8 @@ pub struct Calibration {
     /// What the corners say of an estimated camera without the robot; `None` when it was given, and where a joint estimate
     /// says it better.
     pub camera_fit: Option<CameraFit>,
+    /// What an estimate from poses of the target alone says of them; `None` for one from corners, and for a closed form.
+    pub pose_fit: Option<PoseFit>,
     /// RMS of 2-D corner residuals, pixels.
     pub rms_px: Option<f64>,
     /// What only the joint estimate knows; `None` for a closed form, and without a robot.
@@ -348,6 +351,19 @@ pub struct CameraFit {
     /// Degrees of freedom of that.
     pub degrees_of_freedom: f64,
     /// The target where the corners show that it is bent.
+    pub shape: Option<ShapeEstimate>,
+}
+
+/// What an estimate from poses of the target alone says of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct PoseFit {
+    /// Disagreement of robot and target poses per axis, translation, metres.
+    pub sigma_m: f64,
+    /// Rotation, radians.
+    pub sigma_rad: f64,
+    /// The true length of their translations over the stated one, as the scale of the target; `None` when it is taken as
+    /// exact.
     pub shape: Option<ShapeEstimate>,
 }
 
@@ -438,7 +454,7 @@ pub struct ViewResult {
     pub residuals: Vec<CornerResidual>,
     /// The target's pose as fitted, by the same chain as the residuals.
     pub camera_from_target: Option<Pose<Camera, Target>>,
-    /// How far the view is from what the others expect of it; of the joint estimate only.
+    /// How far the view is from what the others expect of it; `None` for a closed form.
     pub distance: Option<Distance>,
     /// Corners of it that were left out as outliers, by their index.
     pub corners_aside: Vec<usize>,
@@ -525,14 +541,10 @@ pub fn calibrate_with<'a>(
     let used = || observations.views.iter().filter(|v| v.in_fit);
     let only_poses = used().all(|v| v.corners.is_none()) && used().any(|v| v.camera_from_target.is_some());
     if only_poses {
-        for (asked, what) in
-            [(options.free_scale, "the true size of the target"), (options.joint_offsets, "the offset of joints")]
-        {
-            if asked {
-                return Err(CalibrateError::NeedsCorners { what });
-            }
+        if options.joint_offsets {
+            return Err(CalibrateError::NeedsCorners { what: "the offset of joints" });
         }
-        pairs::calibrate(observations, method, &work)
+        pairs::calibrate(observations, method, options, &work)
     } else {
         corners::calibrate(observations, method, options, &work)
     }
@@ -574,27 +586,6 @@ fn chosen(methods: &[MethodResult], name: &str) -> Result<ClosedFormSolution, Ha
         || Err(HandEyeError::NoSolution { method: "closed form", views: 0, reason: "no method of that name" }),
         |m| m.outcome.clone(),
     )
-}
-
-/// The closed form whose chain fits best by `misfit`; ties go to the first.
-fn best_start(
-    methods: &[MethodResult],
-    misfit: impl Fn(&ClosedFormSolution) -> f64,
-) -> Result<ClosedFormSolution, HandEyeError> {
-    let best = methods
-        .iter()
-        .filter_map(|m| m.outcome.as_ref().ok())
-        .map(|s| (misfit(s), s))
-        .filter(|(m, _)| m.is_finite())
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    match best {
-        Some((_, solution)) => Ok(*solution),
-        None => Err(methods.iter().find_map(|m| m.outcome.clone().err()).unwrap_or(HandEyeError::NoSolution {
-            method: "the closed forms",
-            views: 0,
-            reason: "none gave a finite answer",
-        })),
-    }
 }
 
 #[cfg(test)]

@@ -1,15 +1,28 @@
 //! Calibration from robot and target poses alone.
 
+use nalgebra::Point3;
+
 use super::{
-    CalibrateError, CalibratedCamera, Calibration, CameraKnowledge, LinkCovariances, Method, Observations, ViewResult,
-    ViewStatus, best_start, check_motion, chosen, closed_forms,
+    CalibrateError, CalibratedCamera, Calibration, CameraKnowledge, LinkCovariances, Method, Observations, Options,
+    PoseFit, ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
-use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, pose_graph};
-use crate::geometry::se3;
-use crate::progress::Work;
+use crate::estimate::handeye::consensus::consensus;
+use crate::estimate::handeye::pose_graph::{self, PoseGraphSolution};
+use crate::estimate::handeye::screening::{Distance, Estimator, Fit, Judged, screened};
+use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, scale};
+use crate::progress::{CancelToken, Work};
+use crate::targets::bent::BoardShape;
 
-pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -> Result<Calibration, CalibrateError> {
+/// Name of the method in errors.
+const METHOD: &str = "the pose graph";
+
+pub fn calibrate(
+    observations: &Observations,
+    method: Method,
+    options: Options,
+    work: &Work<'_>,
+) -> Result<Calibration, CalibrateError> {
     let mode = observations.mode.unwrap_or(Mode::EyeInHand);
     let pairs: Vec<PosePair> = observations
         .views
@@ -23,13 +36,12 @@ pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -
         })
         .collect::<Result<_, _>>()?;
     check_motion(mode, &pairs)?;
-    let methods = closed_forms(&pairs, work)?;
     let mut calibration = Calibration {
         camera: match observations.camera {
             CameraKnowledge::Fixed(intrinsics) => Some(CalibratedCamera { intrinsics, fixed: true, sigma_px: None }),
             CameraKnowledge::Estimate { .. } => None,
         },
-        methods,
+        methods: closed_forms(&pairs, work)?,
         views: observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::Used)).collect(),
         ..Calibration::default()
     };
@@ -39,38 +51,121 @@ pub fn calibrate(observations: &Observations, method: Method, work: &Work<'_>) -
             (solution.mount_from_camera, solution.anchor_from_target)
         }
         Method::Joint => {
-            let start = best_start(&calibration.methods, |s| misfit(&pairs, s))?;
-            let solution = pose_graph::refine(&pairs, &start)?;
+            let begin = Begin::new(&pairs, &calibration, options)?;
+            let fit = estimate(&pairs, &begin, &observations.target.centre(), options, work)?;
+            if fit.kept.len() < pairs.len() {
+                // For comparison on the same views.
+                let kept: Vec<PosePair> = fit.kept.iter().map(|i| pairs[*i]).collect();
+                calibration.methods = closed_forms(&kept, work)?;
+            }
+            let solution = &fit.solution;
             calibration.link_covariances = Some(LinkCovariances {
                 hand_eye: solution.covariance.fixed_view::<6, 6>(0, 0).into_owned(),
                 target: solution.covariance.fixed_view::<6, 6>(6, 6).into_owned(),
             });
+            calibration.pose_fit = Some(of_solution(solution));
+            let in_fit = calibration.views.iter_mut().filter(|v| v.status == ViewStatus::Used);
+            for (index, (view, judged)) in in_fit.zip(&fit.judged).enumerate() {
+                view.distance = Some(Distance::from(judged));
+                if fit.kept.binary_search(&index).is_err() {
+                    view.status = ViewStatus::Outlier;
+                }
+            }
             (solution.mount_from_camera, solution.anchor_from_target)
         }
     };
     if !(x.is_finite() && y.is_finite()) {
-        return Err(CalibrateError::HandEye(HandEyeError::NoSolution {
-            method: "the pose graph",
-            views: pairs.len(),
-            reason: "it diverged",
-        }));
+        let reason = "it diverged";
+        return Err(HandEyeError::NoSolution { method: METHOD, views: pairs.len(), reason }.into());
     }
-    let used = calibration.views.iter_mut().filter(|v| v.status == ViewStatus::Used);
-    for (view, pair) in used.zip(&pairs) {
+    let with_poses = calibration.views.iter_mut().filter(|v| v.status != ViewStatus::Excluded);
+    for (view, pair) in with_poses.zip(&pairs) {
         view.camera_from_target = Some(x.inverse() * pair.anchor_from_mount.inverse() * y);
     }
     calibration.hand_eye = Some(HandEye::new(mode, x, y));
     Ok(calibration)
 }
 
-/// Sum of squared disagreements, a radian counted as a metre: enough to rank starts.
-fn misfit(pairs: &[PosePair], solution: &ClosedFormSolution) -> f64 {
-    pairs
-        .iter()
-        .map(|pair| {
-            let predicted =
-                solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
-            se3::log((pair.camera_from_target.inverse() * predicted).isometry()).norm_squared()
-        })
-        .sum()
+fn of_solution(solution: &PoseGraphSolution) -> PoseFit {
+    let shape = BoardShape { scale: solution.scale, ..BoardShape::FLAT };
+    let scaled = |sigma| ShapeEstimate { shape, warp_sigma_m: None, scale_sigma: Some(sigma) };
+    PoseFit { sigma_m: solution.sigma_m, sigma_rad: solution.sigma_rad, shape: solution.scale_sigma.map(scaled) }
 }
+
+/// Where the estimate begins.
+struct Begin {
+    solution: ClosedFormSolution,
+    /// Of the target poses; `None` when their unit is known.
+    scale: Option<f64>,
+}
+
+impl Begin {
+    fn new(pairs: &[PosePair], calibration: &Calibration, options: Options) -> Result<Self, HandEyeError> {
+        let none = |reason| HandEyeError::NoSolution { method: METHOD, views: pairs.len(), reason };
+        if options.free_scale {
+            let (solution, scale) = scale::start(pairs)
+                .ok_or_else(|| none("the robot's translations tell no scale of the target poses"))?;
+            return Ok(Self { solution, scale: Some(scale) });
+        }
+        let methods = &calibration.methods;
+        let candidates: Vec<_> = methods.iter().filter_map(|m| m.outcome.clone().ok()).collect();
+        let misfit = |solution: &ClosedFormSolution, view: usize, _| scale::misfit(&pairs[view], solution, 1.0);
+        let found = consensus(pairs, &candidates, None, misfit).ok_or_else(|| {
+            let first = methods.iter().find_map(|m| m.outcome.clone().err());
+            first.unwrap_or_else(|| none("no closed form gave a finite answer"))
+        })?;
+        Ok(Self { solution: found.solution, scale: None })
+    }
+}
+
+fn estimate(
+    pairs: &[PosePair],
+    begin: &Begin,
+    middle: &Point3<f64>,
+    options: Options,
+    work: &Work<'_>,
+) -> Result<Fit<PoseGraphSolution>, HandEyeError> {
+    let estimator = OfPairs { pairs, begin, middle, cancel: work.cancel };
+    if options.keep_outliers {
+        let kept: Vec<usize> = (0..pairs.len()).collect();
+        let solution = estimator.fit(&kept, None)?;
+        let judged = estimator.judge(&solution, &kept)?;
+        return Ok(Fit { solution, kept, judged });
+    }
+    let misfit = |pair| scale::misfit(pair, &begin.solution, begin.scale.unwrap_or(1.0));
+    screened(&estimator, &pairs.iter().map(misfit).collect::<Vec<_>>())
+}
+
+struct OfPairs<'a> {
+    pairs: &'a [PosePair],
+    begin: &'a Begin,
+    middle: &'a Point3<f64>,
+    cancel: &'a CancelToken,
+}
+
+impl Estimator for OfPairs<'_> {
+    type Solution = PoseGraphSolution;
+
+    fn fit(&self, kept: &[usize], near: Option<&PoseGraphSolution>) -> Result<PoseGraphSolution, HandEyeError> {
+        if self.cancel.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        let chosen: Vec<PosePair> = kept.iter().map(|i| self.pairs[*i]).collect();
+        let start = near.map_or(self.begin.solution, |near| ClosedFormSolution {
+            mount_from_camera: near.mount_from_camera,
+            anchor_from_target: near.anchor_from_target,
+        });
+        match self.begin.scale {
+            None => pose_graph::refine(&chosen, &start),
+            Some(scale) => pose_graph::refine_scaled(&chosen, &start, near.map_or(scale, |near| near.scale)),
+        }
+    }
+
+    fn judge(&self, solution: &PoseGraphSolution, kept: &[usize]) -> Result<Vec<Judged>, HandEyeError> {
+        Ok(solution.judge(self.pairs, kept, self.middle))
+    }
+}
+
+#[cfg(test)]
+#[path = "pairs_tests.rs"]
+mod tests;

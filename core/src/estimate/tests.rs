@@ -65,23 +65,6 @@ fn residuals_stand_where_corners_were_measured_with_a_lens_beyond_its_model_too(
 }
 
 #[test]
-fn poses_of_the_target_alone_refuse_what_only_corners_tell() {
-    let t = set(8, 50);
-    let mut observations = t.observations(false);
-    for (view, pose) in observations.views.iter_mut().zip(&t.true_camera_from_target) {
-        (view.corners, view.camera_from_target) = (None, Some(*pose));
-    }
-    let with = |options: Options| calibrate_with(&observations, Method::Joint, options, &CancelToken::default());
-    with(Options::default()).expect("solves");
-    for options in
-        [Options { free_scale: true, ..Options::default() }, Options { joint_offsets: true, ..Options::default() }]
-    {
-        let error = with(options).expect_err("nothing tells it");
-        assert!(matches!(error, CalibrateError::NeedsCorners { .. }), "{error}");
-    }
-}
-
-#[test]
 fn leaving_out_too_many_views_is_told_apart_from_a_target_that_was_not_found() {
     let mut observations = set(5, 52).observations(false);
     for view in &mut observations.views[..3] {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use handeye_core::depth::{ColourMap, DepthImage};
 use handeye_core::diagnose::findings::{self, Finding, FindingOptions};
-use handeye_core::estimate::handeye::joint::outliers::Distance;
+use handeye_core::estimate::handeye::screening::Distance;
 use handeye_core::estimate::handeye::{HandEye, Mode};
 use handeye_core::estimate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
 use handeye_core::geometry::arm::ur5::{JointLimits, inverse_nearest};

@@ -1,6 +1,6 @@
 use handeye_core::diagnose::doctor;
 use handeye_core::diagnose::findings::{self, FindingCode, FindingOptions};
-use handeye_core::estimate::handeye::joint::outliers::Distance;
+use handeye_core::estimate::handeye::screening::Distance;
 use handeye_core::estimate::handeye::{HandEyeError, Mode};
 use handeye_core::estimate::uncertainty::widening::{Evidence, Widening};
 use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView, ShapeEstimate, ViewStatus};

@@ -66,7 +66,9 @@ pub(super) fn with_own_lens(claim: Claim, calibration: &Calibration) -> Claim {
 
 /// Whether the answer is estimated with an effect.
 fn counts_on(calibration: &Calibration, effect: Effect) -> bool {
-    let Some(joint) = &calibration.joint else { return false };
+    let Some(joint) = &calibration.joint else {
+        return effect == Effect::Scale && calibration.pose_fit.is_some_and(|fit| fit.shape.is_some());
+    };
     match effect {
         Effect::Warp => joint.free.warp,
         Effect::Scale => joint.free.scale,

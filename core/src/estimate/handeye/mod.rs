@@ -18,6 +18,8 @@ pub mod joint;
 pub mod motion;
 pub mod one_axis;
 pub mod pose_graph;
+pub(crate) mod scale;
+pub mod screening;
 pub mod subset;
 
 use serde::{Deserialize, Serialize};

@@ -4,12 +4,16 @@
 //! translation and rotation weighted by their own scatter. Camera and robot noise cannot be told apart from pose pairs;
 //! the two levels stated are those of the disagreement between them.
 //!
-//! Reference: Strobl & Hirzinger 2006, "Optimal hand-eye calibration", with the weights re-estimated from residuals.
+//! The unit of the target poses may be unknown, as that of a single moving camera is, or of markers of unknown size. Then a
+//! scale of their translations is one more unknown, which the robot's translations tell.
+//!
+//! Reference: Andreff, Horaud & Espiau 2001, "Robot hand-eye calibration using structure-from-motion" (scale); Strobl & Hirzinger 2006, "Optimal hand-eye calibration", with the weights re-estimated from residuals.
 
-use nalgebra::{Cholesky, Matrix6, SMatrix, SVector, Unit, Vector3, Vector6};
+use nalgebra::{Cholesky, Matrix6, Point3, SMatrix, SVector, Unit, Vector3, Vector6};
 
 use super::closed_form::ClosedFormSolution;
 use super::motion::MIN_VIEWS;
+use super::screening::{Judged, limit};
 use super::{HandEyeError, PosePair};
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::se3;
@@ -27,14 +31,66 @@ pub struct PoseGraphSolution {
     pub sigma_m: f64,
     /// Disagreement per axis in rotation, radians.
     pub sigma_rad: f64,
-    /// Disagreement of each pair: metres and radians.
-    pub residuals: Vec<(f64, f64)>,
+    /// The true length of a target pose's translation over the stated one; 1 when it is taken as exact.
+    pub scale: f64,
+    /// Its standard deviation; `None` when it is taken as exact.
+    pub scale_sigma: Option<f64>,
+}
+
+impl PoseGraphSolution {
+    /// A target pose with its translation in metres.
+    fn in_metres(&self, pair: &PosePair) -> Pose<Camera, Target> {
+        scaled(&pair.camera_from_target, self.scale)
+    }
+
+    /// Where the chain puts the target in a pair.
+    pub(crate) fn predicted(&self, pair: &PosePair) -> Pose<Camera, Target> {
+        predict(pair, &self.mount_from_camera, &self.anchor_from_target)
+    }
+
+    /// How far every one of `pairs` is from what a solution from those `kept`, ascending, expects; `middle` is a point of the
+    /// target, metres.
+    pub(crate) fn judge(&self, pairs: &[PosePair], kept: &[usize], middle: &Point3<f64>) -> Vec<Judged> {
+        let unknowns = 12 + usize::from(self.scale_sigma.is_some());
+        let freedom = 0.5 * (6.0 * kept.len() as f64 - unknowns as f64);
+        let limit = limit(pairs.len(), freedom.max(4.0));
+        let own = Matrix6::from_diagonal(&weights((self.sigma_m, self.sigma_rad)).map(f64::recip));
+        let judged = pairs.iter().enumerate().map(|(index, pair)| {
+            let (seen, predicted) = (self.in_metres(pair), self.predicted(pair));
+            let jacobian = jacobian(&seen, &predicted).fixed_columns::<12>(0).into_owned();
+            let shared = jacobian * self.covariance * jacobian.transpose();
+            let expected = if kept.binary_search(&index).is_ok() { own - shared } else { own + shared };
+            // A pair that the others do not determine has nothing to disagree with.
+            let expected = Cholesky::new(expected).or_else(|| Cholesky::new(own));
+            let error = residual(&seen, &predicted);
+            let metres = (seen.isometry() * middle - predicted.isometry() * middle).norm();
+            Judged {
+                squared: expected.map_or(f64::INFINITY, |v| error.dot(&v.solve(&error))),
+                limit,
+                metres,
+                radians: seen.rotation().angle_to(&predicted.rotation()),
+            }
+        });
+        judged.collect()
+    }
+}
+
+/// A pose with its translation multiplied.
+pub(crate) fn scaled(pose: &Pose<Camera, Target>, scale: f64) -> Pose<Camera, Target> {
+    let mut isometry = *pose.isometry();
+    isometry.translation.vector *= scale;
+    Pose::from_isometry(isometry)
 }
 
 /// Steps; Gauss–Newton from a closed form needs about five, the weights a few more.
 const MAX_STEPS: usize = 50;
 /// A step below a tenth of a nanometre and nanoradian ends the iteration.
 const STEP_TOLERANCE: f64 = 1e-10;
+/// Both links, and the logarithm of the scale.
+const UNKNOWNS: usize = 13;
+const SCALE_AT: usize = 12;
+/// Name of the method in errors.
+const METHOD: &str = "the pose graph";
 /// Floor of the levels, so that exact data do not divide by zero.
 const LEVEL_FLOOR: f64 = 1e-12;
 
@@ -46,7 +102,19 @@ const LEVEL_FLOOR: f64 = 1e-12;
 /// # Errors
 /// [`HandEyeError::TooFewViews`], [`HandEyeError::NoSolution`] for a singular system.
 pub fn refine(pairs: &[PosePair], start: &ClosedFormSolution) -> Result<PoseGraphSolution, HandEyeError> {
-    refine_with(pairs, start, None)
+    refine_with(pairs, start, None, None)
+}
+
+/// As [`refine`], with the scale of the target poses unknown; `scale` is near it.
+///
+/// # Errors
+/// As [`refine`]; translations of the robot that are none tell no scale.
+pub fn refine_scaled(
+    pairs: &[PosePair],
+    start: &ClosedFormSolution,
+    scale: f64,
+) -> Result<PoseGraphSolution, HandEyeError> {
+    refine_with(pairs, start, None, Some(scale))
 }
 
 /// Standard deviation of the open component of a camera's place beforehand, metres: farther than any camera is from the
@@ -62,51 +130,56 @@ pub(super) fn refine_one_axis(
     start: &ClosedFormSolution,
     axis: &Unit<Vector3<f64>>,
 ) -> Result<PoseGraphSolution, HandEyeError> {
-    refine_with(pairs, start, Some(axis))
+    refine_with(pairs, start, Some(axis), None)
 }
 
 fn refine_with(
     pairs: &[PosePair],
     start: &ClosedFormSolution,
     open: Option<&Unit<Vector3<f64>>>,
+    free_scale: Option<f64>,
 ) -> Result<PoseGraphSolution, HandEyeError> {
     if pairs.len() < MIN_VIEWS {
         return Err(HandEyeError::TooFewViews { got: pairs.len(), need: MIN_VIEWS });
     }
     let mut x = start.mount_from_camera;
     let mut y = start.anchor_from_target;
+    let mut scale = free_scale.unwrap_or(1.0);
     let mut levels = (1e-3, 1e-3);
-    let mut normal = SMatrix::<f64, 12, 12>::identity();
+    let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
     for _ in 0..MAX_STEPS {
         let weight = weights(levels);
         normal = SMatrix::zeros();
-        let mut gradient = SVector::<f64, 12>::zeros();
+        let mut gradient = SVector::<f64, UNKNOWNS>::zeros();
         for pair in pairs {
-            let predicted = predict(pair, &x, &y);
-            let residual = residual(pair, &predicted);
-            let mut jacobian = SMatrix::<f64, 6, 12>::zeros();
-            jacobian.fixed_view_mut::<6, 6>(0, 0).copy_from(&-se3::adjoint(&predicted.isometry().inverse()));
-            jacobian.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
+            let (seen, predicted) = (scaled(&pair.camera_from_target, scale), predict(pair, &x, &y));
+            let jacobian = jacobian(&seen, &predicted);
             let weighted = Matrix6::from_diagonal(&weight) * jacobian;
             normal += jacobian.transpose() * weighted;
-            gradient += weighted.transpose() * residual;
+            gradient += weighted.transpose() * residual(&seen, &predicted);
+        }
+        if free_scale.is_none() {
+            normal.fill_row(SCALE_AT, 0.0);
+            normal.fill_column(SCALE_AT, 0.0);
+            (normal[(SCALE_AT, SCALE_AT)], gradient[SCALE_AT]) = (1.0, 0.0);
         }
         if let Some(axis) = open {
-            let mut along = SVector::<f64, 12>::zeros();
+            let mut along = SVector::<f64, UNKNOWNS>::zeros();
             along.fixed_rows_mut::<3>(0).copy_from(&(x.rotation().inverse() * axis.into_inner()));
             let precision = OPEN_M.powi(-2).max(LEAST_INFORMATION * normal.diagonal().max());
             normal += along * along.transpose() * precision;
             gradient += along * (precision * axis.dot(&x.translation()));
         }
         let factor = Cholesky::new(normal).ok_or(HandEyeError::NoSolution {
-            method: "the pose graph",
+            method: METHOD,
             views: pairs.len(),
             reason: "the normal equations are singular: add views turned about other axes",
         })?;
         let step = -factor.solve(&gradient);
         x = x.perturbed(&step.fixed_rows::<6>(0).into_owned());
         y = y.perturbed(&step.fixed_rows::<6>(6).into_owned());
-        let next = scatter(pairs, &x, &y);
+        scale *= step[SCALE_AT].exp();
+        let next = scatter(pairs, &x, &y, scale);
         let settled = (next.0 / levels.0).ln().abs() < 1e-6 && (next.1 / levels.1).ln().abs() < 1e-6;
         levels = next;
         if step.norm() < STEP_TOLERANCE && settled {
@@ -114,20 +187,14 @@ fn refine_with(
         }
     }
     let covariance = normal.try_inverse().unwrap_or_else(|| SMatrix::from_element(f64::INFINITY));
-    let residuals = pairs
-        .iter()
-        .map(|pair| {
-            let r = residual(pair, &predict(pair, &x, &y));
-            (r.fixed_rows::<3>(0).norm(), r.fixed_rows::<3>(3).norm())
-        })
-        .collect();
     Ok(PoseGraphSolution {
         mount_from_camera: x,
         anchor_from_target: y,
-        covariance,
+        covariance: covariance.fixed_view::<12, 12>(0, 0).into_owned(),
         sigma_m: levels.0,
         sigma_rad: levels.1,
-        residuals,
+        scale,
+        scale_sigma: free_scale.map(|_| scale * covariance[(SCALE_AT, SCALE_AT)].sqrt()),
     })
 }
 
@@ -135,8 +202,18 @@ fn predict(pair: &PosePair, x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>) -
     x.inverse() * pair.anchor_from_mount.inverse() * *y
 }
 
-fn residual(pair: &PosePair, predicted: &Pose<Camera, Target>) -> Vector6<f64> {
-    se3::log((pair.camera_from_target.inverse() * *predicted).isometry())
+fn residual(seen: &Pose<Camera, Target>, predicted: &Pose<Camera, Target>) -> Vector6<f64> {
+    se3::log((seen.inverse() * *predicted).isometry())
+}
+
+/// Of the residual by both links, right perturbations, and the logarithm of the scale, at small residuals.
+fn jacobian(seen: &Pose<Camera, Target>, predicted: &Pose<Camera, Target>) -> SMatrix<f64, 6, UNKNOWNS> {
+    let mut jacobian = SMatrix::<f64, 6, UNKNOWNS>::zeros();
+    jacobian.fixed_view_mut::<6, 6>(0, 0).copy_from(&-se3::adjoint(&predicted.isometry().inverse()));
+    jacobian.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
+    let nearer = -(seen.rotation().inverse() * seen.translation());
+    jacobian.fixed_view_mut::<3, 1>(0, SCALE_AT).copy_from(&nearer);
+    jacobian
 }
 
 fn weights((metres, radians): (f64, f64)) -> Vector6<f64> {
@@ -144,11 +221,11 @@ fn weights((metres, radians): (f64, f64)) -> Vector6<f64> {
     Vector6::new(t, t, t, r, r, r)
 }
 
-/// Levels from the residuals, with the twelve unknowns' share of the degrees of freedom taken off evenly.
-fn scatter(pairs: &[PosePair], x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>) -> (f64, f64) {
+/// Levels from the residuals, with the unknowns' share of the degrees of freedom taken off evenly.
+fn scatter(pairs: &[PosePair], x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>, scale: f64) -> (f64, f64) {
     let mut squares = (0.0, 0.0);
     for pair in pairs {
-        let r = residual(pair, &predict(pair, x, y));
+        let r = residual(&scaled(&pair.camera_from_target, scale), &predict(pair, x, y));
         squares.0 += r.fixed_rows::<3>(0).norm_squared();
         squares.1 += r.fixed_rows::<3>(3).norm_squared();
     }
@@ -178,5 +255,13 @@ mod tests {
         let solution = refine(&pairs, &start).expect("solves");
         let (metres, radians) = solution.mount_from_camera.distance_to(&x);
         assert!(metres < 1e-9 && radians < 1e-7, "{metres} {radians}");
+        assert_eq!((solution.scale, solution.scale_sigma), (1.0, None));
+        let halves: Vec<PosePair> = pairs
+            .iter()
+            .map(|pair| PosePair { camera_from_target: scaled(&pair.camera_from_target, 0.5), ..*pair })
+            .collect();
+        let solution = refine_scaled(&halves, &start, 1.8).expect("solves");
+        let (metres, radians) = solution.mount_from_camera.distance_to(&x);
+        assert!(metres < 1e-9 && radians < 1e-7 && (solution.scale - 2.0).abs() < 1e-9, "{solution:?}");
     }
 }

@@ -35,7 +35,12 @@ impl Calibration {
             },
             methods: self.methods.iter().map(method).collect(),
             views: self.views.iter().map(view).collect(),
-            estimate: self.joint.as_ref().map(|joint| self.details(joint)).or_else(|| camera_alone.map(of_camera)),
+            estimate: self
+                .joint
+                .as_ref()
+                .map(|joint| self.details(joint))
+                .or_else(|| camera_alone.map(of_camera))
+                .or_else(|| of_scaled_poses(self.pose_fit?.shape?)),
             provenance: Provenance {
                 tool_version: tool_version.to_owned(),
                 input_sha256,
@@ -74,6 +79,11 @@ impl Calibration {
             residual_distortion: joint.residual_distortion.as_ref().map(residual_distortion),
         }
     }
+}
+
+/// The details of an estimate from poses of the target whose unit was unknown.
+fn of_scaled_poses(shape: ShapeEstimate) -> Option<EstimateDetails> {
+    Some(EstimateDetails { board: Some(board(shape)), ..EstimateDetails::default() })
 }
 
 /// The details of a camera without a robot: the corners' noise is the only one, and the target's size is not seen.
