@@ -6,8 +6,8 @@
 //!
 //! `base_from_tip = base_from_first · Π_j P_j · M_j(q_j) · last_from_flange · flange_from_tip`
 //!
-//! There is one such type, [`Arm`], wherever the numbers come from: rows of Denavit and Hartenberg ([`Arm::from_dh`]) or
-//! a robot that is built in ([`ArmKind`]).
+//! There is one such type, [`Arm`], wherever the numbers come from: rows of Denavit and Hartenberg ([`Arm::from_dh`]), a
+//! robot that is built in ([`ArmKind`]), a URDF file ([`urdf::Urdf`]).
 //!
 //! # Derivatives
 //! Let `z_j` be the direction of the axis of joint `j` and `p_j` a point of it, in the base, and the tip be at `t` with axes
@@ -19,7 +19,8 @@
 //! This needs the axes and where the tip *is*, not what is between flange and tip: with the tip pose that the controller
 //! reports, the tool need not be known ([`Arm::tip_by_joint_at`]).
 //!
-//! What joint offsets do to a calibration, and which of them it can find, is in `docs/maths/joint_offsets.md`.
+//! What joint offsets do to a calibration, and which of them it can find, is in `docs/maths/joint_offsets.md`; which arms
+//! there are, and where their numbers come from, in `docs/arms.md`.
 //!
 //! # Reference
 //! Denavit & Hartenberg 1955; Siciliano et al. 2009, "Robotics: modelling, planning and control", §2.8.2 (rows) and
@@ -33,6 +34,7 @@ mod joint;
 mod model;
 mod placement;
 pub mod ur5;
+pub mod urdf;
 
 use nalgebra::{Isometry3, Matrix6xX, Vector3, Vector6};
 

@@ -11,11 +11,12 @@ use crate::geometry::arm::{Arm, JointKind, JointRange, MAX_JOINTS};
 const REACHED: f64 = 1e-8;
 /// Where a descent stops: what rounding leaves, with room \[m and rad\].
 const CONVERGED: f64 = 1e-13;
-/// Iterations of one descent. One that converges takes ten, beside a singularity thirty.
+/// Iterations of one descent. Of those that reach their goal half take 11, and one in a hundred more than 28.
 const ITERATIONS: usize = 60;
 /// A descent that has improved by less than a tenth in so many iterations is in a dip that is not the goal.
 const PATIENCE: usize = 8;
-/// Starts beside the first, at about 10 µs each.
+/// Starts beside the first, at about 10 µs each. With 96 the study `inverse_kinematics` reaches 99.93 % of the goals of a
+/// Panda, with so many 99.98 %.
 const STARTS: u32 = 256;
 /// A solution found from where the arm is with no joint farther than this \[rad\] is taken at once; one that is farther is
 /// compared with those of [`COMPARED`] more starts, for on the other side of a fold there may be a nearer one. After three
@@ -280,3 +281,7 @@ impl<'a> Search<'a> {
         (joints - self.near).amax()
     }
 }
+
+#[cfg(test)]
+#[path = "search_tests.rs"]
+mod tests;
