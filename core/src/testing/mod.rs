@@ -1,8 +1,9 @@
 //! What tests, studies and benchmarks of all packages share. Feature `testing`.
 //!
 //! [`Scene`] makes images of boards whose corners are known, [`sessions`] chains of robot and camera whose links are known,
-//! [`faulty`] such with something wrong, and [`skip`] is how a test says that the machine lacks what it needs.
+//! [`faulty`] such with something wrong, [`arms`] arms that are not built in, and [`skip`] is how a test says that the machine lacks what it needs.
 
+pub mod arms;
 mod board_views;
 mod drawn;
 mod exact;

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector6;
 
-use super::{Arm, ArmError};
+use super::{Arm, ArmError, JointKind};
 use crate::estimate::handeye::PosePair;
 use crate::estimate::handeye::closed_form::{ClosedForm as _, Shah};
 use crate::geometry::frames::{Base, Pose, Tip};
@@ -14,12 +14,12 @@ pub const DISTANCE_LIMIT_M: f64 = 0.010;
 /// The same for the rotation, radians.
 pub const ROTATION_LIMIT_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 
-/// The robot in one view: the reported pose of the tip, and the joint angles in radians.
+/// The robot in one view: the reported pose of the tip, and the joint values in radians (of a prismatic joint in metres).
 #[derive(Debug, Clone, Copy)]
 pub struct JointView<'a> {
     /// Tip pose as the controller reported it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Joint angles as the controller reported them, radians.
+    /// Joint values as the controller reported them: radians, of a prismatic joint metres.
     pub joints_rad: &'a [f64],
 }
 
@@ -39,11 +39,21 @@ impl Placement {
     /// How the tip moves with each joint in a view that need not be one of those that placed the arm.
     ///
     /// # Errors
-    /// [`ArmError::WrongCount`], [`ArmError::NotFinite`]; [`ArmError::Foreign`] when its joint angles do not belong to
-    /// its pose.
+    /// [`ArmError::WrongCount`], [`ArmError::NotFinite`], [`ArmError::PrismaticOffset`]; [`ArmError::Foreign`] when its
+    /// joint values do not belong to its pose.
     pub fn tip_by_joint(&self, view: &JointView<'_>) -> Result<Vec<Vector6<f64>>, ArmError> {
         let miss = self.arm.forward(view.joints_rad)?.distance_to(&view.base_from_tip);
         Self { arm: self.arm.clone(), misses: vec![miss] }.check()?;
+        self.by_joint(view)
+    }
+
+    /// How the tip moves with each joint, for an estimate of joint offsets. That takes, states and judges angles: the
+    /// offset of a length has no place in it, and one in radians would be wrong without anybody seeing it.
+    fn by_joint(&self, view: &JointView<'_>) -> Result<Vec<Vector6<f64>>, ArmError> {
+        let joints = self.arm.joints();
+        if let Some(i) = joints.iter().position(|joint| joint.kind == JointKind::Prismatic) {
+            return Err(ArmError::PrismaticOffset { joint: i + 1, name: joints[i].name.clone() });
+        }
         self.arm.tip_by_joint_at(&view.base_from_tip, view.joints_rad)
     }
 
@@ -120,13 +130,11 @@ pub fn place(arm: &Arm, views: &[JointView<'_>]) -> Result<Placement, ArmError> 
 /// moves with each joint in every view, see [`Arm::tip_by_joint_at`].
 ///
 /// # Errors
-/// Those of [`place`], and [`ArmError::Foreign`].
+/// Those of [`place`], [`ArmError::Foreign`], and [`ArmError::PrismaticOffset`]: an estimate of joint offsets, which is what
+/// the twists are for, knows revolute joints alone.
 pub fn place_checked(arm: &Arm, views: &[JointView<'_>]) -> Result<(Placement, TipByJoint), ArmError> {
     let placement = place(arm, views)?;
     placement.check()?;
-    let twists = views
-        .iter()
-        .map(|view| placement.arm.tip_by_joint_at(&view.base_from_tip, view.joints_rad))
-        .collect::<Result<_, _>>()?;
+    let twists = views.iter().map(|view| placement.by_joint(view)).collect::<Result<_, _>>()?;
     Ok((placement, twists))
 }

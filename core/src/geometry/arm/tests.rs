@@ -73,6 +73,129 @@ fn twists_are_the_central_differences_of_the_forward_kinematics() {
     }
 }
 
+/// A chain with both kinds of joints, axes along nothing, and a tool.
+fn askew() -> Arm {
+    let place = |numbers: [f64; 6]| se3::exp(&Vector6::from(numbers));
+    let joint = |kind, numbers, axis: [f64; 3]| Joint {
+        name: format!("{kind}"),
+        kind,
+        previous_from_joint: place(numbers),
+        axis: nalgebra::UnitVector3::new_normalize(axis.into()),
+        range: JointRange::ENDLESS,
+    };
+    let joints = vec![
+        joint(JointKind::Prismatic, [0.1, 0.0, 0.2, 0.3, -0.2, 0.1], [1.0, 1.0, 0.0]),
+        joint(JointKind::Revolute, [0.0, 0.1, 0.3, -0.5, 0.2, 0.9], [0.0, 1.0, 0.2]),
+        joint(JointKind::Revolute, [0.4, 0.0, 0.0, 0.1, 1.2, -0.3], [1.0, -1.0, 0.5]),
+        joint(JointKind::Prismatic, [0.0, -0.2, 0.1, 0.7, 0.1, 0.2], [0.0, 0.0, -1.0]),
+        joint(JointKind::Revolute, [0.2, 0.1, 0.0, -1.0, 0.4, 0.0], [0.3, 0.0, 1.0]),
+    ];
+    let arm = Arm::new(joints, place([0.0, 0.0, 0.1, 0.5, 0.0, 0.0])).expect("an arm");
+    arm.mounted(place([0.4, -0.2, 0.7, 0.3, -0.2, 1.1]), place([0.01, 0.03, 0.12, -0.4, 0.2, 0.5]))
+}
+
+#[test]
+fn a_prismatic_joint_shifts_what_is_behind_it_along_its_axis_and_turns_nothing() {
+    let arm = askew();
+    let q = [0.1, -0.4, 0.8, 0.2, 1.3];
+    let (here, frames) = (arm.forward(&q).expect("five joints"), arm.frames(&q).expect("five joints"));
+    for (j, joint) in arm.joints().iter().enumerate().filter(|(_, joint)| joint.kind == JointKind::Prismatic) {
+        let mut moved = q;
+        moved[j] += 0.25;
+        let there = arm.forward(&moved).expect("five joints");
+        let way = frames.base_from_joint[j].rotation * joint.axis.into_inner() * 0.25;
+        assert!((there.translation() - here.translation() - way).norm() < 1e-14, "joint {}", j + 1);
+        assert!(there.rotation().angle_to(&here.rotation()) < 1e-7, "acos near 1 has half the digits");
+    }
+}
+
+#[test]
+fn twists_and_jacobian_of_both_kinds_of_joints_are_the_central_differences() {
+    const STEP: f64 = 1e-5;
+    let arm = askew();
+    for q in configurations(20) {
+        let q = &q[..5];
+        let tip = arm.forward(q).expect("five joints");
+        let (twists, jacobian) = (arm.tip_by_joint(q).expect("five joints"), arm.jacobian(q).expect("five joints"));
+        for (j, twist) in twists.iter().enumerate() {
+            let at = |step: f64| {
+                let mut q = q.to_vec();
+                q[j] += step;
+                arm.forward(&q).expect("five joints")
+            };
+            let moved = |step: f64| se3::log((tip.inverse() * at(step)).isometry());
+            let difference = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
+            assert!((difference - twist).norm() < 1e-9, "joint {}: {difference} is not {twist}", j + 1);
+            let column = jacobian.column(j);
+            let velocity = (at(STEP).translation() - at(-STEP).translation()) / (2.0 * STEP);
+            assert!((column.fixed_rows::<3>(0) - velocity).norm() < 1e-9, "joint {}", j + 1);
+            let turn = se3::rotation_vector(&(at(STEP).rotation() * at(-STEP).rotation().inverse())) / (2.0 * STEP);
+            assert!((column.fixed_rows::<3>(3) - turn).norm() < 1e-9, "joint {}", j + 1);
+        }
+    }
+}
+
+#[test]
+fn an_arm_with_a_prismatic_joint_is_placed_and_checked_but_has_no_joint_offsets() {
+    let arm = askew();
+    let joints: Vec<Vec<f64>> = configurations(10).iter().map(|q| q[..5].to_vec()).collect();
+    let views = views(&arm, &joints);
+    let placement = place(&askew(), &views).expect("placed");
+    placement.check().expect("they belong together");
+    let refused = ArmError::PrismaticOffset { joint: 1, name: "prismatic".to_owned() };
+    assert_eq!(place_checked(&askew(), &views).expect_err("metres"), refused);
+    assert_eq!(placement.tip_by_joint(&views[0]).expect_err("metres"), refused);
+}
+
+#[test]
+fn the_arms_of_universal_robots_are_where_the_maker_puts_them() {
+    // The maker's table again, in millimetres: shoulder height, upper arm, forearm, and how far the wrist is beside, below
+    // and in front. Where that puts the tip is read off the arm's drawing.
+    let published = [
+        (ArmKind::Ur3, [151.9, 243.65, 213.25, 112.35, 85.35, 81.9]),
+        (ArmKind::Ur5, [89.159, 425.0, 392.25, 109.15, 94.65, 82.3]),
+        (ArmKind::Ur10, [127.3, 612.0, 572.3, 163.941, 115.7, 92.2]),
+        (ArmKind::Ur3e, [151.85, 243.55, 213.2, 131.05, 85.35, 92.1]),
+        (ArmKind::Ur5e, [162.5, 425.0, 392.2, 133.3, 99.7, 99.6]),
+        (ArmKind::Ur10e, [180.7, 612.7, 571.55, 174.15, 119.85, 116.55]),
+        (ArmKind::Ur16e, [180.7, 478.4, 360.0, 174.15, 119.85, 116.55]),
+    ];
+    for (kind, mm) in published {
+        let [shoulder, upper, fore, beside, below, front] = mm.map(|mm| mm * 1e-3);
+        let arm = kind.arm();
+        let at = |q: [f64; 6]| arm.forward(&q).expect("six joints").translation();
+        let flat = Vector3::new(-upper - fore, -beside - front, shoulder - below);
+        assert!((at([0.0; 6]) - flat).norm() < 1e-12, "{}", kind.name());
+        let bent = Vector3::new(-fore, -beside - front, shoulder + upper - below);
+        assert!((at([0.0, -PI / 2.0, PI / 2.0, 0.0, 0.0, 0.0]) - bent).norm() < 1e-12, "{}", kind.name());
+        assert!(arm.joints().iter().all(|joint| joint.range.contains(2.0 * PI) && joint.range.speed > 2.0));
+        assert_eq!(arm.first_violation(&[0.0, 0.0, 6.5, 0.0, 0.0, 0.0]), Some(2));
+    }
+}
+
+#[test]
+fn joints_that_no_arm_has_are_refused_by_name() {
+    let good = askew().joints()[1].clone();
+    let refused = |joint: Joint| match Arm::new(vec![good.clone(), joint], Isometry3::identity()) {
+        Err(ArmError::BadJoint { joint: 2, name, defect }) if name == "revolute" => defect,
+        other => panic!("{other:?}"),
+    };
+    let far = Isometry3::translation(0.0, 425.0, 0.0);
+    let defect = refused(Joint { previous_from_joint: far, ..good.clone() });
+    assert!(defect.to_string().contains("lengths are in metres"), "{defect}");
+    let lost = Isometry3::translation(f64::NAN, 0.0, 0.0);
+    assert_eq!(refused(Joint { previous_from_joint: lost, ..good.clone() }), JointDefect::NotFinite);
+    let none = nalgebra::UnitVector3::new_normalize(Vector3::zeros());
+    assert_eq!(refused(Joint { axis: none, ..good.clone() }), JointDefect::Axis);
+    let ranges = [(1.0, -1.0, 1.0), (f64::NAN, 1.0, 1.0), (f64::INFINITY, f64::INFINITY, 1.0), (-1.0, 1.0, 0.0)];
+    for (min, max, speed) in ranges {
+        let range = JointRange { min, max, speed };
+        assert!(matches!(refused(Joint { range, ..good.clone() }), JointDefect::Range { .. }), "{range:?}");
+        assert!(Arm::new(vec![good.clone()], Isometry3::identity()).expect("good").with_ranges(&[range]).is_err());
+    }
+    assert_eq!(Arm::new(Vec::new(), Isometry3::identity()), Err(ArmError::JointCount { got: 0 }));
+}
+
 #[test]
 fn at_the_reported_tip_the_tool_of_the_arm_does_not_matter() {
     let arm = mounted();
@@ -112,13 +235,13 @@ fn the_nominal_arm_passes_for_one_with_its_own_calibration() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut off = |size: f64| rng.random_range(-size..size);
     let nominal = model_ur5();
-    let rows = nominal.rows().iter().map(|row| DhRow {
+    let rows = ArmKind::Ur5Coppeliasim.rows().map(|row| DhRow {
         a_m: row.a_m + off(0.5e-3),
         alpha_rad: row.alpha_rad + off(0.0017),
         d_m: row.d_m + off(0.5e-3),
         theta_offset_rad: row.theta_offset_rad + off(0.0017),
     });
-    let real = Arm::new(rows.collect()).expect("an arm");
+    let real = Arm::from_dh(&rows).expect("an arm");
     let joints = configurations(15);
     let placement = place(&nominal, &views(&real, &joints)).expect("placed");
     assert!(placement.rms_m() > 1e-4, "the arms differ");

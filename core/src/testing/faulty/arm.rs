@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, SMatrix};
 
-use crate::geometry::arm::{Arm, ArmKind, ArmModel, DhRow};
+use crate::geometry::arm::{Arm, ArmKind, DhRow};
 use crate::geometry::se3;
 
 /// Where the search for joint angles starts.
@@ -14,19 +14,19 @@ pub type LinkErrors = [[f64; 4]; 6];
 
 /// The arm of the data sheet.
 pub(super) fn as_stated() -> Arm {
-    ArmModel::Kind(ArmKind::Ur5).arm().expect("built in")
+    ArmKind::Ur5.arm()
 }
 
 /// The same with errors of its links.
 pub(super) fn with_errors(errors: &LinkErrors) -> Arm {
-    let stated = as_stated();
-    let rows = stated.rows().iter().zip(errors).map(|(row, [a, d, alpha, zero])| DhRow {
+    let stated = ArmKind::Ur5.rows();
+    let rows = stated.iter().zip(errors).map(|(row, [a, d, alpha, zero])| DhRow {
         a_m: row.a_m + a,
         alpha_rad: row.alpha_rad + alpha,
         d_m: row.d_m + d,
         theta_offset_rad: row.theta_offset_rad + zero,
     });
-    Arm::new(rows.collect()).expect("small errors")
+    Arm::from_dh(&rows.collect::<Vec<_>>()).expect("small errors")
 }
 
 /// The tip's pose at joint angles, radians.

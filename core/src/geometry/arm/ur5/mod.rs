@@ -1,4 +1,4 @@
-//! Kinematics of the UR5 as CoppeliaSim models it.
+//! The UR5 as CoppeliaSim models it, with its joints counted by the type: six values in, six out, and nothing to check.
 //!
 //! Lengths in metres, angles in radians. The *arm* frame is the `/UR5` object, 14.65 mm above the mounting plane; the
 //! *connection* is the force sensor at the end of the arm, where a tool or a `Tip` dummy is attached. At all joints
@@ -6,20 +6,18 @@
 //!
 //! The geometry is that of the model, fitted to it without residual; it is **not** the table that the manufacturer
 //! publishes, from which the connection differs by 7 mm on average, mostly in the last link.
+//!
+//! Everything is computed by the [`Arm`] of [`ArmKind::Ur5Coppeliasim`]: arm frame and
+//! connection are its base and its tip.
 
-mod forward;
-mod inverse;
-mod iterative;
+use std::sync::LazyLock;
 
-pub use forward::{ArmPose, forward, jacobian, jacobian_at};
-pub use inverse::{IkError, Obstacle, inverse_all, inverse_nearest};
-pub use iterative::{DlsOptions, damped_least_squares, towards};
+use nalgebra::{Isometry3, Matrix6, Translation3};
 
-use std::f64::consts::FRAC_PI_2;
+use super::inverse::pose_error;
+use super::{Arm, ArmKind, JointRange};
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-
-use super::DhRow;
+pub use super::inverse::{DlsOptions, IkError, Obstacle};
 
 /// Number of joints.
 pub const JOINTS: usize = 6;
@@ -27,7 +25,7 @@ pub const JOINTS: usize = 6;
 /// Values of the six joints from the base to the wrist, radians, as `sim.getJointPosition` gives them.
 pub type JointAngles = [f64; JOINTS];
 
-/// Range of every joint in radians, both ends allowed.
+/// Range of every joint in radians, both ends allowed: what a scene says of its arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLimits {
     /// Smallest values.
@@ -44,9 +42,6 @@ impl Default for JointLimits {
 }
 
 impl JointLimits {
-    /// Rounding that a value may exceed its limit by: a joint driven to its stop is not outside.
-    const SLACK_RAD: f64 = 1e-9;
-
     /// Whether every joint is in its range.
     pub fn contains(&self, joints: &JointAngles) -> bool {
         self.first_violation(joints).is_none()
@@ -54,40 +49,113 @@ impl JointLimits {
 
     /// The first joint, counted from 0, that is out of its range or not a number.
     pub fn first_violation(&self, joints: &JointAngles) -> Option<usize> {
-        (0..JOINTS).find(|&i| !self.allows(i, joints[i]))
+        let ranges = self.ranges();
+        (0..JOINTS).find(|&i| !ranges[i].contains(joints[i]))
     }
 
     /// The nearest configuration within the limits.
     #[must_use]
     pub fn clamp(&self, joints: &JointAngles) -> JointAngles {
-        std::array::from_fn(|i| joints[i].max(self.min_rad[i]).min(self.max_rad[i]))
+        let ranges = self.ranges();
+        std::array::from_fn(|i| ranges[i].clamp(joints[i]))
     }
 
-    fn allows(&self, joint: usize, value: f64) -> bool {
-        value >= self.min_rad[joint] - Self::SLACK_RAD && value <= self.max_rad[joint] + Self::SLACK_RAD
+    /// The same, joint by joint.
+    pub fn ranges(&self) -> [JointRange; JOINTS] {
+        std::array::from_fn(|i| JointRange { min: self.min_rad[i], max: self.max_rad[i], speed: f64::INFINITY })
     }
 }
 
-/// The arm in Denavit and Hartenberg's convention: `[a, alpha, d, theta]`, fitted to the model without residual.
-pub(super) const ROWS: [DhRow; JOINTS] = [
-    DhRow::new([0.0, FRAC_PI_2, 0.074_55, 0.0]),
-    DhRow::new([-0.4251, 0.0, 0.0, -FRAC_PI_2]),
-    DhRow::new([-0.392_15, 0.0, 0.0, 0.0]),
-    DhRow::new([0.0, FRAC_PI_2, 0.11, -FRAC_PI_2]),
-    DhRow::new([0.0, -FRAC_PI_2, 0.094_75, 0.0]),
-    DhRow::new([0.0, 0.0, 0.074_95, 0.0]),
-];
-/// Turn about z between the arm frame and the convention's base, and between its flange and the connection.
-const END_TURN: f64 = -FRAC_PI_2;
-
-/// A turn about z.
-fn turn_z(angle: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle))
+/// Where every part of the arm is for one configuration, in the arm frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArmPose {
+    /// Fixed frame of each joint, before the joint's own rotation: origin on its axis, z along it.
+    pub arm_from_joint: [Isometry3<f64>; JOINTS],
+    /// Frame that each joint carries: its fixed frame turned about z by the joint value.
+    pub arm_from_link: [Isometry3<f64>; JOINTS],
+    /// The attachment point behind the last joint.
+    pub arm_from_connection: Isometry3<f64>,
 }
 
-/// That turn as a motion.
-pub(super) fn end_turn() -> Isometry3<f64> {
-    turn_z(END_TURN)
+static ARM: LazyLock<Arm> = LazyLock::new(|| ArmKind::Ur5Coppeliasim.arm());
+
+/// Poses of joints, links and connection for the given joint values in radians.
+///
+/// # Frames and units
+/// Everything is in the arm frame, metres. With all joints at zero the connection is at (−0.18495, 0, 0.98655) and
+/// its axes are z, y and −x of the arm.
+pub fn forward(joints: &JointAngles) -> ArmPose {
+    let mut arm_from_joint = [Isometry3::identity(); JOINTS];
+    let mut arm_from_link = [Isometry3::identity(); JOINTS];
+    let arm_from_flange = ARM.walk(joints, |i, at_rest, link| {
+        arm_from_joint[i] = *at_rest;
+        arm_from_link[i] = *link;
+    });
+    ArmPose { arm_from_joint, arm_from_link, arm_from_connection: arm_from_flange * ARM.flange_from_tip }
+}
+
+/// [`Arm::jacobian`] at the connection.
+pub fn jacobian(joints: &JointAngles) -> Matrix6<f64> {
+    jacobian_at(joints, &Isometry3::identity())
+}
+
+/// [`jacobian`] at the origin of a tool frame that is fixed to the connection.
+pub fn jacobian_at(joints: &JointAngles, connection_from_tip: &Isometry3<f64>) -> Matrix6<f64> {
+    let (axes, arm_from_flange) = ARM.axes(joints);
+    let tip = arm_from_flange * ARM.flange_from_tip * Translation3::from(connection_from_tip.translation.vector);
+    Matrix6::from_columns(&axes.iter().map(|axis| axis.velocity(&tip.translation.vector)).collect::<Vec<_>>())
+}
+
+/// [`Arm::configurations`]: all that put the connection at `arm_from_connection`, up to eight.
+pub fn inverse_all(arm_from_connection: &Isometry3<f64>) -> Vec<JointAngles> {
+    ARM.ur.map(|ur| ur.all(&ARM, arm_from_connection)).unwrap_or_default()
+}
+
+/// [`Arm::inverse`] with limits of its own: the configuration within them that is nearest to `seed`. Where joint 6 is free
+/// it keeps its value from the seed.
+///
+/// # Errors
+/// [`IkError`] says what is in the way or which joint would leave its range.
+pub fn inverse_nearest(
+    arm_from_connection: &Isometry3<f64>,
+    seed: &JointAngles,
+    limits: &JointLimits,
+) -> Result<JointAngles, IkError> {
+    let ur = ARM.ur.as_ref().expect("the model is an arm of Universal Robots; a test finds its closed form");
+    if !seed.iter().all(|q| q.is_finite()) {
+        return Err(IkError::NotFinite);
+    }
+    ur.nearest(&ARM, arm_from_connection, seed, &limits.ranges())
+}
+
+/// Joint values that bring the tip to `arm_from_tip_goal`, by [`towards`]; `None` when the goal is not within the
+/// precision of the options after the last iteration.
+pub fn damped_least_squares(
+    arm_from_tip_goal: &Isometry3<f64>,
+    connection_from_tip: &Isometry3<f64>,
+    seed: &JointAngles,
+    options: &DlsOptions,
+    limits: &JointLimits,
+) -> Option<JointAngles> {
+    let joints = towards(arm_from_tip_goal, connection_from_tip, seed, options, limits);
+    let error = pose_error(&(forward(&joints).arm_from_connection * connection_from_tip), arm_from_tip_goal);
+    let within = error.fixed_rows::<3>(0).norm() <= options.precision_m
+        && error.fixed_rows::<3>(3).norm() <= options.precision_rad;
+    within.then_some(joints)
+}
+
+/// [`Arm::towards`] for a tool that is fixed to the connection, with limits of its own: where the iterations end, which is
+/// near the place that is nearest to the goal.
+pub fn towards(
+    arm_from_tip_goal: &Isometry3<f64>,
+    connection_from_tip: &Isometry3<f64>,
+    seed: &JointAngles,
+    options: &DlsOptions,
+    limits: &JointLimits,
+) -> JointAngles {
+    let arm = ARM.clone().mounted(ARM.base_from_first, ARM.flange_from_tip * connection_from_tip);
+    let found = arm.towards_within(arm_from_tip_goal, seed, options, &limits.ranges());
+    std::array::from_fn(|i| found[i])
 }
 
 #[cfg(test)]

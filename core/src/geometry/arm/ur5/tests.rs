@@ -1,5 +1,5 @@
 use super::*;
-use crate::geometry::arm::ur5::inverse::{pose_error, wrap};
+use crate::geometry::arm::inverse::{pose_error, wrap};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

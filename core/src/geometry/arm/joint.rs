@@ -1,0 +1,89 @@
+//! One joint of an arm: where it sits, how it moves, and how far.
+
+use std::fmt;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3};
+
+/// How a joint moves what is behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum JointKind {
+    /// Turns it about its axis. Its value is an angle in radians.
+    Revolute,
+    /// Shifts it along its axis. Its value is a length in metres.
+    Prismatic,
+}
+
+impl fmt::Display for JointKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Revolute => "revolute",
+            Self::Prismatic => "prismatic",
+        })
+    }
+}
+
+/// How far and how fast a joint moves: radians and rad/s of a revolute one, metres and m/s of a prismatic one. Infinite
+/// where there is no limit, or none is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointRange {
+    /// Smallest value, itself allowed.
+    pub min: f64,
+    /// Largest value, itself allowed.
+    pub max: f64,
+    /// Largest speed either way.
+    pub speed: f64,
+}
+
+impl JointRange {
+    /// A joint without limits.
+    pub const ENDLESS: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY, speed: f64::INFINITY };
+
+    /// Rounding by which a value may exceed its limit: a joint driven to its stop is not outside.
+    pub(super) const SLACK: f64 = 1e-9;
+
+    /// Whether a value is in the range; NaN is not.
+    pub fn contains(&self, value: f64) -> bool {
+        value >= self.min - Self::SLACK && value <= self.max + Self::SLACK
+    }
+
+    /// The nearest value in the range.
+    pub fn clamp(&self, value: f64) -> f64 {
+        value.max(self.min).min(self.max)
+    }
+
+    /// What no joint has: no room at all, NaN, or no speed.
+    pub(super) fn is_sound(&self) -> bool {
+        // Infinity as the smallest value, or its opposite as the largest, leaves no finite one.
+        self.min <= self.max && self.min < f64::INFINITY && self.max > f64::NEG_INFINITY && self.speed > 0.0
+    }
+}
+
+/// A joint, in the frame that the joint before it carries.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// What it is called where it comes from, for messages.
+    pub name: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// Frame of the joint at rest, in the frame that the joint before it carries; of the first joint, in the frame in
+    /// which the arm stands. A point of the axis is its origin.
+    pub previous_from_joint: Isometry3<f64>,
+    /// Direction of the axis in the frame of the joint.
+    pub axis: UnitVector3<f64>,
+    /// How far and how fast it moves.
+    pub range: JointRange,
+}
+
+impl Joint {
+    /// The frame that the joint carries, in its frame at rest, at a value in radians or metres.
+    pub(super) fn motion(&self, value: f64) -> Isometry3<f64> {
+        match self.kind {
+            JointKind::Revolute => {
+                Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&self.axis, value))
+            }
+            JointKind::Prismatic => {
+                Isometry3::from_parts((self.axis.into_inner() * value).into(), UnitQuaternion::identity())
+            }
+        }
+    }
+}
