@@ -52,8 +52,16 @@ pub const FAULTS: [&str; 9] = [
     "images letter by letter, poses by number",
 ];
 
-/// A session with a fault and the code that has to come first. Both set-ups, with the lens given and estimated, take turns.
-pub fn faulty(fault: usize, seed: u64) -> (Observations, FindingCode) {
+/// How sessions with a fault are made, by the remainder of their seed.
+pub const SET_UPS: [&str; 4] =
+    ["in hand, lens given", "to hand, lens given", "in hand, lens estimated", "to hand, lens estimated"];
+
+/// How many of them come in any size; they are first.
+pub const SIZED: usize = 4;
+
+/// A session with a fault, one that comes in any size so many times as large as its name says, and the code that has to come
+/// first. Both set-ups, with the lens given and estimated, take turns.
+pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
     let mode = if seed.is_multiple_of(2) { Mode::EyeInHand } else { Mode::EyeToHand };
     let estimated = seed % 4 > 1;
@@ -63,22 +71,22 @@ pub fn faulty(fault: usize, seed: u64) -> (Observations, FindingCode) {
         0 => {
             // A board slips in its plane and turns a little.
             let angle = rng.random_range(0.0..std::f64::consts::TAU);
-            let slip = Vector3::new(angle.cos(), angle.sin(), 0.0) * 5e-3;
-            let turn = Vector3::z() * rng.random_range(-0.01..0.01);
+            let slip = Vector3::new(angle.cos(), angle.sin(), 0.0) * 5e-3 * times;
+            let turn = Vector3::z() * rng.random_range(-0.01..0.01) * times;
             let fault = Fault { board_moved: Some((12, twist(slip, turn))), ..Fault::default() };
             (session(&setup.with(fault)), FindingCode::BoardMoved)
         }
         1 => {
-            let scale = if rng.random::<bool>() { 0.02 } else { -0.02 };
+            let scale = if rng.random::<bool>() { 0.02 } else { -0.02 } * times;
             (session(&setup.with(Fault { scale, ..Fault::default() })), FindingCode::WrongScale)
         }
         2 => {
-            let offset = 0.2f64.to_radians() * if rng.random::<bool>() { 1.0 } else { -1.0 };
+            let offset = 0.2f64.to_radians() * times * if rng.random::<bool>() { 1.0 } else { -1.0 };
             (session(&setup.with(Fault { joint: Some((3, offset)), ..Fault::default() })), FindingCode::JointOffset)
         }
         3 => {
             // An image one frame of 30 Hz late, of an arm at 0.1 m/s and 10°/s.
-            let motion = twist(direction(&mut rng) * 3.3e-3, direction(&mut rng) * 0.33f64.to_radians());
+            let motion = twist(direction(&mut rng) * 3.3e-3, direction(&mut rng) * 0.33f64.to_radians()) * times;
             let moving = vec![(rng.random_range(0..20), motion)];
             (session(&setup.with(Fault { moving, ..Fault::default() })), FindingCode::OutlierView)
         }

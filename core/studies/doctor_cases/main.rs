@@ -2,7 +2,8 @@
 //!
 //! `cargo run --release -p handeye_core --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or
 //! `… -- TEXT` for the whole report on every case whose name has that text; `… -- as-met [SESSIONS] [FIRST]` for the healthy
-//! sessions with an arm whose error depends on where it stands; one alone with its report.
+//! sessions with an arm whose error depends on where it stands; one alone with its report; `… -- limits [SESSIONS]` for the sizes
+//! from which on faults are found.
 
 mod cases;
 mod faults;
@@ -36,11 +37,62 @@ fn as_met(first: u64, sessions: u64) {
     println!("a cause named in {alarmed} of {sessions} healthy sessions as they are met: {alarms:?}\n");
 }
 
+/// Whether a fault is the first explanation and accepted, or what is said instead.
+fn said_first(fault: usize, times: f64, seed: u64) -> Result<(), String> {
+    let (observations, code) = faults::faulty(fault, times, seed);
+    let diagnosis = faults::examined(&observations);
+    match diagnosis.hypotheses.first() {
+        Some(best) if best.code == code && best.accepted => Ok(()),
+        best => Err(format!("{:?}", best.map(|h| (h.code, h.accepted, h.text.say(English))))),
+    }
+}
+
+/// From which size on faults are found, in every set-up by itself: the size at which it is a half of all sessions, and their share
+/// at twice that.
+fn limits(sessions: u64) {
+    for (fault, name) in faults::FAULTS.iter().enumerate().take(faults::SIZED) {
+        let mut at_twice = 0;
+        for (kind, set_up) in faults::SET_UPS.iter().enumerate() {
+            let found = |times: f64, first: u64| {
+                let seeds = (0..sessions).map(|k| first + faults::SET_UPS.len() as u64 * k + kind as u64);
+                seeds.filter(|seed| said_first(fault, times, *seed).is_ok()).count()
+            };
+            let share = |times: f64| found(times, 6000) as f64 / sessions as f64;
+            let (mut times, mut larger) = (4.0, share(4.0));
+            let limit = loop {
+                let smaller = share(times / 2.0);
+                if smaller < 0.5 && larger >= 0.5 {
+                    // Between the two by the logarithm of the size.
+                    break Some(times / 2.0 * 2f64.powf((0.5 - smaller) / (larger - smaller)));
+                }
+                (times, larger) = (times / 2.0, smaller);
+                if times < 1e-2 {
+                    break None;
+                }
+            };
+            let Some(limit) = limit else {
+                println!("{name}, {set_up}: no size between where it is found in half of all sessions");
+                continue;
+            };
+            let first = found(2.0 * limit, 60_000);
+            at_twice += first;
+            println!(
+                "{name}, {set_up}: limit {limit:.3} times that, at twice the limit first in {first} of {sessions}"
+            );
+        }
+        println!("{name}: at twice the limit first in {at_twice} of {}", 4 * sessions);
+    }
+}
+
 fn main() {
     let mut arguments = std::env::args().skip(1).peekable();
     if arguments.next_if(|a| a == "as-met").is_some() {
         let sessions = number(arguments.next(), 200);
         as_met(number(arguments.next(), 0), sessions);
+        return;
+    }
+    if arguments.next_if(|a| a == "limits").is_some() {
+        limits(number(arguments.next(), 60));
         return;
     }
     if let Some(text) = arguments.next_if(|a| a.parse::<u64>().is_err()) {
@@ -93,13 +145,9 @@ fn main() {
         }
         let mut first = 0;
         for seed in 0..seeds {
-            let (observations, code) = faults::faulty(fault, 5000 + seed);
-            let diagnosis = faults::examined(&observations);
-            let best = diagnosis.hypotheses.first();
-            if best.is_some_and(|h| h.code == code && h.accepted) {
-                first += 1;
-            } else {
-                println!("  {name}, seed {seed}: {:?}", best.map(|h| (h.code, h.accepted, h.text.say(English))));
+            match said_first(fault, 1.0, 5000 + seed) {
+                Ok(()) => first += 1,
+                Err(otherwise) => println!("  {name}, seed {seed}: {otherwise}"),
             }
         }
         println!("{name}: first in {first} of {seeds}");

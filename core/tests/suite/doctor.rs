@@ -68,7 +68,7 @@ fn an_arm_whose_error_depends_on_where_it_stands_raises_no_alarm() {
 fn each_injected_fault_is_ranked_first() {
     for (fault, name) in faults::FAULTS.iter().enumerate() {
         for seed in 0..2 {
-            let (observations, code) = faults::faulty(fault, seed);
+            let (observations, code) = faults::faulty(fault, 1.0, seed);
             let diagnosis = faults::examined_alone(&observations);
             let best = diagnosis.hypotheses.first().expect("tested");
             assert!(best.code == code && best.accepted, "{name}, seed {seed}: {best:?}");
@@ -183,7 +183,7 @@ fn the_stated_error_covers_the_true_one_when_what_was_given_is_wrong() {
 #[test]
 fn no_error_is_stated_where_the_data_contradict_themselves() {
     for fault in [4, 5] {
-        let (observations, code) = faults::faulty(fault, 5000);
+        let (observations, code) = faults::faulty(fault, 1.0, 5000);
         let cancel = CancelToken::default();
         let Ok(mut calibration) = calibrate(&observations, Method::Joint, &cancel) else { continue };
         let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
@@ -242,7 +242,7 @@ mod slow {
     #[test]
     fn whatever_is_found_is_said_in_words_that_can_be_translated() {
         let closed_forms: Vec<&str> = closed_form::all().iter().map(|solver| solver.name()).collect();
-        let faulty = (0..faults::FAULTS.len()).map(|fault| faults::faulty(fault, 0).0);
+        let faulty = (0..faults::FAULTS.len()).map(|fault| faults::faulty(fault, 1.0, 0).0);
         for observations in cases::cases().into_iter().map(|case| case.observations).chain(faulty) {
             let diagnosis = faults::examined(&observations);
             let of_hypotheses = diagnosis.hypotheses.iter().flat_map(|h| [&h.text, &h.advice]);

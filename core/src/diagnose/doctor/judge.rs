@@ -1,19 +1,19 @@
 //! One hypothesis judged: fitted with noise levels of its own, tested, and asked to predict views left out.
 
 use nalgebra::{DVector, Matrix6, Vector6};
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, StudentsT};
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
 use super::screen::{Candidate, view_score};
-use crate::geometry::statistics::outliers;
+use crate::geometry::statistics::{better_by_chance, outliers};
 
 /// Probability of a false alarm per hypothesis, after allowance for the alternatives among which the best was picked.
 /// One in ten thousand, because noise of real robots has longer tails than a Gaussian.
 const ALPHA: f64 = 1e-4;
 /// Probability that a hypothesis predicts views left out better by chance, after the same allowance. It is asked for
-/// besides the one above, whose law of the noise may be wrong.
-const HELD_OUT_ALPHA: f64 = 1e-2;
+/// besides the one above, whose law of the noise may be wrong. Ten views that all gain come about by chance once in a thousand.
+const HELD_OUT_ALPHA: f64 = 2e-3;
 /// Parts that views are left out in, one at a time; as for the held-out error of a calibration.
 const FOLDS: usize = 5;
 /// An offset of a joint must predict held-out views better by this part: an arm has many ways to be wrong, and one more
@@ -65,16 +65,13 @@ pub(super) struct HeldOut {
 }
 
 impl HeldOut {
-    /// Whether views are predicted better than by another model, by more than chance: Student's test of the mean gain
-    /// against how the gains scatter over the views, which needs no law of the noise.
+    /// Whether views are predicted better than by another model, by more than chance: a test of the signed ranks of the gains.
+    /// Without an effect a gain is as likely a loss of that size, whatever the law of the noise. With one, a few views
+    /// gain most; a test of the mean against their scatter never gets beyond `√views` over the relative scatter, however large
+    /// the effect.
     fn is_better_than(&self, other: &Self, ln_alternatives: f64) -> bool {
         let gains: Vec<f64> = self.scores.iter().zip(&other.scores).map(|(with, without)| with - without).collect();
-        let count = gains.len() as f64;
-        let mean = gains.iter().sum::<f64>() / count;
-        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        let Ok(distribution) = StudentsT::new(0.0, 1.0, (count - 1.0).max(1.0)) else { return false };
-        let statistic = mean * count.sqrt() / variance.sqrt();
-        statistic > 0.0 && distribution.sf(statistic) * ln_alternatives.exp() < HELD_OUT_ALPHA
+        better_by_chance(&gains) * ln_alternatives.exp() < HELD_OUT_ALPHA
     }
 }
 
