@@ -52,13 +52,6 @@ pub const FAULTS: [&str; 9] = [
     "images letter by letter, poses by number",
 ];
 
-/// How sessions with a fault are made, by the remainder of their seed.
-pub const SET_UPS: [&str; 4] =
-    ["in hand, lens given", "to hand, lens given", "in hand, lens estimated", "to hand, lens estimated"];
-
-/// How many of them come in any size; they are first.
-pub const SIZED: usize = 4;
-
 /// A session with a fault, one that comes in any size so many times as large as its name says, and the code that has to come
 /// first. Both set-ups, with the lens given and estimated, take turns.
 pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode) {

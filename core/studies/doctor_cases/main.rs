@@ -47,14 +47,20 @@ fn said_first(fault: usize, times: f64, seed: u64) -> Result<(), String> {
     }
 }
 
+/// How sessions with a fault are made, by the remainder of their seed.
+const SET_UPS: [&str; 4] =
+    ["in hand, lens given", "to hand, lens given", "in hand, lens estimated", "to hand, lens estimated"];
+/// How many of the faults come in any size; they are first.
+const SIZED: usize = 4;
+
 /// From which size on faults are found, in every set-up by itself: the size at which it is a half of all sessions, and their share
 /// at twice that.
 fn limits(sessions: u64) {
-    for (fault, name) in faults::FAULTS.iter().enumerate().take(faults::SIZED) {
+    for (fault, name) in faults::FAULTS.iter().enumerate().take(SIZED) {
         let mut at_twice = 0;
-        for (kind, set_up) in faults::SET_UPS.iter().enumerate() {
+        for (kind, set_up) in SET_UPS.iter().enumerate() {
             let found = |times: f64, first: u64| {
-                let seeds = (0..sessions).map(|k| first + faults::SET_UPS.len() as u64 * k + kind as u64);
+                let seeds = (0..sessions).map(|k| first + SET_UPS.len() as u64 * k + kind as u64);
                 seeds.filter(|seed| said_first(fault, times, *seed).is_ok()).count()
             };
             let share = |times: f64| found(times, 6000) as f64 / sessions as f64;
