@@ -12,8 +12,9 @@ use crate::geometry::statistics::{better_by_chance, outliers};
 /// One in ten thousand, because noise of real robots has longer tails than a Gaussian.
 const ALPHA: f64 = 1e-4;
 /// Probability that a hypothesis predicts views left out better by chance, after the same allowance. It is asked for
-/// besides the one above, whose law of the noise may be wrong. Ten views that all gain come about by chance once in a thousand.
-const HELD_OUT_ALPHA: f64 = 2e-3;
+/// besides the one above, whose law of the noise may be wrong. Eight views that all gain come about
+/// by chance four times in a thousand: with fewer nothing is shown so.
+const HELD_OUT_ALPHA: f64 = 5e-3;
 /// Parts that views are left out in, one at a time; as for the held-out error of a calibration.
 const FOLDS: usize = 5;
 /// An offset of a joint must predict held-out views better by this part: an arm has many ways to be wrong, and one more
