@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::{Arm, CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles};
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
+use handeye_core::geometry;
+use handeye_core::geometry::arm::ArmKind;
 use handeye_core::geometry::arm::ur5::{self, DlsOptions, IkError, JointLimits};
 
 /// How far an axis of a joint may be from where the built-in kinematics has it \[m\]. The model and the manufacturer's
@@ -100,6 +102,12 @@ impl ArmKinematics {
     /// Ranges of the joints; infinite for one that turns without end.
     pub fn limits(&self) -> &JointLimits {
         &self.limits
+    }
+
+    /// The arm from its frame to the connection, with its ranges.
+    pub(super) fn arm(&self) -> geometry::arm::Arm {
+        let arm = ArmKind::Ur5Coppeliasim.arm();
+        arm.clone().with_ranges(&self.limits.ranges()).unwrap_or(arm)
     }
 
     /// Where the arm stands, and how it carries its tip.

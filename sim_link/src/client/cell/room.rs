@@ -136,16 +136,21 @@ impl ArmKinematics {
             candidates: CANDIDATES,
             ..ViewOptions::default()
         };
-        let mut views = planning::views_of_board(&setup, &options);
-        let travel = |view: &PlannedView| planning::travel(from, &view.joints);
+        let views = planning::views_of_board(&setup, &options);
+        let joints_of = |view: &PlannedView| JointAngles::try_from(&view.joints[..]).ok();
+        let mut views: Vec<_> = views.iter().filter_map(|view| Some((joints_of(view)?, view.base_from_tip))).collect();
+        let travel = |view: &(JointAngles, Pose<Base, Tip>)| planning::travel(from, &view.0);
         views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
         let is_free = |joints: &JointAngles| setup.path_is_free(from, joints, options.clearance_m);
-        let place =
-            |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
+        let place = |&(joints, base_from_tip): &(JointAngles, Pose<Base, Tip>), room| FollowPlace {
+            joints,
+            base_from_tip,
+            room,
+        };
         for reach in [&reach.wider(), reach] {
             for view in &views {
-                let room = self.room_over(limits, board, reach, &view.joints, ENOUGH);
-                if room >= ENOUGH && is_free(&view.joints) {
+                let room = self.room_over(limits, board, reach, &view.0, ENOUGH);
+                if room >= ENOUGH && is_free(&view.0) {
                     return Ok(place(view, room));
                 }
             }
@@ -153,8 +158,8 @@ impl ArmKinematics {
         let mut best: Option<FollowPlace> = None;
         for view in &views {
             let wanted = best.map_or(LEAST, |best| best.room);
-            let room = self.room_over(limits, board, reach, &view.joints, wanted);
-            if room > wanted && is_free(&view.joints) {
+            let room = self.room_over(limits, board, reach, &view.0, wanted);
+            if room > wanted && is_free(&view.0) {
                 best = Some(place(view, room));
             }
         }

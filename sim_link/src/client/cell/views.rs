@@ -75,7 +75,7 @@ impl ArmKinematics {
             planned => planned?,
         };
         planning::order_by_travel(start, &mut views);
-        Ok(views.into_iter().map(|view| view.joints).collect())
+        Ok(views.iter().filter_map(|view| JointAngles::try_from(&view.joints[..]).ok()).collect())
     }
 
     /// What the planner knows of this arm.
@@ -95,12 +95,13 @@ impl ArmKinematics {
             intrinsics: board.intrinsics,
             tip_from_camera: board.tip_from_camera,
             arm: planning::Arm {
+                chain: self.arm(),
+                body: planning::ArmBody::Ur5,
                 world_from_arm: self.chain().base_from_arm,
                 connection_from_tip: self.chain().connection_from_tip,
                 tip_from_camera: *board.tip_from_camera.isometry(),
             },
-            joint_limits: *self.limits(),
-            start_joints: *start,
+            start_joints: (*start).into(),
             obstacles: vec![sheet, table],
         }
     }
