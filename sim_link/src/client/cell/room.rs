@@ -6,7 +6,7 @@
 //! the tip can have there in every direction at once.
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::JointAngles;
 use super::jog_plan::nearest;
@@ -14,7 +14,6 @@ use super::reach::ArmKinematics;
 use super::views::BoardInView;
 use crate::cell::planning::{self, PlannedView, ViewOptions};
 use crate::client::cell::follow_goal::FollowLimits;
-use handeye_core::geometry::arm::ur5::jacobian_at;
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.
@@ -202,7 +201,8 @@ impl ArmKinematics {
 
     /// The share of its limits of speed that the tip can have in every direction at once, so that no joint is too fast.
     fn share_of_limits(&self, limits: &FollowLimits, joints: &JointAngles) -> f64 {
-        let Some(per_twist) = jacobian_at(joints, &self.chain().connection_from_tip).try_inverse() else { return 0.0 };
+        let inverse = self.jacobian(joints).and_then(Matrix6::try_inverse);
+        let Some(per_twist) = inverse else { return 0.0 };
         let fastest = per_twist
             .row_iter()
             .map(|row| {

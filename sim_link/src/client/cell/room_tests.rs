@@ -14,11 +14,12 @@ const DT_S: f64 = 0.05;
 /// The reference scene, its arm, and the joints at each of the ten reference poses, one after the other.
 fn after_the_sequence() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointAngles>) {
     let scene = Scene::reference().expect("the scene").resolve(1).expect("valid");
-    let arm = ArmKinematics::new(
+    let arm = ArmKinematics::ur5(
         scene.world_from_arm,
         scene.connection_from_tip,
         handeye_core::geometry::arm::ur5::JointLimits::default(),
-    );
+    )
+    .expect("limits with room");
     let board = BoardInView {
         base_from_target: scene.base_from_target,
         target: scene.target,

@@ -88,17 +88,20 @@ impl ArmKinematics {
             size_m: [edge_m(grid.columns), edge_m(grid.rows), SHEET_M],
         };
         let below = Isometry3::translation(0.0, 0.0, -TABLE_BELOW_ARM_M - TABLE_M[2] / 2.0);
-        let table = Obstacle { world_from_centre: self.chain().base_from_arm * below, size_m: TABLE_M };
+        let table = Obstacle { world_from_centre: self.base_from_arm() * below, size_m: TABLE_M };
         ViewSetup {
             base_from_target: board.base_from_target,
             target: board.target,
             intrinsics: board.intrinsics,
             tip_from_camera: board.tip_from_camera,
             arm: planning::Arm {
-                chain: self.arm(),
-                body: planning::ArmBody::Ur5,
-                world_from_arm: self.chain().base_from_arm,
-                connection_from_tip: self.chain().connection_from_tip,
+                chain: self.arm().clone(),
+                body: match self.ur5_chain() {
+                    Some(_) => planning::ArmBody::Ur5,
+                    None => planning::ArmBody::of(self.arm()),
+                },
+                world_from_arm: *self.base_from_arm(),
+                connection_from_tip: *self.connection_from_tip(),
                 tip_from_camera: *board.tip_from_camera.isometry(),
             },
             start_joints: (*start).into(),

@@ -3,11 +3,12 @@ use crate::cell::scene::Scene;
 
 fn arm_and_board(scene: &Scene) -> (ArmKinematics, BoardInView, JointAngles) {
     let scene = scene.resolve(scene.seed).expect("valid");
-    let arm = ArmKinematics::new(
+    let arm = ArmKinematics::ur5(
         scene.world_from_arm,
         scene.connection_from_tip,
         handeye_core::geometry::arm::ur5::JointLimits::default(),
-    );
+    )
+    .expect("limits with room");
     let board = BoardInView {
         base_from_target: scene.base_from_target,
         target: scene.target,
