@@ -13,8 +13,8 @@ use crate::rerun_log::{Entry, Recorder};
 /// The cell and what it publishes of itself.
 pub fn cell(recorder: &Recorder, arm: &mut Arm, truth: &GroundTruth) -> Result<(), LinkError> {
     if recorder.is_on() {
-        let chain = arm.kinematics()?.ok().map(|kinematics| *kinematics.chain());
-        recorder.note(Entry::Cell(Arc::new(CellFacts::new(arm.info(), chain, Some(truth)))));
+        let kinematics = arm.kinematics()?.ok();
+        recorder.note(Entry::Cell(Arc::new(CellFacts::new(arm.info(), kinematics.as_ref(), Some(truth)))));
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_sim_link::client::cell::{ArmChain, CellInfo, GroundTruth, JointAngles, Support};
+use handeye_sim_link::client::cell::{ArmChain, ArmKinematics, CellInfo, GroundTruth, JointAngles, Support};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -14,8 +14,9 @@ pub struct CellFacts {
     pub joint_ranges_rad: [Option<[f64; 2]>; 6],
     /// What the camera's settings say, without its lens: good enough to draw with before there is a calibration.
     pub nominal_intrinsics: Intrinsics,
-    /// The arm as it was measured, if it is the one whose kinematics is built in: where it is drawn, and why goals can be
-    /// checked before anything moves.
+    /// Whether it is known how the tip moves with the joints: goals are then checked before anything moves.
+    pub is_arm_known: bool,
+    /// The arm as it was measured, if it is the UR5, whose bodies are known: where it is drawn.
     pub arm: Option<ArmChain>,
     /// What works with the server's version.
     pub support: Support,
@@ -25,11 +26,12 @@ pub struct CellFacts {
 
 impl CellFacts {
     /// By what the cell says of itself.
-    pub fn new(info: &CellInfo, arm: Option<ArmChain>, truth: Option<&GroundTruth>) -> Self {
+    pub fn new(info: &CellInfo, arm: Option<&ArmKinematics>, truth: Option<&GroundTruth>) -> Self {
         Self {
             joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
             nominal_intrinsics: info.camera_intrinsics_nominal(),
-            arm,
+            is_arm_known: arm.is_some(),
+            arm: arm.and_then(ArmKinematics::ur5_chain),
             support: info.support(),
             truth: truth.map(Truth::from),
         }

@@ -160,6 +160,7 @@ impl ControlPort for FakeCell {
         Ok(CellFacts {
             joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
             nominal_intrinsics: Intrinsics::pinhole(width, height, 60.0),
+            is_arm_known: true,
             arm: Some(ArmChain { base_from_arm: Isometry3::identity(), connection_from_tip: Isometry3::identity() }),
             support: Support::Whole,
             truth: None,

@@ -126,7 +126,7 @@ impl ControlPort for LiveControl {
                 None
             }
         };
-        Ok(CellFacts::new(self.arm.info(), kinematics.ok().map(|kinematics| *kinematics.chain()), truth.as_ref()))
+        Ok(CellFacts::new(self.arm.info(), kinematics.ok().as_ref(), truth.as_ref()))
     }
 
     fn state(&mut self) -> Result<RobotState, PortError> {

@@ -17,9 +17,11 @@ pub struct ArmFile {
 /// The UR5, with frames and axes as ROS has them.
 pub const UR5: ArmFile = ArmFile { name: "ur5", urdf: include_str!("arms/ur5.urdf"), tip: "tool0" };
 /// Franka Panda: seven revolute joints, the elbow beside the line of the arm.
-pub const PANDA: ArmFile = ArmFile { name: "panda", urdf: include_str!("arms/panda.urdf"), tip: "panda_link8" };
+pub const PANDA: ArmFile =
+    ArmFile { name: "panda", urdf: include_str!("../../../assets/arms/panda.urdf"), tip: "panda_link8" };
 /// UFACTORY xArm 6: six revolute joints, no closed form of ours.
-pub const XARM6: ArmFile = ArmFile { name: "xarm6", urdf: include_str!("arms/xarm6.urdf"), tip: "link6" };
+pub const XARM6: ArmFile =
+    ArmFile { name: "xarm6", urdf: include_str!("../../../assets/arms/xarm6.urdf"), tip: "link6" };
 /// The same on a linear track: seven joints, the first prismatic.
 pub const XARM6_ON_TRACK: ArmFile =
     ArmFile { name: "xarm6_on_track", urdf: include_str!("arms/xarm6_on_track.urdf"), tip: "link6" };

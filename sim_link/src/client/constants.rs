@@ -31,6 +31,11 @@ pub const DEPTH_IN_METRES: i64 = 1;
 /// Integer parameter: version, 41000 is 4.10.0.
 pub const INT_PROGRAM_VERSION: i64 = 1;
 
+/// Type of an object: a joint.
+pub const OBJECT_JOINT: i64 = 1;
+/// Type of a joint: it turns about one axis.
+pub const JOINT_REVOLUTE: i64 = 10;
+
 /// Mode of a joint that forces move and a controller holds; in the others it is where it is put.
 pub const JOINT_MODE_DYNAMIC: i64 = 5;
 

@@ -2,7 +2,7 @@
 
 use handeye_core::geometry::frames::Pose;
 use handeye_core::geometry::se3::{adjoint, skew};
-use handeye_sim_link::cell::recorded::{ARM, RecordedSession};
+use handeye_sim_link::cell::recorded::RecordedSession;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SymmetricEigen, Vector6};
 
 /// Hand-eye transform and place of the board.
@@ -39,7 +39,7 @@ impl Information {
             (if i < 3 { noise.robot_m } else { noise.robot_rad }).powi(2)
         }));
         for view in &session.views {
-            let tip = session.truth.reported_tip(&view.joints_rad);
+            let tip = session.truth.reported_tip(&view.joints_rad).expect("joints of the arm");
             let camera_from_target = *session.truth.camera_from_target(&tip).isometry();
             let Linear { unknowns, correction } =
                 linear(session, &view.joints_rad, tip.isometry(), &camera_from_target);
@@ -95,7 +95,7 @@ fn linear(
     let mut unknowns = SMatrix::<f64, 6, UNKNOWNS>::zeros();
     unknowns.fixed_view_mut::<6, 6>(0, 0).copy_from(&-adjoint(&camera_from_target.inverse()));
     unknowns.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
-    let arm = ARM.arm().expect("built in");
+    let arm = &session.truth.arm;
     let placed = arm.clone().mounted(session.truth.world_from_arm * arm.base_from_first, arm.flange_from_tip);
     let twists = placed.tip_by_joint_at(&Pose::from_isometry(*base_from_tip), joints_rad).expect("six joints");
     for (j, twist) in twists.iter().enumerate() {

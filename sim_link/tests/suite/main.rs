@@ -6,6 +6,7 @@ mod arm;
 mod board;
 mod client_faults;
 mod joint_offsets;
+mod other_arms;
 mod vendor;
 
 mod slow {

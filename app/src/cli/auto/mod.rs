@@ -90,8 +90,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
 
     keep_earlier_session(&folder)?;
     // That it is another arm is no fault: its joint angles are then kept and not used.
-    let arm = cell.arm().kinematics().map_err(Failure::failed)?.ok().map(|_ur5| BUILT_IN_ARM);
-    if let Some(shortfall) = shortfall::of(cell.info().support(), arm.is_some()) {
+    let kinematics = cell.arm().kinematics().map_err(Failure::failed)?.ok();
+    let arm = kinematics.as_ref().and_then(|known| known.ur5_chain()).map(|_ur5| BUILT_IN_ARM);
+    if let Some(shortfall) = shortfall::of(cell.info().support(), kinematics.is_some()) {
         tracing::warn!("{}", shortfall.say(Language::English));
     }
     let meta = SessionMeta {

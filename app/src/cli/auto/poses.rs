@@ -14,6 +14,13 @@ use crate::session::start::REFERENCE_POSES;
 /// How many views `--poses auto` plans.
 const PLANNED_VIEWS: usize = 20;
 
+/// As many joints as this program drives.
+fn six(joints: &[f64]) -> Result<[f64; 6], Failure> {
+    let count = joints.len();
+    let wrong = |_| anyhow::anyhow!("the start has {count} joint values; `auto` drives arms of six joints so far");
+    joints.try_into().map_err(wrong).map_err(Failure::unusable)
+}
+
 /// A sequence of poses.
 pub struct Plan {
     /// Where the arm begins.
@@ -39,12 +46,7 @@ impl Plan {
     }
 
     fn taught(taught: &TaughtPoses) -> Result<Self, Failure> {
-        let start_joints = taught
-            .start_joints_rad
-            .as_deref()
-            .map(<[f64; 6]>::try_from)
-            .transpose()
-            .map_err(|_wrong_length| Failure::unusable(anyhow::anyhow!("the start needs six joint angles")))?;
+        let start_joints = taught.start_joints_rad.as_deref().map(six).transpose()?;
         let limits = taught.limits.unwrap_or(limits::SEQUENCE);
         Ok(Self {
             start_joints,
@@ -66,7 +68,7 @@ impl Plan {
         let options = ViewOptions { count: PLANNED_VIEWS, seed, ..ViewOptions::default() };
         let views = poses_looking_at(&ViewSetup::of(&resolved), &options).map_err(Failure::failed)?;
         Ok(Self {
-            start_joints: Some(resolved.start_joints),
+            start_joints: Some(six(&resolved.start_joints)?),
             goals: views
                 .iter()
                 .enumerate()

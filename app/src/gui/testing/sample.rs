@@ -129,6 +129,7 @@ pub fn connected() -> Model {
     model.cell = Some(CellFacts {
         joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
         nominal_intrinsics: intrinsics(),
+        is_arm_known: true,
         arm: Some(arm()),
         support: Support::Whole,
         truth: Some(Truth {

@@ -51,7 +51,9 @@ impl ArmKind {
     pub fn ranges(self) -> [JointRange; 6] {
         let speeds_deg = match self {
             Self::Ur3 | Self::Ur3e => [180.0, 180.0, 180.0, 360.0, 360.0, 360.0],
-            Self::Ur5 | Self::Ur5e | Self::Ur5Coppeliasim => [180.0; 6],
+            Self::Ur5 | Self::Ur5e => [180.0; 6],
+            // What the joints of the model store.
+            Self::Ur5Coppeliasim => [90.0; 6],
             Self::Ur10 | Self::Ur10e | Self::Ur16e => [120.0, 120.0, 180.0, 180.0, 180.0, 180.0],
         };
         let mut ranges = speeds_deg.map(|deg| JointRange { min: -TAU, max: TAU, speed: deg * PI / 180.0 });

@@ -76,7 +76,7 @@ pub struct Joint {
 
 impl Joint {
     /// The frame that the joint carries, in its frame at rest, at a value in radians or metres.
-    pub(super) fn motion(&self, value: f64) -> Isometry3<f64> {
+    pub fn motion(&self, value: f64) -> Isometry3<f64> {
         match self.kind {
             JointKind::Revolute => {
                 Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&self.axis, value))

@@ -35,6 +35,7 @@ mod model;
 mod placement;
 pub mod ur5;
 pub mod urdf;
+mod values;
 
 use nalgebra::{Isometry3, Matrix6xX, Vector3, Vector6};
 
@@ -46,6 +47,7 @@ pub use inverse::{DlsOptions, IkError, Obstacle};
 pub use joint::{Joint, JointKind, JointRange};
 pub use model::{ArmKind, ArmModel};
 pub use placement::{DISTANCE_LIMIT_M, JointView, Placement, ROTATION_LIMIT_RAD, TipByJoint, place, place_checked};
+pub use values::JointValues;
 
 /// Most joints of an arm: twice those of a usual one.
 pub const MAX_JOINTS: usize = 12;
@@ -134,6 +136,11 @@ impl Arm {
             joint.range = *range;
         }
         Ok(self)
+    }
+
+    /// The ranges of all joints, from the base to the tip.
+    pub fn ranges(&self) -> Vec<JointRange> {
+        self.joints.iter().map(|joint| joint.range).collect()
     }
 
     /// Its joints, from the base to the tip.

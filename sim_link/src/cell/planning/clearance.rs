@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use handeye_core::geometry::arm::ur5::{ArmPose, JointAngles, forward};
+use crate::cell::links::{self, LinkCapsule};
+use handeye_core::geometry::arm::{self, ArmFrames};
 
 /// How far the upper arm runs beside the plane through the shoulder, along the shoulder axis.
 const UPPER_ARM_BESIDE_M: f64 = 0.136;
@@ -13,9 +14,29 @@ const SAMPLE_M: f64 = 0.03;
 /// Gap that the arm keeps from itself.
 const SELF_CLEARANCE_M: f64 = 0.01;
 
+/// How the links of an arm fill the room around its axes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ArmBody {
+    /// As those of the UR5, whose tubes run beside its axes.
+    Ur5,
+    /// Straight from joint to joint, see [`links`].
+    Links(Vec<LinkCapsule>),
+}
+
+impl ArmBody {
+    /// That of an arm of which only the chain is known.
+    pub fn of(chain: &arm::Arm) -> Self {
+        Self::Links(links::capsules(chain))
+    }
+}
+
 /// The arm with a camera on its tip, as far as collisions go.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
+    /// Its chain, from the arm frame to the connection, with the ranges of its joints.
+    pub chain: arm::Arm,
+    /// What hangs on it.
+    pub body: ArmBody,
     /// Pose of the arm frame in the world.
     pub world_from_arm: Isometry3<f64>,
     /// Pose of the tip in the connection.
@@ -41,8 +62,15 @@ struct Capsule {
     radius_m: f64,
 }
 
-/// Capsules of the moving arm, in the arm frame, in the order from base to tool.
-struct Body {
+/// What a configuration of the arm fills, in the arm frame.
+struct Filled {
+    /// All that can come to touch something else.
+    moving: Vec<Capsule>,
+    touches_itself: bool,
+}
+
+/// Capsules of the UR5 in the order from base to tool.
+struct Ur5Body {
     column: Capsule,
     upper_arm: Capsule,
     forearm: Capsule,
@@ -52,28 +80,66 @@ struct Body {
 }
 
 impl Arm {
-    /// Whether the arm, its tool and its camera keep their distance from the obstacles, and from the arm itself.
-    pub fn is_free(&self, joints: &JointAngles, obstacles: &[Obstacle], clearance_m: f64) -> bool {
-        let body = self.body(&forward(joints));
-        if body.touches_itself() {
+    /// Whether the arm, its tool and its camera keep their distance from the obstacles, and from the arm itself; values
+    /// that are not those of its joints are nowhere free.
+    pub fn is_free(&self, joints: &[f64], obstacles: &[Obstacle], clearance_m: f64) -> bool {
+        let Some(Filled { moving, touches_itself }) = self.filled(joints) else { return false };
+        if touches_itself {
             return false;
         }
-        let moving = body.moving();
         obstacles.iter().all(|obstacle| {
             let centre_from_arm = obstacle.world_from_centre.inverse() * self.world_from_arm;
             moving.iter().all(|capsule| capsule.distance_to_box(&centre_from_arm, &obstacle.size_m) >= clearance_m)
         })
     }
 
-    fn body(&self, pose: &ArmPose) -> Body {
-        let joint = &pose.arm_from_joint;
-        let on_axis = |i: usize, along_m: f64| joint[i] * Point3::new(0.0, 0.0, along_m);
-        let connection = Point3::from(pose.arm_from_connection.translation.vector);
-        let arm_from_tip = pose.arm_from_connection * self.connection_from_tip;
+    fn filled(&self, joints: &[f64]) -> Option<Filled> {
+        let frames = self.chain.frames(joints).ok()?;
+        let arm_from_connection = frames.base_from_flange * self.chain.flange_from_tip;
+        Some(match &self.body {
+            ArmBody::Ur5 => {
+                let body = self.ur5(&frames, &arm_from_connection);
+                Filled { moving: body.moving().to_vec(), touches_itself: body.touches_itself() }
+            }
+            ArmBody::Links(capsules) => {
+                let moved = links::motions(&self.chain, joints)?;
+                let links = capsules.iter().map(|link| {
+                    let motion = moved.get(link.link)?;
+                    let capsule = Capsule { from: motion * link.from, to: motion * link.to, radius_m: link.radius_m };
+                    Some((link.link, capsule))
+                });
+                let hand = self.hand(&arm_from_connection);
+                let body = LinksBody { links: links.collect::<Option<_>>()?, hand };
+                Filled { moving: body.moving(), touches_itself: body.touches_itself() }
+            }
+        })
+    }
+
+    /// Tool and camera.
+    fn hand(&self, arm_from_connection: &Isometry3<f64>) -> [Capsule; 2] {
+        let connection = Point3::from(arm_from_connection.translation.vector);
+        let arm_from_tip = arm_from_connection * self.connection_from_tip;
         let arm_from_camera = arm_from_tip * self.tip_from_camera;
+        let capsule = |from, to, radius_m| Capsule { from, to, radius_m };
+        [
+            capsule(connection, Point3::from(arm_from_tip.translation.vector), 0.03),
+            // The lens is at the origin, the housing behind it.
+            capsule(
+                Point3::from(arm_from_camera.translation.vector),
+                arm_from_camera * Point3::new(0.0, 0.0, -0.03),
+                0.03,
+            ),
+        ]
+    }
+
+    fn ur5(&self, frames: &ArmFrames, arm_from_connection: &Isometry3<f64>) -> Ur5Body {
+        let joint = &frames.base_from_joint;
+        let on_axis = |i: usize, along_m: f64| joint[i] * Point3::new(0.0, 0.0, along_m);
+        let connection = Point3::from(arm_from_connection.translation.vector);
+        let [tool, camera] = self.hand(arm_from_connection);
         let wrist_1 = joint[3].inverse() * joint[4] * Point3::origin();
         let capsule = |from, to, radius_m| Capsule { from, to, radius_m };
-        Body {
+        Ur5Body {
             column: capsule(Point3::origin(), Point3::new(0.0, 0.0, 0.09), 0.075),
             upper_arm: capsule(on_axis(1, UPPER_ARM_BESIDE_M), joint[2] * beside(UPPER_ARM_BESIDE_M), 0.06),
             forearm: capsule(on_axis(2, FOREARM_BESIDE_M), joint[3] * beside(FOREARM_BESIDE_M), 0.05),
@@ -82,13 +148,8 @@ impl Arm {
                 capsule(on_axis(4, 0.0), on_axis(5, 0.0), 0.04),
                 capsule(on_axis(5, 0.0), connection, 0.04),
             ],
-            tool: capsule(connection, Point3::from(arm_from_tip.translation.vector), 0.03),
-            // The lens is at the origin, the housing behind it.
-            camera: capsule(
-                Point3::from(arm_from_camera.translation.vector),
-                arm_from_camera * Point3::new(0.0, 0.0, -0.03),
-                0.03,
-            ),
+            tool,
+            camera,
         }
     }
 }
@@ -97,7 +158,35 @@ fn beside(distance_m: f64) -> Point3<f64> {
     Point3::new(0.0, 0.0, distance_m)
 }
 
-impl Body {
+/// Links in their order, each with the number of joints that carry it, and what is on the last one.
+struct LinksBody {
+    links: Vec<(usize, Capsule)>,
+    hand: [Capsule; 2],
+}
+
+impl LinksBody {
+    /// What stands on the ground does not move.
+    fn moving(&self) -> Vec<Capsule> {
+        self.links.iter().filter(|(link, _)| *link > 0).map(|(_, capsule)| *capsule).chain(self.hand).collect()
+    }
+
+    /// Two that have no more between them than their own thickness touch by design, and so do those that share a joint.
+    fn touches_itself(&self) -> bool {
+        let all: Vec<Capsule> = self.links.iter().map(|(_, capsule)| *capsule).chain(self.hand).collect();
+        let last_link = self.links.len().saturating_sub(1);
+        (0..all.len()).any(|i| {
+            (i + 2..all.len()).any(|j| {
+                // Tool and camera both sit on the end of the last link.
+                let between = &all[i + 1..=last_link.min(j - 1).max(i)];
+                let gap_m: f64 = between.iter().map(|capsule| (capsule.to - capsule.from).norm()).sum();
+                let thickness_m = all[i].radius_m + all[j].radius_m + SELF_CLEARANCE_M;
+                i < last_link && gap_m > thickness_m && all[i].distance_to(&all[j]) < SELF_CLEARANCE_M
+            })
+        })
+    }
+}
+
+impl Ur5Body {
     fn moving(&self) -> [Capsule; 7] {
         let [a, b, c] = self.wrist;
         [self.upper_arm, self.forearm, a, b, c, self.tool, self.camera]
@@ -156,6 +245,8 @@ fn segment_distance(first: [Point3<f64>; 2], second: [Point3<f64>; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use handeye_core::geometry::arm::ArmKind;
+
     use super::*;
 
     #[test]
@@ -186,6 +277,8 @@ mod tests {
     #[test]
     fn a_folded_arm_touches_itself_and_a_stretched_one_does_not() {
         let arm = Arm {
+            chain: ArmKind::Ur5Coppeliasim.arm(),
+            body: ArmBody::Ur5,
             world_from_arm: Isometry3::identity(),
             connection_from_tip: Isometry3::translation(0.0, 0.0, 0.017),
             tip_from_camera: Isometry3::translation(0.05, 0.0, 0.0),
@@ -198,6 +291,8 @@ mod tests {
     #[test]
     fn an_arm_that_lies_on_the_table_is_not_free() {
         let arm = Arm {
+            chain: ArmKind::Ur5Coppeliasim.arm(),
+            body: ArmBody::Ur5,
             world_from_arm: Isometry3::translation(0.0, 0.0, 0.025),
             connection_from_tip: Isometry3::identity(),
             tip_from_camera: Isometry3::translation(0.05, 0.0, 0.0),

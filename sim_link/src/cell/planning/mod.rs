@@ -10,8 +10,8 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::scene::ResolvedScene;
-pub use clearance::{Arm, Obstacle};
-use handeye_core::geometry::arm::ur5::{JointAngles, JointLimits, inverse_nearest};
+pub use clearance::{Arm, ArmBody, Obstacle};
+use handeye_core::geometry::arm::{ArmKind, JointValues};
 
 /// Largest joint step between two checks of a path: a tool 1 m away moves by 5 cm, half the size of a link.
 const PATH_STEP_RAD: f64 = 0.05;
@@ -30,10 +30,8 @@ pub struct ViewSetup {
     pub tip_from_camera: Pose<Tip, Camera>,
     /// The arm and its tool.
     pub arm: Arm,
-    /// Ranges of the joints.
-    pub joint_limits: JointLimits,
     /// Configuration to start from; poses are reached without changing over to another branch where possible.
-    pub start_joints: JointAngles,
+    pub start_joints: JointValues,
     /// What the arm must not touch.
     pub obstacles: Vec<Obstacle>,
 }
@@ -52,11 +50,15 @@ impl ViewSetup {
             intrinsics: scene.intrinsics,
             tip_from_camera: scene.tip_from_camera,
             arm: Arm {
+                chain: scene.arm.clone(),
+                body: match scene.arm_model.kind() {
+                    Some(ArmKind::Ur5Coppeliasim) => ArmBody::Ur5,
+                    _ => ArmBody::of(&scene.arm),
+                },
                 world_from_arm: scene.world_from_arm,
                 connection_from_tip: scene.connection_from_tip,
                 tip_from_camera: *scene.tip_from_camera.isometry(),
             },
-            joint_limits: scene.joint_limits,
             start_joints: scene.start_joints,
             obstacles: std::iter::once(sheet).chain(solids).collect(),
         }
@@ -105,8 +107,8 @@ impl Default for ViewOptions {
 /// A pose to look at the board from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedView {
-    /// Joint values, radians.
-    pub joints: JointAngles,
+    /// Joint values, radians; of a prismatic joint metres.
+    pub joints: JointValues,
     /// Tip pose there.
     pub base_from_tip: Pose<Base, Tip>,
 }
@@ -256,41 +258,42 @@ impl Iterator for Draws<'_> {
 }
 
 /// Orders views so that each is near the one before: less time on the way, but less spread in the first few.
-pub fn order_by_travel(start: &JointAngles, views: &mut [PlannedView]) {
-    let mut from = *start;
+pub fn order_by_travel(start: &[f64], views: &mut [PlannedView]) {
     for next in 0..views.len() {
+        let before = next.checked_sub(1).map(|last| views[last].joints);
+        let from = before.as_deref().unwrap_or(start);
         let nearest = (next..views.len())
-            .min_by(|&a, &b| travel(&from, &views[a].joints).total_cmp(&travel(&from, &views[b].joints)))
+            .min_by(|&a, &b| travel(from, &views[a].joints).total_cmp(&travel(from, &views[b].joints)))
             .unwrap_or(next);
         views.swap(next, nearest);
-        from = views[next].joints;
     }
 }
 
 impl ViewSetup {
-    fn reach(&self, base_from_tip: &Pose<Base, Tip>) -> Option<JointAngles> {
+    fn reach(&self, base_from_tip: &Pose<Base, Tip>) -> Option<JointValues> {
         let arm_from_connection =
             self.arm.world_from_arm.inverse() * base_from_tip.isometry() * self.arm.connection_from_tip.inverse();
-        inverse_nearest(&arm_from_connection, &self.start_joints, &self.joint_limits).ok()
+        let found = self.arm.chain.inverse(&Pose::from_isometry(arm_from_connection), &self.start_joints).ok()?;
+        JointValues::try_from(&found[..]).ok()
     }
 
-    fn is_free(&self, joints: &JointAngles, clearance_m: f64) -> bool {
+    fn is_free(&self, joints: &[f64], clearance_m: f64) -> bool {
         self.arm.is_free(joints, &self.obstacles, clearance_m)
     }
 
     /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
-    pub fn path_is_free(&self, from: &JointAngles, to: &JointAngles, clearance_m: f64) -> bool {
+    pub fn path_is_free(&self, from: &[f64], to: &[f64], clearance_m: f64) -> bool {
         let steps = (travel(from, to) / PATH_STEP_RAD).ceil().max(1.0) as usize;
         (1..steps).all(|step| {
             let part = step as f64 / steps as f64;
-            let joints: JointAngles = std::array::from_fn(|i| from[i] + part * (to[i] - from[i]));
+            let joints: Vec<f64> = from.iter().zip(to).map(|(from, to)| from + part * (to - from)).collect();
             self.is_free(&joints, clearance_m)
         })
     }
 }
 
-/// Largest joint movement, radians.
-pub fn travel(from: &JointAngles, to: &JointAngles) -> f64 {
+/// Largest joint movement, radians; a metre of a prismatic joint counts as much as a radian.
+pub fn travel(from: &[f64], to: &[f64]) -> f64 {
     from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
@@ -355,7 +358,7 @@ fn choose(
         let Some(best) = (0..rest.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])) else { break };
         let view = rest.swap_remove(best);
         scores.swap_remove(best);
-        let reachable = |from: &JointAngles| setup.path_is_free(from, &view.joints, options.clearance_m);
+        let reachable = |from: &[f64]| setup.path_is_free(from, &view.joints, options.clearance_m);
         if !(reachable(&setup.start_joints) && chosen.iter().all(|other| reachable(&other.joints))) {
             no_path += 1;
             continue;

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::Moment;
 use crate::cell::scene::Scene;
-use handeye_core::geometry::arm::ur5::{JOINTS, JointAngles};
+use handeye_core::geometry::arm::{ArmError, JointValues, MAX_JOINTS};
 
 /// Random numbers of a fault, apart from those of scene and corners.
 const FAULT_STREAM: u64 = 4;
@@ -54,7 +54,9 @@ pub enum Fault {
 
 /// A name that no fault has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no fault {0:?}; it is one of slip, square, joint1 to joint6, motion, inverted, millimetres")]
+#[error(
+    "there is no fault {0:?}; it is one of slip, square, joint1 to joint{MAX_JOINTS}, motion, inverted, millimetres"
+)]
 pub struct UnknownFault(pub String);
 
 impl Fault {
@@ -85,8 +87,12 @@ impl Fault {
                 // The sheet is as much larger, so that a print that just fits still does.
                 scene.board.paper_m = scene.board.paper_m.map(|side| side * scale.max(1.0));
             }
-            Self::JointOffset { joint, offset_deg } if (1..=JOINTS).contains(&joint) => {
-                scene.robot.joint_offset_deg[joint - 1] += offset_deg;
+            Self::JointOffset { joint, offset_deg } => {
+                let joints = scene.robot.start_joints_deg.len();
+                let offsets = scene.robot.joint_offset_deg.get_or_insert(JointValues::zeros(joints));
+                if let Some(offset) = joint.checked_sub(1).and_then(|index| offsets.get_mut(index)) {
+                    *offset += offset_deg;
+                }
             }
             _ => {}
         }
@@ -106,23 +112,22 @@ impl Fault {
     }
 
     /// What the encoders showed when the image was taken.
-    pub(super) fn encoders_of_image(self, moment: &Moment<'_>) -> JointAngles {
-        let Self::InMotion { view, by_m } = self else { return moment.encoders };
+    pub(super) fn encoders_of_image(self, moment: &Moment<'_>) -> Result<JointValues, ArmError> {
+        let Self::InMotion { view, by_m } = self else { return Ok(moment.encoders) };
         if moment.view != view {
-            return moment.encoders;
+            return Ok(moment.encoders);
         }
         // Back along the straight way in joint space; all of it where that is shorter.
-        let at = |part: f64| -> JointAngles {
-            std::array::from_fn(|i| moment.encoders[i] + part * (moment.before[i] - moment.encoders[i]))
-        };
-        let arrived = moment.truth.reported_tip(&moment.encoders);
-        let distance_m = |part: f64| moment.truth.reported_tip(&at(part)).distance_to(&arrived).0;
+        let (here, before) = (moment.encoders, moment.before);
+        let at = |part: f64| JointValues::from_fn(here.len(), |i| here[i] + part * (before[i] - here[i]));
+        let arrived = moment.truth.reported_tip(&here)?;
+        let distance_m = |part: f64| moment.truth.reported_tip(&at(part)).map(|tip| tip.distance_to(&arrived).0);
         let (mut near, mut far) = (0.0, 1.0);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (near + far);
-            if distance_m(middle) < by_m { near = middle } else { far = middle }
+            if distance_m(middle)? < by_m { near = middle } else { far = middle }
         }
-        at(far)
+        Ok(at(far))
     }
 
     /// How a reported pose is written down.
@@ -157,7 +162,7 @@ impl FromStr for Fault {
 
     /// The fault of that name with the size that [`Self::STUDIED`] has; any joint for `joint4`.
     fn from_str(text: &str) -> Result<Self, UnknownFault> {
-        let joint = (1..=JOINTS).map(|joint| Self::JointOffset { joint, offset_deg: 0.2 });
+        let joint = (1..=MAX_JOINTS).map(|joint| Self::JointOffset { joint, offset_deg: 0.2 });
         let found = Self::STUDIED.into_iter().chain(joint).find(|fault| fault.to_string() == text);
         found.ok_or_else(|| UnknownFault(text.to_owned()))
     }

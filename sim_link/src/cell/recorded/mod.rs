@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use handeye_core::estimate::handeye::Mode;
-use handeye_core::geometry::arm::{ArmError, ArmKind, ArmModel, JointView, place_checked};
+use handeye_core::geometry::arm::{ArmError, ArmModel, JointValues, JointView, place_checked};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::dataset::{self, CameraInput, write};
 use handeye_core::targets::TargetSpec;
@@ -22,12 +22,8 @@ use rand_distr::{Distribution as _, StandardNormal};
 
 use super::planning::{PlanError, PlannedView, ViewOptions, ViewSetup, random_poses_looking_at};
 use super::scene::{ResolvedScene, Scene, SceneError};
-use handeye_core::geometry::arm::ur5::JointAngles;
 
 pub use fault::{Fault, UnknownFault};
-
-/// The arm of the cell, as data sets name it.
-pub const ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
 
 /// Random numbers of the corners, apart from those of a scene.
 const CORNER_STREAM: u64 = 3;
@@ -52,6 +48,17 @@ pub enum RecordError {
         /// How many there are.
         views: usize,
     },
+    /// The fault is of a joint that the arm has not.
+    #[error("the fault is in joint {joint} and the arm has {joints}: name another joint")]
+    NoSuchJoint {
+        /// The joint, counted from 1.
+        joint: usize,
+        /// How many there are.
+        joints: usize,
+    },
+    /// The values of the joints are not those of the arm.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
     /// The files could not be written.
     #[error("{path}: {source}")]
     Write {
@@ -90,8 +97,8 @@ pub struct RecordedView {
     pub name: String,
     /// The tip pose as it stands in the record.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The joint angles as the encoders showed them, radians.
-    pub joints_rad: JointAngles,
+    /// The joint values as the encoders showed them, radians; of a prismatic joint metres.
+    pub joints_rad: JointValues,
     /// What a detector would have found.
     pub corners: Vec<Corner>,
 }
@@ -116,7 +123,13 @@ pub fn record(scene: &Scene, options: &SessionOptions) -> Result<RecordedSession
     if let Some(view) = fault.and_then(Fault::view).filter(|view| !(1..=count).contains(view)) {
         return Err(RecordError::NoSuchView { view, views: count });
     }
-    let target = scene.resolve(seed)?.target;
+    let stated = scene.resolve(seed)?;
+    let (target, joints) = (stated.target, stated.arm.joint_count());
+    if let Some(Fault::JointOffset { joint, .. }) = fault
+        && !(1..=joints).contains(&joint)
+    {
+        return Err(RecordError::NoSuchJoint { joint, joints });
+    }
     let mut faulty = scene.clone();
     if let Some(fault) = fault {
         fault.change_scene(&mut faulty);
@@ -131,14 +144,14 @@ pub fn record(scene: &Scene, options: &SessionOptions) -> Result<RecordedSession
         // Each is captured after a move.
         let stop = index as u64 + 1;
         let moment = Moment { truth: &truth, view: index + 1, before, encoders: joints };
-        let seen_at = fault.map_or(joints, |fault| fault.encoders_of_image(&moment));
+        let seen_at = fault.map_or(Ok(joints), |fault| fault.encoders_of_image(&moment))?;
         let slip = fault.map_or_else(nalgebra::Isometry3::identity, |fault| fault.slip(&moment));
         let base_from_target = Pose::from_isometry(
             truth.world_from_plane * slip * truth.world_from_plane.inv_mul(truth.base_from_target.isometry()),
         );
         let shown = ResolvedScene { base_from_target, ..truth.clone() };
-        let corners = corners(&shown, &shown.true_tip(&seen_at, stop), corner_px, &mut rng);
-        let reported = truth.reported_tip(&joints);
+        let corners = corners(&shown, &shown.true_tip(&seen_at, stop)?, corner_px, &mut rng);
+        let reported = truth.reported_tip(&joints)?;
         views.push(RecordedView {
             name: format!("images/{:04}.png", index + 1),
             base_from_tip: fault.map_or(reported, |fault| fault.written(&reported)),
@@ -156,9 +169,9 @@ struct Moment<'a> {
     /// Which view, counted from 1.
     view: usize,
     /// Where the arm came from.
-    before: JointAngles,
+    before: JointValues,
     /// Where it stands.
-    encoders: JointAngles,
+    encoders: JointValues,
 }
 
 fn corners(scene: &ResolvedScene, true_tip: &Pose<Base, Tip>, sigma_px: f64, rng: &mut ChaCha8Rng) -> Vec<Corner> {
@@ -194,7 +207,7 @@ impl RecordedSession {
             .iter()
             .map(|view| JointView { base_from_tip: view.base_from_tip, joints_rad: &view.joints_rad })
             .collect();
-        let (_, twists) = place_checked(&ARM.arm()?, &joint_views)?;
+        let (_, twists) = place_checked(&self.truth.arm, &joint_views)?;
         Ok(self
             .views
             .iter()
@@ -206,7 +219,8 @@ impl RecordedSession {
             .collect())
     }
 
-    /// Writes a dataset folder: `dataset.toml`, `poses.csv` with joint angles, `corners.csv`. The intrinsics in it are the
+    /// Writes a dataset folder: `dataset.toml`, `poses.csv`, with joint values of an arm that data sets have a name for, and
+    /// `corners.csv`. The intrinsics in it are the
     /// true ones, to be taken as they are when `camera_is_known`, as a start otherwise.
     ///
     /// # Errors
@@ -215,14 +229,21 @@ impl RecordedSession {
         let failed = |path: &Path, source| RecordError::Write { path: path.display().to_string(), source };
         std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
         let intrinsics = self.truth.intrinsics;
+        let arm = self.truth.arm_model.kind().map(ArmModel::Kind);
         let camera = CameraInput { fixed: camera_is_known, intrinsics: Some(intrinsics), model: intrinsics.distortion };
-        let description = write::description(Mode::EyeInHand, &self.target, Some(&camera), Some(&ARM)).replacen(
+        let description = write::description(Mode::EyeInHand, &self.target, Some(&camera), arm.as_ref()).replacen(
             "[target]\n",
             "[target]\ncorners = \"corners.csv\"\n",
             1,
         );
-        let rows = self.views.iter().map(|view| (view.name.as_str(), &view.base_from_tip, &view.joints_rad[..]));
-        let poses = write::pose_table_with_joints(handeye_core::geometry::arm::ur5::JOINTS, rows);
+        let poses = match &arm {
+            Some(_) => {
+                let rows =
+                    self.views.iter().map(|view| (view.name.as_str(), &view.base_from_tip, &view.joints_rad[..]));
+                write::pose_table_with_joints(self.truth.arm.joint_count(), rows)
+            }
+            None => write::pose_table(self.views.iter().map(|view| (view.name.as_str(), &view.base_from_tip))),
+        };
         for (name, text) in
             [(dataset::DESCRIPTION, description), (write::POSE_TABLE, poses), ("corners.csv", self.corner_table())]
         {

@@ -1,5 +1,5 @@
 use super::*;
-use handeye_core::geometry::arm::{ArmError, place};
+use handeye_core::geometry::arm::{ArmError, ArmKind, place};
 use handeye_core::geometry::se3;
 use handeye_core::project::dataset::Dataset;
 use nalgebra::Vector6;
@@ -33,12 +33,12 @@ fn the_arm_of_data_sets_is_the_arm_of_the_cell() {
     // The central difference of the cell's own kinematics is off by h²/6.
     const STEP: f64 = 1e-5;
     let scene = Scene::realistic().unwrap().resolve(3).unwrap();
-    let arm = ARM.arm().unwrap();
+    let arm = ArmKind::Ur5Coppeliasim.arm();
     let arm = arm
         .clone()
         .mounted(scene.world_from_arm * arm.base_from_first, arm.flange_from_tip * scene.connection_from_tip);
     for view in session(3, None).views {
-        let tip = scene.reported_tip(&view.joints_rad);
+        let tip = scene.reported_tip(&view.joints_rad).unwrap();
         let (distance_m, angle_rad) = arm.forward(&view.joints_rad).unwrap().distance_to(&tip);
         assert!(distance_m < 1e-12 && angle_rad < 1e-7, "acos near 1 has half the digits");
         let twists = arm.tip_by_joint(&view.joints_rad).unwrap();
@@ -46,7 +46,7 @@ fn the_arm_of_data_sets_is_the_arm_of_the_cell() {
             let moved = |step: f64| {
                 let mut joints = view.joints_rad;
                 joints[j] += step;
-                se3::log((tip.inverse() * scene.reported_tip(&joints)).isometry())
+                se3::log((tip.inverse() * scene.reported_tip(&joints).unwrap()).isometry())
             };
             let difference: Vector6<f64> = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
             assert!((difference - twist).norm() < 1e-9, "joint {}", j + 1);
@@ -118,7 +118,7 @@ fn turning_the_reported_tip_by_the_twists_explains_joint_offsets() {
         assert!(worst_px(&session, offsets_rad) < 1e-6, "joint {joint}");
     }
     let offset_deg = [0.2, -0.2, 0.2, 0.2, -0.2, 0.2];
-    scene.robot.joint_offset_deg = offset_deg;
+    scene.robot.joint_offset_deg = Some(offset_deg.into());
     let session = record(&scene, &exact).unwrap();
     // Of several joints the model has the first order; products of two offsets are 10⁻⁵ m and rad, 0.02 px at 0.3 m.
     assert!(worst_px(&session, [0.0; 6]) > 1.0);
@@ -138,7 +138,7 @@ fn poses_written_wrongly_do_not_fit_the_joint_angles() {
             .map(|view| JointView { base_from_tip: view.base_from_tip, joints_rad: &view.joints_rad })
             .collect();
         // What the controller reports is its own kinematics, whatever is wrong with the arm.
-        assert!(place(&ARM.arm().unwrap(), &views).unwrap().rms_m() < 1e-9);
+        assert!(place(&session.truth.arm, &views).unwrap().rms_m() < 1e-9);
     }
 }
 
@@ -166,7 +166,10 @@ fn faults_have_names() {
         assert_eq!(fault.to_string().parse(), Ok(fault));
     }
     assert_eq!("joint2".parse(), Ok(Fault::JointOffset { joint: 2, offset_deg: 0.2 }));
-    assert_eq!("joint7".parse::<Fault>(), Err(UnknownFault("joint7".to_owned())));
+    assert_eq!("joint13".parse::<Fault>(), Err(UnknownFault("joint13".to_owned())));
+    let absent = SessionOptions { fault: Some("joint7".parse().unwrap()), ..SessionOptions::default() };
+    let error = record(&Scene::default(), &absent).unwrap_err();
+    assert!(matches!(error, RecordError::NoSuchJoint { joint: 7, joints: 6 }), "{error}");
     let late = SessionOptions { views: 10, fault: Some(Fault::STUDIED[0]), ..SessionOptions::default() };
     let error = record(&Scene::default(), &late).unwrap_err();
     assert!(matches!(error, RecordError::NoSuchView { view: 12, views: 10 }), "{error}");

@@ -1,8 +1,11 @@
-//! Ready-made bodies: a UR5, a two-finger gripper, floor and table.
+//! Ready-made bodies: a UR5, the links of any other arm, a two-finger gripper, floor and table.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::{Finish, Shape, Solid};
+use crate::cell::links;
+use crate::cell::scene::ArmSpec;
+use handeye_core::geometry::arm::{Arm, ArmKind};
 
 /// Turned aluminium of tubes and housings.
 pub const ALUMINIUM: [f32; 3] = [0.76, 0.78, 0.80];
@@ -82,6 +85,21 @@ pub fn ur5_parts() -> impl Iterator<Item = (usize, Solid)> {
         let finish = if part.colour == ALUMINIUM && !part.round { Finish::Brushed } else { Finish::Satin };
         (part.link, solid.with_finish(finish))
     })
+}
+
+/// The solids of the arm of a scene in the arm frame with all joints at zero, each with the number of joints that carry it.
+/// The UR5 of CoppeliaSim has its housings; of any other arm the links are tubes between its joints.
+pub fn arm_parts(model: &ArmSpec, arm: &Arm) -> Vec<(usize, Solid)> {
+    if model.kind() == Some(ArmKind::Ur5Coppeliasim) {
+        return ur5_parts().collect();
+    }
+    let tube = |(index, link): (usize, links::LinkCapsule)| {
+        let shape = Shape::Capsule { a: link.from, b: link.to, radius: link.radius_m };
+        // Two tones by turns, so that the joints are seen.
+        let colour = [GRAPHITE, ALUMINIUM][index % 2];
+        (link.link, Solid::new(shape, Isometry3::identity(), colour).with_finish(Finish::Satin))
+    };
+    links::capsules(arm).into_iter().enumerate().map(tube).collect()
 }
 
 /// The cylinder from `a` to `b` and the pose of its frame.

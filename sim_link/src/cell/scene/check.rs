@@ -1,5 +1,6 @@
 //! Ranges of the numbers in a scene file.
 
+use handeye_core::geometry::arm::{Arm, JointKind, JointRange, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use nalgebra::Vector2;
 
@@ -19,20 +20,21 @@ const MAX_PIXELS: u64 = 8_000_000;
 /// Most inner corners along one side of a board.
 const MAX_CORNERS: usize = 200;
 
-/// The first number that is out of its range.
-pub(super) fn check(scene: &Scene) -> Check {
+/// Finds the first number that is out of its range, and gives the arm with the ranges that the scene has for its joints.
+pub(super) fn check(scene: &Scene, arm: Arm) -> Result<Arm, Violation> {
     let Scene { seed: _, simulation, robot, camera, board, image, depth, light, solids } = scene;
     check_simulation(simulation)?;
-    check_robot(robot)?;
+    let arm = check_robot(robot, arm)?;
     check_camera(camera)?;
     check_board(board)?;
     check_image(image)?;
     check_depth(depth)?;
     check_light(light)?;
-    solids.iter().enumerate().try_for_each(|(index, solid)| check_solid(&format!("solids[{index}]"), solid))
+    solids.iter().enumerate().try_for_each(|(index, solid)| check_solid(&format!("solids[{index}]"), solid))?;
+    Ok(arm)
 }
 
-fn violation(field: &str, value: &impl ToString, need: impl Into<String>) -> Check {
+fn violation<T>(field: &str, value: &impl ToString, need: impl Into<String>) -> Result<T, Violation> {
     Err(Violation { field: field.to_owned(), value: value.to_string(), need: need.into() })
 }
 
@@ -73,8 +75,27 @@ fn check_simulation(simulation: &SimulationSpec) -> Check {
     in_range("simulation.speed_factor", *speed_factor, 0.01, 1000.0)
 }
 
-fn check_robot(robot: &RobotSpec) -> Check {
+/// A value of a scene in radians, or of a prismatic joint, where it is metres already, in metres.
+pub(super) fn si(kind: JointKind, value: f64) -> f64 {
+    match kind {
+        JointKind::Revolute => value.to_radians(),
+        JointKind::Prismatic => value,
+    }
+}
+
+/// One value for each joint.
+fn each_joint(field: &str, values: &JointValues, arm: &Arm) -> Check {
+    let count = arm.joint_count();
+    if values.len() == count {
+        return Ok(());
+    }
+    let got = format!("{values:?} of {} values", values.len());
+    violation(field, &got, format!("{count} values, one for each joint of robot.model"))
+}
+
+fn check_robot(robot: &RobotSpec, chain: Arm) -> Result<Arm, Violation> {
     let RobotSpec {
+        model: _,
         arm,
         tip,
         start_joints_deg,
@@ -87,18 +108,48 @@ fn check_robot(robot: &RobotSpec) -> Check {
     } = robot;
     pose("robot.arm", arm)?;
     pose("robot.tip", tip)?;
-    for i in 0..start_joints_deg.len() {
-        let (low, high) = (min_joints_deg[i], max_joints_deg[i]);
-        in_range(&format!("robot.min_joints_deg[{i}]"), low, -720.0, 720.0)?;
-        in_range(&format!("robot.max_joints_deg[{i}]"), high, -720.0, 720.0)?;
-        if low >= high {
+    let given = [
+        ("min_joints_deg", min_joints_deg),
+        ("max_joints_deg", max_joints_deg),
+        ("joint_offset_deg", joint_offset_deg),
+    ];
+    for (field, values) in given.iter().filter_map(|(field, values)| Some((field, values.as_ref()?))) {
+        each_joint(&format!("robot.{field}"), values, &chain)?;
+    }
+    each_joint("robot.start_joints_deg", start_joints_deg, &chain)?;
+    let mut ranges: Vec<JointRange> = chain.ranges();
+    for (i, (joint, range)) in chain.joints().iter().zip(&mut ranges).enumerate() {
+        let farthest = match joint.kind {
+            JointKind::Revolute => 720.0,
+            JointKind::Prismatic => 50.0,
+        };
+        if let Some(low) = min_joints_deg {
+            in_range(&format!("robot.min_joints_deg[{i}]"), low[i], -farthest, farthest)?;
+            range.min = si(joint.kind, low[i]);
+        }
+        if let Some(high) = max_joints_deg {
+            in_range(&format!("robot.max_joints_deg[{i}]"), high[i], -farthest, farthest)?;
+            range.max = si(joint.kind, high[i]);
+        }
+        let unit = |value: f64| if joint.kind == JointKind::Revolute { value.to_degrees() } else { value };
+        let (low, high) = (unit(range.min), unit(range.max));
+        if range.min >= range.max {
             return violation(&format!("robot.max_joints_deg[{i}]"), &high, format!("above the minimum of {low}"));
         }
-        in_range(&format!("robot.start_joints_deg[{i}]"), start_joints_deg[i], low, high)?;
-        in_range(&format!("robot.joint_offset_deg[{i}]"), joint_offset_deg[i], -10.0, 10.0)?;
+        let start = start_joints_deg[i];
+        if !range.contains(si(joint.kind, start)) {
+            let need = format!("a number from {low} to {high}, the range of `{}`", joint.name);
+            return violation(&format!("robot.start_joints_deg[{i}]"), &start, need);
+        }
+        if let Some(offset) = joint_offset_deg {
+            // An estimate of joint offsets knows angles alone, and so do the faults of a cell.
+            let most = if joint.kind == JointKind::Revolute { 10.0 } else { 0.0 };
+            in_range(&format!("robot.joint_offset_deg[{i}]"), offset[i], -most, most)?;
+        }
     }
     in_range("robot.repeatability_mm", *repeatability_mm, 0.0, 10.0)?;
-    in_range("robot.repeatability_deg", *repeatability_deg, 0.0, 5.0)
+    in_range("robot.repeatability_deg", *repeatability_deg, 0.0, 5.0)?;
+    Ok(chain.with_ranges(&ranges).expect("a range for each joint, with room; both were checked"))
 }
 
 fn check_camera(camera: &CameraSpec) -> Check {

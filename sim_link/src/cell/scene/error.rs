@@ -1,5 +1,7 @@
 //! What can be wrong with a scene file.
 
+use handeye_core::geometry::arm::urdf::UrdfError;
+
 use super::locate;
 
 /// Why a scene cannot be used.
@@ -25,6 +27,16 @@ pub enum SceneError {
         field: String,
         /// What is wrong.
         message: String,
+    },
+    /// The file of the arm is missing, is none, or has no such chain.
+    #[error("robot.model: {source}. Name a built-in arm, or a URDF file with its base and tip links. {}", place(file, *line))]
+    Arm {
+        /// Path of the scene as given.
+        file: String,
+        /// Line, counted from 1, where known.
+        line: Option<usize>,
+        /// What is wrong with the arm.
+        source: Box<UrdfError>,
     },
     /// A number out of its range.
     #[error("{field} is {value}, it must be {need}. {}", place(file, *line))]
@@ -54,6 +66,10 @@ fn place(file: &str, line: Option<usize>) -> String {
 }
 
 impl SceneError {
+    pub(super) fn arm(file: &str, line: Option<usize>, source: UrdfError) -> Self {
+        Self::Arm { file: file.to_owned(), line, source: Box::new(source) }
+    }
+
     pub(super) fn syntax(file: &str, text: &str, error: &toml::de::Error) -> Self {
         let start = error.span().map(|span| span.start);
         Self::Syntax {

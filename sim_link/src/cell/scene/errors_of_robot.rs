@@ -1,13 +1,12 @@
 //! How the arm's true pose differs from the one it reports.
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Vector6;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::RobotSpec;
-use handeye_core::geometry::arm::ur5::{JointAngles, forward};
-use handeye_core::geometry::se3;
+use handeye_core::geometry::arm::JointValues;
 
 /// First stream of random numbers that belongs to settled positions; the ones below are the scene's own.
 const FIRST_STREAM: u64 = 1 << 32;
@@ -24,7 +23,7 @@ const FIRST_STREAM: u64 = 1 << 32;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotErrors {
     /// What is added to the joint values that the encoders show, radians.
-    pub joint_offset_rad: JointAngles,
+    pub joint_offset_rad: JointValues,
     /// 1σ per axis of the displacement, metres.
     pub repeatability_m: f64,
     /// 1σ per axis of the rotation, radians.
@@ -33,18 +32,19 @@ pub struct RobotErrors {
 }
 
 impl RobotErrors {
-    pub(super) fn new(robot: &RobotSpec, seed: u64) -> Self {
+    pub(super) fn new(robot: &RobotSpec, joints: usize, seed: u64) -> Self {
+        let offset_deg = robot.joint_offset_deg.unwrap_or(JointValues::zeros(joints));
         Self {
-            joint_offset_rad: robot.joint_offset_deg.map(f64::to_radians),
+            joint_offset_rad: offset_deg.map(f64::to_radians),
             repeatability_m: robot.repeatability_mm * 1e-3,
             repeatability_rad: robot.repeatability_deg.to_radians(),
             seed,
         }
     }
 
-    /// A robot without errors.
-    pub fn none() -> Self {
-        Self { joint_offset_rad: [0.0; 6], repeatability_m: 0.0, repeatability_rad: 0.0, seed: 0 }
+    /// A robot of so many joints without errors.
+    pub fn none(joints: usize) -> Self {
+        Self { joint_offset_rad: JointValues::zeros(joints), repeatability_m: 0.0, repeatability_rad: 0.0, seed: 0 }
     }
 
     /// True minus nominal pose of the tip, `[t; r]` in metres and radians in the tip frame, the `index`-th time that
@@ -53,20 +53,10 @@ impl RobotErrors {
         gaussian(self.seed, FIRST_STREAM.wrapping_add(index), self.repeatability_m, self.repeatability_rad)
     }
 
-    /// Where the tip really is in the arm frame, for the joint values that the encoders show.
-    pub fn true_tip(
-        &self,
-        encoders: &JointAngles,
-        connection_from_tip: &Isometry3<f64>,
-        settled_index: u64,
-    ) -> Isometry3<f64> {
-        let joints = self.true_joints(encoders);
-        forward(&joints).arm_from_connection * connection_from_tip * se3::exp(&self.settled(settled_index))
-    }
-
     /// The true joint values for those that the encoders show, radians.
-    pub fn true_joints(&self, encoders: &JointAngles) -> JointAngles {
-        std::array::from_fn(|i| encoders[i] + self.joint_offset_rad[i])
+    pub fn true_joints(&self, encoders: &JointValues) -> JointValues {
+        let offset = |i: usize| self.joint_offset_rad.get(i).copied().unwrap_or_default();
+        JointValues::from_fn(encoders.len(), |i| encoders[i] + offset(i))
     }
 }
 

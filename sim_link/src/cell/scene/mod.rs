@@ -4,6 +4,7 @@
 //! exact, without noise or distortion. Lengths are in metres and angles in degrees where the name does not say
 //! otherwise; poses are a position and a quaternion x, y, z, w.
 
+mod arm;
 mod board_motion;
 mod check;
 mod error;
@@ -16,6 +17,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+pub use arm::{ArmSpec, UrdfSpec};
 pub use board_motion::{BoardMotionSpec, BoardPath, UnknownPath};
 pub use error::SceneError;
 pub use errors_of_robot::RobotErrors;
@@ -77,7 +79,7 @@ impl Scene {
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let file = path.display().to_string();
         match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&text, &file),
+            Ok(text) => Self::parse(&text, &file, path.parent()),
             Err(source) => Err(SceneError::Read { file, source }),
         }
     }
@@ -87,7 +89,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] names the line and the field.
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
-        Self::parse(text, "scene")
+        Self::parse(text, "scene", None)
     }
 
     /// The public UR5 hand-eye scene: exact, without noise or distortion.
@@ -95,7 +97,7 @@ impl Scene {
     /// # Errors
     /// None as long as the file that is built in is valid, which a test asserts.
     pub fn reference() -> Result<Self, SceneError> {
-        Self::parse(REFERENCE, "assets/scenes/reference.toml")
+        Self::parse(REFERENCE, "assets/scenes/reference.toml", None)
     }
 
     /// The same cell with the faults of a good real one: a lens, a little noise, a robot that repeats to 0.05 mm.
@@ -103,7 +105,7 @@ impl Scene {
     /// # Errors
     /// None as long as the file that is built in is valid, which a test asserts.
     pub fn realistic() -> Result<Self, SceneError> {
-        Self::parse(REALISTIC, "assets/scenes/realistic.toml")
+        Self::parse(REALISTIC, "assets/scenes/realistic.toml", None)
     }
 
     /// The realistic cell with a board that moves in a circle, and images that come as fast as a camera's.
@@ -111,7 +113,7 @@ impl Scene {
     /// # Errors
     /// None as long as the file that is built in is valid, which a test asserts.
     pub fn tracking() -> Result<Self, SceneError> {
-        Self::parse(TRACKING, "assets/scenes/tracking.toml")
+        Self::parse(TRACKING, "assets/scenes/tracking.toml", None)
     }
 
     /// Checks every number, and draws what is random in the scene.
@@ -120,15 +122,22 @@ impl Scene {
     /// the camera a random offset does not move the board.
     ///
     /// # Errors
-    /// [`SceneError::Field`] for a number out of its range.
+    /// [`SceneError::Field`] for a number out of its range, [`SceneError::Arm`] when there is no such arm.
     pub fn resolve(&self, seed: u64) -> Result<ResolvedScene, SceneError> {
-        check::check(self).map_err(|found| found.at("scene", None))?;
-        Ok(resolved::resolve(self, seed))
+        let arm = self.robot.model.arm().map_err(|source| SceneError::arm("scene", None, source))?;
+        let arm = check::check(self, arm).map_err(|found| found.at("scene", None))?;
+        Ok(resolved::resolve(self, arm, seed))
     }
 
-    fn parse(text: &str, file: &str) -> Result<Self, SceneError> {
-        let scene: Self = toml::from_str(text).map_err(|error| SceneError::syntax(file, text, &error))?;
-        check::check(&scene).map_err(|found| {
+    /// `folder` is what files that the scene names are relative to.
+    fn parse(text: &str, file: &str, folder: Option<&Path>) -> Result<Self, SceneError> {
+        let mut scene: Self = toml::from_str(text).map_err(|error| SceneError::syntax(file, text, &error))?;
+        if let Some(folder) = folder {
+            scene.robot.model.written_in(folder);
+        }
+        let line = || locate::line_of(text, "robot.model");
+        let arm = scene.robot.model.arm().map_err(|source| SceneError::arm(file, line(), source))?;
+        check::check(&scene, arm).map_err(|found| {
             let line = locate::line_of(text, &found.field);
             found.at(file, line)
         })?;

@@ -7,13 +7,16 @@ use handeye_core::targets::{Grid, TargetSpec};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 use super::Scene;
+use super::arm::ArmSpec;
 use super::board_motion::BoardMotionSpec;
+use super::check::si;
 use super::errors_of_robot::{RobotErrors, gaussian};
 use super::spec::{
     BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo,
     SimulationSpec, SlipSpec, SolidSpec,
 };
-use handeye_core::geometry::arm::ur5::{JointAngles, JointLimits, forward};
+use handeye_core::geometry::arm::{Arm, ArmError, JointValues};
+use handeye_core::geometry::se3;
 
 const CAMERA_STREAM: u64 = 1;
 const BOARD_STREAM: u64 = 2;
@@ -33,7 +36,11 @@ pub struct ResolvedScene {
     pub near_m: f64,
     /// Depth reported where nothing is seen, metres.
     pub far_m: f64,
-    /// Pose of the arm frame (`/UR5`) in the world.
+    /// The arm, from the arm frame (`/UR5`) to the connection, with the ranges of its joints.
+    pub arm: Arm,
+    /// What the scene file calls it.
+    pub arm_model: ArmSpec,
+    /// Pose of the arm frame in the world.
     pub world_from_arm: Isometry3<f64>,
     /// Pose of the tip (`/UR5/Tip`) in the connection.
     pub connection_from_tip: Isometry3<f64>,
@@ -53,12 +60,10 @@ pub struct ResolvedScene {
     pub target: TargetSpec,
     /// Size of the sheet along x and y of the plane, metres.
     pub paper_m: [f64; 2],
-    /// Joint values at the start, radians.
-    pub start_joints: JointAngles,
+    /// Joint values at the start, radians; of a prismatic joint metres.
+    pub start_joints: JointValues,
     /// What moves them.
     pub joint_mode: JointModeSpec,
-    /// Ranges of the joints.
-    pub joint_limits: JointLimits,
     /// Errors of the arm.
     pub robot_errors: RobotErrors,
     /// Imperfections of the colour image.
@@ -86,15 +91,23 @@ pub struct ResolvedSolid {
 
 impl ResolvedScene {
     /// The tip pose that the controller reports for the joint values of its encoders.
-    pub fn reported_tip(&self, encoders: &JointAngles) -> Pose<Base, Tip> {
-        let arm_from_tip = forward(encoders).arm_from_connection * self.connection_from_tip;
-        Pose::from_isometry(self.world_from_arm * arm_from_tip)
+    ///
+    /// # Errors
+    /// [`ArmError`] for values that are not those of this arm.
+    pub fn reported_tip(&self, encoders: &JointValues) -> Result<Pose<Base, Tip>, ArmError> {
+        let arm_from_tip = self.arm.forward(encoders)?.isometry() * self.connection_from_tip;
+        Ok(Pose::from_isometry(self.world_from_arm * arm_from_tip))
     }
 
     /// Where the tip really is, see [`RobotErrors`].
-    pub fn true_tip(&self, encoders: &JointAngles, settled_index: u64) -> Pose<Base, Tip> {
-        let arm_from_tip = self.robot_errors.true_tip(encoders, &self.connection_from_tip, settled_index);
-        Pose::from_isometry(self.world_from_arm * arm_from_tip)
+    ///
+    /// # Errors
+    /// As [`Self::reported_tip`].
+    pub fn true_tip(&self, encoders: &JointValues, settled_index: u64) -> Result<Pose<Base, Tip>, ArmError> {
+        let joints = self.robot_errors.true_joints(encoders);
+        let settled = se3::exp(&self.robot_errors.settled(settled_index));
+        let arm_from_tip = self.arm.forward(&joints)?.isometry() * self.connection_from_tip * settled;
+        Ok(Pose::from_isometry(self.world_from_arm * arm_from_tip))
     }
 
     /// The target as the camera sees it from a true tip pose.
@@ -104,7 +117,7 @@ impl ResolvedScene {
 }
 
 /// Draws the random parts of a scene that has been checked.
-pub(super) fn resolve(scene: &Scene, seed: u64) -> ResolvedScene {
+pub(super) fn resolve(scene: &Scene, arm: Arm, seed: u64) -> ResolvedScene {
     let Scene { seed: _, simulation, robot, camera, board, image, depth, light, solids } = scene;
     let tip_from_camera = camera_on_tip(camera, seed);
     let world_from_plane = board.plane.isometry()
@@ -131,13 +144,11 @@ pub(super) fn resolve(scene: &Scene, seed: u64) -> ResolvedScene {
         board_slip: board.slip,
         target,
         paper_m: board.paper_m,
-        start_joints: robot.start_joints_deg.map(f64::to_radians),
+        start_joints: JointValues::from_fn(arm.joint_count(), |i| si(arm.joints()[i].kind, robot.start_joints_deg[i])),
         joint_mode: robot.joint_mode,
-        joint_limits: JointLimits {
-            min_rad: robot.min_joints_deg.map(f64::to_radians),
-            max_rad: robot.max_joints_deg.map(f64::to_radians),
-        },
-        robot_errors: RobotErrors::new(robot, seed),
+        robot_errors: RobotErrors::new(robot, arm.joint_count(), seed),
+        arm,
+        arm_model: robot.model.clone(),
         image: *image,
         depth: *depth,
         light: *light,

@@ -4,8 +4,9 @@ use handeye_core::geometry::camera::Distortion;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
+use super::arm::ArmSpec;
 use super::board_motion::BoardMotionSpec;
-use handeye_core::geometry::arm::ur5::JointAngles;
+use handeye_core::geometry::arm::JointValues;
 
 /// cos 45° = sin 45°, for quaternions of quarter and half turns.
 const HALF_SQRT: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -66,42 +67,48 @@ pub enum JointModeSpec {
     Dynamic,
 }
 
-/// The arm.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// The arm. Joint values are degrees, those of a prismatic joint metres.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotSpec {
-    /// Pose of the arm frame (`/UR5`, 14.65 mm above its mounting plane) in the world.
+    /// Which one it is.
+    pub model: ArmSpec,
+    /// Pose of the arm frame (`/UR5`, of CoppeliaSim's model 14.65 mm above its mounting plane) in the world.
     pub arm: PoseSpec,
     /// Pose of the tip (`/UR5/Tip`) in the connection at the end of the arm.
     pub tip: PoseSpec,
-    /// Joint values at the start, degrees.
-    pub start_joints_deg: JointAngles,
+    /// Joint values at the start, one for each joint.
+    pub start_joints_deg: JointValues,
     /// What moves them.
     pub joint_mode: JointModeSpec,
-    /// Smallest joint values, degrees.
-    pub min_joints_deg: JointAngles,
-    /// Largest joint values, degrees.
-    pub max_joints_deg: JointAngles,
+    /// Smallest joint values; those that the arm comes with if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min_joints_deg: Option<JointValues>,
+    /// Largest joint values; those that the arm comes with if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_joints_deg: Option<JointValues>,
     /// How far the arm really stops from the same place each time: 1σ per axis, millimetres.
     pub repeatability_mm: f64,
     /// The same for rotation: 1σ per axis, degrees.
     pub repeatability_deg: f64,
-    /// Constant difference between true and reported joint values, degrees: what a kinematic calibration would find.
-    pub joint_offset_deg: JointAngles,
+    /// Constant difference between true and reported joint values: what a kinematic calibration would find. None if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint_offset_deg: Option<JointValues>,
 }
 
 impl Default for RobotSpec {
     fn default() -> Self {
         Self {
+            model: ArmSpec::default(),
             arm: PoseSpec { position_m: [0.0, 0.0, 0.025], ..PoseSpec::default() },
             tip: PoseSpec { position_m: [0.0, 0.0, 0.017], ..PoseSpec::default() },
-            start_joints_deg: [0.0, 45.0, -60.0, 0.0, 90.0, 0.0],
+            start_joints_deg: JointValues::from([0.0, 45.0, -60.0, 0.0, 90.0, 0.0]),
             joint_mode: JointModeSpec::Kinematic,
-            min_joints_deg: [-360.0; 6],
-            max_joints_deg: [360.0; 6],
+            min_joints_deg: None,
+            max_joints_deg: None,
             repeatability_mm: 0.0,
             repeatability_deg: 0.0,
-            joint_offset_deg: [0.0; 6],
+            joint_offset_deg: None,
         }
     }
 }

@@ -2,7 +2,7 @@ use super::*;
 use crate::axes::sensor_from_camera;
 use crate::cell::motion::Course;
 use crate::cell::planning::ViewSetup;
-use handeye_core::geometry::arm::ur5::{forward, inverse_nearest};
+use handeye_core::geometry::arm::{ArmKind, JointValues};
 use handeye_core::geometry::frames::{Base, PointIn, Pose, Tip};
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -63,7 +63,7 @@ fn the_tracking_scene_is_the_realistic_one_but_for_its_time_step_and_the_motion_
 fn every_path_of_usual_size_keeps_the_board_in_view_of_the_arm_at_its_start() {
     for scene in [Scene::reference().unwrap(), Scene::tracking().unwrap()] {
         let resolved = scene.resolve(1).unwrap();
-        let tip = resolved.reported_tip(&resolved.start_joints);
+        let tip = resolved.reported_tip(&resolved.start_joints).unwrap();
         let plane_from_target = resolved.world_from_plane.inv_mul(resolved.base_from_target.isometry());
         for path in BoardPath::ALL {
             let course = Course::new(&BoardMotionSpec { path, ..BoardMotionSpec::default() }, 1);
@@ -157,9 +157,10 @@ fn the_arm_reaches_every_taught_pose_in_one_configuration_and_touches_nothing() 
     for index in 0..TAUGHT.len() {
         let arm_from_connection =
             scene.world_from_arm.inverse() * taught(index).isometry() * scene.connection_from_tip.inverse();
-        let found = inverse_nearest(&arm_from_connection, &joints, &scene.joint_limits)
-            .unwrap_or_else(|error| panic!("pose {}: {error}", index + 1));
-        let (distance_m, angle_rad) = scene.reported_tip(&found).distance_to(&taught(index));
+        let found = scene.arm.inverse(&Pose::from_isometry(arm_from_connection), &joints);
+        let found = found.unwrap_or_else(|error| panic!("pose {}: {error}", index + 1));
+        let found = JointValues::try_from(&found[..]).unwrap();
+        let (distance_m, angle_rad) = scene.reported_tip(&found).unwrap().distance_to(&taught(index));
         assert!(distance_m < 1e-9 && angle_rad < 1e-9);
         assert!(setup.arm.is_free(&found, &setup.obstacles, 0.0), "pose {} touches something", index + 1);
         joints = found;
@@ -237,15 +238,17 @@ fn repeatability_has_the_stated_size_per_axis() {
 #[test]
 fn a_perfect_robot_is_where_it_says_and_a_faulty_one_is_not() {
     let mut scene = Scene::reference().unwrap();
-    let joints = [0.1, 0.7, -1.0, 0.1, 1.5, 0.2];
+    let joints = JointValues::from([0.1, 0.7, -1.0, 0.1, 1.5, 0.2]);
     let perfect = scene.resolve(1).unwrap();
     assert_eq!(perfect.true_tip(&joints, 3), perfect.reported_tip(&joints));
-    scene.robot.joint_offset_deg = [0.1, -0.1, 0.1, 0.0, 0.1, -0.1];
+    let offset_deg = JointValues::from([0.1, -0.1, 0.1, 0.0, 0.1, -0.1]);
+    scene.robot.joint_offset_deg = Some(offset_deg);
     let offset = scene.resolve(1).unwrap();
     assert_eq!(offset.reported_tip(&joints), perfect.reported_tip(&joints));
-    let moved: [f64; 6] = std::array::from_fn(|i| joints[i] + scene.robot.joint_offset_deg[i].to_radians());
-    let expected = offset.world_from_arm * forward(&moved).arm_from_connection * offset.connection_from_tip;
-    let (distance_m, angle_rad) = offset.true_tip(&joints, 0).distance_to(&Pose::from_isometry(expected));
+    let moved = JointValues::from_fn(6, |i| joints[i] + offset_deg[i].to_radians());
+    let arm_from_connection = *ArmKind::Ur5Coppeliasim.arm().forward(&moved).unwrap().isometry();
+    let expected = offset.world_from_arm * arm_from_connection * offset.connection_from_tip;
+    let (distance_m, angle_rad) = offset.true_tip(&joints, 0).unwrap().distance_to(&Pose::from_isometry(expected));
     assert!(distance_m < 1e-12 && angle_rad < 1e-12);
     scene.robot.repeatability_mm = 0.05;
     let noisy = scene.resolve(1).unwrap();
@@ -289,7 +292,7 @@ fn mistakes_in_a_file_are_found_at_their_line() {
             SceneError::Syntax { line, field, .. } | SceneError::Field { line, field, .. } => {
                 assert_eq!((line, field.as_str()), (Some(expected_line), expected_field), "{text}");
             }
-            SceneError::Read { .. } => panic!("nothing was read"),
+            other => panic!("{other}"),
         }
     }
     let message = Scene::from_toml("[image]\nnoise_grey = -1.0\n").unwrap_err().to_string();

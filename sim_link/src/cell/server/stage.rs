@@ -1,8 +1,6 @@
 //! The objects of the built-in cell: arm, tip, camera, board and what stands around, as a scene describes them.
 
-use std::cell::RefCell;
-
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 
 use crate::cell::motion::Course;
 use crate::cell::render::{Finish, Shape, Solid, props};
@@ -10,15 +8,17 @@ use crate::cell::scene::{JointModeSpec, RelativeTo, ResolvedScene, RobotErrors, 
 use crate::cell::world::{
     Carrier, Chain, Faults, Handle, Joint, JointMode, Kind, Tree, VisionSensor, World, WorldError, turn_z,
 };
-use handeye_core::geometry::arm::ur5::{JOINTS, JointAngles, forward};
+use handeye_core::geometry::arm::{Arm, JointValues};
 
 /// Handles of the objects that the cell itself has to find again.
 #[derive(Debug, Clone)]
 pub struct Stage {
-    /// `/UR5`.
+    /// `/UR5`, whatever arm it is: clients look for it by this name.
     pub arm: Handle,
+    /// Its chain, from there to the connection.
+    pub chain: Arm,
     /// The joints from the base to the wrist.
-    pub joints: [Handle; JOINTS],
+    pub joints: Vec<Handle>,
     /// The attachment point at the end of the arm.
     pub connection: Handle,
     /// `/UR5/Tip`.
@@ -59,12 +59,13 @@ pub fn build(scene: &Scene, resolved: &ResolvedScene) -> Result<(World, Stage), 
     builder.surroundings(scene, resolved, plane)?;
     let mut world = World::default();
     world.tree = builder.tree;
-    world.set_faults(Box::new(CellFaults::new(joints, tip, resolved.robot_errors, plane, resolved.board_slip)));
-    world.set_robot(joints.to_vec(), tip);
+    world.set_faults(Box::new(CellFaults::new(joints.clone(), tip, resolved.robot_errors, plane, resolved.board_slip)));
+    world.set_robot(joints.clone(), tip);
     world.carrier = Some(Carrier::new(plane, Course::new(&resolved.board_motion, resolved.seed)));
     world.set_time_step(resolved.simulation.time_step_s)?;
     let plane_from_target = resolved.world_from_plane.inv_mul(resolved.base_from_target.isometry());
-    let stage = Stage { arm, joints, connection, tip, camera, plane, plane_from_target, solids: builder.solids };
+    let chain = resolved.arm.clone();
+    let stage = Stage { arm, chain, joints, connection, tip, camera, plane, plane_from_target, solids: builder.solids };
     Ok((world, stage))
 }
 
@@ -74,29 +75,39 @@ struct Builder {
 }
 
 impl Builder {
-    fn arm(&mut self, resolved: &ResolvedScene) -> Result<(Handle, [Handle; JOINTS], Handle), WorldError> {
+    /// The arm as the tree of the simulator has one: a joint moves along or about the z axis of its frame, and what it
+    /// carries has the same axes.
+    fn arm(&mut self, resolved: &ResolvedScene) -> Result<(Handle, Vec<Handle>, Handle), WorldError> {
         let arm = self.tree.add("UR5", Kind::Shape, None, resolved.world_from_arm)?;
         self.tree.get_mut(arm)?.model_base = true;
-        let at_zero = forward(&[0.0; JOINTS]);
-        let mut joints = [0; JOINTS];
+        let chain = &resolved.arm;
+        let at_zero = chain.frames(&vec![0.0; chain.joint_count()]).ok().ok_or(WorldError::InvalidData)?;
+        let mut joints = Vec::with_capacity(chain.joint_count());
         let (mut parent, mut arm_from_parent) = (arm, Isometry3::identity());
         let mut frames = vec![(parent, arm_from_parent)];
-        for (index, slot) in joints.iter_mut().enumerate() {
-            let mut joint = Joint::new(resolved.joint_limits.min_rad[index], resolved.joint_limits.max_rad[index]);
+        for (index, part) in chain.joints().iter().enumerate() {
+            let mut joint = Joint::of(part.kind, &part.range);
             joint.set_position(resolved.start_joints[index])?;
             joint.mode = match resolved.joint_mode {
                 JointModeSpec::Kinematic => JointMode::Kinematic,
                 JointModeSpec::Dynamic => JointMode::Dynamic,
             };
-            let parent_from_joint = arm_from_parent.inv_mul(&at_zero.arm_from_joint[index]);
-            *slot = self.tree.add("joint", Kind::Joint(Box::new(joint)), Some(parent), parent_from_joint)?;
-            parent = self.tree.add("link", Kind::Shape, Some(*slot), Isometry3::identity())?;
-            arm_from_parent = at_zero.arm_from_link[index];
+            let axis_from_z = z_along(&part.axis);
+            let parent_from_joint = arm_from_parent.inv_mul(&(at_zero.base_from_joint[index] * axis_from_z));
+            let handle = self.tree.add("joint", Kind::Joint(Box::new(joint)), Some(parent), parent_from_joint)?;
+            joints.push(handle);
+            parent = self.tree.add("link", Kind::Shape, Some(handle), Isometry3::identity())?;
+            arm_from_parent = at_zero.base_from_link[index] * axis_from_z;
             frames.push((parent, arm_from_parent));
         }
-        let parent_from_connection = arm_from_parent.inv_mul(&at_zero.arm_from_connection);
+        let arm_from_connection = at_zero.base_from_flange * chain.flange_from_tip;
+        let parent_from_connection = arm_from_parent.inv_mul(&arm_from_connection);
         let connection = self.tree.add("connection", Kind::ForceSensor, Some(parent), parent_from_connection)?;
-        self.solids.extend(arm_body(&frames));
+        for (link, solid) in props::arm_parts(&resolved.arm_model, chain) {
+            let (handle, arm_from_link) = &frames[link];
+            let world_from_shape = arm_from_link.inverse() * solid.world_from_shape;
+            self.solids.push((*handle, Solid { world_from_shape, ..solid }));
+        }
         Ok((arm, joints, connection))
     }
 
@@ -137,16 +148,11 @@ fn finish(alias: &str) -> Finish {
     }
 }
 
-/// The solids of the arm in the frames of base and links, which are given at all joints zero.
-fn arm_body(frames: &[(Handle, Isometry3<f64>)]) -> Vec<(Handle, Solid)> {
-    let owners = RefCell::new(Vec::new());
-    let link_from_arm = |link: usize| {
-        let (handle, arm_from_link) = frames[link];
-        owners.borrow_mut().push(handle);
-        arm_from_link.inverse()
-    };
-    let solids = props::ur5(&Isometry3::identity(), link_from_arm);
-    owners.into_inner().into_iter().zip(solids).collect()
+/// The turn that takes z to an axis.
+fn z_along(axis: &UnitVector3<f64>) -> UnitQuaternion<f64> {
+    // Opposite to z any axis across will do for the half turn.
+    UnitQuaternion::rotation_between(&Vector3::z(), axis)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
 }
 
 /// `mounting plate` → `MountingPlate`: a name that can stand in a path.
@@ -163,19 +169,19 @@ fn alias(name: &str) -> String {
 /// another one every time the arm has come to rest; of the board that it slips.
 #[derive(Debug)]
 struct CellFaults {
-    joints: [Handle; JOINTS],
+    joints: Vec<Handle>,
     tip: Handle,
     errors: RobotErrors,
     plane: Handle,
     /// `None` when it has happened.
     slip: Option<SlipSpec>,
-    reported: Option<JointAngles>,
+    reported: Option<JointValues>,
     moving: bool,
     settled: u64,
 }
 
 impl CellFaults {
-    fn new(joints: [Handle; JOINTS], tip: Handle, errors: RobotErrors, plane: Handle, slip: Option<SlipSpec>) -> Self {
+    fn new(joints: Vec<Handle>, tip: Handle, errors: RobotErrors, plane: Handle, slip: Option<SlipSpec>) -> Self {
         Self { joints, tip, errors, plane, slip, reported: None, moving: false, settled: 0 }
     }
 
@@ -194,16 +200,18 @@ impl CellFaults {
 
 impl Faults for CellFaults {
     fn apply(&mut self, tree: &mut Tree) {
-        let reported = self.joints.map(|joint| tree.joint(joint).map_or(0.0, Joint::position_rad));
+        let value = |i: usize| tree.joint(self.joints[i]).map_or(0.0, Joint::position_rad);
+        let reported = JointValues::from_fn(self.joints.len(), value);
         let moved = self.reported.is_some_and(|before| before != reported);
         if self.moving && !moved {
             self.settled += 1;
         }
         self.moving = moved;
         self.reported = Some(reported);
-        for (joint, offset_rad) in self.joints.iter().zip(self.errors.joint_offset_rad) {
+        for (joint, offset_rad) in self.joints.iter().zip(self.errors.joint_offset_rad.iter()) {
             if let Ok(object) = tree.get_mut(*joint) {
-                object.displacement = turn_z(offset_rad);
+                // Of a prismatic joint it is zero, which a scene is checked for.
+                object.displacement = turn_z(*offset_rad);
             }
         }
         if let Ok(tip) = tree.get_mut(self.tip) {

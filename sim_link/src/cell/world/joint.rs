@@ -1,6 +1,11 @@
-//! Revolute joints: position, range, and the motion towards a target position.
+//! Joints: position, range, and the motion towards a target position.
+//!
+//! Where a name says radians they are metres of a prismatic joint.
 
 use std::f64::consts::{PI, TAU};
+
+use handeye_core::geometry::arm::{JointKind, JointRange};
+use nalgebra::{Isometry3, Translation3};
 
 use super::error::WorldError;
 use crate::cell::motion::{JointMotion, MotionLimits, MotionState, Sync};
@@ -11,8 +16,14 @@ pub type DriveLimits = [f64; 3];
 /// Limits that the stock UR5 model stores: 90°/s, 360°/s², 360°/s³.
 const DEFAULT_LIMITS: DriveLimits = [PI / 2.0, TAU, TAU];
 
+/// Acceleration and jerk of that model per velocity \[1/s and 1/s²\], which other joints have too: only their speeds are
+/// published.
+const PER_SPEED: [f64; 2] = [4.0, 4.0];
+
 /// A kinematic joint that is sent to where it nearly stands is not moved by the simulator's main script \[rad\].
 const STANDS_WITHIN_RAD: f64 = 0.01 * PI / 180.0;
+/// The same of a prismatic joint \[m\]. Nobody has measured it; it is as far as the tip of an arm of 0.1 m goes by the above.
+const STANDS_WITHIN_M: f64 = 0.02e-3;
 
 /// A dynamic joint lags behind a steady target by its velocity times this \[s\].
 const LAG_S: f64 = 0.07;
@@ -37,9 +48,11 @@ enum Drive {
     Stuck,
 }
 
-/// A revolute joint without mass.
+/// A joint without mass.
 #[derive(Debug, Clone)]
 pub struct Joint {
+    /// Whether it turns or shifts what it carries.
+    pub kind: JointKind,
     /// Whether it turns without end; its position is then in (−π, π].
     pub cyclic: bool,
     /// What moves it.
@@ -54,10 +67,34 @@ pub struct Joint {
 }
 
 impl Joint {
-    /// A kinematic joint at 0, or at the end of its range that is nearest to 0.
+    /// A kinematic joint with the range and the speed of an arm's: one that turns without end is cyclic.
+    pub fn of(kind: JointKind, range: &JointRange) -> Self {
+        let endless = !(range.min.is_finite() && range.max.is_finite());
+        let mut joint = match kind {
+            JointKind::Revolute if endless => Self::new(-PI, PI),
+            _ => Self::new(range.min, range.max),
+        };
+        joint.kind = kind;
+        joint.cyclic = endless && kind == JointKind::Revolute;
+        if range.speed.is_finite() {
+            joint.limits = [range.speed, PER_SPEED[0] * range.speed, PER_SPEED[1] * range.speed];
+        }
+        joint
+    }
+
+    /// What it does to what it carries: a turn about z or a shift along it.
+    pub fn motion(&self, value: f64) -> Isometry3<f64> {
+        match self.kind {
+            JointKind::Revolute => super::turn_z(value),
+            JointKind::Prismatic => Translation3::new(0.0, 0.0, value).into(),
+        }
+    }
+
+    /// A revolute kinematic joint at 0, or at the end of its range that is nearest to 0.
     pub fn new(min_rad: f64, max_rad: f64) -> Self {
         let position_rad = 0.0_f64.max(min_rad).min(max_rad);
         Self {
+            kind: JointKind::Revolute,
             cyclic: false,
             mode: JointMode::Kinematic,
             min_rad,
@@ -134,12 +171,16 @@ impl Joint {
     pub fn drive_to(&mut self, target_rad: f64, limits: Option<DriveLimits>) -> Result<(), WorldError> {
         let target_rad = self.allowed(target_rad)?;
         let limits = limits.unwrap_or(self.limits);
+        let stands_within = match self.kind {
+            JointKind::Revolute => STANDS_WITHIN_RAD,
+            JointKind::Prismatic => STANDS_WITHIN_M,
+        };
         let state = match &self.drive {
             Some(Drive::Moving(drive)) => drive.at(drive.time_s()).state(),
             _ => MotionState::at_rest(vec![self.position_rad]),
         };
-        let stands = !matches!(self.drive, Some(Drive::Moving(_)))
-            && (target_rad - self.position_rad).abs() <= STANDS_WITHIN_RAD;
+        let stands =
+            !matches!(self.drive, Some(Drive::Moving(_))) && (target_rad - self.position_rad).abs() <= stands_within;
         let [max_vel, max_accel, max_jerk] = limits;
         let bounds = MotionLimits::uniform(1, max_vel, max_accel, max_jerk);
         let drive = JointMotion::new(state, &[target_rad], &[0.0], Some(&bounds), Sync::Time).map_err(|error| {

@@ -32,7 +32,7 @@ pub enum Chain {
 pub enum Kind {
     /// A solid.
     Shape,
-    /// A revolute joint.
+    /// A joint.
     Joint(Box<Joint>),
     /// A frame without extent.
     Dummy {
@@ -370,10 +370,10 @@ fn placed(object: &Object, chain: Chain) -> Isometry3<f64> {
     }
 }
 
-/// The rotation that a joint adds between its base frame and what hangs on it.
+/// What a joint adds between its base frame and what hangs on it.
 fn turn(object: &Object) -> Isometry3<f64> {
     match &object.kind {
-        Kind::Joint(joint) => turn_z(joint.position_rad()),
+        Kind::Joint(joint) => joint.motion(joint.position_rad()),
         _ => Isometry3::identity(),
     }
 }

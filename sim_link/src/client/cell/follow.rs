@@ -67,7 +67,7 @@ impl Arm {
         positive([("the time step of the simulation", self.info.time_step_s)])?;
         require_running(&mut self.sim, TASK)?;
         let start = self.movable_joints()?;
-        if !kinematics.chain().fits(&start, &self.base_from_tip()?) {
+        if !kinematics.fits(&start, &self.base_from_tip()?) {
             return Ok(FollowEnd::OtherTip);
         }
         match FollowPlan::new(kinematics, limits, start, self.info.time_step_s) {

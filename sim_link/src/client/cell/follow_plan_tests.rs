@@ -23,7 +23,7 @@ fn arm() -> ArmKinematics {
 
 fn arm_within(limits: JointLimits) -> ArmKinematics {
     let base_from_arm = Isometry3::translation(0.0, 0.0, 0.025);
-    ArmKinematics::new(base_from_arm, Isometry3::translation(0.0, 0.0, 0.017), limits)
+    ArmKinematics::ur5(base_from_arm, Isometry3::translation(0.0, 0.0, 0.017), limits).expect("limits with room")
 }
 
 /// Without walls.

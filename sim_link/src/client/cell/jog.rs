@@ -97,7 +97,7 @@ impl Arm {
         }
         let start = self.movable_joints()?;
         if let ArmJog::Line { kinematics, .. } | ArmJog::Turn { kinematics, .. } = jog
-            && !kinematics.chain().fits(&start, &self.base_from_tip()?)
+            && !kinematics.fits(&start, &self.base_from_tip()?)
         {
             return Ok(JogEnd::OtherTip);
         }

@@ -8,7 +8,8 @@ const START: JointAngles = [0.2, 0.8, -1.1, 0.3, 1.4, -0.5];
 
 fn arm() -> ArmKinematics {
     let base_from_arm = Isometry3::translation(0.0, 0.0, 0.025);
-    ArmKinematics::new(base_from_arm, Isometry3::translation(0.0, 0.0, 0.017), JointLimits::default())
+    ArmKinematics::ur5(base_from_arm, Isometry3::translation(0.0, 0.0, 0.017), JointLimits::default())
+        .expect("limits with room")
 }
 
 fn line(arm: &ArmKinematics, start: JointAngles, along: Vector3<f64>) -> Path<'_> {

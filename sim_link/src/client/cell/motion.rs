@@ -399,7 +399,8 @@ mod tests {
     /// A tip whose line leads through the column of the arm strays, and a stop does not take it back to its line first.
     #[test]
     fn a_stop_of_a_tip_that_is_off_its_line_brakes_the_joints_at_once() {
-        let kinematics = ArmKinematics::new(Isometry3::identity(), Isometry3::identity(), JointLimits::default());
+        let kinematics = ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), JointLimits::default())
+            .expect("limits with room");
         let start: JointAngles = [0.0, 0.8, -1.2, 0.2, 1.5, 0.0];
         let mut behind = start;
         behind[0] += 2.5;

@@ -6,7 +6,7 @@
 //! the tip can have there in every direction at once.
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::JointAngles;
 use super::jog_plan::nearest;
@@ -14,7 +14,6 @@ use super::reach::ArmKinematics;
 use super::views::BoardInView;
 use crate::cell::planning::{self, PlannedView, ViewOptions};
 use crate::client::cell::follow_goal::FollowLimits;
-use handeye_core::geometry::arm::ur5::jacobian_at;
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.
@@ -136,16 +135,21 @@ impl ArmKinematics {
             candidates: CANDIDATES,
             ..ViewOptions::default()
         };
-        let mut views = planning::views_of_board(&setup, &options);
-        let travel = |view: &PlannedView| planning::travel(from, &view.joints);
+        let views = planning::views_of_board(&setup, &options);
+        let joints_of = |view: &PlannedView| JointAngles::try_from(&view.joints[..]).ok();
+        let mut views: Vec<_> = views.iter().filter_map(|view| Some((joints_of(view)?, view.base_from_tip))).collect();
+        let travel = |view: &(JointAngles, Pose<Base, Tip>)| planning::travel(from, &view.0);
         views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
         let is_free = |joints: &JointAngles| setup.path_is_free(from, joints, options.clearance_m);
-        let place =
-            |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
+        let place = |&(joints, base_from_tip): &(JointAngles, Pose<Base, Tip>), room| FollowPlace {
+            joints,
+            base_from_tip,
+            room,
+        };
         for reach in [&reach.wider(), reach] {
             for view in &views {
-                let room = self.room_over(limits, board, reach, &view.joints, ENOUGH);
-                if room >= ENOUGH && is_free(&view.joints) {
+                let room = self.room_over(limits, board, reach, &view.0, ENOUGH);
+                if room >= ENOUGH && is_free(&view.0) {
                     return Ok(place(view, room));
                 }
             }
@@ -153,8 +157,8 @@ impl ArmKinematics {
         let mut best: Option<FollowPlace> = None;
         for view in &views {
             let wanted = best.map_or(LEAST, |best| best.room);
-            let room = self.room_over(limits, board, reach, &view.joints, wanted);
-            if room > wanted && is_free(&view.joints) {
+            let room = self.room_over(limits, board, reach, &view.0, wanted);
+            if room > wanted && is_free(&view.0) {
                 best = Some(place(view, room));
             }
         }
@@ -197,7 +201,8 @@ impl ArmKinematics {
 
     /// The share of its limits of speed that the tip can have in every direction at once, so that no joint is too fast.
     fn share_of_limits(&self, limits: &FollowLimits, joints: &JointAngles) -> f64 {
-        let Some(per_twist) = jacobian_at(joints, &self.chain().connection_from_tip).try_inverse() else { return 0.0 };
+        let inverse = self.jacobian(joints).and_then(Matrix6::try_inverse);
+        let Some(per_twist) = inverse else { return 0.0 };
         let fastest = per_twist
             .row_iter()
             .map(|row| {

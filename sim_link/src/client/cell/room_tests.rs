@@ -14,7 +14,12 @@ const DT_S: f64 = 0.05;
 /// The reference scene, its arm, and the joints at each of the ten reference poses, one after the other.
 fn after_the_sequence() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointAngles>) {
     let scene = Scene::reference().expect("the scene").resolve(1).expect("valid");
-    let arm = ArmKinematics::new(scene.world_from_arm, scene.connection_from_tip, scene.joint_limits);
+    let arm = ArmKinematics::ur5(
+        scene.world_from_arm,
+        scene.connection_from_tip,
+        handeye_core::geometry::arm::ur5::JointLimits::default(),
+    )
+    .expect("limits with room");
     let board = BoardInView {
         base_from_target: scene.base_from_target,
         target: scene.target,
@@ -23,7 +28,7 @@ fn after_the_sequence() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<Joint
     };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/poses/seed10.toml");
     let poses = TaughtPoses::read(&file).expect("the poses").poses;
-    let mut at = scene.start_joints;
+    let mut at = JointAngles::try_from(&scene.start_joints[..]).expect("six");
     let joints = poses.iter().map(|pose| {
         let Goal::Tip(goal) = &pose.goal else { panic!("{} is a pose of the tip", pose.name) };
         at = arm.reach(goal, &at).expect("the sequence visits it");

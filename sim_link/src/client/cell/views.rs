@@ -75,7 +75,7 @@ impl ArmKinematics {
             planned => planned?,
         };
         planning::order_by_travel(start, &mut views);
-        Ok(views.into_iter().map(|view| view.joints).collect())
+        Ok(views.iter().filter_map(|view| JointAngles::try_from(&view.joints[..]).ok()).collect())
     }
 
     /// What the planner knows of this arm.
@@ -88,19 +88,23 @@ impl ArmKinematics {
             size_m: [edge_m(grid.columns), edge_m(grid.rows), SHEET_M],
         };
         let below = Isometry3::translation(0.0, 0.0, -TABLE_BELOW_ARM_M - TABLE_M[2] / 2.0);
-        let table = Obstacle { world_from_centre: self.chain().base_from_arm * below, size_m: TABLE_M };
+        let table = Obstacle { world_from_centre: self.base_from_arm() * below, size_m: TABLE_M };
         ViewSetup {
             base_from_target: board.base_from_target,
             target: board.target,
             intrinsics: board.intrinsics,
             tip_from_camera: board.tip_from_camera,
             arm: planning::Arm {
-                world_from_arm: self.chain().base_from_arm,
-                connection_from_tip: self.chain().connection_from_tip,
+                chain: self.arm().clone(),
+                body: match self.ur5_chain() {
+                    Some(_) => planning::ArmBody::Ur5,
+                    None => planning::ArmBody::of(self.arm()),
+                },
+                world_from_arm: *self.base_from_arm(),
+                connection_from_tip: *self.connection_from_tip(),
                 tip_from_camera: *board.tip_from_camera.isometry(),
             },
-            joint_limits: *self.limits(),
-            start_joints: *start,
+            start_joints: (*start).into(),
             obstacles: vec![sheet, table],
         }
     }

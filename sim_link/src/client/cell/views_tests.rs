@@ -3,14 +3,19 @@ use crate::cell::scene::Scene;
 
 fn arm_and_board(scene: &Scene) -> (ArmKinematics, BoardInView, JointAngles) {
     let scene = scene.resolve(scene.seed).expect("valid");
-    let arm = ArmKinematics::new(scene.world_from_arm, scene.connection_from_tip, scene.joint_limits);
+    let arm = ArmKinematics::ur5(
+        scene.world_from_arm,
+        scene.connection_from_tip,
+        handeye_core::geometry::arm::ur5::JointLimits::default(),
+    )
+    .expect("limits with room");
     let board = BoardInView {
         base_from_target: scene.base_from_target,
         target: scene.target,
         intrinsics: scene.intrinsics,
         tip_from_camera: scene.tip_from_camera,
     };
-    (arm, board, scene.start_joints)
+    (arm, board, JointAngles::try_from(&scene.start_joints[..]).expect("six"))
 }
 
 #[test]

@@ -63,6 +63,14 @@ impl Sim {
         self.call("sim.getObjectType", vec![object.to_value()])?.integer(0)
     }
 
+    /// How a joint moves, see [`crate::client::constants`].
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn get_joint_type(&mut self, joint: ObjectHandle) -> Result<i64, LinkError> {
+        self.call("sim.getJointType", vec![joint.to_value()])?.integer(0)
+    }
+
     /// A new dummy of a size (m) at the origin of the world.
     ///
     /// # Errors

@@ -122,6 +122,21 @@ impl Arm {
         Ok(self.towards_within(base_from_tip.isometry(), near, options, &self.ranges()))
     }
 
+    /// As [`Self::towards`]; `None` when the pose is not within the precision of the options after the last iteration.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn descend(
+        &self,
+        base_from_tip: &Pose<Base, Tip>,
+        near: &[f64],
+        options: &DlsOptions,
+    ) -> Result<Option<Vec<f64>>, ArmError> {
+        let joints = self.towards(base_from_tip, near, options)?;
+        let error = pose_error(&self.tip(&joints), base_from_tip.isometry());
+        Ok(is_within(&error, options.precision_m, options.precision_rad).then_some(joints))
+    }
+
     /// As [`Self::towards`], with other ranges and without checks.
     pub(super) fn towards_within(
         &self,
@@ -131,11 +146,6 @@ impl Arm {
         ranges: &[JointRange],
     ) -> Vec<f64> {
         damped::towards(self, goal, near, options, ranges)
-    }
-
-    /// The ranges of all joints.
-    fn ranges(&self) -> Vec<JointRange> {
-        self.joints.iter().map(|joint| joint.range).collect()
     }
 
     /// Where the tip is; there must be a value for every joint.

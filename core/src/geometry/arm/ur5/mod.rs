@@ -14,7 +14,6 @@ use std::sync::LazyLock;
 
 use nalgebra::{Isometry3, Matrix6, Translation3};
 
-use super::inverse::pose_error;
 use super::{Arm, ArmKind, JointRange};
 
 pub use super::inverse::{DlsOptions, IkError, Obstacle};
@@ -126,22 +125,6 @@ pub fn inverse_nearest(
         return Err(IkError::NotFinite);
     }
     ur.nearest(&ARM, arm_from_connection, seed, &limits.ranges())
-}
-
-/// Joint values that bring the tip to `arm_from_tip_goal`, by [`towards`]; `None` when the goal is not within the
-/// precision of the options after the last iteration.
-pub fn damped_least_squares(
-    arm_from_tip_goal: &Isometry3<f64>,
-    connection_from_tip: &Isometry3<f64>,
-    seed: &JointAngles,
-    options: &DlsOptions,
-    limits: &JointLimits,
-) -> Option<JointAngles> {
-    let joints = towards(arm_from_tip_goal, connection_from_tip, seed, options, limits);
-    let error = pose_error(&(forward(&joints).arm_from_connection * connection_from_tip), arm_from_tip_goal);
-    let within = error.fixed_rows::<3>(0).norm() <= options.precision_m
-        && error.fixed_rows::<3>(3).norm() <= options.precision_rad;
-    within.then_some(joints)
 }
 
 /// [`Arm::towards`] for a tool that is fixed to the connection, with limits of its own: where the iterations end, which is

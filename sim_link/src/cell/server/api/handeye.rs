@@ -104,7 +104,7 @@ fn robot(errors: &RobotErrors) -> Value {
     wire::map([
         ("repeatability_m", Value::Float(errors.repeatability_m)),
         ("repeatability_rad", Value::Float(errors.repeatability_rad)),
-        ("joint_offset_rad", wire::floats(errors.joint_offset_rad)),
+        ("joint_offset_rad", wire::floats(errors.joint_offset_rad.iter().copied())),
     ])
 }
 

@@ -6,6 +6,7 @@ use super::{Call, Outcome, Table, one, several};
 use crate::cell::server::args::ApiError;
 use crate::cell::world::{DriveLimits, Joint, JointMode, State};
 use crate::wire;
+use handeye_core::geometry::arm::JointKind;
 
 pub(super) const FUNCTIONS: Table = &[
     ("getJointPosition", get_joint_position),
@@ -20,6 +21,7 @@ pub(super) const FUNCTIONS: Table = &[
 ];
 
 const JOINT_REVOLUTE: i64 = 10;
+const JOINT_PRISMATIC: i64 = 11;
 const JOINTMODE_KINEMATIC: i64 = 0;
 const JOINTMODE_DYNAMIC: i64 = 5;
 
@@ -60,8 +62,10 @@ fn get_joint_interval(call: &mut Call<'_>) -> Outcome {
 }
 
 fn get_joint_type(call: &mut Call<'_>) -> Outcome {
-    joint(call)?;
-    one(JOINT_REVOLUTE)
+    one(match joint(call)?.kind {
+        JointKind::Revolute => JOINT_REVOLUTE,
+        JointKind::Prismatic => JOINT_PRISMATIC,
+    })
 }
 
 fn get_joint_mode(call: &mut Call<'_>) -> Outcome {

@@ -14,7 +14,8 @@ use crate::cell::server::plans::{
 use crate::cell::server::task::Answer;
 use crate::cell::world::{Chain, Flagged, Handle, poses};
 use crate::wire::{self, Reader};
-use handeye_core::geometry::arm::ur5::{DlsOptions, JointAngles, JointLimits, damped_least_squares};
+use handeye_core::geometry::arm::{DlsOptions, JointRange};
+use handeye_core::geometry::frames::Pose;
 
 pub(super) const FUNCTIONS: Table = &[
     ("moveToPose", move_to_pose),
@@ -159,18 +160,26 @@ impl ArmIk {
     fn follow(&self, cell: &mut Cell, world_from_goal: &Isometry3<f64>) -> Result<(), ApiError> {
         cell.world.tree.set_world_pose(self.target, world_from_goal)?;
         let tree = &cell.world.tree;
-        let mut seed: JointAngles = [0.0; 6];
-        let mut limits = JointLimits::default();
-        for (index, &handle) in cell.stage.joints.iter().enumerate() {
+        let chain = &cell.stage.chain;
+        let mut seed = Vec::with_capacity(cell.stage.joints.len());
+        let mut ranges = chain.ranges();
+        for (&handle, range) in cell.stage.joints.iter().zip(&mut ranges) {
             let joint = tree.joint(handle)?;
-            seed[index] = joint.position_rad();
-            (limits.min_rad[index], limits.max_rad[index]) = joint.interval_rad();
+            seed.push(joint.position_rad());
+            // One that turns without end is wrapped when it is put there.
+            if !joint.cyclic {
+                let (min, max) = joint.interval_rad();
+                *range = JointRange { min, max, ..*range };
+            }
         }
         let goal = tree.world_pose(cell.stage.arm, Chain::Reported)?.inv_mul(world_from_goal);
         let world_from_connection = tree.world_pose(cell.stage.connection, Chain::Reported)?;
         let tip = world_from_connection.inv_mul(&tree.world_pose(self.tip, Chain::Reported)?);
-        let Some(joints) = damped_least_squares(&goal, &tip, &seed, &self.options, &limits) else { return Ok(()) };
-        for (&handle, position_rad) in cell.stage.joints.iter().zip(joints) {
+        let (base_from_first, flange_from_tip) = (chain.base_from_first, chain.flange_from_tip * tip);
+        let arm = chain.clone().mounted(base_from_first, flange_from_tip).with_ranges(&ranges);
+        let found = arm.and_then(|arm| arm.descend(&Pose::from_isometry(goal), &seed, &self.options));
+        let joints = found.map_err(|error| ApiError::Other(error.to_string()))?;
+        for (&handle, position_rad) in cell.stage.joints.iter().zip(joints.unwrap_or_default()) {
             cell.world.tree.joint_mut(handle)?.command(position_rad)?;
         }
         Ok(())

@@ -6,7 +6,6 @@ use nalgebra::{Matrix2, Point3, Vector2};
 
 use super::*;
 use crate::cell::scene::ResolvedScene;
-use handeye_core::geometry::arm::ur5::JointAngles;
 
 /// Grey levels of an image, row 0 on top.
 struct Grey {
@@ -73,8 +72,8 @@ impl Bench {
         bench
     }
 
-    fn put(&mut self, joints: &JointAngles) {
-        let handles = self.engine.cell.stage.joints;
+    fn put(&mut self, joints: &[f64]) {
+        let handles = self.engine.cell.stage.joints.clone();
         for (handle, position) in handles.into_iter().zip(joints) {
             self.call(A, "sim.setJointPosition", vec![Value::from(handle), Value::Float(*position)]);
         }
@@ -122,7 +121,8 @@ fn the_image_shows_the_board_where_the_moment_says_while_board_and_arm_move() {
     let mut worst: f64 = 0.0;
     for pass in 0..60 {
         let swing = 0.05 * (f64::from(pass) * 0.3).sin();
-        let joints = std::array::from_fn(|i| resolved.start_joints[i] + swing * [0.5, -0.4, 0.8, 0.6, -0.7, 1.5][i]);
+        let joints: [f64; 6] =
+            std::array::from_fn(|i| resolved.start_joints[i] + swing * [0.5, -0.4, 0.8, 0.6, -0.7, 1.5][i]);
         bench.put(&joints);
         // Put, but not seen yet: the moment is still that of the last image.
         if pass % 10 == 5 {

@@ -1,3 +1,4 @@
+mod arms;
 mod board;
 mod calls;
 mod fuzz;
@@ -139,7 +140,7 @@ impl Bench {
     }
 
     fn arm(&self) -> Value {
-        wire::integers(self.engine.cell.stage.joints)
+        wire::integers(self.engine.cell.stage.joints.iter().copied())
     }
 }
 

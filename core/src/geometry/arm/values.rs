@@ -1,0 +1,111 @@
+//! A value for each joint of an arm, of whatever number of joints.
+
+use std::fmt;
+use std::ops::{Deref, DerefMut};
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::{ArmError, MAX_JOINTS};
+
+/// A number for each joint from the base to the tip: a position in radians, or of a prismatic joint in metres. It is as
+/// cheap to copy as an array, and has as many numbers as the arm has joints, 0 to [`MAX_JOINTS`].
+#[derive(Clone, Copy)]
+pub struct JointValues {
+    count: usize,
+    /// Those from `count` on are zero.
+    values: [f64; MAX_JOINTS],
+}
+
+impl JointValues {
+    /// From the value of each joint, counted from 0. Of more than [`MAX_JOINTS`] joints, the first so many.
+    pub fn from_fn(count: usize, mut value: impl FnMut(usize) -> f64) -> Self {
+        let count = count.min(MAX_JOINTS);
+        Self { count, values: std::array::from_fn(|i| if i < count { value(i) } else { 0.0 }) }
+    }
+
+    /// All zero.
+    pub fn zeros(count: usize) -> Self {
+        Self::from_fn(count, |_| 0.0)
+    }
+
+    /// Another number for each joint.
+    #[must_use]
+    pub fn map(self, mut change: impl FnMut(f64) -> f64) -> Self {
+        Self::from_fn(self.count, |i| change(self.values[i]))
+    }
+}
+
+impl Deref for JointValues {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.values[..self.count]
+    }
+}
+
+impl DerefMut for JointValues {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.values[..self.count]
+    }
+}
+
+impl<const N: usize> From<[f64; N]> for JointValues {
+    fn from(values: [f64; N]) -> Self {
+        const { assert!(N <= MAX_JOINTS, "no arm has so many joints") };
+        Self::from_fn(N, |i| values[i])
+    }
+}
+
+impl TryFrom<&[f64]> for JointValues {
+    type Error = ArmError;
+
+    /// [`ArmError::JointCount`] for more values than an arm has joints.
+    fn try_from(values: &[f64]) -> Result<Self, ArmError> {
+        if values.len() > MAX_JOINTS {
+            return Err(ArmError::JointCount { got: values.len() });
+        }
+        Ok(Self::from_fn(values.len(), |i| values[i]))
+    }
+}
+
+impl PartialEq for JointValues {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl fmt::Debug for JointValues {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (**self).fmt(f)
+    }
+}
+
+impl Serialize for JointValues {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self[..].serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for JointValues {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let values = Vec::<f64>::deserialize(deserializer)?;
+        Self::try_from(&values[..]).map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_as_many_numbers_as_were_given_and_more_than_an_arm_has_are_refused() {
+        let values = JointValues::from([0.5, -1.0, 2.0]);
+        assert_eq!((values.len(), &values[..]), (3, &[0.5, -1.0, 2.0][..]));
+        assert_eq!(values.map(|v| 2.0 * v), JointValues::from([1.0, -2.0, 4.0]));
+        assert_ne!(values, JointValues::from([0.5, -1.0, 2.0, 0.0]), "a joint at zero is a joint");
+        assert_eq!(JointValues::try_from(&[0.0; 13][..]), Err(ArmError::JointCount { got: 13 }));
+        let text = serde_json::to_string(&values).expect("numbers");
+        assert_eq!(serde_json::from_str::<JointValues>(&text).expect("the same"), values);
+        assert!(serde_json::from_str::<JointValues>("[0,0,0,0,0,0,0,0,0,0,0,0,0]").is_err());
+    }
+}

@@ -1,0 +1,205 @@
+//! Arms that are no UR5: their chain is read from the running simulation and used to move the tip.
+
+use std::path::Path;
+
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::cell::{
+    Arm, ArmJog, ArmKinematics, BoardInView, CellPaths, JogAxes, JogEnd, MotionTolerance, UnknownKinematics,
+};
+use handeye_sim_link::client::{CancelToken, ConnectionOptions, MotionLimits, ObjectHandle};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+/// Of a chain that was read as `f64`; searched joint values agree with a pose to 1e-8.
+const READ_M: f64 = 1e-9;
+const SEARCHED_M: f64 = 1e-7;
+
+struct Bench {
+    _server: CellServer,
+    arm: Arm,
+    truth: ResolvedScene,
+}
+
+impl Bench {
+    fn start(scene: Scene) -> Self {
+        let truth = scene.resolve(scene.seed).expect("valid");
+        let config = CellConfig { real_time: Some(false), ..CellConfig::new(scene) };
+        let server = CellServer::start(config).expect("a free port");
+        let endpoint = server.endpoint().parse().expect("an address");
+        let mut arm =
+            Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("it is whole");
+        arm.sim().start_simulation().expect("a call");
+        arm.sim().set_stepping(true).expect("a call");
+        Self { _server: server, arm, truth }
+    }
+
+    fn shipped(name: &str) -> Self {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes").join(name);
+        Self::start(Scene::load(&file).unwrap_or_else(|error| panic!("{error}")))
+    }
+
+    fn kinematics(&mut self) -> ArmKinematics {
+        self.arm.kinematics().expect("calls").unwrap_or_else(|unknown| panic!("{unknown}"))
+    }
+
+    fn unknown(&mut self) -> UnknownKinematics {
+        self.arm.kinematics().expect("calls").expect_err("it is not to be driven along lines")
+    }
+
+    fn tip(&mut self) -> Pose<Base, Tip> {
+        self.arm.base_from_tip().expect("a call")
+    }
+
+    fn move_joints(&mut self, goal: [f64; 6]) {
+        let limits = MotionLimits::uniform(6, 3.0, 9.0, 90.0);
+        self.arm.move_to_joints(&goal, &limits, &CancelToken::default()).expect("there");
+    }
+
+    /// Where the tip is said to be is where it is, after another motion of all joints than the one it was read at.
+    fn assert_known(&mut self, kinematics: &ArmKinematics) {
+        let now = self.arm.joint_angles().expect("a call");
+        self.move_joints(std::array::from_fn(|i| {
+            now[i] + 0.1 * (i as f64 + 1.0) * if i % 2 == 0 { 1.0 } else { -1.0 }
+        }));
+        let joints = self.arm.joint_angles().expect("a call");
+        let (distance_m, angle_rad) = kinematics.tip(&joints).distance_to(&self.tip());
+        assert!(distance_m < READ_M && angle_rad < 1e-7, "{distance_m} m, {angle_rad} rad");
+    }
+}
+
+#[test]
+fn an_arm_with_another_upper_arm_than_a_ur5_is_taken_as_it_is() {
+    let mut bench = Bench::start(Scene::reference().expect("valid"));
+    assert!(bench.kinematics().ur5_chain().is_some());
+    let sim = bench.arm.sim();
+    let elbow = sim.get_object_index("/UR5/joint", 2).expect("a joint");
+    let in_parent: Pose<Base, Tip> = sim.get_object_pose(elbow, ObjectHandle::PARENT).expect("a pose");
+    let longer = Pose::<Base, Tip>::from_isometry(in_parent.isometry() * Translation3::new(0.007, 0.0, 0.0));
+    sim.set_object_pose(elbow, ObjectHandle::PARENT, &longer).expect("it can be moved");
+    let kinematics = bench.kinematics();
+    assert_eq!(kinematics.ur5_chain(), None, "7 mm are no UR5");
+    bench.assert_known(&kinematics);
+}
+
+#[test]
+fn the_chain_of_an_xarm_is_read_with_its_ranges_and_says_where_the_tip_goes() {
+    let mut bench = Bench::shipped("xarm6.toml");
+    let kinematics = bench.kinematics();
+    assert_eq!(kinematics.ur5_chain(), None);
+    for (i, joint) in bench.truth.arm.joints().iter().enumerate() {
+        assert!((kinematics.limits().min_rad[i] - joint.range.min).abs() < 1e-12, "joint {}", i + 1);
+        assert!((kinematics.limits().max_rad[i] - joint.range.max).abs() < 1e-12, "joint {}", i + 1);
+    }
+    bench.assert_known(&kinematics);
+}
+
+#[test]
+fn joints_that_turn_without_end_have_no_ends() {
+    let text = "[robot]\nmodel = \"ur3e\"\nstart_joints_deg = [0, -90, 90, -90, -90, 0]\n";
+    let mut bench = Bench::start(Scene::from_toml(text).expect("valid"));
+    let kinematics = bench.kinematics();
+    assert_eq!((kinematics.limits().min_rad[5], kinematics.limits().max_rad[5]), (f64::NEG_INFINITY, f64::INFINITY));
+    assert!(kinematics.limits().max_rad[4].is_finite());
+    bench.assert_known(&kinematics);
+}
+
+#[test]
+fn the_tip_of_an_xarm_is_jogged_along_and_about_axes_and_stops_where_it_can_go_no_further() {
+    let mut bench = Bench::shipped("xarm6.toml");
+    let kinematics = bench.kinematics();
+    let before = bench.tip();
+    let line = ArmJog::Line { kinematics: &kinematics, axes: JogAxes::Base, along: Vector3::y() };
+    assert_eq!(bench.arm.jog(&line, Some(0.05), &mut || Some(1.0)), Ok(JogEnd::Arrived));
+    let after = bench.tip();
+    assert!((after.translation() - before.translation() - Vector3::y() * 0.05).norm() < SEARCHED_M);
+    assert!(before.distance_to(&after).1 < 1e-6);
+    let turn = ArmJog::Turn { kinematics: &kinematics, axes: JogAxes::Tip, about: Vector3::z() };
+    assert_eq!(bench.arm.jog(&turn, Some(0.3), &mut || Some(1.0)), Ok(JogEnd::Arrived));
+    let turned = after.rotation().inverse() * bench.tip().rotation();
+    assert!((turned.scaled_axis() - Vector3::z() * 0.3).norm() < 1e-6);
+    let up = ArmJog::Line { kinematics: &kinematics, axes: JogAxes::Base, along: Vector3::z() };
+    let end = bench.arm.jog(&up, None, &mut || Some(1.0)).expect("calls");
+    assert!(matches!(end, JogEnd::Obstacle(_)), "{end:?}");
+    // It is the end indeed: a little higher there is no way to stand, from wherever it is looked for.
+    let here = bench.tip();
+    assert!(here.translation().z > after.translation().z + 0.05, "{here:?}");
+    let arm_from_tip = bench.truth.world_from_arm.inverse() * Translation3::new(0.0, 0.0, 0.05) * here.isometry();
+    let connection = Pose::from_isometry(arm_from_tip * bench.truth.connection_from_tip.inverse());
+    for near in [[0.0; 6], [0.0, -0.5, -1.0, 0.0, 1.6, 0.0], [3.0, -1.0, -2.0, 2.0, -1.0, 1.0]] {
+        assert!(bench.truth.arm.inverse(&connection, &near).is_err(), "from {near:?}");
+    }
+}
+
+#[test]
+fn a_typed_goal_of_an_xarm_is_checked_and_reached_along_a_line() {
+    let mut bench = Bench::shipped("xarm6.toml");
+    let kinematics = bench.kinematics();
+    let start = bench.tip();
+    let turn = UnitQuaternion::from_euler_angles(0.1, -0.2, 0.3);
+    let goal = Pose::from_isometry(Isometry3::from_parts(
+        Translation3::from(start.translation() + Vector3::new(0.05, 0.08, -0.06)),
+        start.rotation() * turn,
+    ));
+    let joints = bench.arm.joint_angles().expect("a call");
+    let found = kinematics.reach(&goal, &joints).expect("it is in reach");
+    assert_eq!(bench.truth.arm.first_violation(&found), None);
+    let limits = MotionLimits::uniform(4, 0.5, 2.0, 20.0);
+    // Tighter than any inverse kinematics of a server is asked for.
+    let tolerance = MotionTolerance { distance_m: SEARCHED_M, angle_rad: 1e-6 };
+    bench.arm.sim().set_stepping(false).expect("a call");
+    bench.arm.move_to_pose(&goal, &limits, &tolerance, &CancelToken::default()).expect("there");
+    let far = Pose::from_isometry(Translation3::new(1.5, 0.0, 0.0) * goal.isometry());
+    let refused = kinematics.reach(&far, &joints).expect_err("nobody reaches so far").to_string();
+    assert!(refused.contains("mm"), "{refused}");
+}
+
+#[test]
+fn views_of_a_board_are_planned_for_an_xarm() {
+    let mut bench = Bench::shipped("xarm6.toml");
+    let kinematics = bench.kinematics();
+    let start = bench.arm.joint_angles().expect("a call");
+    let truth = &bench.truth;
+    let board = BoardInView {
+        base_from_target: truth.base_from_target,
+        target: truth.target,
+        intrinsics: truth.intrinsics,
+        tip_from_camera: truth.tip_from_camera,
+    };
+    let views = kinematics.views_unlike(&board, &[], &start, 5).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(views.len(), 5);
+    for joints in views {
+        let camera_from_target = truth.camera_from_target(&truth.reported_tip(&joints.into()).expect("six joints"));
+        for point in truth.target.points() {
+            let px = truth.intrinsics.project(&(camera_from_target.isometry() * point)).expect("in front");
+            assert!(truth.intrinsics.contains(&px), "{px}");
+        }
+    }
+}
+
+#[test]
+fn an_arm_that_cannot_be_driven_along_lines_says_why() {
+    let unknown = Bench::shipped("panda.toml").unknown();
+    assert!(matches!(&unknown, UnknownKinematics::MoreJoints { alias } if alias == "joint"), "{unknown}");
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/arms/xarm6.urdf"));
+    let prismatic = text.expect("it is shipped").replacen(
+        "<joint name=\"joint1\" type=\"revolute\">",
+        "<joint name=\"joint1\" type=\"prismatic\">",
+        1,
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("arm.urdf"), prismatic).expect("written");
+    let scene = "[robot]\nmodel = { urdf = \"arm.urdf\" }\nstart_joints_deg = [0, -30, -60, 0, 90, 0]\n";
+    std::fs::write(folder.path().join("scene.toml"), scene).expect("written");
+    let scene = Scene::load(&folder.path().join("scene.toml")).unwrap_or_else(|error| panic!("{error}"));
+    let unknown = Bench::start(scene).unknown();
+    assert_eq!(unknown, UnknownKinematics::NotRevolute { joint: 1 });
+
+    let mut loose = Bench::shipped("xarm6.toml");
+    let sim = loose.arm.sim();
+    let first = sim.get_object_index("/UR5/joint", 0).expect("a joint");
+    let args = vec![first.0.into(), (-1).into(), true.into()];
+    sim.connection().call("sim.setObjectParent", args).expect("a call");
+    let unknown = loose.unknown();
+    assert!(matches!(&unknown, UnknownKinematics::Elsewhere { path } if path == "/UR5"), "{unknown}");
+}
