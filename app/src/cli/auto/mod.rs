@@ -9,7 +9,7 @@ use clap::Args;
 use handeye_core::estimate::{Method, Options};
 use handeye_core::project::session::{FolderLock, Session, SessionMeta, Store};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{CellClient, CellPaths};
+use handeye_sim_link::client::cell::{ArmKinematics, CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
 
 use super::cell::SceneArg;
@@ -91,7 +91,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     keep_earlier_session(&folder)?;
     // That it is another arm is no fault: its joint angles are then kept and not used.
     let kinematics = cell.arm().kinematics().map_err(Failure::failed)?.ok();
-    let arm = kinematics.as_ref().and_then(|known| known.ur5_chain()).map(|_ur5| BUILT_IN_ARM);
+    let arm = kinematics.as_ref().and_then(ArmKinematics::ur5_chain).map(|_ur5| BUILT_IN_ARM);
     if let Some(shortfall) = shortfall::of(cell.info().support(), kinematics.is_some()) {
         tracing::warn!("{}", shortfall.say(Language::English));
     }

@@ -40,7 +40,7 @@ impl Calibration {
                 .as_ref()
                 .map(|joint| self.details(joint))
                 .or_else(|| camera_alone.map(of_camera))
-                .or_else(|| of_scaled_poses(self.pose_fit?.shape?)),
+                .or_else(|| self.pose_fit?.shape.map(of_scaled_poses)),
             provenance: Provenance {
                 tool_version: tool_version.to_owned(),
                 input_sha256,
@@ -82,8 +82,8 @@ impl Calibration {
 }
 
 /// The details of an estimate from poses of the target whose unit was unknown.
-fn of_scaled_poses(shape: ShapeEstimate) -> Option<EstimateDetails> {
-    Some(EstimateDetails { board: Some(board(shape)), ..EstimateDetails::default() })
+fn of_scaled_poses(shape: ShapeEstimate) -> EstimateDetails {
+    EstimateDetails { board: Some(board(shape)), ..EstimateDetails::default() }
 }
 
 /// The details of a camera without a robot: the corners' noise is the only one, and the target's size is not seen.

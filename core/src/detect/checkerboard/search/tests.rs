@@ -243,9 +243,8 @@ fn a_hidden_corner_lies_between_its_neighbours_and_says_how_little_is_known_of_i
         assert!(sd > 0.5 && error < 3.0 * sd, "corner {index}: {error} px off, stated {sd} px");
     }
     // More than 15 % of the corners.
-    for index in 0..11 {
-        (seen[index], partly.covariances_px2[index]) = (false, None);
-    }
+    seen[..11].fill(false);
+    partly.covariances_px2[..11].fill(None);
     assert!(Hidden::of(partly, &seen).stated().is_none());
 }
 
