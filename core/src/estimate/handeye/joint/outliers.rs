@@ -1,7 +1,8 @@
 //! The joint estimate with wrong views and wrong corners left out.
 //!
-//! Views are judged as in [`screening`]: the error is that of a view's own pose, from its corners, against the
-//! pose that the chain predicts from its reported robot pose, and its noise that of the robot with that of the corners.
+//! Views are judged as in [`screening`](crate::estimate::handeye::screening): the error is that of a view's own pose, from its
+//! corners, against the pose that the chain predicts from its reported robot pose, and its noise that of the robot with that
+//! of the corners.
 //!
 //! A corner is left out as an outlier when its residual, its view's own pose being free, is several times what nine in ten corners
 //! have; so long tails of honest noise are kept.
