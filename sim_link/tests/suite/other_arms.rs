@@ -6,9 +6,9 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{
-    Arm, ArmJog, ArmKinematics, BoardInView, CellPaths, JogAxes, JogEnd, MotionTolerance, UnknownKinematics,
+    Arm, ArmJog, ArmKinematics, BoardInView, CameraFeed, CellPaths, JogAxes, JogEnd, MotionTolerance, UnknownKinematics,
 };
-use handeye_sim_link::client::{CancelToken, ConnectionOptions, MotionLimits, ObjectHandle};
+use handeye_sim_link::client::{CallOptions, CancelToken, ConnectionOptions, MotionLimits, ObjectHandle};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// Of a chain that was read as `f64`; searched joint values agree with a pose to 1e-8.
@@ -16,7 +16,7 @@ const READ_M: f64 = 1e-9;
 const SEARCHED_M: f64 = 1e-7;
 
 struct Bench {
-    _server: CellServer,
+    server: CellServer,
     arm: Arm,
     truth: ResolvedScene,
 }
@@ -31,7 +31,7 @@ impl Bench {
             Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("it is whole");
         arm.sim().start_simulation().expect("a call");
         arm.sim().set_stepping(true).expect("a call");
-        Self { _server: server, arm, truth }
+        Self { server: server, arm, truth }
     }
 
     fn shipped(name: &str) -> Self {
@@ -175,6 +175,26 @@ fn views_of_a_board_are_planned_for_an_xarm() {
             assert!(truth.intrinsics.contains(&px), "{px}");
         }
     }
+}
+
+/// Its joints are published with every image, and there are more than the client drives.
+#[test]
+fn the_camera_of_an_arm_with_seven_joints_is_seen() {
+    let mut bench = Bench::shipped("panda.toml");
+    let endpoint = bench.server.endpoint().parse().expect("an address");
+    let mut camera =
+        CameraFeed::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("whole");
+    for _ in 0..5 {
+        bench.arm.sim().step(&CallOptions::default()).expect("a call");
+    }
+    let frame = camera.grab().expect("an image");
+    let (distance_m, _) = frame.base_from_tip.distance_to(&bench.tip());
+    assert!(distance_m < READ_M, "{distance_m} m");
+    assert_eq!(frame.joints, bench.arm.joint_angles().expect("a call"));
+    let grey = |p: &[u8]| p.iter().map(|v| f64::from(*v)).sum::<f64>();
+    let levels = frame.rgb.as_raw().chunks_exact(3).map(grey);
+    let (dark, bright) = levels.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| (low.min(v), high.max(v)));
+    assert!(bright > 2.0 * dark + 100.0, "the board's squares: {dark} to {bright}");
 }
 
 #[test]

@@ -98,7 +98,8 @@ pub(super) fn shown_moment(sim: &mut Sim) -> Result<Option<ShownMoment>, LinkErr
     let map = sim.connection().call(MOMENT_FUNCTION, Vec::new())?.into_map(0)?;
     let Some(sim_time_s) = map.get("sim_time").and_then(Reader::number) else { return Ok(None) };
     let joints = map.get("joints").and_then(Reader::numbers).unwrap_or_default();
-    let joints = joints.try_into().map_err(|other: Vec<f64>| bad(format!("joints: {} numbers", other.len())))?;
+    // An arm of more joints shows those that this client drives, as reading them one by one does.
+    let joints = *joints.first_chunk().ok_or_else(|| bad(format!("joints: {} numbers", joints.len())))?;
     let tip = map.get("tip").ok_or_else(|| bad("no tip"))?;
     Ok(Some(ShownMoment {
         sim_time_s,
