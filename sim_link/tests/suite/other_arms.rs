@@ -31,7 +31,7 @@ impl Bench {
             Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("it is whole");
         arm.sim().start_simulation().expect("a call");
         arm.sim().set_stepping(true).expect("a call");
-        Self { server: server, arm, truth }
+        Self { server, arm, truth }
     }
 
     fn shipped(name: &str) -> Self {
