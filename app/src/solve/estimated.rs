@@ -27,8 +27,6 @@ pub fn estimated(calibration: &Calibration) -> Vec<EstimatedValue> {
     let mut lines = Vec::new();
     lines.extend(views_aside(calibration));
     lines.extend(corners_aside(calibration));
-    let of_poses = calibration.pose_fit.and_then(|fit| fit.shape);
-    lines.extend(of_poses.as_ref().and_then(size));
     let Some(joint) = &calibration.joint else { return lines };
     if let Some(shape) = &joint.shape {
         lines.extend(bend(shape));

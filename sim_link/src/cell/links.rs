@@ -4,7 +4,7 @@
 //! joint sits to where the next one does, or its shortest way around: an arm that runs beside its axes, as those of
 //! Universal Robots do, is thicker and to one side of that. Of a prismatic joint the rail is not there.
 
-use handeye_core::geometry::arm::Arm;
+use handeye_core::geometry::arm::{Arm, ArmFrames};
 use nalgebra::{Isometry3, Point3};
 
 /// Radius of the link at the base and of the one at the tip, metres: those of arms for some kilograms.
@@ -17,7 +17,7 @@ const SHORTEST_M: f64 = 1e-3;
 pub struct LinkCapsule {
     /// How many joints carry it.
     pub link: usize,
-    /// One end, in the arm frame with all joints at zero.
+    /// One end, in the frame of the link, see [`arm_from_links`].
     pub from: Point3<f64>,
     /// The other.
     pub to: Point3<f64>,
@@ -27,41 +27,24 @@ pub struct LinkCapsule {
 
 /// The capsules of an arm from its base to its connection; a link between two joints at one place has none.
 pub fn capsules(arm: &Arm) -> Vec<LinkCapsule> {
-    let bare = arm.clone().mounted(Isometry3::identity(), arm.flange_from_tip);
-    let Some(at_zero) = Placed::of(&bare, &vec![0.0; bare.joint_count()]) else { return Vec::new() };
-    let links = at_zero.places.windows(2).enumerate();
-    let last = bare.joint_count() as f64;
-    links
-        .filter(|(_, ends)| (ends[1] - ends[0]).norm() > SHORTEST_M)
-        .map(|(link, ends)| {
-            let radius_m = RADII_M[0] + (RADII_M[1] - RADII_M[0]) * link as f64 / last;
-            LinkCapsule { link, from: ends[0], to: ends[1], radius_m }
+    let count = arm.joint_count();
+    let Ok(at_zero) = arm.frames(&vec![0.0; count]) else { return Vec::new() };
+    let origin = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
+    let connection = origin(&(at_zero.base_from_flange * arm.flange_from_tip));
+    let joints = at_zero.base_from_joint.iter().map(origin);
+    let places: Vec<Point3<f64>> = std::iter::once(Point3::origin()).chain(joints).chain([connection]).collect();
+    let links = arm_from_links(&at_zero);
+    let ends = places.windows(2).zip(links).enumerate();
+    ends.filter(|(_, (ends, _))| (ends[1] - ends[0]).norm() > SHORTEST_M)
+        .map(|(link, (ends, arm_from_link))| {
+            let radius_m = RADII_M[0] + (RADII_M[1] - RADII_M[0]) * link as f64 / count as f64;
+            let [from, to] = [ends[0], ends[1]].map(|end| arm_from_link.inverse_transform_point(&end));
+            LinkCapsule { link, from, to, radius_m }
         })
         .collect()
 }
 
-/// What each link, counted from the base, has moved in the arm frame since all joints were at zero; `None` for values
-/// that are not those of the arm.
-pub fn motions(arm: &Arm, joints: &[f64]) -> Option<Vec<Isometry3<f64>>> {
-    let bare = arm.clone().mounted(Isometry3::identity(), arm.flange_from_tip);
-    let (now, at_zero) = (Placed::of(&bare, joints)?, Placed::of(&bare, &vec![0.0; bare.joint_count()])?);
-    Some(now.links.iter().zip(&at_zero.links).map(|(now, zero)| now * zero.inverse()).collect())
-}
-
-/// Where links are, and the places along the chain between which they reach, in the arm frame.
-struct Placed {
-    links: Vec<Isometry3<f64>>,
-    places: Vec<Point3<f64>>,
-}
-
-impl Placed {
-    fn of(arm: &Arm, joints: &[f64]) -> Option<Self> {
-        let frames = arm.frames(joints).ok()?;
-        let origin = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
-        let tip = frames.base_from_flange * arm.flange_from_tip;
-        let joints = frames.base_from_joint.iter().map(origin);
-        let places = std::iter::once(Point3::origin()).chain(joints).chain([origin(&tip)]).collect();
-        let links = std::iter::once(Isometry3::identity()).chain(frames.base_from_link).collect();
-        Some(Self { links, places })
-    }
+/// Where the links are, counted from the base, which does not move.
+pub fn arm_from_links(frames: &ArmFrames) -> impl Iterator<Item = Isometry3<f64>> {
+    std::iter::once(Isometry3::identity()).chain(frames.base_from_link.iter().copied())
 }

@@ -102,10 +102,10 @@ impl Arm {
                 Filled { moving: body.moving().to_vec(), touches_itself: body.touches_itself() }
             }
             ArmBody::Links(capsules) => {
-                let moved = links::motions(&self.chain, joints)?;
+                let arm_from_links: Vec<Isometry3<f64>> = links::arm_from_links(&frames).collect();
                 let links = capsules.iter().map(|link| {
-                    let motion = moved.get(link.link)?;
-                    let capsule = Capsule { from: motion * link.from, to: motion * link.to, radius_m: link.radius_m };
+                    let at = arm_from_links.get(link.link)?;
+                    let capsule = Capsule { from: at * link.from, to: at * link.to, radius_m: link.radius_m };
                     Some((link.link, capsule))
                 });
                 let hand = self.hand(&arm_from_connection);

@@ -93,11 +93,13 @@ pub fn arm_parts(model: &ArmSpec, arm: &Arm) -> Vec<(usize, Solid)> {
     if model.kind() == Some(ArmKind::Ur5Coppeliasim) {
         return ur5_parts().collect();
     }
+    let at_zero = arm.frames(&vec![0.0; arm.joint_count()]);
+    let arm_from_links: Vec<_> = at_zero.iter().flat_map(links::arm_from_links).collect();
     let tube = |(index, link): (usize, links::LinkCapsule)| {
         let shape = Shape::Capsule { a: link.from, b: link.to, radius: link.radius_m };
         // Two tones by turns, so that the joints are seen.
         let colour = [GRAPHITE, ALUMINIUM][index % 2];
-        (link.link, Solid::new(shape, Isometry3::identity(), colour).with_finish(Finish::Satin))
+        (link.link, Solid::new(shape, arm_from_links[link.link], colour).with_finish(Finish::Satin))
     };
     links::capsules(arm).into_iter().enumerate().map(tube).collect()
 }
