@@ -119,7 +119,7 @@ impl Arm {
         options: &DlsOptions,
     ) -> Result<Vec<f64>, ArmError> {
         self.check(near)?;
-        Ok(self.towards_within(base_from_tip.isometry(), near, options, &self.ranges()))
+        Ok(damped::towards(self, base_from_tip.isometry(), near, options, &self.ranges()))
     }
 
     /// As [`Self::towards`]; `None` when the pose is not within the precision of the options after the last iteration.
@@ -135,17 +135,6 @@ impl Arm {
         let joints = self.towards(base_from_tip, near, options)?;
         let error = pose_error(&self.tip(&joints), base_from_tip.isometry());
         Ok(is_within(&error, options.precision_m, options.precision_rad).then_some(joints))
-    }
-
-    /// As [`Self::towards`], with other ranges and without checks.
-    pub(super) fn towards_within(
-        &self,
-        goal: &Isometry3<f64>,
-        near: &[f64],
-        options: &DlsOptions,
-        ranges: &[JointRange],
-    ) -> Vec<f64> {
-        damped::towards(self, goal, near, options, ranges)
     }
 
     /// Where the tip is; there must be a value for every joint.

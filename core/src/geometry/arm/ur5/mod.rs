@@ -12,7 +12,7 @@
 
 use std::sync::LazyLock;
 
-use nalgebra::{Isometry3, Matrix6, Translation3};
+use nalgebra::Isometry3;
 
 use super::{Arm, ArmKind, JointRange};
 
@@ -93,18 +93,6 @@ pub fn forward(joints: &JointAngles) -> ArmPose {
     ArmPose { arm_from_joint, arm_from_link, arm_from_connection: arm_from_flange * ARM.flange_from_tip }
 }
 
-/// [`Arm::jacobian`] at the connection.
-pub fn jacobian(joints: &JointAngles) -> Matrix6<f64> {
-    jacobian_at(joints, &Isometry3::identity())
-}
-
-/// [`jacobian`] at the origin of a tool frame that is fixed to the connection.
-pub fn jacobian_at(joints: &JointAngles, connection_from_tip: &Isometry3<f64>) -> Matrix6<f64> {
-    let (axes, arm_from_flange) = ARM.axes(joints);
-    let tip = arm_from_flange * ARM.flange_from_tip * Translation3::from(connection_from_tip.translation.vector);
-    Matrix6::from_columns(&axes.iter().map(|axis| axis.velocity(&tip.translation.vector)).collect::<Vec<_>>())
-}
-
 /// [`Arm::configurations`]: all that put the connection at `arm_from_connection`, up to eight.
 pub fn inverse_all(arm_from_connection: &Isometry3<f64>) -> Vec<JointAngles> {
     ARM.ur.map(|ur| ur.all(&ARM, arm_from_connection)).unwrap_or_default()
@@ -125,20 +113,6 @@ pub fn inverse_nearest(
         return Err(IkError::NotFinite);
     }
     ur.nearest(&ARM, arm_from_connection, seed, &limits.ranges())
-}
-
-/// [`Arm::towards`] for a tool that is fixed to the connection, with limits of its own: where the iterations end, which is
-/// near the place that is nearest to the goal.
-pub fn towards(
-    arm_from_tip_goal: &Isometry3<f64>,
-    connection_from_tip: &Isometry3<f64>,
-    seed: &JointAngles,
-    options: &DlsOptions,
-    limits: &JointLimits,
-) -> JointAngles {
-    let arm = ARM.clone().mounted(ARM.base_from_first, ARM.flange_from_tip * connection_from_tip);
-    let found = arm.towards_within(arm_from_tip_goal, seed, options, &limits.ranges());
-    std::array::from_fn(|i| found[i])
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 use super::*;
 use crate::geometry::arm::inverse::{pose_error, wrap};
 use crate::geometry::frames::Pose;
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -25,6 +25,16 @@ fn descend(
     let arm = ARM.clone().mounted(ARM.base_from_first, ARM.flange_from_tip * tool);
     let found = arm.descend(&Pose::from_isometry(*goal), seed, options).unwrap();
     found.map(|joints| JointAngles::try_from(joints).unwrap())
+}
+
+/// Velocity of the origin of a tool on the connection, and rate of turn, by the velocity of each joint.
+fn jacobian_at(joints: &JointAngles, tool: &Isometry3<f64>) -> Matrix6<f64> {
+    let arm = ARM.clone().mounted(ARM.base_from_first, ARM.flange_from_tip * tool);
+    arm.jacobian(joints).unwrap().fixed_columns::<6>(0).into_owned()
+}
+
+fn jacobian(joints: &JointAngles) -> Matrix6<f64> {
+    jacobian_at(joints, &Isometry3::identity())
 }
 
 fn any_joints() -> impl Strategy<Value = JointAngles> {
