@@ -8,14 +8,11 @@ use super::{
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::consensus;
-use crate::estimate::handeye::pose_graph::{self, PoseGraphSolution};
+use crate::estimate::handeye::pose_graph::{self, METHOD, PoseGraphSolution, misfit};
 use crate::estimate::handeye::screening::{Distance, Estimator, Fit, Judged, screened};
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, scale};
 use crate::progress::{CancelToken, Work};
 use crate::targets::bent::BoardShape;
-
-/// Name of the method in errors.
-const METHOD: &str = "the pose graph";
 
 pub fn calibrate(
     observations: &Observations,
@@ -109,8 +106,8 @@ impl Begin {
         }
         let methods = &calibration.methods;
         let candidates: Vec<_> = methods.iter().filter_map(|m| m.outcome.clone().ok()).collect();
-        let misfit = |solution: &ClosedFormSolution, view: usize, _| scale::misfit(&pairs[view], solution, 1.0);
-        let found = consensus(pairs, &candidates, None, misfit).ok_or_else(|| {
+        let of_view = |solution: &ClosedFormSolution, view: usize, _| misfit(&pairs[view], solution, 1.0);
+        let found = consensus(pairs, &candidates, None, of_view).ok_or_else(|| {
             let first = methods.iter().find_map(|m| m.outcome.clone().err());
             first.unwrap_or_else(|| none("no closed form gave a finite answer"))
         })?;
@@ -132,8 +129,8 @@ fn estimate(
         let judged = estimator.judge(&solution, &kept)?;
         return Ok(Fit { solution, kept, judged });
     }
-    let misfit = |pair| scale::misfit(pair, &begin.solution, begin.scale.unwrap_or(1.0));
-    screened(&estimator, &pairs.iter().map(misfit).collect::<Vec<_>>())
+    let of_pair = |pair| misfit(pair, &begin.solution, begin.scale.unwrap_or(1.0));
+    screened(&estimator, &pairs.iter().map(of_pair).collect::<Vec<_>>())
 }
 
 struct OfPairs<'a> {

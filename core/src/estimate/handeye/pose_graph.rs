@@ -90,7 +90,7 @@ const STEP_TOLERANCE: f64 = 1e-10;
 const UNKNOWNS: usize = 13;
 const SCALE_AT: usize = 12;
 /// Name of the method in errors.
-const METHOD: &str = "the pose graph";
+pub(crate) const METHOD: &str = "the pose graph";
 /// Floor of the levels, so that exact data do not divide by zero.
 const LEVEL_FLOOR: f64 = 1e-12;
 
@@ -200,6 +200,13 @@ fn refine_with(
 
 fn predict(pair: &PosePair, x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>) -> Pose<Camera, Target> {
     x.inverse() * pair.anchor_from_mount.inverse() * *y
+}
+
+/// How far a pair, its target pose `scale` times as far away as stated, is from where a solution puts it; a radian counts as a
+/// metre.
+pub(crate) fn misfit(pair: &PosePair, solution: &ClosedFormSolution, scale: f64) -> f64 {
+    let predicted = predict(pair, &solution.mount_from_camera, &solution.anchor_from_target);
+    residual(&scaled(&pair.camera_from_target, scale), &predicted).norm()
 }
 
 fn residual(seen: &Pose<Camera, Target>, predicted: &Pose<Camera, Target>) -> Vector6<f64> {

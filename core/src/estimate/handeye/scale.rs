@@ -15,10 +15,9 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::closed_form::{ClosedForm as _, ClosedFormSolution, ParkMartin};
 use super::draw::Draw;
-use super::pose_graph::scaled;
+use super::pose_graph::misfit;
 use super::{PosePair, subset};
 use crate::geometry::frames::Pose;
-use crate::geometry::se3;
 
 /// Sets that are tried, and views in each: with three in ten views wrong one set in eight is clean.
 const TRIALS: usize = 60;
@@ -76,11 +75,4 @@ fn disagreement(pairs: &[PosePair], (solution, scale): &(ClosedFormSolution, f64
     each.sort_by(f64::total_cmp);
     let agreeing = (AGREEING * each.len() as f64).ceil() as usize;
     each[..agreeing.min(each.len())].iter().sum()
-}
-
-/// How far a pair is from where a solution puts it, a radian counted as a metre.
-pub fn misfit(pair: &PosePair, solution: &ClosedFormSolution, scale: f64) -> f64 {
-    let predicted =
-        solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
-    se3::log((scaled(&pair.camera_from_target, scale).inverse() * predicted).isometry()).norm()
 }
