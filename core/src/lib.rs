@@ -75,6 +75,7 @@ pub mod diagnose;
 pub mod estimate;
 pub mod geometry;
 pub(crate) mod natural_order;
+pub mod plan;
 pub mod progress;
 pub mod project;
 pub mod targets;

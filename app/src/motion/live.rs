@@ -1,6 +1,6 @@
 //! The arm of a cell over the remote API, as the motion worker drives it.
 
-use handeye_sim_link::cell::planning::PlanError;
+use handeye_core::plan::PlanError;
 use handeye_sim_link::client::cell::{
     Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes,
     JogEnd, JogObstacle, JointAngles, MotionTolerance, SettleOptions, UnknownKinematics,

@@ -1,8 +1,6 @@
 //! The built-in simulated cell: an arm with an RGB-D camera and a board, served over the ZeroMQ remote API.
 
-pub mod links;
 pub mod motion;
-pub mod planning;
 pub mod recorded;
 pub mod render;
 pub mod scene;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use handeye_core::plan::{ViewOptions, ViewSetup, poses_looking_at};
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
-use handeye_sim_link::cell::planning::{ViewOptions, ViewSetup, poses_looking_at};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::MotionLimits;
 
@@ -66,7 +66,7 @@ impl Plan {
         let seed = seed.unwrap_or(scene.seed);
         let resolved = meant.resolve(seed).map_err(Failure::unusable)?;
         let options = ViewOptions { count: PLANNED_VIEWS, seed, ..ViewOptions::default() };
-        let views = poses_looking_at(&ViewSetup::of(&resolved), &options).map_err(Failure::failed)?;
+        let views = poses_looking_at(&ViewSetup::from(&resolved), &options).map_err(Failure::failed)?;
         Ok(Self {
             start_joints: Some(six(&resolved.start_joints)?),
             goals: views

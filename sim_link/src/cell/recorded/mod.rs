@@ -20,8 +20,8 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::planning::{PlanError, PlannedView, ViewOptions, ViewSetup, random_poses_looking_at};
 use super::scene::{ResolvedScene, Scene, SceneError};
+use handeye_core::plan::{PlanError, PlannedView, ViewOptions, ViewSetup, random_poses_looking_at};
 
 pub use fault::{Fault, UnknownFault};
 
@@ -135,7 +135,7 @@ pub fn record(scene: &Scene, options: &SessionOptions) -> Result<RecordedSession
         fault.change_scene(&mut faulty);
     }
     let truth = faulty.resolve(seed)?;
-    let planned = random_poses_looking_at(&ViewSetup::of(&truth), &ViewOptions { count, seed, ..look })?;
+    let planned = random_poses_looking_at(&ViewSetup::from(&truth), &ViewOptions { count, seed, ..look })?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(CORNER_STREAM);
     let mut views = Vec::with_capacity(count);

@@ -12,6 +12,7 @@ mod errors_of_robot;
 mod locate;
 mod resolved;
 mod spec;
+mod view_setup;
 
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 use super::*;
 use crate::axes::sensor_from_camera;
 use crate::cell::motion::Course;
-use crate::cell::planning::ViewSetup;
 use handeye_core::geometry::arm::{ArmKind, JointValues};
 use handeye_core::geometry::frames::{Base, PointIn, Pose, Tip};
+use handeye_core::plan::ViewSetup;
 use nalgebra::{Point3, Vector2, Vector3};
 
 /// World poses of the tip that the public script drives to, `[x y z qx qy qz qw]`; it lists one of them twice.
@@ -152,7 +152,7 @@ fn the_realistic_scene_shows_the_whole_board_from_every_taught_pose_whatever_the
 #[test]
 fn the_arm_reaches_every_taught_pose_in_one_configuration_and_touches_nothing() {
     let scene = reference();
-    let setup = ViewSetup::of(&scene);
+    let setup = ViewSetup::from(&scene);
     let mut joints = scene.start_joints;
     for index in 0..TAUGHT.len() {
         let arm_from_connection =

@@ -12,8 +12,8 @@ use super::JointAngles;
 use super::jog_plan::nearest;
 use super::reach::ArmKinematics;
 use super::views::BoardInView;
-use crate::cell::planning::{self, PlannedView, ViewOptions};
 use crate::client::cell::follow_goal::FollowLimits;
+use handeye_core::plan::{self as planning, PlannedView, ViewOptions};
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.

@@ -158,7 +158,7 @@ fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
         assert!(inside(px.x, board.intrinsics.width) && inside(px.y, board.intrinsics.height), "{px}");
     }
     // By the planner's own knowledge of the scene, which has a floor and a plate as well.
-    let setup = planning::ViewSetup::of(&scene);
+    let setup = planning::ViewSetup::from(&scene);
     assert!(setup.path_is_free(sequence.last().expect("ten poses"), &place.joints, 0.01));
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Translation3};
 
 use super::JointAngles;
 use super::reach::ArmKinematics;
-use crate::cell::planning::{self, Obstacle, PlanError, ViewOptions, ViewSetup};
+use handeye_core::plan::{self as planning, Obstacle, PlanError, ViewOptions, ViewSetup};
 
 /// How far below its frame the arm is mounted \[m\]. What it stands on is taken for a table.
 const TABLE_BELOW_ARM_M: f64 = 0.0147;

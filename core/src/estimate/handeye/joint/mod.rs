@@ -26,6 +26,7 @@
 
 pub(crate) mod chain;
 mod curvature;
+mod expected_view;
 pub(crate) mod field;
 mod information;
 mod integrated;
@@ -58,6 +59,7 @@ use crate::progress::{CancelToken, Stage, Work};
 use crate::targets::observation::Corner;
 
 pub use chain::{MAX_JOINTS, base_from_tip_by_joints, camera_from_target};
+pub use expected_view::{ExpectedView, ViewModel};
 pub use field::{RobotField, corrected_base_from_tip};
 pub use integrated::SmallSample;
 pub use weights::CornerWeights;

@@ -6,10 +6,10 @@ use handeye_core::geometry::arm::{JointKind, JointValues};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 
 use super::*;
-use crate::cell::planning::{ViewOptions, ViewSetup, poses_looking_at};
 use crate::cell::recorded::{SessionOptions, record};
 use crate::cell::render::Shape;
 use crate::cell::world::Chain;
+use handeye_core::plan::{ViewOptions, ViewSetup, poses_looking_at};
 
 const JOINT_REVOLUTE: i64 = 10;
 const JOINT_PRISMATIC: i64 = 11;
@@ -206,7 +206,7 @@ fn views_of_the_board_are_found_for_the_arms_of_shipped_scenes_and_a_session_wit
             let px = truth.intrinsics.project(&(start.isometry() * point)).expect("in front");
             assert!(truth.intrinsics.contains(&px), "{name}: at the start the board is at {px}");
         }
-        let views = poses_looking_at(&ViewSetup::of(&truth), &ViewOptions::default());
+        let views = poses_looking_at(&ViewSetup::from(&truth), &ViewOptions::default());
         for view in views.unwrap_or_else(|error| panic!("{name}: {error}")) {
             assert_eq!(truth.arm.first_violation(&view.joints), None, "{name}");
             let (distance_m, angle_rad) =
@@ -230,7 +230,7 @@ fn views_of_the_board_are_found_for_the_arms_of_shipped_scenes_and_a_session_wit
 #[test]
 fn an_arm_that_is_folded_into_itself_or_lies_on_the_floor_is_in_the_way() {
     let truth = shipped("panda.toml").resolve(1).expect("valid");
-    let setup = ViewSetup::of(&truth);
+    let setup = ViewSetup::from(&truth);
     let is_free = |joints_deg: [f64; 7]| setup.arm.is_free(&joints_deg.map(f64::to_radians), &setup.obstacles, 0.02);
     assert!(is_free([0.0, -40.0, 0.0, -130.0, 0.0, 90.0, 45.0]));
     assert!(is_free([0.0, 0.0, 0.0, -90.0, 0.0, 90.0, 0.0]));

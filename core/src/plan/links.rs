@@ -4,7 +4,7 @@
 //! joint sits to where the next one does, or its shortest way around: an arm that runs beside its axes, as those of
 //! Universal Robots do, is thicker and to one side of that. Of a prismatic joint the rail is not there.
 
-use handeye_core::geometry::arm::{Arm, ArmFrames};
+use crate::geometry::arm::{Arm, ArmFrames};
 use nalgebra::{Isometry3, Point3};
 
 /// Radius of the link at the base and of the one at the tip, metres: those of arms for some kilograms.

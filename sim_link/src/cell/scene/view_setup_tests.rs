@@ -1,10 +1,14 @@
+use handeye_core::geometry::arm::JointValues;
+use handeye_core::plan::{PlanError, PlannedView, ViewOptions, order_by_travel, poses_looking_at, travel};
+use nalgebra::{Isometry3, Point3};
+
 use super::*;
 use crate::cell::motion::{JointMotion, MotionLimits, MotionState, Sync};
 use crate::cell::scene::Scene;
 use handeye_core::geometry::frames::PointIn;
 
 fn setup(scene: &Scene) -> ViewSetup {
-    ViewSetup::of(&scene.resolve(scene.seed).unwrap())
+    ViewSetup::from(&scene.resolve(scene.seed).unwrap())
 }
 
 fn scenes() -> [ViewSetup; 2] {
@@ -46,7 +50,7 @@ fn every_view_shows_the_whole_board_from_its_front_and_from_the_distance_asked_f
 #[test]
 fn joints_and_pose_of_a_view_agree_and_keep_the_limits() {
     let scene = Scene::realistic().unwrap().resolve(5).unwrap();
-    let setup = ViewSetup::of(&scene);
+    let setup = ViewSetup::from(&scene);
     for view in poses_looking_at(&setup, &ViewOptions::default()).unwrap() {
         let (distance_m, angle_rad) = scene.reported_tip(&view.joints).unwrap().distance_to(&view.base_from_tip);
         assert!(distance_m < 1e-9 && angle_rad < 1e-9);

@@ -1,17 +1,14 @@
 //! Poses from which to look at a board: reachable, safe to drive between, and as different as possible.
 
-mod clearance;
-
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::targets::TargetSpec;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::scene::ResolvedScene;
-pub use clearance::{Arm, ArmBody, Obstacle};
-use handeye_core::geometry::arm::{ArmKind, JointValues};
+use super::clearance::{Arm, Obstacle};
+use crate::geometry::arm::JointValues;
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::targets::TargetSpec;
 
 /// Largest joint step between two checks of a path: a tool 1 m away moves by 5 cm, half the size of a link.
 const PATH_STEP_RAD: f64 = 0.05;
@@ -34,35 +31,6 @@ pub struct ViewSetup {
     pub start_joints: JointValues,
     /// What the arm must not touch.
     pub obstacles: Vec<Obstacle>,
-}
-
-impl ViewSetup {
-    /// A simulated cell as it truly is.
-    pub fn of(scene: &ResolvedScene) -> Self {
-        let sheet = Obstacle {
-            world_from_centre: scene.world_from_plane * Translation3::new(0.0, 0.0, -0.001),
-            size_m: [scene.paper_m[0], scene.paper_m[1], 0.002],
-        };
-        let solids = scene.solids.iter().map(|s| Obstacle { world_from_centre: s.world_from_solid, size_m: s.size_m });
-        Self {
-            base_from_target: scene.base_from_target,
-            target: scene.target,
-            intrinsics: scene.intrinsics,
-            tip_from_camera: scene.tip_from_camera,
-            arm: Arm {
-                chain: scene.arm.clone(),
-                body: match scene.arm_model.kind() {
-                    Some(ArmKind::Ur5Coppeliasim) => ArmBody::Ur5,
-                    _ => ArmBody::of(&scene.arm),
-                },
-                world_from_arm: scene.world_from_arm,
-                connection_from_tip: scene.connection_from_tip,
-                tip_from_camera: *scene.tip_from_camera.isometry(),
-            },
-            start_joints: scene.start_joints,
-            obstacles: std::iter::once(sheet).chain(solids).collect(),
-        }
-    }
 }
 
 /// What kind of views are wanted.
@@ -277,7 +245,8 @@ impl ViewSetup {
         JointValues::try_from(&found[..]).ok()
     }
 
-    fn is_free(&self, joints: &[f64], clearance_m: f64) -> bool {
+    /// Whether the arm touches neither itself nor anything else there.
+    pub fn is_free(&self, joints: &[f64], clearance_m: f64) -> bool {
         self.arm.is_free(joints, &self.obstacles, clearance_m)
     }
 
@@ -372,7 +341,3 @@ fn choose(
     }
     (chosen, no_path)
 }
-
-#[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-mod tests;

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::cell::links::{self, LinkCapsule};
-use handeye_core::geometry::arm::{self, ArmFrames};
+use super::links::{self, LinkCapsule};
+use crate::geometry::arm::{self, ArmFrames};
 
 /// How far the upper arm runs beside the plane through the shoulder, along the shoulder axis.
 const UPPER_ARM_BESIDE_M: f64 = 0.136;
@@ -245,9 +245,8 @@ fn segment_distance(first: [Point3<f64>; 2], second: [Point3<f64>; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::geometry::arm::ArmKind;
-
     use super::*;
+    use crate::geometry::arm::ArmKind;
 
     #[test]
     fn distances_of_segments_agree_with_a_dense_search() {

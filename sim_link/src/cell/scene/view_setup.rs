@@ -1,0 +1,41 @@
+//! What the planner of views has to know, of a simulated cell.
+
+use handeye_core::geometry::arm::ArmKind;
+use handeye_core::plan::{Arm, ArmBody, Obstacle, ViewSetup};
+use nalgebra::Translation3;
+
+use super::ResolvedScene;
+
+impl From<&ResolvedScene> for ViewSetup {
+    /// A simulated cell as it truly is.
+    fn from(scene: &ResolvedScene) -> Self {
+        let sheet = Obstacle {
+            world_from_centre: scene.world_from_plane * Translation3::new(0.0, 0.0, -0.001),
+            size_m: [scene.paper_m[0], scene.paper_m[1], 0.002],
+        };
+        let solids = scene.solids.iter().map(|s| Obstacle { world_from_centre: s.world_from_solid, size_m: s.size_m });
+        Self {
+            base_from_target: scene.base_from_target,
+            target: scene.target,
+            intrinsics: scene.intrinsics,
+            tip_from_camera: scene.tip_from_camera,
+            arm: Arm {
+                chain: scene.arm.clone(),
+                body: match scene.arm_model.kind() {
+                    Some(ArmKind::Ur5Coppeliasim) => ArmBody::Ur5,
+                    _ => ArmBody::of(&scene.arm),
+                },
+                world_from_arm: scene.world_from_arm,
+                connection_from_tip: scene.connection_from_tip,
+                tip_from_camera: *scene.tip_from_camera.isometry(),
+            },
+            start_joints: scene.start_joints,
+            obstacles: std::iter::once(sheet).chain(solids).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[path = "view_setup_tests.rs"]
+mod tests;
