@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::links::{self, LinkCapsule};
-use crate::geometry::arm::{self, ArmFrames};
+use crate::geometry::arm::{self, ArmFrames, JointValues};
+use crate::geometry::frames::{Base, Pose, Tip};
 
 /// How far the upper arm runs beside the plane through the shoulder, along the shoulder axis.
 const UPPER_ARM_BESIDE_M: f64 = 0.136;
@@ -13,6 +14,14 @@ const FOREARM_BESIDE_M: f64 = 0.016;
 const SAMPLE_M: f64 = 0.03;
 /// Gap that the arm keeps from itself.
 const SELF_CLEARANCE_M: f64 = 0.01;
+
+/// Largest joint step between two checks of a path: a tool 1 m away moves by 5 cm, half the size of a link.
+const PATH_STEP_RAD: f64 = 0.05;
+
+/// Largest joint movement, radians; a metre of a prismatic joint counts as much as a radian.
+pub fn travel(from: &[f64], to: &[f64]) -> f64 {
+    from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
 
 /// How the links of an arm fill the room around its axes.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,6 +100,30 @@ impl Arm {
             let centre_from_arm = obstacle.world_from_centre.inverse() * self.world_from_arm;
             moving.iter().all(|capsule| capsule.distance_to_box(&centre_from_arm, &obstacle.size_m) >= clearance_m)
         })
+    }
+
+    /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
+    pub fn path_is_free(&self, from: &[f64], to: &[f64], obstacles: &[Obstacle], clearance_m: f64) -> bool {
+        let steps = (travel(from, to) / PATH_STEP_RAD).ceil().max(1.0) as usize;
+        (1..steps).all(|step| {
+            let part = step as f64 / steps as f64;
+            let joints: Vec<f64> = from.iter().zip(to).map(|(from, to)| from + part * (to - from)).collect();
+            self.is_free(&joints, obstacles, clearance_m)
+        })
+    }
+
+    /// The joint values nearest to `seed` that put the tip there, within the ranges of the joints.
+    pub fn reach(&self, base_from_tip: &Pose<Base, Tip>, seed: &[f64]) -> Option<JointValues> {
+        let arm_from_connection =
+            self.world_from_arm.inverse() * base_from_tip.isometry() * self.connection_from_tip.inverse();
+        let found = self.chain.inverse(&Pose::from_isometry(arm_from_connection), seed).ok()?;
+        JointValues::try_from(&found[..]).ok()
+    }
+
+    /// Where the tip is with these joint values; `None` for values that are not those of the arm.
+    pub fn tip(&self, joints: &[f64]) -> Option<Pose<Base, Tip>> {
+        let arm_from_connection = *self.chain.forward(joints).ok()?.isometry();
+        Some(Pose::from_isometry(self.world_from_arm * arm_from_connection * self.connection_from_tip))
     }
 
     fn filled(&self, joints: &[f64]) -> Option<Filled> {

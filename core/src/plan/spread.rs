@@ -4,14 +4,11 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::clearance::{Arm, Obstacle};
+use super::clearance::{Arm, Obstacle, travel};
 use crate::geometry::arm::JointValues;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::targets::TargetSpec;
-
-/// Largest joint step between two checks of a path: a tool 1 m away moves by 5 cm, half the size of a link.
-const PATH_STEP_RAD: f64 = 0.05;
 
 /// What the planner knows of a cell. Being a centimetre or a few degrees off costs nothing but margin, so estimates and
 /// drawings do.
@@ -239,10 +236,7 @@ pub fn order_by_travel(start: &[f64], views: &mut [PlannedView]) {
 
 impl ViewSetup {
     fn reach(&self, base_from_tip: &Pose<Base, Tip>) -> Option<JointValues> {
-        let arm_from_connection =
-            self.arm.world_from_arm.inverse() * base_from_tip.isometry() * self.arm.connection_from_tip.inverse();
-        let found = self.arm.chain.inverse(&Pose::from_isometry(arm_from_connection), &self.start_joints).ok()?;
-        JointValues::try_from(&found[..]).ok()
+        self.arm.reach(base_from_tip, &self.start_joints)
     }
 
     /// Whether the arm touches neither itself nor anything else there.
@@ -252,18 +246,8 @@ impl ViewSetup {
 
     /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
     pub fn path_is_free(&self, from: &[f64], to: &[f64], clearance_m: f64) -> bool {
-        let steps = (travel(from, to) / PATH_STEP_RAD).ceil().max(1.0) as usize;
-        (1..steps).all(|step| {
-            let part = step as f64 / steps as f64;
-            let joints: Vec<f64> = from.iter().zip(to).map(|(from, to)| from + part * (to - from)).collect();
-            self.is_free(&joints, clearance_m)
-        })
+        self.arm.path_is_free(from, to, &self.obstacles, clearance_m)
     }
-}
-
-/// Largest joint movement, radians; a metre of a prismatic joint counts as much as a radian.
-pub fn travel(from: &[f64], to: &[f64]) -> f64 {
-    from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 fn draw(setup: &ViewSetup, options: &ViewOptions, rng: &mut ChaCha8Rng) -> Pose<Target, Camera> {

@@ -1,0 +1,80 @@
+//! The first few poses, from one view of the board, when nothing is known of where the camera sits: turns of the tip about
+//! its own axes, so small that the board stays in the image and the arm hardly moves.
+//!
+//! A turn of the tip by an angle turns what is fixed to it by the same angle. It shifts the image by about the focal length
+//! times that angle and by the lever between tip and camera (or board), which is taken to be no longer than the board is
+//! away. Turns about two axes are what a first estimate needs.
+
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
+
+use crate::geometry::frames::{Base, Pose, Tip};
+
+/// Largest turn: more than ten times what corners and robot err by, and a camera a hand's breadth from the tip moves by
+/// less than 3 cm.
+const LARGEST_RAD: f64 = 14.0 * std::f64::consts::PI / 180.0;
+/// Least turn that is worth a capture.
+const LEAST_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
+/// Part of the room in the image that a turn may use: the lever may use as much again.
+const PART: f64 = 0.45;
+/// Axes of the tip in the order in which it is turned about them.
+const TURNS: [[f64; 3]; 8] = [
+    [1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [0.7, 0.7, 0.5],
+    [-0.7, -0.7, -0.5],
+];
+
+/// How far the tip may be turned so that corners which are there now stay in the image, radians, for a focal length in
+/// pixels.
+pub fn free_turn_rad(corners_px: impl Iterator<Item = Vector2<f64>>, image_size: (u32, u32), focal_px: f64) -> f64 {
+    let (width, height) = (f64::from(image_size.0), f64::from(image_size.1));
+    let room_px = corners_px
+        .map(|px| px.x.min(px.y).min(width - 1.0 - px.x).min(height - 1.0 - px.y))
+        .fold(f64::INFINITY, f64::min);
+    (PART * room_px.max(0.0) / focal_px).clamp(LEAST_RAD, LARGEST_RAD)
+}
+
+/// Pose `index` of the fan about a tip pose, with turns of `turn_rad`; after the last one it begins anew with turns twice
+/// as small, because what has been tried did not show the board.
+pub fn pose(about: &Pose<Base, Tip>, index: usize, turn_rad: f64) -> Pose<Base, Tip> {
+    let axis = Vector3::from(TURNS[index % TURNS.len()]);
+    let halved = 0.5_f64.powi((index / TURNS.len()) as i32);
+    let turn = UnitQuaternion::from_scaled_axis(axis * (turn_rad * halved));
+    let mut turned = *about.isometry();
+    turned.rotation *= turn;
+    Pose::from_isometry(turned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_that_nearly_fills_the_image_is_turned_less_than_a_small_one_in_its_middle() {
+        let around = |half: f64| {
+            [[-1.0, -1.0], [1.0, 1.0]].into_iter().map(move |[x, y]| Vector2::new(320.0 + half * x, 240.0 + half * y))
+        };
+        let turn = |half| free_turn_rad(around(half), (640, 480), 600.0);
+        assert!(turn(200.0) < 0.5 * turn(100.0));
+        assert!(turn(239.0) >= LEAST_RAD && turn(10.0) <= LARGEST_RAD);
+        // What it uses of the room is less than half of it.
+        assert!(turn(200.0) * 600.0 < 0.5 * 40.0);
+    }
+
+    #[test]
+    fn the_tip_stays_where_it_is_and_turns_about_two_axes_first() {
+        let about: Pose<Base, Tip> =
+            Pose::from_isometry(crate::geometry::se3::exp(&nalgebra::Vector6::new(0.3, 0.1, 0.5, 0.2, 1.0, 0.4)));
+        let turn = |index| {
+            let pose = pose(&about, index, 0.2);
+            assert!((pose.translation() - about.translation()).norm() < 1e-12);
+            (about.rotation().inverse() * pose.rotation()).scaled_axis()
+        };
+        assert!(turn(0).normalize().dot(&turn(1).normalize()).abs() < 0.1);
+        assert!((turn(0).norm() - 0.2).abs() < 1e-12 && (turn(8).norm() - 0.1).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,433 @@
+//! Calibration that chooses its own poses: from one view of the board to the accuracy that was asked for.
+//!
+//! # How
+//! Before there is a first estimate the tip is turned a little about its own axes ([`fan`]). From then on every view is the
+//! one of many possible ones that lowers the expected error of the tip over a box most, per second of travel ([`choose`]),
+//! by the same information matrix as the estimate ([`ViewModel`]). A view is possible where the whole board is in the image
+//! in spite of what is not known yet, so moves are small at first and grow with what is known.
+//!
+//! # When it ends
+//! See [`Ending`]. The error is that of the calibration, at the upper 80 % limit of its noise levels: an end that waits for
+//! a small estimate prefers estimates that happen to be small.
+//!
+//! # Degenerate cases
+//! A session whose views determine nothing goes on with the fan. Joint offsets of the robot, where they are estimated, are
+//! not among what a view is expected to tell.
+
+pub mod candidates;
+pub mod choose;
+pub mod design;
+pub mod fan;
+
+use nalgebra::{Point3, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use crate::estimate::handeye::HandEye;
+use crate::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
+use crate::estimate::{Calibration, CameraKnowledge, Observations, ViewStatus};
+use crate::geometry::frames::{Base, Pose, Tip};
+use crate::geometry::point_error;
+use crate::progress::CancelToken;
+use candidates::ViewRange;
+use choose::{ChooseOptions, Chooser, Plan, Proposal, Robot};
+use design::Design;
+
+/// Views from which on an end is possible: with fewer the noise levels are hardly known.
+pub const LEAST_VIEWS: usize = 8;
+/// Gain of the best view \[part of the error\] below which more views are not worth their time.
+pub const LEAST_GAIN: f64 = 0.03;
+/// Solves in a row in which the error has to be below the goal.
+const IN_A_ROW: usize = 2;
+/// Probability that the noise levels are below what the end is judged by.
+const LEVEL_SURE: f64 = 0.8;
+/// How far the tip turns from the nearest view so far, per view there is: a first estimate from small turns is not trusted
+/// with large ones. From six views on there is no limit.
+const TURN_PER_VIEW_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+/// Views with a limit of that.
+const CAREFUL_VIEWS: usize = 6;
+/// Poses of the fan that are tried before it is given up.
+const MOST_FAN: usize = 24;
+/// Noise levels below which a plan does not reckon: an estimate from few views may be nothing.
+const LEAST_NOISE: Noise = Noise { corner_px: 0.02, robot_m: 2e-5, robot_rad: 5e-5, ..Noise::EXACT };
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GuidedOptions {
+    /// The 95 % error that is to be reached, metres.
+    pub goal_m: f64,
+    /// Views at the most.
+    pub most_views: usize,
+    /// Time at the most, seconds.
+    pub most_s: f64,
+    /// Views that are compared at every step.
+    pub candidates: usize,
+    /// Views that are planned ahead.
+    pub ahead: usize,
+    /// What a capture takes after the arm has arrived, seconds.
+    pub dwell_s: f64,
+    /// Nearest and farthest distance \[m\] from which the board is looked at; `None` for about what has been.
+    pub distance_m: Option<[f64; 2]>,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl Default for GuidedOptions {
+    fn default() -> Self {
+        Self {
+            goal_m: 3e-4,
+            most_views: 40,
+            most_s: f64::INFINITY,
+            candidates: 1000,
+            ahead: 6,
+            dwell_s: 1.5,
+            distance_m: None,
+            seed: 1,
+        }
+    }
+}
+
+/// What is known when the next pose is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Known<'a> {
+    /// All views so far.
+    pub observations: &'a Observations,
+    /// What they give; `None` while they do not determine an answer.
+    pub calibration: Option<&'a Calibration>,
+    /// Whether nothing is found that speaks against the answer.
+    pub is_sound: bool,
+    /// The arm; `None` where its chain is not known.
+    pub robot: Option<&'a Robot>,
+    /// Since the beginning, seconds.
+    pub elapsed_s: f64,
+}
+
+/// What comes next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Next {
+    /// The first of these views, and then ask again.
+    Go {
+        /// The views that are planned.
+        plan: Plan,
+        /// Why the first.
+        why: Why,
+    },
+    /// Nothing.
+    End(Ending),
+}
+
+/// Why a pose is proposed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Why {
+    /// A small turn about an axis of the tip, because nothing is known of where the camera sits. Radians.
+    FirstTurns {
+        /// The turn.
+        turn_rad: f64,
+    },
+    /// What it lowers the error from and to, metres, and the part of the gain that is rotation of the camera.
+    Gain {
+        /// The 95 % error now.
+        from_m: f64,
+        /// The 95 % error with it.
+        to_m: f64,
+        /// Part of the gain that is rotation of the camera rather than its position.
+        rotation_part: f64,
+    },
+}
+
+/// Why it ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ending {
+    /// The error is below the goal. Metres.
+    GoalReached {
+        /// The error that is stated.
+        error_m: f64,
+    },
+    /// The best view would lower the error by less than [`LEAST_GAIN`].
+    LittleToGain {
+        /// By what part of it.
+        gain: f64,
+    },
+    /// As many views as allowed.
+    MostViews,
+    /// As much time as allowed.
+    MostTime,
+    /// The arm touches something where it stands, as far as is known: it cannot be driven away safely.
+    StartBlocked,
+    /// The board was not seen from any of the first turns, or they determine nothing.
+    NoStart,
+    /// No view that would tell something can be reached.
+    NothingInReach {
+        /// Views that were compared.
+        candidates: usize,
+    },
+}
+
+/// What was promised of a view and what came of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Promise {
+    /// Number of views with it.
+    pub views: usize,
+    /// The error before it over that after it was to be, see [`Proposal::error_ratio`].
+    pub promised_ratio: f64,
+    /// The stated error after it over that before it; `None` until there is one.
+    pub achieved_ratio: Option<f64>,
+}
+
+/// Chooses the poses of one calibration.
+#[derive(Debug, Clone)]
+pub struct Guide {
+    options: GuidedOptions,
+    failed: Vec<Pose<Base, Tip>>,
+    fan_tried: usize,
+    below: usize,
+    solved_views: usize,
+    before_m: Option<f64>,
+    promises: Vec<Promise>,
+}
+
+impl Guide {
+    /// Nothing is captured yet.
+    pub fn new(options: GuidedOptions) -> Self {
+        Self {
+            options,
+            failed: Vec::new(),
+            fan_tried: 0,
+            below: 0,
+            solved_views: 0,
+            before_m: None,
+            promises: Vec::new(),
+        }
+    }
+
+    /// What is asked for.
+    pub fn options(&self) -> &GuidedOptions {
+        &self.options
+    }
+
+    /// Promised and achieved gain, view by view.
+    pub fn promises(&self) -> &[Promise] {
+        &self.promises
+    }
+
+    /// A pose gave no view: it is not proposed again, nor its neighbourhood.
+    pub fn failed(&mut self, base_from_tip: &Pose<Base, Tip>) {
+        self.failed.push(*base_from_tip);
+    }
+
+    /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which mean nothing.
+    pub fn next(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
+        let used = used_views(known.observations, known.calibration);
+        self.keep_promises(known, used.len());
+        if let Some(ending) = self.ending(known, used.len()) {
+            return Next::End(ending);
+        }
+        let is_blocked = |robot: &Robot| !robot.arm.is_free(&robot.joints, &robot.obstacles, robot.clearance_m);
+        if used.len() <= 1 && known.robot.is_some_and(is_blocked) {
+            return Next::End(Ending::StartBlocked);
+        }
+        let target = &known.observations.target;
+        let model = known.calibration.and_then(|calibration| ViewModel::new(calibration, target));
+        let Some(model) = model else { return self.fan(known) };
+        let noise = at_least(model.noise(), &LEAST_NOISE);
+        let model = model.with_noise(noise);
+        match self.plan(known, &model, &used, cancel) {
+            None => self.fan(known),
+            Some((plan, stated_m)) => self.judged(plan, stated_m, used.len()),
+        }
+    }
+
+    /// The plan from an estimate, and the error that is stated now, metres; `None` where the views so far determine nothing.
+    fn plan(
+        &self,
+        known: &Known<'_>,
+        model: &ViewModel,
+        used: &[(Pose<Base, Tip>, Vec<usize>)],
+        cancel: &CancelToken,
+    ) -> Option<(Plan, f64)> {
+        let calibration = known.calibration?;
+        let joint = calibration.joint.as_ref()?;
+        let target = &known.observations.target;
+        let stated_m = calibration.modelled_error_95_m()?;
+        let views: Vec<ExpectedView> =
+            used.iter().filter_map(|(pose, corners)| model.expected(pose, corners)).collect();
+        let weight = design::weight_of(&box_about(&joint.reference_point, 0.5 * target.extent().max()));
+        let design = Design::new(model.prior(), &views, weight)?;
+        let distances =
+            used.iter().map(|(pose, _)| (model.camera_from_target(pose).isometry() * target.centre()).coords.norm());
+        let range = ViewRange::about(distances)?;
+        let range = self.options.distance_m.map_or(range, |distance_m| range.within(distance_m));
+        let taken: Vec<Pose<Base, Tip>> = used.iter().map(|(pose, _)| *pose).collect();
+        let turn_rad =
+            if used.len() < CAREFUL_VIEWS { TURN_PER_VIEW_RAD * used.len() as f64 } else { std::f64::consts::TAU };
+        let options = ChooseOptions {
+            candidates: self.options.candidates,
+            ahead: self.options.ahead.min(self.options.most_views.saturating_sub(used.len())).max(1),
+            seed: self.options.seed.wrapping_add(used.len() as u64).wrapping_add(977 * self.failed.len() as u64),
+            dwell_s: self.options.dwell_s,
+            failed: &self.failed,
+            turn_rad,
+        };
+        let robot = known.robot.map(|robot| self.with_board(robot, model, known.observations));
+        let chooser = Chooser { model, target, range: &range, robot: robot.as_ref(), taken: &taken };
+        Some((chooser.plan(&design, &options, cancel), stated_m))
+    }
+
+    /// The arm with camera and board where the estimate has them.
+    fn with_board(&self, robot: &Robot, model: &ViewModel, observations: &Observations) -> Robot {
+        let mut robot = robot.clone();
+        match model.hand_eye() {
+            HandEye::EyeInHand { tip_from_camera, base_from_target } => {
+                robot.arm.tip_from_camera = *tip_from_camera.isometry();
+                robot.obstacles.push(super::sheet(&observations.target, base_from_target));
+            }
+            HandEye::EyeToHand { tip_from_target, .. } => {
+                let centre = observations.target.centre();
+                robot.arm.tip_from_camera = tip_from_target.isometry() * nalgebra::Translation3::from(centre.coords);
+            }
+        }
+        robot
+    }
+
+    fn judged(&mut self, plan: Plan, stated_m: f64, views: usize) -> Next {
+        let Some(first) = plan.proposals.first() else {
+            return Next::End(Ending::NothingInReach { candidates: plan.candidates });
+        };
+        let gain = 1.0 - plan.best_ratio;
+        if views >= LEAST_VIEWS && gain < LEAST_GAIN {
+            return Next::End(Ending::LittleToGain { gain });
+        }
+        let why =
+            Why::Gain { from_m: stated_m, to_m: stated_m * first.error_ratio, rotation_part: first.rotation_part };
+        self.promises.push(Promise { views: views + 1, promised_ratio: first.error_ratio, achieved_ratio: None });
+        self.before_m = Some(stated_m);
+        Next::Go { plan, why }
+    }
+
+    /// Notes what came of the last promise.
+    fn keep_promises(&mut self, known: &Known<'_>, views: usize) {
+        let stated_m = known.calibration.and_then(Calibration::modelled_error_95_m);
+        match (self.promises.last_mut(), self.before_m.take(), stated_m) {
+            (Some(promise), Some(before_m), Some(now_m)) if promise.views == views => {
+                promise.achieved_ratio = Some(now_m / before_m);
+            }
+            // The view failed, or was left out as an outlier.
+            (Some(promise), _, _) if promise.achieved_ratio.is_none() => {
+                self.promises.pop();
+            }
+            _ => {}
+        }
+    }
+
+    fn ending(&mut self, known: &Known<'_>, views: usize) -> Option<Ending> {
+        if let Some(calibration) = known.calibration.filter(|_| views >= LEAST_VIEWS && views != self.solved_views) {
+            self.solved_views = views;
+            let error_m = calibration.tip_error_95_m();
+            let is_below = error_at_upper_levels(calibration).is_some_and(|error_m| error_m <= self.options.goal_m);
+            self.below = if is_below && known.is_sound { self.below + 1 } else { 0 };
+            if let (true, Some(error_m)) = (self.below >= IN_A_ROW, error_m) {
+                return Some(Ending::GoalReached { error_m });
+            }
+        }
+        if views >= self.options.most_views {
+            return Some(Ending::MostViews);
+        }
+        (known.elapsed_s >= self.options.most_s).then_some(Ending::MostTime)
+    }
+
+    /// A small turn about the first view.
+    fn fan(&mut self, known: &Known<'_>) -> Next {
+        let observations = known.observations;
+        let first = observations.views.iter().find_map(|view| {
+            let corners = view.corners.as_ref().filter(|corners| view.in_fit && corners.len() >= 4)?;
+            Some((view.base_from_tip?, corners))
+        });
+        let Some((about, corners)) = first else { return Next::End(Ending::NoStart) };
+        if self.fan_tried >= MOST_FAN {
+            return Next::End(Ending::NoStart);
+        }
+        let focal_px = match observations.camera {
+            CameraKnowledge::Fixed(intrinsics) => intrinsics.fx,
+            CameraKnowledge::Estimate { start: Some(intrinsics), .. } => intrinsics.fx,
+            // A usual lens; one that is twice as long halves the room that is left.
+            CameraKnowledge::Estimate { start: None, .. } => f64::from(observations.image_size.0),
+        };
+        let turn_rad = fan::free_turn_rad(corners.iter().map(|corner| corner.px), observations.image_size, focal_px);
+        while self.fan_tried < MOST_FAN {
+            let base_from_tip = fan::pose(&about, self.fan_tried, turn_rad);
+            self.fan_tried += 1;
+            let joints = match known.robot {
+                None => None,
+                Some(robot) => {
+                    let reached = robot.arm.reach(&base_from_tip, &robot.joints);
+                    let free = reached.filter(|joints| {
+                        robot.arm.is_free(joints, &robot.obstacles, robot.clearance_m) && robot.path_is_free(joints)
+                    });
+                    let Some(joints) = free else { continue };
+                    Some(joints)
+                }
+            };
+            let proposal = Proposal {
+                base_from_tip,
+                camera_from_target: Pose::identity(),
+                joints,
+                travel_s: 0.0,
+                error_ratio: 1.0,
+                rotation_part: 1.0,
+            };
+            let plan = Plan { proposals: vec![proposal], best_ratio: 1.0, candidates: 1, ways: 1 };
+            return Next::Go { plan, why: Why::FirstTurns { turn_rad } };
+        }
+        Next::End(Ending::NoStart)
+    }
+}
+
+/// The error that is stated, at the upper limit of the noise levels, metres; `None` where nothing may be stated.
+pub fn error_at_upper_levels(calibration: &Calibration) -> Option<f64> {
+    let stated_m = calibration.tip_error_95_m()?;
+    let joint = calibration.joint.as_ref()?;
+    let covariance = point_error::covariance(calibration.hand_eye_covariance()?, &joint.reference_point);
+    let plain_m = point_error::radius_95(&(covariance / joint.small_sample.scale));
+    Some(stated_m.max(plain_m * upper_level(joint.small_sample.degrees_of_freedom)))
+}
+
+/// The upper limit of a noise level over its estimate from so many numbers.
+fn upper_level(degrees_of_freedom: f64) -> f64 {
+    match ChiSquared::new(degrees_of_freedom) {
+        Ok(chi) if degrees_of_freedom.is_finite() => {
+            (degrees_of_freedom / chi.inverse_cdf(1.0 - LEVEL_SURE)).max(1.0).sqrt()
+        }
+        _ => 1.0,
+    }
+}
+
+/// Middle and corners of a cube with so long half edges \[m\].
+fn box_about(middle: &Point3<f64>, half_m: f64) -> Vec<Point3<f64>> {
+    let signs = [-half_m, half_m];
+    let corners = signs.iter().flat_map(|&x| signs.iter().flat_map(move |&y| signs.map(|z| Vector3::new(x, y, z))));
+    corners.chain([Vector3::zeros()]).map(|offset| middle + offset).collect()
+}
+
+/// Reported tip poses of the views that are in the fit, and the indices of the corners found in them.
+fn used_views(observations: &Observations, calibration: Option<&Calibration>) -> Vec<(Pose<Base, Tip>, Vec<usize>)> {
+    let is_used = |index: usize| {
+        calibration
+            .is_none_or(|calibration| calibration.views.get(index).is_some_and(|view| view.status == ViewStatus::Used))
+    };
+    let of_view = |(index, view): (usize, &crate::estimate::ObservedView)| {
+        let corners = view.corners.as_ref().filter(|_| view.in_fit && is_used(index))?;
+        Some((view.base_from_tip?, corners.iter().map(|corner| corner.index).collect()))
+    };
+    observations.views.iter().enumerate().filter_map(of_view).collect()
+}
+
+fn at_least(noise: &Noise, least: &Noise) -> Noise {
+    Noise {
+        corner_px: noise.corner_px.max(least.corner_px),
+        robot_m: noise.robot_m.max(least.robot_m),
+        robot_rad: noise.robot_rad.max(least.robot_rad),
+        ..*noise
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,143 @@
+use super::*;
+use crate::estimate::handeye::Mode;
+use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
+use crate::testing::sessions::REALISTIC;
+
+fn setup(arm: CellArm, mode: Mode, seed: u64) -> CellSetup {
+    CellSetup { arm, mode, noise: REALISTIC, free_lens: false, seed }
+}
+
+fn options(goal_m: f64) -> GuidedOptions {
+    GuidedOptions { goal_m, candidates: 300, ..GuidedOptions::default() }
+}
+
+#[test]
+fn from_one_view_of_the_board_the_goal_is_reached_on_three_arms_with_the_camera_on_the_arm_and_beside_it() {
+    let goal_m = 2e-4;
+    for arm in CellArm::ALL {
+        for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+            for seed in 0..2 {
+                let mut cell = GuidedCell::new(setup(arm, mode, seed));
+                let run = cell.run(options(goal_m));
+                let Ending::GoalReached { error_m } = run.ending else {
+                    panic!("{arm:?} {mode:?} {seed}: {:?}", run.ending)
+                };
+                assert!(error_m <= goal_m);
+                let (views, _, true_m) = *run.history.last().expect("it was solved");
+                assert!(views <= 16, "{arm:?} {mode:?} {seed}: {views} views");
+                assert!(true_m < 2.0 * goal_m, "{arm:?} {mode:?} {seed}: {true_m} m off");
+                assert!(run.failed <= 2, "{arm:?} {mode:?} {seed}: the board left the image {} times", run.failed);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_unknown_lens_is_estimated_on_the_way() {
+    let mut cell = GuidedCell::new(CellSetup { free_lens: true, ..setup(CellArm::Ur5e, Mode::EyeInHand, 4) });
+    let run = cell.run(options(5e-4));
+    assert!(matches!(run.ending, Ending::GoalReached { .. }), "{:?} {:?}", run.ending, run.history);
+    let focal_px = run.calibration.and_then(|c| c.intrinsics()).expect("a lens").fx;
+    assert!((focal_px - 581.0).abs() < 3.0, "{focal_px}");
+}
+
+/// Nothing is known of the camera at first, so the arm hardly moves.
+#[test]
+fn the_first_moves_are_small_and_grow_with_what_is_known() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let mut cell = GuidedCell::new(setup(CellArm::Ur5e, mode, 6));
+        let first = cell.base_from_tip();
+        let _run = cell.run(GuidedOptions { most_views: 9, ..options(1e-9) });
+        let turns: Vec<f64> = cell
+            .observations
+            .views
+            .iter()
+            .map(|view| view.base_from_tip.expect("a robot").rotation().angle_to(&first.rotation()).to_degrees())
+            .collect();
+        assert!(turns[1..3].iter().all(|turn| *turn < 15.0), "{mode:?} {turns:?}");
+        assert!(turns[3] < 50.0, "{mode:?} {turns:?}");
+        assert!(turns.iter().copied().fold(0.0, f64::max) > 45.0, "{mode:?} {turns:?}");
+    }
+}
+
+#[test]
+fn a_goal_out_of_reach_ends_when_more_views_are_not_worth_it_or_are_not_allowed() {
+    let run = |options| GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 1)).run(options);
+    let Ending::LittleToGain { gain } = run(options(1e-9)).ending else { panic!("it never ends") };
+    assert!((0.0..LEAST_GAIN).contains(&gain));
+    let few = run(GuidedOptions { most_views: 6, ..options(1e-9) });
+    assert_eq!(few.ending, Ending::MostViews);
+    assert_eq!(few.history.last().map(|point| point.0), Some(6));
+    assert_eq!(run(GuidedOptions { most_s: 5.0, ..options(1e-9) }).ending, Ending::MostTime);
+}
+
+#[test]
+fn two_runs_of_one_seed_are_the_same_and_promises_are_kept() {
+    let run = || GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 2)).run(options(1.5e-4));
+    let (a, b) = (run(), run());
+    assert_eq!(a.history, b.history);
+    let mut ratios: Vec<f64> = a.promises.iter().filter_map(|p| Some(p.achieved_ratio? / p.promised_ratio)).collect();
+    ratios.sort_by(f64::total_cmp);
+    assert!(ratios.len() >= 5, "{:?}", a.promises);
+    let median = ratios[ratios.len() / 2];
+    assert!((0.6..1.6).contains(&median), "{ratios:?}");
+}
+
+#[test]
+fn a_pose_that_failed_is_not_proposed_again_nor_its_neighbourhood() {
+    let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 3));
+    let _begun = cell.run(GuidedOptions { most_views: 5, ..options(1e-9) });
+    let calibration = cell.calibrate();
+    let mut guide = Guide::new(options(1e-9));
+    let mut tried: Vec<Pose<Base, Tip>> = Vec::new();
+    for _ in 0..6 {
+        let known = Known {
+            observations: &cell.observations,
+            calibration: calibration.as_ref(),
+            is_sound: true,
+            robot: Some(&cell.robot),
+            elapsed_s: 0.0,
+        };
+        let Next::Go { plan, .. } = guide.next(&known, &CancelToken::default()) else { panic!("there is more") };
+        let next = plan.proposals[0].base_from_tip;
+        for before in &tried {
+            let (m, rad) = before.distance_to(&next);
+            assert!(m >= 0.04 || rad >= 8_f64.to_radians(), "{m} m and {rad} rad from one that failed");
+        }
+        guide.failed(&next);
+        tried.push(next);
+    }
+}
+
+#[test]
+fn a_board_that_is_never_seen_again_and_an_arm_that_touches_something_end_with_the_reason() {
+    let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 5));
+    let first = cell.robot.joints;
+    let next = |guide: &mut Guide, cell: &GuidedCell| {
+        let known = Known {
+            observations: &cell.observations,
+            calibration: None,
+            is_sound: true,
+            robot: Some(&cell.robot),
+            elapsed_s: 0.0,
+        };
+        guide.next(&known, &CancelToken::default())
+    };
+    let mut guide = Guide::new(options(1e-3));
+    assert_eq!(next(&mut guide, &cell), Next::End(Ending::NoStart), "there is no view of the board yet");
+    assert!(cell.capture(&first));
+    let mut moves = 0;
+    let ending = loop {
+        match next(&mut guide, &cell) {
+            Next::Go { plan, .. } => guide.failed(&plan.proposals[0].base_from_tip),
+            Next::End(ending) => break ending,
+        }
+        moves += 1;
+    };
+    assert_eq!(ending, Ending::NoStart);
+    assert!((4..=MOST_FAN).contains(&moves), "{moves} moves");
+    cell.robot
+        .obstacles
+        .push(crate::plan::Obstacle { world_from_centre: *cell.base_from_tip().isometry(), size_m: [0.1; 3] });
+    assert_eq!(next(&mut Guide::new(options(1e-3)), &cell), Next::End(Ending::StartBlocked));
+}

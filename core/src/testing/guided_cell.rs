@@ -1,0 +1,301 @@
+//! A cell that takes the poses that guided capture proposes: an arm, a camera and a board whose places are known.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::arms;
+use super::sessions::{BOARD, camera, reported, seen};
+use crate::estimate::handeye::Mode;
+use crate::estimate::handeye::joint::Noise;
+use crate::estimate::{Calibration, CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use crate::geometry::arm::{Arm, ArmKind, JointValues};
+use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use crate::plan::guided::choose::Robot;
+use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Promise};
+use crate::plan::{self, ArmBody, Obstacle};
+use crate::progress::CancelToken;
+
+/// Arms of the cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CellArm {
+    /// UR5e, six joints, closed form.
+    Ur5e,
+    /// Franka Panda, seven joints.
+    Panda,
+    /// UFACTORY xArm 6, six joints, no closed form.
+    Xarm6,
+}
+
+impl CellArm {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Ur5e, Self::Panda, Self::Xarm6];
+
+    fn chain(self) -> Arm {
+        let from_file = |file: arms::ArmFile| file.arm().expect("a file of this project");
+        match self {
+            Self::Ur5e => ArmKind::Ur5e.arm(),
+            Self::Panda => from_file(arms::PANDA),
+            Self::Xarm6 => from_file(arms::XARM6),
+        }
+    }
+
+    /// Over a board in front of the arm.
+    fn home(self) -> Vec<f64> {
+        match self {
+            // Its base looks along -x.
+            Self::Ur5e => vec![std::f64::consts::PI, -1.6, 1.9, -1.9, -1.57, 0.0],
+            Self::Panda => vec![0.0, -0.7, 0.0, -2.27, 0.0, 1.57, 0.785],
+            Self::Xarm6 => vec![0.0, -0.52, -1.05, 0.0, 1.57, 0.0],
+        }
+    }
+}
+
+/// What a cell is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct CellSetup {
+    /// The arm.
+    pub arm: CellArm,
+    /// Where the camera sits.
+    pub mode: Mode,
+    /// What corners and robot err by.
+    pub noise: Noise,
+    /// Whether the lens is to be estimated.
+    pub free_lens: bool,
+    /// Seed of places and noise.
+    pub seed: u64,
+}
+
+/// The cell.
+pub struct GuidedCell {
+    setup: CellSetup,
+    rng: ChaCha8Rng,
+    intrinsics: Intrinsics,
+    /// The true camera on its mount.
+    pub mount_from_camera: Pose<Mount, Camera>,
+    /// The true place of the board.
+    pub anchor_from_target: Pose<Anchor, Target>,
+    /// The arm where it stands now.
+    pub robot: Robot,
+    /// What was seen so far.
+    pub observations: Observations,
+    points: Vec<Point3<f64>>,
+}
+
+/// What came of a guided session.
+#[derive(Debug, Clone)]
+pub struct GuidedRun {
+    /// Why it ended.
+    pub ending: Ending,
+    /// The calibration at the end.
+    pub calibration: Option<Calibration>,
+    /// Moves that showed no board.
+    pub failed: usize,
+    /// Of each number of views with an answer: views, stated 95 % error and true error, metres.
+    pub history: Vec<(usize, f64, f64)>,
+    /// Promised and achieved gains.
+    pub promises: Vec<Promise>,
+    /// What the moves and captures took, seconds.
+    pub time_s: f64,
+}
+
+/// Free space that the arm keeps, metres.
+const CLEARANCE_M: f64 = 0.02;
+/// Table on which the arm stands.
+const TABLE: [f64; 3] = [4.0, 4.0, 0.1];
+
+impl GuidedCell {
+    /// Draws the places of camera and board, with the board in view of an arm that touches nothing.
+    ///
+    /// # Panics
+    /// When there are no such places: a mistake in the setup.
+    pub fn new(setup: CellSetup) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+        (0..1000).find_map(|_| Self::drawn(setup, &mut rng)).expect("most places are good")
+    }
+
+    fn drawn(setup: CellSetup, rng: &mut ChaCha8Rng) -> Option<Self> {
+        let mut about = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        // The middle of the board over the table, a little tilted, its printed side up; z of a target points into it.
+        let in_front = Vector3::new(0.42 + about(0.05), about(0.12), 0.06 + about(0.03));
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0));
+        let lying = Isometry3::from_parts(in_front.into(), yaw * down * tilt(about(0.15), about(0.15)))
+            * Translation3::from(-BOARD.centre().coords);
+        let beside = Isometry3::from_parts(
+            Vector3::new(0.06 + about(0.02), about(0.03), 0.04 + about(0.02)).into(),
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0)) * tilt(about(0.2), about(0.2)),
+        );
+        let distance_m = 0.38 + about(0.06);
+        let seen_first = Isometry3::from_parts(
+            Vector3::new(about(0.03), about(0.03), distance_m).into(),
+            tilt(about(0.2), about(0.2)) * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.5)),
+        ) * Translation3::from(-BOARD.centre().coords);
+        let (mount_from_camera, anchor_from_target, first_tip) = match setup.mode {
+            Mode::EyeInHand => {
+                let first_tip = lying * seen_first.inverse() * beside.inverse();
+                (beside, lying, first_tip)
+            }
+            Mode::EyeToHand => {
+                // The camera stands on the far side and looks at the board that the arm holds up in front of it.
+                let board_at = Vector3::new(0.45 + about(0.05), about(0.1), 0.45 + about(0.05));
+                let facing = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2);
+                let camera_turn = facing * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.3));
+                let base_from_camera =
+                    Isometry3::from_parts((board_at + Vector3::x() * distance_m).into(), camera_turn);
+                let on_tip = Isometry3::from_parts(
+                    Vector3::new(about(0.02), about(0.02), 0.05).into(),
+                    down * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0)),
+                ) * Translation3::from(-BOARD.centre().coords);
+                (base_from_camera, on_tip, base_from_camera * seen_first * on_tip.inverse())
+            }
+        };
+        let chain = setup.arm.chain();
+        let tip_from_camera = match setup.mode {
+            Mode::EyeInHand => mount_from_camera,
+            Mode::EyeToHand => anchor_from_target * Translation3::from(BOARD.centre().coords),
+        };
+        let home = setup.arm.home();
+        let arm = plan::Arm {
+            body: ArmBody::of(&chain),
+            chain,
+            world_from_arm: Isometry3::identity(),
+            connection_from_tip: Isometry3::identity(),
+            tip_from_camera,
+        };
+        let table =
+            Obstacle { world_from_centre: Isometry3::translation(0.0, 0.0, -TABLE[2] / 2.0 - 0.01), size_m: TABLE };
+        let obstacles = vec![table];
+        let joints = arm.reach(&Pose::from_isometry(first_tip), &home)?;
+        if !arm.is_free(&joints, &obstacles, CLEARANCE_M) {
+            return None;
+        }
+        let intrinsics = camera();
+        let knowledge = if setup.free_lens {
+            CameraKnowledge::Estimate { model: Distortion::None, start: None }
+        } else {
+            CameraKnowledge::Fixed(intrinsics)
+        };
+        Some(Self {
+            setup,
+            rng: ChaCha8Rng::seed_from_u64(setup.seed ^ 0x5eed),
+            intrinsics,
+            mount_from_camera: Pose::from_isometry(mount_from_camera),
+            anchor_from_target: Pose::from_isometry(anchor_from_target),
+            robot: Robot {
+                arm,
+                obstacles,
+                clearance_m: CLEARANCE_M,
+                joints,
+                speed_rad_s: 1.0,
+                acceleration_rad_s2: 2.0,
+            },
+            observations: Observations {
+                mode: Some(setup.mode),
+                target: BOARD,
+                image_size: (intrinsics.width, intrinsics.height),
+                camera: knowledge,
+                views: Vec::new(),
+            },
+            points: BOARD.points(),
+        })
+    }
+
+    /// Where the controller says the tip is.
+    ///
+    /// # Panics
+    /// Never: the joints are those of the arm.
+    pub fn base_from_tip(&self) -> Pose<Base, Tip> {
+        self.robot.arm.tip(&self.robot.joints).expect("its own joints")
+    }
+
+    /// Drives the arm there and captures; whether the whole board was in the image.
+    pub fn capture(&mut self, joints: &JointValues) -> bool {
+        self.robot.joints = *joints;
+        let reported_tip = self.base_from_tip();
+        let Some(view) = self.view(&reported_tip) else { return false };
+        self.observations.views.push(view);
+        true
+    }
+
+    /// What would be captured at a tip pose that the robot reports.
+    fn view(&mut self, base_from_tip: &Pose<Base, Tip>) -> Option<ObservedView> {
+        // The error goes the other way round: where the tip truly is, of where it is said to be.
+        let error = reported(&mut self.rng, &Pose::identity(), &self.setup.noise).inverse();
+        let true_tip = *base_from_tip * error.relabel();
+        let camera_from_target = crate::estimate::handeye::joint::camera_from_target(
+            self.setup.mode,
+            &true_tip,
+            &self.mount_from_camera,
+            &self.anchor_from_target,
+        );
+        let no_more = |_| Vector2::zeros();
+        let corners = seen(
+            &mut self.rng,
+            &self.intrinsics,
+            camera_from_target.isometry(),
+            &self.points,
+            self.setup.noise.corner_px,
+            no_more,
+        )?;
+        let name = format!("view {}", self.observations.views.len());
+        Some(ObservedView::new(name, Some(*base_from_tip), Some(corners)))
+    }
+
+    /// How far a calibration puts a point from where it is, metres: where the camera saw the board, which is where the
+    /// expected error is stated.
+    pub fn true_error_m(&self, calibration: &Calibration) -> Option<f64> {
+        let estimated = calibration.hand_eye?.mount_from_camera();
+        let point = calibration.joint.as_ref()?.reference_point;
+        let off = self.mount_from_camera.inverse() * estimated;
+        Some((off.isometry() * point - point).norm())
+    }
+
+    /// The calibration from the views so far.
+    pub fn calibrate(&self) -> Option<Calibration> {
+        calibrate(&self.observations, Method::Joint, &CancelToken::default()).ok()
+    }
+
+    /// A whole guided session from the first view on.
+    pub fn run(&mut self, options: GuidedOptions) -> GuidedRun {
+        let mut guide = Guide::new(options);
+        let first = self.robot.joints;
+        let (mut time_s, mut failed, mut history, mut calibration) = (0.0, 0, Vec::new(), None);
+        assert!(self.capture(&first), "the board is in view at the beginning");
+        loop {
+            let known = Known {
+                observations: &self.observations,
+                calibration: calibration.as_ref(),
+                is_sound: true,
+                robot: Some(&self.robot),
+                elapsed_s: time_s,
+            };
+            let plan = match guide.next(&known, &CancelToken::default()) {
+                Next::End(ending) => {
+                    let promises = guide.promises().to_vec();
+                    return GuidedRun { ending, calibration, failed, history, promises, time_s };
+                }
+                Next::Go { plan, .. } => plan,
+            };
+            let proposal = &plan.proposals[0];
+            let joints = proposal.joints.expect("the chain is known");
+            time_s += proposal.travel_s + guide.options().dwell_s;
+            if self.capture(&joints) {
+                calibration = self.calibrate();
+                if let Some(solved) = &calibration
+                    && let (Some(stated), Some(truth)) = (solved.tip_error_95_m(), self.true_error_m(solved))
+                {
+                    history.push((self.observations.views.len(), stated, truth));
+                }
+            } else {
+                failed += 1;
+                guide.failed(&proposal.base_from_tip);
+            }
+        }
+    }
+}
+
+fn tilt(about_x: f64, about_y: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0))
+}
