@@ -6,14 +6,14 @@ use rand_chacha::ChaCha8Rng;
 
 use super::arms;
 use super::sessions::{BOARD, camera, reported, seen};
-use crate::estimate::handeye::Mode;
-use crate::estimate::handeye::joint::Noise;
-use crate::estimate::{Calibration, CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use crate::estimate::handeye::joint::{Noise, ViewModel};
+use crate::estimate::handeye::{HandEye, Mode};
+use crate::estimate::{Calibration, CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView, calibrate};
 use crate::geometry::arm::{Arm, ArmKind, JointValues};
-use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use crate::plan::guided::choose::Robot;
-use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Promise};
+use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Step};
 use crate::plan::{self, ArmBody, Obstacle};
 use crate::progress::CancelToken;
 
@@ -94,10 +94,10 @@ pub struct GuidedRun {
     pub failed: usize,
     /// Of each number of views with an answer: views, stated 95 % error and true error, metres.
     pub history: Vec<(usize, f64, f64)>,
-    /// Promised and achieved gains.
-    pub promises: Vec<Promise>,
-    /// What the moves and captures took, seconds.
-    pub time_s: f64,
+    /// Every pose that was proposed.
+    pub steps: Vec<Step>,
+    /// When the views were taken, seconds.
+    pub times_s: Vec<f64>,
 }
 
 /// Free space that the arm keeps, metres.
@@ -171,11 +171,12 @@ impl GuidedCell {
         if !arm.is_free(&joints, &obstacles, CLEARANCE_M) {
             return None;
         }
-        let intrinsics = camera();
-        let knowledge = if setup.free_lens {
-            CameraKnowledge::Estimate { model: Distortion::None, start: None }
+        // With all that is estimated of a lens by default, of which it has none.
+        let free = Intrinsics { distortion: DEFAULT_MODEL, ..camera() };
+        let (intrinsics, knowledge) = if setup.free_lens {
+            (free, CameraKnowledge::NOTHING)
         } else {
-            CameraKnowledge::Fixed(intrinsics)
+            (camera(), CameraKnowledge::Fixed(camera()))
         };
         Some(Self {
             setup,
@@ -252,6 +253,13 @@ impl GuidedCell {
         Some((off.isometry() * point - point).norm())
     }
 
+    /// The model of what is true.
+    pub fn truth(&self) -> ViewModel {
+        let Self { setup, intrinsics, mount_from_camera, anchor_from_target, .. } = self;
+        let hand_eye = HandEye::new(setup.mode, *mount_from_camera, *anchor_from_target);
+        ViewModel::known(hand_eye, *intrinsics, setup.free_lens, setup.noise, &BOARD)
+    }
+
     /// The calibration from the views so far.
     pub fn calibrate(&self) -> Option<Calibration> {
         calibrate(&self.observations, Method::Joint, &CancelToken::default()).ok()
@@ -261,7 +269,9 @@ impl GuidedCell {
     pub fn run(&mut self, options: GuidedOptions) -> GuidedRun {
         let mut guide = Guide::new(options);
         let first = self.robot.joints;
-        let (mut time_s, mut failed, mut history, mut calibration) = (0.0, 0, Vec::new(), None);
+        let (mut failed, mut history, mut calibration) = (0, Vec::new(), None);
+        let mut time_s = guide.options().dwell_s;
+        let mut times_s = vec![time_s];
         assert!(self.capture(&first), "the board is in view at the beginning");
         loop {
             let known = Known {
@@ -273,8 +283,8 @@ impl GuidedCell {
             };
             let plan = match guide.next(&known, &CancelToken::default()) {
                 Next::End(ending) => {
-                    let promises = guide.promises().to_vec();
-                    return GuidedRun { ending, calibration, failed, history, promises, time_s };
+                    let steps = guide.steps().to_vec();
+                    return GuidedRun { ending, calibration, failed, history, steps, times_s };
                 }
                 Next::Go { plan, .. } => plan,
             };
@@ -282,6 +292,8 @@ impl GuidedCell {
             let joints = proposal.joints.expect("the chain is known");
             time_s += proposal.travel_s + guide.options().dwell_s;
             if self.capture(&joints) {
+                times_s.push(time_s);
+                guide.captured();
                 calibration = self.calibrate();
                 if let Some(solved) = &calibration
                     && let (Some(stated), Some(truth)) = (solved.tip_error_95_m(), self.true_error_m(solved))
@@ -290,7 +302,7 @@ impl GuidedCell {
                 }
             } else {
                 failed += 1;
-                guide.failed(&proposal.base_from_tip);
+                guide.failed();
             }
         }
     }

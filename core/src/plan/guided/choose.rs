@@ -154,6 +154,15 @@ impl Chooser<'_> {
         Plan { proposals, best_ratio, candidates: pool.len(), ways }
     }
 
+    /// A view at random that the arm gets to on a straight path in joint space.
+    pub fn at_random(&self, design: &Design, options: &ChooseOptions<'_>, cancel: &CancelToken) -> Option<Proposal> {
+        let mut pool = self.pool(design, options, cancel);
+        let mut ways = 0;
+        let found =
+            (0..pool.len()).find(|&k| self.way(&mut pool[k], &mut ways).is_some() && self.path_is_free(&pool[k]))?;
+        proposals(&pool, design, &[found]).pop()
+    }
+
     /// Views at random that are wholly in the image, with what they are expected to say.
     fn pool(&self, design: &Design, options: &ChooseOptions<'_>, cancel: &CancelToken) -> Vec<Candidate> {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);

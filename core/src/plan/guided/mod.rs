@@ -18,6 +18,7 @@ pub mod candidates;
 pub mod choose;
 pub mod design;
 pub mod fan;
+pub mod record;
 
 use nalgebra::{Point3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -25,9 +26,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
 use crate::estimate::{Calibration, CameraKnowledge, Observations, ViewStatus};
+use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::point_error;
 use crate::progress::CancelToken;
+use crate::targets::TargetSpec;
 use candidates::ViewRange;
 use choose::{ChooseOptions, Chooser, Plan, Proposal, Robot};
 use design::Design;
@@ -47,6 +50,8 @@ const TURN_PER_VIEW_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 const CAREFUL_VIEWS: usize = 6;
 /// Poses of the fan that are tried before it is given up.
 const MOST_FAN: usize = 24;
+/// Views at random among which a check finds one that the arm gets to.
+const CHECK_CANDIDATES: usize = 200;
 /// Noise levels below which a plan does not reckon: an estimate from few views may be nothing.
 const LEAST_NOISE: Noise = Noise { corner_px: 0.02, robot_m: 2e-5, robot_rad: 5e-5, ..Noise::EXACT };
 
@@ -59,6 +64,8 @@ pub struct GuidedOptions {
     pub most_views: usize,
     /// Time at the most, seconds.
     pub most_s: f64,
+    /// Gain of the best view, part of the error, below which it ends: see [`LEAST_GAIN`].
+    pub least_gain: f64,
     /// Views that are compared at every step.
     pub candidates: usize,
     /// Views that are planned ahead.
@@ -77,6 +84,7 @@ impl Default for GuidedOptions {
             goal_m: 3e-4,
             most_views: 40,
             most_s: f64::INFINITY,
+            least_gain: LEAST_GAIN,
             candidates: 1000,
             ahead: 6,
             dwell_s: 1.5,
@@ -142,7 +150,7 @@ pub enum Ending {
         /// The error that is stated.
         error_m: f64,
     },
-    /// The best view would lower the error by less than [`LEAST_GAIN`].
+    /// The best view would lower the error by less than [`GuidedOptions::least_gain`].
     LittleToGain {
         /// By what part of it.
         gain: f64,
@@ -162,15 +170,42 @@ pub enum Ending {
     },
 }
 
-/// What was promised of a view and what came of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Promise {
-    /// Number of views with it.
-    pub views: usize,
-    /// The error before it over that after it was to be, see [`Proposal::error_ratio`].
-    pub promised_ratio: f64,
-    /// The stated error after it over that before it; `None` until there is one.
-    pub achieved_ratio: Option<f64>,
+/// A pose that was proposed, and what came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Where the tip was to go.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// The joint values there; `None` for an arm whose chain is not known.
+    pub joints: Option<JointValues>,
+    /// Why.
+    pub why: Why,
+    /// The 95 % error that is stated after it, metres; `None` until there is one.
+    pub achieved_m: Option<f64>,
+    /// How long the arm was to be on its way, seconds.
+    pub travel_s: f64,
+    /// Views that were compared.
+    pub candidates: usize,
+    /// What came of it.
+    pub outcome: Outcome,
+}
+
+/// What came of a pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Not known yet.
+    Pending,
+    /// A view.
+    Captured,
+    /// No view: no board, blurred, not reached.
+    Failed,
+}
+
+impl Step {
+    /// The gain that was achieved over the one promised, both as ratios of the error after and before it.
+    pub fn achieved_over_promised(&self) -> Option<f64> {
+        let (_, to_m) = self.why.errors_m()?;
+        Some(self.achieved_m? / to_m)
+    }
 }
 
 /// Chooses the poses of one calibration.
@@ -181,22 +216,14 @@ pub struct Guide {
     fan_tried: usize,
     below: usize,
     solved_views: usize,
-    before_m: Option<f64>,
-    promises: Vec<Promise>,
+    steps: Vec<Step>,
+    ended: Option<Ending>,
 }
 
 impl Guide {
     /// Nothing is captured yet.
     pub fn new(options: GuidedOptions) -> Self {
-        Self {
-            options,
-            failed: Vec::new(),
-            fan_tried: 0,
-            below: 0,
-            solved_views: 0,
-            before_m: None,
-            promises: Vec::new(),
-        }
+        Self { options, failed: Vec::new(), fan_tried: 0, below: 0, solved_views: 0, steps: Vec::new(), ended: None }
     }
 
     /// What is asked for.
@@ -204,20 +231,49 @@ impl Guide {
         &self.options
     }
 
-    /// Promised and achieved gain, view by view.
-    pub fn promises(&self) -> &[Promise] {
-        &self.promises
+    /// Every pose that was proposed, and what came of it.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
     }
 
-    /// A pose gave no view: it is not proposed again, nor its neighbourhood.
-    pub fn failed(&mut self, base_from_tip: &Pose<Base, Tip>) {
-        self.failed.push(*base_from_tip);
+    /// The pose proposed last gave no view: it is not proposed again, nor its neighbourhood.
+    pub fn failed(&mut self) {
+        if let Some(step) = self.steps.last_mut() {
+            step.outcome = Outcome::Failed;
+            self.failed.push(step.base_from_tip);
+        }
+    }
+
+    /// The pose proposed last gave a view.
+    pub fn captured(&mut self) {
+        if let Some(step) = self.steps.last_mut() {
+            step.outcome = Outcome::Captured;
+        }
     }
 
     /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which mean nothing.
     pub fn next(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
         let used = used_views(known.observations, known.calibration);
-        self.keep_promises(known, used.len());
+        if let Some(step) = self.steps.last_mut().filter(|step| step.outcome == Outcome::Captured) {
+            step.achieved_m = known.calibration.and_then(Calibration::modelled_error_95_m);
+        }
+        let next = self.found(known, &used, cancel);
+        match &next {
+            Next::End(ending) => self.ended = Some(*ending),
+            Next::Go { plan, why } => self.steps.extend(plan.proposals.first().map(|first| Step {
+                base_from_tip: first.base_from_tip,
+                joints: first.joints,
+                why: *why,
+                achieved_m: None,
+                travel_s: first.travel_s,
+                candidates: plan.candidates,
+                outcome: Outcome::Pending,
+            })),
+        }
+        next
+    }
+
+    fn found(&mut self, known: &Known<'_>, used: &[(Pose<Base, Tip>, Vec<usize>)], cancel: &CancelToken) -> Next {
         if let Some(ending) = self.ending(known, used.len()) {
             return Next::End(ending);
         }
@@ -230,7 +286,7 @@ impl Guide {
         let Some(model) = model else { return self.fan(known) };
         let noise = at_least(model.noise(), &LEAST_NOISE);
         let model = model.with_noise(noise);
-        match self.plan(known, &model, &used, cancel) {
+        match self.plan(known, &model, used, cancel) {
             None => self.fan(known),
             Some((plan, stated_m)) => self.judged(plan, stated_m, used.len()),
         }
@@ -244,10 +300,48 @@ impl Guide {
         used: &[(Pose<Base, Tip>, Vec<usize>)],
         cancel: &CancelToken,
     ) -> Option<(Plan, f64)> {
-        let calibration = known.calibration?;
-        let joint = calibration.joint.as_ref()?;
+        let stated_m = known.calibration?.modelled_error_95_m()?;
+        let ground = self.ground(known, model, used)?;
+        let options = ChooseOptions {
+            candidates: self.options.candidates,
+            ahead: self.options.ahead.min(self.options.most_views.saturating_sub(used.len())).max(1),
+            seed: self.options.seed.wrapping_add(used.len() as u64).wrapping_add(977 * self.failed.len() as u64),
+            dwell_s: self.options.dwell_s,
+            failed: &self.failed,
+            turn_rad: if used.len() < CAREFUL_VIEWS {
+                TURN_PER_VIEW_RAD * used.len() as f64
+            } else {
+                std::f64::consts::TAU
+            },
+        };
+        let chooser = ground.chooser(model, &known.observations.target);
+        Some((chooser.plan(&ground.design, &options, cancel), stated_m))
+    }
+
+    /// A pose that was not designed, to check the answer at: a view at random that the arm gets to. `index` counts the
+    /// checks. `None` where there is no answer, or no such view.
+    pub fn check_pose(&self, known: &Known<'_>, index: usize, cancel: &CancelToken) -> Option<Proposal> {
         let target = &known.observations.target;
-        let stated_m = calibration.modelled_error_95_m()?;
+        let model = ViewModel::new(known.calibration?, target)?;
+        let model = model.clone().with_noise(at_least(model.noise(), &LEAST_NOISE));
+        let used = used_views(known.observations, known.calibration);
+        let ground = self.ground(known, &model, &used)?;
+        let options = ChooseOptions {
+            candidates: CHECK_CANDIDATES,
+            ahead: 1,
+            // Apart from the seeds of the plans.
+            seed: self.options.seed.wrapping_add(1_000_003 * (index as u64 + 1)),
+            dwell_s: self.options.dwell_s,
+            failed: &self.failed,
+            turn_rad: std::f64::consts::TAU,
+        };
+        ground.chooser(&model, target).at_random(&ground.design, &options, cancel)
+    }
+
+    /// What a choice stands on; `None` where the views so far determine nothing.
+    fn ground(&self, known: &Known<'_>, model: &ViewModel, used: &[(Pose<Base, Tip>, Vec<usize>)]) -> Option<Ground> {
+        let joint = known.calibration?.joint.as_ref()?;
+        let target = &known.observations.target;
         let views: Vec<ExpectedView> =
             used.iter().filter_map(|(pose, corners)| model.expected(pose, corners)).collect();
         let weight = design::weight_of(&box_about(&joint.reference_point, 0.5 * target.extent().max()));
@@ -256,66 +350,22 @@ impl Guide {
             used.iter().map(|(pose, _)| (model.camera_from_target(pose).isometry() * target.centre()).coords.norm());
         let range = ViewRange::about(distances)?;
         let range = self.options.distance_m.map_or(range, |distance_m| range.within(distance_m));
-        let taken: Vec<Pose<Base, Tip>> = used.iter().map(|(pose, _)| *pose).collect();
-        let turn_rad =
-            if used.len() < CAREFUL_VIEWS { TURN_PER_VIEW_RAD * used.len() as f64 } else { std::f64::consts::TAU };
-        let options = ChooseOptions {
-            candidates: self.options.candidates,
-            ahead: self.options.ahead.min(self.options.most_views.saturating_sub(used.len())).max(1),
-            seed: self.options.seed.wrapping_add(used.len() as u64).wrapping_add(977 * self.failed.len() as u64),
-            dwell_s: self.options.dwell_s,
-            failed: &self.failed,
-            turn_rad,
-        };
-        let robot = known.robot.map(|robot| self.with_board(robot, model, known.observations));
-        let chooser = Chooser { model, target, range: &range, robot: robot.as_ref(), taken: &taken };
-        Some((chooser.plan(&design, &options, cancel), stated_m))
+        let taken = used.iter().map(|(pose, _)| *pose).collect();
+        let robot = known.robot.map(|robot| with_board(robot, model, known.observations));
+        Some(Ground { design, range, robot, taken })
     }
 
-    /// The arm with camera and board where the estimate has them.
-    fn with_board(&self, robot: &Robot, model: &ViewModel, observations: &Observations) -> Robot {
-        let mut robot = robot.clone();
-        match model.hand_eye() {
-            HandEye::EyeInHand { tip_from_camera, base_from_target } => {
-                robot.arm.tip_from_camera = *tip_from_camera.isometry();
-                robot.obstacles.push(super::sheet(&observations.target, base_from_target));
-            }
-            HandEye::EyeToHand { tip_from_target, .. } => {
-                let centre = observations.target.centre();
-                robot.arm.tip_from_camera = tip_from_target.isometry() * nalgebra::Translation3::from(centre.coords);
-            }
-        }
-        robot
-    }
-
-    fn judged(&mut self, plan: Plan, stated_m: f64, views: usize) -> Next {
+    fn judged(&self, plan: Plan, stated_m: f64, views: usize) -> Next {
         let Some(first) = plan.proposals.first() else {
             return Next::End(Ending::NothingInReach { candidates: plan.candidates });
         };
         let gain = 1.0 - plan.best_ratio;
-        if views >= LEAST_VIEWS && gain < LEAST_GAIN {
+        if views >= LEAST_VIEWS && gain < self.options.least_gain {
             return Next::End(Ending::LittleToGain { gain });
         }
-        let why =
-            Why::Gain { from_m: stated_m, to_m: stated_m * first.error_ratio, rotation_part: first.rotation_part };
-        self.promises.push(Promise { views: views + 1, promised_ratio: first.error_ratio, achieved_ratio: None });
-        self.before_m = Some(stated_m);
+        let to_m = stated_m * first.error_ratio;
+        let why = Why::Gain { from_m: stated_m, to_m, rotation_part: first.rotation_part };
         Next::Go { plan, why }
-    }
-
-    /// Notes what came of the last promise.
-    fn keep_promises(&mut self, known: &Known<'_>, views: usize) {
-        let stated_m = known.calibration.and_then(Calibration::modelled_error_95_m);
-        match (self.promises.last_mut(), self.before_m.take(), stated_m) {
-            (Some(promise), Some(before_m), Some(now_m)) if promise.views == views => {
-                promise.achieved_ratio = Some(now_m / before_m);
-            }
-            // The view failed, or was left out as an outlier.
-            (Some(promise), _, _) if promise.achieved_ratio.is_none() => {
-                self.promises.pop();
-            }
-            _ => {}
-        }
     }
 
     fn ending(&mut self, known: &Known<'_>, views: usize) -> Option<Ending> {
@@ -378,6 +428,36 @@ impl Guide {
             return Next::Go { plan, why: Why::FirstTurns { turn_rad } };
         }
         Next::End(Ending::NoStart)
+    }
+}
+
+/// The arm with camera and board where the estimate has them.
+fn with_board(robot: &Robot, model: &ViewModel, observations: &Observations) -> Robot {
+    let mut robot = robot.clone();
+    match model.hand_eye() {
+        HandEye::EyeInHand { tip_from_camera, base_from_target } => {
+            robot.arm.tip_from_camera = *tip_from_camera.isometry();
+            robot.obstacles.push(super::sheet(&observations.target, base_from_target));
+        }
+        HandEye::EyeToHand { tip_from_target, .. } => {
+            let centre = observations.target.centre();
+            robot.arm.tip_from_camera = tip_from_target.isometry() * nalgebra::Translation3::from(centre.coords);
+        }
+    }
+    robot
+}
+
+/// What a choice stands on.
+struct Ground {
+    design: Design,
+    range: ViewRange,
+    robot: Option<Robot>,
+    taken: Vec<Pose<Base, Tip>>,
+}
+
+impl Ground {
+    fn chooser<'a>(&'a self, model: &'a ViewModel, target: &'a TargetSpec) -> Chooser<'a> {
+        Chooser { model, target, range: &self.range, robot: self.robot.as_ref(), taken: &self.taken }
     }
 }
 

@@ -68,6 +68,20 @@ impl ViewModel {
         })
     }
 
+    /// Of links and lens that are known, with a flat target and a robot whose errors do not depend on where it stands.
+    pub fn known(
+        hand_eye: HandEye,
+        intrinsics: Intrinsics,
+        free_lens: bool,
+        noise: Noise,
+        target: &TargetSpec,
+    ) -> Self {
+        let free = Free { intrinsics: free_lens, ..Free::default() };
+        let layout = Layout { form: free.form().count(&intrinsics), joints: 0, field: 0 };
+        let board = BoardPoints::new(&target.points());
+        Self { hand_eye, intrinsics, free, noise, board, shape: BoardShape::default(), field: None, layout }
+    }
+
     /// The same with other noise levels.
     #[must_use]
     pub fn with_noise(self, noise: Noise) -> Self {

@@ -1,0 +1,165 @@
+//! A guided session as it is kept, so that it can be studied afterwards, and its reasons in words.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Ending, Guide, Outcome, Why};
+use crate::text;
+use crate::wording::{English, Text};
+
+/// A guided session.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GuidedRecord {
+    /// The 95 % error that was asked for, millimetres.
+    pub goal_mm: f64,
+    /// Seed of the candidates.
+    pub seed: u64,
+    /// Every pose that was proposed, in order.
+    pub steps: Vec<StepRecord>,
+    /// Why it ended; `None` while it goes on, and where it was stopped.
+    pub ending: Option<EndingRecord>,
+}
+
+/// A pose that was proposed, and what came of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StepRecord {
+    /// Tip in the base, metres.
+    pub translation_m: [f64; 3],
+    /// Unit quaternion x, y, z, w.
+    pub rotation_xyzw: [f64; 4],
+    /// Joint values, radians; of a prismatic joint metres. `None` for an arm whose chain is not known.
+    pub joints: Option<Vec<f64>>,
+    /// Why this pose.
+    pub why: String,
+    /// The error before it that was stated, 95 %, millimetres; `None` for the first turns.
+    pub before_mm: Option<f64>,
+    /// The error that it was to lead to.
+    pub promised_mm: Option<f64>,
+    /// The error that it led to; `None` where there was no answer yet, and where it was not captured.
+    pub achieved_mm: Option<f64>,
+    /// How long the arm was to be on its way, seconds.
+    pub travel_s: f64,
+    /// Views that were compared.
+    pub candidates: usize,
+    /// `captured`, `failed`, or `pending` where it was stopped on the way.
+    pub outcome: String,
+}
+
+/// Why it ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EndingRecord {
+    /// A code that stays the same.
+    pub code: String,
+    /// In words.
+    pub text: String,
+}
+
+impl Guide {
+    /// The session so far.
+    pub fn record(&self) -> GuidedRecord {
+        let mm = |metres: f64| metres * 1e3;
+        let steps = self.steps.iter().map(|step| StepRecord {
+            translation_m: step.base_from_tip.translation().into(),
+            rotation_xyzw: step.base_from_tip.xyzw(),
+            joints: step.joints.map(|joints| joints.to_vec()),
+            why: step.why.text().say(English),
+            before_mm: step.why.errors_m().map(|(from_m, _)| mm(from_m)),
+            promised_mm: step.why.errors_m().map(|(_, to_m)| mm(to_m)),
+            achieved_mm: step.achieved_m.map(mm),
+            travel_s: step.travel_s,
+            candidates: step.candidates,
+            outcome: match step.outcome {
+                Outcome::Pending => "pending",
+                Outcome::Captured => "captured",
+                Outcome::Failed => "failed",
+            }
+            .to_owned(),
+        });
+        let ending =
+            self.ended.map(|ending| EndingRecord { code: ending.code().to_owned(), text: ending.text().say(English) });
+        GuidedRecord { goal_mm: mm(self.options.goal_m), seed: self.options.seed, steps: steps.collect(), ending }
+    }
+}
+
+impl Why {
+    /// The 95 % error that is stated now and the one that is promised, metres.
+    pub fn errors_m(&self) -> Option<(f64, f64)> {
+        match *self {
+            Self::FirstTurns { .. } => None,
+            Self::Gain { from_m, to_m, .. } => Some((from_m, to_m)),
+        }
+    }
+
+    /// In one sentence.
+    pub fn text(&self) -> Text {
+        match *self {
+            Self::FirstTurns { turn_rad } => text!(
+                "A turn of {turn}° about the TCP: where the camera sits is not known yet, so the first moves are small",
+                turn = format!("{:.1}", turn_rad.to_degrees())
+            ),
+            Self::Gain { from_m, to_m, rotation_part } => {
+                let (from, to) = (format!("{:.3}", from_m * 1e3), format!("{:.3}", to_m * 1e3));
+                if rotation_part > 0.5 {
+                    text!(
+                        "Lowers the expected error from {from} to {to} mm, most by what it tells of the rotation of the camera",
+                        from = from,
+                        to = to
+                    )
+                } else {
+                    text!(
+                        "Lowers the expected error from {from} to {to} mm, most by what it tells of the position of the camera",
+                        from = from,
+                        to = to
+                    )
+                }
+            }
+        }
+    }
+}
+
+impl Ending {
+    /// A code that stays the same.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::GoalReached { .. } => "goal_reached",
+            Self::LittleToGain { .. } => "little_to_gain",
+            Self::MostViews => "most_views",
+            Self::MostTime => "most_time",
+            Self::StartBlocked => "start_blocked",
+            Self::NoStart => "no_start",
+            Self::NothingInReach { .. } => "nothing_in_reach",
+        }
+    }
+
+    /// What it means and, where it is no success, what to do.
+    pub fn text(&self) -> Text {
+        match *self {
+            Self::GoalReached { error_m } => {
+                text!("The goal is reached: the expected error is {error} mm", error = format!("{:.3}", error_m * 1e3))
+            }
+            Self::LittleToGain { gain } => text!(
+                "The best further pose would lower the expected error by {percent} % only: for a smaller error take a larger \
+                 board, a camera of higher resolution or a more accurate robot",
+                percent = format!("{:.1}", gain * 100.0)
+            ),
+            Self::MostViews => text!("As many poses as allowed are taken: allow more of them for a smaller error"),
+            Self::MostTime => text!("The time that was allowed is over: allow more of it for a smaller error"),
+            Self::StartBlocked => text!(
+                "As far as is known the arm touches something where it stands: move it into free space and begin again"
+            ),
+            Self::NoStart => text!(
+                "No pose near the first one gave a view of the whole board that determines an answer: bring the board to the \
+                 middle of the image, with the arm free to turn, and begin again"
+            ),
+            Self::NothingInReach { candidates } => text!(
+                "Of {candidates} views of the board none can be reached on a free path: move the board towards the middle of \
+                 the workspace and begin again",
+                candidates = candidates
+            ),
+        }
+    }
+
+    /// Whether the answer is as good as was asked for, or as good as it gets.
+    pub fn is_success(&self) -> bool {
+        matches!(self, Self::GoalReached { .. })
+    }
+}
