@@ -13,7 +13,7 @@ use handeye_core::project::export::ExportNames;
 use handeye_core::project::session::CaptureId;
 use handeye_core::project::taught_poses::TaughtPose;
 use handeye_core::targets::TargetSpec;
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_core::geometry::arm::JointValues;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{
@@ -248,7 +248,7 @@ pub enum Event {
         /// The number of the request.
         id: MotionId,
         /// The joints at each \[rad\]; or why there are none.
-        views: Result<Vec<JointAngles>, Text>,
+        views: Result<Vec<JointValues>, Text>,
     },
     /// A held jog button can do no more, or may not: the arm stands.
     JogEnded {

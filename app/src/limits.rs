@@ -1,5 +1,6 @@
 //! How fast the arm moves when nobody says otherwise.
 
+use handeye_core::geometry::arm::JointKind;
 use handeye_core::project::taught_poses;
 use handeye_sim_link::client::MotionLimits;
 
@@ -13,11 +14,24 @@ pub const SEQUENCE: taught_poses::MotionLimits = taught_poses::MotionLimits {
     tip_jerk: 1.0,
 };
 
-/// For motions of the six joints, at a share of the speed.
-pub fn of_joints(limits: &taught_poses::MotionLimits, share: f64) -> MotionLimits {
-    let [velocity, acceleration, jerk] =
-        slower([limits.joint_velocity, limits.joint_acceleration, limits.joint_jerk], share);
-    MotionLimits::uniform(6, velocity, acceleration, jerk)
+/// For motions of joints of these kinds, at a share of the speed. A prismatic joint takes the tip along as far as it goes
+/// itself, so it has the limits of the tip.
+pub fn of_joints(
+    limits: &taught_poses::MotionLimits,
+    share: f64,
+    kinds: impl Iterator<Item = JointKind>,
+) -> MotionLimits {
+    let of_kind = |kind| match kind {
+        JointKind::Revolute => slower([limits.joint_velocity, limits.joint_acceleration, limits.joint_jerk], share),
+        JointKind::Prismatic => slower([limits.tip_velocity, limits.tip_acceleration, limits.tip_jerk], share),
+    };
+    let mut all = MotionLimits { velocity: Vec::new(), acceleration: Vec::new(), jerk: Vec::new() };
+    for [velocity, acceleration, jerk] in kinds.map(of_kind) {
+        all.velocity.push(velocity);
+        all.acceleration.push(acceleration);
+        all.jerk.push(jerk);
+    }
+    all
 }
 
 /// For motions of the tip (x, y, z, angle), at a share of the speed.
@@ -40,7 +54,7 @@ mod tests {
 
     /// How long the cell's generator of motions takes for joint 1 to turn by an angle.
     fn duration_s(share: f64, angle_rad: f64) -> f64 {
-        let MotionLimits { velocity, acceleration, jerk } = of_joints(&SEQUENCE, share);
+        let MotionLimits { velocity, acceleration, jerk } = of_joints(&SEQUENCE, share, [JointKind::Revolute].into_iter());
         let limits = motion::MotionLimits::uniform(1, velocity[0], acceleration[0], jerk[0]);
         let start = MotionState::at_rest(vec![0.0]);
         let motion = JointMotion::new(start, &[angle_rad], &[0.0], Some(&limits), Sync::Phase).expect("a motion");

@@ -76,7 +76,7 @@ fn main() -> anyhow::Result<()> {
         let mut view = app.model().view.jog;
         view.speed = 0.005;
         app.apply(Command::SetJog(view));
-        let goal = MotionGoal::Joints([0.4, 0.3, -0.6, 0.2, 1.2, 0.3]);
+        let goal = MotionGoal::Joints([0.4, 0.3, -0.6, 0.2, 1.2, 0.3].into());
         app.apply(Command::Move { goal, what: Text::verbatim("a far place") });
     })?;
 

@@ -106,7 +106,7 @@ fn leaving_brakes_an_arm_that_it_moves_and_leaves_the_arm_of_others_alone() {
         };
         until(&mut bench.app, &|model| model.control.is_connected() && model.mover.is_connected());
         if moves {
-            let goal = MotionGoal::Joints([0.5; 6]);
+            let goal = MotionGoal::Joints([0.5; 6].into());
             bench.app.apply(Command::Move { goal, what: Text::verbatim("there") });
             until(&mut bench.app, &|_| !cell.script().moved.is_empty());
         }
@@ -186,7 +186,7 @@ fn a_pause_breaks_a_sequence_off_and_it_is_continued_with_the_pose_that_has_no_c
     bench.app.replace_model(sample::solved());
     bench.app.apply(Command::VerifyAtPlanned);
     let id = bench.app.numbers.motion;
-    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
+    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     let id = bench.app.numbers.motion;
     bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Arrived });
     let number = bench.app.numbers.capture;
@@ -261,12 +261,12 @@ fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_lea
     let id = bench.app.numbers.motion;
     bench.app.apply(Command::Stop);
     assert!(!bench.app.model().planning);
-    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
+    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     assert!(!bench.app.model().sequence_runs, "it was stopped");
 
     bench.app.apply(Command::VerifyAtPlanned);
     let id = bench.app.numbers.motion;
-    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6]; 3]) });
+    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     let sequence = bench.app.model().sequence.clone().expect("a sequence");
     assert!(bench.app.model().sequence_runs && !bench.app.model().planning);
     assert_eq!(sequence.names, ["V1", "V2", "V3"]);

@@ -9,7 +9,7 @@ use handeye_core::image::{RgbImage, imageops};
 use handeye_core::project::session::{Capture, CaptureId, Role, SessionError, Store};
 use handeye_core::targets::TargetSpec;
 use handeye_core::targets::observation::Corner;
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_core::geometry::arm::JointValues;
 
 use crate::model::CapturePurpose;
 
@@ -32,7 +32,7 @@ pub struct Measured {
     /// The tip as the controller reported it with the last of the images.
     pub base_from_tip: Pose<Base, Tip>,
     /// The joints at the same instant \[rad\].
-    pub joints_rad: JointAngles,
+    pub joints_rad: JointValues,
     /// Simulated time of the last image \[s\].
     pub sim_time_s: f64,
     /// How many images there were.

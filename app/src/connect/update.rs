@@ -91,7 +91,7 @@ impl App {
     }
 
     pub(crate) fn cell_found(&mut self, facts: CellFacts) {
-        if let Some(shortfall) = shortfall::of(facts.support, facts.is_arm_known) {
+        if let Some(shortfall) = shortfall::of(facts.support, facts.arm.is_some()) {
             self.say(Severity::Warning, shortfall);
         }
         self.model.cell = Some(facts);

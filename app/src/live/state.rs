@@ -8,7 +8,7 @@ use handeye_core::depth::{DepthImage, DepthSample};
 use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 use handeye_core::verify::MeasuredPoint;
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_core::geometry::arm::JointValues;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -33,7 +33,7 @@ pub struct FrameInfo {
     /// The tip as the controller reported it at the instant of the images.
     pub base_from_tip: Pose<Base, Tip>,
     /// The joints at the same instant \[rad\].
-    pub joints_rad: JointAngles,
+    pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it; only ever compared with.
     pub base_from_target_true: Option<Pose<Base, Target>>,
 }

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::depth::ColourMap;
 use handeye_core::estimate::Method;
 use handeye_core::estimate::handeye::HandEye;
@@ -16,7 +17,6 @@ use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::verify::Predictor;
-use handeye_sim_link::client::cell::JointAngles;
 use serde::{Deserialize, Serialize};
 
 pub use crate::capture::state::{
@@ -28,7 +28,7 @@ pub use crate::live::state::{
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{
-    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
+    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
     Truth,
 };
 pub use crate::rerun_log::state::{RerunState, ViewerState};
@@ -140,8 +140,8 @@ pub enum Simulation {
 pub struct RobotState {
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints from the base up \[rad\].
-    pub joints_rad: JointAngles,
+    /// Positions of the joints from the base up \[rad, or m of a prismatic joint\].
+    pub joints_rad: JointValues,
     /// Simulated time \[s\].
     pub sim_time_s: f64,
     /// Whether it advances.
@@ -322,6 +322,18 @@ pub struct Model {
 }
 
 impl Model {
+    /// How a joint, counted from 0 at the base, moves. As long as no cell says so it turns.
+    pub fn joint_kind(&self, index: usize) -> JointKind {
+        let joint = self.cell.as_ref().and_then(|cell| cell.joints.get(index));
+        joint.map_or(JointKind::Revolute, |joint| joint.kind)
+    }
+
+    /// Values of all joints as a person reads them, each with its unit.
+    pub fn joints_said(&self, joints: &[f64]) -> String {
+        let said = |(i, &value): (usize, &f64)| format!("{:.1}", self.joint_kind(i).quantity(value)).replace('-', "−");
+        joints.iter().enumerate().map(said).collect::<Vec<_>>().join("  ")
+    }
+
     /// Before anything has happened.
     pub fn new(source: CellSource, view: ViewSettings) -> Self {
         let first = LinkState::first(&source);

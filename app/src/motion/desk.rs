@@ -24,7 +24,7 @@ pub enum MotionTask {
         id: MotionId,
         /// Which way, and how fast.
         request: JogRequest,
-        /// How far: metres for translations, radians for turns and joints.
+        /// How far: metres for translations and prismatic joints, radians for turns and revolute joints.
         length: f64,
     },
     /// After the board, until it is cancelled.

@@ -11,7 +11,7 @@ fn desk() -> MotionQueue {
 }
 
 fn task(id: u64) -> MotionTask {
-    MotionTask::Move(MotionRequest { id: MotionId(id), goal: MotionGoal::Joints([0.0; 6]), speed: 1.0 })
+    MotionTask::Move(MotionRequest { id: MotionId(id), goal: MotionGoal::Joints([0.0; 6].into()), speed: 1.0 })
 }
 
 fn button(index: usize) -> JogRequest {

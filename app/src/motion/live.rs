@@ -1,9 +1,10 @@
 //! The arm of a cell over the remote API, as the motion worker drives it.
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::PlanError;
 use handeye_sim_link::client::cell::{
     Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes,
-    JogEnd, JogObstacle, JointAngles, MotionTolerance, SettleOptions, UnknownKinematics,
+    JogEnd, JogObstacle, MotionTolerance, SettleOptions, UnknownKinematics,
 };
 use handeye_sim_link::client::{CancelToken, LinkError, SimulationState};
 use nalgebra::Vector3;
@@ -33,7 +34,7 @@ impl LiveMotion {
     /// Whether there is a way, before anything moves. What the arm cannot do is `Some` reason.
     fn obstacle(&mut self, goal: &MotionGoal) -> Result<Option<Text>, LinkError> {
         let (MotionGoal::Tip(goal), Ok(kinematics)) = (goal, &self.kinematics) else { return Ok(None) };
-        let joints = self.arm.joint_angles()?;
+        let joints = self.arm.joint_values()?;
         Ok(kinematics.reach(goal, &joints).err().map(|why| text!("The arm cannot go there: {why}", why = why)))
     }
 
@@ -46,7 +47,8 @@ impl LiveMotion {
         }
         match goal {
             MotionGoal::Joints(joints) => {
-                self.arm.move_to_joints(joints, &limits::of_joints(&limits::SEQUENCE, speed), cancel)?;
+                let limits = limits::of_joints(&limits::SEQUENCE, speed, self.arm.info().joint_kinds());
+                self.arm.move_to_joints(joints, &limits, cancel)?;
                 self.arm.settle(&SettleOptions::default(), cancel)?;
             }
             MotionGoal::Tip(pose) => {
@@ -119,7 +121,7 @@ impl MotionPort for LiveMotion {
     fn room(&mut self, board: &BoardInView) -> Result<Room, PortError> {
         // Following says what is wrong with an arm of unknown kinematics.
         let Ok(kinematics) = &self.kinematics else { return Ok(Room::Enough) };
-        let joints = self.arm.joint_angles().map_err(port_error)?;
+        let joints = self.arm.joint_values().map_err(port_error)?;
         let (limits, reach) = (FollowLimits::default(), BoardReach::default());
         if kinematics.has_room_to_follow(&limits, board, &reach, &joints) {
             return Ok(Room::Enough);
@@ -134,7 +136,7 @@ impl MotionPort for LiveMotion {
         })
     }
 
-    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointAngles>, Text>, PortError> {
+    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
         let ViewsRequest { board, taken, count } = request;
         let kinematics = match &self.kinematics {
             Ok(kinematics) => kinematics,
@@ -142,7 +144,7 @@ impl MotionPort for LiveMotion {
                 return Ok(Err(text!("The kinematics of the arm is not known: {why}", why = why)));
             }
         };
-        let start = self.arm.joint_angles().map_err(port_error)?;
+        let start = self.arm.joint_values().map_err(port_error)?;
         Ok(kinematics.views_unlike(board, taken, &start, *count).map_err(|why| no_views(&why)))
     }
 
@@ -223,6 +225,7 @@ fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, P
         error if error.is_connection_loss() => Err(port_error(error)),
         // These are found out before anything moves.
         error @ (LinkError::JointOutOfRange { .. }
+        | LinkError::JointCount { .. }
         | LinkError::BadMotion { .. }
         | LinkError::NoSuchObject { .. }
         | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(said(&error))),
@@ -237,18 +240,23 @@ fn said(error: &LinkError) -> Text {
             text!("The simulation is paused: continue it first")
         }
         LinkError::NotRunning { .. } => text!("The simulation is stopped: start it first"),
-        LinkError::JointElsewhere { joint, at_deg, goal_deg } => text!(
-            "Joint {joint} stands at {at}° instead of {goal}°: another client or a script of the scene moves or holds it",
+        LinkError::JointElsewhere { joint, at, goal } => text!(
+            "Joint {joint} stands at {at} instead of {goal}: another client or a script of the scene moves or holds it",
             joint = joint,
-            at = format!("{at_deg:.3}"),
-            goal = format!("{goal_deg:.3}")
+            at = format!("{at:.3}"),
+            goal = format!("{goal:.3}")
         ),
-        LinkError::JointOutOfRange { joint, goal_deg, min_deg, max_deg } => text!(
-            "Joint {joint} cannot go to {goal}°: its range is {min}° to {max}°",
+        LinkError::JointOutOfRange { joint, goal, min, max } => text!(
+            "Joint {joint} cannot go to {goal}: its range is {min} to {max}",
             joint = joint,
-            goal = format!("{goal_deg:.2}"),
-            min = format!("{min_deg:.1}"),
-            max = format!("{max_deg:.1}")
+            goal = format!("{goal:.2}"),
+            min = format!("{min:.1}"),
+            max = format!("{max:.1}")
+        ),
+        LinkError::JointCount { got, need } => text!(
+            "{got} joint values for an arm of {need} joints: the goal was taught for another arm",
+            got = got,
+            need = need
         ),
         LinkError::Unreached { distance_mm, angle_deg } => text!(
             "The tip stopped {mm} mm and {deg}° from its goal, which may be out of reach: choose another pose, or go \
@@ -292,16 +300,16 @@ fn arm_jog<'a>(
 
 fn obstacle_text(obstacle: &JogObstacle) -> Text {
     match obstacle {
-        JogObstacle::JointRange { joint, limit_deg } => {
+        JogObstacle::JointRange { joint, limit } => {
             text!(
-                "Joint {joint} is at the end of its range, {limit}°",
+                "Joint {joint} is at the end of its range, {limit}",
                 joint = joint,
-                limit = format!("{limit_deg:.1}")
+                limit = format!("{limit:.1}")
             )
         }
         JogObstacle::Reach(why) => text!("The arm reaches no further: {why}", why = why),
         JogObstacle::Singular { joint } => text!(
-            "The arm is stretched, or two of its axes are in line: joint {joint} would turn too fast. Go another way or \
+            "The arm is stretched, or two of its axes are in line: joint {joint} would be too fast. Go another way or \
              move single joints",
             joint = joint
         ),

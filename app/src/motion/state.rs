@@ -1,8 +1,9 @@
 //! What the arm does and is asked to do.
 
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_sim_link::client::cell::{ArmChain, ArmKinematics, CellInfo, GroundTruth, JointAngles, Support};
+use handeye_sim_link::client::cell::{ArmKinematics, CellInfo, CellJoint, GroundTruth, Support};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -10,14 +11,13 @@ use crate::text::Text;
 /// What is known about the cell once it is connected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CellFacts {
-    /// Ranges of the joints \[rad\] from the base up; `None` for a joint that turns without end.
-    pub joint_ranges_rad: [Option<[f64; 2]>; 6],
+    /// The joints from the base up.
+    pub joints: Vec<JointFacts>,
     /// What the camera's settings say, without its lens: good enough to draw with before there is a calibration.
     pub nominal_intrinsics: Intrinsics,
-    /// Whether it is known how the tip moves with the joints: goals are then checked before anything moves.
-    pub is_arm_known: bool,
-    /// The arm as it was measured, if it is the UR5, whose bodies are known: where it is drawn.
-    pub arm: Option<ArmChain>,
+    /// The arm as it was measured. Where that is not known, goals are not checked before anything moves, and it is not
+    /// drawn.
+    pub arm: Option<ArmKinematics>,
     /// What works with the server's version.
     pub support: Support,
     /// What a simulated cell publishes for comparison; never read by a solver.
@@ -28,13 +28,28 @@ impl CellFacts {
     /// By what the cell says of itself.
     pub fn new(info: &CellInfo, arm: Option<&ArmKinematics>, truth: Option<&GroundTruth>) -> Self {
         Self {
-            joint_ranges_rad: info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad])),
+            joints: info.joints.iter().map(JointFacts::from).collect(),
             nominal_intrinsics: info.camera_intrinsics_nominal(),
-            is_arm_known: arm.is_some(),
-            arm: arm.and_then(ArmKinematics::ur5_chain),
+            arm: arm.cloned(),
             support: info.support(),
             truth: truth.map(Truth::from),
         }
+    }
+}
+
+/// A joint of the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct JointFacts {
+    /// How it moves.
+    pub kind: JointKind,
+    /// How far \[rad, or m of a prismatic joint\]; `None` for one that has no end.
+    pub range: Option<[f64; 2]>,
+}
+
+impl From<&CellJoint> for JointFacts {
+    fn from(joint: &CellJoint) -> Self {
+        let range = [joint.range.min, joint.range.max];
+        Self { kind: joint.kind, range: range.iter().all(|end| end.is_finite()).then_some(range) }
     }
 }
 
@@ -63,8 +78,8 @@ pub struct MotionId(pub u64);
 /// Where to move.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum MotionGoal {
-    /// These joint positions \[rad\].
-    Joints(JointAngles),
+    /// These joint positions \[rad, or m of a prismatic joint\].
+    Joints(JointValues),
     /// This pose of the tip.
     Tip(Pose<Base, Tip>),
 }
@@ -147,7 +162,7 @@ pub enum Jog {
     Joint {
         /// Which.
         index: usize,
-        /// Towards larger angles.
+        /// Towards larger values.
         forward: bool,
     },
     /// The tip, along an axis.
@@ -176,11 +191,11 @@ pub enum JogStep {
     /// As long as it is held.
     #[default]
     Hold,
-    /// This far: metres for translations, radians for rotations and joints.
+    /// This far: metres for translations and prismatic joints, radians for rotations and revolute joints.
     Step {
-        /// Translations.
+        /// Translations and prismatic joints.
         metres: f64,
-        /// Rotations and joints.
+        /// Rotations and revolute joints.
         radians: f64,
     },
 }

@@ -1,5 +1,6 @@
 //! Moving and jogging the arm.
 
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Camera, Pose, Tip};
 use handeye_core::project::session::CaptureId;
 
@@ -28,8 +29,10 @@ impl App {
 
     pub(crate) fn go_to_capture(&mut self, id: CaptureId) {
         let Some(capture) = self.model.document().capture(id) else { return };
-        let joints = capture.joints_rad.as_deref().and_then(|joints| joints.try_into().ok());
-        // Joints bring the arm back exactly; a recorded session may have the pose alone.
+        let joints = capture.joints_rad.as_deref().and_then(|joints| JointValues::try_from(joints).ok());
+        let of_arm = self.model.cell.as_ref().map(|cell| cell.joints.len());
+        // Joints bring the arm back exactly; a recorded session may have the pose alone, or be of another arm.
+        let joints = joints.filter(|joints| of_arm.is_none_or(|count| count == joints.len()));
         let goal = joints.map_or(MotionGoal::Tip(capture.base_from_tip), MotionGoal::Joints);
         self.start_motion(goal, text!("pose of capture {id}", id = id));
     }
@@ -82,7 +85,13 @@ impl App {
                 self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
                 let id = self.numbers.motion;
                 let speed = self.model.view.jog.speed;
-                match self.workers.jog_step(id, jog, [metres, radians], speed, self.camera_on_tip()) {
+                let is_length = match jog {
+                    Jog::Translate { .. } => true,
+                    Jog::Rotate { .. } => false,
+                    Jog::Joint { index, .. } => self.model.joint_kind(index) == JointKind::Prismatic,
+                };
+                let length = if is_length { metres } else { radians };
+                match self.workers.jog_step(id, jog, length, speed, self.camera_on_tip()) {
                     Ok(()) => {
                         let (what, since_s) = (text!("the next step"), self.model.now_s);
                         self.model.motion = Motion::Moving { id, what, since_s };

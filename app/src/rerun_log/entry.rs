@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::session::{CaptureId, Document};
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_core::geometry::arm::JointValues;
 
 use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved, Step, Tracked};
 
@@ -21,7 +21,7 @@ pub enum Entry {
         /// The tip as the controller reports it.
         base_from_tip: Pose<Base, Tip>,
         /// Joints \[rad\].
-        joints_rad: JointAngles,
+        joints_rad: JointValues,
     },
     /// A live image.
     Image {

@@ -26,7 +26,7 @@ fn observed(id: u32, width: u32) -> Entry {
 }
 
 fn robot(sim_time_s: f64) -> Entry {
-    Entry::Robot { sim_time_s, base_from_tip: Pose::identity(), joints_rad: [0.0; 6] }
+    Entry::Robot { sim_time_s, base_from_tip: Pose::identity(), joints_rad: [0.0; 6].into() }
 }
 
 fn words(lasting: &Lasting) -> Vec<String> {

@@ -15,7 +15,7 @@ fn rates(rate: Rate) -> Rates {
 }
 
 fn robot(sim_time_s: f64) -> Entry {
-    Entry::Robot { sim_time_s, base_from_tip: Pose::identity(), joints_rad: [0.0; 6] }
+    Entry::Robot { sim_time_s, base_from_tip: Pose::identity(), joints_rad: [0.0; 6].into() }
 }
 
 fn image(number: u64) -> Entry {
@@ -28,7 +28,7 @@ fn image(number: u64) -> Entry {
         depth_range_m: [0.0, 1.0],
         far_plane_m: 1.0,
         base_from_tip: Pose::identity(),
-        joints_rad: [0.0; 6],
+        joints_rad: [0.0; 6].into(),
         base_from_target_true: None,
     };
     let depth = DepthImage::new(1, 1, vec![1.0]).expect("an image");

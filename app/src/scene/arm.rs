@@ -2,18 +2,20 @@
 
 use std::sync::LazyLock;
 
-use handeye_core::geometry::arm::ur5::forward;
+use handeye_core::geometry::arm::ArmKind;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_sim_link::cell::render::{Solid, props};
 use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::client::cell::{ArmChain, JOINTS, JointAngles};
+use handeye_sim_link::client::cell::ArmKinematics;
 use nalgebra::Isometry3;
 
 use crate::model::CellFacts;
 
 /// The arm of the built-in scene.
-static BUILT_IN: LazyLock<Option<ArmChain>> = LazyLock::new(|| {
+static BUILT_IN: LazyLock<Option<ArmKinematics>> = LazyLock::new(|| {
     let scene = Scene::reference().and_then(|scene| scene.resolve(0)).ok()?;
-    Some(ArmChain { base_from_arm: scene.world_from_arm, connection_from_tip: scene.connection_from_tip })
+    let ranges = ArmKind::Ur5Coppeliasim.ranges();
+    ArmKinematics::ur5(scene.world_from_arm, scene.connection_from_tip, &ranges).ok()
 });
 
 /// An arm with its joints at some positions.
@@ -22,59 +24,58 @@ pub struct PosedArm {
     /// Where it stands.
     pub base_from_arm: Isometry3<f64>,
     /// What each link, counted from the foot, has moved since all joints were zero.
-    pub links: [Isometry3<f64>; JOINTS + 1],
+    pub links: Vec<Isometry3<f64>>,
+    /// Its bodies in the arm frame with all joints at zero, each with the number of its link: those of the UR5, and of any
+    /// other arm tubes between its joints.
+    pub bodies: Vec<(usize, Solid)>,
 }
 
-/// The arm with these joints; `None` for one whose kinematics is not built in.
+/// The arm with these joints; `None` for one whose kinematics is not known, and for joints that are not its own.
 ///
 /// It stands where it was measured in the cell. Without a cell it is that of the built-in scene, if its tip is where the
 /// robot reported it: an arm that ends beside its tip would be a lie.
-pub fn posed_arm(
-    cell: Option<&CellFacts>,
-    base_from_tip: &Pose<Base, Tip>,
-    joints_rad: &JointAngles,
-) -> Option<PosedArm> {
-    let chain = match cell {
-        Some(facts) => facts.arm,
-        None => BUILT_IN.filter(|chain| chain.fits(joints_rad, base_from_tip)),
+pub fn posed_arm(cell: Option<&CellFacts>, base_from_tip: &Pose<Base, Tip>, joints: &[f64]) -> Option<PosedArm> {
+    let kinematics = match cell {
+        Some(facts) => facts.arm.as_ref(),
+        None => BUILT_IN.as_ref().filter(|arm| arm.fits(joints, base_from_tip)),
     }?;
-    if !joints_rad.iter().all(|joint| joint.is_finite()) {
-        return None;
-    }
-    let (now, at_zero) = (forward(joints_rad), forward(&[0.0; JOINTS]));
-    let links = std::array::from_fn(|link| match link.checked_sub(1) {
-        None => Isometry3::identity(),
-        Some(joint) => now.arm_from_link[joint] * at_zero.arm_from_link[joint].inverse(),
-    });
-    Some(PosedArm { base_from_arm: chain.base_from_arm, links })
+    let arm = kinematics.arm();
+    let (now, at_zero) = (arm.frames(joints).ok()?, arm.frames(&vec![0.0; joints.len()]).ok()?);
+    let moved = now.base_from_link.iter().zip(&at_zero.base_from_link).map(|(now, zero)| now * zero.inverse());
+    Some(PosedArm {
+        base_from_arm: *kinematics.base_from_arm(),
+        links: std::iter::once(Isometry3::identity()).chain(moved).collect(),
+        bodies: if kinematics.is_ur5() { props::ur5_parts().collect() } else { props::link_parts(arm) },
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use handeye_sim_link::cell::render::{Shape, props};
+    use handeye_core::geometry::arm::JointValues;
+    use handeye_sim_link::cell::render::Shape;
     use nalgebra::{Point3, Translation3};
 
     use super::*;
     use crate::gui::testing::sample;
 
-    const JOINTS_RAD: [JointAngles; 3] =
-        [[0.0; JOINTS], [0.3, 0.8, -1.0, 0.2, 1.5, 2.0], [-2.0, 0.5, -1.5, 0.4, -1.2, 0.1]];
+    const JOINTS_RAD: [[f64; 6]; 3] =
+        [[0.0; 6], [0.3, 0.8, -1.0, 0.2, 1.5, 2.0], [-2.0, 0.5, -1.5, 0.4, -1.2, 0.1]];
 
-    fn built_in() -> ArmChain {
-        BUILT_IN.expect("the built-in scene")
+    fn built_in() -> ArmKinematics {
+        BUILT_IN.clone().expect("the built-in scene")
     }
 
     /// The ends of the axes of all bodies of the arm in the base, foot first.
     fn axes(arm: &PosedArm) -> Vec<[Point3<f64>; 2]> {
-        let ends = |(link, solid): (usize, handeye_sim_link::cell::render::Solid)| {
+        let ends = |(link, solid): &(usize, Solid)| {
             let ends = match solid.shape {
                 Shape::Capsule { a, b, .. } => [a, b],
                 Shape::Cylinder { half_height, .. } => [-half_height, half_height].map(|z| Point3::new(0.0, 0.0, z)),
                 other => panic!("the arm has no {other:?}"),
             };
-            ends.map(|end| arm.base_from_arm * arm.links[link] * solid.world_from_shape * end)
+            ends.map(|end| arm.base_from_arm * arm.links[*link] * solid.world_from_shape * end)
         };
-        props::ur5_parts().map(ends).collect()
+        arm.bodies.iter().map(ends).collect()
     }
 
     #[test]
@@ -97,9 +98,9 @@ mod tests {
     #[test]
     fn the_arm_is_where_it_was_measured_with_whatever_tool_and_without_a_cell_only_if_it_ends_at_its_tip() {
         let [_, joints_rad, _] = JOINTS_RAD;
-        let elsewhere = Isometry3::translation(1.0, 0.0, 0.0) * built_in().base_from_arm;
-        let longer = built_in().connection_from_tip * Translation3::new(0.0, 0.0, 0.1);
-        let chain = ArmChain { base_from_arm: elsewhere, connection_from_tip: longer };
+        let elsewhere = Isometry3::translation(1.0, 0.0, 0.0) * built_in().base_from_arm();
+        let longer = built_in().connection_from_tip() * Translation3::new(0.0, 0.0, 0.1);
+        let chain = ArmKinematics::ur5(elsewhere, longer, &built_in().arm().ranges()).expect("ranges with room");
         let base_from_tip = chain.tip(&joints_rad);
         let measured = CellFacts { arm: Some(chain), ..sample::connected().cell.expect("connected") };
         let arm = posed_arm(Some(&measured), &base_from_tip, &joints_rad).expect("it was measured");
@@ -107,6 +108,28 @@ mod tests {
         let other = CellFacts { arm: None, ..measured };
         assert!(posed_arm(Some(&other), &built_in().tip(&joints_rad), &joints_rad).is_none());
         assert!(posed_arm(None, &base_from_tip, &joints_rad).is_none());
-        assert!(posed_arm(None, &built_in().tip(&joints_rad), &[f64::NAN; JOINTS]).is_none());
+        assert!(posed_arm(None, &built_in().tip(&joints_rad), &[f64::NAN; 6]).is_none());
+        assert!(posed_arm(None, &built_in().tip(&joints_rad), &joints_rad[..5]).is_none());
+    }
+
+    /// The Panda has seven joints; its hand hangs on the last one.
+    #[test]
+    fn any_other_arm_is_drawn_as_tubes_that_hang_together_from_its_foot_to_its_tip() {
+        let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes/panda.toml");
+        let scene = Scene::load(&scene).and_then(|scene| scene.resolve(0)).expect("it is shipped");
+        let kinematics = ArmKinematics::new(scene.arm.clone(), scene.world_from_arm);
+        let facts = CellFacts { arm: Some(kinematics.clone()), ..sample::connected().cell.expect("connected") };
+        for joints in [scene.start_joints, JointValues::from([0.5, -0.3, 0.8, -1.5, 0.2, 1.9, -1.0])] {
+            let base_from_tip = kinematics.tip(&joints);
+            let arm = posed_arm(Some(&facts), &base_from_tip, &joints).expect("it is known");
+            assert_eq!(arm.links.len(), 8);
+            let axes = axes(&arm);
+            assert!((axes[0][0].coords - scene.world_from_arm.translation.vector).norm() < 1e-9, "{:?}", axes[0]);
+            for pair in axes.windows(2) {
+                assert!((pair[0][1] - pair[1][0]).norm() < 1e-9, "a gap: {pair:?}");
+            }
+            let end = axes.last().expect("tubes")[1].coords;
+            assert!((end - base_from_tip.translation()).norm() < 1e-9, "{end}");
+        }
     }
 }

@@ -7,6 +7,7 @@ use handeye_core::estimate::{Method, Options};
 use handeye_core::geometry::arm::{ArmKind, ArmModel};
 use handeye_core::project::session::{GroundTruth, SessionMeta};
 use handeye_core::targets::{Grid, TargetSpec};
+use handeye_sim_link::client::cell::ArmKinematics;
 
 use crate::model::Truth;
 
@@ -14,7 +15,7 @@ use crate::model::Truth;
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
 /// The arm whose kinematics is built in, of which a cell tells whether it is its own.
-pub const BUILT_IN_ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
+const BUILT_IN_ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
 
 /// The ten reference poses, so that they are there wherever the binary is.
 pub const REFERENCE_POSES: &str = include_str!("../../../assets/poses/seed10.toml");
@@ -32,6 +33,11 @@ pub fn solve_options(method: Method, options: Options, target: &TargetSpec) -> B
         ("joint_offsets".to_owned(), options.joint_offsets.into()),
         (TARGET_OPTION.to_owned(), target),
     ])
+}
+
+/// The arm whose joint values the estimate of joint offsets may use: of any other the values are kept and not used.
+pub fn arm(kinematics: Option<&ArmKinematics>) -> Option<ArmModel> {
+    kinematics.filter(|arm| arm.is_ur5()).map(|_ur5| BUILT_IN_ARM)
 }
 
 /// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use handeye_core::image::RgbImage;
 use handeye_core::project::session::{CaptureId, Document, Edit};
 use handeye_core::targets::observation::Corner;
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_core::geometry::arm::JointValues;
 use serde::{Deserialize, Serialize};
 
 use crate::capture::state::CapturePurpose;
@@ -77,7 +77,7 @@ pub struct PoseSequence {
     /// The poses in their order.
     pub names: Vec<String>,
     /// The joints at each \[rad\], of poses that were planned; `None` for taught ones, which the session has.
-    pub planned: Option<Vec<JointAngles>>,
+    pub planned: Option<Vec<JointValues>>,
     /// What is captured at each; `None` only moves.
     pub purpose: Option<CapturePurpose>,
     /// How the poses up to now went; the next one is under way.

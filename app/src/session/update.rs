@@ -22,7 +22,7 @@ impl App {
     fn beginning(&self) -> Box<Beginning> {
         let cell = self.model.cell.as_ref();
         let mut meta = start::meta(cell.and_then(|cell| cell.truth.as_ref()), timestamp_rfc3339());
-        meta.arm = cell.and_then(|cell| cell.arm).map(|_ur5| start::BUILT_IN_ARM);
+        meta.arm = start::arm(cell.and_then(|cell| cell.arm.as_ref()));
         Box::new(Beginning { meta, taught: reference_poses() })
     }
 

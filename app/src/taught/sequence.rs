@@ -1,7 +1,8 @@
 //! Visiting all taught poses, or poses that are planned to verify at, with a capture at each.
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::estimate::handeye::HandEye;
-use handeye_sim_link::client::cell::{BoardInView, JointAngles};
+use handeye_sim_link::client::cell::BoardInView;
 
 use crate::app::App;
 use crate::model::{
@@ -75,7 +76,7 @@ impl App {
     }
 
     /// The poses are planned, or cannot be.
-    pub(crate) fn planned(&mut self, id: MotionId, views: Result<Vec<JointAngles>, Text>) {
+    pub(crate) fn planned(&mut self, id: MotionId, views: Result<Vec<JointValues>, Text>) {
         // After a stop nothing begins by itself now.
         if self.numbers.plan != Some(id) || !self.model.planning {
             return;

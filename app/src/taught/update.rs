@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use handeye_core::project::session::{Edit, TaughtChange};
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::project::taught_poses::{Goal, TaughtPose, TaughtPoses};
 
 use crate::app::App;
@@ -105,12 +106,12 @@ impl App {
         let what = text!("pose {name}", name = name);
         let goal = self.model.document().taught.iter().find(|pose| pose.name == name).map(|pose| match &pose.goal {
             Goal::Tip(base_from_tip) => Some(MotionGoal::Tip(*base_from_tip)),
-            Goal::Joints(joints) => joints.as_slice().try_into().ok().map(MotionGoal::Joints),
+            Goal::Joints(joints) => JointValues::try_from(&joints[..]).ok().map(MotionGoal::Joints),
         });
         match goal {
             Some(Some(goal)) => self.start_motion(goal, what),
             Some(None) => {
-                let why = text!("this arm has six joints and the pose another number");
+                let why = text!("no arm has as many joints as the pose");
                 self.moved(self.numbers.motion, MotionOutcome::Refused(why));
             }
             None => {

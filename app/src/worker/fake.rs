@@ -3,12 +3,13 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
+use handeye_core::geometry::arm::{ArmKind, JointKind, JointValues};
 use handeye_core::depth::DepthImage;
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{ArmChain, BoardInView, FollowMoment, FollowWish, JointAngles, Support};
+use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish, Support};
 use nalgebra::Isometry3;
 
 use super::port::{
@@ -53,7 +54,7 @@ pub struct Script {
     /// Whether there is room to follow.
     pub room: Room,
     /// The poses that are planned, or why there are none.
-    pub views: Result<Vec<JointAngles>, Text>,
+    pub views: Result<Vec<JointValues>, Text>,
     /// Motions that were begun.
     pub moved: Vec<MotionGoal>,
     /// Jogs and steps that were begun.
@@ -158,10 +159,9 @@ impl ControlPort for FakeCell {
         drop(self.answer()?);
         let (width, height) = SIZE;
         Ok(CellFacts {
-            joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
+            joints: vec![crate::model::JointFacts { kind: JointKind::Revolute, range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]) }; 6],
             nominal_intrinsics: Intrinsics::pinhole(width, height, 60.0),
-            is_arm_known: true,
-            arm: Some(ArmChain { base_from_arm: Isometry3::identity(), connection_from_tip: Isometry3::identity() }),
+            arm: ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges()).ok(),
             support: Support::Whole,
             truth: None,
         })
@@ -171,7 +171,7 @@ impl ControlPort for FakeCell {
         let script = self.answer()?;
         Ok(RobotState {
             base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
-            joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0],
+            joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
             sim_time_s: script.frames as f64 * 0.05,
             simulation: script.simulation,
         })
@@ -266,14 +266,14 @@ impl MotionPort for FakeCell {
         Ok(self.answer()?.room.clone())
     }
 
-    fn views(&mut self, _request: &ViewsRequest) -> Result<Result<Vec<JointAngles>, Text>, PortError> {
+    fn views(&mut self, _request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
         Ok(self.answer()?.views.clone())
     }
 
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
         let RobotState { base_from_tip, joints_rad, .. } = self.state()?;
         let sim_time_s = || self.script().frames as f64 * 0.05;
-        let moment = |sim_time_s| FollowMoment { sim_time_s, joints_rad, base_from_tip };
+        let moment = |sim_time_s| FollowMoment { sim_time_s, joints: joints_rad, base_from_tip };
         self.end_of_motion(|_| {}, || wish(&moment(sim_time_s())) != FollowWish::End)
     }
 }
@@ -299,7 +299,7 @@ impl CameraPort for FakeCell {
             sim_time_s: script.frames as f64 * 0.05,
             image_age_s: 0.0,
             base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
-            joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0],
+            joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
             base_from_target_true: None,
         })
     }

@@ -134,7 +134,7 @@ impl ControlPort for LiveControl {
         let read = |arm: &mut Arm| {
             Ok(RobotState {
                 base_from_tip: arm.base_from_tip()?,
-                joints_rad: arm.joint_angles()?,
+                joints_rad: arm.joint_values()?,
                 sim_time_s: arm.sim().get_simulation_time()?,
                 simulation: match arm.sim().get_simulation_state()? {
                     SimulationState::Stopped => Simulation::Stopped,

@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::thread::JoinHandle;
 
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::Base;
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{Arm, CellPaths, JointAngles};
+use handeye_sim_link::client::cell::{Arm, CellPaths};
 use handeye_sim_link::client::{CallOptions, ConnectionOptions, Endpoint, Sim, SimulationState};
 use handeye_sim_link::wire;
 
@@ -55,8 +56,8 @@ impl Live {
         Self { server, bench, watch }
     }
 
-    fn joints(&mut self) -> JointAngles {
-        self.watch.joint_angles().expect("a call")
+    fn joints(&mut self) -> JointValues {
+        self.watch.joint_values().expect("a call")
     }
 
     fn tip(&mut self) -> Pose<Base, Tip> {
@@ -64,7 +65,7 @@ impl Live {
     }
 
     /// Waits until the first joint is past a position.
-    fn wait_until_moving(&mut self, start: &JointAngles) {
+    fn wait_until_moving(&mut self, start: &JointValues) {
         let deadline = Instant::now() + PATIENCE;
         while self.joints() == *start {
             assert!(Instant::now() < deadline, "nothing moves");
@@ -106,7 +107,8 @@ fn a_cell_of_this_project_is_called_so_and_its_facts_are_known() {
     assert!(facts.arm.is_some());
     let truth = facts.truth.expect("the cell publishes it");
     assert!((truth.tip_from_camera.translation().x - 0.05).abs() < 1e-12);
-    assert_eq!(facts.joint_ranges_rad, [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6]);
+    let turn = crate::model::JointFacts { kind: JointKind::Revolute, range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]) };
+    assert_eq!(facts.joints, [turn; 6]);
     let connector = LiveConnector::new(source(&live.server));
     let connected = connector.connect_motion(&CancelToken::default()).expect("it is there");
     assert_eq!(connected.server, "Handeye cell");
@@ -137,7 +139,7 @@ fn nothing_moves_while_the_simulation_rests_and_the_reason_is_told() {
     let mut live = Live::new(false);
     live.watch.sim().stop_simulation().expect("a call");
     while live.watch.sim().get_simulation_state().expect("a call") != SimulationState::Stopped {}
-    live.bench.move_to(1, MotionGoal::Joints([0.0; 6]), 1.0);
+    live.bench.move_to(1, MotionGoal::Joints([0.0; 6].into()), 1.0);
     // No other pose would go better: a sequence ends with it.
     let MotionOutcome::Failed(why) = live.bench.moved(1) else { panic!("it did not fail") };
     assert!(why.say(Language::English).contains("stopped"), "{why:?}");
@@ -193,7 +195,7 @@ fn a_stop_works_while_the_connection_for_motions_hangs() {
     let (fake, release) = FakeCell::that_never_answers();
     let connector: Arc<dyn Connector> = Arc::new(Half { live: LiveConnector::new(source(&server)), fake });
     let mut live = Live::with(server, &connector);
-    live.bench.move_to(1, MotionGoal::Joints([0.0; 6]), 1.0);
+    live.bench.move_to(1, MotionGoal::Joints([0.0; 6].into()), 1.0);
     let start = live.joints();
     let other = long_motion(&live.server);
     live.wait_until_moving(&start);
@@ -245,14 +247,14 @@ fn a_step_goes_exactly_as_far_as_it_was_asked_to() {
     let before = live.tip();
     let camera = live.bench.facts().truth.expect("published").tip_from_camera;
     let jog = Jog::Translate { frame: JogFrame::Camera, axis: Axis::Z, forward: false };
-    live.bench.workers.jog_step(MotionId(1), jog, [0.01, 0.1], 0.25, Some(camera)).expect("the worker is there");
+    live.bench.workers.jog_step(MotionId(1), jog, 0.01, 0.25, Some(camera)).expect("the worker is there");
     assert_eq!(live.bench.moved(1), MotionOutcome::Arrived);
     let moved = live.tip().translation() - before.translation();
     let back = before.rotation() * (camera.rotation() * nalgebra::Vector3::new(0.0, 0.0, -0.01));
     assert!((moved - back).norm() < 1e-7, "{moved} instead of {back}");
 
     let jog = Jog::Rotate { frame: JogFrame::Camera, axis: Axis::X, forward: true };
-    live.bench.workers.jog_step(MotionId(2), jog, [0.01, 0.1], 0.25, None).expect("the worker is there");
+    live.bench.workers.jog_step(MotionId(2), jog, 0.1, 0.25, None).expect("the worker is there");
     let MotionOutcome::Refused(why) = live.bench.moved(2) else { panic!("nobody knows the camera") };
     assert!(why.say(Language::English).contains("calibrate first"), "{why:?}");
 }
@@ -282,12 +284,12 @@ mod slow {
         let mut live = Live::new(false);
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/poses/seed10.toml");
         let sequence = TaughtPoses::read(Path::new(file)).expect("the taught poses");
-        let start: JointAngles = sequence.start_joints_rad.expect("a start").try_into().expect("six joints");
+        let start = JointValues::try_from(&sequence.start_joints_rad.expect("a start")[..]).expect("six joints");
         let mut id = 0;
         for speed in [1.0, 0.25] {
             let goals = sequence.poses.iter().map(|pose| match &pose.goal {
                 Goal::Tip(pose) => MotionGoal::Tip(*pose),
-                Goal::Joints(joints) => MotionGoal::Joints(joints.clone().try_into().expect("six joints")),
+                Goal::Joints(joints) => MotionGoal::Joints(JointValues::try_from(&joints[..]).expect("six joints")),
             });
             for goal in std::iter::once(MotionGoal::Joints(start)).chain(goals) {
                 id += 1;

@@ -213,8 +213,8 @@ impl Workers {
         self.begin(MotionTask::Move(request))
     }
 
-    /// Asks for one step of a jog at a share of the fastest speed: metres along a line, or radians about an axis or of a
-    /// joint. Reported as [`Self::move_to`].
+    /// Asks for one step of a jog at a share of the fastest speed: metres along a line or of a prismatic joint, radians about an
+    /// axis or of a revolute joint. Reported as [`Self::move_to`].
     ///
     /// # Errors
     /// As [`Self::move_to`].
@@ -222,11 +222,10 @@ impl Workers {
         &self,
         id: MotionId,
         jog: Jog,
-        [metres, radians]: [f64; 2],
+        length: f64,
         speed: f64,
         tip_from_camera: Option<Pose<Tip, CameraFrame>>,
     ) -> Result<(), Busy> {
-        let length = if matches!(jog, Jog::Translate { .. }) { metres } else { radians };
         self.begin(MotionTask::JogStep { id, request: JogRequest { jog, tip_from_camera, speed }, length })
     }
 

@@ -1,5 +1,6 @@
 //! The motion worker with a cell that does as it is told.
 
+use handeye_core::geometry::arm::JointValues;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 
@@ -113,7 +114,7 @@ impl Bench {
     }
 }
 
-const HOME: MotionGoal = MotionGoal::Joints([0.0, 0.5, -1.0, 0.0, 1.5, 0.0]);
+const HOME: MotionGoal = MotionGoal::Joints(JointValues::of([0.0, 0.5, -1.0, 0.0, 1.5, 0.0]));
 const LEFT: Jog = Jog::Joint { index: 0, forward: true };
 const RIGHT: Jog = Jog::Joint { index: 0, forward: false };
 
@@ -155,7 +156,7 @@ fn a_motion_arrives_or_is_refused_with_the_words_of_the_cell() {
     cell.script().motions = FakeMotions::Refuse(why.clone());
     bench.move_to(2, HOME, 1.0);
     assert_eq!(bench.moved(2), MotionOutcome::Refused(why));
-    bench.workers.jog_step(MotionId(3), LEFT, [0.01, 0.1], 0.5, None).expect("the worker is there");
+    bench.workers.jog_step(MotionId(3), LEFT, 0.1, 0.5, None).expect("the worker is there");
     assert!(matches!(bench.moved(3), MotionOutcome::Refused(_)));
     assert_eq!(bench.ends(), 3);
 }
@@ -302,7 +303,7 @@ fn following_moves_to_where_there_is_room_first_when_that_is_wished_and_needed()
     follow(&bench, 1, FollowWish::KeepViewWithRoom);
     bench.moved(1);
     assert!(cell.script().moved.is_empty(), "there is room");
-    cell.script().room = Room::At(joints);
+    cell.script().room = Room::At(joints.into());
     follow(&bench, 2, FollowWish::KeepView);
     bench.moved(2);
     assert!(cell.script().moved.is_empty(), "it was not wished");
@@ -314,7 +315,7 @@ fn following_moves_to_where_there_is_room_first_when_that_is_wished_and_needed()
     });
     assert!(said.contains("no room to go along with the board"), "{said}");
     bench.moved(3);
-    assert_eq!(cell.script().moved, [MotionGoal::Joints(joints)]);
+    assert_eq!(cell.script().moved, [MotionGoal::Joints(joints.into())]);
     let why = Text::verbatim("the board is at the column");
     cell.script().room = Room::Nowhere(why.clone());
     follow(&bench, 4, FollowWish::KeepViewWithRoom);
@@ -325,7 +326,7 @@ fn following_moves_to_where_there_is_room_first_when_that_is_wished_and_needed()
 fn a_stop_on_the_way_to_where_there_is_room_ends_the_following() {
     let (cell, mut bench) = fake(FakeMotions::Hang);
     tracked(&bench);
-    cell.script().room = Room::At([0.0; 6]);
+    cell.script().room = Room::At([0.0; 6].into());
     bench.workers.follow(MotionId(1), FollowWish::KeepViewWithRoom, 0.25).expect("the worker is there");
     begun(&cell, 1);
     bench.workers.press_stop();
@@ -340,7 +341,7 @@ fn poses_are_planned_without_a_motion_and_the_arm_is_free_afterwards() {
     tracked(&bench);
     let board = bench.workers.follow.board_in_view().expect("tracked");
     let request = ViewsRequest { board, taken: Vec::new(), count: 2 };
-    let views = vec![[0.1; 6], [0.2; 6]];
+    let views = vec![JointValues::from([0.1; 6]), [0.2; 6].into()];
     cell.script().views = Ok(views.clone());
     bench.workers.plan_views(MotionId(1), request).expect("the worker is there");
     let planned = bench.until("the poses", |event| match event {

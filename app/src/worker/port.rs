@@ -1,10 +1,11 @@
 //! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::depth::DepthImage;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish, JointAngles};
+use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish};
 
 use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
 use crate::text::Text;
@@ -128,7 +129,7 @@ pub enum Room {
     /// It can.
     Enough,
     /// It can from these joints \[rad\].
-    At(JointAngles),
+    At(JointValues),
     /// It can from nowhere, and this is why.
     Nowhere(Text),
 }
@@ -172,7 +173,7 @@ pub trait MotionPort: Send {
     ///
     /// # Errors
     /// As [`Self::move_to`].
-    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointAngles>, Text>, PortError>;
+    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError>;
 
     /// Leads the tip where `wish` wants it, pass by pass, and returns when the arm stands: [`MotionOutcome::Stopped`] when
     /// that was wished or a stop came, and why otherwise.
@@ -196,7 +197,7 @@ pub struct RawFrame {
     /// The tip as the controller reports it at that instant.
     pub base_from_tip: Pose<Base, Tip>,
     /// The joints at that instant \[rad\].
-    pub joints_rad: JointAngles,
+    pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it.
     pub base_from_target_true: Option<Pose<Base, Target>>,
 }

@@ -35,6 +35,8 @@ pub const INT_PROGRAM_VERSION: i64 = 1;
 pub const OBJECT_JOINT: i64 = 1;
 /// Type of a joint: it turns about one axis.
 pub const JOINT_REVOLUTE: i64 = 10;
+/// Type of a joint: it shifts along one axis.
+pub const JOINT_PRISMATIC: i64 = 11;
 
 /// Mode of a joint that forces move and a controller holds; in the others it is where it is put.
 pub const JOINT_MODE_DYNAMIC: i64 = 5;

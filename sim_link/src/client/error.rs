@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use handeye_core::geometry::arm::JointQuantity;
+
 use super::convert::ConvertError;
 use super::endpoint::{BadEndpoint, Endpoint};
 use super::sim::SimulationState;
@@ -141,6 +143,25 @@ pub enum LinkError {
         /// What it is for.
         what: &'static str,
     },
+    /// An arm with more joints than are driven.
+    #[error(
+        "{count} joints carry the tip and at most {} are driven; set the path of the arm in the settings to the object \
+         that its first joint hangs on",
+        handeye_core::geometry::arm::MAX_JOINTS
+    )]
+    TooManyJoints {
+        /// Joints between base and tip.
+        count: usize,
+    },
+    /// A joint without an axis.
+    #[error(
+        "joint {joint} of the arm, counted from its base, is spherical: revolute and prismatic joints are driven; replace \
+         it in the scene by three revolute ones"
+    )]
+    SphericalJoint {
+        /// Counted from 1 at the base.
+        joint: usize,
+    },
     /// The server answers, but what a task waits for does not come.
     #[error(
         "{task}: waited {after:.1?} for {awaited}, in vain; look at the simulator, and start the simulation again if its \
@@ -166,16 +187,24 @@ pub enum LinkError {
         state: SimulationState,
     },
     /// A joint cannot go there; the simulator would clamp it without a word.
-    #[error("joint {joint} cannot go to {goal_deg:.2}°: its range is {min_deg:.1}° to {max_deg:.1}°")]
+    #[error("joint {joint} cannot go to {goal:.2}: its range is {min:.1} to {max:.1}")]
     JointOutOfRange {
         /// Which joint, counted from 1 at the base.
         joint: usize,
         /// Where it should go.
-        goal_deg: f64,
+        goal: JointQuantity,
         /// Lower end of its range.
-        min_deg: f64,
+        min: JointQuantity,
         /// Upper end of its range.
-        max_deg: f64,
+        max: JointQuantity,
+    },
+    /// A goal for another number of joints.
+    #[error("{got} joint values for an arm of {need} joints: the goal was taught for another arm")]
+    JointCount {
+        /// Values given.
+        got: usize,
+        /// Joints of the arm.
+        need: usize,
     },
     /// A goal or a limit of a motion is not usable.
     #[error("{what} of a motion must be {expected}, got {value}")]
@@ -214,16 +243,16 @@ pub enum LinkError {
     },
     /// A joint is not where a motion has put it.
     #[error(
-        "joint {joint} stands at {at_deg:.3}° instead of {goal_deg:.3}°: another client or a script of the scene moves or \
+        "joint {joint} stands at {at:.3} instead of {goal:.3}: another client or a script of the scene moves or \
          holds it; end that, or start the simulation again"
     )]
     JointElsewhere {
         /// Which joint, counted from 1 at the base.
         joint: usize,
         /// Where it is.
-        at_deg: f64,
+        at: JointQuantity,
         /// Where it should be.
-        goal_deg: f64,
+        goal: JointQuantity,
     },
     /// No motion fits the limits.
     #[error("no motion fits these limits of velocity, acceleration and jerk: {reason}")]
@@ -244,13 +273,13 @@ pub enum LinkError {
     },
     /// The arm did not come to rest.
     #[error(
-        "the arm still moves by {rate_deg_s:.3}°/s after {after_s:.2} s of simulation; wait longer or check the scene"
+        "the arm still moves by {rate:.3}/s after {after_s:.2} s of simulation; wait longer or check the scene"
     )]
     NotSettled {
         /// Simulated time waited.
         after_s: f64,
-        /// Fastest joint.
-        rate_deg_s: f64,
+        /// Speed of the fastest joint, per second.
+        rate: JointQuantity,
     },
     /// Image and pose could not be had for one and the same instant.
     #[error(

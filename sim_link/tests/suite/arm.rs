@@ -1,11 +1,12 @@
 //! Motions, jogs and stops of the arm against the real cell over a socket.
 
 use ciborium::Value;
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{
-    Arm, ArmJog, ArmKinematics, CameraFeed, CellClient, CellPaths, JogAxes, JogEnd, JogObstacle, JointAngles,
+    Arm, ArmJog, ArmKinematics, CameraFeed, CellClient, CellPaths, JogAxes, JogEnd, JogObstacle,
 };
 use handeye_sim_link::client::{
     CallOptions, CancelToken, Connection, ConnectionOptions, Endpoint, LinkError, MotionLimits, ObjectHandle, Sim,
@@ -47,8 +48,8 @@ impl Bench {
         self.arm.kinematics().expect("calls").expect("it is the UR5")
     }
 
-    fn joints(&mut self) -> JointAngles {
-        self.arm.joint_angles().expect("a call")
+    fn joints(&mut self) -> JointValues {
+        self.arm.joint_values().expect("a call")
     }
 
     fn tip(&mut self) -> Pose<Base, Tip> {
@@ -82,7 +83,7 @@ fn forget(address: &str, uuid: &str) {
 #[test]
 fn a_motion_that_the_server_has_forgotten_is_named_and_can_be_made_again() {
     let Bench { server, arm: mut witness } = Bench::running();
-    let goal = witness.joint_angles().expect("a call").map(|angle| angle + 0.5);
+    let goal = witness.joint_values().expect("a call").map(|angle| angle + 0.5);
     let (uuids, uuid) = channel::<String>();
     let (mut passes, address) = (0, server.endpoint());
     let mut cell = watched(&server, move || {
@@ -97,7 +98,7 @@ fn a_motion_that_the_server_has_forgotten_is_named_and_can_be_made_again() {
         cell.arm().move_to_joints(&goal, &slow(), &CancelToken::default()).expect_err("nobody knows the motion");
     assert!(matches!(error, LinkError::Forgotten { .. }), "{error}");
     assert!(error.to_string().contains("slept"), "{error}");
-    assert!(cell.arm().joint_angles().expect("a call") != goal);
+    assert!(cell.arm().joint_values().expect("a call") != goal);
     let limits = MotionLimits::uniform(6, 3.0, 9.0, 90.0);
     cell.arm().move_to_joints(&goal, &limits, &CancelToken::default()).expect("there");
 }
@@ -141,7 +142,7 @@ fn a_held_joint_moves_from_the_first_pass_within_its_limits_and_comes_to_rest() 
     let mut seen = vec![bench.joints()[1]];
     let mut passes = 0;
     let mut held = || {
-        seen.push(watch.joint_angles().expect("a call")[1]);
+        seen.push(watch.joint_values().expect("a call")[1]);
         passes += 1;
         (passes <= 10).then_some(0.5)
     };
@@ -213,7 +214,7 @@ fn a_tip_that_is_held_until_it_can_go_no_further_stops_and_says_why() {
     let mut before = bench.joints();
     let mut fastest_rad_s = 0.0_f64;
     let mut held = || {
-        let now = watch.joint_angles().expect("a call");
+        let now = watch.joint_values().expect("a call");
         let change = now.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         fastest_rad_s = fastest_rad_s.max(change / TIME_STEP_S);
         before = now;
@@ -251,7 +252,7 @@ fn a_stop_of_another_client_brings_a_jog_to_rest_within_its_limits() {
     let mut passes = 0;
     let mut held = || {
         passes += 1;
-        seen.push(other.joint_angles().expect("a call")[0]);
+        seen.push(other.joint_values().expect("a call")[0]);
         if passes == 15 {
             other.stop().expect("a call");
         }
@@ -342,7 +343,7 @@ fn a_cancelled_motion_is_braked_and_not_cut_off() {
     let cancel = CancelToken::default();
     let (token, (seen, passes)) = (cancel.clone(), channel());
     let look = move || {
-        let angle_rad = watch.joint_angles().expect("a call")[0];
+        let angle_rad = watch.joint_values().expect("a call")[0];
         if angle_rad > CANCELLED_AT_RAD {
             token.cancel();
         }
@@ -353,7 +354,7 @@ fn a_cancelled_motion_is_braked_and_not_cut_off() {
     cell.arm().sim().set_stepping(true).expect("a call");
     let outcome = cell.arm().move_to_joints(&goal, &limits, &cancel);
     assert!(matches!(outcome, Err(LinkError::Cancelled { .. })), "{outcome:?}");
-    let rest = cell.arm().joint_angles().expect("a call")[0];
+    let rest = cell.arm().joint_values().expect("a call")[0];
     let seen: Vec<f64> = passes.try_iter().collect();
     let cancelled_at = *seen.iter().find(|angle| **angle > CANCELLED_AT_RAD).expect("it was cancelled");
     assert!(rest < 1.6, "it stopped on its way, at {rest}");
@@ -410,7 +411,7 @@ fn a_motion_that_another_client_stops_says_so() {
     let start = bench.joints()[0];
     let stopping = std::thread::spawn(move || {
         begun.recv_timeout(PATIENCE).expect("it begins");
-        while other.joint_angles().expect("a call")[0] == start {}
+        while other.joint_values().expect("a call")[0] == start {}
         other.stop()
     });
     began.send(()).expect("it waits");

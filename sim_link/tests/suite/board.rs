@@ -63,10 +63,10 @@ fn a_frame_is_of_one_instant_while_joints_are_put_and_the_board_moves() {
         let mut goal = before.joints;
         goal[1] += 0.004;
         goal[2] -= 0.007;
-        for (joint, angle_rad) in joints.iter().zip(goal) {
-            bench.arm.sim().set_joint_position(*joint, angle_rad).expect("a call");
+        for (joint, angle_rad) in joints.iter().zip(&goal) {
+            bench.arm.sim().set_joint_position(*joint, *angle_rad).expect("a call");
         }
-        assert_eq!(bench.arm.joint_angles(), Ok(goal), "they are there already");
+        assert_eq!(bench.arm.joint_values(), Ok(goal), "they are there already");
         assert_eq!(bench.grab(), before, "and not in the images yet");
         bench.step(1);
         let frame = bench.grab();
@@ -135,7 +135,7 @@ fn a_frame_of_a_stopped_simulation_has_the_present_state_and_no_board() {
     bench.step(5);
     let frame = bench.grab();
     assert_eq!(frame.base_from_target_true, None);
-    assert_eq!(Ok(frame.joints), bench.arm.joint_angles());
+    assert_eq!(Ok(frame.joints), bench.arm.joint_values());
     let reported = bench.arm.base_from_tip().expect("a call");
     assert_eq!(frame.base_from_tip, reported);
 }

@@ -2,6 +2,7 @@
 //!
 //! `slow` is what the fast tier (`./test fast`) leaves out.
 
+mod any_joints;
 mod arm;
 mod board;
 mod client_faults;

@@ -83,10 +83,10 @@ fn converse(transport: Box<dyn Transport>, endpoint: &Endpoint) -> Result<Suppor
     let unused = Sim::new(Connection::over(Box::new(ZmqTransport::new(endpoint, None)), endpoint, options(8)));
     let mut cell = CellClient::over(control, unused, &CellPaths::default())?;
     cell.arm().kinematics()?.expect("it is the UR5");
-    let mut goal = cell.arm().joint_angles()?;
+    let mut goal = cell.arm().joint_values()?;
     goal[5] += 0.02;
     cell.arm().move_to_joints(&goal, &MotionLimits::uniform(6, 1.0, 4.0, 40.0), &CancelToken::default())?;
-    assert_eq!(cell.arm().joint_angles()?, goal);
+    assert_eq!(cell.arm().joint_values()?, goal);
     cell.arm().stop()?;
     Ok(cell.info().support())
 }

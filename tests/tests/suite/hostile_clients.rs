@@ -46,7 +46,7 @@ fn nothing_but_a_zeromq_socket_of_version_3_commands_the_cell() {
     let cell = CellProcess::start(&[]);
     let (mut arm, _camera) = connect(&cell);
     let request = move_the_arm(&mut arm);
-    let before = arm.joint_angles().expect("a call");
+    let before = arm.joint_values().expect("a call");
     // A socket of the library takes all of them for requests.
     let router = zmq::Context::new().socket(zmq::ROUTER).expect("a socket");
     router.set_rcvtimeo(PATIENCE.as_millis() as i32).expect("an option");
@@ -64,13 +64,13 @@ fn nothing_but_a_zeromq_socket_of_version_3_commands_the_cell() {
         let mut answer = Vec::new();
         let _reset = refused.read_to_end(&mut answer).is_err();
         assert!(answer.len() <= 64, "{what}: it got more than a greeting");
-        assert_eq!(arm.joint_angles(), Ok(before), "{what}");
+        assert_eq!(arm.joint_values(), Ok(before), "{what}");
     }
     let mut today = dial(cell.port());
     hostile::introduce(&mut today);
     today.write_all(&hostile::framed(&request)).expect("sent");
     let began = Instant::now();
-    while arm.joint_angles().expect("a call")[0] != 1.0 {
+    while arm.joint_values().expect("a call")[0] != 1.0 {
         assert!(began.elapsed() < PATIENCE, "the request itself is good");
     }
 }

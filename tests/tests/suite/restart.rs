@@ -42,7 +42,7 @@ fn a_cell_killed_in_a_move_is_reported_and_taken_up_again() {
     let limits = MotionLimits::uniform(6, 0.05, 0.1, 0.5);
     let (moving, has_moved) = std::sync::mpsc::channel();
     let mover = thread::spawn(move || {
-        let before = arm.joint_angles().expect("answers");
+        let before = arm.joint_values().expect("answers");
         moving.send(()).expect("the test listens");
         let goal = before.map(|q| q + 1.0);
         let outcome = arm.move_to_joints(&goal, &limits, &CancelToken::default());
@@ -51,8 +51,8 @@ fn a_cell_killed_in_a_move_is_reported_and_taken_up_again() {
     has_moved.recv().expect("the move begins");
     // A second client sees the arm move, so the kill falls into the move.
     let (mut witness, _) = connect(port);
-    let start = witness.joint_angles().expect("answers");
-    while witness.joint_angles().expect("answers") == start {}
+    let start = witness.joint_values().expect("answers");
+    while witness.joint_values().expect("answers") == start {}
     let killed = Instant::now();
     cell.kill();
     let (mut arm, outcome, noticed) = mover.join().expect("no panic");
@@ -62,10 +62,10 @@ fn a_cell_killed_in_a_move_is_reported_and_taken_up_again() {
     assert!(noticed - killed < NOTICED_WITHIN);
 
     let _again = CellProcess::start_on(port, &[]);
-    until_it_answers(|| arm.joint_angles());
+    until_it_answers(|| arm.joint_values());
     arm.sim().start_simulation().expect("starts");
     let limits = MotionLimits::uniform(6, 2.0, 8.0, 80.0);
-    let goal = arm.joint_angles().expect("answers").map(|q| q + 0.05);
+    let goal = arm.joint_values().expect("answers").map(|q| q + 0.05);
     arm.move_to_joints(&goal, &limits, &CancelToken::default()).expect("carries on");
 }
 

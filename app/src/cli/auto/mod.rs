@@ -9,7 +9,7 @@ use clap::Args;
 use handeye_core::estimate::{Method, Options};
 use handeye_core::project::session::{FolderLock, Session, SessionMeta, Store};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{ArmKinematics, CellClient, CellPaths};
+use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
 
 use super::cell::SceneArg;
@@ -18,7 +18,7 @@ use super::{Failure, RerunArg, out, record, rerun_arg, solve};
 use crate::cli::auto::sequence::PoseSequence;
 use crate::model::{CaptureOptions, Step, Truth};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
-use crate::session::start::{self, BUILT_IN_ARM};
+use crate::session::start;
 use crate::shortfall;
 use crate::text::Language;
 use crate::worker::{timestamp, timestamp_rfc3339};
@@ -91,13 +91,12 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     keep_earlier_session(&folder)?;
     // That it is another arm is no fault: its joint angles are then kept and not used.
     let kinematics = cell.arm().kinematics().map_err(Failure::failed)?.ok();
-    let arm = kinematics.as_ref().and_then(ArmKinematics::ur5_chain).map(|_ur5| BUILT_IN_ARM);
     if let Some(shortfall) = shortfall::of(cell.info().support(), kinematics.is_some()) {
         tracing::warn!("{}", shortfall.say(Language::English));
     }
     let meta = SessionMeta {
         seeds: args.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
-        arm,
+        arm: start::arm(kinematics.as_ref()),
         ..start::meta(Some(&Truth::from(&truth)), timestamp_rfc3339())
     };
     let mut session = Store::create(&folder, meta).map_err(Failure::failed)?;

@@ -11,6 +11,7 @@ use handeye_sim_link::client::{CallOptions, LinkError, SimulationState};
 
 use super::super::{Failure, record};
 use super::poses::Plan;
+use crate::limits;
 use crate::capture::{self, CaptureEnd, CaptureRequest, Images};
 use crate::model::{CaptureOptions, CapturePurpose, LiveFrame, RefusalKind};
 use crate::rerun_log::Recorder;
@@ -52,7 +53,7 @@ impl PoseSequence<'_> {
         self.set_going().map_err(Failure::failed)?;
         if let Some(start) = &plan.start_joints {
             self.persisting("the start", |sequence| {
-                sequence.cell.arm().move_to_joints(start, &plan.joint_limits, sequence.cancel)
+                sequence.move_to_joints(start)
             })?;
         }
         for (index, (name, goal)) in plan.goals.iter().enumerate() {
@@ -114,18 +115,21 @@ impl PoseSequence<'_> {
     fn go_to(&mut self, goal: &Goal) -> Result<(), LinkError> {
         let Self { cell, plan, cancel, .. } = self;
         match goal {
-            Goal::Tip(pose) => cell.arm().move_to_pose(pose, &plan.tip_limits, &MotionTolerance::default(), cancel),
+            Goal::Tip(pose) => {
+                let limits = limits::of_tip(&plan.limits, 1.0);
+                cell.arm().move_to_pose(pose, &limits, &MotionTolerance::default(), cancel)
+            }
             Goal::Joints(joints) => {
-                let joints = joints.as_slice().try_into().map_err(|_wrong_length| LinkError::BadMotion {
-                    what: "the goal",
-                    expected: "six joints",
-                    value: joints.len() as f64,
-                })?;
-                cell.arm().move_to_joints(joints, &plan.joint_limits, cancel)?;
+                self.move_to_joints(joints)?;
                 // Waiting for the joints costs no images.
-                cell.arm().settle(&SettleOptions::default(), cancel).map(drop)
+                self.cell.arm().settle(&SettleOptions::default(), self.cancel).map(drop)
             }
         }
+    }
+
+    fn move_to_joints(&mut self, joints: &[f64]) -> Result<(), LinkError> {
+        let limits = limits::of_joints(&self.plan.limits, 1.0, self.cell.info().joint_kinds());
+        self.cell.arm().move_to_joints(joints, &limits, self.cancel)
     }
 
     /// Stepped, a pass takes as long as it takes, and the same command gives the same images on every machine.

@@ -321,7 +321,7 @@ fn reach(
     })?;
     let kinematics = arm.kinematics().map_err(Failure::failed)?;
     if let Ok(kinematics) = &kinematics {
-        let joints = arm.joint_angles().map_err(Failure::failed)?;
+        let joints = arm.joint_values().map_err(Failure::failed)?;
         kinematics.reach(&goal.base_from_tip, &joints).map_err(Failure::failed)?;
     }
     let limits = limits::of_tip(&limits::SEQUENCE, 1.0);

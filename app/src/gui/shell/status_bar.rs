@@ -2,6 +2,8 @@
 
 use egui::{Button, Label, RichText, Sense, Ui, Vec2};
 
+use handeye_core::geometry::arm::{JointKind, MAX_JOINTS};
+
 use crate::command::{Command, Outbox};
 use crate::gui::status::STALE_AFTER_S;
 use crate::gui::style::numbers;
@@ -13,6 +15,8 @@ use crate::{text, tr};
 
 /// Shown where a number is not known.
 const UNKNOWN: &str = "–";
+/// As wide as a joint value gets.
+const WIDEST_ANGLE: &str = "−888.8";
 
 /// So long \[s\] something that went as asked is news.
 const FRESH_S: f64 = 30.0;
@@ -38,9 +42,9 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         rotation_ui(ui, model, colour, outbox);
         field_ui(
             ui,
-            tr!(language, "Joints 1 to 6 [deg]"),
-            &text(joints_deg),
-            "−888.8  −888.8  −888.8  −888.8  −888.8  −888.8",
+            &joints_caption(model).say(language),
+            &robot.map_or_else(|| UNKNOWN.to_owned(), |robot| joints_shown(model, robot)),
+            &[WIDEST_ANGLE; MAX_JOINTS][..joint_count(model)].join("  "),
             colour,
         );
         field_ui(
@@ -165,8 +169,24 @@ fn under_way(model: &Model) -> Option<Text> {
     }
 }
 
-fn joints_deg(robot: &RobotState) -> String {
-    numbers::row(&robot.joints_rad.map(f64::to_degrees), 1, 6)
+/// Those of the arm, or of a usual one as long as there is none.
+fn joint_count(model: &Model) -> usize {
+    model.robot.as_ref().map_or(6, |robot| robot.joints_rad.len())
+}
+
+fn joints_caption(model: &Model) -> Text {
+    let count = joint_count(model);
+    let shifts = |i: &usize| model.joint_kind(*i) == JointKind::Prismatic;
+    let rails: Vec<String> = (0..count).filter(shifts).map(|i| format!("J{}", i + 1)).collect();
+    if rails.is_empty() {
+        return text!("Joints 1 to {count} [deg]", count = count);
+    }
+    text!("Joints 1 to {count} [deg; {rails} mm]", count = count, rails = rails.join(" "))
+}
+
+fn joints_shown(model: &Model, robot: &RobotState) -> String {
+    let shown = |(i, &value): (usize, &f64)| value * model.joint_kind(i).shown_per_si();
+    numbers::row(&robot.joints_rad.iter().enumerate().map(shown).collect::<Vec<_>>(), 1, 6)
 }
 
 /// Tenths while it is young, so that it does not flicker.

@@ -188,7 +188,7 @@ pub fn connected() -> LinkState {
 pub fn robot(simulation: Simulation) -> RobotState {
     RobotState {
         base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
-        joints_rad: [0.0, std::f64::consts::FRAC_PI_4, -1.0, 0.0, 0.0, 0.0],
+        joints_rad: [0.0, std::f64::consts::FRAC_PI_4, -1.0, 0.0, 0.0, 0.0].into(),
         sim_time_s: 12.35,
         simulation,
     }
@@ -210,7 +210,7 @@ pub fn frame(number: u64) -> Event {
         depth_range_m: [0.4, 1.2],
         far_plane_m: 3.5,
         base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
-        joints_rad: [0.0; 6],
+        joints_rad: [0.0; 6].into(),
         base_from_target_true: None,
     };
     Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) }

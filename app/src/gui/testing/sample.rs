@@ -8,7 +8,7 @@ use handeye_core::diagnose::findings::{self, Finding, FindingOptions};
 use handeye_core::estimate::handeye::screening::Distance;
 use handeye_core::estimate::handeye::{HandEye, Mode};
 use handeye_core::estimate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
-use handeye_core::geometry::arm::ur5::{JointLimits, inverse_nearest};
+use handeye_core::geometry::arm::{ArmKind, JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::{Rgb, RgbImage};
@@ -18,7 +18,7 @@ use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_core::targets::observation::{Corner, View};
 use handeye_core::track::{BoardDetection, ByDepth, Estimate, State, Update};
 use handeye_core::verify::{self, CheckCapture, Predictor};
-use handeye_sim_link::client::cell::{ArmChain, JointAngles, Support};
+use handeye_sim_link::client::cell::{ArmKinematics, Support};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
@@ -122,14 +122,13 @@ pub fn connected() -> Model {
     model.mover = connected;
     model.robot = Some(RobotState {
         base_from_tip: base_from_tip(1),
-        joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0],
+        joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
         sim_time_s: 12.35,
         simulation: Simulation::Running,
     });
     model.cell = Some(CellFacts {
-        joint_ranges_rad: [Some([-std::f64::consts::TAU, std::f64::consts::TAU]); 6],
+        joints: vec![crate::model::JointFacts { kind: JointKind::Revolute, range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]) }; 6],
         nominal_intrinsics: intrinsics(),
-        is_arm_known: true,
         arm: Some(arm()),
         support: Support::Whole,
         truth: Some(Truth {
@@ -147,7 +146,7 @@ pub fn connected() -> Model {
         depth_range_m: [0.3, 0.5],
         far_plane_m: 3.5,
         base_from_tip: base_from_tip(1),
-        joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0],
+        joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
         base_from_target_true: Some(base_from_target()),
     };
     model.frame = Some(LiveFrame { info, images: Arc::new(images()) });
@@ -365,19 +364,15 @@ pub fn tracking() -> Model {
 }
 
 /// The arm of the reference scene.
-fn arm() -> ArmChain {
-    ArmChain {
-        base_from_arm: Isometry3::translation(0.0, 0.0, 0.025),
-        connection_from_tip: Isometry3::translation(0.0, 0.0, 0.017),
-    }
+fn arm() -> ArmKinematics {
+    let (base_from_arm, connection_from_tip) =
+        (Isometry3::translation(0.0, 0.0, 0.025), Isometry3::translation(0.0, 0.0, 0.017));
+    ArmKinematics::ur5(base_from_arm, connection_from_tip, &ArmKind::Ur5Coppeliasim.ranges()).expect("ranges with room")
 }
 
 /// The joints with which the arm of the reference scene has its tip there.
-fn joints_at(base_from_tip: &Pose<Base, Tip>) -> JointAngles {
-    let ArmChain { base_from_arm, connection_from_tip } = arm();
-    let arm_from_connection = base_from_arm.inverse() * base_from_tip.isometry() * connection_from_tip.inverse();
-    let near = [0.0, 0.8, -1.5, 0.5, 1.5, 0.0];
-    inverse_nearest(&arm_from_connection, &near, &JointLimits::default()).expect("within reach")
+fn joints_at(base_from_tip: &Pose<Base, Tip>) -> JointValues {
+    arm().reach(base_from_tip, &[0.0, 0.8, -1.5, 0.5, 1.5, 0.0]).expect("within reach")
 }
 
 #[test]

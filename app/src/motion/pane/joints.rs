@@ -1,7 +1,7 @@
 //! The joints: where each is, where it is sent, and buttons that jog it.
 
 use egui::{Id, RichText, Shape, Slider, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_core::geometry::arm::{JointKind, JointValues};
 
 use super::blocked::Blocked;
 use super::hold::{self, Hold};
@@ -12,15 +12,16 @@ use crate::gui::style::theme::Palette;
 use crate::model::{Jog, Model, Motion, MotionGoal};
 use crate::{text, tr};
 
-/// What a slider covers for a joint that turns without end \[rad\].
+/// What a slider covers for a joint that turns without end \[rad\], and for one that shifts without end \[m\].
 const ENDLESS_RAD: [f64; 2] = [-std::f64::consts::TAU, std::f64::consts::TAU];
+const ENDLESS_M: [f64; 2] = [-2.0, 2.0];
 /// A goal is shown this long \[s\] without a motion towards it: by then it was refused.
 const GOAL_SHOWN_S: f64 = 0.5;
 
 /// Where the joints are sent, while they are on their way.
 #[derive(Debug, Clone, Copy)]
 struct Goal {
-    joints_rad: JointAngles,
+    joints: JointValues,
     /// When it was sent; `None` while a slider is dragged.
     sent_s: Option<f64>,
 }
@@ -29,12 +30,18 @@ fn id() -> Id {
     Id::new("goal of the joint sliders")
 }
 
-/// Limits of a joint \[rad\].
-pub fn range_rad(model: &Model, index: usize) -> [f64; 2] {
-    model.cell.as_ref().and_then(|cell| cell.joint_ranges_rad[index]).unwrap_or(ENDLESS_RAD)
+/// Limits of a joint in degrees, or in millimetres of a prismatic one.
+pub fn shown_range(model: &Model, index: usize) -> [f64; 2] {
+    let kind = model.joint_kind(index);
+    let known = model.cell.as_ref().and_then(|cell| cell.joints.get(index)?.range);
+    let range = known.unwrap_or(match kind {
+        JointKind::Revolute => ENDLESS_RAD,
+        JointKind::Prismatic => ENDLESS_M,
+    });
+    range.map(|end| end * kind.shown_per_si())
 }
 
-/// The six rows.
+/// A row for each joint.
 pub fn joints_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, hold: &mut Hold, outbox: &mut Outbox) {
     let language = model.view.language;
     parts::section_ui(ui, tr!(language, "Joints"));
@@ -64,7 +71,7 @@ fn row_ui(
     ui: &mut Ui,
     model: &Model,
     index: usize,
-    live: &JointAngles,
+    live: &JointValues,
     goal: &mut Option<Goal>,
     hold: &mut Hold,
     outbox: &mut Outbox,
@@ -83,16 +90,19 @@ fn row_ui(
             hold.button(ui, &response, Jog::Joint { index, forward });
             response.on_hover_text(text!("{name}. Hold to move", name = &name).say(language));
         }
-        let sent_deg = goal.map(|goal| goal.joints_rad[index].to_degrees());
+        let kind = model.joint_kind(index);
+        let shown = |joints: &JointValues| joints[index] * kind.shown_per_si();
+        let sent = goal.map(|goal| shown(&goal.joints));
         slider_ui(ui, model, index, live, goal, outbox);
-        let live_deg = live[index].to_degrees();
-        let said = numbers::fixed(live_deg, 1, 7);
+        let here = shown(live);
+        let said = numbers::fixed(here, 1, 7);
         let caption = text!("Joint {joint} is at", joint = joint).say(language);
-        parts::value_ui(ui, &caption, &format!("{said}°"), palette.text);
+        parts::value_ui(ui, &caption, &format!("{said}{}", kind.unit()), palette.text);
         // The goal only where it is another place.
-        if let Some(deg) = sent_deg.filter(|deg| (deg - live_deg).abs() > 0.05) {
+        if let Some(goal) = sent.filter(|goal| (goal - here).abs() > 0.05) {
             let caption = text!("Joint {joint} goes to", joint = joint).say(language);
-            parts::value_ui(ui, &caption, &format!("→{}°", numbers::fixed(deg, 1, 6)), palette.accent);
+            let said = format!("→{}{}", numbers::fixed(goal, 1, 6), kind.unit());
+            parts::value_ui(ui, &caption, &said, palette.accent);
         }
     });
 }
@@ -101,37 +111,43 @@ fn slider_ui(
     ui: &mut Ui,
     model: &Model,
     index: usize,
-    live: &JointAngles,
+    live: &JointValues,
     goal: &mut Option<Goal>,
     outbox: &mut Outbox,
 ) {
     let language = model.view.language;
-    let [low, high] = range_rad(model, index).map(f64::to_degrees);
-    let live_deg = live[index].to_degrees();
-    let mut deg = goal.map_or(live_deg, |goal| goal.joints_rad[index].to_degrees());
+    let kind = model.joint_kind(index);
+    let [low, high] = shown_range(model, index);
+    let here = live[index] * kind.shown_per_si();
+    let mut chosen = goal.map_or(here, |goal| goal.joints[index] * kind.shown_per_si());
     // Room for both numbers, so that a goal moves nothing.
     ui.spacing_mut().slider_width = (ui.available_width() - 146.0).max(60.0);
-    let slider = Slider::new(&mut deg, low..=high).show_value(false).smart_aim(false);
+    let slider = Slider::new(&mut chosen, low..=high).show_value(false).smart_aim(false);
     // The place of the arm may be outside its range, and is not to be changed by being shown.
     let response = ui.add(slider.clamping(egui::SliderClamping::Edits));
-    let name = text!("Goal of joint {joint} in degrees", joint = index + 1).say(language);
+    let name = match kind {
+        JointKind::Revolute => text!("Goal of joint {joint} in degrees", joint = index + 1),
+        JointKind::Prismatic => text!("Goal of joint {joint} in millimetres", joint = index + 1),
+    };
+    let name = name.say(language);
     let enabled = ui.is_enabled();
-    response.widget_info(|| WidgetInfo::slider(enabled, deg, &name));
-    live_mark_ui(ui, response.rect, ((live_deg - low) / (high - low)).clamp(0.0, 1.0) as f32);
+    response.widget_info(|| WidgetInfo::slider(enabled, chosen, &name));
+    live_mark_ui(ui, response.rect, ((here - low) / (high - low)).clamp(0.0, 1.0) as f32);
     let is_sent = response.drag_stopped() || (response.changed() && !response.dragged());
     if response.changed() || response.dragged() || response.drag_stopped() {
-        let mut joints_rad = goal.map_or(*live, |goal| goal.joints_rad);
-        joints_rad[index] = deg.clamp(low, high).to_radians();
-        *goal = Some(Goal { joints_rad, sent_s: is_sent.then_some(model.now_s) });
+        let mut joints = goal.map_or(*live, |goal| goal.joints);
+        joints[index] = chosen.clamp(low, high) / kind.shown_per_si();
+        *goal = Some(Goal { joints, sent_s: is_sent.then_some(model.now_s) });
         if is_sent {
-            let what = text!("joint {joint} at {angle}°", joint = index + 1, angle = format!("{deg:.1}"));
-            outbox.send(Command::Move { goal: MotionGoal::Joints(joints_rad), what });
+            let place = format!("{:.1}", kind.quantity(joints[index]));
+            let what = text!("joint {joint} at {place}", joint = index + 1, place = place);
+            outbox.send(Command::Move { goal: MotionGoal::Joints(joints), what });
         }
     }
     let limits = text!(
-        "From {low}° to {high}°. Drag to choose, let go to move there; the mark is where the joint is",
-        low = numbers::fixed(low, 0, 0),
-        high = numbers::fixed(high, 0, 0)
+        "From {low} to {high}. Drag to choose, let go to move there; the mark is where the joint is",
+        low = format!("{}{}", numbers::fixed(low, 0, 0), kind.unit()),
+        high = format!("{}{}", numbers::fixed(high, 0, 0), kind.unit())
     );
     response.on_hover_text(limits.say(language));
 }

@@ -1,11 +1,12 @@
 //! A place to move to, in numbers.
 
 use egui::{Button, DragValue, Grid, Id, RichText, Ui, WidgetInfo, WidgetType};
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::blocked::Blocked;
-use super::joints::range_rad;
+use super::joints::shown_range;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
@@ -18,21 +19,28 @@ const FIELD: f32 = 84.0;
 const FARTHEST_MM: f64 = 10_000.0;
 
 /// What is being typed.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Typed {
     is_tip: bool,
-    /// Joints [°].
-    joints_deg: [f64; 6],
+    /// Joints [°, or mm of a prismatic one].
+    joints: JointValues,
     /// x, y, z \[mm\]; roll, pitch, yaw [°].
     tip: [f64; 6],
     /// Whether it was filled with where the arm is.
     is_filled: bool,
 }
 
+impl Default for Typed {
+    fn default() -> Self {
+        Self { is_tip: false, joints: JointValues::zeros(0), tip: [0.0; 6], is_filled: false }
+    }
+}
+
 impl Typed {
-    fn fill(&mut self, robot: &RobotState) {
+    fn fill(&mut self, model: &Model, robot: &RobotState) {
         let rounded = |value: f64| (value * 100.0).round() / 100.0;
-        self.joints_deg = robot.joints_rad.map(|radians| rounded(radians.to_degrees()));
+        let shown = |i: usize| rounded(robot.joints_rad[i] * model.joint_kind(i).shown_per_si());
+        self.joints = JointValues::from_fn(robot.joints_rad.len(), shown);
         let [x, y, z]: [f64; 3] = robot.base_from_tip.translation().into();
         let (roll, pitch, yaw) = robot.base_from_tip.rotation().euler_angles();
         let mm = [x, y, z].map(|metres| rounded(metres * 1e3));
@@ -53,13 +61,15 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
     let language = model.view.language;
     let id = Id::new("typed goal");
     let mut typed: Typed = parts::remembered(ui, id);
-    if let Some(robot) = model.robot.as_ref().filter(|_| !typed.is_filled) {
-        typed.fill(robot);
+    // Another arm has other joints.
+    let is_other = |robot: &RobotState| !typed.is_filled || robot.joints_rad.len() != typed.joints.len();
+    if let Some(robot) = model.robot.as_ref().filter(|robot| is_other(robot)) {
+        typed.fill(model, robot);
     }
     parts::section_ui(ui, tr!(language, "Move to numbers"));
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        for (is_tip, name) in [(false, tr!(language, "Joint angles")), (true, tr!(language, "Tip pose in base"))] {
+        for (is_tip, name) in [(false, tr!(language, "Joint values")), (true, tr!(language, "Tip pose in base"))] {
             if ui.selectable_label(typed.is_tip == is_tip, name).clicked() {
                 typed.is_tip = is_tip;
             }
@@ -75,7 +85,8 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
             let (goal, what) = if typed.is_tip {
                 (MotionGoal::Tip(typed.base_from_tip()), text!("typed tip pose"))
             } else {
-                (MotionGoal::Joints(typed.joints_deg.map(f64::to_radians)), text!("typed joint angles"))
+                let si = |i: usize| typed.joints[i] / model.joint_kind(i).shown_per_si();
+                (MotionGoal::Joints(JointValues::from_fn(typed.joints.len(), si)), text!("typed joint values"))
             };
             outbox.send(Command::Move { goal, what });
         }
@@ -83,7 +94,7 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
         if ui.add_enabled(is_read, Button::new(tr!(language, "Take where it is"))).clicked()
             && let Some(robot) = &model.robot
         {
-            typed.fill(robot);
+            typed.fill(model, robot);
         }
     });
     parts::remember(ui, id, typed);
@@ -93,30 +104,32 @@ fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
     let weak = Palette::of(ui).weak;
     let is_tip = typed.is_tip;
     let language = model.view.language;
-    let names = if is_tip {
-        ["x", "y", "z", tr!(language, "roll"), tr!(language, "pitch"), tr!(language, "yaw")]
-    } else {
-        ["J1", "J2", "J3", "J4", "J5", "J6"]
-    };
-    let values = if is_tip { &mut typed.tip } else { &mut typed.joints_deg };
+    let tip = ["x", "y", "z", tr!(language, "roll"), tr!(language, "pitch"), tr!(language, "yaw")];
+    let values: &mut [f64] = if is_tip { &mut typed.tip } else { &mut typed.joints };
     Grid::new("typed goal").num_columns(6).spacing([6.0, 4.0]).min_col_width(0.0).show(ui, |ui| {
-        for (index, (name, value)) in names.into_iter().zip(values).enumerate() {
+        for (index, value) in values.iter_mut().enumerate() {
+            let name = if is_tip { tip[index].to_owned() } else { format!("J{}", index + 1) };
             let is_length = is_tip && index < 3;
             let range = if is_length {
                 -FARTHEST_MM..=FARTHEST_MM
             } else if is_tip {
                 -360.0..=360.0
             } else {
-                let [low, high] = range_rad(model, index).map(f64::to_degrees);
+                let [low, high] = shown_range(model, index);
                 low..=high
             };
-            ui.label(RichText::new(name).small().color(weak));
+            let unit = match is_tip {
+                true if is_length => " mm",
+                true => "°",
+                false => model.joint_kind(index).unit(),
+            };
+            ui.label(RichText::new(&name).small().color(weak));
             let field = DragValue::new(value)
                 .range(range)
                 .clamp_existing_to_range(false)
                 .speed(0.1)
                 .max_decimals(2)
-                .suffix(if is_length { " mm" } else { "°" });
+                .suffix(unit);
             let response = ui.add_sized([FIELD, ui.spacing().interact_size.y], field);
             let said = text!("{name} of the goal", name = name).say(language);
             response.widget_info(|| WidgetInfo { label: Some(said.clone()), ..WidgetInfo::new(WidgetType::DragValue) });

@@ -32,7 +32,8 @@ use std::sync::Arc;
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::session::{CaptureId, Document};
-use handeye_sim_link::client::cell::JointAngles;
+use handeye_core::geometry::arm::{JointKind, JointValues};
+use handeye_sim_link::cell::render::Solid;
 use rerun::{RecordingStream, TextLog, TextLogLevel};
 
 pub use error::RecordError;
@@ -57,8 +58,10 @@ const DEPTH_EVERY_S: f64 = 1.0;
 pub struct SceneWriter {
     clock: Clock,
     known: Known,
-    /// Whether the solids of the arm are written.
-    has_solids: bool,
+    /// The solids of the arm that are written.
+    solids: Vec<(usize, Solid)>,
+    /// The joints that have names in the plot.
+    named_joints: Vec<JointKind>,
     session_trail: Trail,
     connection_trail: Trail,
     captures: Captures,
@@ -81,7 +84,8 @@ impl SceneWriter {
         Self {
             clock: Clock::default(),
             known: Known::default(),
-            has_solids: false,
+            solids: Vec::new(),
+            named_joints: Vec::new(),
             session_trail: Trail::new(paths::TRAJECTORY_SESSION, style::PAST_WAY),
             connection_trail: Trail::new(paths::TRAJECTORY_CONNECTION, style::WAY),
             captures: Captures::default(),
@@ -99,7 +103,6 @@ impl SceneWriter {
         let pen = Pen::new(rec);
         pen.write_static("/", &rerun::ViewCoordinates::RIGHT_HAND_Z_UP())?;
         pen.write_static(paths::BASE, &axes(style::LARGE_AXES))?;
-        pen.write_static(paths::PLOT_JOINTS, &robot::joint_series())?;
         for (path, name) in result::SERIES {
             pen.write_static(path, &result::named(name))?;
         }
@@ -175,12 +178,12 @@ impl SceneWriter {
         pen: Pen<'_>,
         sim_time_s: f64,
         base_from_tip: &Pose<Base, Tip>,
-        joints: &JointAngles,
+        joints: &JointValues,
     ) -> Result<(), RecordError> {
         self.clock.tick(sim_time_s);
         pen.at(self.clock.live());
         self.tip(pen, base_from_tip, Some(joints))?;
-        robot::write_joints(pen, joints)?;
+        self.joints(pen, joints)?;
         // The way is one line on every time line.
         pen.at(self.clock.now());
         self.trails(pen, base_from_tip)
@@ -190,14 +193,14 @@ impl SceneWriter {
         &mut self,
         pen: Pen<'_>,
         base_from_tip: &Pose<Base, Tip>,
-        joints: Option<&JointAngles>,
+        joints: Option<&[f64]>,
     ) -> Result<(), RecordError> {
         let is_first = self.known.base_from_tip.replace(*base_from_tip).is_none();
         pen.frame(paths::TIP, base_from_tip.isometry(), style::LARGE_AXES)?;
         if let Some(arm) = joints.and_then(|joints| posed_arm(self.known.cell.as_ref(), base_from_tip, joints)) {
-            if !self.has_solids {
-                robot::write_solids(pen)?;
-                self.has_solids = true;
+            if self.solids != arm.bodies {
+                robot::write_solids(pen, &arm.bodies, &self.solids)?;
+                self.solids.clone_from(&arm.bodies);
             }
             robot::write_arm(pen, &arm)?;
         }
@@ -208,6 +211,12 @@ impl SceneWriter {
             let camera = self.known.true_camera();
             write_camera(pen, &self.known, camera.map(|camera| CameraItem { shape: None, ..camera }))
         }
+    }
+
+    fn joints(&mut self, pen: Pen<'_>, joints: &[f64]) -> Result<(), RecordError> {
+        let cell = self.known.cell.as_ref();
+        let kind = |i: usize| cell.and_then(|cell| cell.joints.get(i)).map_or(JointKind::Revolute, |joint| joint.kind);
+        robot::write_joints(pen, joints, kind, &mut self.named_joints)
     }
 
     fn trails(&mut self, pen: Pen<'_>, base_from_tip: &Pose<Base, Tip>) -> Result<(), RecordError> {
@@ -292,9 +301,8 @@ impl SceneWriter {
         let as_taken = Instant { sim_time_s: taken.sim_time_s.filter(|_| !is_live), ..taken };
         pen.at(as_taken);
         let live_tip = self.known.base_from_tip;
-        let joints: Option<JointAngles> = record.joints_rad.as_deref().and_then(|joints| joints.try_into().ok());
-        self.tip(pen, &record.base_from_tip, joints.as_ref())?;
-        robot::write_joints(pen, record.joints_rad.as_deref().unwrap_or_default())?;
+        self.tip(pen, &record.base_from_tip, record.joints_rad.as_deref())?;
+        self.joints(pen, record.joints_rad.as_deref().unwrap_or_default())?;
         if is_live {
             self.known.base_from_tip = live_tip;
         } else {

@@ -1,7 +1,7 @@
 //! The arm, its joints, and the way that the tip went.
 
-use handeye_sim_link::cell::render::{Shape, Solid, props};
-use handeye_sim_link::client::cell::JOINTS;
+use handeye_core::geometry::arm::JointKind;
+use handeye_sim_link::cell::render::{Shape, Solid};
 use nalgebra::Vector3;
 use rerun::{Capsules3D, Color, Cylinders3D, FillMode, LineStrips3D, Radius, Scalars, SeriesLines};
 
@@ -17,12 +17,18 @@ pub(super) fn write_arm(pen: Pen<'_>, arm: &PosedArm) -> Result<(), RecordError>
     arm.links.iter().enumerate().try_for_each(|(link, moved)| pen.write(&paths::link(link), &transform(moved)))
 }
 
-/// The solids of each link with all joints zero.
-pub(super) fn write_solids(pen: Pen<'_>) -> Result<(), RecordError> {
-    for index in 0..=JOINTS {
+/// The solids of each link with all joints zero, in place of those that are written already.
+pub(super) fn write_solids(
+    pen: Pen<'_>,
+    bodies: &[(usize, Solid)],
+    written: &[(usize, Solid)],
+) -> Result<(), RecordError> {
+    let last = bodies.iter().chain(written).map(|(link, _)| *link).max().unwrap_or(0);
+    for index in 0..=last {
         let link = paths::link(index);
+        let had = |is_kind: fn(&Shape) -> bool| written.iter().any(|(link, s)| *link == index && is_kind(&s.shape));
         let (mut cylinders, mut capsules) = (Vec::new(), Vec::new());
-        for (_, solid) in props::ur5_parts().filter(|(link, _)| *link == index) {
+        for (_, solid) in bodies.iter().filter(|(link, _)| *link == index) {
             match solid.shape {
                 Shape::Cylinder { radius, half_height } => {
                     cylinders.push((solid, radius as f32, (2.0 * half_height) as f32));
@@ -35,7 +41,7 @@ pub(super) fn write_solids(pen: Pen<'_>) -> Result<(), RecordError> {
                 Shape::Sphere { .. } | Shape::Box { .. } | Shape::Plane => {}
             }
         }
-        if !cylinders.is_empty() {
+        if !cylinders.is_empty() || had(|shape| matches!(shape, Shape::Cylinder { .. })) {
             let housings = Cylinders3D::from_lengths_and_radii(
                 cylinders.iter().map(|(_, _, length)| *length),
                 cylinders.iter().map(|(_, radius, _)| *radius),
@@ -46,7 +52,7 @@ pub(super) fn write_solids(pen: Pen<'_>) -> Result<(), RecordError> {
             .with_fill_mode(FillMode::Solid);
             pen.write_static(&paths::below(&link, "housings"), &housings)?;
         }
-        if !capsules.is_empty() {
+        if !capsules.is_empty() || had(|shape| matches!(shape, Shape::Capsule { .. })) {
             let tubes = Capsules3D::from_endpoints_and_radii(
                 capsules.iter().map(|(_, [a, _], _)| *a),
                 capsules.iter().map(|(_, [_, b], _)| *b),
@@ -65,17 +71,29 @@ fn colour(solid: &Solid) -> Color {
     Color::from_rgb(red, green, blue)
 }
 
-/// The joint angles as numbers.
-pub(super) fn write_joints(pen: Pen<'_>, joints_rad: &[f64]) -> Result<(), RecordError> {
-    if joints_rad.is_empty() {
+/// The joint values as numbers, and names for the joints in the plot where `named` are others.
+pub(super) fn write_joints(
+    pen: Pen<'_>,
+    joints: &[f64],
+    kind: impl Fn(usize) -> JointKind,
+    named: &mut Vec<JointKind>,
+) -> Result<(), RecordError> {
+    if joints.is_empty() {
         return Ok(());
     }
-    pen.write(paths::PLOT_JOINTS, &Scalars::new(joints_rad.iter().map(|q| q.to_degrees())))
+    let kinds: Vec<JointKind> = (0..joints.len()).map(kind).collect();
+    if *named != kinds {
+        pen.write_static(paths::PLOT_JOINTS, &joint_series(&kinds))?;
+        named.clone_from(&kinds);
+    }
+    let shown = joints.iter().zip(&kinds).map(|(value, kind)| value * kind.shown_per_si());
+    pen.write(paths::PLOT_JOINTS, &Scalars::new(shown))
 }
 
 /// Names of the joints in the plot.
-pub(super) fn joint_series() -> SeriesLines {
-    SeriesLines::new().with_names((1..=JOINTS).map(|joint| format!("joint {joint} [°]")))
+fn joint_series(kinds: &[JointKind]) -> SeriesLines {
+    let name = |(i, kind): (usize, &JointKind)| format!("joint {} [{}]", i + 1, kind.unit().trim_start());
+    SeriesLines::new().with_names(kinds.iter().enumerate().map(name))
 }
 
 /// A line that grows, in blocks, so that what was written once is not written again with every point.

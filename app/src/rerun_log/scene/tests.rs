@@ -236,12 +236,12 @@ fn captures_keep_their_simulated_time_unless_they_are_of_a_session_that_was_open
     };
     let mut bench = Bench::new();
     bench.write(&with_captures(&model, &[]));
-    bench.write(&Entry::Robot { sim_time_s: 1.5, base_from_tip: Pose::identity(), joints_rad: [0.0; 6] });
+    bench.write(&Entry::Robot { sim_time_s: 1.5, base_from_tip: Pose::identity(), joints_rad: [0.0; 6].into() });
     bench.write(&with_captures(&model, &[1, 2, 3]));
     assert_eq!(times(&bench.writer), [Some(1.0), Some(2.0), Some(3.0)]);
 
     let mut bench = Bench::new();
-    bench.write(&Entry::Robot { sim_time_s: 1.5, base_from_tip: Pose::identity(), joints_rad: [0.0; 6] });
+    bench.write(&Entry::Robot { sim_time_s: 1.5, base_from_tip: Pose::identity(), joints_rad: [0.0; 6].into() });
     bench.write(&with_captures(&model, &[1, 2, 3]));
     assert_eq!(times(&bench.writer), [Some(1.0), Some(1.5), Some(1.5)]);
 }

@@ -10,8 +10,8 @@ use crate::scene::PosedArm;
 
 /// Draws them.
 pub fn arm(canvas: &mut Canvas, arm: &PosedArm, palette: &Palette) {
-    for (link, solid) in props::ur5_parts() {
-        let base_from_shape = arm.base_from_arm * arm.links[link] * solid.world_from_shape;
+    for (link, solid) in &arm.bodies {
+        let base_from_shape = arm.base_from_arm * arm.links[*link] * solid.world_from_shape;
         let (ends, radius_m, closed) = match solid.shape {
             Shape::Capsule { a, b, radius } => ([a, b], radius, false),
             Shape::Cylinder { radius, half_height } => {

@@ -100,10 +100,8 @@ impl Mark {
 fn kind_ui(ui: &mut Ui, pose: &TaughtPose, model: &Model) {
     let language = model.view.language;
     let (kind, numbers) = match &pose.goal {
-        Goal::Joints(joints_rad) => {
-            let deg: Vec<f64> = joints_rad.iter().map(|radians| radians.to_degrees()).collect();
-            let numbers = numbers::row(&deg, 1, 0);
-            (tr!(language, "joints"), text!("Joints [°]: {numbers}", numbers = numbers))
+        Goal::Joints(joints) => {
+            (tr!(language, "joints"), text!("Joints: {values}", values = model.joints_said(joints)))
         }
         Goal::Tip(base_from_tip) => {
             let mm = numbers::translation_mm(base_from_tip);

@@ -45,7 +45,7 @@ fn follow(model: &Model) -> Option<&'static str> {
             Simulation::Paused => tr!(language, "The simulation is paused: the arm moves only while it runs"),
             _ => tr!(language, "The simulation is stopped: the arm moves only while it runs"),
         })
-    } else if model.cell.as_ref().is_none_or(|cell| !cell.is_arm_known) {
+    } else if model.cell.as_ref().is_none_or(|cell| cell.arm.is_none()) {
         Some(tr!(language, "This arm's kinematics is not known, so it cannot follow"))
     } else if model.sequence_runs {
         Some(tr!(language, "A sequence is under way: stop it to move the arm yourself"))

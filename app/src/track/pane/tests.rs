@@ -175,7 +175,7 @@ fn the_arm_says_why_it_cannot_follow() {
     blocked(|model| model.track.on = false, "Start tracking first");
     blocked(|model| model.mover = LinkState::Failed { why: Text::verbatim("gone") }, "the arm cannot be moved until");
     blocked(|model| model.sequence_runs = true, "A sequence is under way");
-    let unknown = |model: &mut Model| model.cell.iter_mut().for_each(|cell| cell.is_arm_known = false);
+    let unknown = |model: &mut Model| model.cell.iter_mut().for_each(|cell| cell.arm = None);
     blocked(unknown, "This arm's kinematics is not known");
     let rests = |model: &mut Model| model.robot.iter_mut().for_each(|it| it.simulation = Simulation::Stopped);
     blocked(rests, "The simulation is stopped");

@@ -145,7 +145,7 @@ fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane
     pane.model().sequence_runs = true;
     pane.model().sequence = Some(PoseSequence {
         names: vec!["V1".to_owned(), "V2".to_owned(), "V3".to_owned()],
-        planned: Some(vec![[0.0; 6]; 3]),
+        planned: Some(vec![[0.0; 6].into(); 3]),
         purpose: Some(CapturePurpose::Verify),
         outcomes: vec![StopOutcome::Done, StopOutcome::Skipped(Text::verbatim("the board was not found"))],
         began_s: 90.0,

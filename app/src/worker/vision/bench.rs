@@ -102,7 +102,7 @@ impl Table {
             depth_range_m: [0.1, 3.5],
             far_plane_m: 3.5,
             base_from_tip: Pose::identity(),
-            joints_rad: [0.0; 6],
+            joints_rad: [0.0; 6].into(),
             base_from_target_true: None,
         };
         let depth = DepthImage { width: 1, height: 1, metres: vec![0.5] };

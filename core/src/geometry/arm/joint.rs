@@ -3,9 +3,11 @@
 use std::fmt;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3};
+use serde::{Deserialize, Serialize};
 
 /// How a joint moves what is behind it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum JointKind {
     /// Turns it about its axis. Its value is an angle in radians.
     Revolute,

@@ -33,11 +33,14 @@ mod inverse;
 mod joint;
 mod model;
 mod placement;
+mod quantity;
+mod record;
 pub mod ur5;
 pub mod urdf;
 mod values;
 
 use nalgebra::{Isometry3, Matrix6xX, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::frames::{Base, Pose, Tip};
 
@@ -47,6 +50,7 @@ pub use inverse::{DlsOptions, IkError, Obstacle};
 pub use joint::{Joint, JointKind, JointRange};
 pub use model::{ArmKind, ArmModel};
 pub use placement::{DISTANCE_LIMIT_M, JointView, Placement, ROTATION_LIMIT_RAD, TipByJoint, place, place_checked};
+pub use quantity::JointQuantity;
 pub use values::JointValues;
 
 /// Most joints of an arm: twice those of a usual one.
@@ -55,7 +59,8 @@ pub const MAX_JOINTS: usize = 12;
 const LONGEST_LINK_M: f64 = 10.0;
 
 /// A serial arm: its joints, where it stands, and where its tip is.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(into = "record::ArmRecord", try_from = "record::ArmRecord")]
 pub struct Arm {
     joints: Vec<Joint>,
     /// The end of the chain in the frame that the last joint carries.

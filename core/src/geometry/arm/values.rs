@@ -23,6 +23,18 @@ impl JointValues {
         Self { count, values: std::array::from_fn(|i| if i < count { value(i) } else { 0.0 }) }
     }
 
+    /// These, where a constant is needed.
+    pub const fn of<const N: usize>(given: [f64; N]) -> Self {
+        const { assert!(N <= MAX_JOINTS, "no arm has so many joints") };
+        let mut values = [0.0; MAX_JOINTS];
+        let mut i = 0;
+        while i < N {
+            values[i] = given[i];
+            i += 1;
+        }
+        Self { count: N, values }
+    }
+
     /// All zero.
     pub fn zeros(count: usize) -> Self {
         Self::from_fn(count, |_| 0.0)
@@ -49,10 +61,18 @@ impl DerefMut for JointValues {
     }
 }
 
+impl<'a> IntoIterator for &'a JointValues {
+    type Item = &'a f64;
+    type IntoIter = std::slice::Iter<'a, f64>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
 impl<const N: usize> From<[f64; N]> for JointValues {
     fn from(values: [f64; N]) -> Self {
-        const { assert!(N <= MAX_JOINTS, "no arm has so many joints") };
-        Self::from_fn(N, |i| values[i])
+        Self::of(values)
     }
 }
 

@@ -126,7 +126,7 @@ fn turning_the_reported_tip_by_the_twists_explains_joint_offsets() {
 }
 
 #[test]
-fn poses_written_wrongly_do_not_fit_the_joint_angles() {
+fn poses_written_wrongly_do_not_fit_the_joint_values() {
     for fault in [Fault::PosesInverted, Fault::Millimetres] {
         assert!(matches!(session(1, Some(fault)).views(), Err(ArmError::Foreign { .. })), "{fault}");
     }

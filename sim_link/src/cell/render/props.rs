@@ -90,9 +90,11 @@ pub fn ur5_parts() -> impl Iterator<Item = (usize, Solid)> {
 /// The solids of the arm of a scene in the arm frame with all joints at zero, each with the number of joints that carry it.
 /// The UR5 of CoppeliaSim has its housings; of any other arm the links are tubes between its joints.
 pub fn arm_parts(model: &ArmSpec, arm: &Arm) -> Vec<(usize, Solid)> {
-    if model.kind() == Some(ArmKind::Ur5Coppeliasim) {
-        return ur5_parts().collect();
-    }
+    if model.kind() == Some(ArmKind::Ur5Coppeliasim) { ur5_parts().collect() } else { link_parts(arm) }
+}
+
+/// The links of an arm whose shape is not known, as tubes between its joints; otherwise as [`arm_parts`].
+pub fn link_parts(arm: &Arm) -> Vec<(usize, Solid)> {
     let at_zero = arm.frames(&vec![0.0; arm.joint_count()]);
     let arm_from_links: Vec<_> = at_zero.iter().flat_map(links::arm_from_links).collect();
     let tube = |(index, link): (usize, links::LinkCapsule)| {

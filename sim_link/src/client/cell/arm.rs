@@ -3,13 +3,16 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
 use super::hold::Hold;
 use super::truth::{self, GroundTruth};
-use super::{CellInfo, CellObjects, CellPaths, JOINTS, JointAngles, discover, read_joint_angles, require_running};
-use crate::client::cell::joint_elsewhere::joint_elsewhere;
+use super::joint_elsewhere::joint_elsewhere;
+use super::joints::{largest_change, of_rad, read_joint_values};
+use super::objects::CellObjects;
+use super::{CellInfo, CellPaths, discover, require_running};
 use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;
 use crate::client::options::{CallOptions, ConnectionOptions};
@@ -47,7 +50,7 @@ impl Default for MotionTolerance {
 /// When an arm counts as standing still.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SettleOptions {
-    /// Fastest joint (rad/s) that counts as at rest.
+    /// Fastest joint (rad/s) that counts as at rest; one that shifts over [`super::RAD_PER_M`] of it (m/s).
     pub rate_rad_s: f64,
     /// Longest wait, in simulated time (s).
     pub limit_s: f64,
@@ -95,12 +98,17 @@ impl Arm {
         &mut self.sim
     }
 
-    /// Positions of the joints from the base up (rad).
+    /// Positions of the joints from the base up (rad, or m of a prismatic joint).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn joint_angles(&mut self) -> Result<JointAngles, LinkError> {
-        read_joint_angles(&mut self.sim, &self.objects.joints)
+    pub fn joint_values(&mut self) -> Result<JointValues, LinkError> {
+        read_joint_values(&mut self.sim, &self.objects)
+    }
+
+    /// How joint `index`, counted from 0, moves.
+    pub(super) fn kind(&self, index: usize) -> JointKind {
+        self.info.joints[index].kind
     }
 
     /// The tip as the controller reports it: its pose in the world of the scene.
@@ -129,13 +137,13 @@ impl Arm {
         if self.brake()? {
             return Ok(());
         }
-        for index in 0..JOINTS {
+        for index in 0..self.objects.joints.len() {
             let joint = self.objects.joints[index];
-            let here_rad = self.sim.get_joint_position(joint)?;
+            let here = self.sim.get_joint_position(joint)?;
             if self.sim.is_joint_dynamic(joint)? {
-                self.sim.set_joint_target_position(joint, here_rad)?;
-            } else if !self.sim.set_joint_position(joint, here_rad)? {
-                self.nudge(index, here_rad)?;
+                self.sim.set_joint_target_position(joint, here)?;
+            } else if !self.sim.set_joint_position(joint, here)? {
+                self.nudge(index, here)?;
             }
         }
         Ok(())
@@ -149,38 +157,39 @@ impl Arm {
     ///
     /// # Errors
     /// [`LinkError::JointElsewhere`] for a joint that something else keeps moving.
-    pub(super) fn movable_joints(&mut self) -> Result<JointAngles, LinkError> {
+    pub(super) fn movable_joints(&mut self) -> Result<JointValues, LinkError> {
         let started = Instant::now();
-        let mut nudged_to = [None; JOINTS];
+        let mut nudged_to = vec![None; self.objects.joints.len()];
         loop {
             let mut refuses = None;
-            let here = self.joint_angles()?;
-            for index in 0..JOINTS {
+            let here = self.joint_values()?;
+            for index in 0..here.len() {
                 let joint = self.objects.joints[index];
                 if self.sim.is_joint_dynamic(joint)? || self.sim.set_joint_position(joint, here[index])? {
                     continue;
                 }
-                let goal_rad = match nudged_to[index] {
-                    Some(goal_rad) => goal_rad,
+                let goal = match nudged_to[index] {
+                    Some(goal) => goal,
                     None => *nudged_to[index].insert(self.nudge(index, here[index])?),
                 };
-                refuses = Some((index, goal_rad));
+                refuses = Some((index, goal));
             }
-            let Some((index, goal_rad)) = refuses else { return Ok(here) };
+            let Some((index, goal)) = refuses else { return Ok(here) };
             if started.elapsed() > LONGEST_NUDGE {
-                return Err(joint_elsewhere(index, here[index], goal_rad));
+                return Err(joint_elsewhere(index, self.kind(index), here[index], goal));
             }
             self.sim.step(&CallOptions::default())?;
         }
     }
 
     /// Sends a kinematic joint a little towards the middle of its range, and returns where.
-    fn nudge(&mut self, index: usize, here_rad: f64) -> Result<f64, LinkError> {
-        let interval = &self.info.joint_intervals[index];
-        let to_middle = if here_rad > f64::midpoint(interval.min_rad, interval.max_rad) { -1.0 } else { 1.0 };
-        let goal_rad = here_rad + to_middle * NUDGE_RAD;
-        self.sim.set_joint_target_position(self.objects.joints[index], goal_rad)?;
-        Ok(goal_rad)
+    fn nudge(&mut self, index: usize, here: f64) -> Result<f64, LinkError> {
+        let joint = &self.info.joints[index];
+        // The middle of a joint without end is not a number, and either way is good.
+        let to_middle = if here > f64::midpoint(joint.range.min, joint.range.max) { -1.0 } else { 1.0 };
+        let goal = here + to_middle * of_rad(joint.kind, NUDGE_RAD);
+        self.sim.set_joint_target_position(self.objects.joints[index], goal)?;
+        Ok(goal)
     }
 
     /// Has the server brake every motion; `false` when it has no function for that.
@@ -204,11 +213,11 @@ impl Arm {
         let call = CallOptions::cancelled_by(cancel);
         let started = Instant::now();
         let mut start_s = self.sim.get_simulation_time()?;
-        let (mut before_s, mut before) = (start_s, self.joint_angles()?);
+        let (mut before_s, mut before) = (start_s, self.joint_values()?);
         let (mut resting, mut looks) = (0, 0);
         loop {
             self.sim.step(&call)?;
-            let (now_s, now) = (self.sim.get_simulation_time()?, self.joint_angles()?);
+            let (now_s, now) = (self.sim.get_simulation_time()?, self.joint_values()?);
             let has_advanced = now_s > before_s;
             let after = started.elapsed();
             if after > options.longest {
@@ -223,7 +232,7 @@ impl Arm {
                 }
                 continue;
             }
-            let travel_rad = before.iter().zip(&now).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+            let (fastest, travel_rad) = largest_change(self.info.joint_kinds(), &before, &now);
             let rate_rad_s = travel_rad / (now_s - before_s);
             resting = if rate_rad_s <= options.rate_rad_s { resting + 1 } else { 0 };
             let after_s = now_s - start_s;
@@ -233,7 +242,8 @@ impl Arm {
             // A simulation that runs faster than it is asked may be past the limit at the first look, and at rest for long.
             looks += 1;
             if resting == 0 && looks > RESTING_PASSES && after_s > options.limit_s {
-                return Err(LinkError::NotSettled { after_s, rate_deg_s: rate_rad_s.to_degrees() });
+                let kind = self.kind(fastest);
+                return Err(LinkError::NotSettled { after_s, rate: kind.quantity(of_rad(kind, rate_rad_s)) });
             }
             (before_s, before) = (now_s, now);
         }

@@ -3,13 +3,16 @@
 use std::sync::Arc;
 
 use handeye_core::depth::DepthImage;
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 
 use super::hold::Hold;
 use super::truth::{self, GroundTruth, ShownMoment};
-use super::{CellInfo, CellObjects, CellPaths, JointAngles, discover, read_joint_angles};
+use super::joints::read_joint_values;
+use super::objects::CellObjects;
+use super::{CellInfo, CellPaths, discover};
 use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;
 use crate::client::options::ConnectionOptions;
@@ -32,8 +35,8 @@ pub struct Frame {
     pub image_age_s: f64,
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints (rad).
-    pub joints: JointAngles,
+    /// Positions of the joints (rad, or m of a prismatic joint).
+    pub joints: JointValues,
     /// Where the board is in these images, if the cell publishes it. For comparison only.
     pub base_from_target_true: Option<Pose<Base, Target>>,
 }
@@ -153,7 +156,7 @@ impl CameraFeed {
         if !self.tells_moment {
             return Ok(None);
         }
-        match truth::shown_moment(&mut self.sim) {
+        match truth::shown_moment(&mut self.sim, self.objects.joints.len()) {
             Err(error) if error.is_unknown_function() => {
                 self.tells_moment = false;
                 Ok(None)
@@ -168,7 +171,7 @@ impl CameraFeed {
             image_age_s,
             sim_time_s: self.sim.get_simulation_time()?,
             base_from_tip: self.base_from_tip()?,
-            joints: read_joint_angles(&mut self.sim, &self.objects.joints)?,
+            joints: read_joint_values(&mut self.sim, &self.objects)?,
             rgb: self.sim.get_vision_sensor_image(self.objects.camera)?,
             depth: self.sim.get_vision_sensor_depth(self.objects.depth)?,
             base_from_target_true: None,

@@ -5,13 +5,14 @@
 //! passes between; it still moves by one step of one pass then, because the way of several in one would be wild, and
 //! after a longer pause it starts anew from rest.
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 
 use super::follow_goal::{FollowEnd, FollowGoal, FollowLimits, positive};
 use super::follow_plan::FollowPlan;
 use super::reach::ArmKinematics;
 use super::stream::{Pass, Point, Stream};
-use super::{Arm, JointAngles, require_running};
+use super::{Arm, require_running};
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::sim::ObjectHandle;
@@ -39,8 +40,8 @@ pub enum FollowWish {
 pub struct FollowMoment {
     /// Simulated time \[s\] that the next point is for: one pass from now. A goal is meant for this time.
     pub sim_time_s: f64,
-    /// The joints as they are sent \[rad\].
-    pub joints_rad: JointAngles,
+    /// The joints as they are sent \[rad, or m of a prismatic joint\].
+    pub joints: JointValues,
     /// The tip by these joints.
     pub base_from_tip: Pose<Base, Tip>,
 }
@@ -99,7 +100,7 @@ impl Arm {
             }
             let sim_time_s = now_s + dt_s;
             let base_from_tip = plan.base_from_tip();
-            let goal = match wish(&FollowMoment { sim_time_s, joints_rad: *plan.joints(), base_from_tip }) {
+            let goal = match wish(&FollowMoment { sim_time_s, joints: *plan.joints(), base_from_tip }) {
                 _ if ending.is_some() => None,
                 FollowWish::Towards(goal) if goal.is_finite() => Some(goal),
                 FollowWish::Towards(_) => {

@@ -16,9 +16,9 @@ pub struct FollowLimits {
     pub turn_rad_s: f64,
     /// Angular acceleration of the tip [rad/s²].
     pub turn_acceleration_rad_s2: f64,
-    /// Speed of any joint [rad/s].
+    /// Speed of any joint [rad/s]; one that shifts may have this over [`super::RAD_PER_M`] [m/s].
     pub joint_speed_rad_s: f64,
-    /// Acceleration of any joint [rad/s²].
+    /// Acceleration of any joint [rad/s²]; of one that shifts likewise [m/s²].
     pub joint_acceleration_rad_s2: f64,
     /// Where the tip may be.
     pub workspace: Workspace,

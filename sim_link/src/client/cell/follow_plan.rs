@@ -5,14 +5,15 @@
 //! ranges of the joints and the workspace; otherwise less of the step is taken, in the worst case none, and the arm
 //! brakes. So whatever goals come, the limits hold from the first pass to the last, and the arm can always be stopped.
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3::rotation_vector;
 use nalgebra::{Isometry3, Vector3};
 
-use super::jog_plan::{JogObstacle, largest_change, nearest};
+use super::follow_goal::{FollowEnd, FollowGoal, FollowLimits, moved};
+use super::jog_plan::{JogObstacle, nearest};
+use super::joints::{in_rad, largest_change, of_rad};
 use super::reach::ArmKinematics;
-use super::{JOINTS, JointAngles};
-use crate::client::cell::follow_goal::{FollowEnd, FollowGoal, FollowLimits, moved};
 
 /// Share of the tip's acceleration that slows it down; the rest is for the curve that it takes when all joints brake.
 const BRAKING_SHARE: f64 = 0.9;
@@ -49,31 +50,32 @@ const ROUNDING: f64 = 1e-6;
 /// The arm in motion: where it is, and its speeds in the last pass.
 #[derive(Debug, Clone, Copy)]
 struct Moving {
-    joints: JointAngles,
-    rates_rad_s: JointAngles,
+    joints: JointValues,
+    /// In rad/s, or m/s of a prismatic joint.
+    rates: JointValues,
     base_from_tip: Isometry3<f64>,
     velocity_m_s: Vector3<f64>,
     turn_rad_s: Vector3<f64>,
 }
 
 impl Moving {
-    fn standing(kinematics: &ArmKinematics, joints: JointAngles) -> Self {
+    fn standing(kinematics: &ArmKinematics, joints: JointValues) -> Self {
         let base_from_tip = *kinematics.tip(&joints).isometry();
         let (velocity_m_s, turn_rad_s) = (Vector3::zeros(), Vector3::zeros());
-        Self { joints, rates_rad_s: [0.0; JOINTS], base_from_tip, velocity_m_s, turn_rad_s }
+        Self { joints, rates: JointValues::zeros(joints.len()), base_from_tip, velocity_m_s, turn_rad_s }
     }
 
-    /// One pass later, if the joints turn at these rates.
-    fn after(&self, kinematics: &ArmKinematics, rates_rad_s: JointAngles, dt_s: f64) -> Self {
-        let joints = std::array::from_fn(|i| self.joints[i] + rates_rad_s[i] * dt_s);
+    /// One pass later, if the joints move at these rates.
+    fn after(&self, kinematics: &ArmKinematics, rates: JointValues, dt_s: f64) -> Self {
+        let joints = JointValues::from_fn(rates.len(), |i| self.joints[i] + rates[i] * dt_s);
         let base_from_tip = *kinematics.tip(&joints).isometry();
         let shift = base_from_tip.translation.vector - self.base_from_tip.translation.vector;
         let turn = rotation_vector(&(base_from_tip.rotation * self.base_from_tip.rotation.inverse()));
-        Self { joints, rates_rad_s, base_from_tip, velocity_m_s: shift / dt_s, turn_rad_s: turn / dt_s }
+        Self { joints, rates, base_from_tip, velocity_m_s: shift / dt_s, turn_rad_s: turn / dt_s }
     }
 
     fn is_at_rest(&self) -> bool {
-        self.rates_rad_s.iter().all(|rate| *rate == 0.0)
+        self.rates.iter().all(|rate| *rate == 0.0)
     }
 }
 
@@ -95,10 +97,10 @@ impl<'a> FollowPlan<'a> {
     pub fn new(
         kinematics: &'a ArmKinematics,
         limits: &FollowLimits,
-        joints: JointAngles,
+        joints: JointValues,
         dt_s: f64,
     ) -> Result<Self, FollowEnd> {
-        if let Some(joint) = kinematics.limits().first_violation(&joints) {
+        if let Some(joint) = kinematics.arm().first_violation(&joints) {
             return Err(FollowEnd::JointLimit { joint: joint + 1 });
         }
         let now = Moving::standing(kinematics, joints);
@@ -109,7 +111,7 @@ impl<'a> FollowPlan<'a> {
     }
 
     /// The joints as they were last sent \[rad\].
-    pub fn joints(&self) -> &JointAngles {
+    pub fn joints(&self) -> &JointValues {
         &self.now.joints
     }
 
@@ -134,7 +136,7 @@ impl<'a> FollowPlan<'a> {
     }
 
     /// The joints for the next pass [rad]: towards the goal for the time of this point, or to rest with `None`.
-    pub fn advance(&mut self, goal: Option<&FollowGoal>) -> JointAngles {
+    pub fn advance(&mut self, goal: Option<&FollowGoal>) -> JointValues {
         let braked = self.braked(&self.now);
         self.now = match goal.filter(|_| self.obstacle.is_none()).map(|goal| self.rates_towards(goal)) {
             None => braked,
@@ -142,7 +144,7 @@ impl<'a> FollowPlan<'a> {
                 self.obstacle = Some(obstacle);
                 braked
             }
-            Some(Ok(rates_rad_s)) => self.most_of(&rates_rad_s, &braked),
+            Some(Ok(rates)) => self.most_of(&rates, &braked),
         };
         self.now.joints
     }
@@ -150,7 +152,8 @@ impl<'a> FollowPlan<'a> {
     /// One pass of coming to rest: all joints by the same share, as fast as the limits allow.
     fn braked(&self, now: &Moving) -> Moving {
         let limits = &self.limits;
-        let fastest = now.rates_rad_s.iter().fold(0.0, |most: f64, rate| most.max(rate.abs()));
+        let rates_rad_s = self.kinematics.kinds().zip(now.rates.iter()).map(|(kind, rate)| in_rad(kind, *rate));
+        let fastest = rates_rad_s.fold(0.0, |most: f64, rate| most.max(rate.abs()));
         let lost = [
             limits.joint_acceleration_rad_s2 * self.dt_s / fastest,
             BRAKING_SHARE * limits.acceleration_m_s2 * self.dt_s / now.velocity_m_s.norm(),
@@ -158,11 +161,11 @@ impl<'a> FollowPlan<'a> {
         ];
         // A speed of zero gives an infinite share, or none that is a number; neither is the smallest.
         let kept = 1.0 - lost.into_iter().fold(1.0, f64::min);
-        now.after(self.kinematics, now.rates_rad_s.map(|rate| rate * kept), self.dt_s)
+        now.after(self.kinematics, now.rates.map(|rate| rate * kept), self.dt_s)
     }
 
     /// Rates of the joints that the goal asks for, none faster than it may be.
-    fn rates_towards(&self, goal: &FollowGoal) -> Result<JointAngles, FollowEnd> {
+    fn rates_towards(&self, goal: &FollowGoal) -> Result<JointValues, FollowEnd> {
         let goal_in_base = goal.base_from_tip.isometry();
         if !self.limits.workspace.contains(&goal_in_base.translation.vector) {
             return Err(FollowEnd::Workspace);
@@ -177,9 +180,10 @@ impl<'a> FollowPlan<'a> {
             let next = moved(&self.now.base_from_tip, &(velocity_m_s * step_s), &(turn_rad_s * step_s));
             share *= match nearest(self.kinematics, &Pose::from_isometry(next), &self.now.joints) {
                 Ok(joints) => {
-                    let (_, by_rad) = largest_change(&self.now.joints, &joints);
+                    let (_, by_rad) = largest_change(self.kinematics.kinds(), &self.now.joints, &joints);
                     if by_rad <= largest_step {
-                        return Ok(std::array::from_fn(|i| (joints[i] - self.now.joints[i]) / self.dt_s));
+                        let rate = |i: usize| (joints[i] - self.now.joints[i]) / self.dt_s;
+                        return Ok(JointValues::from_fn(joints.len(), rate));
                     }
                     (largest_step / by_rad).min(LEAST_SLOWING)
                 }
@@ -212,19 +216,20 @@ impl<'a> FollowPlan<'a> {
     }
 
     /// As much of a step as can be taken; what is left of it is braking.
-    fn most_of(&self, rates_rad_s: &JointAngles, braked: &Moving) -> Moving {
-        let change = self.limits.joint_acceleration_rad_s2 * self.dt_s;
+    fn most_of(&self, rates: &JointValues, braked: &Moving) -> Moving {
+        let change_rad_s = self.limits.joint_acceleration_rad_s2 * self.dt_s;
         let mut share: f64 = 1.0;
-        for (i, wanted) in rates_rad_s.iter().enumerate() {
-            let more = wanted - braked.rates_rad_s[i];
-            let spent = (braked.rates_rad_s[i] - self.now.rates_rad_s[i]) * more.signum();
+        for (i, (kind, wanted)) in self.kinematics.kinds().zip(rates.iter()).enumerate() {
+            let change = of_rad(kind, change_rad_s);
+            let more = wanted - braked.rates[i];
+            let spent = (braked.rates[i] - self.now.rates[i]) * more.signum();
             if more.abs() > change - spent {
                 share = share.min((change - spent).max(0.0) / more.abs());
             }
         }
         let step = |share: f64| {
-            let rates =
-                std::array::from_fn(|i| braked.rates_rad_s[i] + (rates_rad_s[i] - braked.rates_rad_s[i]) * share);
+            let rate = |i: usize| braked.rates[i] + (rates[i] - braked.rates[i]) * share;
+            let rates = JointValues::from_fn(rates.len(), rate);
             let next = self.now.after(self.kinematics, rates, self.dt_s);
             self.can_be_taken(&next).then_some(next)
         };
@@ -264,16 +269,16 @@ impl<'a> FollowPlan<'a> {
     fn is_allowed(&self, from: &Moving, to: &Moving) -> bool {
         let limits = &self.limits;
         let is_within = |value: f64, limit: f64| value <= limit * (1.0 + ROUNDING);
-        (0..JOINTS).all(|i| {
-            let change = (to.rates_rad_s[i] - from.rates_rad_s[i]).abs();
-            is_within(to.rates_rad_s[i].abs(), limits.joint_speed_rad_s)
+        self.kinematics.kinds().enumerate().all(|(i, kind)| {
+            let change = in_rad(kind, to.rates[i] - from.rates[i]).abs();
+            is_within(in_rad(kind, to.rates[i]).abs(), limits.joint_speed_rad_s)
                 && is_within(change, limits.joint_acceleration_rad_s2 * self.dt_s)
         }) && is_within(to.velocity_m_s.norm(), limits.speed_m_s)
             && is_within((to.velocity_m_s - from.velocity_m_s).norm(), limits.acceleration_m_s2 * self.dt_s)
             && is_within(to.turn_rad_s.norm(), limits.turn_rad_s)
             && is_within((to.turn_rad_s - from.turn_rad_s).norm(), limits.turn_acceleration_rad_s2 * self.dt_s)
             && limits.workspace.contains(&to.base_from_tip.translation.vector)
-            && self.kinematics.limits().contains(&to.joints)
+            && self.kinematics.arm().first_violation(&to.joints).is_none()
     }
 }
 

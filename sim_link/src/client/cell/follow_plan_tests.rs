@@ -7,21 +7,21 @@ use rand_chacha::ChaCha8Rng;
 
 use super::super::follow_goal::Workspace;
 use super::*;
-use handeye_core::geometry::arm::ur5::JointLimits;
+use handeye_core::geometry::arm::{ArmKind, JointRange};
 
 const DT_S: f64 = 0.05;
 
 /// As the public scene begins: 0°, 45°, −60°, 0°, 90°, 0°.
-const START: JointAngles = [0.0, FRAC_PI_4, -FRAC_PI_3, 0.0, FRAC_PI_2, 0.0];
+const START: JointValues = JointValues::of([0.0, FRAC_PI_4, -FRAC_PI_3, 0.0, FRAC_PI_2, 0.0]);
 
 /// From full speed every limit is down to zero after six or seven of these passes, one after the other.
 const PASSES_TO_REST: usize = 20;
 
 fn arm() -> ArmKinematics {
-    arm_within(JointLimits::default())
+    arm_within(&ArmKind::Ur5Coppeliasim.ranges())
 }
 
-fn arm_within(limits: JointLimits) -> ArmKinematics {
+fn arm_within(limits: &[JointRange]) -> ArmKinematics {
     let base_from_arm = Isometry3::translation(0.0, 0.0, 0.025);
     ArmKinematics::ur5(base_from_arm, Isometry3::translation(0.0, 0.0, 0.017), limits).expect("limits with room")
 }
@@ -48,11 +48,11 @@ struct Run<'a> {
     arm: &'a ArmKinematics,
     plan: FollowPlan<'a>,
     dt_s: f64,
-    points: Vec<JointAngles>,
+    points: Vec<JointValues>,
 }
 
 impl<'a> Run<'a> {
-    fn new(arm: &'a ArmKinematics, limits: &FollowLimits, start: JointAngles, dt_s: f64) -> Self {
+    fn new(arm: &'a ArmKinematics, limits: &FollowLimits, start: JointValues, dt_s: f64) -> Self {
         let plan = FollowPlan::new(arm, limits, start, dt_s).expect("nothing forbids to move");
         Self { arm, plan, dt_s, points: vec![start] }
     }
@@ -77,7 +77,7 @@ impl<'a> Run<'a> {
     /// What was exceeded by how much, over all points and a standstill after them. Computed from the points alone.
     fn broken_limit(&self, limits: &FollowLimits) -> Option<String> {
         let last = *self.points.last()?;
-        let points: Vec<JointAngles> =
+        let points: Vec<JointValues> =
             std::iter::once(self.points[0]).chain(self.points.iter().copied()).chain([last]).collect();
         let tips: Vec<_> = points.iter().map(|q| self.arm.tip(q)).collect();
         let over = |what: &str, pass: usize, value: f64, limit: f64| {
@@ -87,15 +87,15 @@ impl<'a> Run<'a> {
         let velocity = |k: usize| (tips[k + 1].translation() - tips[k].translation()) / self.dt_s;
         let turn = |k: usize| (tips[k + 1].rotation() * tips[k].rotation().inverse()).scaled_axis() / self.dt_s;
         let rates =
-            |k: usize| -> JointAngles { std::array::from_fn(|i| (points[k + 1][i] - points[k][i]) / self.dt_s) };
-        let largest = |q: JointAngles| q.into_iter().fold(0.0, |most: f64, q| most.max(q.abs()));
+            |k: usize| -> JointValues { JointValues::from_fn(6, |i| (points[k + 1][i] - points[k][i]) / self.dt_s) };
+        let largest = |q: JointValues| q.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
         for k in 0..points.len() - 1 {
             let broken = over("speed", k, velocity(k).norm(), limits.speed_m_s)
                 .or(over("turn", k, turn(k).norm(), limits.turn_rad_s))
                 .or(over("joint speed", k, largest(rates(k)), limits.joint_speed_rad_s));
             let outside = !limits.workspace.contains(&tips[k].translation());
             let broken = broken.or(outside.then(|| format!("the tip is outside in pass {k}")));
-            let unreached = !self.arm.limits().contains(&points[k]);
+            let unreached = self.arm.arm().first_violation(&points[k]).is_some();
             let broken = broken.or(unreached.then(|| format!("a joint is out of its range in pass {k}")));
             if broken.is_some() {
                 return broken;
@@ -105,7 +105,7 @@ impl<'a> Run<'a> {
             let acceleration = (velocity(k + 1) - velocity(k)).norm() / self.dt_s;
             let turning = (turn(k + 1) - turn(k)).norm() / self.dt_s;
             let (before, after) = (rates(k), rates(k + 1));
-            let joint = largest(std::array::from_fn(|i| (after[i] - before[i]) / self.dt_s));
+            let joint = largest(JointValues::from_fn(6, |i| (after[i] - before[i]) / self.dt_s));
             let broken = over("acceleration", k, acceleration, limits.acceleration_m_s2)
                 .or(over("angular acceleration", k, turning, limits.turn_acceleration_rad_s2))
                 .or(over("joint acceleration", k, joint, limits.joint_acceleration_rad_s2));
@@ -277,9 +277,9 @@ fn a_goal_out_of_reach_ends_it_before_any_joint_is_wild() {
 
 #[test]
 fn a_joint_at_the_end_of_its_range_ends_it_and_is_named() {
-    let mut ranges = JointLimits::default();
-    ranges.max_rad[5] = START[5] + 0.8;
-    let (arm, limits) = (arm_within(ranges), open());
+    let mut ranges = ArmKind::Ur5Coppeliasim.ranges();
+    ranges[5].max = START[5] + 0.8;
+    let (arm, limits) = (arm_within(&ranges), open());
     let start = arm.tip(&START);
     let mut run = Run::new(&arm, &limits, START, DT_S);
     let axis = start.rotation() * Vector3::z();
@@ -295,7 +295,7 @@ fn a_joint_at_the_end_of_its_range_ends_it_and_is_named() {
     assert_eq!(run.plan.obstacle(), Some(FollowEnd::JointLimit { joint: 6 }));
     assert!(run.plan.is_at_rest());
     assert_eq!(run.broken_limit(&limits), None);
-    let left_rad = ranges.max_rad[5] - run.plan.joints()[5];
+    let left_rad = ranges[5].max - run.plan.joints()[5];
     assert!((0.0..0.1).contains(&left_rad), "{left_rad} rad");
 }
 
@@ -365,19 +365,19 @@ fn vector(most: f64) -> impl Strategy<Value = Vector3<f64>> {
 }
 
 /// Goals that jump about: near where the arm begins, or anywhere it reaches, and moving on at more than it can.
-fn legs(near: JointAngles) -> impl Strategy<Value = Vec<Leg>> {
+fn legs(near: JointValues) -> impl Strategy<Value = Vec<Leg>> {
     let goal =
         (prop::array::uniform6(-1.0_f64..1.0), prop_oneof![Just(0.2), Just(0.8), Just(3.0)], vector(0.25), vector(0.8))
             .prop_map(move |(by, spread, velocity_m_s, angular_velocity_rad_s)| {
-                let joints = std::array::from_fn(|i| near[i] + by[i] * spread);
+                let joints = JointValues::from_fn(6, |i| near[i] + by[i] * spread);
                 FollowGoal { base_from_tip: arm().tip(&joints), velocity_m_s, angular_velocity_rad_s }
             });
     let leg = (1_u32..40, prop::option::weighted(0.85, goal)).prop_map(|(passes, goal)| Leg { passes, goal });
     prop::collection::vec(leg, 1..5)
 }
 
-fn starts() -> impl Strategy<Value = JointAngles> {
-    prop::array::uniform6(-3.0_f64..3.0)
+fn starts() -> impl Strategy<Value = JointValues> {
+    prop::array::uniform6(-3.0_f64..3.0).prop_map(JointValues::from)
 }
 
 /// The defaults, each up to three times smaller or larger.
@@ -406,7 +406,7 @@ fn longest_rest_s(limits: &FollowLimits) -> f64 {
 
 fn keeps_limits_and_ends_at_rest(
     limits: &FollowLimits,
-    start: JointAngles,
+    start: JointValues,
     legs: &[Leg],
     dt_s: f64,
 ) -> Result<(), TestCaseError> {
@@ -468,7 +468,7 @@ proptest! {
         by in prop::array::uniform6(-0.6_f64..0.6),
     ) {
         let (arm, limits) = (arm(), open());
-        let goal = still(arm.tip(&std::array::from_fn(|i| start[i] + by[i])));
+        let goal = still(arm.tip(&JointValues::from_fn(6, |i| start[i] + by[i])));
         let mut run = Run::new(&arm, &limits, start, DT_S);
         for _ in 0..600 {
             run.pass(Some(&goal));

@@ -3,13 +3,14 @@
 //! The next point is computed here and sent for one pass of the simulation, so the arm stands within a pass when this
 //! client hangs, dies, or loses its connection. As long as it lives, it comes to rest within the limits of acceleration.
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use nalgebra::Vector3;
 
 use super::jog_plan::{JogObstacle, JogPlan, Path};
 use super::reach::ArmKinematics;
 use super::stream::{Pass, Point, Stream};
-use super::{Arm, JOINTS, JointAngles, require_running};
+use super::{Arm, require_running};
 use crate::client::error::LinkError;
 
 /// What the arm is asked for, in messages.
@@ -22,7 +23,7 @@ pub enum ArmJog<'a> {
     Joint {
         /// Which.
         index: usize,
-        /// Towards larger angles.
+        /// Towards larger values.
         forward: bool,
     },
     /// The tip along a direction of some axes; its orientation stays.
@@ -143,15 +144,17 @@ impl Arm {
         }
     }
 
-    fn path<'a>(&self, jog: &ArmJog<'a>, start: &JointAngles) -> Result<Path<'a>, LinkError> {
+    fn path<'a>(&self, jog: &ArmJog<'a>, start: &JointValues) -> Result<Path<'a>, LinkError> {
         match *jog {
-            ArmJog::Joint { index, forward } if index < JOINTS => {
-                let limits = self.info.joint_intervals.map(|i| (!i.cyclic).then_some([i.min_rad, i.max_rad]));
-                Ok(Path::Joint { index, sign: if forward { 1.0 } else { -1.0 }, start: *start, limits })
-            }
-            ArmJog::Joint { index, .. } => {
-                Err(LinkError::BadMotion { what: "the joint", expected: "one of 0 to 5", value: index as f64 })
-            }
+            ArmJog::Joint { index, forward } => match self.info.joints.get(index) {
+                Some(&joint) => {
+                    Ok(Path::Joint { index, joint, sign: if forward { 1.0 } else { -1.0 }, start: *start })
+                }
+                None => {
+                    let (expected, value) = ("one of the arm's, counted from 0", index as f64);
+                    Err(LinkError::BadMotion { what: "the joint", expected, value })
+                }
+            },
             ArmJog::Line { kinematics, axes, along } => {
                 let start = kinematics.tip(start);
                 Ok(Path::Line { kinematics, start, along: axes.direction_in_base(&start, &along)? })

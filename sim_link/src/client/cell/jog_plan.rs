@@ -1,18 +1,19 @@
 //! The points of a jog, one per pass: along a fixed path, within limits of speed and acceleration, to a stop before
 //! whatever is in the way. Nothing here knows a connection or a clock.
 
+use handeye_core::geometry::arm::{IkError, JointKind, JointQuantity, JointRange, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use super::joints::{CellJoint, in_rad, largest_change};
 use super::reach::ArmKinematics;
-use super::{JOINTS, JointAngles};
-use handeye_core::geometry::arm::ur5::{IkError, JointLimits};
 
 /// Fastest jog of a joint [rad/s]: two thirds of what the model of the arm allows its joints by default.
 pub const JOINT_SPEED: f64 = 60.0 * std::f64::consts::PI / 180.0;
 /// Half of what it allows [rad/s²]: from full speed a joint stops within 10°.
 const JOINT_ACCELERATION: f64 = 180.0 * std::f64::consts::PI / 180.0;
-/// Fastest jog of the tip along a line [m/s]: the reduced speed at which ISO 10218-1 lets people be near an arm.
+/// Fastest jog of the tip along a line, and of a prismatic joint, which takes the tip along as fast [m/s]: the reduced speed
+/// at which ISO 10218-1 lets people be near an arm.
 pub const LINE_SPEED: f64 = 0.25;
 /// From full speed the tip stops within 31 mm [m/s²].
 const LINE_ACCELERATION: f64 = 1.0;
@@ -21,7 +22,8 @@ pub const TURN_SPEED: f64 = 45.0 * std::f64::consts::PI / 180.0;
 /// From full speed it stops within 6° [rad/s²].
 const TURN_ACCELERATION: f64 = 180.0 * std::f64::consts::PI / 180.0;
 
-/// Fastest joint while the tip is jogged [rad/s]: what the model of the arm allows its joints by default.
+/// Fastest joint while the tip is jogged [rad/s]: what the model of the arm allows its joints by default. One that shifts
+/// over [`super::RAD_PER_M`] of it [m/s].
 const JOINT_RATE: f64 = 90.0 * std::f64::consts::PI / 180.0;
 
 /// Near a singular position the tip slows down so that no joint exceeds its rate; below this share of the fastest speed
@@ -37,6 +39,9 @@ const STEP_SAMPLES: usize = 64;
 /// A joint that turns by more between two neighbouring points of a path has changed to another configuration \[rad\].
 const JUMP_RAD: f64 = 0.5;
 
+/// Dimensions of a pose: joints beyond these are to spare.
+const POSE: usize = 6;
+
 /// How often a step that is too fast is halved before it is given up: to less than the crawl.
 const SLOWER_STEPS: usize = 6;
 
@@ -48,19 +53,19 @@ const AT_END: f64 = 1e-9;
 #[non_exhaustive]
 pub enum JogObstacle {
     /// A joint is at the end of its range.
-    #[error("joint {joint} is at the end of its range, {limit_deg:.1}°")]
+    #[error("joint {joint} is at the end of its range, {limit:.1}")]
     JointRange {
         /// Counted from 1 at the base.
         joint: usize,
         /// The end.
-        limit_deg: f64,
+        limit: JointQuantity,
     },
     /// The arm reaches no further.
     #[error(transparent)]
     Reach(IkError),
     /// The joints would have to turn at once by a lot for the tip to move on by a little.
     #[error(
-        "the arm is stretched, or two of its axes are in line: joint {joint} would turn too fast; go another way or \
+        "the arm is stretched, or two of its axes are in line: joint {joint} would be too fast; go another way or \
          move single joints"
     )]
     Singular {
@@ -73,7 +78,7 @@ pub enum JogObstacle {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Path<'a> {
     /// One joint from its start; `sign` is 1 or −1.
-    Joint { index: usize, sign: f64, start: JointAngles, limits: [Option<[f64; 2]>; JOINTS] },
+    Joint { index: usize, joint: CellJoint, sign: f64, start: JointValues },
     /// The tip from its start, along a unit vector of the base.
     Line { kinematics: &'a ArmKinematics, start: Pose<Base, Tip>, along: Vector3<f64> },
     /// The tip about an axis of the base through a point.
@@ -84,14 +89,14 @@ impl Path<'_> {
     /// Fastest speed and acceleration along it.
     fn limits(&self) -> [f64; 2] {
         match self {
-            Self::Joint { .. } => [JOINT_SPEED, JOINT_ACCELERATION],
-            Self::Line { .. } => [LINE_SPEED, LINE_ACCELERATION],
+            Self::Joint { joint: CellJoint { kind: JointKind::Revolute, .. }, .. } => [JOINT_SPEED, JOINT_ACCELERATION],
+            Self::Joint { .. } | Self::Line { .. } => [LINE_SPEED, LINE_ACCELERATION],
             Self::Turn { .. } => [TURN_SPEED, TURN_ACCELERATION],
         }
     }
 
     /// The joints after a distance, from those at a point shortly before.
-    fn joints_at(&self, distance: f64, before: &JointAngles) -> Result<JointAngles, JogObstacle> {
+    fn joints_at(&self, distance: f64, before: &JointValues) -> Result<JointValues, JogObstacle> {
         match self {
             Self::Joint { index, sign, start, .. } => {
                 let mut joints = *start;
@@ -110,45 +115,61 @@ impl Path<'_> {
         }
     }
 
+    /// The joint that moves most, counted from 0, and by how much \[rad\].
+    fn largest_change(&self, from: &JointValues, to: &JointValues) -> (usize, f64) {
+        match self {
+            Self::Joint { index, joint, .. } => (*index, in_rad(joint.kind, to[*index] - from[*index]).abs()),
+            Self::Line { kinematics, .. } | Self::Turn { kinematics, .. } => {
+                largest_change(kinematics.kinds(), from, to)
+            }
+        }
+    }
+
     /// How far it leads, where that is known beforehand.
     fn end(&self) -> Option<(f64, JogObstacle)> {
-        let Self::Joint { index, sign, start, limits } = self else { return None };
-        let [min_rad, max_rad] = limits[*index]?;
-        let limit_rad = if *sign > 0.0 { max_rad } else { min_rad };
-        let obstacle = JogObstacle::JointRange { joint: index + 1, limit_deg: limit_rad.to_degrees() };
-        Some((((limit_rad - start[*index]) * sign).max(0.0), obstacle))
+        let Self::Joint { index, joint, sign, start } = self else { return None };
+        let limit = if *sign > 0.0 { joint.range.max } else { joint.range.min };
+        let obstacle = JogObstacle::JointRange { joint: index + 1, limit: joint.kind.quantity(limit) };
+        limit.is_finite().then(|| (((limit - start[*index]) * sign).max(0.0), obstacle))
     }
 }
 
 /// The joints of the same configuration of the arm, or what is in the way.
+///
+/// Joints that an arm has to spare move as little as they can. Where that takes one of them to the end of its range, those
+/// near an end give way as far as the others can do without them.
 pub(super) fn nearest(
     kinematics: &ArmKinematics,
     goal: &Pose<Base, Tip>,
-    before: &JointAngles,
-) -> Result<JointAngles, JogObstacle> {
+    before: &JointValues,
+) -> Result<JointValues, JogObstacle> {
     // Without the ranges first: within them the nearest may be another configuration, and a jump.
     let half_turn = std::f64::consts::PI;
-    let around = JointLimits { min_rad: before.map(|q| q - half_turn), max_rad: before.map(|q| q + half_turn) };
-    let joints = kinematics.reach_within(goal, before, &around).map_err(JogObstacle::Reach)?;
-    let (fastest, by_rad) = largest_change(before, &joints);
-    if by_rad > JUMP_RAD {
-        return Err(JogObstacle::Singular { joint: fastest + 1 });
+    let around: Vec<JointRange> = (before.iter())
+        .map(|q| JointRange { min: q - half_turn, max: q + half_turn, speed: f64::INFINITY })
+        .collect();
+    let joints = near(kinematics, goal, before, &around)?;
+    let arm = kinematics.arm();
+    let Some(joint) = arm.first_violation(&joints) else { return Ok(joints) };
+    let range = &arm.joints()[joint].range;
+    if arm.joint_count() > POSE
+        && let Ok(within) = near(kinematics, goal, before, &arm.ranges())
+    {
+        return Ok(within);
     }
-    match kinematics.limits().first_violation(&joints) {
-        None => Ok(joints),
-        Some(joint) => {
-            let limits = kinematics.limits();
-            let over = joints[joint] > limits.max_rad[joint];
-            let limit_rad = if over { limits.max_rad[joint] } else { limits.min_rad[joint] };
-            Err(JogObstacle::JointRange { joint: joint + 1, limit_deg: limit_rad.to_degrees() })
-        }
-    }
+    let limit = if joints[joint] > range.max { range.max } else { range.min };
+    Err(JogObstacle::JointRange { joint: joint + 1, limit: arm.joints()[joint].kind.quantity(limit) })
 }
 
-pub(super) fn largest_change(from: &JointAngles, to: &JointAngles) -> (usize, f64) {
-    (0..JOINTS)
-        .map(|i| (i, (to[i] - from[i]).abs()))
-        .fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
+fn near(
+    kinematics: &ArmKinematics,
+    goal: &Pose<Base, Tip>,
+    before: &JointValues,
+    ranges: &[JointRange],
+) -> Result<JointValues, JogObstacle> {
+    let joints = kinematics.reach_within(goal, before, ranges).map_err(JogObstacle::Reach)?;
+    let (fastest, by_rad) = largest_change(kinematics.kinds(), before, &joints);
+    if by_rad > JUMP_RAD { Err(JogObstacle::Singular { joint: fastest + 1 }) } else { Ok(joints) }
 }
 
 /// The fastest speed for the next `dt_s` from which the rest of a distance is enough to stop.
@@ -167,7 +188,7 @@ pub(super) struct JogPlan<'a> {
     length: Option<f64>,
     distance: f64,
     speed: f64,
-    joints: JointAngles,
+    joints: JointValues,
     obstacle: Option<JogObstacle>,
 }
 
@@ -176,7 +197,7 @@ impl<'a> JogPlan<'a> {
     ///
     /// # Errors
     /// What is in the way of a given length.
-    pub fn new(path: Path<'a>, joints: JointAngles, dt_s: f64, length: Option<f64>) -> Result<Self, JogObstacle> {
+    pub fn new(path: Path<'a>, joints: JointValues, dt_s: f64, length: Option<f64>) -> Result<Self, JogObstacle> {
         let plan = Self { path, dt_s, length, distance: 0.0, speed: 0.0, joints, obstacle: None };
         plan.check_length()?;
         Ok(plan)
@@ -201,7 +222,7 @@ impl<'a> JogPlan<'a> {
     }
 
     /// The joints for the next pass; `share` of the fastest speed is wanted, and a standstill with `None`.
-    pub fn advance(&mut self, share: Option<f64>) -> JointAngles {
+    pub fn advance(&mut self, share: Option<f64>) -> JointValues {
         let [fastest, acceleration] = self.path.limits();
         let wanted = share.filter(|share| share.is_finite()).map_or(0.0, |share| share.clamp(0.0, 1.0) * fastest);
         let change = acceleration * self.dt_s;
@@ -225,7 +246,7 @@ impl<'a> JogPlan<'a> {
                 distance = length;
             }
             let joints = self.path.joints_at(distance, &self.joints)?;
-            let (fastest, by_rad) = largest_change(&self.joints, &joints);
+            let (fastest, by_rad) = self.path.largest_change(&self.joints, &joints);
             if by_rad <= JOINT_RATE * self.dt_s {
                 (self.joints, self.distance) = (joints, distance);
                 return Ok(());
@@ -293,11 +314,11 @@ impl<'a> JogPlan<'a> {
     }
 
     /// The speed along the path at which the fastest joint has its rate.
-    fn rate_limit(&self, from: &JointAngles, to: &JointAngles, between: f64, fastest: f64) -> Result<f64, JogObstacle> {
+    fn rate_limit(&self, from: &JointValues, to: &JointValues, between: f64, fastest: f64) -> Result<f64, JogObstacle> {
         if matches!(self.path, Path::Joint { .. }) {
             return Ok(fastest);
         }
-        let (joint, by_rad) = largest_change(from, to);
+        let (joint, by_rad) = self.path.largest_change(from, to);
         let limit = JOINT_RATE * between / by_rad.max(f64::MIN_POSITIVE);
         if limit < CRAWL * fastest { Err(JogObstacle::Singular { joint: joint + 1 }) } else { Ok(limit.min(fastest)) }
     }

@@ -2,26 +2,28 @@ use approx::assert_relative_eq;
 use proptest::prelude::*;
 
 use super::*;
+use handeye_core::geometry::arm::ArmKind;
 
 const DT_S: f64 = 0.05;
-const START: JointAngles = [0.2, 0.8, -1.1, 0.3, 1.4, -0.5];
+const START: JointValues = JointValues::of([0.2, 0.8, -1.1, 0.3, 1.4, -0.5]);
 
 fn arm() -> ArmKinematics {
     let base_from_arm = Isometry3::translation(0.0, 0.0, 0.025);
-    ArmKinematics::ur5(base_from_arm, Isometry3::translation(0.0, 0.0, 0.017), JointLimits::default())
-        .expect("limits with room")
+    ArmKinematics::ur5(base_from_arm, Isometry3::translation(0.0, 0.0, 0.017), &ArmKind::Ur5Coppeliasim.ranges())
+        .expect("ranges with room")
 }
 
-fn line(arm: &ArmKinematics, start: JointAngles, along: Vector3<f64>) -> Path<'_> {
+fn line(arm: &ArmKinematics, start: JointValues, along: Vector3<f64>) -> Path<'_> {
     Path::Line { kinematics: arm, start: arm.tip(&start), along: along.normalize() }
 }
 
-fn joint(index: usize, sign: f64, limits: [f64; 2]) -> Path<'static> {
-    Path::Joint { index, sign, start: START, limits: [Some(limits); JOINTS] }
+fn joint(index: usize, sign: f64, [min, max]: [f64; 2]) -> Path<'static> {
+    let range = JointRange { min, max, speed: f64::INFINITY };
+    Path::Joint { index, joint: CellJoint { kind: JointKind::Revolute, range }, sign, start: START }
 }
 
 /// Advances while `share` is wanted, until it stands, and gives every point.
-fn run(plan: &mut JogPlan<'_>, mut share: impl FnMut(usize) -> Option<f64>) -> Vec<JointAngles> {
+fn run(plan: &mut JogPlan<'_>, mut share: impl FnMut(usize) -> Option<f64>) -> Vec<JointValues> {
     let mut points = Vec::new();
     for pass in 0..10_000 {
         let wanted = share(pass);
@@ -51,7 +53,7 @@ fn a_joint_moves_in_the_first_pass_and_keeps_its_limits_from_start_to_rest() {
     for pair in speeds.windows(2) {
         assert!((pair[1] - pair[0]).abs() <= JOINT_ACCELERATION * DT_S + 1e-9, "{speeds:?}");
     }
-    let others = |q: &JointAngles| (0..JOINTS).filter(|&i| i != 2).all(|i| q[i] == START[i]);
+    let others = |q: &JointValues| (0..q.len()).filter(|&i| i != 2).all(|i| q[i] == START[i]);
     assert!(points.iter().all(others));
 }
 
@@ -61,7 +63,7 @@ fn a_joint_comes_to_rest_at_the_end_of_its_range_and_says_so() {
     let points = run(&mut plan, |_| Some(1.0));
     assert_relative_eq!(points.last().expect("points")[0], 0.9, epsilon = 1e-6);
     assert!(points.iter().all(|q| q[0] <= 0.9 + 1e-12));
-    assert_eq!(plan.obstacle(), Some(JogObstacle::JointRange { joint: 1, limit_deg: 0.9_f64.to_degrees() }));
+    assert_eq!(plan.obstacle(), Some(JogObstacle::JointRange { joint: 1, limit: JointKind::Revolute.quantity(0.9) }));
     for pair in speeds(START[0], points.iter().map(|q| q[0])).windows(2) {
         assert!((pair[1] - pair[0]).abs() <= JOINT_ACCELERATION * DT_S + 1e-9);
     }
@@ -109,7 +111,7 @@ fn a_turn_keeps_its_centre() {
 fn out_of_a_singular_position_the_tip_goes_as_slowly_as_the_joints_need() {
     let arm = arm();
     // Stretched straight up: at first the tip hardly moves however fast the elbow turns.
-    let upright = [0.0; JOINTS];
+    let upright = JointValues::zeros(6);
     let mut plan = JogPlan::new(line(&arm, upright, -Vector3::z()), upright, DT_S, None).expect("no length");
     let points = run(&mut plan, |pass| (pass < 100).then_some(1.0));
     assert!(pass_rates(&upright, &points) <= JOINT_RATE * (1.0 + 1e-9));
@@ -126,8 +128,9 @@ fn direction() -> impl Strategy<Value = Vector3<f64>> {
         .prop_map(|v| v.normalize())
 }
 
-fn pass_rates(start: &JointAngles, points: &[JointAngles]) -> f64 {
-    std::iter::once(start).chain(points).zip(points).map(|(a, b)| largest_change(a, b).1 / DT_S).fold(0.0, f64::max)
+fn pass_rates(start: &JointValues, points: &[JointValues]) -> f64 {
+    let kinds = || std::iter::repeat(JointKind::Revolute);
+    std::iter::once(start).chain(points).zip(points).map(|(a, b)| largest_change(kinds(), a, b).1 / DT_S).fold(0.0, f64::max)
 }
 
 mod slow {
@@ -143,7 +146,7 @@ mod slow {
             turns in any::<bool>(),
             share in 0.05_f64..1.0,
         ) {
-            let arm = arm();
+            let (arm, start) = (arm(), JointValues::from(start));
             let tip = arm.tip(&start);
             let path = if turns {
                 Path::Turn { kinematics: &arm, start: tip, about: along, centre: tip.translation() }
@@ -164,7 +167,7 @@ mod slow {
                     ((moved - along * moved.dot(&along)).norm(), tip.distance_to(&now).1)
                 };
                 prop_assert!(distance_m < 1e-7 && angle_rad < 1e-6, "{distance_m} m, {angle_rad} rad off");
-                prop_assert!(arm.limits().contains(q));
+                prop_assert!(arm.arm().first_violation(q).is_none());
             }
         }
     }

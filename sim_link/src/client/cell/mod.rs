@@ -21,7 +21,9 @@ mod hold;
 mod jog;
 mod jog_plan;
 mod joint_elsewhere;
+mod joints;
 mod motion;
+mod objects;
 mod reach;
 mod room;
 mod sentinel;
@@ -33,6 +35,7 @@ mod views;
 
 use std::sync::Arc;
 
+use handeye_core::geometry::arm::JointKind;
 use handeye_core::geometry::camera::Intrinsics;
 
 pub use arm::{Arm, MotionTolerance, SettleOptions};
@@ -45,30 +48,28 @@ pub use jog_plan::{
     JOINT_SPEED as JOG_JOINT_SPEED_RAD_S, JogObstacle, LINE_SPEED as JOG_LINE_SPEED_M_S,
     TURN_SPEED as JOG_TURN_SPEED_RAD_S,
 };
-pub use reach::{ArmChain, ArmKinematics, UnknownKinematics};
+pub use joints::{CellJoint, RAD_PER_M};
+pub use reach::{ArmKinematics, UnknownKinematics};
 pub use room::{BoardReach, FollowPlace, NoPlace};
 pub use support::{Support, version_name};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
 pub use views::BoardInView;
 
+use objects::CellObjects;
+
 use super::endpoint::Endpoint;
 use super::error::LinkError;
 use super::options::ConnectionOptions;
 use super::protocol::ProtocolVersion;
-use super::sim::{JointInterval, ObjectHandle, SensorOptics, Sim, SimulationState};
-
-/// Number of joints of the arm.
-pub const JOINTS: usize = 6;
-
-/// Positions of the joints from the base up (rad).
-pub type JointAngles = [f64; JOINTS];
+use super::sim::{SensorOptics, Sim, SimulationState};
 
 /// Where the parts of the cell are in the scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CellPaths {
-    /// The base of the arm; without it the kinematics of the arm is not known.
+    /// The base of the arm; without it the kinematics of the arm is not known. All joints between it and the tip are
+    /// driven, whatever they are called.
     pub arm: String,
-    /// The joints: the first six matches in the order of the tree, from the base up.
+    /// The joints of an arm whose tip does not hang on that base: all matches in the order of the tree, from the base up.
     pub joints: String,
     /// The dummy whose pose the controller reports.
     pub tip: String,
@@ -105,27 +106,14 @@ pub struct CellInfo {
     pub program_version: i64,
     /// Whether it is a cell of this project, which CoppeliaSim's version number does not tell.
     pub is_handeye_cell: bool,
-    /// Ranges of the joints from the base up.
-    pub joint_intervals: [JointInterval; JOINTS],
+    /// The joints from the base up.
+    pub joints: Vec<CellJoint>,
     /// The colour sensor.
     pub optics: SensorOptics,
     /// The depth sensor, whose clipping planes bound the depths.
     pub depth_optics: SensorOptics,
     /// Simulated time per pass (s).
     pub time_step_s: f64,
-}
-
-/// Handles of the cell's objects.
-#[derive(Debug, Clone, PartialEq)]
-struct CellObjects {
-    arm: Option<ObjectHandle>,
-    arm_path: String,
-    joints: [ObjectHandle; JOINTS],
-    tip: ObjectHandle,
-    target: Option<ObjectHandle>,
-    target_path: String,
-    camera: ObjectHandle,
-    depth: ObjectHandle,
 }
 
 /// A cell: an arm and its camera, over two connections.
@@ -195,40 +183,26 @@ impl CellInfo {
         Support::of(self.protocol, self.program_version)
     }
 
+    /// How each joint moves, from the base up.
+    pub fn joint_kinds(&self) -> impl Iterator<Item = JointKind> {
+        self.joints.iter().map(|joint| joint.kind)
+    }
+
     fn read(sim: &mut Sim, objects: &CellObjects, program_version: i64) -> Result<Self, LinkError> {
-        let mut joint_intervals = Vec::with_capacity(JOINTS);
-        for &joint in &objects.joints {
-            joint_intervals.push(sim.get_joint_interval(joint)?);
+        let mut joints = Vec::with_capacity(objects.joints.len());
+        for (index, &joint) in objects.joints.iter().enumerate() {
+            let read = CellJoint::read(sim, joint)?;
+            joints.push(read.ok_or(LinkError::SphericalJoint { joint: index + 1 })?);
         }
         Ok(Self {
             endpoint: sim.connection().endpoint().clone(),
             protocol: sim.connection().version().unwrap_or(ProtocolVersion::V2),
             program_version,
             is_handeye_cell: truth::is_published(sim)?,
-            joint_intervals: std::array::from_fn(|i| joint_intervals[i]),
+            joints,
             optics: sim.get_sensor_optics(objects.camera)?,
             depth_optics: sim.get_sensor_optics(objects.depth)?,
             time_step_s: sim.get_simulation_time_step()?,
-        })
-    }
-}
-
-impl CellObjects {
-    fn find(sim: &mut Sim, paths: &CellPaths) -> Result<Self, LinkError> {
-        let mut joints = [ObjectHandle::WORLD; JOINTS];
-        for (index, joint) in joints.iter_mut().enumerate() {
-            let found = sim.get_object_index(&paths.joints, index as u32);
-            *joint = named(found, &format!("{} [{index}]", paths.joints), "joint of the arm")?;
-        }
-        Ok(Self {
-            arm: sim.find_object(&paths.arm)?,
-            arm_path: paths.arm.clone(),
-            joints,
-            tip: named(sim.get_object(&paths.tip), &paths.tip, "tip")?,
-            target: sim.find_object(&paths.target)?,
-            target_path: paths.target.clone(),
-            camera: named(sim.get_object(&paths.camera), &paths.camera, "colour sensor")?,
-            depth: named(sim.get_object(&paths.depth), &paths.depth, "depth sensor")?,
         })
     }
 }
@@ -252,30 +226,11 @@ fn look_around(sim: &mut Sim, paths: &CellPaths) -> Result<(Arc<CellObjects>, Ar
     Ok((Arc::new(objects), Arc::new(info)))
 }
 
-/// An object that the scene has to have. Only when the server says that there is none it is so; another refusal is the
-/// server's to explain.
-fn named(found: Result<ObjectHandle, LinkError>, path: &str, what: &'static str) -> Result<ObjectHandle, LinkError> {
-    match found {
-        Ok(handle) if handle.0 >= 0 => Ok(handle),
-        Ok(_) => Err(LinkError::NoSuchObject { path: path.to_owned(), what }),
-        Err(error) if error.is_missing_object() => Err(LinkError::NoSuchObject { path: path.to_owned(), what }),
-        Err(error) => Err(error),
-    }
-}
-
 fn require_running(sim: &mut Sim, task: &'static str) -> Result<(), LinkError> {
     match sim.get_simulation_state()? {
         SimulationState::Running => Ok(()),
         state => Err(LinkError::NotRunning { task, state }),
     }
-}
-
-fn read_joint_angles(sim: &mut Sim, joints: &[ObjectHandle; JOINTS]) -> Result<JointAngles, LinkError> {
-    let mut angles = [0.0; JOINTS];
-    for (angle, &joint) in angles.iter_mut().zip(joints) {
-        *angle = sim.get_joint_position(joint)?;
-    }
-    Ok(angles)
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ fn cell_that_tells(moment: Option<Value>) -> Cell {
 fn a_frame_of_a_built_in_cell_has_all_of_the_pass_that_its_images_show() {
     let mut cell = cell_that_tells(Some(wire::map(shown())));
     let frame = cell.client.camera().grab().expect("a frame");
-    assert_eq!((frame.sim_time_s, frame.joints), (0.95, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]));
+    assert_eq!((frame.sim_time_s, frame.joints), (0.95, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6].into()));
     assert_eq!(frame.base_from_tip.translation(), Vector3::new(0.3, 0.2, 0.1));
     assert_eq!(frame.base_from_target_true.map(|pose| pose.translation()), Some(Vector3::new(0.0, -0.4, 0.8)));
     assert_eq!(calls(&cell, "sim.getJointPosition"), 0, "one call instead of eight");

@@ -9,14 +9,16 @@
 
 use std::time::{Duration, Instant};
 
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
 use super::arm::{MotionTolerance, SettleOptions};
 use super::joint_elsewhere::joint_elsewhere;
+use super::joints::{difference_rad, largest_change, of_rad};
 use super::reach::ArmKinematics;
-use super::stream::{PLACED_OFF_RAD, Pass, Point, Stream, difference_rad};
-use super::{Arm, JOINTS, JointAngles, require_running};
+use super::stream::{PLACED_OFF_RAD, Pass, Point, Stream};
+use super::{Arm, require_running};
 use crate::cell::motion::{self, JointMotion, MotionState, Sync};
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
@@ -37,7 +39,7 @@ pub(super) const LONGEST_BRAKING: Duration = Duration::from_secs(10);
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
 /// Fastest joint on a straight line \[rad/s\], that of the stock UR5 model: where some joint would have to be faster, the
-/// line leads past a singular position.
+/// line leads past a singular position. One that shifts over [`super::RAD_PER_M`] of it \[m/s\], as of all that follows.
 const LINE_JOINT_SPEED_RAD_S: f64 = std::f64::consts::FRAC_PI_2;
 
 /// How a stop brakes, not as gently as the motion goes: joints as hard as those of the stock UR5 may [rad/s², rad/s³], the
@@ -57,7 +59,7 @@ const ARRIVED_OFF_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 #[derive(Debug, Clone)]
 enum Way<'a> {
     /// All joints at once.
-    Joints { motion: Box<JointMotion>, limits: motion::MotionLimits, goal: JointAngles },
+    Joints { motion: Box<JointMotion>, limits: motion::MotionLimits, goal: JointValues, kinds: Vec<JointKind> },
     /// The tip along a line.
     Line(Box<Line<'a>>),
 }
@@ -68,28 +70,33 @@ struct Line<'a> {
     motion: motion::PoseMotion,
     limits: motion::MotionLimits,
     goal: Pose<Base, Tip>,
-    joints: JointAngles,
+    joints: JointValues,
     /// Of the tip, along x, y, z and about its axis.
     speeds: Vec<f64>,
     /// Velocities of the joints while the tip is off its line.
-    astray_rad_s: Option<JointAngles>,
+    astray: Option<JointValues>,
     /// Passes since the end of the line.
     overtime: u32,
     is_over: bool,
 }
 
 impl<'a> Way<'a> {
-    fn joints(start: &JointAngles, goal: &JointAngles, limits: &MotionLimits) -> Result<Self, LinkError> {
+    fn joints(
+        start: &JointValues,
+        goal: &JointValues,
+        limits: &MotionLimits,
+        kinds: Vec<JointKind>,
+    ) -> Result<Self, LinkError> {
         let limits = generator_limits(limits);
         let rest = MotionState::at_rest(start.to_vec());
-        let motion = JointMotion::new(rest, goal, &[0.0; JOINTS], Some(&limits), Sync::Phase)
+        let motion = JointMotion::new(rest, goal, &JointValues::zeros(goal.len()), Some(&limits), Sync::Phase)
             .map_err(|error| unplanned(&error))?;
-        Ok(Self::Joints { motion: Box::new(motion), limits, goal: *goal })
+        Ok(Self::Joints { motion: Box::new(motion), limits, goal: *goal, kinds })
     }
 
     fn line(
         kinematics: &'a ArmKinematics,
-        start: &JointAngles,
+        start: &JointValues,
         goal: &Pose<Base, Tip>,
         limits: &MotionLimits,
     ) -> Result<Self, LinkError> {
@@ -104,18 +111,18 @@ impl<'a> Way<'a> {
             goal: *goal,
             joints: *start,
             speeds: vec![0.0; 4],
-            astray_rad_s: None,
+            astray: None,
             overtime: 0,
             is_over: false,
         })))
     }
 
     /// The joints one pass later.
-    fn next(&mut self, time_step_s: f64) -> JointAngles {
+    fn next(&mut self, time_step_s: f64) -> JointValues {
         match self {
-            Self::Joints { motion, .. } => {
+            Self::Joints { motion, goal, .. } => {
                 let step = motion.step(time_step_s);
-                std::array::from_fn(|i| step.pos[i])
+                JointValues::from_fn(goal.len(), |i| step.pos[i])
             }
             Self::Line(line) => line.next(time_step_s),
         }
@@ -131,32 +138,28 @@ impl<'a> Way<'a> {
     /// Replaces the rest by coming to rest: of the tip on its line, or of the joints where it is off its line, so that it
     /// does not go there first.
     fn brake(&mut self) {
-        let limits = |dofs: usize, vel: &[f64], [acceleration, jerk]: [f64; 2]| {
-            // Braking makes nothing faster, so the limit of speed is only not to be in the way.
-            let fastest = vel.iter().fold(1.0_f64, |fastest, vel| fastest.max(vel.abs()));
-            motion::MotionLimits::uniform(dofs, 2.0 * fastest, acceleration, jerk)
-        };
         if let Self::Line(line) = self
-            && let Some(vel) = line.astray_rad_s
+            && let Some(vel) = line.astray
         {
             let state = MotionState { vel: vel.to_vec(), ..MotionState::at_rest(line.joints.to_vec()) };
-            let limits = limits(JOINTS, &vel, JOINT_BRAKE);
+            let kinds: Vec<JointKind> = line.kinematics.kinds().collect();
+            let limits = joint_brake(&kinds, &vel);
             match JointMotion::stop(state, &limits) {
                 Ok(stop) => {
-                    let goal = std::array::from_fn(|i| stop.target_pos()[i]);
-                    *self = Self::Joints { motion: Box::new(stop), limits, goal };
+                    let goal = JointValues::from_fn(kinds.len(), |i| stop.target_pos()[i]);
+                    *self = Self::Joints { motion: Box::new(stop), limits, goal, kinds };
                 }
                 Err(error) => tracing::error!(%error, "a motion could not be braked"),
             }
             return;
         }
         let braked = match self {
-            Self::Joints { motion, .. } => {
+            Self::Joints { motion, kinds, .. } => {
                 let state = motion.at(motion.time_s()).state();
-                let limits = limits(JOINTS, &state.vel, JOINT_BRAKE);
+                let limits = joint_brake(kinds, &state.vel);
                 JointMotion::stop(state, &limits).map(|stop| **motion = stop)
             }
-            Self::Line(line) => line.motion.stop(&limits(4, &line.speeds, LINE_BRAKE)).map(|stop| line.motion = stop),
+            Self::Line(line) => line.motion.stop(&brake(&line.speeds, |_| LINE_BRAKE)).map(|stop| line.motion = stop),
         };
         if let Err(error) = braked {
             // There is a way to rest from any state.
@@ -165,11 +168,12 @@ impl<'a> Way<'a> {
     }
 
     /// The same goal from a standstill.
-    fn begin_again(&mut self, joints: &JointAngles) {
+    fn begin_again(&mut self, joints: &JointValues) {
         let rest = MotionState::at_rest(joints.to_vec());
         match self {
-            Self::Joints { motion, limits, goal } => {
-                if let Ok(anew) = JointMotion::new(rest, &goal[..], &[0.0; JOINTS], Some(limits), Sync::Phase) {
+            Self::Joints { motion, limits, goal, .. } => {
+                let still = JointValues::zeros(goal.len());
+                if let Ok(anew) = JointMotion::new(rest, &goal[..], &still, Some(limits), Sync::Phase) {
                     **motion = anew;
                 }
             }
@@ -177,10 +181,27 @@ impl<'a> Way<'a> {
                 let tip = line.kinematics.tip(joints);
                 let (goal, limits) = (line.goal.isometry(), Some(&line.limits));
                 if let Ok(anew) = motion::PoseMotion::new(tip.isometry(), goal, limits, None, Sync::Phase) {
-                    (line.motion, line.joints, line.astray_rad_s) = (anew, *joints, None);
+                    (line.motion, line.joints, line.astray) = (anew, *joints, None);
                 }
             }
         }
+    }
+}
+
+fn joint_brake(kinds: &[JointKind], vel: &[f64]) -> motion::MotionLimits {
+    brake(vel, |i| JOINT_BRAKE.map(|limit| of_rad(kinds[i], limit)))
+}
+
+/// Limits of coming to rest, of which `hardest` gives acceleration and jerk.
+fn brake(vel: &[f64], hardest: impl Fn(usize) -> [f64; 2]) -> motion::MotionLimits {
+    // Braking makes nothing faster, so the limit of speed is only not to be in the way.
+    let fastest = vel.iter().fold(1.0_f64, |fastest, vel| fastest.max(vel.abs()));
+    motion::MotionLimits {
+        max_vel: vec![2.0 * fastest; vel.len()],
+        max_accel: (0..vel.len()).map(|i| hardest(i)[0]).collect(),
+        max_jerk: (0..vel.len()).map(|i| hardest(i)[1]).collect(),
+        min_vel: None,
+        min_accel: None,
     }
 }
 
@@ -189,31 +210,29 @@ impl Line<'_> {
     ///
     /// Where the line leads out of reach, past a singular position or to the end of a joint, the tip leaves it by as much
     /// as it takes, and comes back to it as fast as the joints may.
-    fn next(&mut self, time_step_s: f64) -> JointAngles {
+    fn next(&mut self, time_step_s: f64) -> JointValues {
         let step = self.motion.step(time_step_s);
         let most_rad = LINE_JOINT_SPEED_RAD_S * time_step_s;
         let on_line = Pose::from_isometry(step.pose);
         let solved = self.kinematics.reach(&on_line, &self.joints).ok();
+        let kinematics = self.kinematics;
+        let travel_rad = |from: &JointValues, to: &JointValues| largest_change(kinematics.kinds(), from, to).1;
         let exact = solved.filter(|joints| travel_rad(joints, &self.joints) <= most_rad);
         let joints = exact.unwrap_or_else(|| {
             // The way back may lead through what kept the tip from its line; the goal itself is worth a detour.
             let goal = solved.filter(|_| step.finished);
             let wanted = goal.unwrap_or_else(|| self.kinematics.towards(&on_line, &self.joints));
             let share = (most_rad / travel_rad(&wanted, &self.joints)).min(1.0);
-            std::array::from_fn(|i| self.joints[i] + share * (wanted[i] - self.joints[i]))
+            JointValues::from_fn(wanted.len(), |i| self.joints[i] + share * (wanted[i] - self.joints[i]))
         });
         self.overtime += u32::from(step.finished);
         let stands = exact.is_some() || travel_rad(&joints, &self.joints) < STANDS_RAD;
         self.is_over = step.finished && (stands || self.overtime > LONGEST_OVERTIME_PASSES);
-        let vel_rad_s = std::array::from_fn(|i| (joints[i] - self.joints[i]) / time_step_s);
-        self.astray_rad_s = exact.is_none().then_some(vel_rad_s);
+        let vel = JointValues::from_fn(joints.len(), |i| (joints[i] - self.joints[i]) / time_step_s);
+        self.astray = exact.is_none().then_some(vel);
         (self.joints, self.speeds) = (joints, step.vel);
         joints
     }
-}
-
-fn travel_rad(from: &JointAngles, to: &JointAngles) -> f64 {
-    from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 fn generator_limits(limits: &MotionLimits) -> motion::MotionLimits {
@@ -231,31 +250,31 @@ fn unplanned(error: &motion::MotionError) -> LinkError {
 }
 
 impl Arm {
-    /// Moves the joints to `goal` (rad) within `limits`, and returns when they are there and, where a controller moves
+    /// Moves the joints to `goal` (rad, or m of a prismatic joint) within `limits`, and returns when they are there and, where a controller moves
     /// them, at rest.
     ///
     /// # Errors
-    /// [`LinkError::JointOutOfRange`] or [`LinkError::BadMotion`] before anything moves; [`LinkError::NotRunning`];
+    /// [`LinkError::JointCount`], [`LinkError::JointOutOfRange`] or [`LinkError::BadMotion`] before anything moves; [`LinkError::NotRunning`];
     /// [`LinkError::Cancelled`] with the arm at rest, [`LinkError::MotionStopped`] when it was another client that
     /// stopped it; [`LinkError::JointElsewhere`] when something else moves or holds a joint.
     pub fn move_to_joints(
         &mut self,
-        goal: &JointAngles,
+        goal: &[f64],
         limits: &MotionLimits,
         cancel: &CancelToken,
     ) -> Result<(), LinkError> {
         const TASK: &str = "moving the joints";
-        self.check_range(goal)?;
-        limits.validate(JOINTS)?;
+        let goal = self.check_range(goal)?;
+        limits.validate(goal.len())?;
         let start = self.ready(TASK, cancel)?;
-        let dynamic = self.send_motion(Way::joints(&start, goal, limits)?, start, TASK, cancel)?;
+        let dynamic = self.send_motion(Way::joints(&start, &goal, limits, self.info.joint_kinds().collect())?, start, TASK, cancel)?;
         if dynamic.contains(&true) {
             self.settle(&SettleOptions::default(), cancel)?;
         }
-        let here = self.joint_angles()?;
+        let here = self.joint_values()?;
         let most_rad = |joint: usize| if dynamic[joint] { ARRIVED_OFF_RAD } else { PLACED_OFF_RAD };
-        match (0..JOINTS).find(|&i| difference_rad(here[i], goal[i]) > most_rad(i)) {
-            Some(joint) => Err(joint_elsewhere(joint, here[joint], goal[joint])),
+        match (0..goal.len()).find(|&i| difference_rad(self.kind(i), here[i], goal[i]) > most_rad(i)) {
+            Some(joint) => Err(joint_elsewhere(joint, self.kind(joint), here[joint], goal[joint])),
             None => Ok(()),
         }
     }
@@ -299,7 +318,7 @@ impl Arm {
     }
 
     /// Where the joints stand, ready to be moved.
-    fn ready(&mut self, task: &'static str, cancel: &CancelToken) -> Result<JointAngles, LinkError> {
+    fn ready(&mut self, task: &'static str, cancel: &CancelToken) -> Result<JointValues, LinkError> {
         require_running(&mut self.sim, task)?;
         if cancel.is_cancelled() {
             return Err(LinkError::Cancelled { call: task.to_owned() });
@@ -311,12 +330,12 @@ impl Arm {
     fn send_motion(
         &mut self,
         way: Way<'_>,
-        start: JointAngles,
+        start: JointValues,
         task: &'static str,
         cancel: &CancelToken,
-    ) -> Result<[bool; JOINTS], LinkError> {
+    ) -> Result<Vec<bool>, LinkError> {
         let mut stream = Stream::begin(self, start, task)?;
-        let dynamic = *stream.dynamic();
+        let dynamic = stream.dynamic().to_vec();
         let outcome = self.send_points(way, &mut stream, task, cancel).map(|()| dynamic);
         stream.end(self, outcome)
     }
@@ -348,10 +367,10 @@ impl Arm {
                 Point { joints: sent, target: None }
             })?;
             match pass {
-                Pass::NotFollowing { joint, at_rad } => {
+                Pass::NotFollowing { joint, at } => {
                     // A simulation that is ended puts the joints back.
                     require_running(&mut self.sim, task)?;
-                    return Err(joint_elsewhere(joint, at_rad, sent[joint]));
+                    return Err(joint_elsewhere(joint, self.kind(joint), at, sent[joint]));
                 }
                 Pass::None => require_running(&mut self.sim, task)?,
                 Pass::Sent if !way.is_over() => {}
@@ -368,24 +387,24 @@ impl Arm {
         }
     }
 
-    fn check_range(&self, goal: &JointAngles) -> Result<(), LinkError> {
-        for (index, (&goal_rad, interval)) in goal.iter().zip(&self.info.joint_intervals).enumerate() {
-            if !goal_rad.is_finite() {
-                let expected = "finite angles";
-                return Err(LinkError::BadMotion { what: "the goal", expected, value: goal_rad });
+    /// The goal, if it is one of this arm.
+    fn check_range(&self, goal: &[f64]) -> Result<JointValues, LinkError> {
+        let need = self.info.joints.len();
+        let of_arm = JointValues::try_from(goal).ok().filter(|goal| goal.len() == need);
+        let goal = of_arm.ok_or(LinkError::JointCount { got: goal.len(), need })?;
+        for (index, (&value, joint)) in goal.iter().zip(&self.info.joints).enumerate() {
+            if !value.is_finite() {
+                let expected = "finite joint values";
+                return Err(LinkError::BadMotion { what: "the goal", expected, value });
             }
-            // A millionth of a radian over the end is rounding, and clamping it moves nothing.
-            let inside = (interval.min_rad - 1e-6..=interval.max_rad + 1e-6).contains(&goal_rad);
-            if !interval.cyclic && !inside {
-                return Err(LinkError::JointOutOfRange {
-                    joint: index + 1,
-                    goal_deg: goal_rad.to_degrees(),
-                    min_deg: interval.min_rad.to_degrees(),
-                    max_deg: interval.max_rad.to_degrees(),
-                });
+            // A millionth over the end is rounding, and clamping it moves nothing.
+            let inside = (joint.range.min - 1e-6..=joint.range.max + 1e-6).contains(&value);
+            if !inside {
+                let [goal, min, max] = [value, joint.range.min, joint.range.max].map(|v| joint.kind.quantity(v));
+                return Err(LinkError::JointOutOfRange { joint: index + 1, goal, min, max });
             }
         }
-        Ok(())
+        Ok(goal)
     }
 }
 
@@ -394,20 +413,20 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
-    use handeye_core::geometry::arm::ur5::JointLimits;
+    use handeye_core::geometry::arm::ArmKind;
 
     /// A tip whose line leads through the column of the arm strays, and a stop does not take it back to its line first.
     #[test]
     fn a_stop_of_a_tip_that_is_off_its_line_brakes_the_joints_at_once() {
-        let kinematics = ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), JointLimits::default())
-            .expect("limits with room");
-        let start: JointAngles = [0.0, 0.8, -1.2, 0.2, 1.5, 0.0];
+        let kinematics = ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges())
+            .expect("ranges with room");
+        let start = JointValues::from([0.0, 0.8, -1.2, 0.2, 1.5, 0.0]);
         let mut behind = start;
         behind[0] += 2.5;
         let (goal, limits) = (kinematics.tip(&behind), MotionLimits::uniform(4, 0.5, 2.0, 20.0));
         let mut way = Way::line(&kinematics, &start, &goal, &limits).expect("a profile");
         let is_astray =
-            |way: &Way<'_>| matches!(way, Way::Line(line) if line.astray_rad_s.is_some_and(|v| v[0].abs() > 0.5));
+            |way: &Way<'_>| matches!(way, Way::Line(line) if line.astray.is_some_and(|v| v[0].abs() > 0.5));
         let mut joints = start;
         for _ in 0..400 {
             joints = way.next(0.05);

@@ -1,16 +1,18 @@
 //! The chain of the arm of a scene, as the running simulation has it, and what it can reach.
 
+use handeye_core::geometry;
+use handeye_core::geometry::arm::{
+    ArmError, ArmFrames, ArmKind, DlsOptions, IkError, Joint, JointKind, JointRange, JointValues, MAX_JOINTS,
+};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use nalgebra::{Isometry3, Matrix6, Translation3, Vector3};
+use nalgebra::{Isometry3, Matrix6xX, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{Arm, CellInfo, CellObjects, JOINTS, JointAngles, read_joint_angles};
-use crate::client::constants;
+use super::joints::{CellJoint, read_joint_values};
+use super::objects::{Carriers, CellObjects};
+use super::Arm;
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
-use handeye_core::geometry;
-use handeye_core::geometry::arm::ur5::{self, DlsOptions, IkError, JointLimits};
-use handeye_core::geometry::arm::{ArmError, ArmKind, Joint, JointKind};
 
 /// How far an axis of a joint may be from where the built-in kinematics has it \[m\]. The model and the manufacturer's
 /// table differ by 7 mm; a physics engine holds its joints together to a tenth of a millimetre.
@@ -27,40 +29,15 @@ const TIP_TOLERANCE_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 /// How often joints and axes are read again because the arm moved meanwhile.
 const ATTEMPTS: u32 = 5;
 
-/// Objects between the tip and the last joint, at most; more is a loop.
-const LONGEST_CHAIN: usize = 32;
-
-/// The chain from the base to the tip of a UR5: the built-in kinematics lies between its two ends.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ArmChain {
-    /// Where the arm stands.
-    pub base_from_arm: Isometry3<f64>,
-    /// How it carries its tip.
-    pub connection_from_tip: Isometry3<f64>,
-}
-
-impl ArmChain {
-    /// Where the tip is with the joints at `joints` (rad).
-    pub fn tip(&self, joints: &JointAngles) -> Pose<Base, Tip> {
-        let arm_from_connection = ur5::forward(joints).arm_from_connection;
-        Pose::from_isometry(self.base_from_arm * arm_from_connection * self.connection_from_tip)
-    }
-
-    /// Whether a reported tip is where it should be with these joints: the scene may have changed since.
-    pub fn fits(&self, joints: &JointAngles, base_from_tip: &Pose<Base, Tip>) -> bool {
-        is_near(&self.tip(joints), base_from_tip)
-    }
-}
-
-/// The kinematics of the arm in a scene: its chain, where it stands, what it carries, and how far its joints turn.
-#[derive(Debug, Clone, PartialEq)]
+/// The kinematics of the arm in a scene: its chain, where it stands, what it carries, and how far its joints move.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ArmKinematics {
     /// From the arm frame to the connection, with the ranges of the scene.
     arm: geometry::arm::Arm,
     /// Whether that is the UR5 whose shape is known.
     is_ur5: bool,
-    chain: ArmChain,
-    limits: JointLimits,
+    base_from_arm: Isometry3<f64>,
+    connection_from_tip: Isometry3<f64>,
 }
 
 /// Why the kinematics of an arm is not known.
@@ -73,16 +50,6 @@ pub enum UnknownKinematics {
         /// The path looked for.
         path: String,
     },
-    /// The joints do not follow each other from the base to the tip.
-    #[error(
-        "joint {joint} is not the next one below joint {} on the way from the tip to the base: give the joints of the arm \
-         in their order",
-        joint + 1
-    )]
-    Order {
-        /// Counted from 1 at the base.
-        joint: usize,
-    },
     /// The joints are not above the base.
     #[error(
         "the joints do not hang on {path}, which is taken for the base of the arm: give the object that they hang on"
@@ -91,20 +58,9 @@ pub enum UnknownKinematics {
         /// The path looked for.
         path: String,
     },
-    /// The arm has joints that are not driven.
-    #[error(
-        "besides the {JOINTS} joints that are driven {alias:?} moves the tip: arms of {JOINTS} joints are driven so far"
-    )]
-    MoreJoints {
-        /// What it is called in the scene.
-        alias: String,
-    },
-    /// A joint that shifts, or turns about every axis.
-    #[error("joint {joint} is not revolute: only arms of revolute joints are driven along lines so far")]
-    NotRevolute {
-        /// Counted from 1 at the base.
-        joint: usize,
-    },
+    /// Other joints carry the tip than when the scene was looked at.
+    #[error("other joints carry the tip than when the connection was made: connect again")]
+    OtherJoints,
     /// What was read is not an arm.
     #[error("what the scene says of the arm is not one: {0}")]
     NoChain(#[from] ArmError),
@@ -126,19 +82,19 @@ impl ArmKinematics {
     /// That of a UR5 that stands at `base_from_arm` and carries its tip at `connection_from_tip`.
     ///
     /// # Errors
-    /// [`ArmError::BadJoint`] for limits without room.
+    /// [`ArmError::WrongCount`], and [`ArmError::BadJoint`] for ranges without room.
     pub fn ur5(
         base_from_arm: Isometry3<f64>,
         connection_from_tip: Isometry3<f64>,
-        limits: JointLimits,
+        ranges: &[JointRange],
     ) -> Result<Self, ArmError> {
-        let arm = ArmKind::Ur5Coppeliasim.arm().with_ranges(&limits.ranges())?;
-        Ok(Self { arm, is_ur5: true, chain: ArmChain { base_from_arm, connection_from_tip }, limits })
+        let arm = ArmKind::Ur5Coppeliasim.arm().with_ranges(ranges)?;
+        Ok(Self { arm, is_ur5: true, base_from_arm, connection_from_tip })
     }
 
-    /// Ranges of the joints; infinite for one that turns without end.
-    pub fn limits(&self) -> &JointLimits {
-        &self.limits
+    /// That of an arm that is known otherwise, up to its tip.
+    pub fn new(arm: geometry::arm::Arm, base_from_arm: Isometry3<f64>) -> Self {
+        Self { arm, is_ur5: false, base_from_arm, connection_from_tip: Isometry3::identity() }
     }
 
     /// The arm from its frame to the connection, with its ranges.
@@ -146,84 +102,82 @@ impl ArmKinematics {
         &self.arm
     }
 
+    /// How each joint moves, from the base up.
+    pub fn kinds(&self) -> impl Iterator<Item = JointKind> {
+        self.arm.joints().iter().map(|joint| joint.kind)
+    }
+
     /// Where the arm stands.
     pub fn base_from_arm(&self) -> &Isometry3<f64> {
-        &self.chain.base_from_arm
+        &self.base_from_arm
     }
 
     /// How it carries its tip; the identity for an arm that was measured up to there.
     pub fn connection_from_tip(&self) -> &Isometry3<f64> {
-        &self.chain.connection_from_tip
+        &self.connection_from_tip
     }
 
-    /// The two ends of a UR5; `None` for any other arm.
-    pub fn ur5_chain(&self) -> Option<ArmChain> {
-        self.is_ur5.then_some(self.chain)
+    /// Whether it is the simulator's UR5, whose numbers are exact and whose shape is known.
+    pub fn is_ur5(&self) -> bool {
+        self.is_ur5
     }
 
-    /// Where the tip is with the joints at `joints` (rad); nowhere, which is not a number, for joints that are none.
-    pub fn tip(&self, joints: &JointAngles) -> Pose<Base, Tip> {
+    /// Where the tip is with these joints; nowhere, which is not a number, for joints that are none.
+    pub fn tip(&self, joints: &[f64]) -> Pose<Base, Tip> {
         let arm_from_connection = match self.arm.forward(joints) {
             Ok(pose) => *pose.isometry(),
             Err(_) => Isometry3::translation(f64::NAN, f64::NAN, f64::NAN),
         };
-        Pose::from_isometry(self.chain.base_from_arm * arm_from_connection * self.chain.connection_from_tip)
+        Pose::from_isometry(self.base_from_arm * arm_from_connection * self.connection_from_tip)
     }
 
     /// Whether a reported tip is where it should be with these joints: the scene may have changed since.
-    pub fn fits(&self, joints: &JointAngles, base_from_tip: &Pose<Base, Tip>) -> bool {
+    pub fn fits(&self, joints: &[f64], base_from_tip: &Pose<Base, Tip>) -> bool {
         is_near(&self.tip(joints), base_from_tip)
     }
 
-    /// The joint positions (rad) nearest to `seed` that put the tip to `goal`.
+    /// The joint values nearest to `seed` that put the tip to `goal`, within the ranges of the joints.
     ///
     /// # Errors
     /// [`IkError`] says what is in the way or which joint would leave its range.
-    pub fn reach(&self, goal: &Pose<Base, Tip>, seed: &JointAngles) -> Result<JointAngles, IkError> {
+    pub fn reach(&self, goal: &Pose<Base, Tip>, seed: &[f64]) -> Result<JointValues, IkError> {
         self.solve(&self.arm, goal, seed)
     }
 
-    /// As [`Self::reach`], with other limits.
+    /// As [`Self::reach`], with other ranges.
     pub(super) fn reach_within(
         &self,
         goal: &Pose<Base, Tip>,
-        seed: &JointAngles,
-        limits: &JointLimits,
-    ) -> Result<JointAngles, IkError> {
-        // Limits about joints that are not numbers are none.
-        let arm = self.arm.clone().with_ranges(&limits.ranges()).map_err(|_none| IkError::NotFinite)?;
+        seed: &[f64],
+        ranges: &[JointRange],
+    ) -> Result<JointValues, IkError> {
+        // Ranges about joints that are not numbers are none.
+        let arm = self.arm.clone().with_ranges(ranges).map_err(|_none| IkError::NotFinite)?;
         self.solve(&arm, goal, seed)
     }
 
-    fn solve(
-        &self,
-        arm: &geometry::arm::Arm,
-        goal: &Pose<Base, Tip>,
-        seed: &JointAngles,
-    ) -> Result<JointAngles, IkError> {
+    fn solve(&self, arm: &geometry::arm::Arm, goal: &Pose<Base, Tip>, seed: &[f64]) -> Result<JointValues, IkError> {
         if !goal.is_finite() {
             return Err(IkError::NotFinite);
         }
-        let ArmChain { base_from_arm, connection_from_tip } = &self.chain;
-        let arm_from_connection = base_from_arm.inverse() * goal.isometry() * connection_from_tip.inverse();
+        let arm_from_connection = self.base_from_arm.inverse() * goal.isometry() * self.connection_from_tip.inverse();
         let found = arm.inverse(&Pose::from_isometry(arm_from_connection), seed)?;
-        JointAngles::try_from(found).map_err(|found| IkError::WrongCount { got: seed.len(), need: found.len() })
+        JointValues::try_from(&found[..]).map_err(|_more| IkError::WrongCount { got: found.len(), need: MAX_JOINTS })
     }
 
-    /// The joint positions (rad), found from `seed` on, that take the tip as near to `goal` as the arm can; the seed for a
-    /// goal that is no pose.
-    pub(super) fn towards(&self, goal: &Pose<Base, Tip>, seed: &JointAngles) -> JointAngles {
-        let arm_from_tip = Pose::from_isometry(self.chain.base_from_arm.inverse() * goal.isometry());
-        let found = self.with_tip(self.chain.connection_from_tip).towards(&arm_from_tip, seed, &DlsOptions::default());
-        found.ok().and_then(|found| JointAngles::try_from(found).ok()).unwrap_or(*seed)
+    /// The joint values, found from `seed` on, that take the tip as near to `goal` as the arm can; the seed for a goal that
+    /// is no pose.
+    pub(super) fn towards(&self, goal: &Pose<Base, Tip>, seed: &JointValues) -> JointValues {
+        let arm_from_tip = Pose::from_isometry(self.base_from_arm.inverse() * goal.isometry());
+        let found = self.with_tip(self.connection_from_tip).towards(&arm_from_tip, seed, &DlsOptions::default());
+        found.ok().and_then(|found| JointValues::try_from(&found[..]).ok()).unwrap_or(*seed)
     }
 
     /// Velocity and angular velocity of the tip per velocity of each joint, in the axes of the arm frame; `None` for
     /// joints that are not numbers.
-    pub(super) fn jacobian(&self, joints: &JointAngles) -> Option<Matrix6<f64>> {
-        let at_tip = Translation3::from(self.chain.connection_from_tip.translation.vector).into();
-        let jacobian = self.with_tip(at_tip).jacobian(joints).ok()?;
-        Some(jacobian.fixed_columns::<JOINTS>(0).into_owned())
+    pub(super) fn jacobian(&self, joints: &[f64]) -> Option<Matrix6xX<f64>> {
+        let at_tip = Translation3::from(self.connection_from_tip.translation.vector).into();
+        self.with_tip(at_tip).jacobian(joints).ok()
     }
 
     /// The arm up to something that is fixed to the connection.
@@ -261,8 +215,15 @@ impl Arm {
         let Some(arm) = self.objects.arm else {
             return Ok(Err(UnknownKinematics::NoArm { path: self.objects.arm_path.clone() }));
         };
-        if !is_tip_on_last_joint(&mut self.sim, &self.objects)? {
+        let carriers = Carriers::of(&mut self.sim, self.objects.tip, Some(arm))?;
+        if carriers.joints.last() != self.objects.joints.last() {
             return Ok(Err(UnknownKinematics::LooseTip));
+        }
+        if !carriers.reach_base {
+            return Ok(Err(UnknownKinematics::Elsewhere { path: self.objects.arm_path.clone() }));
+        }
+        if carriers.joints != self.objects.joints {
+            return Ok(Err(UnknownKinematics::OtherJoints));
         }
         for _ in 0..ATTEMPTS {
             let held = self.hold.acquire(&mut self.sim)?;
@@ -272,14 +233,9 @@ impl Arm {
                 None => measured?,
             };
             if let Some(measured) = measured {
-                let limits = limits_of(&self.info);
-                if measured.is_ur5() {
-                    return Ok(measured.ur5(limits).map_err(UnknownKinematics::NoChain));
-                }
-                return Ok(match chain_defect(&mut self.sim, &self.objects, arm)? {
-                    Some(defect) => Err(defect),
-                    None => measured.chain(limits).map_err(UnknownKinematics::NoChain),
-                });
+                let joints = &self.info.joints;
+                let known = if measured.is_ur5(joints) { measured.ur5(joints) } else { measured.chain(joints) };
+                return Ok(known.map_err(UnknownKinematics::NoChain));
             }
         }
         Ok(Err(UnknownKinematics::Moving))
@@ -288,8 +244,8 @@ impl Arm {
 
 /// One instant of the arm.
 struct Measured {
-    joints: JointAngles,
-    arm_from_joint: [Isometry3<f64>; JOINTS],
+    joints: JointValues,
+    arm_from_joint: Vec<Isometry3<f64>>,
     arm_from_tip: Isometry3<f64>,
     base_from_arm: Isometry3<f64>,
 }
@@ -297,22 +253,26 @@ struct Measured {
 /// `None` when the arm moved meanwhile.
 fn measure(sim: &mut Sim, objects: &CellObjects, arm: ObjectHandle) -> Result<Option<Measured>, LinkError> {
     let mut pose = |object, frame| sim.get_object_pose::<Base, Tip>(object, frame).map(|pose| *pose.isometry());
-    let mut arm_from_joint = [Isometry3::identity(); JOINTS];
     let base_from_arm = pose(arm, ObjectHandle::WORLD)?;
     let before = pose(objects.tip, arm)?;
-    for (slot, &joint) in arm_from_joint.iter_mut().zip(&objects.joints) {
-        *slot = pose(joint, arm)?;
-    }
-    let joints = read_joint_angles(sim, &objects.joints)?;
+    let arm_from_joint = objects.joints.iter().map(|&joint| pose(joint, arm)).collect::<Result<_, _>>()?;
+    let joints = read_joint_values(sim, objects)?;
     let arm_from_tip = *sim.get_object_pose::<Base, Tip>(objects.tip, arm)?.isometry();
     Ok((before == arm_from_tip).then_some(Measured { joints, arm_from_joint, arm_from_tip, base_from_arm }))
 }
 
 impl Measured {
+    /// Where everything would be if it were the UR5; `None` for joints that one does not have.
+    fn as_ur5(&self) -> Option<ArmFrames> {
+        ArmKind::Ur5Coppeliasim.arm().frames(&self.joints).ok()
+    }
+
     /// Whether the axes are those of the UR5.
-    fn is_ur5(&self) -> bool {
-        let expected = ur5::forward(&self.joints);
-        self.arm_from_joint.iter().zip(&expected.arm_from_joint).all(|(found, expected)| {
+    fn is_ur5(&self, joints: &[CellJoint]) -> bool {
+        let Some(expected) = self.as_ur5().filter(|_| joints.iter().all(|j| j.kind == JointKind::Revolute)) else {
+            return false;
+        };
+        self.arm_from_joint.iter().zip(&expected.base_from_joint).all(|(found, expected)| {
             let axis = expected.rotation * Vector3::z();
             let angle_rad = (found.rotation * Vector3::z()).angle(&axis);
             // Where along its axis a joint has its origin is a matter of drawing.
@@ -322,80 +282,31 @@ impl Measured {
         })
     }
 
-    fn ur5(&self, limits: JointLimits) -> Result<ArmKinematics, ArmError> {
-        let connection_from_tip = ur5::forward(&self.joints).arm_from_connection.inv_mul(&self.arm_from_tip);
-        ArmKinematics::ur5(self.base_from_arm, connection_from_tip, limits)
+    fn ur5(&self, joints: &[CellJoint]) -> Result<ArmKinematics, ArmError> {
+        let arm_from_connection = *ArmKind::Ur5Coppeliasim.arm().forward(&self.joints)?.isometry();
+        let connection_from_tip = arm_from_connection.inv_mul(&self.arm_from_tip);
+        let ranges: Vec<JointRange> = joints.iter().map(|joint| joint.range).collect();
+        ArmKinematics::ur5(self.base_from_arm, connection_from_tip, &ranges)
     }
 
-    /// The arm as it was read, up to its tip. A joint turns about the z axis of its frame, which does not turn with it.
-    fn chain(&self, limits: JointLimits) -> Result<ArmKinematics, ArmError> {
+    /// The arm as it was read, up to its tip. A joint moves about or along the z axis of its frame, which does not move with
+    /// it.
+    fn chain(&self, joints: &[CellJoint]) -> Result<ArmKinematics, ArmError> {
         let mut arm_from_link = Isometry3::identity();
-        let mut joints = Vec::with_capacity(JOINTS);
-        for (index, (arm_from_joint, value)) in self.arm_from_joint.iter().zip(self.joints).enumerate() {
+        let mut chain = Vec::with_capacity(joints.len());
+        let measured = self.arm_from_joint.iter().zip(self.joints.iter());
+        for (index, ((arm_from_joint, &value), CellJoint { kind, range })) in measured.zip(joints).enumerate() {
             let joint = Joint {
                 name: format!("joint {}", index + 1),
-                kind: JointKind::Revolute,
+                kind: *kind,
                 previous_from_joint: arm_from_link.inv_mul(arm_from_joint),
                 axis: Vector3::z_axis(),
-                range: limits.ranges()[index],
+                range: *range,
             };
             arm_from_link = arm_from_joint * joint.motion(value);
-            joints.push(joint);
+            chain.push(joint);
         }
-        let arm = geometry::arm::Arm::new(joints, arm_from_link.inv_mul(&self.arm_from_tip))?;
-        let chain = ArmChain { base_from_arm: self.base_from_arm, connection_from_tip: Isometry3::identity() };
-        Ok(ArmKinematics { arm, is_ur5: false, chain, limits })
+        let arm = geometry::arm::Arm::new(chain, arm_from_link.inv_mul(&self.arm_from_tip))?;
+        Ok(ArmKinematics::new(arm, self.base_from_arm))
     }
-}
-
-/// What keeps the joints that are driven from being all that moves the tip in the arm frame: `None` if nothing does.
-fn chain_defect(
-    sim: &mut Sim,
-    objects: &CellObjects,
-    arm: ObjectHandle,
-) -> Result<Option<UnknownKinematics>, LinkError> {
-    let mut left = JOINTS;
-    let mut object = objects.tip;
-    for _ in 0..LONGEST_CHAIN {
-        match sim.get_object_parent(object)? {
-            Some(parent) if left > 0 && parent == objects.joints[left - 1] => {
-                if sim.get_joint_type(parent)? != constants::JOINT_REVOLUTE {
-                    return Ok(Some(UnknownKinematics::NotRevolute { joint: left }));
-                }
-                (left, object) = (left - 1, parent);
-            }
-            Some(parent) if objects.joints.contains(&parent) => break,
-            Some(parent) if left == 0 && parent == arm => return Ok(None),
-            Some(parent) if sim.get_object_type(parent)? == constants::OBJECT_JOINT => {
-                return Ok(Some(UnknownKinematics::MoreJoints { alias: sim.get_object_alias(parent)? }));
-            }
-            Some(parent) => object = parent,
-            None => break,
-        }
-    }
-    Ok(Some(match left {
-        0 => UnknownKinematics::Elsewhere { path: objects.arm_path.clone() },
-        joint => UnknownKinematics::Order { joint },
-    }))
-}
-
-fn limits_of(info: &CellInfo) -> JointLimits {
-    let end = |index: usize, end: f64, endless: f64| if info.joint_intervals[index].cyclic { endless } else { end };
-    JointLimits {
-        min_rad: std::array::from_fn(|i| end(i, info.joint_intervals[i].min_rad, f64::NEG_INFINITY)),
-        max_rad: std::array::from_fn(|i| end(i, info.joint_intervals[i].max_rad, f64::INFINITY)),
-    }
-}
-
-/// Whether the first joint that is met from the tip upwards is the last one of the arm.
-fn is_tip_on_last_joint(sim: &mut Sim, objects: &CellObjects) -> Result<bool, LinkError> {
-    let mut object = objects.tip;
-    for _ in 0..LONGEST_CHAIN {
-        match sim.get_object_parent(object)? {
-            Some(parent) if objects.joints.contains(&parent) => return Ok(parent == objects.joints[JOINTS - 1]),
-            Some(parent) => object = parent,
-            None => return Ok(false),
-        }
-    }
-    Ok(false)
 }

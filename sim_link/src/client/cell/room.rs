@@ -5,14 +5,15 @@
 //! ends there. So a place is judged by the worst of all poses of the board within a reach: by the share of its limits that
 //! the tip can have there in every direction at once.
 
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6, Matrix6xX, MatrixXx6, Point3, RowVector6, Translation3, UnitQuaternion, Vector3};
 
-use super::JointAngles;
+use super::follow_goal::FollowLimits;
 use super::jog_plan::nearest;
+use super::joints::in_rad;
 use super::reach::ArmKinematics;
 use super::views::BoardInView;
-use crate::client::cell::follow_goal::FollowLimits;
 use handeye_core::plan::{self as planning, PlannedView, ViewOptions};
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
@@ -82,8 +83,8 @@ impl BoardReach {
 /// A place to follow a board from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FollowPlace {
-    /// The joints there \[rad\].
-    pub joints: JointAngles,
+    /// The joints there.
+    pub joints: JointValues,
     /// The tip there.
     pub base_from_tip: Pose<Base, Tip>,
     /// The least share of its limits that the tip can have in every direction, wherever the board goes within its reach.
@@ -109,7 +110,7 @@ impl ArmKinematics {
         limits: &FollowLimits,
         board: &BoardInView,
         reach: &BoardReach,
-        joints: &JointAngles,
+        joints: &JointValues,
     ) -> bool {
         self.room_over(limits, board, reach, joints, ENOUGH) >= ENOUGH
     }
@@ -125,7 +126,7 @@ impl ArmKinematics {
         limits: &FollowLimits,
         board: &BoardInView,
         reach: &BoardReach,
-        from: &JointAngles,
+        from: &JointValues,
     ) -> Result<FollowPlace, NoPlace> {
         let setup = self.view_setup(board, from);
         let distance_m = board.distance_m(&self.tip(from));
@@ -135,21 +136,19 @@ impl ArmKinematics {
             candidates: CANDIDATES,
             ..ViewOptions::default()
         };
-        let views = planning::views_of_board(&setup, &options);
-        let joints_of = |view: &PlannedView| JointAngles::try_from(&view.joints[..]).ok();
-        let mut views: Vec<_> = views.iter().filter_map(|view| Some((joints_of(view)?, view.base_from_tip))).collect();
-        let travel = |view: &(JointAngles, Pose<Base, Tip>)| planning::travel(from, &view.0);
+        let mut views = planning::views_of_board(&setup, &options);
+        let travel = |view: &PlannedView| planning::travel(from, &view.joints);
         views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
-        let is_free = |joints: &JointAngles| setup.path_is_free(from, joints, options.clearance_m);
-        let place = |&(joints, base_from_tip): &(JointAngles, Pose<Base, Tip>), room| FollowPlace {
-            joints,
-            base_from_tip,
+        let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
+        let place = |view: &PlannedView, room| FollowPlace {
+            joints: view.joints,
+            base_from_tip: view.base_from_tip,
             room,
         };
         for reach in [&reach.wider(), reach] {
             for view in &views {
-                let room = self.room_over(limits, board, reach, &view.0, ENOUGH);
-                if room >= ENOUGH && is_free(&view.0) {
+                let room = self.room_over(limits, board, reach, &view.joints, ENOUGH);
+                if room >= ENOUGH && is_free(&view.joints) {
                     return Ok(place(view, room));
                 }
             }
@@ -157,8 +156,8 @@ impl ArmKinematics {
         let mut best: Option<FollowPlace> = None;
         for view in &views {
             let wanted = best.map_or(LEAST, |best| best.room);
-            let room = self.room_over(limits, board, reach, &view.0, wanted);
-            if room > wanted && is_free(&view.0) {
+            let room = self.room_over(limits, board, reach, &view.joints, wanted);
+            if room > wanted && is_free(&view.joints) {
                 best = Some(place(view, room));
             }
         }
@@ -173,7 +172,7 @@ impl ArmKinematics {
         limits: &FollowLimits,
         board: &BoardInView,
         reach: &BoardReach,
-        joints: &JointAngles,
+        joints: &JointValues,
         wanted: f64,
     ) -> f64 {
         let base_from_target = board.base_from_target.isometry();
@@ -200,18 +199,31 @@ impl ArmKinematics {
     }
 
     /// The share of its limits of speed that the tip can have in every direction at once, so that no joint is too fast.
-    fn share_of_limits(&self, limits: &FollowLimits, joints: &JointAngles) -> f64 {
-        let inverse = self.jacobian(joints).and_then(Matrix6::try_inverse);
-        let Some(per_twist) = inverse else { return 0.0 };
-        let fastest = per_twist
-            .row_iter()
-            .map(|row| {
-                let (linear, angular) = (row.fixed_columns::<3>(0).norm(), row.fixed_columns::<3>(3).norm());
-                linear * limits.speed_m_s + angular * limits.turn_rad_s
-            })
-            .fold(0.0, f64::max);
+    fn share_of_limits(&self, limits: &FollowLimits, joints: &JointValues) -> f64 {
+        let Some(per_twist) = self.jacobian(joints).and_then(|jacobian| least_rates(&jacobian)) else { return 0.0 };
+        let share = |(kind, row): (JointKind, RowVector6<f64>)| {
+            let (linear, angular) = (row.fixed_columns::<3>(0).norm(), row.fixed_columns::<3>(3).norm());
+            let fastest = linear * limits.speed_m_s + angular * limits.turn_rad_s;
+            in_rad(kind, fastest)
+        };
+        let rows = per_twist.row_iter().map(|row| row.into_owned());
+        let fastest = self.kinds().zip(rows).map(share).fold(0.0, f64::max);
         if fastest.is_finite() { limits.joint_speed_rad_s / fastest } else { 0.0 }
     }
+}
+
+/// The joint rates of a motion of the tip; of those that an arm with joints to spare can have, the least. `None` where some
+/// motion has none.
+fn least_rates(jacobian: &Matrix6xX<f64>) -> Option<MatrixXx6<f64>> {
+    let rates = if jacobian.ncols() == 6 {
+        let square: Matrix6<f64> = jacobian.fixed_columns::<6>(0).into_owned();
+        square.try_inverse().map(|inverse| MatrixXx6::from_fn(6, |row, column| inverse[(row, column)]))
+    } else {
+        let square: Matrix6<f64> = jacobian * jacobian.transpose();
+        square.try_inverse().map(|inverse| jacobian.transpose() * inverse)
+    };
+    // Fewer joints than a pose has dimensions leave a matrix that is singular but for rounding.
+    rates.filter(|_| jacobian.ncols() >= 6)
 }
 
 /// A board shifted along its axes and turned about its middle, in its own axes before.

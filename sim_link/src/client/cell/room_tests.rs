@@ -6,18 +6,19 @@ use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use super::super::follow_goal::FollowGoal;
 use super::super::follow_plan::FollowPlan;
 use super::*;
+use handeye_core::geometry::arm::ArmKind;
 use crate::cell::motion::Course;
 use crate::cell::scene::{BoardMotionSpec, BoardPath, ResolvedScene, Scene};
 
 const DT_S: f64 = 0.05;
 
 /// The reference scene, its arm, and the joints at each of the ten reference poses, one after the other.
-fn after_the_sequence() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointAngles>) {
+fn after_the_sequence() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointValues>) {
     let scene = Scene::reference().expect("the scene").resolve(1).expect("valid");
     let arm = ArmKinematics::ur5(
         scene.world_from_arm,
         scene.connection_from_tip,
-        handeye_core::geometry::arm::ur5::JointLimits::default(),
+        &ArmKind::Ur5Coppeliasim.ranges(),
     )
     .expect("limits with room");
     let board = BoardInView {
@@ -28,7 +29,7 @@ fn after_the_sequence() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<Joint
     };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/poses/seed10.toml");
     let poses = TaughtPoses::read(&file).expect("the poses").poses;
-    let mut at = JointAngles::try_from(&scene.start_joints[..]).expect("six");
+    let mut at = scene.start_joints;
     let joints = poses.iter().map(|pose| {
         let Goal::Tip(goal) = &pose.goal else { panic!("{} is a pose of the tip", pose.name) };
         at = arm.reach(goal, &at).expect("the sequence visits it");
@@ -48,7 +49,7 @@ fn board_at(scene: &ResolvedScene, course: &Course, seconds: f64) -> Pose<Base, 
 /// wants it after the first seconds \[m\]; or after how many seconds it ended.
 fn followed(
     (scene, arm): (&ResolvedScene, &ArmKinematics),
-    joints: JointAngles,
+    joints: JointValues,
     motion: &BoardMotionSpec,
     from_s: f64,
     seconds: f64,

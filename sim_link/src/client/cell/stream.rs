@@ -9,11 +9,13 @@
 
 use std::time::Instant;
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 
 use super::arm::clock_past;
 use super::sentinel::Sentinel;
-use super::{Arm, JOINTS, JointAngles, read_joint_angles};
+use super::Arm;
+use super::joints::{difference_rad, read_joint_values};
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::sim::ObjectHandle;
@@ -27,8 +29,8 @@ const DRIVEN_OFF_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Points under way to an arm that nobody else moves.
 pub(super) struct Stream {
     sentinel: Sentinel,
-    dynamic: [bool; JOINTS],
-    sent: JointAngles,
+    dynamic: Vec<bool>,
+    sent: JointValues,
     seen_s: Option<f64>,
     /// When simulated time went on for the last time.
     advanced: Instant,
@@ -50,8 +52,8 @@ pub(super) struct Slot {
 /// What is sent in a pass.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
-    /// Where the joints go \[rad\].
-    pub joints: JointAngles,
+    /// Where the joints go.
+    pub joints: JointValues,
     /// Where the target dummy goes, if anywhere.
     pub target: Option<Pose<Base, Tip>>,
 }
@@ -67,18 +69,16 @@ pub(super) enum Pass {
     NotFollowing {
         /// Which, counted from 0.
         joint: usize,
-        /// Where it is \[rad\].
-        at_rad: f64,
+        /// Where it is.
+        at: f64,
     },
 }
 
 impl Stream {
     /// For an arm that stands at `start`; `task` says what for, in messages.
-    pub fn begin(arm: &mut Arm, start: JointAngles, task: &'static str) -> Result<Self, LinkError> {
-        let mut dynamic = [false; JOINTS];
-        for (dynamic, &joint) in dynamic.iter_mut().zip(&arm.objects.joints) {
-            *dynamic = arm.sim.is_joint_dynamic(joint)?;
-        }
+    pub fn begin(arm: &mut Arm, start: JointValues, task: &'static str) -> Result<Self, LinkError> {
+        let joints = &arm.objects.joints;
+        let dynamic = joints.iter().map(|&joint| arm.sim.is_joint_dynamic(joint)).collect::<Result<_, _>>()?;
         let sentinel = Sentinel::begin(&mut arm.sim, &arm.info)?;
         let advanced = Instant::now();
         Ok(Self { sentinel, dynamic, sent: start, seen_s: None, advanced, is_stopped: false, task })
@@ -93,12 +93,12 @@ impl Stream {
     }
 
     /// Which joints are moved by their controllers.
-    pub fn dynamic(&self) -> &[bool; JOINTS] {
+    pub fn dynamic(&self) -> &[bool] {
         &self.dynamic
     }
 
     /// Where the joints were sent last.
-    pub fn sent(&self) -> &JointAngles {
+    pub fn sent(&self) -> &JointValues {
         &self.sent
     }
 
@@ -157,18 +157,19 @@ impl Stream {
         }
         let since_last_s = self.seen_s.map(|seen_s| now_s - seen_s);
         (self.seen_s, self.advanced) = (Some(now_s), Instant::now());
-        let joints = read_joint_angles(&mut arm.sim, &arm.objects.joints)?;
+        let joints = read_joint_values(&mut arm.sim, &arm.objects)?;
         let tolerance = |joint: usize| if self.dynamic[joint] { DRIVEN_OFF_RAD } else { PLACED_OFF_RAD };
-        if let Some(joint) = (0..JOINTS).find(|&i| difference_rad(joints[i], self.sent[i]) > tolerance(i)) {
-            return Ok(Pass::NotFollowing { joint, at_rad: joints[joint] });
+        let off_rad = |joint: usize| difference_rad(arm.kind(joint), joints[joint], self.sent[joint]);
+        if let Some(joint) = (0..joints.len()).find(|&i| off_rad(i) > tolerance(i)) {
+            return Ok(Pass::NotFollowing { joint, at: joints[joint] });
         }
         let point = next(&Slot { now_s, since_last_s, is_stopped: self.is_stopped });
-        for joint in (0..JOINTS).filter(|&i| point.joints[i] != self.sent[i]) {
-            let (handle, position_rad) = (arm.objects.joints[joint], point.joints[joint]);
+        for joint in (0..joints.len()).filter(|&i| point.joints[i] != self.sent[i]) {
+            let (handle, position) = (arm.objects.joints[joint], point.joints[joint]);
             if self.dynamic[joint] {
-                arm.sim.set_joint_target_position(handle, position_rad)?;
+                arm.sim.set_joint_target_position(handle, position)?;
             } else {
-                arm.sim.set_joint_position(handle, position_rad)?;
+                arm.sim.set_joint_position(handle, position)?;
             }
         }
         self.sent = point.joints;
@@ -177,11 +178,4 @@ impl Stream {
         }
         Ok(Pass::Sent)
     }
-}
-
-/// Between two angles, the short way round: a joint that turns without end comes back from the other side.
-pub(super) fn difference_rad(a: f64, b: f64) -> f64 {
-    let turn = std::f64::consts::TAU;
-    let rest = (a - b).rem_euclid(turn);
-    rest.min(turn - rest)
 }

@@ -4,16 +4,20 @@ use std::sync::{Mutex, PoisonError};
 
 use approx::assert_relative_eq;
 use ciborium::Value;
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::*;
+use crate::client::constants;
 use crate::client::convert::seven_from_pose;
 use crate::client::sim::MotionLimits;
 use crate::client::testing::{Answer, Log, args, connection, err, func, ret};
 use crate::client::transport::TransportFault;
 use crate::wire::{self, Reader};
+
+const JOINTS: usize = 6;
 
 /// State of the cell, and how it misbehaves.
 struct World {
@@ -111,6 +115,9 @@ impl World {
         let id = args.first().and_then(Reader::integer).unwrap_or(-1);
         match name {
             "sim.getObject" => self.object(args),
+            // The tip hangs on nothing, so its joints are found by their name.
+            "sim.getObjectParent" => ret([Value::from(-1)]),
+            "sim.getJointType" => ret([Value::from(constants::JOINT_REVOLUTE)]),
             "sim.getJointInterval" => ret([Value::from(false), wire::floats([-3.0, 6.5])]),
             "sim.getJointPosition" => ret([Value::Float(self.joints[id as usize])]),
             "sim.setJointTargetPosition" => {
@@ -195,7 +202,7 @@ impl World {
         }
         let path = args[0].text().expect("a path");
         let handle = match (path, index) {
-            ("/UR5/joint", Some(index)) => Some(index),
+            ("/UR5/joint", Some(index)) => (index < JOINTS as i64).then_some(index),
             ("/UR5/Tip", None) => Some(TIP),
             ("/UR5/Target", None) => Some(TARGET),
             ("/UR5/3D_camera", None) => Some(CAMERA),
@@ -276,7 +283,7 @@ fn edit(world: &Shared, change: impl FnOnce(&mut World)) {
     change(&mut world.lock().unwrap_or_else(PoisonError::into_inner));
 }
 
-const GOAL: JointAngles = [0.3, -0.6, 0.9, 0.0, 1.5, 0.0];
+const GOAL: JointValues = JointValues::of([0.3, -0.6, 0.9, 0.0, 1.5, 0.0]);
 
 fn limits() -> MotionLimits {
     MotionLimits::uniform(JOINTS, 3.0, 2.0, 1.0)
@@ -292,7 +299,7 @@ fn the_reference_scene_is_discovered() {
     let info = cell.client.info();
     assert_eq!((info.program_version, info.protocol, info.time_step_s), (41000, ProtocolVersion::V2, 0.05));
     assert_eq!((info.optics.width, info.optics.height, info.depth_optics.far_m), (4, 2, 3.5));
-    assert_relative_eq!(info.joint_intervals[5].max_rad, 3.5, epsilon = 1e-12);
+    assert_relative_eq!(info.joints[5].range.max, 3.5, epsilon = 1e-12);
     // f = 2 / tan(0.5)
     assert_relative_eq!(cell.client.info().camera_intrinsics_nominal().fx, 3.6609754, epsilon = 1e-6);
 }
@@ -356,7 +363,7 @@ fn a_scene_without_a_target_can_do_everything_but_motions_to_a_pose() {
 fn a_motion_is_sent_point_by_point_within_its_limits() {
     let mut cell = cell(world());
     cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
-    assert_eq!(cell.client.arm().joint_angles(), Ok(GOAL));
+    assert_eq!(cell.client.arm().joint_values(), Ok(GOAL));
     let functions = cell.control.functions();
     for unwanted in ["sim.setStepping", "sim.setJointTargetPosition"] {
         assert!(!functions.contains(&unwanted.to_owned()), "{unwanted}");
@@ -380,7 +387,7 @@ fn a_motion_of_joints_that_controllers_move_waits_until_they_are_there() {
     edit(&world, |w| (w.joint_mode, w.follow) = (5, 0.5));
     let mut cell = cell(world);
     cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
-    let joints = cell.client.arm().joint_angles().expect("a call");
+    let joints = cell.client.arm().joint_values().expect("a call");
     assert!(joints.iter().zip(&GOAL).all(|(a, b)| (a - b).abs() < 1e-4), "{joints:?}");
 
     edit(&cell.world, |w| w.follow = 0.0);
@@ -429,7 +436,7 @@ fn a_joint_that_takes_no_positions_is_freed_before_a_motion() {
     edit(&world, |w| w.stuck = Some(2));
     let mut cell = cell(Arc::clone(&world));
     cell.client.arm().move_to_joints(&GOAL, &limits(), &CancelToken::default()).expect("arrived");
-    assert_eq!(cell.client.arm().joint_angles(), Ok(GOAL));
+    assert_eq!(cell.client.arm().joint_values(), Ok(GOAL));
 }
 
 #[test]
@@ -447,8 +454,8 @@ fn a_joint_that_is_held_in_a_motion_is_named_with_where_it_stands() {
     let slow = MotionLimits::uniform(JOINTS, 1e-3, 2.0, 1.0);
     let error = cell.client.arm().move_to_joints(&GOAL, &slow, &CancelToken::default()).expect_err("held");
     held.join().expect("no panic");
-    let LinkError::JointElsewhere { joint: 5, at_deg, goal_deg } = error else { panic!("{error}") };
-    assert!(at_deg < goal_deg && goal_deg < GOAL[4].to_degrees(), "{at_deg}° {goal_deg}°");
+    let LinkError::JointElsewhere { joint: 5, at, goal } = error else { panic!("{error}") };
+    assert!(at.value < goal.value && goal.value < GOAL[4], "{at} {goal}");
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! What a simulated cell says about itself, for comparison with what a calibration found.
 
 use ciborium::Value;
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 
-use super::{CellInfo, CellObjects, JointAngles};
+use super::CellInfo;
+use super::objects::CellObjects;
 use crate::axes::sensor_from_camera;
 use crate::client::convert;
 use crate::client::error::LinkError;
@@ -85,7 +87,7 @@ impl PublishedTruth {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ShownMoment {
     pub sim_time_s: f64,
-    pub joints: JointAngles,
+    pub joints: JointValues,
     pub base_from_tip: Pose<Base, Tip>,
     pub base_from_target: Option<Pose<Base, Target>>,
 }
@@ -94,12 +96,12 @@ pub(super) struct ShownMoment {
 ///
 /// # Errors
 /// [`LinkError::BadTruth`] when a part cannot be computed with; otherwise as for any call.
-pub(super) fn shown_moment(sim: &mut Sim) -> Result<Option<ShownMoment>, LinkError> {
+pub(super) fn shown_moment(sim: &mut Sim, joint_count: usize) -> Result<Option<ShownMoment>, LinkError> {
     let map = sim.connection().call(MOMENT_FUNCTION, Vec::new())?.into_map(0)?;
     let Some(sim_time_s) = map.get("sim_time").and_then(Reader::number) else { return Ok(None) };
     let joints = map.get("joints").and_then(Reader::numbers).unwrap_or_default();
-    // An arm of more joints shows those that this client drives, as reading them one by one does.
-    let joints = *joints.first_chunk().ok_or_else(|| bad(format!("joints: {} numbers", joints.len())))?;
+    let of_arm = JointValues::try_from(&joints[..]).ok().filter(|joints| joints.len() == joint_count);
+    let joints = of_arm.ok_or_else(|| bad(format!("{} joints, and the arm has {joint_count}", joints.len())))?;
     let tip = map.get("tip").ok_or_else(|| bad("no tip"))?;
     Ok(Some(ShownMoment {
         sim_time_s,

@@ -1,11 +1,11 @@
 //! Views of a board for the arm of a scene: what the planner of views has to know, from what a client knows.
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::targets::TargetSpec;
 use nalgebra::{Isometry3, Translation3};
 
-use super::JointAngles;
 use super::reach::ArmKinematics;
 use handeye_core::plan::{self as planning, Obstacle, PlanError, ViewOptions, ViewSetup};
 
@@ -44,7 +44,7 @@ impl BoardInView {
 }
 
 impl ArmKinematics {
-    /// Joints \[rad\] from which the whole board is seen, as different as possible from the views at `taken` and from each
+    /// Joints from which the whole board is seen, as different as possible from the views at `taken` and from each
     /// other: up to `count` of them, at least two, in an order with short ways. Nothing that is known is touched on the
     /// way from `start` to the first and from each to the next.
     ///
@@ -56,9 +56,9 @@ impl ArmKinematics {
         &self,
         board: &BoardInView,
         taken: &[Pose<Base, Tip>],
-        start: &JointAngles,
+        start: &JointValues,
         count: usize,
-    ) -> Result<Vec<JointAngles>, PlanError> {
+    ) -> Result<Vec<JointValues>, PlanError> {
         let setup = self.view_setup(board, start);
         let mut options = ViewOptions { count, ..ViewOptions::default() };
         let distances = taken.iter().map(|pose| board.distance_m(pose));
@@ -75,11 +75,11 @@ impl ArmKinematics {
             planned => planned?,
         };
         planning::order_by_travel(start, &mut views);
-        Ok(views.iter().filter_map(|view| JointAngles::try_from(&view.joints[..]).ok()).collect())
+        Ok(views.iter().map(|view| view.joints).collect())
     }
 
     /// What the planner knows of this arm.
-    pub(super) fn view_setup(&self, board: &BoardInView, start: &JointAngles) -> ViewSetup {
+    pub(super) fn view_setup(&self, board: &BoardInView, start: &JointValues) -> ViewSetup {
         let grid = board.target.grid();
         let edge_m = |points: usize| (points.saturating_sub(1) as f64 + 2.0 * SHEET_EDGE_SQUARES) * grid.square_m;
         let centre = board.target.centre();
@@ -96,15 +96,12 @@ impl ArmKinematics {
             tip_from_camera: board.tip_from_camera,
             arm: planning::Arm {
                 chain: self.arm().clone(),
-                body: match self.ur5_chain() {
-                    Some(_) => planning::ArmBody::Ur5,
-                    None => planning::ArmBody::of(self.arm()),
-                },
+                body: if self.is_ur5() { planning::ArmBody::Ur5 } else { planning::ArmBody::of(self.arm()) },
                 world_from_arm: *self.base_from_arm(),
                 connection_from_tip: *self.connection_from_tip(),
                 tip_from_camera: *board.tip_from_camera.isometry(),
             },
-            start_joints: (*start).into(),
+            start_joints: *start,
             obstacles: vec![sheet, table],
         }
     }

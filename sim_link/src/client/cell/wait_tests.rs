@@ -15,7 +15,7 @@ fn with_clock(clock: fn(f64) -> f64) -> Cell {
         w.targets = [0.5; JOINTS];
         w.follow = 0.5;
     });
-    assert!(cell.client.arm().joint_angles().is_ok());
+    assert!(cell.client.arm().joint_values().is_ok());
     cell
 }
 
@@ -73,10 +73,13 @@ fn a_jog_and_a_following_arm_do_not_wait_for_a_clock_that_stands() {
     assert!(matches!(error, LinkError::WaitedTooLong { task: "jogging the arm", .. }), "{error}");
 
     edit(&cell.world, |w| (w.joints, w.targets) = ([0.1, 0.2, -0.9, 0.3, 0.8, 0.1], [0.1, 0.2, -0.9, 0.3, 0.8, 0.1]));
-    let limits = handeye_core::geometry::arm::ur5::JointLimits { min_rad: [-6.0; JOINTS], max_rad: [6.0; JOINTS] };
-    let kinematics = ArmKinematics::ur5(nalgebra::Isometry3::identity(), nalgebra::Isometry3::identity(), limits)
-        .expect("limits with room");
-    let tip = kinematics.tip(&cell.client.arm().joint_angles().expect("angles"));
+    let kinematics = ArmKinematics::ur5(
+        nalgebra::Isometry3::identity(),
+        nalgebra::Isometry3::identity(),
+        &handeye_core::geometry::arm::ArmKind::Ur5Coppeliasim.ranges(),
+    )
+    .expect("ranges with room");
+    let tip = kinematics.tip(&cell.client.arm().joint_values().expect("angles"));
     edit(&cell.world, |w| w.base_from_tip = tip);
     let outcome = cell.client.arm().follow(&kinematics, &FollowLimits::default(), &mut |_| FollowWish::Rest);
     assert!(matches!(outcome, Err(LinkError::WaitedTooLong { task: "following", .. })), "{outcome:?}");

@@ -43,10 +43,10 @@ impl ObjectHandle {
 pub struct JointInterval {
     /// It turns without end.
     pub cyclic: bool,
-    /// Lower end (rad).
-    pub min_rad: f64,
-    /// Upper end (rad).
-    pub max_rad: f64,
+    /// Lower end (rad, or m of a prismatic joint).
+    pub min: f64,
+    /// Upper end (rad, or m of a prismatic joint).
+    pub max: f64,
 }
 
 /// Typed calls over one [`Connection`].

@@ -163,7 +163,7 @@ impl Sim {
         self.call("sim.setObjectPosition", vec![object.to_value(), frame.to_value(), value]).map(drop)
     }
 
-    /// The position of a joint (rad).
+    /// The position of a joint (rad, or m of a prismatic joint).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -180,19 +180,19 @@ impl Sim {
         Ok(self.call("sim.getJointMode", vec![joint.to_value()])?.integer(0)? == constants::JOINT_MODE_DYNAMIC)
     }
 
-    /// Puts a joint at a position (rad) at once. The simulator clamps to its interval.
+    /// Puts a joint at a position (rad, or m of a prismatic joint) at once. The simulator clamps to its interval.
     ///
     /// `false` if the joint stays where it is: from CoppeliaSim 4.7 on one that a target position moves takes no other.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn set_joint_position(&mut self, joint: ObjectHandle, position_rad: f64) -> Result<bool, LinkError> {
-        let reply = self.call("sim.setJointPosition", vec![joint.to_value(), Value::Float(position_rad)])?;
+    pub fn set_joint_position(&mut self, joint: ObjectHandle, position: f64) -> Result<bool, LinkError> {
+        let reply = self.call("sim.setJointPosition", vec![joint.to_value(), Value::Float(position)])?;
         // Servers that never refuse may also say nothing.
         Ok(reply.integer(0) != Ok(0))
     }
 
-    /// Where the controller of a joint holds it or takes it (rad).
+    /// Where the controller of a joint holds it or takes it (rad, or m of a prismatic joint).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
@@ -200,12 +200,12 @@ impl Sim {
         self.call("sim.getJointTargetPosition", vec![joint.to_value()])?.number(0)
     }
 
-    /// Tells the controller of a joint where to take it (rad).
+    /// Tells the controller of a joint where to take it (rad, or m of a prismatic joint).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn set_joint_target_position(&mut self, joint: ObjectHandle, position_rad: f64) -> Result<(), LinkError> {
-        self.call("sim.setJointTargetPosition", vec![joint.to_value(), Value::Float(position_rad)]).map(drop)
+    pub fn set_joint_target_position(&mut self, joint: ObjectHandle, position: f64) -> Result<(), LinkError> {
+        self.call("sim.setJointTargetPosition", vec![joint.to_value(), Value::Float(position)]).map(drop)
     }
 
     /// The range of a joint.
@@ -215,7 +215,7 @@ impl Sim {
     pub fn get_joint_interval(&mut self, joint: ObjectHandle) -> Result<JointInterval, LinkError> {
         let reply = self.call("sim.getJointInterval", vec![joint.to_value()])?;
         // The second number is the length of the interval, not its end.
-        let [min_rad, range_rad] = reply.exactly::<2>(1)?;
-        Ok(JointInterval { cyclic: reply.boolean(0)?, min_rad, max_rad: min_rad + range_rad })
+        let [min, length] = reply.exactly::<2>(1)?;
+        Ok(JointInterval { cyclic: reply.boolean(0)?, min, max: min + length })
     }
 }

@@ -87,7 +87,7 @@ fn a_pose_that_is_none_is_refused_with_the_name_of_the_call() {
 fn the_second_number_of_an_interval_is_its_length() {
     let (mut sim, _log) = answering(vec![Value::from(false), wire::floats([-1.0, 3.0])]);
     let interval = sim.get_joint_interval(OBJECT).expect("an interval");
-    assert_eq!(interval, JointInterval { cyclic: false, min_rad: -1.0, max_rad: 2.0 });
+    assert_eq!(interval, JointInterval { cyclic: false, min: -1.0, max: 2.0 });
 }
 
 #[test]

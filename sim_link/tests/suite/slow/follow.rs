@@ -2,11 +2,12 @@
 
 use std::sync::mpsc::channel;
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{
-    Arm, ArmKinematics, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowMoment, FollowWish, JointAngles,
+    Arm, ArmKinematics, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowMoment, FollowWish, 
     MotionTolerance, Workspace,
 };
 use handeye_sim_link::client::{
@@ -84,12 +85,12 @@ fn on_circle(start: &Pose<Base, Tip>, radius_m: f64, speed_m_s: f64, time_s: f64
 /// What a second client has seen, once per pass.
 #[derive(Default)]
 struct Seen {
-    points: Vec<(f64, JointAngles)>,
+    points: Vec<(f64, JointValues)>,
 }
 
 impl Seen {
-    fn look(&mut self, watch: &mut Arm) -> (f64, JointAngles) {
-        let now = (watch.sim().get_simulation_time().expect("a call"), watch.joint_angles().expect("a call"));
+    fn look(&mut self, watch: &mut Arm) -> (f64, JointValues) {
+        let now = (watch.sim().get_simulation_time().expect("a call"), watch.joint_values().expect("a call"));
         self.points.push(now);
         now
     }
@@ -97,16 +98,16 @@ impl Seen {
     /// That every pass was seen, that no limit was exceeded from one to the next, and that the arm stands in the end.
     fn check(&self, kinematics: &ArmKinematics, limits: &FollowLimits, what: &str) {
         let near = |value: f64, limit: f64| value <= limit * 1.00001 + 1e-6;
-        let largest = |q: JointAngles| q.into_iter().fold(0.0, |most: f64, q| most.max(q.abs()));
-        let mut before = ([0.0; 6], Vector3::zeros(), Vector3::zeros());
+        let largest = |q: JointValues| q.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
+        let mut before = (JointValues::zeros(6), Vector3::zeros(), Vector3::zeros());
         for pair in self.points.windows(2) {
             let (from, to) = (pair[0], pair[1]);
             assert!((to.0 - from.0 - TIME_STEP_S).abs() < 1e-9, "{what}: a pass was missed at {} s", from.0);
             let (tip_from, tip_to) = (kinematics.tip(&from.1), kinematics.tip(&to.1));
-            let rates: JointAngles = std::array::from_fn(|i| (to.1[i] - from.1[i]) / TIME_STEP_S);
+            let rates = JointValues::from_fn(6, |i| (to.1[i] - from.1[i]) / TIME_STEP_S);
             let velocity = (tip_to.translation() - tip_from.translation()) / TIME_STEP_S;
             let turn = (tip_to.rotation() * tip_from.rotation().inverse()).scaled_axis() / TIME_STEP_S;
-            let joint_change = largest(std::array::from_fn(|i| (rates[i] - before.0[i]) / TIME_STEP_S));
+            let joint_change = largest(JointValues::from_fn(6, |i| (rates[i] - before.0[i]) / TIME_STEP_S));
             let change = (velocity - before.1).norm() / TIME_STEP_S;
             let turn_change = (turn - before.2).norm() / TIME_STEP_S;
             let context = format!("{what}, {} s", to.0);
@@ -280,13 +281,13 @@ fn following_gives_way_when_somebody_else_moves_a_joint() {
         FollowWish::Towards(still(goal))
     });
     assert_eq!(end, Ok(FollowEnd::NotFollowing { joint: 4 }));
-    assert!((bench.arm.joint_angles().expect("a call")[3] + 1.0).abs() < 1e-9, "the other has its way");
+    assert!((bench.arm.joint_values().expect("a call")[3] + 1.0).abs() < 1e-9, "the other has its way");
 }
 
 #[test]
 fn nothing_moves_for_another_tip_or_limits_without_sense() {
     let mut bench = Bench::stepped();
-    let before = bench.arm.joint_angles().expect("a call");
+    let before = bench.arm.joint_values().expect("a call");
     let goal = shifted(&bench.tip(), Vector3::new(0.0, 0.1, 0.0));
     let limits = FollowLimits { joint_speed_rad_s: 0.0, ..FollowLimits::default() };
     let mut asked = 0;
@@ -301,7 +302,7 @@ fn nothing_moves_for_another_tip_or_limits_without_sense() {
     bench.arm.sim().set_object_pose(tip, ObjectHandle::PARENT, &moved).expect("a call");
     assert_eq!(bench.follow(&mut wish), Ok(FollowEnd::OtherTip));
     assert_eq!(asked, 0);
-    assert_eq!(bench.arm.joint_angles().expect("a call"), before);
+    assert_eq!(bench.arm.joint_values().expect("a call"), before);
 }
 
 #[test]
@@ -351,7 +352,7 @@ fn a_client_that_misses_passes_takes_no_larger_steps() {
         for _ in 0..points.len() % 5 {
             other.sim().step(&CallOptions::default()).expect("a pass");
         }
-        points.push(moment.joints_rad);
+        points.push(moment.joints);
         times_s.push(moment.sim_time_s);
         if points.len() < 80 {
             FollowWish::Towards(on_circle(&start, 0.1, 0.2, moment.sim_time_s))
@@ -389,11 +390,11 @@ fn a_client_that_dies_leaves_a_standing_arm() {
     });
     death.recv_timeout(std::time::Duration::from_mins(1)).expect("it moves and dies");
     assert!(dying.join().is_err());
-    let stands = watch.joint_angles().expect("a call");
+    let stands = watch.joint_values().expect("a call");
     let moved_m = start.distance_to(&watch.base_from_tip().expect("a call")).0;
     assert!(moved_m > 1e-3, "it was on its way, {moved_m} m from its start");
     for _ in 0..20 {
         watch.sim().step(&CallOptions::default()).expect("a pass");
-        assert_eq!(watch.joint_angles().expect("a call"), stands);
+        assert_eq!(watch.joint_values().expect("a call"), stands);
     }
 }

@@ -43,7 +43,7 @@ fn stop_and_go_on(joint_mode: JointModeSpec) {
     };
     let (joint_limits, tip_limits) =
         (MotionLimits::uniform(6, 1.0, 4.0, 40.0), MotionLimits::uniform(4, 0.3, 2.0, 20.0));
-    let start = cell.arm().joint_angles().expect("a call");
+    let start = cell.arm().joint_values().expect("a call");
     let kinematics = cell.arm().kinematics().expect("calls").expect("a UR5");
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     for round in 0..100 {

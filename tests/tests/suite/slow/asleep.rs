@@ -48,8 +48,8 @@ fn a_sequence_goes_on_when_the_cell_has_forgotten_the_sleeper() {
 
     let (child, mut said) = auto(&out, &["--connect", &endpoint]);
     until_said(&mut said, "pose 2 of 10 captured");
-    let (at, deadline) = (witness.joint_angles().expect("an answer"), Instant::now() + PATIENCE);
-    while witness.joint_angles().expect("an answer") == at {
+    let (at, deadline) = (witness.joint_values().expect("an answer"), Instant::now() + PATIENCE);
+    while witness.joint_values().expect("an answer") == at {
         assert!(Instant::now() < deadline, "the arm does not move");
     }
     put_to_sleep(&child);

@@ -8,7 +8,7 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::client::cell::{Arm, CellPaths, JOINTS, MotionTolerance};
+use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits};
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 use nalgebra::Vector3;
@@ -37,9 +37,9 @@ fn first_pose() -> Pose<Base, Tip> {
 
 /// Swings the arm about the joint at its base until it is told that it is enough; returns how far the tip went \[m\].
 fn to_and_fro(arm: &mut Arm, enough: &CancelToken) -> Result<f64, LinkError> {
-    let centre = arm.joint_angles()?;
+    let centre = arm.joint_values()?;
     let tip = arm.base_from_tip()?.translation();
-    let limits = MotionLimits::uniform(JOINTS, SPEED_M_S / tip.xy().norm(), 1.0, 10.0);
+    let limits = MotionLimits::uniform(6, SPEED_M_S / tip.xy().norm(), 1.0, 10.0);
     let mut travelled_m = 0.0;
     for side_rad in [0.06, -0.06].into_iter().cycle() {
         let mut goal = centre;

@@ -257,7 +257,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
             let now = bench.model().frame.clone().expect("an image").info;
             let dt_s = now.sim_time_s - before.sim_time_s;
             if dt_s > 0.0 {
-                let turned = now.joints_rad.iter().zip(before.joints_rad).map(|(now, before)| (now - before).abs());
+                let turned = now.joints_rad.iter().zip(&before.joints_rad).map(|(now, before)| (now - before).abs());
                 let speed = turned.fold(0.0, f64::max) / dt_s;
                 fastest_rad_s = fastest_rad_s.max(speed);
                 at_rest_since_s = if speed > 0.0 { None } else { at_rest_since_s.or(Some(now.sim_time_s)) };

@@ -93,13 +93,13 @@ fn auto_waits_out_a_pause_and_leaves_a_simulation_running_that_it_did_not_start(
 
 /// Waits until the arm has moved and then stands for so many passes.
 fn until_it_stands(person: &mut Arm, passes: u32) {
-    let start = person.joint_angles().expect("an answer");
-    while person.joint_angles().expect("an answer") == start {}
+    let start = person.joint_values().expect("an answer");
+    while person.joint_values().expect("an answer") == start {}
     let mut joints = start;
     let (mut time_s, mut seen) = (f64::NAN, 0);
     while seen < passes {
         let (now, now_s) =
-            (person.joint_angles().expect("an answer"), person.sim().get_simulation_time().expect("an answer"));
+            (person.joint_values().expect("an answer"), person.sim().get_simulation_time().expect("an answer"));
         seen = if now == joints { seen + u32::from(now_s != time_s) } else { 0 };
         (joints, time_s) = (now, now_s);
     }
@@ -158,9 +158,9 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
 fn before_the_board(person: &mut Arm, session: &Path) {
     person.sim().start_simulation().expect("an answer");
     let session = Session::open(session).expect("a session");
-    let joints = session.document.captures[6].joints_rad.as_deref().expect("joints").try_into().expect("six");
+    let joints = session.document.captures[6].joints_rad.as_deref().expect("joints");
     let limits = MotionLimits::uniform(6, 1.0, 2.0, 20.0);
-    person.move_to_joints(&joints, &limits, &CancelToken::default()).expect("it gets there");
+    person.move_to_joints(joints, &limits, &CancelToken::default()).expect("it gets there");
 }
 
 #[test]

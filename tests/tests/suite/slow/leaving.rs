@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 
 use handeye_app::command::Command;
 use handeye_app::model::{CellSource, Model, SolveStatus};
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::Store;
-use handeye_sim_link::client::cell::{Arm, CellPaths, JointAngles};
+use handeye_sim_link::client::cell::{Arm, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::CellProcess;
 use handeye_tests::desktop::{self, Desktop};
@@ -32,8 +33,8 @@ impl Witness {
         self.0.sim().get_simulation_time().expect("the cell answers")
     }
 
-    fn joints(&mut self) -> JointAngles {
-        self.0.joint_angles().expect("the cell answers")
+    fn joints(&mut self) -> JointValues {
+        self.0.joint_values().expect("the cell answers")
     }
 
     fn until_moving(&mut self) {

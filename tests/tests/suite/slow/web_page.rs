@@ -120,7 +120,7 @@ fn a_page_in_a_browser_moves_nothing() {
     let mut arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
     let joint = arm.sim().get_object_index("/UR5/joint", 0).expect("a joint");
     let request = hostile::request("page", "sim.setJointPosition", vec![Value::from(joint.0), Value::Float(1.0)]);
-    let before = arm.joint_angles().expect("a call");
+    let before = arm.joint_values().expect("a call");
     // A socket of the library, which takes the page for an old client: the attack is real.
     let router = zmq::Context::new().socket(zmq::ROUTER).expect("a socket");
     router.set_rcvtimeo(PATIENCE.as_millis() as i32).expect("an option");
@@ -148,5 +148,5 @@ fn a_page_in_a_browser_moves_nothing() {
     is_done.recv_timeout(PATIENCE).expect("the page comes to its end");
     server.join().expect("no panic");
     while router.recv_multipart(0).expect("the library takes it").pop().expect("a frame") != request {}
-    assert_eq!(arm.joint_angles(), Ok(before), "the page moved the arm");
+    assert_eq!(arm.joint_values(), Ok(before), "the page moved the arm");
 }
