@@ -6,6 +6,7 @@ use std::sync::Arc;
 use anyhow::anyhow;
 use handeye_core::estimate::handeye::{HandEyeError, Mode};
 use handeye_core::estimate::{CalibrateError, Method, ObservedView, Options};
+use handeye_core::plan::guided::record::GuidedRecord;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::template::{CHOICE, template};
 use handeye_core::project::dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
@@ -117,6 +118,11 @@ impl Solution {
     pub fn new(folder: &Path, input: Input, mut solved: Solved) -> Self {
         solved.result.provenance.input_sha256 = Some(input.sha256.clone());
         Self { folder: folder.to_path_buf(), input, solved: Arc::new(solved) }
+    }
+
+    /// That its poses were chosen on the way, and why.
+    pub fn guided_by(&mut self, record: Option<GuidedRecord>) {
+        Arc::make_mut(&mut self.solved).result.guided = record;
     }
 
     /// The document that is written.

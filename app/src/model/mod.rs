@@ -9,10 +9,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::depth::ColourMap;
 use handeye_core::estimate::Method;
 use handeye_core::estimate::handeye::HandEye;
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_core::project::session::{CaptureId, Document};
@@ -28,8 +28,8 @@ pub use crate::live::state::{
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{
-    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest,
-    Truth,
+    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal, MotionId, MotionOutcome,
+    MotionRequest, Truth,
 };
 pub use crate::rerun_log::state::{RerunState, ViewerState};
 pub use crate::session::state::{

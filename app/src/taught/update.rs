@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_core::project::session::{Edit, TaughtChange};
 use handeye_core::geometry::arm::JointValues;
+use handeye_core::project::session::{Edit, TaughtChange};
 use handeye_core::project::taught_poses::{Goal, TaughtPose, TaughtPoses};
 
 use crate::app::App;

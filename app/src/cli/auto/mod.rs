@@ -1,13 +1,19 @@
 //! `handeye auto`: poses, captures, result and exports from one command.
 
+mod guided;
 mod poses;
 pub(crate) mod sequence;
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use clap::Args;
 use handeye_core::estimate::{Method, Options};
+use handeye_core::plan::Obstacle;
+use handeye_core::plan::guided::record::GUIDED_RECORD;
+use handeye_core::plan::guided::{Guide, GuidedOptions};
 use handeye_core::project::session::{FolderLock, Session, SessionMeta, Store};
+use handeye_sim_link::cell::scene::ResolvedScene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
@@ -22,8 +28,12 @@ use crate::session::start;
 use crate::shortfall;
 use crate::text::Language;
 use crate::worker::{timestamp, timestamp_rfc3339};
-use poses::Plan;
+use guided::GuidedSequence;
+use poses::{GUIDED, Plan};
 use solve::Solution;
+
+/// Captures that check a guided answer.
+const CHECK_POSES: usize = 3;
 
 /// Options of `handeye auto`.
 #[derive(Debug, Args)]
@@ -31,9 +41,12 @@ pub struct AutoArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
     #[arg(long, value_name = "ADDR")]
     connect: Option<String>,
-    /// `seed10` (the ten reference poses), a pose file, or `auto` (planned views of the board).
-    #[arg(long, value_name = "seed10|FILE|auto", default_value = "seed10")]
+    /// `seed10` (the ten reference poses), a pose file, `auto` (planned views of the board), or `guided` (each pose chosen
+    /// by what the captures so far leave open, until the goal is reached).
+    #[arg(long, value_name = "seed10|FILE|auto|guided", default_value = "seed10")]
     poses: String,
+    #[command(flatten)]
+    guided: GuidedArgs,
     /// Folder of the session; a new one under `sessions` if not given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -55,6 +68,53 @@ pub struct AutoArgs {
     rerun: RerunArg,
 }
 
+/// What guided capture is asked for.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "With --poses guided")]
+struct GuidedArgs {
+    /// Expected error (95 %) to be reached, millimetres; 0.3 if not given.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    goal: Option<f64>,
+    /// Captures at the most; 40 if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=400))]
+    max_poses: Option<u32>,
+    /// Minutes of the cell's time at the most; no limit if not given.
+    #[arg(long, value_name = "MIN", value_parser = positive)]
+    max_minutes: Option<f64>,
+    /// Captures afterwards, at poses at random, that never enter the fit and check the answer; 3 if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100))]
+    check_poses: Option<u32>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_none| "not a number".to_owned())?;
+    if number > 0.0 && number.is_finite() { Ok(number) } else { Err("a number above 0 is needed".to_owned()) }
+}
+
+impl GuidedArgs {
+    /// The first option that was given.
+    fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("--goal", self.goal.is_some()),
+            ("--max-poses", self.max_poses.is_some()),
+            ("--max-minutes", self.max_minutes.is_some()),
+            ("--check-poses", self.check_poses.is_some()),
+        ];
+        given.into_iter().find_map(|(name, is_given)| is_given.then_some(name))
+    }
+
+    fn options(&self, seed: u64) -> GuidedOptions {
+        let default = GuidedOptions::default();
+        GuidedOptions {
+            goal_m: self.goal.map_or(default.goal_m, |mm| mm * 1e-3),
+            most_views: self.max_poses.map_or(default.most_views, |poses| poses as usize),
+            most_s: self.max_minutes.map_or(default.most_s, |minutes| minutes * 60.0),
+            seed,
+            ..default
+        }
+    }
+}
+
 pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     if args.connect.is_some() && args.scene.is_given() {
@@ -62,8 +122,19 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
             "--scene describes the built-in cell and --connect takes another: give one of them"
         )));
     }
+    let is_guided = args.poses == GUIDED;
+    if let Some(option) = args.guided.given().filter(|_| !is_guided) {
+        return Err(Failure::unusable(anyhow::anyhow!("{option} goes with --poses guided")));
+    }
     let scene = args.scene.load()?;
-    let plan = Plan::find(&args.poses, &scene, args.seed)?;
+    let plan = match args.connect {
+        Some(_) if is_guided => Plan::from_here(),
+        _ => Plan::find(&args.poses, &scene, args.seed)?,
+    };
+    // What stands around is in the scene file; of another cell only the plane under the arm is known.
+    let solids =
+        if is_guided && args.connect.is_none() { solids(&poses::meant(&scene, args.seed)?) } else { Vec::new() };
+    let seed = args.seed.unwrap_or(scene.seed);
     let recorder = args.rerun.start(RerunChoice::Record, Pace::Everything, true)?;
     let server = match args.connect {
         Some(_) => None,
@@ -90,7 +161,13 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
 
     keep_earlier_session(&folder)?;
     // That it is another arm is no fault: its joint angles are then kept and not used.
-    let kinematics = cell.arm().kinematics().map_err(Failure::failed)?.ok();
+    let kinematics = cell.arm().kinematics().map_err(Failure::failed)?;
+    if let (true, Err(unknown)) = (is_guided, &kinematics) {
+        return Err(Failure::failed(anyhow::anyhow!(
+            "guided capture takes an arm whose chain is known: {unknown}; give the poses by a file, --poses FILE"
+        )));
+    }
+    let kinematics = kinematics.ok();
     if let Some(shortfall) = shortfall::of(cell.info().support(), kinematics.is_some()) {
         tracing::warn!("{}", shortfall.say(Language::English));
     }
@@ -103,7 +180,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     recorder.note(Entry::Step(Step::Capture));
     record::document(&recorder, &session);
     record::cell(&recorder, cell.arm(), &truth).map_err(Failure::failed)?;
-    let captured = PoseSequence {
+    let mut sequence = PoseSequence {
         cell: &mut cell,
         plan: &plan,
         options: CaptureOptions { frames: args.frames, ..CaptureOptions::default() },
@@ -111,8 +188,17 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         session: &mut session,
         recorder: &recorder,
         cancel: &cancel,
-    }
-    .run();
+        began: Instant::now(),
+        images: 0,
+    };
+    let mut guide = is_guided.then(|| Guide::new(args.guided.options(seed)));
+    let captured = match (&mut guide, &kinematics) {
+        (Some(guide), Some(kinematics)) => {
+            let checks = args.guided.check_poses.map_or(CHECK_POSES, |poses| poses as usize);
+            GuidedSequence::new(&mut sequence, guide, kinematics, solids, checks).run().map(Some)
+        }
+        _ => sequence.run().map(|()| None),
+    };
     // Whatever happened on the way, the arm is not left moving and the simulation not waiting for steps. It ends unless
     // somebody else had started it.
     let ended = cell.arm().stop().and_then(|()| {
@@ -124,17 +210,33 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         let (count, folder) = (session.document().captures.len(), folder.display());
         tracing::warn!("{count} captures are kept in {folder}; `handeye calibrate {folder}` solves them");
     }
-    captured?;
+    if let Some(guide) = &guide {
+        guide.record().write(&folder.join(GUIDED_RECORD)).map_err(Failure::failed)?;
+    }
+    let ending = captured?;
     if let Err(error) = ended {
         tracing::warn!(%error, "the simulation could not be stopped");
     }
     drop(cell);
     drop(server);
 
-    let solution = solve::folder(&folder, Method::Joint, Options::default(), Some(Truth::from(&truth)), &cancel)?;
+    let mut solution = solve::folder(&folder, Method::Joint, Options::default(), Some(Truth::from(&truth)), &cancel)?;
+    solution.guided_by(guide.as_ref().map(Guide::record));
     finish(&session, args.json.as_ref(), &solution)?;
     solution.note(&recorder);
-    rerun_arg::finish(recorder, &cancel)
+    rerun_arg::finish(recorder, &cancel)?;
+    match ending {
+        Some(ending) if !ending.is_success() => {
+            Err(Failure::failed(anyhow::anyhow!("the goal is not reached. {}", ending.text().say(Language::English))))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What stands in a scene.
+fn solids(scene: &ResolvedScene) -> Vec<Obstacle> {
+    let solids = scene.solids.iter();
+    solids.map(|solid| Obstacle { world_from_centre: solid.world_from_solid, size_m: solid.size_m }).collect()
 }
 
 fn finish(session: &Store, json: Option<&Output>, solution: &Solution) -> Result<(), Failure> {

@@ -4,14 +4,19 @@ use std::path::Path;
 
 use handeye_core::plan::{ViewOptions, ViewSetup, poses_looking_at};
 use handeye_core::project::taught_poses::{Goal, MotionLimits, TaughtPoses};
-use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
 
 use super::super::Failure;
 use crate::limits;
 use crate::session::start::REFERENCE_POSES;
 
+/// How much the board is tilted at most where guided capture begins.
+const FIRST_TILT_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// How many views `--poses auto` plans.
 const PLANNED_VIEWS: usize = 20;
+
+/// Poses that are chosen on the way.
+pub const GUIDED: &str = "guided";
 
 /// A sequence of poses.
 pub struct Plan {
@@ -32,6 +37,7 @@ impl Plan {
                 Ok(Self::taught(&poses))
             }
             "auto" => Self::planned(scene, seed),
+            GUIDED => Self::begun(scene, seed),
             file => Ok(Self::taught(&TaughtPoses::read(Path::new(file)).map_err(Failure::unusable)?)),
         }
     }
@@ -44,15 +50,24 @@ impl Plan {
         }
     }
 
+    /// No pose but the one to begin at: with the board in view, as a person jogs the arm first.
+    fn begun(scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
+        let resolved = meant(scene, seed)?;
+        let options = ViewOptions { count: 1, cone_rad: FIRST_TILT_RAD, seed: resolved.seed, ..ViewOptions::default() };
+        let views = poses_looking_at(&ViewSetup::from(&resolved), &options).map_err(Failure::failed)?;
+        let start_joints = views.first().map(|view| view.joints.to_vec());
+        Ok(Self { start_joints, goals: Vec::new(), limits: limits::SEQUENCE })
+    }
+
+    /// None at all: the arm begins where it stands.
+    pub fn from_here() -> Self {
+        Self { start_joints: None, goals: Vec::new(), limits: limits::SEQUENCE }
+    }
+
     /// Views from where the scene says that board and camera are *meant* to be: what a person planning a sequence knows.
     fn planned(scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
-        let mut meant = scene.clone();
-        meant.camera.random_offset_mm = 0.0;
-        meant.camera.random_offset_deg = 0.0;
-        meant.board.random_offset_mm = 0.0;
-        meant.board.random_offset_deg = 0.0;
-        let seed = seed.unwrap_or(scene.seed);
-        let resolved = meant.resolve(seed).map_err(Failure::unusable)?;
+        let resolved = meant(scene, seed)?;
+        let seed = resolved.seed;
         let options = ViewOptions { count: PLANNED_VIEWS, seed, ..ViewOptions::default() };
         let views = poses_looking_at(&ViewSetup::from(&resolved), &options).map_err(Failure::failed)?;
         Ok(Self {
@@ -65,4 +80,14 @@ impl Plan {
             limits: limits::SEQUENCE,
         })
     }
+}
+
+/// The scene with board and camera where they are meant to be.
+pub fn meant(scene: &Scene, seed: Option<u64>) -> Result<ResolvedScene, Failure> {
+    let mut meant = scene.clone();
+    meant.camera.random_offset_mm = 0.0;
+    meant.camera.random_offset_deg = 0.0;
+    meant.board.random_offset_mm = 0.0;
+    meant.board.random_offset_deg = 0.0;
+    meant.resolve(seed.unwrap_or(scene.seed)).map_err(Failure::unusable)
 }

@@ -4,15 +4,15 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use handeye_core::progress::CancelToken;
-use handeye_core::project::session::Store;
+use handeye_core::project::session::{CaptureId, Store};
 use handeye_core::project::taught_poses::Goal;
 use handeye_sim_link::client::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{CallOptions, LinkError, SimulationState};
 
 use super::super::{Failure, record};
 use super::poses::Plan;
+use crate::capture::{self, CaptureEnd, CaptureRequest, Images, Measured};
 use crate::limits;
-use crate::capture::{self, CaptureEnd, CaptureRequest, Images};
 use crate::model::{CaptureOptions, CapturePurpose, LiveFrame, RefusalKind};
 use crate::rerun_log::Recorder;
 use crate::text::Language;
@@ -35,6 +35,10 @@ pub struct PoseSequence<'a> {
     pub session: &'a mut Store,
     pub recorder: &'a Recorder,
     pub cancel: &'a CancelToken,
+    /// The clock of the images.
+    pub began: Instant,
+    /// Images so far.
+    pub images: u64,
 }
 
 /// What came of a pose.
@@ -48,59 +52,11 @@ impl PoseSequence<'_> {
     /// left out; anything else ends the sequence.
     pub fn run(&mut self) -> Result<(), Failure> {
         let plan = self.plan;
-        let began = Instant::now();
-        let mut images = 0;
-        self.set_going().map_err(Failure::failed)?;
-        if let Some(start) = &plan.start_joints {
-            self.persisting("the start", |sequence| {
-                sequence.move_to_joints(start)
-            })?;
-        }
+        self.begin()?;
         for (index, (name, goal)) in plan.goals.iter().enumerate() {
             let number = index as u64 + 1;
-            let visit = self.persisting(&format!("pose {name:?}"), |sequence| {
-                match sequence.go_to(goal) {
-                    Err(error @ LinkError::Unreached { .. }) => return Ok(Visit::Unreached(error)),
-                    arrived => arrived?,
-                }
-                let request = CaptureRequest::new(
-                    number,
-                    CapturePurpose::Calibrate,
-                    sequence.options,
-                    Some(name.clone()),
-                    sequence.session.document(),
-                );
-                let target = sequence.session.document().meta.target;
-                let info = sequence.cell.info().clone();
-                let mut eye = Passes {
-                    cell: &mut *sequence.cell,
-                    info,
-                    cancel: sequence.cancel,
-                    began,
-                    images: &mut images,
-                    first: true,
-                };
-                match capture::take(request, &target, &mut eye, sequence.cancel)? {
-                    // The next try waits for the simulation, and takes the capture from the beginning.
-                    CaptureEnd::Refused(refused) if refused.kind == RefusalKind::Paused => {
-                        Err(LinkError::NotRunning { task: "a capture", state: SimulationState::Paused })
-                    }
-                    ended => Ok(Visit::Ended(ended)),
-                }
-            })?;
-            match visit {
-                Visit::Ended(CaptureEnd::Good(measured, last)) => {
-                    measured.record(self.session).map_err(Failure::failed)?;
-                    record::capture(self.recorder, last, self.session);
-                    tracing::info!("pose {number} of {} captured ({name})", plan.goals.len());
-                }
-                Visit::Ended(CaptureEnd::Refused(refused)) if refused.kind.concerns_the_pose() => {
-                    tracing::warn!("pose {name:?} is left out: {}", refused.why.say(Language::English));
-                }
-                Visit::Ended(CaptureEnd::Refused(refused)) => {
-                    return Err(Failure::failed(anyhow::anyhow!("{}", refused.why.say(Language::English))));
-                }
-                Visit::Unreached(error) => tracing::warn!("pose {name:?} is left out: {error}"),
+            if self.visit(number, name, goal, CapturePurpose::Calibrate)?.is_some() {
+                tracing::info!("pose {number} of {} captured ({name})", plan.goals.len());
             }
         }
         if self.session.document().captures.is_empty() {
@@ -110,6 +66,66 @@ impl PoseSequence<'_> {
             )));
         }
         Ok(())
+    }
+
+    /// Starts the simulation and goes to where the plan begins.
+    pub fn begin(&mut self) -> Result<(), Failure> {
+        self.set_going().map_err(Failure::failed)?;
+        match &self.plan.start_joints {
+            Some(start) => self.persisting("the start", |sequence| sequence.move_to_joints(start)),
+            None => Ok(()),
+        }
+    }
+
+    /// Goes to a pose and captures there; the capture, recorded in the session. `None` for a pose that the arm cannot
+    /// reach, or that gives no capture: why is in the log.
+    pub fn visit(
+        &mut self,
+        number: u64,
+        name: &str,
+        goal: &Goal,
+        purpose: CapturePurpose,
+    ) -> Result<Option<(CaptureId, Box<Measured>)>, Failure> {
+        let visit = self.persisting(&format!("pose {name:?}"), |sequence| {
+            match sequence.go_to(goal) {
+                Err(error @ LinkError::Unreached { .. }) => return Ok(Visit::Unreached(error)),
+                arrived => arrived?,
+            }
+            let (options, document) = (sequence.options, sequence.session.document());
+            let request = CaptureRequest::new(number, purpose, options, Some(name.to_owned()), document);
+            let target = document.meta.target;
+            let info = sequence.cell.info().clone();
+            let mut eye = Passes {
+                cell: &mut *sequence.cell,
+                info,
+                cancel: sequence.cancel,
+                began: sequence.began,
+                images: &mut sequence.images,
+                first: true,
+            };
+            match capture::take(request, &target, &mut eye, sequence.cancel)? {
+                // The next try waits for the simulation, and takes the capture from the beginning.
+                CaptureEnd::Refused(refused) if refused.kind == RefusalKind::Paused => {
+                    Err(LinkError::NotRunning { task: "a capture", state: SimulationState::Paused })
+                }
+                ended => Ok(Visit::Ended(ended)),
+            }
+        })?;
+        match visit {
+            Visit::Ended(CaptureEnd::Good(measured, last)) => {
+                let id = measured.record(self.session).map_err(Failure::failed)?;
+                record::capture(self.recorder, last, self.session);
+                return Ok(Some((id, measured)));
+            }
+            Visit::Ended(CaptureEnd::Refused(refused)) if refused.kind.concerns_the_pose() => {
+                tracing::warn!("pose {name:?} is left out: {}", refused.why.say(Language::English));
+            }
+            Visit::Ended(CaptureEnd::Refused(refused)) => {
+                return Err(Failure::failed(anyhow::anyhow!("{}", refused.why.say(Language::English))));
+            }
+            Visit::Unreached(error) => tracing::warn!("pose {name:?} is left out: {error}"),
+        }
+        Ok(None)
     }
 
     fn go_to(&mut self, goal: &Goal) -> Result<(), LinkError> {

@@ -45,7 +45,7 @@ const IN_A_ROW: usize = 2;
 const LEVEL_SURE: f64 = 0.8;
 /// How far the tip turns from the nearest view so far, per view there is: a first estimate from small turns is not trusted
 /// with large ones. From six views on there is no limit.
-const TURN_PER_VIEW_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+const TURN_PER_VIEW_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Views with a limit of that.
 const CAREFUL_VIEWS: usize = 6;
 /// Poses of the fan that are tried before it is given up.

@@ -1,10 +1,17 @@
 //! A guided session as it is kept, so that it can be studied afterwards, and its reasons in words.
 
+use std::io;
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Ending, Guide, Outcome, Why};
+use crate::project::files::{atomic_file, json_text};
 use crate::text;
 use crate::wording::{English, Text};
+
+/// Name of the record in a session.
+pub const GUIDED_RECORD: &str = "guided.json";
 
 /// A guided session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,6 +58,16 @@ pub struct EndingRecord {
     pub code: String,
     /// In words.
     pub text: String,
+}
+
+impl GuidedRecord {
+    /// Writes it as JSON, as a whole or not at all.
+    ///
+    /// # Errors
+    /// That of the file.
+    pub fn write(&self, path: &Path) -> io::Result<()> {
+        atomic_file::write(path, json_text::pretty(self)?.as_bytes())
+    }
 }
 
 impl Guide {

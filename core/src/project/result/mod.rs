@@ -18,6 +18,7 @@ use crate::diagnose::record::FindingRecord;
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Camera, Frame, Mount, Pose};
+use crate::plan::guided::record::GuidedRecord;
 
 pub use check::BadResult;
 pub use estimate::{
@@ -61,6 +62,9 @@ pub struct CalibrationResult {
     /// Errors on captures that never entered the fit; `None` when there are none.
     #[serde(default)]
     pub verification: Option<VerificationSummary>,
+    /// How its poses were chosen, where guided capture chose them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub guided: Option<GuidedRecord>,
     /// Comparison with the truth, where a simulated cell publishes it.
     pub truth: Option<TruthComparison>,
     /// What made this result.
@@ -358,6 +362,7 @@ impl Default for CalibrationResult {
             estimate: None,
             findings: Vec::new(),
             verification: None,
+            guided: None,
             truth: None,
             provenance: Provenance::default(),
         }

@@ -147,9 +147,7 @@ impl Arm {
     fn path<'a>(&self, jog: &ArmJog<'a>, start: &JointValues) -> Result<Path<'a>, LinkError> {
         match *jog {
             ArmJog::Joint { index, forward } => match self.info.joints.get(index) {
-                Some(&joint) => {
-                    Ok(Path::Joint { index, joint, sign: if forward { 1.0 } else { -1.0 }, start: *start })
-                }
+                Some(&joint) => Ok(Path::Joint { index, joint, sign: if forward { 1.0 } else { -1.0 }, start: *start }),
                 None => {
                     let (expected, value) = ("one of the arm's, counted from 0", index as f64);
                     Err(LinkError::BadMotion { what: "the joint", expected, value })

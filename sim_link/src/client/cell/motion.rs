@@ -267,7 +267,12 @@ impl Arm {
         let goal = self.check_range(goal)?;
         limits.validate(goal.len())?;
         let start = self.ready(TASK, cancel)?;
-        let dynamic = self.send_motion(Way::joints(&start, &goal, limits, self.info.joint_kinds().collect())?, start, TASK, cancel)?;
+        let dynamic = self.send_motion(
+            Way::joints(&start, &goal, limits, self.info.joint_kinds().collect())?,
+            start,
+            TASK,
+            cancel,
+        )?;
         if dynamic.contains(&true) {
             self.settle(&SettleOptions::default(), cancel)?;
         }
@@ -418,15 +423,15 @@ mod tests {
     /// A tip whose line leads through the column of the arm strays, and a stop does not take it back to its line first.
     #[test]
     fn a_stop_of_a_tip_that_is_off_its_line_brakes_the_joints_at_once() {
-        let kinematics = ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges())
-            .expect("ranges with room");
+        let kinematics =
+            ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges())
+                .expect("ranges with room");
         let start = JointValues::from([0.0, 0.8, -1.2, 0.2, 1.5, 0.0]);
         let mut behind = start;
         behind[0] += 2.5;
         let (goal, limits) = (kinematics.tip(&behind), MotionLimits::uniform(4, 0.5, 2.0, 20.0));
         let mut way = Way::line(&kinematics, &start, &goal, &limits).expect("a profile");
-        let is_astray =
-            |way: &Way<'_>| matches!(way, Way::Line(line) if line.astray.is_some_and(|v| v[0].abs() > 0.5));
+        let is_astray = |way: &Way<'_>| matches!(way, Way::Line(line) if line.astray.is_some_and(|v| v[0].abs() > 0.5));
         let mut joints = start;
         for _ in 0..400 {
             joints = way.next(0.05);

@@ -140,11 +140,8 @@ impl ArmKinematics {
         let travel = |view: &PlannedView| planning::travel(from, &view.joints);
         views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
         let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
-        let place = |view: &PlannedView, room| FollowPlace {
-            joints: view.joints,
-            base_from_tip: view.base_from_tip,
-            room,
-        };
+        let place =
+            |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
         for reach in [&reach.wider(), reach] {
             for view in &views {
                 let room = self.room_over(limits, board, reach, &view.joints, ENOUGH);

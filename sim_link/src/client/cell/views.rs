@@ -4,19 +4,16 @@ use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::targets::TargetSpec;
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::Isometry3;
 
 use super::reach::ArmKinematics;
+use handeye_core::plan::guided::choose::Robot;
 use handeye_core::plan::{self as planning, Obstacle, PlanError, ViewOptions, ViewSetup};
 
 /// How far below its frame the arm is mounted \[m\]. What it stands on is taken for a table.
 const TABLE_BELOW_ARM_M: f64 = 0.0147;
 /// Edges of that table [m]: more than the arm reaches.
 const TABLE_M: [f64; 3] = [4.0, 4.0, 0.1];
-/// What is printed on has an edge about the pattern; this much of it on each side, in squares.
-const SHEET_EDGE_SQUARES: f64 = 2.0;
-/// Thickness of what is printed on \[m\].
-const SHEET_M: f64 = 0.002;
 /// Views are planned from so much nearer and farther than those that there are.
 const OTHER_DISTANCES: [f64; 2] = [0.9, 1.1];
 /// With fewer views nothing can be said about their scatter.
@@ -80,30 +77,50 @@ impl ArmKinematics {
 
     /// What the planner knows of this arm.
     pub(super) fn view_setup(&self, board: &BoardInView, start: &JointValues) -> ViewSetup {
-        let grid = board.target.grid();
-        let edge_m = |points: usize| (points.saturating_sub(1) as f64 + 2.0 * SHEET_EDGE_SQUARES) * grid.square_m;
-        let centre = board.target.centre();
-        let sheet = Obstacle {
-            world_from_centre: board.base_from_target.isometry() * Translation3::new(centre.x, centre.y, SHEET_M / 2.0),
-            size_m: [edge_m(grid.columns), edge_m(grid.rows), SHEET_M],
-        };
-        let below = Isometry3::translation(0.0, 0.0, -TABLE_BELOW_ARM_M - TABLE_M[2] / 2.0);
-        let table = Obstacle { world_from_centre: self.base_from_arm() * below, size_m: TABLE_M };
         ViewSetup {
             base_from_target: board.base_from_target,
             target: board.target,
             intrinsics: board.intrinsics,
             tip_from_camera: board.tip_from_camera,
-            arm: planning::Arm {
-                chain: self.arm().clone(),
-                body: if self.is_ur5() { planning::ArmBody::Ur5 } else { planning::ArmBody::of(self.arm()) },
-                world_from_arm: *self.base_from_arm(),
-                connection_from_tip: *self.connection_from_tip(),
-                tip_from_camera: *board.tip_from_camera.isometry(),
-            },
+            arm: self.as_planned(*board.tip_from_camera.isometry()),
             start_joints: *start,
-            obstacles: vec![sheet, table],
+            obstacles: vec![planning::sheet(&board.target, &board.base_from_target), self.table()],
         }
+    }
+
+    /// The arm as guided capture drives it from `joints`, at these speeds, with `solids` and the plane that it stands on
+    /// around it. Where the camera sits is not known before there is an estimate.
+    pub fn guided_robot(
+        &self,
+        joints: &JointValues,
+        speed_rad_s: f64,
+        acceleration_rad_s2: f64,
+        solids: &[Obstacle],
+    ) -> Robot {
+        Robot {
+            arm: self.as_planned(Isometry3::identity()),
+            obstacles: std::iter::once(self.table()).chain(solids.iter().copied()).collect(),
+            clearance_m: ViewOptions::default().clearance_m,
+            joints: *joints,
+            speed_rad_s,
+            acceleration_rad_s2,
+        }
+    }
+
+    fn as_planned(&self, tip_from_camera: Isometry3<f64>) -> planning::Arm {
+        planning::Arm {
+            chain: self.arm().clone(),
+            body: if self.is_ur5() { planning::ArmBody::Ur5 } else { planning::ArmBody::of(self.arm()) },
+            world_from_arm: *self.base_from_arm(),
+            connection_from_tip: *self.connection_from_tip(),
+            tip_from_camera,
+        }
+    }
+
+    /// The plane that the arm stands on.
+    fn table(&self) -> Obstacle {
+        let below = Isometry3::translation(0.0, 0.0, -TABLE_BELOW_ARM_M - TABLE_M[2] / 2.0);
+        Obstacle { world_from_centre: self.base_from_arm() * below, size_m: TABLE_M }
     }
 }
 

@@ -1,0 +1,178 @@
+//! `handeye auto --poses guided`: every pose is chosen by what the captures so far leave open.
+
+use std::collections::BTreeMap;
+
+use handeye_core::diagnose::doctor;
+use handeye_core::diagnose::findings::FindingOptions;
+use handeye_core::estimate::claim::Claim;
+use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
+use handeye_core::plan::Obstacle;
+use handeye_core::plan::guided::choose::{Proposal, Robot};
+use handeye_core::plan::guided::{Ending, Guide, Known, LEAST_VIEWS, Next};
+use handeye_core::progress::CancelToken;
+use handeye_core::project::session::CaptureId;
+use handeye_core::project::taught_poses::Goal;
+use handeye_core::targets::observation::Corner;
+use handeye_sim_link::client::cell::ArmKinematics;
+
+use super::super::Failure;
+use super::sequence::PoseSequence;
+use crate::model::CapturePurpose;
+use crate::text::Language;
+
+/// A guided session on its way.
+pub struct GuidedSequence<'a, 's> {
+    /// What goes to poses and captures there.
+    pub sequence: &'a mut PoseSequence<'s>,
+    /// What chooses the poses.
+    pub guide: &'a mut Guide,
+    /// The chain of the arm.
+    pub kinematics: &'a ArmKinematics,
+    /// What stands around, besides the plane that the arm stands on and the board.
+    pub solids: Vec<Obstacle>,
+    /// Captures that check the answer afterwards.
+    pub checks: usize,
+    /// What was found in the captures.
+    corners: BTreeMap<CaptureId, Vec<Corner>>,
+    image_size: (u32, u32),
+    /// Captures and tries so far.
+    number: u64,
+    /// Simulated time of the first and of the last capture, seconds.
+    time_s: Option<[f64; 2]>,
+}
+
+impl<'a, 's> GuidedSequence<'a, 's> {
+    /// Nothing is captured yet.
+    pub fn new(
+        sequence: &'a mut PoseSequence<'s>,
+        guide: &'a mut Guide,
+        kinematics: &'a ArmKinematics,
+        solids: Vec<Obstacle>,
+        checks: usize,
+    ) -> Self {
+        Self {
+            sequence,
+            guide,
+            kinematics,
+            solids,
+            checks,
+            corners: BTreeMap::new(),
+            image_size: (0, 0),
+            number: 0,
+            time_s: None,
+        }
+    }
+
+    /// From the board in view to the end of the session, and the captures that check it.
+    pub fn run(&mut self) -> Result<Ending, Failure> {
+        self.sequence.begin()?;
+        let here = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
+        if !self.visit(&Goal::Joints(here.to_vec()), CapturePurpose::Calibrate)? {
+            return Err(Failure::failed(anyhow::anyhow!(
+                "the board is not captured from where the arm stands: bring the whole board into the image and begin again"
+            )));
+        }
+        let ending = loop {
+            let (observations, calibration) = self.solve()?;
+            let robot = self.robot()?;
+            let known = self.known(&observations, calibration.as_ref(), &robot);
+            let plan = match self.guide.next(&known, self.sequence.cancel) {
+                Next::End(ending) => break ending,
+                Next::Go { plan, why } => {
+                    tracing::info!("{}", why.text().say(Language::English));
+                    plan
+                }
+            };
+            self.check_cancelled()?;
+            let Some(proposal) = plan.proposals.first() else { break Ending::NothingInReach { candidates: 0 } };
+            if self.visit(&goal(proposal), CapturePurpose::Calibrate)? {
+                self.guide.captured();
+            } else {
+                self.guide.failed();
+            }
+        };
+        tracing::info!("{}", ending.text().say(Language::English));
+        self.check()?;
+        Ok(ending)
+    }
+
+    /// Captures that were not designed and never enter the fit.
+    fn check(&mut self) -> Result<(), Failure> {
+        let (observations, calibration) = self.solve()?;
+        for index in 0..self.checks {
+            let robot = self.robot()?;
+            let known = self.known(&observations, calibration.as_ref(), &robot);
+            let Some(proposal) = self.guide.check_pose(&known, index, self.sequence.cancel) else {
+                tracing::warn!("there is no further view in reach to check the answer at");
+                break;
+            };
+            self.visit(&goal(&proposal), CapturePurpose::Verify)?;
+        }
+        Ok(())
+    }
+
+    fn known<'k>(
+        &self,
+        observations: &'k Observations,
+        calibration: Option<&'k Calibration>,
+        robot: &'k Robot,
+    ) -> Known<'k> {
+        Known {
+            observations,
+            calibration,
+            is_sound: calibration.is_some_and(|calibration| calibration.claim == Claim::AsModelled),
+            robot: Some(robot),
+            elapsed_s: self.time_s.map_or(0.0, |[first, last]| last - first),
+        }
+    }
+
+    /// Whether it gave a capture.
+    fn visit(&mut self, goal: &Goal, purpose: CapturePurpose) -> Result<bool, Failure> {
+        self.number += 1;
+        let name = match purpose {
+            CapturePurpose::Calibrate => format!("guided {}", self.number),
+            CapturePurpose::Verify => format!("check {}", self.number),
+        };
+        let Some((id, measured)) = self.sequence.visit(self.number, &name, goal, purpose)? else { return Ok(false) };
+        self.image_size = measured.rgb.dimensions();
+        self.corners.insert(id, measured.corners.clone());
+        let first_s = self.time_s.map_or(measured.sim_time_s, |[first, _]| first);
+        self.time_s = Some([first_s, measured.sim_time_s]);
+        tracing::info!("captured ({name})");
+        Ok(true)
+    }
+
+    /// What the captures give, with what speaks against it where there are enough to end.
+    fn solve(&self) -> Result<(Observations, Option<Calibration>), Failure> {
+        let document = self.sequence.session.document();
+        let observations = document.observations(self.image_size, |id| self.corners.get(&id).cloned()).observations;
+        let cancel: &CancelToken = self.sequence.cancel;
+        let mut calibration = calibrate(&observations, Method::Joint, cancel).ok();
+        if observations.views.len() >= LEAST_VIEWS {
+            // It learns which error may be stated.
+            doctor::diagnose(&observations, calibration.as_mut(), &FindingOptions::default(), cancel);
+        }
+        self.check_cancelled()?;
+        Ok((observations, calibration))
+    }
+
+    fn check_cancelled(&self) -> Result<(), Failure> {
+        if self.sequence.cancel.is_cancelled() {
+            return Err(Failure::failed(anyhow::anyhow!("interrupted")));
+        }
+        Ok(())
+    }
+
+    fn robot(&mut self) -> Result<Robot, Failure> {
+        let joints = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
+        let limits = self.sequence.plan.limits;
+        Ok(self.kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &self.solids))
+    }
+}
+
+fn goal(proposal: &Proposal) -> Goal {
+    match &proposal.joints {
+        Some(joints) => Goal::Joints(joints.to_vec()),
+        None => Goal::Tip(proposal.base_from_tip),
+    }
+}
