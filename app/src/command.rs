@@ -16,6 +16,7 @@ use handeye_core::project::taught_poses::TaughtPose;
 use handeye_core::targets::TargetSpec;
 use serde::{Deserialize, Serialize};
 
+use crate::guided::state::ChoiceOutcome;
 use crate::model::{
     BoardMotion, CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, DepthScale,
     Dialog, FolderListing, FollowStatus, FollowWish, FrameImages, FrameInfo, ImagePoint, JobId, Jog, JogSettings, Link,
@@ -119,6 +120,8 @@ pub enum Command {
     },
     /// Go on with the sequence that was broken off, at the pose at which it was.
     ContinueSequence,
+    /// Choose poses, visit them and capture there until the goal is reached.
+    CalibrateForMe,
     /// Have poses planned that are not in the fit, visit them, and capture for verification at each.
     VerifyAtPlanned,
     /// No more poses.
@@ -242,6 +245,14 @@ pub enum Event {
         id: MotionId,
         /// How.
         outcome: MotionOutcome,
+    },
+    /// The next pose of a guided sequence was chosen, or cannot be.
+    #[serde(skip)]
+    Guided {
+        /// The number of the request.
+        id: MotionId,
+        /// What was chosen.
+        outcome: ChoiceOutcome,
     },
     /// Poses to look at the board from were planned, or cannot be.
     Planned {

@@ -8,6 +8,7 @@ pub mod command;
 pub mod connect;
 pub mod export;
 pub mod gui;
+pub mod guided;
 pub mod limits;
 pub mod live;
 pub mod messages;

@@ -178,6 +178,7 @@ impl App {
             Command::GoToCapture(id) => self.go_to_capture(id),
             Command::RunSequence { purpose } => self.run_sequence(purpose),
             Command::ContinueSequence => self.continue_sequence(),
+            Command::CalibrateForMe => self.calibrate_for_me(),
             Command::VerifyAtPlanned => self.plan_verification(),
             Command::StopSequence => self.stop_sequence(),
 
@@ -249,6 +250,7 @@ impl App {
                 self.model.detection = Some(*detection);
             }
             Event::Moved { id, outcome } => self.moved(id, outcome),
+            Event::Guided { id, outcome } => self.guided_chosen(id, outcome),
             Event::Planned { id, views } => self.planned(id, views),
             Event::JogEnded { why } => self.jog_ended(why),
             Event::CaptureWaits { number, wait } => self.capture_waits(number, wait),
@@ -273,6 +275,7 @@ impl App {
             Event::NoBrowser => self.show_rerun_address(),
             Event::Notice { severity, text } => self.say(severity, text),
         }
+        self.guided_step();
     }
 
     /// Has the settings written.

@@ -167,7 +167,7 @@ fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_sequence() {
     bench.app.model.sequence_runs = true;
     let names = vec!["a".to_owned(), "b".to_owned()];
     bench.app.model.sequence =
-        Some(PoseSequence { names, planned: None, purpose: None, outcomes: Vec::new(), began_s: 0.0 });
+        Some(PoseSequence { names, planned: None, purpose: None, outcomes: Vec::new(), began_s: 0.0, guided: None });
     let id = bench.app.numbers.motion;
     bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Refused(Text::verbatim("too far")) });
     let sequence = bench.app.model().sequence.clone().expect("the sequence");

@@ -12,6 +12,7 @@ mod failure;
 mod gate;
 mod out;
 mod output;
+mod plan;
 mod record;
 pub mod rerun_arg;
 mod shared;
@@ -58,6 +59,9 @@ enum Command {
     /// Say what is wrong with a session or a dataset folder, and what to do about it.
     #[command(after_help = "Example:\n  handeye doctor my_robot_images --json diagnosis.json")]
     Doctor(doctor::DoctorArgs),
+    /// Say which poses would lower the expected error of a session or a dataset folder most.
+    #[command(after_help = "Example:\n  handeye plan my_robot_images --count 5 --json plan.json")]
+    Plan(plan::PlanArgs),
     /// Track the board live with a calibration, and have the arm follow it.
     #[command(after_help = "Example:\n  handeye track --calibration session/result.json --follow --frames 600")]
     Track(track::TrackArgs),
@@ -89,6 +93,7 @@ pub fn main() -> ExitCode {
         Command::Auto(args) => auto::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Plan(args) => plan::run(&args),
         Command::Track(args) => track::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Target(args) => target::run(&args),

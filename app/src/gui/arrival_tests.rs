@@ -15,6 +15,7 @@ fn sequence_runs(mut model: Model, purpose: CapturePurpose, done: usize) -> Mode
         purpose: Some(purpose),
         outcomes: vec![StopOutcome::Done; done],
         began_s: 90.0,
+        guided: None,
     });
     model.sequence_runs = done < 10;
     model

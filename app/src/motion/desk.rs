@@ -7,6 +7,7 @@ use handeye_sim_link::client::CancelToken;
 
 use super::jog_line::{HELD_S, Held, JogLine};
 use crate::command::Event;
+use crate::guided::state::GuideRequest;
 use crate::model::{FollowWish, MotionGoal, MotionId, MotionOutcome, MotionRequest};
 use crate::text;
 use crate::text::Text;
@@ -36,6 +37,13 @@ pub enum MotionTask {
         /// Share of the fastest speed at which it moves to where it has room.
         speed: f64,
     },
+    /// Nothing that moves: the next pose of a guided sequence.
+    Guide {
+        /// Its number.
+        id: MotionId,
+        /// What is wanted.
+        request: Box<GuideRequest>,
+    },
     /// Nothing that moves: where the board can be looked at from, of which only the arm's kinematics tells.
     Plan {
         /// Its number.
@@ -50,7 +58,7 @@ impl MotionTask {
     pub fn id(&self) -> MotionId {
         match self {
             Self::Move(request) => request.id,
-            Self::JogStep { id, .. } | Self::Follow { id, .. } | Self::Plan { id, .. } => *id,
+            Self::JogStep { id, .. } | Self::Follow { id, .. } | Self::Plan { id, .. } | Self::Guide { id, .. } => *id,
         }
     }
 
@@ -60,7 +68,7 @@ impl MotionTask {
             Self::Move(MotionRequest { goal: MotionGoal::Tip(_), .. }) => text!("a motion of the tip"),
             Self::JogStep { .. } => text!("a step"),
             Self::Follow { .. } => text!("following the board"),
-            Self::Plan { .. } => text!("planning of poses"),
+            Self::Plan { .. } | Self::Guide { .. } => text!("planning of poses"),
         }
     }
 }

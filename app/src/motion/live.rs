@@ -2,6 +2,7 @@
 
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::PlanError;
+use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::cell::{
     Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes,
     JogEnd, JogObstacle, MotionTolerance, SettleOptions, UnknownKinematics,
@@ -146,6 +147,16 @@ impl MotionPort for LiveMotion {
         };
         let start = self.arm.joint_values().map_err(port_error)?;
         Ok(kinematics.views_unlike(board, taken, &start, *count).map_err(|why| no_views(&why)))
+    }
+
+    fn robot(&mut self) -> Result<Result<Robot, Text>, PortError> {
+        let kinematics = match &self.kinematics {
+            Ok(kinematics) => kinematics,
+            Err(why) => return Ok(Err(text!("The kinematics of the arm is not known: {why}", why = why))),
+        };
+        let joints = self.arm.joint_values().map_err(port_error)?;
+        let limits = limits::SEQUENCE;
+        Ok(Ok(kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &[])))
     }
 
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {

@@ -9,6 +9,7 @@ use handeye_sim_link::client::cell::{FollowMoment, FollowWish as ArmWish};
 use super::desk::{MotionQueue, MotionTask, Work};
 use super::jog_line::Held;
 use crate::command::Event;
+use crate::guided::state::GuideRequest;
 use crate::model::{FollowStatus, FollowWish, Link, MotionGoal, MotionId, MotionOutcome, Severity};
 use crate::text;
 use crate::track::follow_line::FollowLine;
@@ -45,6 +46,7 @@ impl Motions {
             MotionTask::Move(request) => port.move_to(&request.goal, request.speed, cancel),
             MotionTask::JogStep { request, length, .. } => port.jog_step(request, *length, cancel),
             MotionTask::Follow { wish, speed, .. } => self.follow(port, *wish, *speed, cancel, outlet),
+            MotionTask::Guide { id, request } => return self.guide(port, *id, request, cancel, outlet),
             MotionTask::Plan { id, request } => return self.plan(port, *id, request, outlet),
         };
         // First, so that what the window asks for next is not refused.
@@ -75,6 +77,23 @@ impl Motions {
             Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
         };
         outlet.report(Event::Planned { id, views });
+        ended
+    }
+
+    fn guide(
+        &self,
+        port: &mut dyn MotionPort,
+        id: MotionId,
+        request: &GuideRequest,
+        cancel: &CancelToken,
+        outlet: &Outlet,
+    ) -> Result<(), PortError> {
+        let (outcome, ended) = match port.robot() {
+            Ok(robot) => (robot.map(|robot| Box::new(request.choose(&robot, cancel))), Ok(())),
+            Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
+        };
+        self.desk.done();
+        outlet.report(Event::Guided { id, outcome });
         ended
     }
 

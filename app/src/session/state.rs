@@ -10,6 +10,7 @@ use handeye_core::targets::observation::Corner;
 use serde::{Deserialize, Serialize};
 
 use crate::capture::state::CapturePurpose;
+use crate::guided::state::GuidedProgress;
 use crate::live::state::FrameImages;
 use crate::text::Text;
 
@@ -84,6 +85,9 @@ pub struct PoseSequence {
     pub outcomes: Vec<StopOutcome>,
     /// When it began.
     pub began_s: f64,
+    /// What chooses its poses on the way; `None` where they are known from the beginning.
+    #[serde(skip)]
+    pub guided: Option<Box<GuidedProgress>>,
 }
 
 impl PoseSequence {
@@ -94,7 +98,7 @@ impl PoseSequence {
 
     /// Whether it leads to poses that were planned to verify at.
     pub fn is_planned(&self) -> bool {
-        self.planned.is_some()
+        self.planned.is_some() && self.guided.is_none()
     }
 }
 

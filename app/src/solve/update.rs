@@ -80,13 +80,24 @@ impl App {
         self.desk.solve(job);
     }
 
-    fn corners(&self, id: CaptureId) -> Option<&Vec<Corner>> {
+    pub(crate) fn corners(&self, id: CaptureId) -> Option<&Vec<Corner>> {
         self.model.observed(id)?.corners.as_ref()
     }
 
+    /// What was observed in the captures.
+    pub(crate) fn seen(&self, document: &Document) -> SessionObservations {
+        document.observations(self.image_size(), |id| self.corners(id).cloned())
+    }
+
+    /// Whether the present question was asked, of captures that have all been looked at.
+    pub(crate) fn is_answered(&self) -> bool {
+        let document = self.model.document();
+        let are_seen = document.captures.iter().all(|it| self.model.observed.contains_key(&it.id));
+        are_seen && self.asked.as_ref() == Some(&self.question())
+    }
+
     fn job(&self, id: JobId, document: &Document) -> SolveJob {
-        let SessionObservations { observations, captures, verification } =
-            document.observations(self.image_size(), |id| self.corners(id).cloned());
+        let SessionObservations { observations, captures, verification } = self.seen(document);
         SolveJob {
             id,
             observations,

@@ -28,10 +28,11 @@ impl App {
             purpose,
             outcomes: Vec::new(),
             began_s: self.model.now_s,
+            guided: None,
         });
     }
 
-    fn begin_sequence(&mut self, sequence: PoseSequence) {
+    pub(crate) fn begin_sequence(&mut self, sequence: PoseSequence) {
         self.model.sequence = Some(sequence);
         self.model.sequence_runs = true;
         self.next_stop();
@@ -89,6 +90,7 @@ impl App {
                 purpose: Some(CapturePurpose::Verify),
                 outcomes: Vec::new(),
                 began_s: self.model.now_s,
+                guided: None,
             }),
             Err(why) => {
                 let said = text!("There are no poses to verify at: {why}", why = why);
@@ -113,7 +115,7 @@ impl App {
     }
 
     /// Sets out for the next pose, or ends the sequence.
-    fn next_stop(&mut self) {
+    pub(crate) fn next_stop(&mut self) {
         let Some(sequence) = self.model.sequence.as_ref().filter(|_| self.model.sequence_runs) else { return };
         if let Some(name) = sequence.current() {
             let name = name.to_owned();
@@ -124,6 +126,10 @@ impl App {
             }
             return;
         }
+        if self.guided_is_over() || self.guided_waits() {
+            return;
+        }
+        let Some(sequence) = self.model.sequence.as_ref() else { return };
         let pane = pane_of(sequence);
         let of = sequence.names.len();
         let done = sequence.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
@@ -140,6 +146,7 @@ impl App {
     }
 
     fn end_stop(&mut self, outcome: StopOutcome) {
+        self.guided_visited(&outcome);
         if let Some(sequence) = &mut self.model.sequence {
             sequence.outcomes.push(outcome);
         }
@@ -149,6 +156,10 @@ impl App {
     /// The motion of the sequence has ended.
     pub(crate) fn sequence_moved(&mut self, outcome: &MotionOutcome) {
         let Some(sequence) = &self.model.sequence else { return };
+        if sequence.current().is_none() {
+            // No pose is under way but the choice of one, and that ended without one.
+            return self.break_off();
+        }
         match outcome {
             MotionOutcome::Arrived => match sequence.purpose {
                 Some(purpose) => {
@@ -182,7 +193,7 @@ impl App {
         }
     }
 
-    fn break_off(&mut self) {
+    pub(crate) fn break_off(&mut self) {
         self.model.sequence_runs = false;
         let pane = self.model.sequence.as_ref().map_or(Pane::Taught, pane_of);
         self.say_in(pane, Severity::Warning, text!("The sequence was broken off; what was captured is kept"));
@@ -191,5 +202,9 @@ impl App {
 
 /// Where it says how it went.
 fn pane_of(sequence: &PoseSequence) -> Pane {
-    if sequence.is_planned() { Pane::Verify } else { Pane::Taught }
+    match sequence {
+        sequence if sequence.guided.is_some() => Pane::Poses,
+        sequence if sequence.is_planned() => Pane::Verify,
+        _ => Pane::Taught,
+    }
 }

@@ -8,6 +8,7 @@ use handeye_core::geometry::arm::{ArmKind, JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
+use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish, Support};
 use nalgebra::Isometry3;
@@ -16,6 +17,7 @@ use super::port::{
     CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
 };
 use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, RobotState, Simulation};
+use crate::text;
 use crate::text::Text;
 
 /// Width and height of the fake images in pixels.
@@ -55,6 +57,8 @@ pub struct Script {
     pub room: Room,
     /// The poses that are planned, or why there are none.
     pub views: Result<Vec<JointValues>, Text>,
+    /// The arm as guided capture drives it.
+    pub robot: Result<Robot, Text>,
     /// Motions that were begun.
     pub moved: Vec<MotionGoal>,
     /// Jogs and steps that were begun.
@@ -86,6 +90,7 @@ impl FakeCell {
             motions: FakeMotions::Arrive,
             room: Room::Enough,
             views: Ok(Vec::new()),
+            robot: Err(text!("The kinematics of the arm is not known")),
             moved: Vec::new(),
             jogged: Vec::new(),
             board: BoardMotion::default(),
@@ -275,6 +280,10 @@ impl MotionPort for FakeCell {
 
     fn views(&mut self, _request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
         Ok(self.answer()?.views.clone())
+    }
+
+    fn robot(&mut self) -> Result<Result<Robot, Text>, PortError> {
+        Ok(self.answer()?.robot.clone())
     }
 
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {

@@ -61,6 +61,7 @@ pub use vision::VisionTask;
 use crate::capture::Measured;
 use crate::command::Event;
 use crate::connect::worker::Control;
+use crate::guided::state::GuideRequest;
 use crate::live::worker::Camera;
 use crate::model::{
     CellSource, FollowWish, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, Tracked, ViewSettings,
@@ -246,6 +247,15 @@ impl Workers {
     /// As [`Self::move_to`].
     pub fn plan_views(&self, id: MotionId, request: ViewsRequest) -> Result<(), Busy> {
         self.begin(MotionTask::Plan { id, request: Box::new(request) })
+    }
+
+    /// Asks for the next pose of a guided sequence. [`Event::Guided`] tells it; [`Event::Moved`], with the same number, why
+    /// it is not chosen.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn guide(&self, id: MotionId, request: GuideRequest) -> Result<(), Busy> {
+        self.begin(MotionTask::Guide { id, request: Box::new(request) })
     }
 
     /// Ends the motion that is under way, without a stop of everything else.

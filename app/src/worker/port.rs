@@ -4,6 +4,7 @@ use handeye_core::depth::DepthImage;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
+use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish};
 
@@ -174,6 +175,12 @@ pub trait MotionPort: Send {
     /// # Errors
     /// As [`Self::move_to`].
     fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError>;
+
+    /// The arm as guided capture drives it, where it stands; or why it cannot be. Nothing moves.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    fn robot(&mut self) -> Result<Result<Robot, Text>, PortError>;
 
     /// Leads the tip where `wish` wants it, pass by pass, and returns when the arm stands: [`MotionOutcome::Stopped`] when
     /// that was wished or a stop came, and why otherwise.

@@ -24,6 +24,7 @@ mod slow {
     mod first_user;
     mod following;
     mod fuzz;
+    mod guided;
     mod interrupted;
     mod leaving;
     mod official_client;

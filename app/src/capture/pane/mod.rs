@@ -13,6 +13,7 @@ use crate::capture::rows::{self, CaptureTable};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::{self, Marks};
 use crate::gui::style::theme::{Palette, Tone};
+use crate::guided::pane::{begin_ui, progress_ui};
 use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
 use crate::live::textures::Thumbnails;
@@ -38,6 +39,9 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
         ui.spacing_mut().interact_size.y = ui.spacing().interact_size.y.min(button);
         ui.spacing_mut().item_spacing.y = 4.0;
         actions_ui(ui, model, &table, button, outbox);
+        if let Some(sequence) = &model.sequence {
+            progress_ui(ui, model, sequence);
+        }
     });
     let room = ui.available_rect_before_wrap();
     let has_status = model.capture.is_some() || kept_refusal(model).is_some();
@@ -105,6 +109,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
         return;
     }
     let calibrates = |sequence: &&PoseSequence| sequence.purpose == Some(CapturePurpose::Calibrate);
+    begin_ui(ui, model, hindrance, height, outbox);
     if let Some(sequence) = model.sequence.as_ref().filter(calibrates) {
         sequence::continue_ui(ui, model, sequence, outbox);
     }

@@ -8,6 +8,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::status::STALE_AFTER_S;
 use crate::gui::style::numbers;
 use crate::gui::style::theme::{CAPTION, Palette};
+use crate::guided;
 use crate::live::pane::waiting;
 use crate::model::{FollowStatus, Model, Motion, RobotState, RotationFormat, Severity};
 use crate::text::Text;
@@ -142,6 +143,9 @@ fn under_way(model: &Model) -> Option<Text> {
         return Some(text!("Planning poses that are not in the fit…"));
     }
     if let (true, Some(sequence)) = (model.sequence_runs, &model.sequence) {
+        if let Some(guided) = &sequence.guided {
+            return Some(guided::pane::under_way(sequence, guided));
+        }
         let (number, of) = (sequence.outcomes.len() + 1, sequence.names.len());
         return sequence.current().map(|name| text!("Pose {n} of {of}: {name}", n = number, of = of, name = name));
     }

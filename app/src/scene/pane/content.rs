@@ -12,6 +12,7 @@ use super::canvas::Canvas;
 use super::captures::{self, Spot};
 use super::ground::{self, SPACING_MM};
 use super::legend::{Entry, Sign};
+use super::planned;
 use crate::capture::rows::CaptureTable;
 use crate::gui::style::marks::Marks;
 use crate::gui::style::theme::Palette;
@@ -53,6 +54,7 @@ pub fn draw(canvas: &mut Canvas, ui: &Ui, model: &Model, table: &CaptureTable, p
     }
     live_camera(canvas, &known, language, palette, &mut entries);
     let spots = captures::captures(canvas, model, &known, palette, marks, pointed);
+    entries.extend(planned::planned(canvas, model, &known, language, palette));
     entries.extend(capture_entries(table, language, palette, marks));
     boards(canvas, &known, language, (palette, marks), &mut entries);
     entries.push(grid_entry(palette, language));

@@ -12,6 +12,7 @@ mod content;
 mod eye;
 mod ground;
 mod legend;
+mod planned;
 
 use egui::{Align, CornerRadius, Layout, PointerButton, Pos2, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2};
 use egui::{WidgetInfo, WidgetType};

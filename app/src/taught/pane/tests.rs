@@ -117,6 +117,7 @@ fn a_sequence_says_how_each_pose_went_and_can_be_stopped() {
         purpose: Some(CapturePurpose::Calibrate),
         outcomes: vec![StopOutcome::Done, StopOutcome::Skipped(Text::verbatim("the board was not found"))],
         began_s: 90.0,
+        guided: None,
     });
     let mut pane = driven(model);
     assert!(pane.sees("Pose 3 of 3: right"));

@@ -149,6 +149,7 @@ fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane
         purpose: Some(CapturePurpose::Verify),
         outcomes: vec![StopOutcome::Done, StopOutcome::Skipped(Text::verbatim("the board was not found"))],
         began_s: 90.0,
+        guided: None,
     });
     pane.steps();
     assert!(pane.sees("Pose 3 of 3: V3"));

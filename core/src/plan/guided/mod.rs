@@ -209,7 +209,7 @@ impl Step {
 }
 
 /// Chooses the poses of one calibration.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Guide {
     options: GuidedOptions,
     failed: Vec<Pose<Base, Tip>>,

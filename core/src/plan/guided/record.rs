@@ -117,13 +117,13 @@ impl Why {
                 let (from, to) = (format!("{:.3}", from_m * 1e3), format!("{:.3}", to_m * 1e3));
                 if rotation_part > 0.5 {
                     text!(
-                        "Lowers the expected error from {from} to {to} mm, most by what it tells of the rotation of the camera",
+                        "Lowers the expected error from {from} to {to} mm, mostly in the rotation of the camera",
                         from = from,
                         to = to
                     )
                 } else {
                     text!(
-                        "Lowers the expected error from {from} to {to} mm, most by what it tells of the position of the camera",
+                        "Lowers the expected error from {from} to {to} mm, mostly in the position of the camera",
                         from = from,
                         to = to
                     )

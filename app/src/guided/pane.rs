@@ -1,0 +1,90 @@
+//! The button that begins, and what is under way.
+
+use egui::{Button, RichText, Spinner, Ui, Vec2};
+
+use super::state::{CHECKS, GuidedProgress, Waits};
+use crate::command::{Command, Outbox};
+use crate::gui::style::marks::Marks;
+use crate::gui::style::parts;
+use crate::gui::style::theme::{Palette, Tone};
+use crate::model::{Model, Motion, PoseSequence};
+use crate::taught::pane::immovable;
+use crate::text::Text;
+use crate::{text, tr};
+
+/// The button, where nothing is under way.
+pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, height: f32, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let words = RichText::new(tr!(language, "Calibrate for me")).strong().color(Marks::of(ui).on_accent);
+    let button = Button::new(words).fill(Palette::of(ui).accent).min_size(Vec2::new(0.0, height));
+    let what = tr!(
+        language,
+        "Begins with the board in view: moves the arm to one pose after the other, each chosen by what it adds to the answer, \
+         captures there until the goal is reached, and checks the answer at three more poses. Stop the sequence and STOP end \
+         it; what was captured is kept"
+    );
+    if parts::gated_ui(ui, blocked(model, hindrance), button).on_hover_text(what).clicked() {
+        outbox.send(Command::CalibrateForMe);
+    }
+}
+
+/// Why it cannot begin.
+fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static str> {
+    let language = model.view.language;
+    if let Some(why) = hindrance.or_else(|| immovable(model)) {
+        Some(why)
+    } else if model.cell.as_ref().is_none_or(|cell| cell.arm.is_none()) {
+        Some(tr!(language, "This arm's kinematics is not known, so no poses can be chosen: move it yourself"))
+    } else if model.motion != Motion::Idle {
+        Some(tr!(language, "The arm is moving: wait until it stands, or stop it"))
+    } else if model.board_seen_s.is_none() && model.document().captures.is_empty() {
+        Some(tr!(language, "The board has not been seen: move the arm until the whole board is in the image"))
+    } else {
+        None
+    }
+}
+
+/// How far it is and why the arm goes where it goes; afterwards, how it ended.
+pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
+    let language = model.view.language;
+    let Some(guided) = sequence.guided.as_deref() else { return };
+    if !model.sequence_runs {
+        if let Some(ending) = guided.ending {
+            let tone = if ending.is_success() { Tone::Good } else { Tone::Warning };
+            parts::notice_ui(ui, tone, &ending.text().say(language), |_| ());
+        }
+        return;
+    }
+    ui.horizontal(|ui| {
+        ui.add(Spinner::new().size(14.0).color(Palette::of(ui).busy));
+        ui.label(RichText::new(under_way(sequence, guided).say(language)).strong());
+    });
+    if let Some(why) = &guided.why {
+        parts::hint_ui(ui, &why.text().say(language));
+    }
+    if let Some(error) = error_and_goal(model) {
+        ui.label(error.say(language));
+    }
+}
+
+/// What is done now.
+pub fn under_way(sequence: &PoseSequence, guided: &GuidedProgress) -> Text {
+    let number = sequence.outcomes.len() + 1;
+    match (guided.waits, guided.ending) {
+        (_, Some(_)) => {
+            text!("Check {n} of {of}: a pose that is not in the fit", n = guided.checked + 1, of = CHECKS)
+        }
+        (Waits::Nothing, None) => text!("Pose {n}: on the way, then a capture", n = number),
+        (Waits::Answer, None) => text!("Solving with {n} {n|pose|poses}", n = number - 1),
+        (Waits::Choice, None) => text!("Choosing pose {n}", n = number),
+    }
+}
+
+fn error_and_goal(model: &Model) -> Option<Text> {
+    let error_mm = model.solve.solved.as_ref()?.result.quality.tip_error_95_mm?;
+    Some(text!(
+        "Expected error {error} mm (95 %), goal {goal} mm",
+        error = format!("{error_mm:.3}"),
+        goal = format!("{:.3}", model.view.goal.0 * 1e3)
+    ))
+}

@@ -1,0 +1,121 @@
+//! A guided sequence.
+
+use std::sync::Arc;
+
+use handeye_core::estimate::Observations;
+use handeye_core::estimate::claim::Claim;
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::plan::guided::choose::{Proposal, Robot};
+use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Why};
+use handeye_core::progress::CancelToken;
+
+use crate::model::Solved;
+use crate::text::Text;
+
+/// Captures that check the answer afterwards.
+pub const CHECKS: usize = 3;
+
+/// How a guided sequence goes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GuidedProgress {
+    /// What chooses the poses, and knows all it has proposed.
+    pub guide: Guide,
+    /// What the sequence waits for between two poses.
+    pub waits: Waits,
+    /// Why the pose that is under way was chosen.
+    pub why: Option<Why>,
+    /// Where the tip goes next, and after that as far as it is planned.
+    pub ahead: Vec<Pose<Base, Tip>>,
+    /// How the choice ended; what follows checks the answer.
+    pub ending: Option<Ending>,
+    /// Captures so far that check it.
+    pub checked: usize,
+}
+
+/// What a guided sequence waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waits {
+    /// For nothing: a pose is under way.
+    Nothing,
+    /// For the answer from all captures.
+    Answer,
+    /// For the next pose.
+    Choice,
+}
+
+impl GuidedProgress {
+    /// At the beginning.
+    pub fn new(options: GuidedOptions) -> Self {
+        Self {
+            guide: Guide::new(options),
+            waits: Waits::Nothing,
+            why: None,
+            ahead: Vec::new(),
+            ending: None,
+            checked: 0,
+        }
+    }
+}
+
+/// A choice that is asked for.
+#[derive(Debug, Clone)]
+pub struct GuideRequest {
+    /// What chooses.
+    pub guide: Guide,
+    /// What was observed.
+    pub observations: Observations,
+    /// The answer from it, where there is one.
+    pub solved: Option<Arc<Solved>>,
+    /// Since the beginning \[s\].
+    pub elapsed_s: f64,
+    /// The number of the check, where a pose to check the answer at is asked for.
+    pub check: Option<usize>,
+}
+
+/// By its choice alone: observations are large, and two requests are never compared but in tests.
+impl PartialEq for GuideRequest {
+    fn eq(&self, other: &Self) -> bool {
+        self.guide == other.guide && self.check == other.check
+    }
+}
+
+/// What was chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// What chose, with what it proposed.
+    pub guide: Guide,
+    /// What comes next.
+    pub step: ChosenStep,
+}
+
+/// What comes next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ChosenStep {
+    /// A pose, or the end of the choice.
+    Next(Box<Next>),
+    /// A pose to check the answer at; `None` where there is none in reach.
+    Check(Option<Box<Proposal>>),
+}
+
+impl GuideRequest {
+    /// Chooses, for an arm that stands still. Takes some tenths of a second.
+    pub fn choose(&self, robot: &Robot, cancel: &CancelToken) -> Choice {
+        let mut guide = self.guide.clone();
+        let calibration = self.solved.as_ref().map(|solved| &solved.calibration);
+        let known = Known {
+            observations: &self.observations,
+            calibration,
+            is_sound: calibration.is_some_and(|it| it.claim == Claim::AsModelled),
+            robot: Some(robot),
+            elapsed_s: self.elapsed_s,
+        };
+        let step = match self.check {
+            Some(index) => ChosenStep::Check(guide.check_pose(&known, index, cancel).map(Box::new)),
+            None => ChosenStep::Next(Box::new(guide.next(&known, cancel))),
+        };
+        Choice { guide, step }
+    }
+}
+
+/// What a choice was, or why there is none.
+pub type ChoiceOutcome = Result<Box<Choice>, Text>;

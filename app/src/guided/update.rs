@@ -1,0 +1,187 @@
+//! How a guided sequence goes on.
+
+use std::sync::Arc;
+
+use handeye_core::plan::guided::choose::Proposal;
+use handeye_core::plan::guided::{Ending, GuidedOptions, Next};
+
+use super::state::{CHECKS, Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits};
+use crate::app::App;
+use crate::model::{CapturePurpose, MotionId, Pane, PoseSequence, Severity, SolveStatus, StopOutcome};
+use crate::text;
+use crate::text::Text;
+
+impl App {
+    /// From the board in view to the goal. Captures that there are count; without any the first is taken here.
+    pub(crate) fn calibrate_for_me(&mut self) {
+        if self.model.sequence_runs || self.model.planning {
+            return;
+        }
+        let Some(joints) = self.model.robot.as_ref().map(|robot| robot.joints_rad) else { return };
+        let options = GuidedOptions { goal_m: self.model.view.goal.0, ..GuidedOptions::default() };
+        let has_views = self.model.document().in_use().any(|it| self.corners(it.id).is_some());
+        self.model.messages.is_over_in(Pane::Poses);
+        let here = if has_views { Vec::new() } else { vec![joints] };
+        self.begin_sequence(PoseSequence {
+            names: here.iter().map(|_| pose_name(1)).collect(),
+            planned: Some(here),
+            purpose: Some(CapturePurpose::Calibrate),
+            outcomes: Vec::new(),
+            began_s: self.model.now_s,
+            guided: Some(Box::new(GuidedProgress::new(options))),
+        });
+    }
+
+    fn guided_mut(&mut self) -> Option<&mut GuidedProgress> {
+        let runs = self.model.sequence_runs;
+        self.model.sequence.as_mut().filter(|_| runs)?.guided.as_deref_mut()
+    }
+
+    /// All poses that were chosen have been visited; whether that is for the guide to go on with.
+    pub(crate) fn guided_waits(&mut self) -> bool {
+        let has_captures = !self.model.document().captures.is_empty();
+        let Some(guided) = self.guided_mut() else { return false };
+        guided.waits = Waits::Answer;
+        if !has_captures {
+            self.guided_ends(Severity::Warning, Ending::NoStart.text());
+        }
+        true
+    }
+
+    /// A pose of a guided sequence is over.
+    pub(crate) fn guided_visited(&mut self, outcome: &StopOutcome) {
+        let Some(guided) = self.guided_mut() else { return };
+        if guided.ending.is_some() {
+            guided.checked += 1;
+            return;
+        }
+        match outcome {
+            StopOutcome::Done => guided.guide.captured(),
+            StopOutcome::Skipped(_) => guided.guide.failed(),
+        }
+    }
+
+    /// Asks for the next pose as soon as the answer from all captures is there. Looked at after every event, because the
+    /// answer may come in several ways, or not at all.
+    pub(crate) fn guided_step(&mut self) {
+        let waits = self.guided_mut().map(|guided| guided.waits);
+        if waits != Some(Waits::Answer) || self.model.capture.is_some() {
+            return;
+        }
+        if matches!(self.model.solve.status, SolveStatus::Running { .. }) || !self.is_answered() {
+            return;
+        }
+        let solved = self.model.solve.solved.clone().filter(|_| self.model.solve.fresh);
+        let document = Arc::clone(&self.model.session.document);
+        let observations = self.seen(&document).observations;
+        let Some(sequence) = self.model.sequence.as_mut() else { return };
+        let elapsed_s = self.model.now_s - sequence.began_s;
+        let Some(guided) = sequence.guided.as_deref_mut() else { return };
+        guided.waits = Waits::Choice;
+        let check = guided.ending.map(|_| guided.checked);
+        let request = GuideRequest { guide: guided.guide.clone(), observations, solved, elapsed_s, check };
+        self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
+        if self.workers.guide(self.numbers.motion, request).is_err() {
+            self.break_off();
+        }
+    }
+
+    /// The next pose is chosen, or there is none.
+    pub(crate) fn guided_chosen(&mut self, id: MotionId, outcome: ChoiceOutcome) {
+        // After a stop nothing begins by itself now.
+        if id != self.numbers.motion || self.guided_mut().is_none_or(|guided| guided.waits != Waits::Choice) {
+            return;
+        }
+        let Choice { guide, step } = match outcome {
+            Ok(choice) => *choice,
+            Err(why) => return self.guided_ends(Severity::Warning, why),
+        };
+        let Some(guided) = self.guided_mut() else { return };
+        guided.guide = guide;
+        guided.waits = Waits::Nothing;
+        match step {
+            ChosenStep::Next(next) => match *next {
+                Next::Go { plan, why } => {
+                    guided.why = Some(why);
+                    guided.ahead = plan.proposals.iter().map(|proposal| proposal.base_from_tip).collect();
+                    match plan.proposals.first() {
+                        Some(first) => self.guided_goes_to(first),
+                        None => self.choice_ended(Ending::NothingInReach { candidates: plan.candidates }),
+                    }
+                }
+                Next::End(ending) => self.choice_ended(ending),
+            },
+            ChosenStep::Check(Some(proposal)) => {
+                guided.ahead = vec![proposal.base_from_tip];
+                self.guided_goes_to(&proposal);
+            }
+            ChosenStep::Check(None) => self.guided_finished(),
+        }
+    }
+
+    fn guided_goes_to(&mut self, proposal: &Proposal) {
+        let Some(joints) = proposal.joints else {
+            return self.guided_ends(Severity::Warning, text!("The kinematics of the arm is not known"));
+        };
+        let Some(sequence) = self.model.sequence.as_mut() else { return };
+        let name = match sequence.purpose {
+            Some(CapturePurpose::Verify) => format!("C{}", sequence.names.len() + 1),
+            _ => pose_name(sequence.names.len() + 1),
+        };
+        sequence.names.push(name);
+        sequence.planned.get_or_insert_default().push(joints);
+        self.next_stop();
+    }
+
+    /// No more poses for the fit. Where there is an answer it is checked.
+    fn choice_ended(&mut self, ending: Ending) {
+        let has_answer = self.model.solve.fresh;
+        let Some(sequence) = self.model.sequence.as_mut() else { return };
+        if let Some(guided) = sequence.guided.as_deref_mut() {
+            guided.ending = Some(ending);
+            guided.why = None;
+            guided.ahead.clear();
+            guided.waits = Waits::Answer;
+        }
+        if !has_answer {
+            return self.guided_ends(Severity::Warning, ending.text());
+        }
+        sequence.purpose = Some(CapturePurpose::Verify);
+        self.guided_checks();
+    }
+
+    fn guided_checks(&mut self) {
+        if self.guided_mut().is_some_and(|guided| guided.checked >= CHECKS) {
+            self.guided_finished();
+        } else {
+            self.guided_step();
+        }
+    }
+
+    /// Whether the sequence is guided and over: then it has been said how it went.
+    pub(crate) fn guided_is_over(&mut self) -> bool {
+        if self.guided_mut().is_some_and(|guided| guided.ending.is_some() && guided.checked >= CHECKS) {
+            self.guided_finished();
+            return true;
+        }
+        false
+    }
+
+    fn guided_finished(&mut self) {
+        let Some(ending) = self.guided_mut().and_then(|guided| guided.ending) else { return };
+        let severity = if ending.is_success() { Severity::Info } else { Severity::Warning };
+        self.guided_ends(severity, ending.text());
+    }
+
+    fn guided_ends(&mut self, severity: Severity, why: Text) {
+        self.model.sequence_runs = false;
+        match severity {
+            Severity::Info => self.say(severity, why),
+            _ => self.say_in(Pane::Poses, severity, why),
+        }
+    }
+}
+
+fn pose_name(number: usize) -> String {
+    format!("G{number}")
+}

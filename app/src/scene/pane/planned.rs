@@ -1,0 +1,62 @@
+//! Poses that guided capture has planned: where the camera, or the board, will be.
+
+use egui::Color32;
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+
+use super::board::{self, Line};
+use super::camera::Frustum;
+use super::canvas::Canvas;
+use super::legend::{Entry, Sign};
+use crate::gui::style::theme::Palette;
+use crate::model::Model;
+use crate::scene::{BoardItem, Fixed, Known};
+use crate::text::Language;
+use crate::tr;
+
+/// Length of a frustum [m]: that of a capture, which it becomes.
+const LENGTH_M: f64 = 0.06;
+/// How strong the poses after the next one are.
+const LATER: f32 = 0.45;
+
+/// Draws them, the next one strongest, and gives their line of the legend.
+pub fn planned(
+    canvas: &mut Canvas,
+    model: &Model,
+    known: &Known,
+    language: Language,
+    palette: &Palette,
+) -> Option<Entry> {
+    let guided = model.sequence.as_ref().filter(|_| model.sequence_runs)?.guided.as_deref()?;
+    for (index, base_from_tip) in guided.ahead.iter().enumerate() {
+        let (width, colour) = if index == 0 { (2.0, palette.busy) } else { (1.0, palette.busy.gamma_multiply(LATER)) };
+        ghost(canvas, known, base_from_tip, width, colour);
+    }
+    (!guided.ahead.is_empty()).then(|| Entry {
+        sign: Sign::Frustum,
+        colour: palette.busy,
+        name: tr!(language, "Planned poses").to_owned(),
+        what: tr!(
+            language,
+            "Where the camera goes next, chosen by what it adds to the answer; those after the next one may still change"
+        )
+        .to_owned(),
+    })
+}
+
+fn ghost(canvas: &mut Canvas, known: &Known, base_from_tip: &Pose<Base, Tip>, width: f32, colour: Color32) {
+    if let Some(BoardItem { place: Fixed::Tip(tip_from_target), shape: Some(target), .. }) = known.board() {
+        board::outlined(canvas, &(*base_from_tip * tip_from_target), &target, (width, colour), Line::Dashed);
+        return;
+    }
+    let camera = known.camera().and_then(|camera| match camera.place {
+        Fixed::Tip(tip_from_camera) => Some(*base_from_tip * tip_from_camera),
+        Fixed::Base(_) => None,
+    });
+    match (camera, known.intrinsics()) {
+        (Some(base_from_camera), Some(intrinsics)) => {
+            let frustum = Frustum { base_from_camera, intrinsics: &intrinsics, length_m: LENGTH_M };
+            frustum.draw(canvas, width, colour, colour.gamma_multiply(0.06));
+        }
+        _ => canvas.dot(&base_from_tip.translation().into(), 3.0 + width, colour),
+    }
+}

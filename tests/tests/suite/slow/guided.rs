@@ -1,0 +1,131 @@
+//! Guided capture: from the board in view to a calibration of the accuracy that was asked for, from the command line and by
+//! one click, on the built-in cell over its real socket.
+
+use std::path::Path;
+use std::process::{Command as Process, Output};
+
+use handeye_app::command::Command;
+use handeye_app::model::{CellSource, JogSettings, Model, Motion};
+use handeye_core::plan::guided::record::GuidedRecord;
+use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::session::Role;
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_tests::workbench::Workbench;
+use handeye_tests::{handeye_binary, workspace_root};
+
+fn auto(folder: &Path, arguments: &[&str]) -> Output {
+    let out = folder.join("session");
+    let mut all = vec!["auto", "--quiet", "--rerun", "off", "--out", out.to_str().expect("UTF-8")];
+    all.extend_from_slice(arguments);
+    Process::new(handeye_binary()).args(all).output().expect("the binary is built: cargo build -p handeye_app")
+}
+
+fn scene(name: &str) -> String {
+    workspace_root().join("assets/scenes").join(name).to_str().expect("UTF-8").to_owned()
+}
+
+#[test]
+fn a_noisy_cell_and_a_seven_joint_arm_reach_the_goal_and_the_answer_is_checked() {
+    for (name, goal) in [("realistic.toml", "0.5"), ("panda.toml", "0.3")] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let output = auto(folder.path(), &["--poses", "guided", "--goal", goal, "--scene", &scene(name)]);
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        let session = folder.path().join("session");
+        let result = CalibrationResult::read(&session.join("result.json")).expect("a result");
+        let goal_mm: f64 = goal.parse().expect("a number");
+        let guided = result.guided.as_ref().expect("its poses were chosen");
+        assert_eq!(guided.ending.as_ref().map(|it| it.code.as_str()), Some("goal_reached"), "{name}: {guided:?}");
+        let stated_mm = result.quality.tip_error_95_mm.expect("stated");
+        assert!(stated_mm <= goal_mm, "{name}: {stated_mm} mm");
+        // Whatever was chosen, the truth decides: the translation of the camera alone is off by no more than a point is.
+        let truth = result.truth.expect("the cell publishes its truth");
+        let off_mm = truth.translation_error_mm.expect("known");
+        println!("{name}: {} views, stated {stated_mm:.3} mm, camera off by {off_mm:.3} mm", result.views.len());
+        assert!(off_mm < 2.0 * goal_mm, "{name}: {off_mm} mm");
+        assert!(result.views.len() <= 25, "{name}: {} views", result.views.len());
+        assert_eq!(result.verification.as_ref().map(|it| it.captures), Some(3), "{name}");
+        // The same in the session, for whoever studies it.
+        let kept = std::fs::read_to_string(session.join("guided.json")).expect("the record");
+        assert_eq!(&serde_json::from_str::<GuidedRecord>(&kept).expect("JSON"), guided);
+        let captured = guided.steps.iter().filter(|step| step.outcome == "captured").count();
+        // The first view is where the arm stood.
+        assert_eq!(captured + 1, result.views.len(), "{name}");
+        assert!(guided.steps.iter().any(|step| step.promised_mm.is_some() && step.achieved_mm.is_some()));
+    }
+}
+
+#[test]
+fn a_goal_out_of_reach_fails_with_the_reason_and_keeps_the_answer() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["--poses", "guided", "--goal", "0.001", "--max-poses", "9", "--check-poses", "0"];
+    let scene = scene("realistic.toml");
+    let output = auto(folder.path(), &[&arguments[..], &["--scene", &scene]].concat());
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("the goal is not reached") && said.contains("allow more"), "{said}");
+    let result = CalibrationResult::read(&folder.path().join("session/result.json")).expect("a result all the same");
+    assert_eq!(result.views.len(), 9);
+    assert!(result.verification.is_none());
+
+    let output = auto(folder.path(), &["--poses", "seed10", "--goal", "0.3"]);
+    assert_eq!(output.status.code(), Some(2), "a goal is nobody's but the guide's");
+}
+
+/// The built-in cell at the pace of real time, with the board in view.
+fn connected(folder: &Path) -> (Workbench, CellServer) {
+    let scene = Scene::reference().expect("the scene");
+    let cell = CellServer::start(CellConfig { real_time: Some(true), ..CellConfig::new(scene) }).expect("a cell");
+    let mut bench = Workbench::start(CellSource::Address(cell.endpoint()), folder, None);
+    bench.until("a cell", |model| {
+        let connected = model.control.is_connected() && model.camera.is_connected() && model.mover.is_connected();
+        connected && model.frame.is_some() && model.cell.is_some() && model.robot.is_some()
+    });
+    bench.click(Command::StartSimulation);
+    bench.until("passing time", |model| model.resting_simulation().is_none());
+    bench.until("the board", |model| model.board_seen_s.is_some());
+    bench.click(Command::SetJog(JogSettings { speed: 1.0, ..JogSettings::default() }));
+    (bench, cell)
+}
+
+fn count(model: &Model, role: Role) -> usize {
+    model.document().captures.iter().filter(|it| it.role == role).count()
+}
+
+#[test]
+fn one_click_leads_from_the_board_in_view_to_a_checked_answer_below_the_goal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut bench, _cell) = connected(folder.path());
+    bench.click(Command::CalibrateForMe);
+    bench.until("a choice", |model| {
+        model.sequence.as_ref().and_then(|it| it.guided.as_ref()).is_some_and(|guided| guided.why.is_some())
+    });
+    bench.until("the end", |model| !model.sequence_runs);
+    bench.until("the checks", |model| model.solve.current().is_some_and(|solved| solved.verified_captures.len() == 3));
+    let model = bench.model();
+    let solved = model.solve.current().expect("solved");
+    let error_mm = solved.result.quality.tip_error_95_mm.expect("stated");
+    assert!(error_mm <= model.view.goal.0 * 1e3, "{error_mm} mm: {}", bench.said());
+    assert!((8..=16).contains(&count(model, Role::Calibration)), "{}", count(model, Role::Calibration));
+    assert_eq!(count(model, Role::Verification), 3);
+    assert!(bench.said().contains("The goal is reached"), "{}", bench.said());
+}
+
+#[test]
+fn a_stop_ends_it_at_once_and_it_goes_on_from_there_when_wished() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut bench, _cell) = connected(folder.path());
+    bench.click(Command::CalibrateForMe);
+    bench.until("two captures", |model| count(model, Role::Calibration) >= 2);
+    bench.click(Command::Stop);
+    bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending && model.motion == Motion::Idle);
+    let kept = count(bench.model(), Role::Calibration);
+    let sim_time = |model: &Model| model.robot.as_ref().map_or(0.0, |robot| robot.sim_time_s);
+    let stopped_s = sim_time(bench.model());
+    bench.until("two seconds", |model| sim_time(model) > stopped_s + 2.0);
+    assert_eq!(count(bench.model(), Role::Calibration), kept, "nothing goes on by itself");
+    // Captures that there are count.
+    bench.click(Command::CalibrateForMe);
+    bench.until("the end", |model| !model.sequence_runs && count(model, Role::Verification) == 3);
+    assert!(count(bench.model(), Role::Calibration) <= kept + 16);
+}
