@@ -7,13 +7,13 @@ use std::sync::Arc;
 
 use handeye_core::depth::ColourMap;
 use handeye_core::estimate::handeye::Mode;
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::progress::Stage;
 use handeye_core::project::dataset::CameraInput;
 use handeye_core::project::export::ExportNames;
 use handeye_core::project::session::CaptureId;
 use handeye_core::project::taught_poses::TaughtPose;
 use handeye_core::targets::TargetSpec;
-use handeye_core::geometry::arm::JointValues;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{

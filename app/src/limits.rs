@@ -54,7 +54,8 @@ mod tests {
 
     /// How long the cell's generator of motions takes for joint 1 to turn by an angle.
     fn duration_s(share: f64, angle_rad: f64) -> f64 {
-        let MotionLimits { velocity, acceleration, jerk } = of_joints(&SEQUENCE, share, [JointKind::Revolute].into_iter());
+        let MotionLimits { velocity, acceleration, jerk } =
+            of_joints(&SEQUENCE, share, [JointKind::Revolute].into_iter());
         let limits = motion::MotionLimits::uniform(1, velocity[0], acceleration[0], jerk[0]);
         let start = MotionState::at_rest(vec![0.0]);
         let motion = JointMotion::new(start, &[angle_rad], &[0.0], Some(&limits), Sync::Phase).expect("a motion");

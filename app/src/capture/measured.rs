@@ -4,12 +4,12 @@ use std::fmt;
 use std::sync::Arc;
 
 use handeye_core::depth::DepthImage;
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::image::{RgbImage, imageops};
 use handeye_core::project::session::{Capture, CaptureId, Role, SessionError, Store};
 use handeye_core::targets::TargetSpec;
 use handeye_core::targets::observation::Corner;
-use handeye_core::geometry::arm::JointValues;
 
 use crate::model::CapturePurpose;
 

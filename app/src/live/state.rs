@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_core::depth::{DepthImage, DepthSample};
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 use handeye_core::verify::MeasuredPoint;
-use handeye_core::geometry::arm::JointValues;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;

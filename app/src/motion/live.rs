@@ -301,11 +301,7 @@ fn arm_jog<'a>(
 fn obstacle_text(obstacle: &JogObstacle) -> Text {
     match obstacle {
         JogObstacle::JointRange { joint, limit } => {
-            text!(
-                "Joint {joint} is at the end of its range, {limit}",
-                joint = joint,
-                limit = format!("{limit:.1}")
-            )
+            text!("Joint {joint} is at the end of its range, {limit}", joint = joint, limit = format!("{limit:.1}"))
         }
         JogObstacle::Reach(why) => text!("The arm reaches no further: {why}", why = why),
         JogObstacle::Singular { joint } => text!(

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::session::{CaptureId, Document};
-use handeye_core::geometry::arm::JointValues;
 
 use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved, Step, Tracked};
 
@@ -26,7 +26,7 @@ pub enum Entry {
     /// A live image.
     Image {
         /// When and from where.
-        info: FrameInfo,
+        info: Box<FrameInfo>,
         /// The pixels.
         images: Arc<FrameImages>,
     },

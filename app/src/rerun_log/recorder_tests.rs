@@ -35,7 +35,11 @@ fn said(words: &str) -> Entry {
 }
 
 fn robot(sim_time_s: f64) -> Entry {
-    Entry::Robot { sim_time_s, base_from_tip: handeye_core::geometry::frames::Pose::identity(), joints_rad: [0.1; 6].into() }
+    Entry::Robot {
+        sim_time_s,
+        base_from_tip: handeye_core::geometry::frames::Pose::identity(),
+        joints_rad: [0.1; 6].into(),
+    }
 }
 
 /// The entities of a recording, and how many rows each has.

@@ -58,8 +58,7 @@ mod tests {
     use super::*;
     use crate::gui::testing::sample;
 
-    const JOINTS_RAD: [[f64; 6]; 3] =
-        [[0.0; 6], [0.3, 0.8, -1.0, 0.2, 1.5, 2.0], [-2.0, 0.5, -1.5, 0.4, -1.2, 0.1]];
+    const JOINTS_RAD: [[f64; 6]; 3] = [[0.0; 6], [0.3, 0.8, -1.0, 0.2, 1.5, 2.0], [-2.0, 0.5, -1.5, 0.4, -1.2, 0.1]];
 
     fn built_in() -> ArmKinematics {
         BUILT_IN.clone().expect("the built-in scene")

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::image::RgbImage;
 use handeye_core::project::session::{CaptureId, Document, Edit};
 use handeye_core::targets::observation::Corner;
-use handeye_core::geometry::arm::JointValues;
 use serde::{Deserialize, Serialize};
 
 use crate::capture::state::CapturePurpose;

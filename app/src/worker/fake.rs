@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use handeye_core::geometry::arm::{ArmKind, JointKind, JointValues};
 use handeye_core::depth::DepthImage;
+use handeye_core::geometry::arm::{ArmKind, JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
@@ -159,9 +159,16 @@ impl ControlPort for FakeCell {
         drop(self.answer()?);
         let (width, height) = SIZE;
         Ok(CellFacts {
-            joints: vec![crate::model::JointFacts { kind: JointKind::Revolute, range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]) }; 6],
+            joints: vec![
+                crate::model::JointFacts {
+                    kind: JointKind::Revolute,
+                    range: Some([-std::f64::consts::TAU, std::f64::consts::TAU])
+                };
+                6
+            ],
             nominal_intrinsics: Intrinsics::pinhole(width, height, 60.0),
-            arm: ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges()).ok(),
+            arm: ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges())
+                .ok(),
             support: Support::Whole,
             truth: None,
         })

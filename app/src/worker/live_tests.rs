@@ -107,7 +107,10 @@ fn a_cell_of_this_project_is_called_so_and_its_facts_are_known() {
     assert!(facts.arm.is_some());
     let truth = facts.truth.expect("the cell publishes it");
     assert!((truth.tip_from_camera.translation().x - 0.05).abs() < 1e-12);
-    let turn = crate::model::JointFacts { kind: JointKind::Revolute, range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]) };
+    let turn = crate::model::JointFacts {
+        kind: JointKind::Revolute,
+        range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]),
+    };
     assert_eq!(facts.joints, [turn; 6]);
     let connector = LiveConnector::new(source(&live.server));
     let connected = connector.connect_motion(&CancelToken::default()).expect("it is there");

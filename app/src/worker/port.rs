@@ -1,7 +1,7 @@
 //! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
 
-use handeye_core::geometry::arm::JointValues;
 use handeye_core::depth::DepthImage;
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;

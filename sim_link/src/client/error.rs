@@ -272,9 +272,7 @@ pub enum LinkError {
         angle_deg: f64,
     },
     /// The arm did not come to rest.
-    #[error(
-        "the arm still moves by {rate:.3}/s after {after_s:.2} s of simulation; wait longer or check the scene"
-    )]
+    #[error("the arm still moves by {rate:.3}/s after {after_s:.2} s of simulation; wait longer or check the scene")]
     NotSettled {
         /// Simulated time waited.
         after_s: f64,

@@ -213,7 +213,10 @@ fn an_arm_on_a_track_is_moved_jogged_and_follows_with_its_track_in_metres() {
     goal[0] = 0.9;
     let limits = MotionLimits::uniform(7, 3.0, 9.0, 90.0);
     let error = bench.arm.move_to_joints(&goal, &limits, &CancelToken::default()).expect_err("the rail is 0.8 m long");
-    assert!(error.to_string().contains("joint 1 cannot go to 900.00 mm: its range is -800.0 mm to 800.0 mm"), "{error}");
+    assert!(
+        error.to_string().contains("joint 1 cannot go to 900.00 mm: its range is -800.0 mm to 800.0 mm"),
+        "{error}"
+    );
 
     let tip = bench.tip();
     let rail = ArmJog::Joint { index: 0, forward: true };
@@ -221,7 +224,10 @@ fn an_arm_on_a_track_is_moved_jogged_and_follows_with_its_track_in_metres() {
     assert!((bench.arm.joint_values().expect("a call")[0] + 0.1).abs() < 1e-9);
     assert!((bench.tip().translation() - tip.translation()).norm() - 0.3 < 1e-9, "the tip goes along");
     let end = bench.arm.jog(&rail, None, &mut || Some(1.0)).expect("calls");
-    assert!(matches!(end, JogEnd::Obstacle(JogObstacle::JointRange { joint: 1, limit }) if limit.value == 0.8), "{end:?}");
+    assert!(
+        matches!(end, JogEnd::Obstacle(JogObstacle::JointRange { joint: 1, limit }) if limit.value == 0.8),
+        "{end:?}"
+    );
 
     bench.move_joints(&start);
     jog_there_and_back(&mut bench, Vector3::y(), 0.3);

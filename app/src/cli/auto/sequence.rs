@@ -11,8 +11,8 @@ use handeye_sim_link::client::{CallOptions, LinkError, SimulationState};
 
 use super::super::{Failure, record};
 use super::poses::Plan;
-use crate::limits;
 use crate::capture::{self, CaptureEnd, CaptureRequest, Images};
+use crate::limits;
 use crate::model::{CaptureOptions, CapturePurpose, LiveFrame, RefusalKind};
 use crate::rerun_log::Recorder;
 use crate::text::Language;
@@ -52,9 +52,7 @@ impl PoseSequence<'_> {
         let mut images = 0;
         self.set_going().map_err(Failure::failed)?;
         if let Some(start) = &plan.start_joints {
-            self.persisting("the start", |sequence| {
-                sequence.move_to_joints(start)
-            })?;
+            self.persisting("the start", |sequence| sequence.move_to_joints(start))?;
         }
         for (index, (name, goal)) in plan.goals.iter().enumerate() {
             let number = index as u64 + 1;
@@ -91,7 +89,7 @@ impl PoseSequence<'_> {
             match visit {
                 Visit::Ended(CaptureEnd::Good(measured, last)) => {
                     measured.record(self.session).map_err(Failure::failed)?;
-                    record::capture(self.recorder, last, self.session);
+                    record::capture(self.recorder, *last, self.session);
                     tracing::info!("pose {number} of {} captured ({name})", plan.goals.len());
                 }
                 Visit::Ended(CaptureEnd::Refused(refused)) if refused.kind.concerns_the_pose() => {

@@ -127,7 +127,13 @@ pub fn connected() -> Model {
         simulation: Simulation::Running,
     });
     model.cell = Some(CellFacts {
-        joints: vec![crate::model::JointFacts { kind: JointKind::Revolute, range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]) }; 6],
+        joints: vec![
+            crate::model::JointFacts {
+                kind: JointKind::Revolute,
+                range: Some([-std::f64::consts::TAU, std::f64::consts::TAU])
+            };
+            6
+        ],
         nominal_intrinsics: intrinsics(),
         arm: Some(arm()),
         support: Support::Whole,

@@ -30,9 +30,9 @@ mod track;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::session::{CaptureId, Document};
-use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_sim_link::cell::render::Solid;
 use rerun::{RecordingStream, TextLog, TextLogLevel};
 

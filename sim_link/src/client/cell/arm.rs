@@ -8,10 +8,10 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
 use super::hold::Hold;
-use super::truth::{self, GroundTruth};
 use super::joint_elsewhere::joint_elsewhere;
 use super::joints::{largest_change, of_rad, read_joint_values};
 use super::objects::CellObjects;
+use super::truth::{self, GroundTruth};
 use super::{CellInfo, CellPaths, discover, require_running};
 use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;

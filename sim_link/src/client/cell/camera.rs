@@ -9,9 +9,9 @@ use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 
 use super::hold::Hold;
-use super::truth::{self, GroundTruth, ShownMoment};
 use super::joints::read_joint_values;
 use super::objects::CellObjects;
+use super::truth::{self, GroundTruth, ShownMoment};
 use super::{CellInfo, CellPaths, discover};
 use crate::client::endpoint::Endpoint;
 use crate::client::error::LinkError;

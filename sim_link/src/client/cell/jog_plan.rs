@@ -145,9 +145,8 @@ pub(super) fn nearest(
 ) -> Result<JointValues, JogObstacle> {
     // Without the ranges first: within them the nearest may be another configuration, and a jump.
     let half_turn = std::f64::consts::PI;
-    let around: Vec<JointRange> = (before.iter())
-        .map(|q| JointRange { min: q - half_turn, max: q + half_turn, speed: f64::INFINITY })
-        .collect();
+    let around: Vec<JointRange> =
+        (before.iter()).map(|q| JointRange { min: q - half_turn, max: q + half_turn, speed: f64::INFINITY }).collect();
     let joints = near(kinematics, goal, before, &around)?;
     let arm = kinematics.arm();
     let Some(joint) = arm.first_violation(&joints) else { return Ok(joints) };

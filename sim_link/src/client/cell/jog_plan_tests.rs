@@ -130,7 +130,11 @@ fn direction() -> impl Strategy<Value = Vector3<f64>> {
 
 fn pass_rates(start: &JointValues, points: &[JointValues]) -> f64 {
     let kinds = || std::iter::repeat(JointKind::Revolute);
-    std::iter::once(start).chain(points).zip(points).map(|(a, b)| largest_change(kinds(), a, b).1 / DT_S).fold(0.0, f64::max)
+    std::iter::once(start)
+        .chain(points)
+        .zip(points)
+        .map(|(a, b)| largest_change(kinds(), a, b).1 / DT_S)
+        .fold(0.0, f64::max)
 }
 
 mod slow {

@@ -8,9 +8,9 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Matrix6xX, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::Arm;
 use super::joints::{CellJoint, read_joint_values};
 use super::objects::{Carriers, CellObjects};
-use super::Arm;
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
 

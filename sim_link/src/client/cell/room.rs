@@ -140,11 +140,8 @@ impl ArmKinematics {
         let travel = |view: &PlannedView| planning::travel(from, &view.joints);
         views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
         let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
-        let place = |view: &PlannedView, room| FollowPlace {
-            joints: view.joints,
-            base_from_tip: view.base_from_tip,
-            room,
-        };
+        let place =
+            |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
         for reach in [&reach.wider(), reach] {
             for view in &views {
                 let room = self.room_over(limits, board, reach, &view.joints, ENOUGH);
@@ -206,7 +203,7 @@ impl ArmKinematics {
             let fastest = linear * limits.speed_m_s + angular * limits.turn_rad_s;
             in_rad(kind, fastest)
         };
-        let rows = per_twist.row_iter().map(|row| row.into_owned());
+        let rows = per_twist.row_iter().map(nalgebra::Matrix::into_owned);
         let fastest = self.kinds().zip(rows).map(share).fold(0.0, f64::max);
         if fastest.is_finite() { limits.joint_speed_rad_s / fastest } else { 0.0 }
     }

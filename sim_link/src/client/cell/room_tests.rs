@@ -6,21 +6,17 @@ use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use super::super::follow_goal::FollowGoal;
 use super::super::follow_plan::FollowPlan;
 use super::*;
-use handeye_core::geometry::arm::ArmKind;
 use crate::cell::motion::Course;
 use crate::cell::scene::{BoardMotionSpec, BoardPath, ResolvedScene, Scene};
+use handeye_core::geometry::arm::ArmKind;
 
 const DT_S: f64 = 0.05;
 
 /// The reference scene, its arm, and the joints at each of the ten reference poses, one after the other.
 fn after_the_sequence() -> (ResolvedScene, ArmKinematics, BoardInView, Vec<JointValues>) {
     let scene = Scene::reference().expect("the scene").resolve(1).expect("valid");
-    let arm = ArmKinematics::ur5(
-        scene.world_from_arm,
-        scene.connection_from_tip,
-        &ArmKind::Ur5Coppeliasim.ranges(),
-    )
-    .expect("limits with room");
+    let arm = ArmKinematics::ur5(scene.world_from_arm, scene.connection_from_tip, &ArmKind::Ur5Coppeliasim.ranges())
+        .expect("limits with room");
     let board = BoardInView {
         base_from_target: scene.base_from_target,
         target: scene.target,

@@ -12,10 +12,10 @@ use std::time::Instant;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 
-use super::arm::clock_past;
-use super::sentinel::Sentinel;
 use super::Arm;
+use super::arm::clock_past;
 use super::joints::{difference_rad, read_joint_values};
+use super::sentinel::Sentinel;
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::sim::ObjectHandle;

@@ -1,15 +1,11 @@
 use super::*;
-use handeye_core::geometry::arm::ArmKind;
 use crate::cell::scene::Scene;
+use handeye_core::geometry::arm::ArmKind;
 
 fn arm_and_board(scene: &Scene) -> (ArmKinematics, BoardInView, JointValues) {
     let scene = scene.resolve(scene.seed).expect("valid");
-    let arm = ArmKinematics::ur5(
-        scene.world_from_arm,
-        scene.connection_from_tip,
-        &ArmKind::Ur5Coppeliasim.ranges(),
-    )
-    .expect("limits with room");
+    let arm = ArmKinematics::ur5(scene.world_from_arm, scene.connection_from_tip, &ArmKind::Ur5Coppeliasim.ranges())
+        .expect("limits with room");
     let board = BoardInView {
         base_from_target: scene.base_from_target,
         target: scene.target,

@@ -7,8 +7,8 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{
-    Arm, ArmKinematics, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowMoment, FollowWish, 
-    MotionTolerance, Workspace,
+    Arm, ArmKinematics, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowMoment, FollowWish, MotionTolerance,
+    Workspace,
 };
 use handeye_sim_link::client::{
     CallOptions, CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits, ObjectHandle, SimulationState,
