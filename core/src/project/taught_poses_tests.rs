@@ -152,7 +152,8 @@ fn what_is_written_reads_back() {
 
 #[test]
 fn a_prismatic_joint_has_metres_in_file_and_program() {
-    let goal = vec![0.1, -0.25, std::f64::consts::FRAC_PI_2];
+    // Angles that degrees have exactly.
+    let goal = vec![0.0, -0.25, std::f64::consts::FRAC_PI_2];
     let poses = vec![TaughtPose { name: "on the rail".into(), goal: Goal::Joints(goal.clone()) }];
     let taught = TaughtPoses { prismatic: vec![1], start_joints_rad: Some(goal), limits: None, poses };
     let text = taught.to_toml();
