@@ -28,7 +28,7 @@ pub trait Images {
 #[derive(Debug)]
 pub enum CaptureEnd {
     /// It is good; with the last of its images.
-    Good(Box<Measured>, LiveFrame),
+    Good(Box<Measured>, Box<LiveFrame>),
     /// There is none.
     Refused(CaptureRefused),
 }
@@ -65,7 +65,7 @@ pub fn take<P: Images>(
             },
         };
         return Ok(match ended {
-            Ok(measured) => CaptureEnd::Good(Box::new(measured), frame),
+            Ok(measured) => CaptureEnd::Good(Box::new(measured), Box::new(frame)),
             Err((kind, why)) => CaptureEnd::Refused(CaptureRefused { kind, why, at_s: received_s }),
         });
     }

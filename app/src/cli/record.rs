@@ -37,7 +37,7 @@ pub fn image(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame) {
 fn note(recorder: &Recorder, LiveFrame { info, images }: LiveFrame) {
     let FrameInfo { sim_time_s, base_from_tip, joints_rad, .. } = info;
     recorder.note(Entry::Robot { sim_time_s, base_from_tip, joints_rad });
-    recorder.note(Entry::Image { info, images });
+    recorder.note(Entry::Image { info: Box::new(info), images });
 }
 
 /// Images as the window has them, without colours of depths: those are the window's, and a viewer has its own.

@@ -322,10 +322,12 @@ pub struct Model {
 }
 
 impl Model {
-    /// How a joint, counted from 0 at the base, moves. As long as no cell says so it turns.
+    /// How a joint, counted from 0 at the base, moves, by the cell or else by the session. As long as neither says so it
+    /// turns.
     pub fn joint_kind(&self, index: usize) -> JointKind {
-        let joint = self.cell.as_ref().and_then(|cell| cell.joints.get(index));
-        joint.map_or(JointKind::Revolute, |joint| joint.kind)
+        let of_cell = self.cell.as_ref().map(|cell| cell.joints.get(index).map(|joint| joint.kind));
+        let of_session = || self.document().meta.joint_kinds.as_ref()?.get(index).copied();
+        of_cell.unwrap_or_else(of_session).unwrap_or(JointKind::Revolute)
     }
 
     /// Values of all joints as a person reads them, each with its unit.

@@ -185,6 +185,17 @@ pub enum Jog {
     },
 }
 
+impl Jog {
+    /// Whether it goes along something, in metres, and not about it, in radians; `kind` says how a joint moves.
+    pub fn is_length(&self, kind: impl Fn(usize) -> JointKind) -> bool {
+        match *self {
+            Self::Translate { .. } => true,
+            Self::Rotate { .. } => false,
+            Self::Joint { index, .. } => kind(index) == JointKind::Prismatic,
+        }
+    }
+}
+
 /// How far one press of a jog button goes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub enum JogStep {
@@ -215,5 +226,19 @@ pub struct JogSettings {
 impl Default for JogSettings {
     fn default() -> Self {
         Self { frame: JogFrame::Base, step: JogStep::Hold, speed: 0.25 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_of_a_prismatic_joint_is_a_length_and_one_of_a_revolute_joint_an_angle() {
+        let kind = |joint: usize| if joint == 1 { JointKind::Prismatic } else { JointKind::Revolute };
+        let is_length = |jog: Jog| jog.is_length(kind);
+        let (frame, axis, forward) = (JogFrame::Base, Axis::X, true);
+        assert!(is_length(Jog::Joint { index: 1, forward }) && is_length(Jog::Translate { frame, axis, forward }));
+        assert!(!is_length(Jog::Joint { index: 0, forward }) && !is_length(Jog::Rotate { frame, axis, forward }));
     }
 }

@@ -1,6 +1,6 @@
 //! Moving and jogging the arm.
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Camera, Pose, Tip};
 use handeye_core::project::session::CaptureId;
 
@@ -85,12 +85,7 @@ impl App {
                 self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
                 let id = self.numbers.motion;
                 let speed = self.model.view.jog.speed;
-                let is_length = match jog {
-                    Jog::Translate { .. } => true,
-                    Jog::Rotate { .. } => false,
-                    Jog::Joint { index, .. } => self.model.joint_kind(index) == JointKind::Prismatic,
-                };
-                let length = if is_length { metres } else { radians };
+                let length = if jog.is_length(|joint| self.model.joint_kind(joint)) { metres } else { radians };
                 match self.workers.jog_step(id, jog, length, speed, self.camera_on_tip()) {
                     Ok(()) => {
                         let (what, since_s) = (text!("the next step"), self.model.now_s);

@@ -26,7 +26,7 @@ pub enum Entry {
     /// A live image.
     Image {
         /// When and from where.
-        info: FrameInfo,
+        info: Box<FrameInfo>,
         /// The pixels.
         images: Arc<FrameImages>,
     },

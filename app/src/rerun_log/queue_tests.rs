@@ -33,7 +33,7 @@ fn image(number: u64) -> Entry {
     };
     let depth = DepthImage::new(1, 1, vec![1.0]).expect("an image");
     let images = FrameImages { rgb: RgbImage::new(1, 1), depth, depth_coloured: RgbImage::new(1, 1) };
-    Entry::Image { info, images: Arc::new(images) }
+    Entry::Image { info: Box::new(info), images: Arc::new(images) }
 }
 
 fn said(words: &str) -> Entry {

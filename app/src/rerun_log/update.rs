@@ -32,7 +32,7 @@ impl App {
                 joints_rad: robot.joints_rad,
             },
             Event::Frame { info, images: Some(images), .. } => {
-                Entry::Image { info: info.clone(), images: Arc::clone(images) }
+                Entry::Image { info: Box::new(info.clone()), images: Arc::clone(images) }
             }
             Event::Detection(detection) => Entry::Detection(Arc::new((**detection).clone())),
             Event::Cell(facts) => Entry::Cell(Arc::new((**facts).clone())),

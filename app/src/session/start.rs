@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use handeye_core::estimate::handeye::{HandEye, Mode};
 use handeye_core::estimate::{Method, Options};
-use handeye_core::geometry::arm::{ArmKind, ArmModel};
+use handeye_core::geometry::arm::{ArmKind, ArmModel, JointKind};
 use handeye_core::project::session::{GroundTruth, SessionMeta};
 use handeye_core::targets::{Grid, TargetSpec};
 use handeye_sim_link::client::cell::ArmKinematics;
@@ -40,6 +40,12 @@ pub fn arm(kinematics: Option<&ArmKinematics>) -> Option<ArmModel> {
     kinematics.filter(|arm| arm.is_ur5()).map(|_ur5| BUILT_IN_ARM)
 }
 
+/// How the joints of an arm move, where a session has to say so: where they are others than six that turn.
+pub fn joint_kinds(kinds: impl Iterator<Item = JointKind>) -> Option<Vec<JointKind>> {
+    let kinds: Vec<JointKind> = kinds.collect();
+    (kinds != [JointKind::Revolute; 6] && !kinds.is_empty()).then_some(kinds)
+}
+
 /// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.
 pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
     let ground_truth = truth.and_then(|truth| {
@@ -56,5 +62,6 @@ pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
         seeds: BTreeMap::new(),
         ground_truth,
         arm: None,
+        joint_kinds: None,
     }
 }

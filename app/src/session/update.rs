@@ -23,7 +23,10 @@ impl App {
         let cell = self.model.cell.as_ref();
         let mut meta = start::meta(cell.and_then(|cell| cell.truth.as_ref()), timestamp_rfc3339());
         meta.arm = start::arm(cell.and_then(|cell| cell.arm.as_ref()));
-        Box::new(Beginning { meta, taught: reference_poses() })
+        meta.joint_kinds = cell.and_then(|cell| start::joint_kinds(cell.joints.iter().map(|joint| joint.kind)));
+        // They are meant for one arm, and would send any other somewhere.
+        let is_other = cell.and_then(|cell| cell.arm.as_ref()).is_some_and(|arm| !arm.is_ur5());
+        Box::new(Beginning { meta, taught: if is_other { Vec::new() } else { reference_poses() } })
     }
 
     /// Says what a session begins with while there is none on the disk.

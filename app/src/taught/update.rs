@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_core::geometry::arm::JointValues;
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::project::session::{Edit, TaughtChange};
 use handeye_core::project::taught_poses::{Goal, TaughtPose, TaughtPoses};
 
@@ -98,7 +98,14 @@ impl App {
     }
 
     pub(crate) fn export_taught(&mut self, file: PathBuf) {
-        let asked = self.desk.files(FileTask::WritePoses { file, poses: self.taught() });
+        let poses = self.taught();
+        let joints = poses.iter().find_map(|pose| match &pose.goal {
+            Goal::Joints(joints) => Some(joints.len()),
+            Goal::Tip(_) => None,
+        });
+        let is_prismatic = |joint: &usize| self.model.joint_kind(*joint) == JointKind::Prismatic;
+        let prismatic = (0..joints.unwrap_or(0)).filter(is_prismatic).collect();
+        let asked = self.desk.files(FileTask::WritePoses { file, poses, prismatic });
         self.expect(text!("The poses were not written"), asked);
     }
 

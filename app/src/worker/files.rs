@@ -55,6 +55,8 @@ pub enum FileTask {
         file: PathBuf,
         /// What.
         poses: Vec<TaughtPose>,
+        /// Which joints of the arm are prismatic, counted from 0 at the base.
+        prismatic: Vec<usize>,
     },
 }
 
@@ -95,8 +97,8 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
             Ok(taught) => outlet.report(Event::PosesRead { poses: taught.poses }),
             Err(error) => outlet.notice(Severity::Error, text!("The poses were not read: {error}", error = error)),
         },
-        FileTask::WritePoses { file, poses } => {
-            let taught = TaughtPoses { start_joints_rad: None, limits: None, poses };
+        FileTask::WritePoses { file, poses, prismatic } => {
+            let taught = TaughtPoses { prismatic, start_joints_rad: None, limits: None, poses };
             match taught.write(&file) {
                 Ok(()) => outlet.notice(Severity::Info, text!("Poses written to {file}", file = file.display())),
                 Err(error) => {

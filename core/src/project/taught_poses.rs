@@ -22,7 +22,8 @@
 //! joints_deg = [0.0, 45.0, -60.0, 0.0, 90.0, 0.0]
 //! ```
 //!
-//! `start_joints_deg` and `limits` may be left out. Angles in the file are degrees, in the program radians.
+//! `start_joints_deg` and `limits` may be left out. Angles in the file are degrees, in the program radians. Where an arm has
+//! prismatic joints, `prismatic_joints = [1]` names them, counted from 1 at the base; their values are metres in both.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -32,6 +33,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use crate::geometry::arm::MAX_JOINTS;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::files::atomic_file;
 use crate::project::files::image_file::one_line;
@@ -49,7 +51,9 @@ const ROUNDING: f64 = 1e-12;
 /// Taught poses, and how to move between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TaughtPoses {
-    /// Where the robot begins, joint angles in radians.
+    /// Which joints are prismatic, counted from 0 at the base.
+    pub prismatic: Vec<usize>,
+    /// Where the robot begins, joint values in radians, or metres of a prismatic joint.
     pub start_joints_rad: Option<Vec<f64>>,
     /// How fast it may move.
     pub limits: Option<MotionLimits>,
@@ -72,12 +76,12 @@ pub enum Goal {
     /// A pose of the tip.
     #[serde(rename = "base_from_tip", with = "crate::project::session::pose_record")]
     Tip(Pose<Base, Tip>),
-    /// Joint angles in radians.
+    /// Joint values in radians, or metres of a prismatic joint.
     #[serde(rename = "joints_rad")]
     Joints(Vec<f64>),
 }
 
-/// Limits of motion. Joint limits are radians and hold for every joint; tip limits are metres and radians alike.
+/// Limits of motion. Joint limits are radians and hold for every joint that turns; one that shifts has those of the tip. Tip limits are metres and radians alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionLimits {
     /// rad/s.
@@ -166,6 +170,9 @@ pub enum PosesProblem {
         /// Angles elsewhere.
         need: usize,
     },
+    /// A joint that no arm has.
+    #[error("prismatic_joints counts joints from 1 at the base to at most {MAX_JOINTS}")]
+    Prismatic,
     /// A limit that stops every motion.
     #[error("{0} must be a positive number")]
     Limit(&'static str),
@@ -176,6 +183,8 @@ pub enum PosesProblem {
 struct RawFile {
     format: Spanned<String>,
     version: Spanned<i64>,
+    #[serde(default)]
+    prismatic_joints: Option<Spanned<Vec<usize>>>,
     start_joints_deg: Option<Spanned<Vec<f64>>>,
     limits: Option<Spanned<RawLimits>>,
     #[serde(default, rename = "pose")]
@@ -253,6 +262,11 @@ impl TaughtPoses {
             text.push_str(&content);
             text.push('\n');
         };
+        if !self.prismatic.is_empty() {
+            let counted: Vec<usize> = self.prismatic.iter().map(|joint| joint + 1).collect();
+            line(format!("prismatic_joints = {counted:?} # their values are metres"));
+        }
+        let degrees = |joints: &[f64]| degrees(joints, &self.prismatic);
         if let Some(joints) = &self.start_joints_rad {
             line(format!("start_joints_deg = {:?}", degrees(joints)));
         }
@@ -290,8 +304,10 @@ impl TaughtPoses {
     }
 }
 
-fn degrees(radians: &[f64]) -> Vec<f64> {
-    radians.iter().map(|r| r.to_degrees()).collect()
+/// Degrees, or metres of a prismatic joint.
+fn degrees(joints: &[f64], prismatic: &[usize]) -> Vec<f64> {
+    let shown = |(i, value): (usize, &f64)| if prismatic.contains(&i) { *value } else { value.to_degrees() };
+    joints.iter().enumerate().map(shown).collect()
 }
 
 fn limits_table(limits: &MotionLimits) -> String {
@@ -331,11 +347,9 @@ fn parse(text: &str) -> Result<TaughtPoses, Defect> {
     if raw.poses.is_empty() {
         return Err(Defect { row: None, pose: None, problem: PosesProblem::Empty });
     }
-    let mut joint_count = None;
+    let mut joints = JointReader { prismatic: prismatic(raw.prismatic_joints.as_ref(), at)?, count: None };
     let start_joints_rad = match &raw.start_joints_deg {
-        Some(joints) => {
-            Some(radians("start_joints_deg", joints.get_ref(), &mut joint_count).map_err(|p| at(joints.span(), p))?)
-        }
+        Some(given) => Some(joints.read("start_joints_deg", given.get_ref()).map_err(|p| at(given.span(), p))?),
         None => None,
     };
     let limits = match &raw.limits {
@@ -348,18 +362,18 @@ fn parse(text: &str) -> Result<TaughtPoses, Defect> {
         let goal = if poses.iter().any(|p| p.name == name) {
             Err(PosesProblem::SameName)
         } else {
-            goal(pose.get_ref(), &mut joint_count)
+            goal(pose.get_ref(), &mut joints)
         };
         let goal = goal.map_err(|problem| Defect { pose: Some(name.clone()), ..at(pose.span(), problem) })?;
         poses.push(TaughtPose { name, goal });
     }
-    Ok(TaughtPoses { start_joints_rad, limits, poses })
+    Ok(TaughtPoses { prismatic: joints.prismatic, start_joints_rad, limits, poses })
 }
 
-fn goal(raw: &RawPose, joint_count: &mut Option<usize>) -> Result<Goal, PosesProblem> {
+fn goal(raw: &RawPose, reader: &mut JointReader) -> Result<Goal, PosesProblem> {
     match (&raw.base_from_tip, &raw.joints_deg) {
         (Some(transform), None) => tip_pose(transform).map(Goal::Tip),
-        (None, Some(joints)) => radians("joints_deg", joints, joint_count).map(Goal::Joints),
+        (None, Some(joints)) => reader.read("joints_deg", joints).map(Goal::Joints),
         _ => Err(PosesProblem::Goal),
     }
 }
@@ -381,15 +395,37 @@ fn tip_pose(raw: &RawTransform) -> Result<Pose<Base, Tip>, PosesProblem> {
     Ok(Pose::from_isometry(Isometry3::from_parts(Translation3::from(raw.translation_m), rotation)))
 }
 
-fn radians(key: &'static str, degrees: &[f64], joint_count: &mut Option<usize>) -> Result<Vec<f64>, PosesProblem> {
-    if !degrees.iter().all(|v| v.is_finite()) {
-        return Err(PosesProblem::NotFinite(key));
+/// Joint values of one arm.
+struct JointReader {
+    prismatic: Vec<usize>,
+    /// As many as the first ones were.
+    count: Option<usize>,
+}
+
+impl JointReader {
+    fn read(&mut self, key: &'static str, given: &[f64]) -> Result<Vec<f64>, PosesProblem> {
+        if !given.iter().all(|v| v.is_finite()) {
+            return Err(PosesProblem::NotFinite(key));
+        }
+        let need = *self.count.get_or_insert(given.len());
+        if given.len() != need || given.is_empty() {
+            return Err(PosesProblem::JointCount { got: given.len(), need: need.max(1) });
+        }
+        let si = |(i, value): (usize, &f64)| if self.prismatic.contains(&i) { *value } else { value.to_radians() };
+        Ok(given.iter().enumerate().map(si).collect())
     }
-    let need = *joint_count.get_or_insert(degrees.len());
-    if degrees.len() != need || degrees.is_empty() {
-        return Err(PosesProblem::JointCount { got: degrees.len(), need: need.max(1) });
+}
+
+/// The joints that are named, counted from 0.
+fn prismatic(
+    named: Option<&Spanned<Vec<usize>>>,
+    at: impl Fn(std::ops::Range<usize>, PosesProblem) -> Defect,
+) -> Result<Vec<usize>, Defect> {
+    let Some(named) = named else { return Ok(Vec::new()) };
+    if !named.get_ref().iter().all(|joint| (1..=MAX_JOINTS).contains(joint)) {
+        return Err(at(named.span(), PosesProblem::Prismatic));
     }
-    Ok(degrees.iter().map(|d| d.to_radians()).collect())
+    Ok(named.get_ref().iter().map(|joint| joint - 1).collect())
 }
 
 fn motion_limits(raw: &RawLimits) -> Result<MotionLimits, PosesProblem> {

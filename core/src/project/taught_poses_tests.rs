@@ -144,9 +144,24 @@ fn what_is_written_reads_back() {
     assert_eq!(read.poses[10].name, poses.poses[10].name);
     let (Goal::Joints(a), Goal::Joints(b)) = (&read.poses[10].goal, &poses.poses[10].goal) else { panic!("joints") };
     assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15));
-    let bare = TaughtPoses { start_joints_rad: None, limits: None, poses: poses.poses[..1].to_vec() };
+    let bare =
+        TaughtPoses { prismatic: Vec::new(), start_joints_rad: None, limits: None, poses: poses.poses[..1].to_vec() };
     bare.write(&path).expect("write");
     assert_eq!(TaughtPoses::read(&path).expect("read"), bare);
+}
+
+#[test]
+fn a_prismatic_joint_has_metres_in_file_and_program() {
+    // Angles that degrees have exactly.
+    let goal = vec![0.0, -0.25, std::f64::consts::FRAC_PI_2];
+    let poses = vec![TaughtPose { name: "on the rail".into(), goal: Goal::Joints(goal.clone()) }];
+    let taught = TaughtPoses { prismatic: vec![1], start_joints_rad: Some(goal), limits: None, poses };
+    let text = taught.to_toml();
+    assert!(text.contains("prismatic_joints = [2]") && text.contains(", -0.25, 90.0]"), "{text}");
+    assert_eq!(TaughtPoses::parse(Path::new("p.toml"), &text).expect("its own"), taught);
+    let wrong = text.replace("[2]", "[0]");
+    let error = TaughtPoses::parse(Path::new("p.toml"), &wrong).expect_err("counted from 1").to_string();
+    assert!(error.starts_with("p.toml, row 4") && error.contains("from 1 at the base"), "{error}");
 }
 
 #[test]

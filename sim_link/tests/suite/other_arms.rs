@@ -60,7 +60,7 @@ impl Bench {
     /// Where the tip is said to be is where it is, after another motion of all joints than the one it was read at.
     pub fn assert_known(&mut self, kinematics: &ArmKinematics) {
         let now = self.arm.joint_values().expect("a call");
-        let sign = |i: usize| if i % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         self.move_joints(&JointValues::from_fn(now.len(), |i| now[i] + 0.05 * (i as f64 + 1.0) * sign(i)));
         let joints = self.arm.joint_values().expect("a call");
         let (distance_m, angle_rad) = kinematics.tip(&joints).distance_to(&self.tip());

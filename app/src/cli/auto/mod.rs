@@ -156,6 +156,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| Path::new("sessions").join(timestamp()));
     let mut cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())
         .map_err(Failure::failed)?;
+    plan.check_joints(cell.info().joints.len())?;
     let truth = cell.camera().ground_truth().map_err(Failure::failed)?;
     let ran_before = cell.arm().sim().get_simulation_state().map_err(Failure::failed)? != SimulationState::Stopped;
 
@@ -174,6 +175,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let meta = SessionMeta {
         seeds: args.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
         arm: start::arm(kinematics.as_ref()),
+        joint_kinds: start::joint_kinds(cell.info().joint_kinds()),
         ..start::meta(Some(&Truth::from(&truth)), timestamp_rfc3339())
     };
     let mut session = Store::create(&folder, meta).map_err(Failure::failed)?;

@@ -42,6 +42,21 @@ impl Plan {
         }
     }
 
+    /// Whether the arm has as many joints as the poses have values.
+    pub fn check_joints(&self, need: usize) -> Result<(), Failure> {
+        let goals = self.goals.iter().filter_map(|(_, goal)| match goal {
+            Goal::Joints(joints) => Some(joints.len()),
+            Goal::Tip(_) => None,
+        });
+        match self.start_joints.iter().map(Vec::len).chain(goals).find(|got| *got != need) {
+            None => Ok(()),
+            Some(got) => Err(Failure::unusable(anyhow::anyhow!(
+                "the poses are for an arm of {got} joints and this one has {need}: give a pose file of this arm, or `--poses \
+                 auto` with its scene"
+            ))),
+        }
+    }
+
     fn taught(taught: &TaughtPoses) -> Self {
         Self {
             start_joints: taught.start_joints_rad.clone(),

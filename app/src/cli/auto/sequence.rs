@@ -114,7 +114,7 @@ impl PoseSequence<'_> {
         match visit {
             Visit::Ended(CaptureEnd::Good(measured, last)) => {
                 let id = measured.record(self.session).map_err(Failure::failed)?;
-                record::capture(self.recorder, last, self.session);
+                record::capture(self.recorder, *last, self.session);
                 return Ok(Some((id, measured)));
             }
             Visit::Ended(CaptureEnd::Refused(refused)) if refused.kind.concerns_the_pose() => {

@@ -191,6 +191,14 @@ impl Live {
     /// Has the arm of the cell that this program started look at the board, and the board move.
     fn prepare_own_cell(&mut self, board: &BoardMotion, cancel: &CancelToken) -> Result<(), Failure> {
         self.arm.sim().start_simulation().map_err(Failure::failed)?;
+        // The reference poses are those of the UR5. Any other arm begins where its scene has it.
+        if self.arm.kinematics().map_err(Failure::failed)?.is_ok_and(|arm| arm.is_ur5()) {
+            self.look_at_board(cancel)?;
+        }
+        self.arm.move_board(board).map_err(Failure::failed)
+    }
+
+    fn look_at_board(&mut self, cancel: &CancelToken) -> Result<(), Failure> {
         let poses = TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES).map_err(Failure::failed)?;
         let goals = poses.poses.iter().filter_map(|taught| match &taught.goal {
             Goal::Tip(goal) => Some(goal),
@@ -205,7 +213,7 @@ impl Live {
                 .and_then(|()| self.arm.settle(&SettleOptions::default(), cancel).map(|_| ()))
                 .map_err(Failure::failed)?;
         }
-        self.arm.move_board(board).map_err(Failure::failed)
+        Ok(())
     }
 
     fn watch(

@@ -1,13 +1,16 @@
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
+use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::Pose;
+use handeye_core::image::RgbImage;
+use handeye_core::project::session::{Capture, Session, SessionMeta, Store};
 
 use super::*;
 use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    Axis, Home, Jog, JogFrame, JogStep, LinkState, Motion, MotionGoal, MotionId, Pane, Severity, Simulation,
+    Axis, Home, Jog, JogFrame, JogStep, JointFacts, LinkState, Motion, MotionGoal, MotionId, Pane, Severity, Simulation,
 };
 use crate::text::Text;
 
@@ -178,6 +181,61 @@ fn numbers_are_moved_to() {
     let [Command::Move { goal: MotionGoal::Joints(joints_rad), .. }] = &sent[..] else { panic!("{sent:?}") };
     assert!((joints_rad[2] + std::f64::consts::FRAC_PI_4).abs() < 1e-9, "{joints_rad:?}");
     assert!((joints_rad[0] - 0.1).abs() < 1e-4, "the rest is where the arm is");
+}
+
+/// With an arm on a track, its rail at 250 mm.
+fn on_track() -> Model {
+    let mut model = sample::connected();
+    let cell = model.cell.as_mut().expect("connected");
+    cell.joints.insert(0, JointFacts { kind: JointKind::Prismatic, range: Some([-0.8, 0.8]) });
+    model.robot.as_mut().expect("connected").joints_rad = [0.25, 0.1, 0.5, -1.0, 0.0, 1.5, 0.7].into();
+    model
+}
+
+#[test]
+fn an_arm_has_a_row_for_each_joint_with_degrees_or_millimetres_and_a_step_and_a_typed_goal_likewise() {
+    let mut pane = driven(on_track());
+    for joint in 1..=7 {
+        assert!(pane.harness.query_by_label(&format!("Jog joint {joint} +")).is_some(), "joint {joint}");
+        assert!(pane.harness.query_by_label(&format!("J{joint} of the goal")).is_some(), "joint {joint}");
+    }
+    assert!(pane.harness.query_by_label("Jog joint 8 +").is_none());
+    assert!(pane.harness.query_by_label("Goal of joint 1 in millimetres").is_some());
+    assert!(pane.harness.query_by_label("Goal of joint 7 in degrees").is_some());
+    assert!(pane.sees("Joint 1 is at: 250.0 mm") && pane.sees("Joint 7 is at: 40.1°"));
+    pane.type_into("J1 of the goal", "-300");
+    pane.press(Key::Enter);
+    pane.type_into("J7 of the goal", "90");
+    pane.press(Key::Enter);
+    let sent = pane.click("Move there");
+    let [Command::Move { goal: MotionGoal::Joints(joints), .. }] = &sent[..] else { panic!("{sent:?}") };
+    assert!((joints[0] + 0.3).abs() < 1e-12 && (joints[6] - std::f64::consts::FRAC_PI_2).abs() < 1e-9, "{joints:?}");
+}
+
+#[test]
+fn a_session_of_an_arm_with_seven_joints_that_is_opened_has_seven_rows() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let joints = [0.1, -0.6, 0.2, -2.2, 0.3, 1.6, 0.7];
+    let meta = SessionMeta {
+        joint_kinds: Some(vec![JointKind::Revolute; 7]),
+        ..crate::session::start::meta(None, "2026-05-02T10:11:12Z".to_owned())
+    };
+    let mut store = Store::create(folder.path(), meta).expect("a new session");
+    let image = RgbImage::from_pixel(16, 16, [9, 9, 9].into());
+    let capture = Capture { joints_rad: Some(&joints), ..Capture::new(&image, Pose::identity()) };
+    store.add_capture(&capture).expect("written");
+    drop(store);
+    let mut model = sample::connected();
+    model.session.document = Session::open(folder.path()).expect("it is one").document;
+    let kept = model.document().captures[0].joints_rad.clone().expect("kept");
+    model.cell.as_mut().expect("connected").joints = vec![JointFacts { kind: JointKind::Revolute, range: None }; 7];
+    model.robot.as_mut().expect("connected").joints_rad = JointValues::try_from(&kept[..]).expect("seven");
+    let pane = driven(model);
+    for (joint, angle) in joints.iter().enumerate() {
+        let said = format!("Joint {} is at: {:.1}°", joint + 1, angle.to_degrees()).replace('-', "−");
+        assert!(pane.sees(&said), "{said}");
+    }
+    assert!(pane.harness.query_by_label("Jog joint 8 +").is_none());
 }
 
 #[test]

@@ -52,7 +52,7 @@ pub const PLOT_HELDOUT: &str = "plots/residual/held_out";
 pub const PLOT_VERIFIED: &str = "plots/residual/verification";
 /// Expected error of a measured point, 95 % \[mm\].
 pub const PLOT_EXPECTED: &str = "plots/expected_error";
-/// The six joints \[deg\].
+/// The joints \[deg, or mm of a prismatic one\].
 pub const PLOT_JOINTS: &str = "plots/joints";
 /// From image to tracked pose \[ms\].
 pub const PLOT_LATENCY: &str = "plots/track/latency";

@@ -82,7 +82,7 @@ fn all(model: &Model) -> Vec<Entry> {
         Entry::Cell(Arc::new(model.cell.clone().expect("connected"))),
         robot(model),
         document(model),
-        Entry::Image { info: frame.info.clone(), images: Arc::clone(&frame.images) },
+        Entry::Image { info: Box::new(frame.info.clone()), images: Arc::clone(&frame.images) },
         Entry::Detection(Arc::new(model.detection.clone().expect("seen"))),
     ];
     for (id, observed) in &model.observed {

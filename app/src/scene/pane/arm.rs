@@ -10,6 +10,8 @@ use crate::scene::PosedArm;
 
 /// Draws them.
 pub fn arm(canvas: &mut Canvas, arm: &PosedArm, palette: &Palette) {
+    // The ends of tubes are inside of the housings of an arm that has some.
+    let has_housings = arm.bodies.iter().any(|(_, solid)| matches!(solid.shape, Shape::Cylinder { .. }));
     for (link, solid) in &arm.bodies {
         let base_from_shape = arm.base_from_arm * arm.links[*link] * solid.world_from_shape;
         let (ends, radius_m, closed) = match solid.shape {
@@ -20,7 +22,13 @@ pub fn arm(canvas: &mut Canvas, arm: &PosedArm, palette: &Palette) {
             // The arm has no others.
             Shape::Sphere { .. } | Shape::Box { .. } | Shape::Plane => continue,
         };
-        let body = Cylinder { ends: ends.map(|end| base_from_shape * end), radius_m, closed };
+        let ends = ends.map(|end| base_from_shape * end);
+        if !has_housings {
+            for end in &ends {
+                canvas.ball(end, radius_m, tone(solid.colour, palette));
+            }
+        }
+        let body = Cylinder { ends, radius_m, closed };
         canvas.cylinder(&body, tone(solid.colour, palette));
     }
 }

@@ -182,6 +182,22 @@ impl Canvas {
         self.push(depth_m, Shape::Vec(vec![Shape::mesh(mesh), Shape::closed_line(outline, edge)]));
     }
 
+    /// The round end of a body, left out behind the eye.
+    pub fn ball(&mut self, middle: &Point3<f64>, radius_m: f64, colour: Color32) {
+        let [right, up, forward] = self.eye.axes();
+        let Some(seen) = self.eye.point(middle) else { return };
+        let mut mesh = Mesh::default();
+        mesh.colored_vertex(seen.at, self.lit(colour, &-forward));
+        for side in 0..SIDES {
+            let (sin, cos) = (side as f64 / SIDES as f64 * std::f64::consts::TAU).sin_cos();
+            let normal = right * cos + up * sin;
+            let Some(edge) = self.eye.point(&(middle + normal * radius_m)) else { return };
+            mesh.colored_vertex(edge.at, self.lit(colour, &normal));
+            mesh.add_triangle(0, 1 + side as u32, 1 + ((side + 1) % SIDES) as u32);
+        }
+        self.push((middle - self.eye.at()).norm(), Shape::mesh(mesh));
+    }
+
     /// Draws all of it.
     pub fn paint(mut self, painter: &Painter) {
         painter.extend(self.ground);

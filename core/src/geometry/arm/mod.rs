@@ -35,7 +35,6 @@ mod model;
 mod placement;
 mod quantity;
 mod record;
-pub mod ur5;
 pub mod urdf;
 mod values;
 
@@ -307,3 +306,6 @@ fn twists(axes: &[Axis], base_from_tip: &Isometry3<f64>) -> Vec<Vector6<f64>> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod ur5_tests;

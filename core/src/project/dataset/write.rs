@@ -11,8 +11,32 @@ use crate::targets::TargetSpec;
 /// Name of the pose table that [`description`] points to.
 pub const POSE_TABLE: &str = "poses.csv";
 
-/// The text of `dataset.toml` for a pose table by [`pose_table`], or with an arm by [`pose_table_with_joints`].
-pub fn description(mode: Mode, target: &TargetSpec, camera: Option<&CameraInput>, arm: Option<&ArmModel>) -> String {
+/// What a pose table by [`pose_table_with_joints`] has the joint values of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Joints<'a> {
+    /// Of this arm.
+    Of(&'a ArmModel),
+    /// Of an arm that is not known, with so many joints: they are kept, and not used.
+    Count(usize),
+}
+
+impl Joints<'_> {
+    /// How many; `None` for an arm that is none.
+    pub fn count(self) -> Option<usize> {
+        match self {
+            Self::Of(model) => Some(model.arm().ok()?.joint_count()),
+            Self::Count(count) => Some(count),
+        }
+    }
+}
+
+/// The text of `dataset.toml` for a pose table by [`pose_table`], or with joints by [`pose_table_with_joints`].
+pub fn description(
+    mode: Mode,
+    target: &TargetSpec,
+    camera: Option<&CameraInput>,
+    joints: Option<Joints<'_>>,
+) -> String {
     let mode = match mode {
         Mode::EyeInHand => "eye_in_hand",
         Mode::EyeToHand => "eye_to_hand",
@@ -22,8 +46,10 @@ pub fn description(mode: Mode, target: &TargetSpec, camera: Option<&CameraInput>
          [robot]\nposes = \"{POSE_TABLE}\"\nlength_unit = \"m\"\nrotation = \"quaternion_xyzw\"\npose = \"base_from_tip\"\n",
         target_table(target)
     );
-    if let Some(arm) = arm {
-        text.push_str(&arm_table(arm));
+    match joints {
+        Some(Joints::Of(arm)) => text.push_str(&arm_table(arm)),
+        Some(Joints::Count(count)) => text.push_str(&joint_columns(count)),
+        None => {}
     }
     if let Some(camera) = camera {
         text.push_str(&camera_table(camera));
@@ -37,7 +63,12 @@ fn arm_table(arm: &ArmModel) -> String {
         ArmModel::Kind(kind) => (arm.arm().map_or(0, |arm| arm.joint_count()), format!("kind = \"{}\"", kind.name())),
         ArmModel::Dh(rows) => (rows.len(), format!("dh = {rows:?}")),
     };
-    format!("joints = {joints}\njoint_unit = \"rad\"\n\n[robot.arm]\n{what}\n")
+    format!("{}\n[robot.arm]\n{what}\n", joint_columns(joints))
+}
+
+/// The columns of joint values; with radians the metres of a prismatic joint stay as they are.
+fn joint_columns(count: usize) -> String {
+    format!("joints = {count}\njoint_unit = \"rad\"\n")
 }
 
 /// The table `[target]` of a `dataset.toml`.
@@ -110,7 +141,7 @@ pub fn pose_table<'a>(views: impl IntoIterator<Item = (&'a str, &'a Pose<Base, T
     table(0, views.into_iter().map(|(name, base_from_tip)| (name, base_from_tip, &[][..])))
 }
 
-/// [`pose_table`] with joint angles in radians, `joints` for every view.
+/// [`pose_table`] with joint values in radians, or metres of a prismatic joint, `joints` for every view.
 pub fn pose_table_with_joints<'a>(
     joints: usize,
     views: impl IntoIterator<Item = (&'a str, &'a Pose<Base, Tip>, &'a [f64])>,

@@ -6,8 +6,9 @@ use nalgebra::Vector6;
 
 use super::capture_id::CaptureId;
 use super::document::{CaptureRecord, Document};
-use crate::geometry::arm::{self, ArmError, ArmModel, JointView};
+use crate::geometry::arm::{self, ArmError, JointView};
 use crate::project::dataset;
+use crate::project::dataset::write::Joints;
 
 impl Document {
     /// How the tip moves with each joint in the captures, see [`crate::geometry::arm::Arm::tip_by_joint_at`].
@@ -28,20 +29,26 @@ impl Document {
     }
 
     /// The session's `dataset.toml` and `poses.csv`: the captures in use and no others, so that the command line solves
-    /// what the window solves. Joint angles are there when the arm is known and every one of these captures has them.
+    /// what the window solves. Joint values are there when the arm or the kinds of its joints are known and every one of
+    /// these captures has them.
     pub(super) fn as_dataset(&self) -> (String, String) {
         let meta = &self.meta;
-        let describe = |arm| dataset::write::description(meta.mode, &meta.target, meta.camera.as_ref(), arm);
-        let with_joints = meta.arm.as_ref().and_then(|model| Some((model, self.table_with_joints(model)?)));
-        if let Some((model, table)) = with_joints {
-            return (describe(Some(model)), table);
+        let describe = |joints| dataset::write::description(meta.mode, &meta.target, meta.camera.as_ref(), joints);
+        if let Some((joints, table)) = self.joints().and_then(|joints| Some((joints, self.table_with_joints(joints)?)))
+        {
+            return (describe(Some(joints)), table);
         }
         let views = self.in_use().map(|capture| (capture.image.as_str(), &capture.base_from_tip));
         (describe(None), dataset::write::pose_table(views))
     }
 
-    fn table_with_joints(&self, model: &ArmModel) -> Option<String> {
-        let joints = model.arm().ok()?.joint_count();
+    fn joints(&self) -> Option<Joints<'_>> {
+        let unknown = || self.meta.joint_kinds.as_ref().map(|kinds| Joints::Count(kinds.len()));
+        self.meta.arm.as_ref().map(Joints::Of).or_else(unknown)
+    }
+
+    fn table_with_joints(&self, joints: Joints<'_>) -> Option<String> {
+        let joints = joints.count()?;
         let rows = self
             .in_use()
             .map(|capture| {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::geometry::arm::ArmKind;
+use crate::geometry::arm::{ArmKind, ArmModel, JointKind};
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::dataset::Dataset;
 use crate::project::session::tests::{folder, image, meta};
@@ -59,6 +59,32 @@ fn a_session_without_an_arm_is_the_data_set_that_it_was_before_there_were_any() 
     assert!(!description.contains("joint") && table.starts_with("image,x,y,z,qx,qy,qz,qw\n"), "{description}");
     let json = std::fs::read_to_string(dir.path().join("session.json")).expect("read");
     assert!(!json.contains("\"arm\""));
+}
+
+/// A Panda's, and those of an arm on a track: a metre is no angle, and is not converted.
+#[test]
+fn joints_of_an_arm_that_is_not_known_are_kept_in_session_and_data_set_whatever_their_number_and_kind() {
+    let kinds = [vec![JointKind::Revolute; 7], vec![JointKind::Prismatic, JointKind::Revolute]];
+    for (kinds, joints_rad) in kinds.into_iter().zip([&[0.1, -0.2, 0.3, -2.1, 0.5, 1.6, 0.7][..], &[-1.25, 3.0]]) {
+        let dir = folder();
+        let mut store =
+            Store::create(dir.path(), SessionMeta { joint_kinds: Some(kinds.clone()), ..meta() }).expect("new");
+        for n in 1..=3 {
+            let (image, base_from_tip) = (image(n), tip(&JOINTS_RAD[usize::from(n)]));
+            let capture = Capture { joints_rad: Some(joints_rad), ..Capture::new(&image, base_from_tip) };
+            store.add_capture(&capture).expect("add");
+        }
+        let data = Dataset::read(dir.path()).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!((data.arm, data.entries.len()), (None, 3));
+        assert!(data.entries.iter().all(|entry| entry.joints_rad.as_deref() == Some(joints_rad)), "every digit");
+        drop(store);
+        let reopened = Session::open(dir.path()).expect("open").document;
+        assert_eq!(reopened.meta.joint_kinds, Some(kinds));
+        assert!(reopened.captures.iter().all(|capture| capture.joints_rad.as_deref() == Some(joints_rad)));
+        assert_eq!(reopened.tip_by_joint(), Ok(BTreeMap::new()), "they are not used");
+    }
+    let none = SessionMeta { joint_kinds: Some(Vec::new()), ..meta() };
+    assert!(Store::create(folder().path(), none).is_err(), "an arm has a joint");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::capture_id::CaptureId;
 use super::edit_error::EditError;
 use super::pose_record;
 use crate::estimate::handeye::{HandEye, Mode};
-use crate::geometry::arm::ArmModel;
+use crate::geometry::arm::{ArmModel, JointKind, MAX_JOINTS};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::dataset::CameraInput;
@@ -54,6 +54,10 @@ pub struct SessionMeta {
     /// The arm, where it is known: what the joint angles of the captures belong to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmModel>,
+    /// How the joints of an arm that is not known move, from the base up. Without it they are taken for six that turn, as
+    /// they were in sessions that were written before there were others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_kinds: Option<Vec<JointKind>>,
 }
 
 /// What a simulated cell knows.
@@ -197,6 +201,9 @@ impl SessionMeta {
         self.target.check().map_err(|why| bad("target", &format!("cannot be: {why}")))?;
         if let Some(Err(e)) = self.arm.as_ref().map(ArmModel::arm) {
             return Err(bad("arm", &format!("is of no use: {}", one_line(&e))));
+        }
+        if self.joint_kinds.as_ref().is_some_and(|kinds| kinds.is_empty() || kinds.len() > MAX_JOINTS) {
+            return Err(bad("joint_kinds", "has no joints, or more than an arm has"));
         }
         let Some(camera) = &self.camera else { return Ok(()) };
         if camera.fixed && camera.intrinsics.is_none() {

@@ -28,6 +28,7 @@ pub(super) fn meta() -> SessionMeta {
         seeds: [("scene".to_owned(), u64::MAX)].into(),
         ground_truth: Some(GroundTruth::new(&links, Some(intrinsics))),
         arm: None,
+        joint_kinds: None,
     }
 }
 

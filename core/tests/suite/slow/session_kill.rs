@@ -39,6 +39,7 @@ fn meta() -> SessionMeta {
         seeds: [].into(),
         ground_truth: None,
         arm: None,
+        joint_kinds: None,
     }
 }
 

@@ -12,6 +12,7 @@ use std::path::Path;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::geometry::arm::{ArmError, ArmModel, JointValues, JointView, place_checked};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::project::dataset::write::Joints;
 use handeye_core::project::dataset::{self, CameraInput, write};
 use handeye_core::targets::TargetSpec;
 use handeye_core::targets::observation::{Corner, View};
@@ -231,11 +232,12 @@ impl RecordedSession {
         let intrinsics = self.truth.intrinsics;
         let arm = self.truth.arm_model.kind().map(ArmModel::Kind);
         let camera = CameraInput { fixed: camera_is_known, intrinsics: Some(intrinsics), model: intrinsics.distortion };
-        let description = write::description(Mode::EyeInHand, &self.target, Some(&camera), arm.as_ref()).replacen(
-            "[target]\n",
-            "[target]\ncorners = \"corners.csv\"\n",
-            1,
-        );
+        let description =
+            write::description(Mode::EyeInHand, &self.target, Some(&camera), arm.as_ref().map(Joints::Of)).replacen(
+                "[target]\n",
+                "[target]\ncorners = \"corners.csv\"\n",
+                1,
+            );
         let poses = match &arm {
             Some(_) => {
                 let rows =

@@ -146,13 +146,12 @@ impl Arm {
 
     fn path<'a>(&self, jog: &ArmJog<'a>, start: &JointValues) -> Result<Path<'a>, LinkError> {
         match *jog {
-            ArmJog::Joint { index, forward } => match self.info.joints.get(index) {
-                Some(&joint) => Ok(Path::Joint { index, joint, sign: if forward { 1.0 } else { -1.0 }, start: *start }),
-                None => {
-                    let (expected, value) = ("one of the arm's, counted from 0", index as f64);
-                    Err(LinkError::BadMotion { what: "the joint", expected, value })
-                }
-            },
+            ArmJog::Joint { index, forward } => {
+                let (what, expected) = ("the joint", "one of the arm's, counted from 0");
+                let none = LinkError::BadMotion { what, expected, value: index as f64 };
+                let joint = *self.info.joints.get(index).ok_or(none)?;
+                Ok(Path::Joint { index, joint, sign: if forward { 1.0 } else { -1.0 }, start: *start })
+            }
             ArmJog::Line { kinematics, axes, along } => {
                 let start = kinematics.tip(start);
                 Ok(Path::Line { kinematics, start, along: axes.direction_in_base(&start, &along)? })

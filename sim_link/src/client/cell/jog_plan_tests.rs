@@ -121,6 +121,37 @@ fn out_of_a_singular_position_the_tip_goes_as_slowly_as_the_joints_need() {
     assert!(all_m > 0.5, "and then it goes on: {all_m} m");
 }
 
+/// A Panda has a joint to spare: where the smallest motion takes another one to its end, that one stays within its range
+/// and the tip goes on along its line.
+#[test]
+fn a_joint_to_spare_gives_way_where_another_one_comes_to_the_end_of_its_range() {
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes/panda.toml");
+    let scene = crate::cell::scene::Scene::load(&scene).and_then(|scene| scene.resolve(0)).expect("it is shipped");
+    let arm = ArmKinematics::new(scene.arm.clone(), scene.world_from_arm);
+    let mut start = scene.start_joints;
+    let range = arm.arm().joints()[6].range;
+    start[6] = range.max - 0.02;
+    let (tip, mut gave_way) = (arm.tip(&start), 0);
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z(), -Vector3::x(), -Vector3::y(), -Vector3::z()];
+    for about in axes.map(|axis| tip.rotation() * axis) {
+        let path = Path::Turn { kinematics: &arm, start: tip, about, centre: tip.translation() };
+        let mut plan = JogPlan::new(path, start, DT_S, None).expect("no length");
+        let mut before = start;
+        for joints in run(&mut plan, |pass| (pass < 40).then_some(0.5)) {
+            assert_eq!(arm.arm().first_violation(&joints), None, "{joints:?}");
+            let (_, by_rad) = largest_change(arm.kinds(), &before, &joints);
+            assert!(by_rad <= JOINT_RATE * DT_S * (1.0 + 1e-9), "{by_rad} rad in a pass");
+            assert!((arm.tip(&joints).translation() - tip.translation()).norm() < 1e-7);
+            let free: Vec<JointRange> = vec![JointRange::ENDLESS; 7];
+            let least = near(&arm, &arm.tip(&joints), &before, &free);
+            let moved = joints != before;
+            gave_way += u32::from(moved && least.is_ok_and(|least| arm.arm().first_violation(&least).is_some()));
+            before = joints;
+        }
+    }
+    assert!(gave_way > 3, "{gave_way} passes");
+}
+
 fn direction() -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-1.0_f64..1.0)
         .prop_map(Vector3::from)

@@ -59,9 +59,17 @@ const ARRIVED_OFF_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 #[derive(Debug, Clone)]
 enum Way<'a> {
     /// All joints at once.
-    Joints { motion: Box<JointMotion>, limits: motion::MotionLimits, goal: JointValues, kinds: Vec<JointKind> },
+    Joints(Box<Joints>),
     /// The tip along a line.
     Line(Box<Line<'a>>),
+}
+
+#[derive(Debug, Clone)]
+struct Joints {
+    motion: JointMotion,
+    limits: motion::MotionLimits,
+    goal: JointValues,
+    kinds: Vec<JointKind>,
 }
 
 #[derive(Debug, Clone)]
@@ -91,7 +99,7 @@ impl<'a> Way<'a> {
         let rest = MotionState::at_rest(start.to_vec());
         let motion = JointMotion::new(rest, goal, &JointValues::zeros(goal.len()), Some(&limits), Sync::Phase)
             .map_err(|error| unplanned(&error))?;
-        Ok(Self::Joints { motion: Box::new(motion), limits, goal: *goal, kinds })
+        Ok(Self::Joints(Box::new(Joints { motion, limits, goal: *goal, kinds })))
     }
 
     fn line(
@@ -120,9 +128,9 @@ impl<'a> Way<'a> {
     /// The joints one pass later.
     fn next(&mut self, time_step_s: f64) -> JointValues {
         match self {
-            Self::Joints { motion, goal, .. } => {
-                let step = motion.step(time_step_s);
-                JointValues::from_fn(goal.len(), |i| step.pos[i])
+            Self::Joints(joints) => {
+                let step = joints.motion.step(time_step_s);
+                JointValues::from_fn(joints.goal.len(), |i| step.pos[i])
             }
             Self::Line(line) => line.next(time_step_s),
         }
@@ -130,7 +138,7 @@ impl<'a> Way<'a> {
 
     fn is_over(&self) -> bool {
         match self {
-            Self::Joints { motion, .. } => motion.at(motion.time_s()).finished,
+            Self::Joints(joints) => joints.motion.at(joints.motion.time_s()).finished,
             Self::Line(line) => line.is_over,
         }
     }
@@ -147,17 +155,17 @@ impl<'a> Way<'a> {
             match JointMotion::stop(state, &limits) {
                 Ok(stop) => {
                     let goal = JointValues::from_fn(kinds.len(), |i| stop.target_pos()[i]);
-                    *self = Self::Joints { motion: Box::new(stop), limits, goal, kinds };
+                    *self = Self::Joints(Box::new(Joints { motion: stop, limits, goal, kinds }));
                 }
                 Err(error) => tracing::error!(%error, "a motion could not be braked"),
             }
             return;
         }
         let braked = match self {
-            Self::Joints { motion, kinds, .. } => {
-                let state = motion.at(motion.time_s()).state();
-                let limits = joint_brake(kinds, &state.vel);
-                JointMotion::stop(state, &limits).map(|stop| **motion = stop)
+            Self::Joints(joints) => {
+                let state = joints.motion.at(joints.motion.time_s()).state();
+                let limits = joint_brake(&joints.kinds, &state.vel);
+                JointMotion::stop(state, &limits).map(|stop| joints.motion = stop)
             }
             Self::Line(line) => line.motion.stop(&brake(&line.speeds, |_| LINE_BRAKE)).map(|stop| line.motion = stop),
         };
@@ -171,10 +179,10 @@ impl<'a> Way<'a> {
     fn begin_again(&mut self, joints: &JointValues) {
         let rest = MotionState::at_rest(joints.to_vec());
         match self {
-            Self::Joints { motion, limits, goal, .. } => {
-                let still = JointValues::zeros(goal.len());
-                if let Ok(anew) = JointMotion::new(rest, &goal[..], &still, Some(limits), Sync::Phase) {
-                    **motion = anew;
+            Self::Joints(way) => {
+                let still = JointValues::zeros(way.goal.len());
+                if let Ok(anew) = JointMotion::new(rest, &way.goal, &still, Some(&way.limits), Sync::Phase) {
+                    way.motion = anew;
                 }
             }
             Self::Line(line) => {

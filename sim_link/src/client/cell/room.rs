@@ -203,7 +203,7 @@ impl ArmKinematics {
             let fastest = linear * limits.speed_m_s + angular * limits.turn_rad_s;
             in_rad(kind, fastest)
         };
-        let rows = per_twist.row_iter().map(|row| row.into_owned());
+        let rows = per_twist.row_iter().map(nalgebra::Matrix::into_owned);
         let fastest = self.kinds().zip(rows).map(share).fold(0.0, f64::max);
         if fastest.is_finite() { limits.joint_speed_rad_s / fastest } else { 0.0 }
     }

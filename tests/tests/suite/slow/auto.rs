@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use handeye_core::project::dataset::Dataset;
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::Session;
 use handeye_core::testing::python;
@@ -29,6 +30,59 @@ fn errors(result: &CalibrationResult) -> (f64, f64, f64) {
         truth.rotation_error_deg.expect("known"),
         truth.focal_error_percent.expect("known"),
     )
+}
+
+/// Seven joints, from the scene to the data set, and then the arm follows the board with the calibration that it gave.
+#[test]
+fn a_panda_is_calibrated_within_what_it_states_keeps_seven_joints_and_follows_the_board() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = workspace_root().join("assets/scenes/panda.toml");
+    let scene = scene.to_str().expect("UTF-8");
+    let result = auto(folder.path(), &["--poses", "auto", "--scene", scene]);
+    let (mm, deg, percent) = errors(&result);
+    println!("Panda, planned poses: {mm:.4} mm, {deg:.4}°, focal length {percent:.4} %");
+    let covariance = result.hand_eye.as_ref().and_then(|link| link.covariance).expect("stated");
+    let sigma = |from: usize| (from..from + 3).map(|i| covariance[i][i]).sum::<f64>().sqrt();
+    // Three standard deviations of each: what is left in an exact cell is rounding to grey levels.
+    assert!(mm <= 3.0 * sigma(0) * 1e3, "{mm} mm, stated {} mm", sigma(0) * 1e3);
+    assert!(deg <= 3.0 * sigma(3).to_degrees(), "{deg}°, stated {}°", sigma(3).to_degrees());
+    assert_eq!(result.views.len(), 20);
+
+    let session = folder.path().join("session");
+    let document = Session::open(&session).expect("a session").document;
+    assert_eq!(document.captures.len(), 20);
+    assert!(
+        document.captures.iter().all(|capture| capture.joints_rad.as_ref().is_some_and(|joints| joints.len() == 7))
+    );
+    let data = Dataset::read(&session).expect("the session is a data set");
+    for (entry, capture) in data.entries.iter().zip(&document.captures) {
+        assert_eq!(entry.joints_rad, capture.joints_rad, "every digit");
+    }
+
+    let json = folder.path().join("track.json");
+    let (calibration, json) = (session.to_str().expect("UTF-8"), json.to_str().expect("UTF-8"));
+    let output = handeye(&[
+        "track",
+        "--quiet",
+        "--follow",
+        "--calibration",
+        calibration,
+        "--scene",
+        scene,
+        "--board-path",
+        "circle",
+        "--board-speed",
+        "0.03",
+        "--frames",
+        "120",
+        "--json",
+        json,
+    ]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(json).expect("written");
+    let tracked: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    println!("{}", tracked["summary"]);
+    assert!(tracked["summary"]["follow_ended"].is_null(), "{}", tracked["summary"]);
 }
 
 #[test]

@@ -1,14 +1,59 @@
-use super::*;
-use crate::geometry::arm::inverse::{pose_error, wrap};
-use crate::geometry::frames::Pose;
+//! CoppeliaSim's UR5: its geometry as the model has it, and its configurations in closed form.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::LazyLock;
+
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::inverse::{pose_error, wrap};
+use super::{Arm, ArmKind, DlsOptions, IkError, JointRange, Obstacle};
+use crate::geometry::frames::Pose;
+
+type JointAngles = [f64; 6];
+
+static ARM: LazyLock<Arm> = LazyLock::new(|| ArmKind::Ur5Coppeliasim.arm());
+
+/// Where everything is in the frame of the model, 14.65 mm above the mounting plane.
+#[expect(clippy::struct_field_names, reason = "all of it is in the frame of the arm")]
+struct ArmPose {
+    arm_from_joint: Vec<Isometry3<f64>>,
+    arm_from_link: Vec<Isometry3<f64>>,
+    arm_from_connection: Isometry3<f64>,
+}
+
+fn forward(joints: &JointAngles) -> ArmPose {
+    let frames = ARM.frames(joints).unwrap();
+    ArmPose {
+        arm_from_joint: frames.base_from_joint,
+        arm_from_link: frames.base_from_link,
+        arm_from_connection: frames.base_from_flange * ARM.flange_from_tip,
+    }
+}
+
+fn inverse_all(goal: &Isometry3<f64>) -> Vec<JointAngles> {
+    let found = ARM.configurations(&Pose::from_isometry(*goal)).expect("it has a closed form");
+    found.into_iter().map(|joints| joints.try_into().unwrap()).collect()
+}
+
+/// One turn either way for every joint, as the stock model has it.
+fn turns() -> [JointRange; 6] {
+    ArmKind::Ur5Coppeliasim.ranges()
+}
+
+fn inverse_nearest(
+    goal: &Isometry3<f64>,
+    seed: &JointAngles,
+    ranges: &[JointRange; 6],
+) -> Result<JointAngles, IkError> {
+    let found = ARM.clone().with_ranges(ranges).unwrap().inverse(&Pose::from_isometry(*goal), seed)?;
+    Ok(found.try_into().unwrap())
+}
 
 /// Rounding of a chain of a dozen products of numbers around one.
 const ROUNDING: f64 = 1e-14;
-/// What `inverse_all` promises.
+/// What a closed form promises.
 const EXACT: f64 = 1e-12;
 
 fn miss(joints: &JointAngles, goal: &Isometry3<f64>) -> f64 {
@@ -77,7 +122,7 @@ fn joint_axes_at_zero_are_those_of_the_model() {
 fn a_joint_turns_what_follows_it_about_its_own_z() {
     let joints = [0.3, -0.7, 1.1, 0.4, -0.9, 2.0];
     let before = forward(&joints);
-    for i in 0..JOINTS {
+    for i in 0..6 {
         let mut turned = joints;
         turned[i] += 0.25;
         let after = forward(&turned);
@@ -146,7 +191,7 @@ proptest! {
         prop_assume!(jacobian(&joints).determinant().abs() > 1e-3);
         let goal = forward(&joints).arm_from_connection;
         let seed: JointAngles = std::array::from_fn(|i| f64::clamp(joints[i] + nudge[i], -TAU, TAU));
-        let found = inverse_nearest(&goal, &seed, &JointLimits::default())?;
+        let found = inverse_nearest(&goal, &seed, &turns())?;
         for (a, b) in found.iter().zip(&joints) {
             prop_assert!((a - b).abs() < 1e-9, "{found:?} is not {joints:?}");
         }
@@ -157,7 +202,7 @@ proptest! {
         const H: f64 = 1e-6;
         let tool = Isometry3::from_parts(Translation3::from(offset), UnitQuaternion::from_euler_angles(0.3, 1.0, -2.0));
         let analytic = jacobian_at(&joints, &tool);
-        for i in 0..JOINTS {
+        for i in 0..6 {
             let at = |delta: f64| {
                 let mut moved = joints;
                 moved[i] += delta;
@@ -202,7 +247,7 @@ fn a_straight_wrist_keeps_the_sixth_joint_of_the_seed() {
     for branch in inverse_all(&goal) {
         assert!(miss(&branch, &goal) < EXACT);
     }
-    let found = inverse_nearest(&goal, &joints, &JointLimits::default()).unwrap();
+    let found = inverse_nearest(&goal, &joints, &turns()).unwrap();
     for (a, b) in found.iter().zip(&joints) {
         assert!((a - b).abs() < 1e-9, "{found:?}");
     }
@@ -213,7 +258,7 @@ fn near_the_wrist_singularity_solutions_stay_exact() {
     for exponent in 1..14 {
         let joints = [0.2, 0.6, -1.3, 0.4, 10f64.powi(-exponent), 1.1];
         let goal = forward(&joints).arm_from_connection;
-        let found = inverse_nearest(&goal, &joints, &JointLimits::default()).unwrap();
+        let found = inverse_nearest(&goal, &joints, &turns()).unwrap();
         assert!(miss(&found, &goal) < EXACT, "joint 5 at 1e-{exponent}");
         // The nearer the singularity the less the pose says about joint 6, but it must not jump away.
         assert!((found[5] - joints[5]).abs() < 1e-2, "joint 5 at 1e-{exponent}: {found:?}");
@@ -224,7 +269,7 @@ fn near_the_wrist_singularity_solutions_stay_exact() {
 fn a_stretched_arm_is_reached() {
     let joints = [0.2, 0.6, 0.0, 0.4, 0.9, 1.1];
     let goal = forward(&joints).arm_from_connection;
-    let found = inverse_nearest(&goal, &joints, &JointLimits::default()).unwrap();
+    let found = inverse_nearest(&goal, &joints, &turns()).unwrap();
     assert!(miss(&found, &goal) < 1e-8);
 }
 
@@ -232,7 +277,7 @@ fn a_stretched_arm_is_reached() {
 fn goals_out_of_reach_say_by_how_much() {
     let at = |x: f64, y: f64, z: f64| Isometry3::translation(x, y, z);
     let seed = [0.0; 6];
-    let error = |goal: &Isometry3<f64>| inverse_nearest(goal, &seed, &JointLimits::default()).unwrap_err();
+    let error = |goal: &Isometry3<f64>| inverse_nearest(goal, &seed, &turns()).unwrap_err();
     let far = error(&at(1.5, 0.0, 0.3));
     assert!(matches!(far, IkError::Unreachable { obstacle: Obstacle::TooFar { .. } }), "{far}");
     assert!(far.to_string().contains("closer to the robot"), "{far}");
@@ -251,21 +296,20 @@ fn moving_a_far_goal_by_the_stated_amount_brings_it_into_reach() {
         - Vector3::new(0.0, 0.0, 0.07455))
     .normalize();
     let far = Translation3::from(outwards * 0.05) * base;
-    let error = inverse_nearest(&far, &[0.0; 6], &JointLimits::default()).unwrap_err();
+    let error = inverse_nearest(&far, &[0.0; 6], &turns()).unwrap_err();
     let IkError::Unreachable { obstacle: Obstacle::TooFar { needed_m, reach_m } } = error else {
         panic!("{error}");
     };
     let back = Translation3::from(-outwards * (needed_m - reach_m + 1e-6)) * far;
-    assert!(inverse_nearest(&back, &[0.0; 6], &JointLimits::default()).is_ok());
+    assert!(inverse_nearest(&back, &[0.0; 6], &turns()).is_ok());
 }
 
 #[test]
 fn limits_that_exclude_every_branch_name_the_joint() {
     let joints = [0.4, 0.3, -1.4, 0.5, 1.2, 0.7];
     let goal = forward(&joints).arm_from_connection;
-    let mut limits = JointLimits::default();
-    limits.min_rad[5] = 3.0;
-    limits.max_rad[5] = 3.05;
+    let mut limits = turns();
+    (limits[5].min, limits[5].max) = (3.0, 3.05);
     let error = inverse_nearest(&goal, &joints, &limits).unwrap_err();
     let IkError::OutsideLimits { joint, needed_deg, min_deg, max_deg } = error else { panic!("{error}") };
     assert_eq!(joint, 5);
@@ -278,8 +322,8 @@ fn a_joint_range_of_its_own_is_filled_by_a_full_turn() {
     // The public scene's joint 6 runs from 0 to two turns.
     let joints = [0.4, 0.3, -1.4, 0.5, 1.2, -0.7];
     let goal = forward(&joints).arm_from_connection;
-    let mut limits = JointLimits::default();
-    (limits.min_rad[5], limits.max_rad[5]) = (0.0, 2.0 * TAU);
+    let mut limits = turns();
+    (limits[5].min, limits[5].max) = (0.0, 2.0 * TAU);
     let mut seed = joints;
     seed[5] = 5.0;
     let found = inverse_nearest(&goal, &seed, &limits).unwrap();
