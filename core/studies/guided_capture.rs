@@ -3,16 +3,19 @@
 //! ```text
 //! cargo run --release -p handeye_core --example guided_capture -- choice 200
 //! cargo run --release -p handeye_core --example guided_capture -- stop 1000
+//! cargo run --release -p handeye_core --example guided_capture -- speed 20
 //! ```
 //!
 //! `choice`: the expected error of the tip over the box about the board, by the true model and the poses that were taken, in
 //! sessions that begin with one view of the board. Farthest rotation and random views know from the beginning where camera
 //! and board are; guided capture does not. The optimum is the best set of so many views out of the same thousand, by
-//! exchange. `stop`: what is true when guided capture ends by itself.
+//! exchange. `stop`: what is true when guided capture ends by itself. `speed`: how long the choice of a pose takes, on one
+//! thread, with a thousand candidates and six poses ahead.
 
 #![expect(clippy::expect_used, clippy::print_stdout, reason = "a study prints, and stops at what cannot be")]
 
 use std::env;
+use std::time::Instant;
 
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
@@ -21,8 +24,9 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::nalgebra::{Matrix6, Point3, UnitQuaternion, Vector3};
 use handeye_core::plan::guided::candidates::ViewRange;
 use handeye_core::plan::guided::design::{Design, weight_of};
-use handeye_core::plan::guided::{Ending, GuidedOptions, Step};
+use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Known, Step};
 use handeye_core::plan::travel;
+use handeye_core::progress::CancelToken;
 use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
 use handeye_core::testing::sessions::{BOARD, REALISTIC};
 use rand::SeedableRng as _;
@@ -43,7 +47,8 @@ fn main() {
     match what.as_str() {
         "choice" => choice(sessions),
         "stop" => stop(sessions),
-        other => println!("{other:?} is none of choice, stop"),
+        "speed" => speed(sessions),
+        other => println!("{other:?} is none of choice, stop, speed"),
     }
 }
 
@@ -305,6 +310,35 @@ fn spread(mut of: Vec<f64>) -> String {
     of.sort_by(f64::total_cmp);
     let mean = of.iter().sum::<f64>() / of.len() as f64;
     format!("{mean:>8.3} ({:5.3})", of[(of.len() * 9 / 10).min(of.len() - 1)])
+}
+
+fn speed(sessions: u64) {
+    println!("median time to choose the eleventh pose, ms, {sessions} sessions");
+    for (arm, mode) in SETUPS {
+        for free_lens in [false, true] {
+            let mut times: Vec<f64> = (0..sessions)
+                .map(|seed| {
+                    let mut cell = GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens, seed });
+                    let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
+                    let calibration = cell.calibrate();
+                    let known = Known {
+                        observations: &cell.observations,
+                        calibration: calibration.as_ref(),
+                        is_sound: true,
+                        robot: Some(&cell.robot),
+                        elapsed_s: 0.0,
+                    };
+                    let mut guide = Guide::new(GuidedOptions { goal_m: 0.0, ..GuidedOptions::default() });
+                    let began = Instant::now();
+                    let _next = guide.next(&known, &CancelToken::default());
+                    began.elapsed().as_secs_f64() * 1e3
+                })
+                .collect();
+            times.sort_by(f64::total_cmp);
+            let lens = if free_lens { "lens estimated" } else { "lens known" };
+            println!("{arm:?}, {mode:?}, {lens}: {:.0}", times[times.len() / 2]);
+        }
+    }
 }
 
 fn stop(sessions: u64) {

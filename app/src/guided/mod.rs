@@ -6,3 +6,6 @@
 pub(crate) mod pane;
 pub mod state;
 mod update;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,90 @@
+use handeye_core::plan::guided::{Ending, GuidedOptions, Why};
+
+use super::pane::{begin_ui, progress_ui};
+use super::state::{GuidedProgress, Waits};
+use crate::command::Command;
+use crate::gui::testing::driven::Driven;
+use crate::gui::testing::sample;
+use crate::model::{CapturePurpose, Jog, Model, Motion, PoseSequence, StopOutcome};
+use crate::text::Language;
+
+const BUTTON: &str = "Calibrate for me";
+
+fn pane(model: Model) -> Driven {
+    Driven::new(
+        |ui, model, outbox| {
+            begin_ui(ui, model, None, 30.0, outbox);
+            if let Some(sequence) = &model.sequence {
+                progress_ui(ui, model, sequence);
+            }
+        },
+        model,
+    )
+}
+
+/// A cell with a known arm and the board in view.
+fn ready() -> Model {
+    let mut model = sample::solved();
+    model.board_seen_s = Some(model.now_s);
+    model
+}
+
+fn under_way(waits: Waits, ending: Option<Ending>) -> Model {
+    let mut model = ready();
+    let guided = GuidedProgress {
+        waits,
+        ending,
+        why: Some(Why::Gain { from_m: 8e-4, to_m: 5e-4, rotation_part: 0.9 }),
+        ..GuidedProgress::new(GuidedOptions::default())
+    };
+    model.sequence = Some(PoseSequence {
+        names: vec!["G1".to_owned(), "G2".to_owned()],
+        planned: Some(vec![[0.0; 6].into(); 2]),
+        purpose: Some(CapturePurpose::Calibrate),
+        outcomes: vec![StopOutcome::Done],
+        began_s: 90.0,
+        guided: Some(Box::new(guided)),
+    });
+    model.sequence_runs = true;
+    model
+}
+
+#[test]
+fn it_is_offered_where_it_can_begin() {
+    let mut pane = pane(ready());
+    assert_eq!(pane.click(BUTTON), [Command::CalibrateForMe]);
+    let is_blocked = |change: fn(&mut Model)| {
+        let mut model = ready();
+        change(&mut model);
+        assert!(!self::pane(model).is_enabled(BUTTON));
+    };
+    is_blocked(|model| model.cell.iter_mut().for_each(|cell| cell.arm = None));
+    is_blocked(|model| model.motion = Motion::Jogging(Jog::Joint { index: 0, forward: true }));
+    is_blocked(|model| model.planning = true);
+    let mut unseen = sample::connected();
+    unseen.board_seen_s = None;
+    assert!(!self::pane(unseen).is_enabled(BUTTON), "there is no board to begin with");
+}
+
+#[test]
+fn what_is_under_way_and_why_stands_in_the_pane() {
+    let pane = self::pane(under_way(Waits::Nothing, None));
+    assert!(pane.sees("Pose 2: on the way, then a capture"));
+    assert!(pane.sees("Lowers the expected error from 0.800 to 0.500 mm, mostly in the rotation of the camera"));
+    assert!(pane.sees("goal 0.500 mm"));
+    assert!(self::pane(under_way(Waits::Choice, None)).sees("Choosing pose 2"));
+    let checking = under_way(Waits::Nothing, Some(Ending::GoalReached { error_m: 3e-4 }));
+    assert!(self::pane(checking).sees("Check 1 of 3"));
+}
+
+#[test]
+fn how_it_ended_is_said_in_the_language_of_the_window_and_it_can_begin_again() {
+    let mut model = under_way(Waits::Nothing, Some(Ending::GoalReached { error_m: 3e-4 }));
+    model.sequence_runs = false;
+    let ended = pane(model.clone());
+    assert!(ended.sees("The goal is reached: the expected error is 0.300 mm"));
+    assert!(ended.is_enabled(BUTTON) && ended.nothing_is_cut_off());
+    model.view.language = Language::Chinese;
+    let chinese = pane(model);
+    assert!(chinese.sees("已达到目标：期望误差为 0.300 mm") && chinese.sees("自动标定"));
+}
