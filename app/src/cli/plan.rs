@@ -35,7 +35,7 @@ pub struct PlanArgs {
 struct PlanDocument {
     format: &'static str,
     version: u32,
-    /// The error that is stated now, 95 %, millimetres.
+    /// The error now by the noise alone, 95 %, millimetres.
     error_mm: f64,
     poses: Vec<PlannedPose>,
 }
@@ -119,7 +119,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
 }
 
 fn table(document: &PlanDocument) -> String {
-    let mut text = format!("expected error now: {:.3} mm (95 %)\n", document.error_mm);
+    let mut text = format!("expected error now, by the noise alone: {:.3} mm (95 %)\n", document.error_mm);
     text += "poses of the tip in the base; whether the arm reaches them is not checked\n";
     text += "      x [mm]    y [mm]    z [mm]       qx       qy       qz       qw   then [mm]\n";
     for (index, pose) in document.poses.iter().enumerate() {

@@ -1,13 +1,14 @@
 //! The button that begins, and what is under way.
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
+use handeye_core::estimate::handeye::Mode;
 
 use super::state::{CHECKS, GuidedProgress, Waits};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::Marks;
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
-use crate::model::{Model, Motion, PoseSequence};
+use crate::model::{Model, Motion, Pane, PoseSequence};
 use crate::taught::pane::immovable;
 use crate::text::Text;
 use crate::{text, tr};
@@ -28,6 +29,12 @@ pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, hei
     }
 }
 
+/// Whether there is more to reach: no captures yet, or an answer that is not below the goal.
+pub fn is_wanted(model: &Model) -> bool {
+    let error_mm = model.solve.solved.as_ref().and_then(|solved| solved.result.quality.tip_error_95_mm);
+    model.document().captures.is_empty() || error_mm.is_none_or(|error_mm| error_mm > model.view.goal.0 * 1e3)
+}
+
 /// Why it cannot begin.
 fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static str> {
     let language = model.view.language;
@@ -35,6 +42,8 @@ fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static st
         Some(why)
     } else if model.cell.as_ref().is_none_or(|cell| cell.arm.is_none()) {
         Some(tr!(language, "This arm's kinematics is not known, so no poses can be chosen: move it yourself"))
+    } else if model.document().meta.mode == Mode::EyeToHand {
+        Some(tr!(language, "Poses are chosen for a camera on the tip only: take these captures yourself"))
     } else if model.motion != Motion::Idle {
         Some(tr!(language, "The arm is moving: wait until it stands, or stop it"))
     } else if model.board_seen_s.is_none() && model.document().captures.is_empty() {
@@ -49,7 +58,9 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
     let language = model.view.language;
     let Some(guided) = sequence.guided.as_deref() else { return };
     if !model.sequence_runs {
-        if let Some(ending) = guided.ending {
+        if let Some(message) = model.messages.standing_in(Pane::Poses) {
+            parts::notice_ui(ui, Tone::Warning, &message.text.say(language), |_| ());
+        } else if let Some(ending) = guided.ending.filter(|_| model.solve.fresh) {
             let tone = if ending.is_success() { Tone::Good } else { Tone::Warning };
             parts::notice_ui(ui, tone, &ending.text().say(language), |_| ());
         }
@@ -62,7 +73,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
     if let Some(why) = &guided.why {
         parts::hint_ui(ui, &why.text().say(language));
     }
-    if let Some(error) = error_and_goal(model) {
+    if let Some(error) = error_and_goal(model, guided) {
         ui.label(error.say(language));
     }
 }
@@ -80,11 +91,11 @@ pub fn under_way(sequence: &PoseSequence, guided: &GuidedProgress) -> Text {
     }
 }
 
-fn error_and_goal(model: &Model) -> Option<Text> {
+fn error_and_goal(model: &Model, guided: &GuidedProgress) -> Option<Text> {
     let error_mm = model.solve.solved.as_ref()?.result.quality.tip_error_95_mm?;
     Some(text!(
         "Expected error {error} mm (95 %), goal {goal} mm",
         error = format!("{error_mm:.3}"),
-        goal = format!("{:.3}", model.view.goal.0 * 1e3)
+        goal = format!("{:.3}", guided.guide.options().goal_m * 1e3)
     ))
 }

@@ -30,6 +30,8 @@ pub struct GuidedProgress {
     pub ending: Option<Ending>,
     /// Captures so far that check it.
     pub checked: usize,
+    /// Poses that were tried for that.
+    pub tried: usize,
 }
 
 /// What a guided sequence waits for.
@@ -53,6 +55,7 @@ impl GuidedProgress {
             ahead: Vec::new(),
             ending: None,
             checked: 0,
+            tried: 0,
         }
     }
 }

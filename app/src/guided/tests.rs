@@ -71,7 +71,7 @@ fn what_is_under_way_and_why_stands_in_the_pane() {
     let pane = self::pane(under_way(Waits::Nothing, None));
     assert!(pane.sees("Pose 2: on the way, then a capture"));
     assert!(pane.sees("Lowers the expected error from 0.800 to 0.500 mm, mostly in the rotation of the camera"));
-    assert!(pane.sees("goal 0.500 mm"));
+    assert!(pane.sees("goal 0.300 mm"), "the goal that it began with");
     assert!(self::pane(under_way(Waits::Choice, None)).sees("Choosing pose 2"));
     let checking = under_way(Waits::Nothing, Some(Ending::GoalReached { error_m: 3e-4 }));
     assert!(self::pane(checking).sees("Check 1 of 3"));

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use handeye_core::estimate::Method;
 use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::plan::guided::{Ending, GuidedOptions, Next};
 
@@ -18,10 +19,14 @@ impl App {
             return;
         }
         let Some(joints) = self.model.robot.as_ref().map(|robot| robot.joints_rad) else { return };
-        let options = GuidedOptions { goal_m: self.model.view.goal.0, ..GuidedOptions::default() };
-        let has_views = self.model.document().in_use().any(|it| self.corners(it.id).is_some());
+        let views = self.model.document().in_use().filter(|it| self.corners(it.id).is_some()).count();
+        let default = GuidedOptions::default();
+        let most_views = default.most_views + views;
+        let options = GuidedOptions { goal_m: self.model.view.goal.0, most_views, ..default };
+        // What a view adds is known of the joint estimate alone.
+        self.set_method(Method::Joint.name());
         self.model.messages.is_over_in(Pane::Poses);
-        let here = if has_views { Vec::new() } else { vec![joints] };
+        let here = if views > 0 { Vec::new() } else { vec![joints] };
         self.begin_sequence(PoseSequence {
             names: here.iter().map(|_| pose_name(1)).collect(),
             planned: Some(here),
@@ -30,6 +35,32 @@ impl App {
             began_s: self.model.now_s,
             guided: Some(Box::new(GuidedProgress::new(options))),
         });
+    }
+
+    /// Whether the last sequence is a guided one that was broken off: it goes on with a choice from where the arm is now,
+    /// because the way to the pose that was left out is another one than was checked.
+    pub(crate) fn continue_guided(&mut self) -> bool {
+        let is_idle = !self.model.sequence_runs && !self.model.planning;
+        let Some(sequence) = self.model.sequence.as_mut().filter(|_| is_idle) else { return false };
+        let (visited, Some(guided)) = (sequence.outcomes.len(), sequence.guided.as_deref_mut()) else { return false };
+        guided.waits = Waits::Answer;
+        guided.ahead.clear();
+        sequence.names.truncate(visited);
+        if let Some(planned) = &mut sequence.planned {
+            planned.truncate(visited);
+        }
+        self.model.sequence_runs = true;
+        if self.model.document().captures.is_empty() {
+            self.calibrate_again();
+        }
+        self.guided_step();
+        true
+    }
+
+    /// From the beginning.
+    fn calibrate_again(&mut self) {
+        self.model.sequence_runs = false;
+        self.calibrate_for_me();
     }
 
     fn guided_mut(&mut self) -> Option<&mut GuidedProgress> {
@@ -52,7 +83,8 @@ impl App {
     pub(crate) fn guided_visited(&mut self, outcome: &StopOutcome) {
         let Some(guided) = self.guided_mut() else { return };
         if guided.ending.is_some() {
-            guided.checked += 1;
+            guided.tried += 1;
+            guided.checked += usize::from(*outcome == StopOutcome::Done);
             return;
         }
         match outcome {
@@ -68,7 +100,7 @@ impl App {
         if waits != Some(Waits::Answer) || self.model.capture.is_some() {
             return;
         }
-        if matches!(self.model.solve.status, SolveStatus::Running { .. }) || !self.is_answered() {
+        if matches!(self.model.solve.status, SolveStatus::Running { .. }) || !self.is_asked() {
             return;
         }
         let solved = self.model.solve.solved.clone().filter(|_| self.model.solve.fresh);
@@ -78,7 +110,7 @@ impl App {
         let elapsed_s = self.model.now_s - sequence.began_s;
         let Some(guided) = sequence.guided.as_deref_mut() else { return };
         guided.waits = Waits::Choice;
-        let check = guided.ending.map(|_| guided.checked);
+        let check = guided.ending.map(|_| guided.tried);
         let request = GuideRequest { guide: guided.guide.clone(), observations, solved, elapsed_s, check };
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         if self.workers.guide(self.numbers.motion, request).is_err() {
@@ -135,6 +167,13 @@ impl App {
 
     /// No more poses for the fit. Where there is an answer it is checked.
     fn choice_ended(&mut self, ending: Ending) {
+        if matches!(self.model.solve.status, SolveStatus::Running { .. }) {
+            // The captures or the goal are others than those that were chosen by.
+            if let Some(guided) = self.guided_mut() {
+                guided.waits = Waits::Answer;
+            }
+            return;
+        }
         let has_answer = self.model.solve.fresh;
         let Some(sequence) = self.model.sequence.as_mut() else { return };
         if let Some(guided) = sequence.guided.as_deref_mut() {
@@ -151,16 +190,14 @@ impl App {
     }
 
     fn guided_checks(&mut self) {
-        if self.guided_mut().is_some_and(|guided| guided.checked >= CHECKS) {
-            self.guided_finished();
-        } else {
+        if !self.guided_is_over() {
             self.guided_step();
         }
     }
 
     /// Whether the sequence is guided and over: then it has been said how it went.
     pub(crate) fn guided_is_over(&mut self) -> bool {
-        if self.guided_mut().is_some_and(|guided| guided.ending.is_some() && guided.checked >= CHECKS) {
+        if self.guided_mut().is_some_and(|guided| guided.checked >= CHECKS || guided.tried >= 2 * CHECKS) {
             self.guided_finished();
             return true;
         }
@@ -168,9 +205,29 @@ impl App {
     }
 
     fn guided_finished(&mut self) {
-        let Some(ending) = self.guided_mut().and_then(|guided| guided.ending) else { return };
+        let Some((ending, checked)) = self.guided_mut().and_then(|guided| Some((guided.ending?, guided.checked)))
+        else {
+            return;
+        };
+        if checked < CHECKS {
+            let said = text!(
+                "{ending}. It was checked at {checked} of {of} poses only: see why in the log, and verify where you can",
+                ending = ending.text(),
+                checked = checked,
+                of = CHECKS
+            );
+            return self.guided_ends(Severity::Warning, said);
+        }
         let severity = if ending.is_success() { Severity::Info } else { Severity::Warning };
         self.guided_ends(severity, ending.text());
+    }
+
+    /// A guided sequence is of one target and one set-up.
+    pub(crate) fn forget_guided(&mut self) {
+        if self.model.sequence.as_ref().is_some_and(|sequence| sequence.guided.is_some()) {
+            self.stop_sequence();
+            self.model.sequence = None;
+        }
     }
 
     fn guided_ends(&mut self, severity: Severity, why: Text) {

@@ -1,17 +1,20 @@
 //! The motion worker: moves the arm, one thing at a time, and says how it ended.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
+use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{FollowMoment, FollowWish as ArmWish};
 
 use super::desk::{MotionQueue, MotionTask, Work};
 use super::jog_line::Held;
 use crate::command::Event;
-use crate::guided::state::GuideRequest;
+use crate::guided::state::{Choice, GuideRequest};
 use crate::model::{FollowStatus, FollowWish, Link, MotionGoal, MotionId, MotionOutcome, Severity};
 use crate::text;
+use crate::text::Text;
 use crate::track::follow_line::FollowLine;
 use crate::worker::link::{Duty, Outlet};
 use crate::worker::port::{Connected, Connector, JogRequest, MotionPort, PortError, Room, ViewsRequest};
@@ -89,7 +92,7 @@ impl Motions {
         outlet: &Outlet,
     ) -> Result<(), PortError> {
         let (outcome, ended) = match port.robot() {
-            Ok(robot) => (robot.map(|robot| Box::new(request.choose(&robot, cancel))), Ok(())),
+            Ok(robot) => (robot.and_then(|robot| chosen(request, &robot, cancel)), Ok(())),
             Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
         };
         self.desk.done();
@@ -200,4 +203,10 @@ impl Duty for Motions {
     ) -> Result<(), PortError> {
         Ok(())
     }
+}
+
+/// A defect in the choice must not take the thread that moves the arm.
+fn chosen(request: &GuideRequest, robot: &Robot, cancel: &CancelToken) -> Result<Box<Choice>, Text> {
+    let chosen = catch_unwind(AssertUnwindSafe(|| request.choose(robot, cancel)));
+    chosen.map(Box::new).map_err(|_panic| text!("The choice of a pose failed by a defect of this program: report it"))
 }

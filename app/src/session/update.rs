@@ -79,10 +79,12 @@ impl App {
     }
 
     pub(crate) fn set_target(&mut self, target: TargetSpec) {
+        self.forget_guided();
         self.edit(Edit::SetTarget(target));
     }
 
     pub(crate) fn set_mode(&mut self, mode: Mode) {
+        self.forget_guided();
         self.edit(Edit::SetMode(mode));
     }
 

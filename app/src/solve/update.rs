@@ -90,7 +90,7 @@ impl App {
     }
 
     /// Whether the present question was asked, of captures that have all been looked at.
-    pub(crate) fn is_answered(&self) -> bool {
+    pub(crate) fn is_asked(&self) -> bool {
         let document = self.model.document();
         let are_seen = document.captures.iter().all(|it| self.model.observed.contains_key(&it.id));
         are_seen && self.asked.as_ref() == Some(&self.question())

@@ -40,6 +40,9 @@ impl App {
 
     /// Goes on with a sequence that was broken off: the pose at which that was is visited again.
     pub(crate) fn continue_sequence(&mut self) {
+        if self.continue_guided() {
+            return;
+        }
         let left = self.model.sequence.as_ref().and_then(PoseSequence::current);
         if left.is_some() && !self.model.sequence_runs && !self.model.planning {
             self.model.sequence_runs = true;

@@ -13,7 +13,7 @@ use crate::capture::rows::{self, CaptureTable};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::{self, Marks};
 use crate::gui::style::theme::{Palette, Tone};
-use crate::guided::pane::{begin_ui, progress_ui};
+use crate::guided::pane::{begin_ui, is_wanted, progress_ui};
 use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
 use crate::live::textures::Thumbnails;
@@ -109,7 +109,9 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
         return;
     }
     let calibrates = |sequence: &&PoseSequence| sequence.purpose == Some(CapturePurpose::Calibrate);
-    begin_ui(ui, model, hindrance, height, outbox);
+    if is_wanted(model) {
+        begin_ui(ui, model, hindrance, height, outbox);
+    }
     if let Some(sequence) = model.sequence.as_ref().filter(calibrates) {
         sequence::continue_ui(ui, model, sequence, outbox);
     }

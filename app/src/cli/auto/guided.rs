@@ -76,14 +76,15 @@ impl<'a, 's> GuidedSequence<'a, 's> {
             let (observations, calibration) = self.solve()?;
             let robot = self.robot()?;
             let known = self.known(&observations, calibration.as_ref(), &robot);
-            let plan = match self.guide.next(&known, self.sequence.cancel) {
+            let next = self.guide.next(&known, self.sequence.cancel);
+            self.check_cancelled()?;
+            let plan = match next {
                 Next::End(ending) => break ending,
                 Next::Go { plan, why } => {
                     tracing::info!("{}", why.text().say(Language::English));
                     plan
                 }
             };
-            self.check_cancelled()?;
             let Some(proposal) = plan.proposals.first() else { break Ending::NothingInReach { candidates: 0 } };
             if self.visit(&goal(proposal), CapturePurpose::Calibrate)? {
                 self.guide.captured();
@@ -99,6 +100,9 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     /// Captures that were not designed and never enter the fit.
     fn check(&mut self) -> Result<(), Failure> {
         let (observations, calibration) = self.solve()?;
+        if calibration.is_none() {
+            return Ok(());
+        }
         for index in 0..self.checks {
             let robot = self.robot()?;
             let known = self.known(&observations, calibration.as_ref(), &robot);

@@ -31,8 +31,8 @@ const TILT_RAD: f64 = 50.0 * std::f64::consts::PI / 180.0;
 const BORDER_SQUARES: f64 = 1.0;
 
 impl ViewRange {
-    /// About the distances \[m\] that the board has been seen from: half as near and half as far again, where cameras of a
-    /// fixed focus are still sharp.
+    /// About the distances \[m\] that somebody chose to see the board from: from two thirds of the nearest to one and a half
+    /// times the farthest, where cameras of a fixed focus are still sharp.
     pub fn about(distances_m: impl Iterator<Item = f64>) -> Option<Self> {
         let (nearest, farthest) =
             distances_m.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), d| (low.min(d), high.max(d)));
@@ -42,14 +42,6 @@ impl ViewRange {
             margin_px: 12.0,
             spacing_px: 8.0,
         })
-    }
-
-    /// The same, but no nearer and no farther than a given range \[m\].
-    #[must_use]
-    pub fn within(self, distance_m: [f64; 2]) -> Self {
-        let [low, high] = self.distance_m;
-        let distance_m = [low.clamp(distance_m[0], distance_m[1]), high.clamp(distance_m[0], distance_m[1])];
-        Self { distance_m, ..self }
     }
 
     /// A view with the middle of the board anywhere in the image, turned and tilted at random. Whether it is wholly in the

@@ -30,7 +30,7 @@ const FAILED_NEAR: (f64, f64) = (0.04, 8.0 * std::f64::consts::PI / 180.0);
 pub struct Robot {
     /// The arm, with what is on its tip.
     pub arm: Arm,
-    /// What it must not touch, the board included.
+    /// What it must not touch, besides the board.
     pub obstacles: Vec<Obstacle>,
     /// Free space around arm and tool, metres.
     pub clearance_m: f64,
@@ -72,7 +72,8 @@ pub struct Proposal {
     pub travel_s: f64,
     /// Expected error over the box with it and those before it in the plan, over that without any of them.
     pub error_ratio: f64,
-    /// Part of what it lowers the criterion by that is rotation of the camera; the rest is its position.
+    /// Of what it lowers the variances of rotation and position of the camera by, each weighed by what it does to the
+    /// tip, the part of rotation; what the two have in common is in neither.
     pub rotation_part: f64,
 }
 
@@ -85,8 +86,6 @@ pub struct Plan {
     pub best_ratio: f64,
     /// Views that were compared.
     pub candidates: usize,
-    /// Of these the arm was asked for a way to so many.
-    pub ways: usize,
 }
 
 /// What a plan is made from.
@@ -102,6 +101,8 @@ pub struct Chooser<'a> {
     pub robot: Option<&'a Robot>,
     /// Tip poses of the views so far.
     pub taken: &'a [Pose<Base, Tip>],
+    /// Ends the search: what is found is then shorter, or nothing.
+    pub cancel: &'a CancelToken,
 }
 
 /// How the arm gets to a candidate.
@@ -131,32 +132,32 @@ impl Chooser<'_> {
     /// the other is taken out of the plan for the best one in its place, while that helps. Of the plan that view comes
     /// first which lowers the error most per second, of those that the arm can be driven to on a straight path in joint
     /// space.
-    pub fn plan(&self, design: &Design, options: &ChooseOptions<'_>, cancel: &CancelToken) -> Plan {
-        let mut pool = self.pool(design, options, cancel);
+    pub fn plan(&self, design: &Design, options: &ChooseOptions<'_>) -> Plan {
+        let mut pool = self.pool(design, options);
         let mut ways = 0;
         let mut chosen: Vec<usize> = Vec::with_capacity(options.ahead);
         let mut with_chosen = design.clone();
-        while chosen.len() < options.ahead && !cancel.is_cancelled() {
+        while chosen.len() < options.ahead {
             let Some(best) = self.best(&mut pool, &with_chosen, &chosen, f64::INFINITY, &mut ways) else { break };
             with_chosen = with_chosen.with(&pool[best].view);
             chosen.push(best);
         }
         let best_ratio = chosen.first().map_or(1.0, |&best| design.error_with_m(&pool[best].view) / design.error_m());
-        self.exchange(&mut pool, design, &mut chosen, &mut ways, cancel);
+        self.exchange(&mut pool, design, &mut chosen, &mut ways);
         let first = self.first(&mut pool, design, &chosen, options, &mut ways);
         let Some(first) = first else {
-            return Plan { proposals: Vec::new(), best_ratio: 1.0, candidates: pool.len(), ways };
+            return Plan { proposals: Vec::new(), best_ratio: 1.0, candidates: pool.len() };
         };
         chosen.retain(|&k| k != first);
         chosen.insert(0, first);
         chosen.truncate(options.ahead);
         let proposals = proposals(&pool, design, &chosen);
-        Plan { proposals, best_ratio, candidates: pool.len(), ways }
+        Plan { proposals, best_ratio, candidates: pool.len() }
     }
 
     /// A view at random that the arm gets to on a straight path in joint space.
-    pub fn at_random(&self, design: &Design, options: &ChooseOptions<'_>, cancel: &CancelToken) -> Option<Proposal> {
-        let mut pool = self.pool(design, options, cancel);
+    pub fn at_random(&self, design: &Design, options: &ChooseOptions<'_>) -> Option<Proposal> {
+        let mut pool = self.pool(design, options);
         let mut ways = 0;
         let found =
             (0..pool.len()).find(|&k| self.way(&mut pool[k], &mut ways).is_some() && self.path_is_free(&pool[k]))?;
@@ -164,13 +165,13 @@ impl Chooser<'_> {
     }
 
     /// Views at random that are wholly in the image, with what they are expected to say.
-    fn pool(&self, design: &Design, options: &ChooseOptions<'_>, cancel: &CancelToken) -> Vec<Candidate> {
+    fn pool(&self, design: &Design, options: &ChooseOptions<'_>) -> Vec<Candidate> {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
         let (intrinsics, target) = (self.model.intrinsics(), self.target);
         let all: Vec<usize> = (0..target.len()).collect();
         let mut pool = Vec::with_capacity(options.candidates);
         for _ in 0..options.candidates * DRAWS_PER_CANDIDATE {
-            if pool.len() >= options.candidates || cancel.is_cancelled() {
+            if pool.len() >= options.candidates || self.cancel.is_cancelled() {
                 break;
             }
             let Some(drawn) = self.range.draw(&mut rng, intrinsics, target) else { continue };
@@ -225,6 +226,9 @@ impl Chooser<'_> {
 
     /// The joint values at a candidate and how long it takes there, if the arm gets to it.
     fn way(&self, candidate: &mut Candidate, ways: &mut usize) -> Option<(Option<JointValues>, f64)> {
+        if self.cancel.is_cancelled() {
+            return None;
+        }
         if candidate.way == Way::Unknown {
             candidate.way = match self.robot {
                 None => Way::To { joints: None, travel_s: 0.0 },
@@ -242,20 +246,10 @@ impl Chooser<'_> {
     }
 
     /// Takes views out of the plan for better ones in their place.
-    fn exchange(
-        &self,
-        pool: &mut [Candidate],
-        design: &Design,
-        chosen: &mut [usize],
-        ways: &mut usize,
-        cancel: &CancelToken,
-    ) {
+    fn exchange(&self, pool: &mut [Candidate], design: &Design, chosen: &mut [usize], ways: &mut usize) {
         for _ in 0..EXCHANGES {
             let mut changed = false;
             for place in 0..chosen.len() {
-                if cancel.is_cancelled() {
-                    return;
-                }
                 let others = chosen.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, &c)| c);
                 let without = others.fold(design.clone(), |design, k| design.with(&pool[k].view));
                 let now_m = without.error_with_m(&pool[chosen[place]].view);
@@ -292,14 +286,12 @@ impl Chooser<'_> {
         if let Some((_, k)) = by_rate.into_iter().find(|&(_, k)| self.path_is_free(&pool[k])) {
             return Some(k);
         }
-        let mut barred = chosen.to_vec();
-        while let Some(k) = self.best(pool, design, &barred, f64::INFINITY, ways) {
-            if self.path_is_free(&pool[k]) {
-                return Some(k);
-            }
-            barred.push(k);
-        }
-        None
+        let mut others: Vec<(f64, usize)> = (0..pool.len()).map(|k| (design.error_with_m(&pool[k].view), k)).collect();
+        others.sort_by(|a, b| a.0.total_cmp(&b.0));
+        others
+            .into_iter()
+            .map(|(_, k)| k)
+            .find(|&k| self.way(&mut pool[k], ways).is_some() && self.path_is_free(&pool[k]))
     }
 
     fn path_is_free(&self, candidate: &Candidate) -> bool {

@@ -70,7 +70,7 @@ impl Design {
         self.clone()
     }
 
-    /// Part of what lowered the criterion since `before` that is rotation of the camera, 0 to 1; the rest is its position.
+    /// Of what the two diagonal parts of the criterion lost since `before`, the part of the rotation of the camera, 0 to 1.
     pub fn rotation_part_of_gain(&self, before: &Self) -> f64 {
         let gain = |at: usize| {
             let of = |design: &Self| {

@@ -5,7 +5,7 @@
 //! times that angle and by the lever between tip and camera (or board), which is taken to be no longer than the board is
 //! away. Turns about two axes are what a first estimate needs.
 
-use nalgebra::{UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Unit, UnitQuaternion, Vector2, Vector3};
 
 use crate::geometry::frames::{Base, Pose, Tip};
 
@@ -24,8 +24,8 @@ const TURNS: [[f64; 3]; 8] = [
     [0.0, -1.0, 0.0],
     [0.0, 0.0, 1.0],
     [0.0, 0.0, -1.0],
-    [0.7, 0.7, 0.5],
-    [-0.7, -0.7, -0.5],
+    [0.6, 0.6, 0.529],
+    [-0.6, -0.6, -0.529],
 ];
 
 /// How far the tip may be turned so that corners which are there now stay in the image, radians, for a focal length in
@@ -38,15 +38,14 @@ pub fn free_turn_rad(corners_px: impl Iterator<Item = Vector2<f64>>, image_size:
     (PART * room_px.max(0.0) / focal_px).clamp(LEAST_RAD, LARGEST_RAD)
 }
 
-/// Pose `index` of the fan about a tip pose, with turns of `turn_rad`; after the last one it begins anew with turns twice
-/// as small, because what has been tried did not show the board.
-pub fn pose(about: &Pose<Base, Tip>, index: usize, turn_rad: f64) -> Pose<Base, Tip> {
-    let axis = Vector3::from(TURNS[index % TURNS.len()]);
-    let halved = 0.5_f64.powi((index / TURNS.len()) as i32);
-    let turn = UnitQuaternion::from_scaled_axis(axis * (turn_rad * halved));
+/// Pose `index` of the fan about a tip pose, and its turn \[rad\], with turns of `turn_rad`; after the last one it begins anew
+/// with turns half as large, in case the board left the image.
+pub fn pose(about: &Pose<Base, Tip>, index: usize, turn_rad: f64) -> (Pose<Base, Tip>, f64) {
+    let axis = Unit::new_normalize(Vector3::from(TURNS[index % TURNS.len()]));
+    let turn_rad = turn_rad * 0.5_f64.powi((index / TURNS.len()) as i32);
     let mut turned = *about.isometry();
-    turned.rotation *= turn;
-    Pose::from_isometry(turned)
+    turned.rotation *= UnitQuaternion::from_axis_angle(&axis, turn_rad);
+    (Pose::from_isometry(turned), turn_rad)
 }
 
 #[cfg(test)]
@@ -70,11 +69,13 @@ mod tests {
         let about: Pose<Base, Tip> =
             Pose::from_isometry(crate::geometry::se3::exp(&nalgebra::Vector6::new(0.3, 0.1, 0.5, 0.2, 1.0, 0.4)));
         let turn = |index| {
-            let pose = pose(&about, index, 0.2);
+            let (pose, stated_rad) = pose(&about, index, 0.2);
+            assert!((about.rotation().angle_to(&pose.rotation()) - stated_rad).abs() < 1e-12);
             assert!((pose.translation() - about.translation()).norm() < 1e-12);
             (about.rotation().inverse() * pose.rotation()).scaled_axis()
         };
         assert!(turn(0).normalize().dot(&turn(1).normalize()).abs() < 0.1);
-        assert!((turn(0).norm() - 0.2).abs() < 1e-12 && (turn(8).norm() - 0.1).abs() < 1e-12);
+        assert!((turn(0).norm() - 0.2).abs() < 1e-12 && (turn(6).norm() - 0.2).abs() < 1e-12);
+        assert!((turn(8).norm() - 0.1).abs() < 1e-12);
     }
 }

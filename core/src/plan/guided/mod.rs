@@ -29,6 +29,7 @@ use crate::estimate::{Calibration, CameraKnowledge, Observations, ViewStatus};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::point_error;
+use crate::plan::travel;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use candidates::ViewRange;
@@ -48,6 +49,12 @@ const LEVEL_SURE: f64 = 0.8;
 const TURN_PER_VIEW_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Views with a limit of that.
 const CAREFUL_VIEWS: usize = 6;
+/// Free space around the arm while there are fewer views than that: camera and board are not where they are taken to be.
+const CAREFUL_CLEARANCE_M: f64 = 0.05;
+/// Largest way of a joint to a pose of the fan, radians: more is another configuration, not a small turn.
+const LARGEST_FAN_WAY_RAD: f64 = 0.8;
+/// Poses in a row without a view after which it ends.
+const MOST_FAILURES: usize = 5;
 /// Poses of the fan that are tried before it is given up.
 const MOST_FAN: usize = 24;
 /// Views at random among which a check finds one that the arm gets to.
@@ -72,8 +79,6 @@ pub struct GuidedOptions {
     pub ahead: usize,
     /// What a capture takes after the arm has arrived, seconds.
     pub dwell_s: f64,
-    /// Nearest and farthest distance \[m\] from which the board is looked at; `None` for about what has been.
-    pub distance_m: Option<[f64; 2]>,
     /// Seed of everything random.
     pub seed: u64,
 }
@@ -88,7 +93,6 @@ impl Default for GuidedOptions {
             candidates: 1000,
             ahead: 6,
             dwell_s: 1.5,
-            distance_m: None,
             seed: 1,
         }
     }
@@ -131,13 +135,13 @@ pub enum Why {
         /// The turn.
         turn_rad: f64,
     },
-    /// What it lowers the error from and to, metres, and the part of the gain that is rotation of the camera.
+    /// What it lowers the error from and to, metres, and how much of that is rotation of the camera.
     Gain {
-        /// The 95 % error now.
+        /// The 95 % error now, by the noise alone.
         from_m: f64,
-        /// The 95 % error with it.
+        /// The same with it.
         to_m: f64,
-        /// Part of the gain that is rotation of the camera rather than its position.
+        /// See [`Proposal::rotation_part`].
         rotation_part: f64,
     },
 }
@@ -163,6 +167,15 @@ pub enum Ending {
     StartBlocked,
     /// The board was not seen from any of the first turns, or they determine nothing.
     NoStart,
+    /// So many poses in a row gave no view of the board.
+    BoardLost {
+        /// How many.
+        poses: usize,
+    },
+    /// There was an answer, and there is none now.
+    AnswerLost,
+    /// The best view would gain little, and what was found speaks against the answer.
+    Doubted,
     /// No view that would tell something can be reached.
     NothingInReach {
         /// Views that were compared.
@@ -179,7 +192,7 @@ pub struct Step {
     pub joints: Option<JointValues>,
     /// Why.
     pub why: Why,
-    /// The 95 % error that is stated after it, metres; `None` until there is one.
+    /// The 95 % error after it by the noise alone, metres; `None` until there is one.
     pub achieved_m: Option<f64>,
     /// How long the arm was to be on its way, seconds.
     pub travel_s: f64,
@@ -216,6 +229,9 @@ pub struct Guide {
     fan_tried: usize,
     below: usize,
     solved_views: usize,
+    /// Where the board was when the first choice was made: what a person chose, not the guide.
+    range: Option<ViewRange>,
+    failures: usize,
     steps: Vec<Step>,
     ended: Option<Ending>,
 }
@@ -223,7 +239,17 @@ pub struct Guide {
 impl Guide {
     /// Nothing is captured yet.
     pub fn new(options: GuidedOptions) -> Self {
-        Self { options, failed: Vec::new(), fan_tried: 0, below: 0, solved_views: 0, steps: Vec::new(), ended: None }
+        Self {
+            options,
+            failed: Vec::new(),
+            fan_tried: 0,
+            below: 0,
+            solved_views: 0,
+            range: None,
+            failures: 0,
+            steps: Vec::new(),
+            ended: None,
+        }
     }
 
     /// What is asked for.
@@ -242,6 +268,7 @@ impl Guide {
             step.outcome = Outcome::Failed;
             self.failed.push(step.base_from_tip);
         }
+        self.failures += 1;
     }
 
     /// The pose proposed last gave a view.
@@ -249,6 +276,7 @@ impl Guide {
         if let Some(step) = self.steps.last_mut() {
             step.outcome = Outcome::Captured;
         }
+        self.failures = 0;
     }
 
     /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which mean nothing.
@@ -256,8 +284,16 @@ impl Guide {
         let used = used_views(known.observations, known.calibration);
         if let Some(step) = self.steps.last_mut().filter(|step| step.outcome == Outcome::Captured) {
             step.achieved_m = known.calibration.and_then(Calibration::modelled_error_95_m);
+            let last = known.observations.views.len().wrapping_sub(1);
+            if known.calibration.is_some_and(|it| it.views.get(last).is_some_and(|v| v.status == ViewStatus::Outlier)) {
+                // It says nothing, and would be proposed again.
+                self.failed.push(step.base_from_tip);
+            }
         }
         let next = self.found(known, &used, cancel);
+        if cancel.is_cancelled() {
+            return next;
+        }
         match &next {
             Next::End(ending) => self.ended = Some(*ending),
             Next::Go { plan, why } => self.steps.extend(plan.proposals.first().map(|first| Step {
@@ -277,35 +313,52 @@ impl Guide {
         if let Some(ending) = self.ending(known, used.len()) {
             return Next::End(ending);
         }
+        if self.failures >= MOST_FAILURES && self.range.is_some() {
+            return Next::End(Ending::BoardLost { poses: self.failures });
+        }
         let is_blocked = |robot: &Robot| !robot.arm.is_free(&robot.joints, &robot.obstacles, robot.clearance_m);
         if used.len() <= 1 && known.robot.is_some_and(is_blocked) {
             return Next::End(Ending::StartBlocked);
         }
         let target = &known.observations.target;
         let model = known.calibration.and_then(|calibration| ViewModel::new(calibration, target));
-        let Some(model) = model else { return self.fan(known) };
+        let Some(model) = model else { return self.without_answer(known) };
         let noise = at_least(model.noise(), &LEAST_NOISE);
         let model = model.with_noise(noise);
         match self.plan(known, &model, used, cancel) {
-            None => self.fan(known),
-            Some((plan, stated_m)) => self.judged(plan, stated_m, used.len()),
+            None => self.without_answer(known),
+            Some((plan, modelled_m)) if plan.candidates > 0 => {
+                self.judged(plan, modelled_m, used.len(), known.is_sound)
+            }
+            // So little is known that no view is surely in the image: more of the small turns.
+            Some(_) => self.fan(known),
         }
     }
 
-    /// The plan from an estimate, and the error that is stated now, metres; `None` where the views so far determine nothing.
+    /// The first turns are for before there is an answer: later the arm is elsewhere, and they are no small moves.
+    fn without_answer(&mut self, known: &Known<'_>) -> Next {
+        if self.range.is_some() { Next::End(Ending::AnswerLost) } else { self.fan(known) }
+    }
+
+    /// The plan from an estimate, and its error now by the noise alone, metres; `None` where the views so far determine nothing.
     fn plan(
-        &self,
+        &mut self,
         known: &Known<'_>,
         model: &ViewModel,
         used: &[(Pose<Base, Tip>, Vec<usize>)],
         cancel: &CancelToken,
     ) -> Option<(Plan, f64)> {
-        let stated_m = known.calibration?.modelled_error_95_m()?;
-        let ground = self.ground(known, model, used)?;
+        let modelled_m = known.calibration?.modelled_error_95_m()?;
+        let ground = self.ground(known, model, used, cancel)?;
+        self.range = Some(ground.range);
         let options = ChooseOptions {
             candidates: self.options.candidates,
             ahead: self.options.ahead.min(self.options.most_views.saturating_sub(used.len())).max(1),
-            seed: self.options.seed.wrapping_add(used.len() as u64).wrapping_add(977 * self.failed.len() as u64),
+            seed: self
+                .options
+                .seed
+                .wrapping_add(known.observations.views.len() as u64)
+                .wrapping_add(977 * self.failed.len() as u64),
             dwell_s: self.options.dwell_s,
             failed: &self.failed,
             turn_rad: if used.len() < CAREFUL_VIEWS {
@@ -315,7 +368,7 @@ impl Guide {
             },
         };
         let chooser = ground.chooser(model, &known.observations.target);
-        Some((chooser.plan(&ground.design, &options, cancel), stated_m))
+        Some((chooser.plan(&ground.design, &options), modelled_m))
     }
 
     /// A pose that was not designed, to check the answer at: a view at random that the arm gets to. `index` counts the
@@ -325,7 +378,7 @@ impl Guide {
         let model = ViewModel::new(known.calibration?, target)?;
         let model = model.clone().with_noise(at_least(model.noise(), &LEAST_NOISE));
         let used = used_views(known.observations, known.calibration);
-        let ground = self.ground(known, &model, &used)?;
+        let ground = self.ground(known, &model, &used, cancel)?;
         let options = ChooseOptions {
             candidates: CHECK_CANDIDATES,
             ahead: 1,
@@ -335,11 +388,17 @@ impl Guide {
             failed: &self.failed,
             turn_rad: std::f64::consts::TAU,
         };
-        ground.chooser(&model, target).at_random(&ground.design, &options, cancel)
+        ground.chooser(&model, target).at_random(&ground.design, &options)
     }
 
     /// What a choice stands on; `None` where the views so far determine nothing.
-    fn ground(&self, known: &Known<'_>, model: &ViewModel, used: &[(Pose<Base, Tip>, Vec<usize>)]) -> Option<Ground> {
+    fn ground<'c>(
+        &self,
+        known: &Known<'_>,
+        model: &ViewModel,
+        used: &[(Pose<Base, Tip>, Vec<usize>)],
+        cancel: &'c CancelToken,
+    ) -> Option<Ground<'c>> {
         let joint = known.calibration?.joint.as_ref()?;
         let target = &known.observations.target;
         let views: Vec<ExpectedView> =
@@ -348,23 +407,25 @@ impl Guide {
         let design = Design::new(model.prior(), &views, weight)?;
         let distances =
             used.iter().map(|(pose, _)| (model.camera_from_target(pose).isometry() * target.centre()).coords.norm());
-        let range = ViewRange::about(distances)?;
-        let range = self.options.distance_m.map_or(range, |distance_m| range.within(distance_m));
+        let range = self.range.or_else(|| ViewRange::about(distances))?;
         let taken = used.iter().map(|(pose, _)| *pose).collect();
-        let robot = known.robot.map(|robot| with_board(robot, model, known.observations));
-        Some(Ground { design, range, robot, taken })
+        let mut robot = known.robot.map(|robot| with_board(robot, model, known.observations));
+        if let Some(robot) = robot.as_mut().filter(|_| used.len() < CAREFUL_VIEWS) {
+            robot.clearance_m = robot.clearance_m.max(CAREFUL_CLEARANCE_M);
+        }
+        Some(Ground { design, range, robot, taken, cancel })
     }
 
-    fn judged(&self, plan: Plan, stated_m: f64, views: usize) -> Next {
+    fn judged(&self, plan: Plan, modelled_m: f64, views: usize, is_sound: bool) -> Next {
         let Some(first) = plan.proposals.first() else {
             return Next::End(Ending::NothingInReach { candidates: plan.candidates });
         };
         let gain = 1.0 - plan.best_ratio;
         if views >= LEAST_VIEWS && gain < self.options.least_gain {
-            return Next::End(Ending::LittleToGain { gain });
+            return Next::End(if is_sound { Ending::LittleToGain { gain } } else { Ending::Doubted });
         }
-        let to_m = stated_m * first.error_ratio;
-        let why = Why::Gain { from_m: stated_m, to_m, rotation_part: first.rotation_part };
+        let to_m = modelled_m * first.error_ratio;
+        let why = Why::Gain { from_m: modelled_m, to_m, rotation_part: first.rotation_part };
         Next::Go { plan, why }
     }
 
@@ -378,7 +439,8 @@ impl Guide {
                 return Some(Ending::GoalReached { error_m });
             }
         }
-        if views >= self.options.most_views {
+        let in_fit = known.observations.views.iter().filter(|view| view.in_fit && view.corners.is_some()).count();
+        if in_fit >= self.options.most_views {
             return Some(Ending::MostViews);
         }
         (known.elapsed_s >= self.options.most_s).then_some(Ending::MostTime)
@@ -403,14 +465,16 @@ impl Guide {
         };
         let turn_rad = fan::free_turn_rad(corners.iter().map(|corner| corner.px), observations.image_size, focal_px);
         while self.fan_tried < MOST_FAN {
-            let base_from_tip = fan::pose(&about, self.fan_tried, turn_rad);
+            let (base_from_tip, turn_rad) = fan::pose(&about, self.fan_tried, turn_rad);
             self.fan_tried += 1;
             let joints = match known.robot {
                 None => None,
                 Some(robot) => {
                     let reached = robot.arm.reach(&base_from_tip, &robot.joints);
                     let free = reached.filter(|joints| {
-                        robot.arm.is_free(joints, &robot.obstacles, robot.clearance_m) && robot.path_is_free(joints)
+                        travel(&robot.joints, joints) <= LARGEST_FAN_WAY_RAD
+                            && robot.arm.is_free(joints, &robot.obstacles, robot.clearance_m)
+                            && robot.path_is_free(joints)
                     });
                     let Some(joints) = free else { continue };
                     Some(joints)
@@ -424,14 +488,15 @@ impl Guide {
                 error_ratio: 1.0,
                 rotation_part: 1.0,
             };
-            let plan = Plan { proposals: vec![proposal], best_ratio: 1.0, candidates: 1, ways: 1 };
+            let plan = Plan { proposals: vec![proposal], best_ratio: 1.0, candidates: 1 };
             return Next::Go { plan, why: Why::FirstTurns { turn_rad } };
         }
         Next::End(Ending::NoStart)
     }
 }
 
-/// The arm with camera and board where the estimate has them.
+/// The arm with what is on its tip, the camera or the middle of the board, where the estimate has it; and the board among what
+/// it must not touch where it is not on the tip.
 fn with_board(robot: &Robot, model: &ViewModel, observations: &Observations) -> Robot {
     let mut robot = robot.clone();
     match model.hand_eye() {
@@ -448,16 +513,24 @@ fn with_board(robot: &Robot, model: &ViewModel, observations: &Observations) -> 
 }
 
 /// What a choice stands on.
-struct Ground {
+struct Ground<'c> {
     design: Design,
     range: ViewRange,
     robot: Option<Robot>,
     taken: Vec<Pose<Base, Tip>>,
+    cancel: &'c CancelToken,
 }
 
-impl Ground {
+impl Ground<'_> {
     fn chooser<'a>(&'a self, model: &'a ViewModel, target: &'a TargetSpec) -> Chooser<'a> {
-        Chooser { model, target, range: &self.range, robot: self.robot.as_ref(), taken: &self.taken }
+        Chooser {
+            model,
+            target,
+            range: &self.range,
+            robot: self.robot.as_ref(),
+            taken: &self.taken,
+            cancel: self.cancel,
+        }
     }
 }
 

@@ -37,7 +37,7 @@ pub struct StepRecord {
     pub joints: Option<Vec<f64>>,
     /// Why this pose.
     pub why: String,
-    /// The error before it that was stated, 95 %, millimetres; `None` for the first turns.
+    /// The error before it by the noise alone, 95 %, millimetres; `None` for the first turns.
     pub before_mm: Option<f64>,
     /// The error that it was to lead to.
     pub promised_mm: Option<f64>,
@@ -143,6 +143,9 @@ impl Ending {
             Self::MostTime => "most_time",
             Self::StartBlocked => "start_blocked",
             Self::NoStart => "no_start",
+            Self::BoardLost { .. } => "board_lost",
+            Self::AnswerLost => "answer_lost",
+            Self::Doubted => "doubted",
             Self::NothingInReach { .. } => "nothing_in_reach",
         }
     }
@@ -167,6 +170,18 @@ impl Ending {
                 "No pose near the first one gave a view of the whole board that determines an answer: bring the board to the \
                  middle of the image, with the arm free to turn, and begin again"
             ),
+            Self::BoardLost { poses } => text!(
+                "{poses} poses in a row gave no view of the whole board: see that it stands where it stood, that light and lens \
+                 are as they were, and begin again",
+                poses = poses
+            ),
+            Self::AnswerLost => text!(
+                "There was an answer, and the captures that are in the fit now give none: solve again, or see what was found"
+            ),
+            Self::Doubted => text!(
+                "More poses would gain little, and what was found speaks against the answer: see the findings, do what they \
+                 say, and begin again"
+            ),
             Self::NothingInReach { candidates } => text!(
                 "Of {candidates} views of the board none can be reached on a free path: move the board towards the middle of \
                  the workspace and begin again",
@@ -175,7 +190,7 @@ impl Ending {
         }
     }
 
-    /// Whether the answer is as good as was asked for, or as good as it gets.
+    /// Whether the answer is as good as was asked for.
     pub fn is_success(&self) -> bool {
         matches!(self, Self::GoalReached { .. })
     }

@@ -57,7 +57,7 @@ fn the_first_moves_are_small_and_grow_with_what_is_known() {
             .map(|view| view.base_from_tip.expect("a robot").rotation().angle_to(&first.rotation()).to_degrees())
             .collect();
         assert!(turns[1..3].iter().all(|turn| *turn < 15.0), "{mode:?} {turns:?}");
-        assert!(turns[3] < 50.0, "{mode:?} {turns:?}");
+        assert!(turns[3] < 80.0, "{mode:?} {turns:?}");
         assert!(turns.iter().copied().fold(0.0, f64::max) > 45.0, "{mode:?} {turns:?}");
     }
 }
@@ -86,13 +86,49 @@ fn two_runs_of_one_seed_are_the_same_and_promises_are_kept() {
 }
 
 #[test]
-fn a_pose_that_failed_is_not_proposed_again_nor_its_neighbourhood() {
+fn a_pose_that_failed_is_not_proposed_again_and_many_in_a_row_end_it_as_a_lost_answer_does() {
     let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 3));
     let _begun = cell.run(GuidedOptions { most_views: 5, ..options(1e-9) });
     let calibration = cell.calibrate();
+    let known = Known {
+        observations: &cell.observations,
+        calibration: calibration.as_ref(),
+        is_sound: true,
+        robot: Some(&cell.robot),
+        elapsed_s: 0.0,
+    };
     let mut guide = Guide::new(options(1e-9));
     let mut tried: Vec<Pose<Base, Tip>> = Vec::new();
-    for _ in 0..6 {
+    for _ in 0..MOST_FAILURES {
+        let Next::Go { plan, .. } = guide.next(&known, &CancelToken::default()) else { panic!("there is more") };
+        let next = plan.proposals[0].base_from_tip;
+        for before in &tried {
+            let (m, rad) = before.distance_to(&next);
+            assert!(m >= 0.04 || rad >= 8_f64.to_radians(), "{m} m and {rad} rad from one that failed");
+        }
+        guide.failed();
+        tried.push(next);
+    }
+    let lost = guide.next(&known, &CancelToken::default());
+    assert_eq!(lost, Next::End(Ending::BoardLost { poses: MOST_FAILURES }));
+
+    // Without an answer the arm does not go back to the first turns from wherever it is now.
+    let mut guide = Guide::new(options(1e-9));
+    assert!(matches!(guide.next(&known, &CancelToken::default()), Next::Go { .. }));
+    guide.captured();
+    let without = Known { calibration: None, ..known };
+    assert_eq!(guide.next(&without, &CancelToken::default()), Next::End(Ending::AnswerLost));
+}
+
+/// A view that is left out as an outlier says nothing: the next proposal is another one.
+#[test]
+fn a_view_that_is_an_outlier_is_not_proposed_again() {
+    let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 8));
+    let _begun = cell.run(GuidedOptions { most_views: 10, ..options(1e-9) });
+    let mut guide = Guide::new(options(1e-9));
+    let mut proposed: Vec<Pose<Base, Tip>> = Vec::new();
+    for _ in 0..3 {
+        let calibration = cell.calibrate();
         let known = Known {
             observations: &cell.observations,
             calibration: calibration.as_ref(),
@@ -102,12 +138,17 @@ fn a_pose_that_failed_is_not_proposed_again_nor_its_neighbourhood() {
         };
         let Next::Go { plan, .. } = guide.next(&known, &CancelToken::default()) else { panic!("there is more") };
         let next = plan.proposals[0].base_from_tip;
-        for before in &tried {
+        if let Some(before) = proposed.last() {
             let (m, rad) = before.distance_to(&next);
-            assert!(m >= 0.04 || rad >= 8_f64.to_radians(), "{m} m and {rad} rad from one that failed");
+            assert!(m >= 0.04 || rad >= 8_f64.to_radians(), "{m} m and {rad} rad from the outlier");
         }
-        guide.failed();
-        tried.push(next);
+        proposed.push(next);
+        assert!(cell.capture(&plan.proposals[0].joints.expect("a chain")));
+        // The robot said that it is 3 cm from where it was.
+        let view = cell.observations.views.last_mut().expect("it was captured");
+        let off = nalgebra::Vector6::new(0.03, -0.02, 0.02, 0.0, 0.0, 0.0);
+        view.base_from_tip = view.base_from_tip.map(|pose| pose.perturbed(&off));
+        guide.captured();
     }
 }
 

@@ -125,7 +125,7 @@ fn a_stop_ends_it_at_once_and_it_goes_on_from_there_when_wished() {
     bench.until("two seconds", |model| sim_time(model) > stopped_s + 2.0);
     assert_eq!(count(bench.model(), Role::Calibration), kept, "nothing goes on by itself");
     // Captures that there are count.
-    bench.click(Command::CalibrateForMe);
+    bench.click(Command::ContinueSequence);
     bench.until("the end", |model| !model.sequence_runs && count(model, Role::Verification) == 3);
     assert!(count(bench.model(), Role::Calibration) <= kept + 16);
 }

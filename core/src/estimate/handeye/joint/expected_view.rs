@@ -203,7 +203,7 @@ impl ViewModel {
     }
 
     /// How well the pose of the target in a view is foretold with shared unknowns of that covariance: covariance of the
-    /// right perturbation `[t; r]` of `camera_from_target`, m and rad. Of lens and shape nothing is in it.
+    /// right perturbation `[t; r]` of `camera_from_target`, m and rad. Nothing of lens, shape and the robot's field is in it.
     pub fn pose_covariance(&self, base_from_tip: &Pose<Base, Tip>, covariance: &DMatrix<f64>) -> Matrix6<f64> {
         let chain = self.chain(base_from_tip);
         let mut by_links = nalgebra::SMatrix::<f64, 6, 12>::zeros();
