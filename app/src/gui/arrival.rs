@@ -3,7 +3,7 @@
 
 use handeye_core::project::session::Role;
 
-use crate::model::{CapturePurpose, Model, Step};
+use crate::model::{CapturePurpose, Model, PoseSequence, Step};
 
 /// Looks at the model frame by frame.
 #[derive(Debug, Default)]
@@ -77,7 +77,12 @@ fn step_of(model: &Model) -> Option<Step> {
 
 /// Whether every pose was visited.
 fn is_complete(model: &Model) -> bool {
-    model.sequence.as_ref().is_some_and(|sequence| sequence.current().is_none())
+    let is_over = |sequence: &PoseSequence| {
+        // Between two poses of a guided sequence there is none under way either.
+        let is_chosen = sequence.guided.as_ref().is_none_or(|guided| guided.ending.is_some());
+        is_chosen && sequence.current().is_none()
+    };
+    model.sequence.as_ref().is_some_and(is_over)
 }
 
 /// Whether the answer is there, and counts the last captures.

@@ -86,5 +86,5 @@ fn how_it_ended_is_said_in_the_language_of_the_window_and_it_can_begin_again() {
     assert!(ended.is_enabled(BUTTON) && ended.nothing_is_cut_off());
     model.view.language = Language::Chinese;
     let chinese = pane(model);
-    assert!(chinese.sees("已达到目标：期望误差为 0.300 mm") && chinese.sees("自动标定"));
+    assert!(chinese.sees("已达到目标：预期误差为 0.300 mm") && chinese.sees("自动标定"));
 }

@@ -36,10 +36,13 @@ fn from_one_view_of_the_board_the_goal_is_reached_on_three_arms_with_the_camera_
 fn an_unknown_lens_is_estimated_on_the_way() {
     for (seed, mode) in [(4, Mode::EyeInHand), (5, Mode::EyeInHand), (6, Mode::EyeToHand)] {
         let mut cell = GuidedCell::new(CellSetup { free_lens: true, ..setup(CellArm::Ur5e, mode, seed) });
-        let run = cell.run(options(5e-4));
+        let run = cell.run(options(8e-4));
         assert!(matches!(run.ending, Ending::GoalReached { .. }), "{:?} {:?}", run.ending, run.history);
-        let focal_px = run.calibration.and_then(|c| c.intrinsics()).expect("a lens").fx;
-        assert!((focal_px - 581.0).abs() < 4.0, "{focal_px}");
+        let camera = run.calibration.and_then(|it| it.camera).expect("a lens");
+        let sigma_px = camera.sigma_px.expect("it was estimated")[0];
+        let off_px = (camera.intrinsics.fx - 581.0).abs();
+        // One in 16,000 by chance.
+        assert!(off_px < 4.0 * sigma_px && sigma_px < 2.0, "{off_px} px, stated {sigma_px} px");
     }
 }
 
