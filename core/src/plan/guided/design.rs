@@ -23,7 +23,7 @@ pub struct Design {
 
 /// `W` over points in camera coordinates \[m\], each counting alike.
 pub fn weight_of(points: &[Point3<f64>]) -> Matrix6<f64> {
-    let sum: Matrix6<f64> = points.iter().map(|point| point_error::by_hand_eye(point)).map(|j| j.tr_mul(&j)).sum();
+    let sum: Matrix6<f64> = points.iter().map(point_error::by_hand_eye).map(|j| j.tr_mul(&j)).sum();
     sum / points.len().max(1) as f64
 }
 

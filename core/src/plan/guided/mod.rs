@@ -49,8 +49,8 @@ const LEVEL_SURE: f64 = 0.8;
 const TURN_PER_VIEW_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Views with a limit of that.
 const CAREFUL_VIEWS: usize = 6;
-/// Free space around the arm while there are fewer views than that: camera and board are not where they are taken to be.
-const CAREFUL_CLEARANCE_M: f64 = 0.05;
+/// Further free space around the board, metres, while there are fewer views than that: it is not where it is taken to be.
+const CAREFUL_ROOM_M: f64 = 0.03;
 /// Largest way of a joint to a pose of the fan, radians: more is another configuration, not a small turn.
 const LARGEST_FAN_WAY_RAD: f64 = 0.8;
 /// Poses in a row without a view after which it ends.
@@ -409,10 +409,8 @@ impl Guide {
             used.iter().map(|(pose, _)| (model.camera_from_target(pose).isometry() * target.centre()).coords.norm());
         let range = self.range.or_else(|| ViewRange::about(distances))?;
         let taken = used.iter().map(|(pose, _)| *pose).collect();
-        let mut robot = known.robot.map(|robot| with_board(robot, model, known.observations));
-        if let Some(robot) = robot.as_mut().filter(|_| used.len() < CAREFUL_VIEWS) {
-            robot.clearance_m = robot.clearance_m.max(CAREFUL_CLEARANCE_M);
-        }
+        let room_m = if used.len() < CAREFUL_VIEWS { CAREFUL_ROOM_M } else { 0.0 };
+        let robot = known.robot.map(|robot| with_board(robot, model, known.observations, room_m));
         Some(Ground { design, range, robot, taken, cancel })
     }
 
@@ -458,8 +456,9 @@ impl Guide {
             return Next::End(Ending::NoStart);
         }
         let focal_px = match observations.camera {
-            CameraKnowledge::Fixed(intrinsics) => intrinsics.fx,
-            CameraKnowledge::Estimate { start: Some(intrinsics), .. } => intrinsics.fx,
+            CameraKnowledge::Fixed(intrinsics) | CameraKnowledge::Estimate { start: Some(intrinsics), .. } => {
+                intrinsics.fx
+            }
             // A usual lens; one that is twice as long halves the room that is left.
             CameraKnowledge::Estimate { start: None, .. } => f64::from(observations.image_size.0),
         };
@@ -496,13 +495,15 @@ impl Guide {
 }
 
 /// The arm with what is on its tip, the camera or the middle of the board, where the estimate has it; and the board among what
-/// it must not touch where it is not on the tip.
-fn with_board(robot: &Robot, model: &ViewModel, observations: &Observations) -> Robot {
+/// it must not touch where it is not on the tip, with some room about it.
+fn with_board(robot: &Robot, model: &ViewModel, observations: &Observations, room_m: f64) -> Robot {
     let mut robot = robot.clone();
     match model.hand_eye() {
         HandEye::EyeInHand { tip_from_camera, base_from_target } => {
             robot.arm.tip_from_camera = *tip_from_camera.isometry();
-            robot.obstacles.push(super::sheet(&observations.target, base_from_target));
+            let mut sheet = super::sheet(&observations.target, base_from_target);
+            sheet.size_m = sheet.size_m.map(|edge_m| edge_m + 2.0 * room_m);
+            robot.obstacles.push(sheet);
         }
         HandEye::EyeToHand { tip_from_target, .. } => {
             let centre = observations.target.centre();
