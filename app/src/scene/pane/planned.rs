@@ -28,12 +28,12 @@ pub fn planned(
 ) -> Option<Entry> {
     let guided = model.sequence.as_ref().filter(|_| model.sequence_runs)?.guided.as_deref()?;
     for (index, base_from_tip) in guided.ahead.iter().enumerate() {
-        let (width, colour) = if index == 0 { (2.0, palette.busy) } else { (1.0, palette.busy.gamma_multiply(LATER)) };
+        let (width, colour) = if index == 0 { (2.0, palette.text) } else { (1.0, palette.text.gamma_multiply(LATER)) };
         ghost(canvas, known, base_from_tip, width, colour);
     }
     (!guided.ahead.is_empty()).then(|| Entry {
         sign: Sign::Frustum,
-        colour: palette.busy,
+        colour: palette.text,
         name: tr!(language, "Planned poses").to_owned(),
         what: tr!(
             language,
