@@ -21,11 +21,10 @@ use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::nalgebra::{Matrix6, Point3, UnitQuaternion, Vector3};
+use handeye_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use handeye_core::plan::guided::candidates::ViewRange;
-use handeye_core::plan::guided::design::{Design, weight_of};
-use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Known, Step};
-use handeye_core::plan::travel;
+use handeye_core::plan::guided::design::{Design, weight_about};
+use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Step};
 use handeye_core::progress::CancelToken;
 use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
 use handeye_core::testing::sessions::{BOARD, REALISTIC};
@@ -80,7 +79,7 @@ impl Bench {
         let truth = cell.truth();
         let first_tip = cell.base_from_tip();
         let centre = truth.camera_from_target(&first_tip).isometry() * BOARD.centre();
-        let weight = weight_of(&cube(&centre, 0.5 * BOARD.extent().max()));
+        let weight = weight_about(&centre, &BOARD);
         let all: Vec<usize> = (0..BOARD.len()).collect();
         let range = ViewRange::about([centre.coords.norm()].into_iter()).expect("it is in front of the camera");
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
@@ -122,7 +121,7 @@ impl Bench {
         let mut views = vec![(&self.first, time_s)];
         for &k in chosen {
             let next = &self.pool[k];
-            time_s += travel_s(&at, &next.joints) + DWELL_S;
+            time_s += cell.robot.travel_s(&at, &next.joints) + DWELL_S;
             at = next.joints;
             views.push((&next.view, time_s));
         }
@@ -194,7 +193,7 @@ impl Bench {
             let seen = range.shows(self.truth.intrinsics(), &BOARD, &self.truth.camera_from_target(&pose), None);
             let joints = cell.robot.arm.reach(&pose, &at);
             if let (true, Some(joints), Some(view)) = (seen, joints, self.truth.expected(&pose, &all)) {
-                time_s += travel_s(&at, &joints) + DWELL_S;
+                time_s += cell.robot.travel_s(&at, &joints) + DWELL_S;
                 at = joints;
                 views.push((view, time_s));
             }
@@ -232,22 +231,6 @@ impl Bench {
             }
         }
         now_m
-    }
-}
-
-fn cube(middle: &Point3<f64>, half_m: f64) -> Vec<Point3<f64>> {
-    let signs = [-half_m, half_m];
-    let corners = signs.iter().flat_map(|&x| signs.iter().flat_map(move |&y| signs.map(|z| Vector3::new(x, y, z))));
-    corners.chain([Vector3::zeros()]).map(|offset| middle + offset).collect()
-}
-
-fn travel_s(from: &JointValues, to: &JointValues) -> f64 {
-    let (speed, acceleration) = (1.0, 2.0);
-    let way = travel(from, to);
-    if way > speed * speed / acceleration {
-        way / speed + speed / acceleration
-    } else {
-        2.0 * (way / acceleration).sqrt()
     }
 }
 
@@ -321,13 +304,7 @@ fn speed(sessions: u64) {
                     let mut cell = GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens, seed });
                     let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
                     let calibration = cell.calibrate();
-                    let known = Known {
-                        observations: &cell.observations,
-                        calibration: calibration.as_ref(),
-                        is_sound: true,
-                        robot: Some(&cell.robot),
-                        elapsed_s: 0.0,
-                    };
+                    let known = cell.known(calibration.as_ref(), 0.0);
                     let mut guide = Guide::new(GuidedOptions { goal_m: 0.0, ..GuidedOptions::default() });
                     let began = Instant::now();
                     let _next = guide.next(&known, &CancelToken::default());

@@ -84,13 +84,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
         seed: args.seed,
         ..GuidedOptions::default()
     };
-    let known = Known {
-        observations: &observations,
-        calibration: Some(&calibration),
-        is_sound: true,
-        robot: None,
-        elapsed_s: 0.0,
-    };
+    let known = Known { observations: &observations, calibration: Some(&calibration), robot: None, elapsed_s: 0.0 };
     let next = Guide::new(options).next(&known, &cancel);
     if cancel.is_cancelled() {
         return Err(Failure::failed(HandEyeError::Cancelled));

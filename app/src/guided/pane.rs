@@ -2,8 +2,9 @@
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
 use handeye_core::estimate::handeye::Mode;
+use handeye_core::plan::guided::CHECKS;
 
-use super::state::{CHECKS, GuidedProgress, Waits};
+use super::state::{GuidedProgress, Waits};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::Marks;
 use crate::gui::style::parts;

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use handeye_core::estimate::Observations;
-use handeye_core::estimate::claim::Claim;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::plan::guided::choose::{Proposal, Robot};
 use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Why};
@@ -11,9 +10,6 @@ use handeye_core::progress::CancelToken;
 
 use crate::model::Solved;
 use crate::text::Text;
-
-/// Captures that check the answer afterwards.
-pub const CHECKS: usize = 3;
 
 /// How a guided sequence goes.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,13 +101,8 @@ impl GuideRequest {
     pub fn choose(&self, robot: &Robot, cancel: &CancelToken) -> Choice {
         let mut guide = self.guide.clone();
         let calibration = self.solved.as_ref().map(|solved| &solved.calibration);
-        let known = Known {
-            observations: &self.observations,
-            calibration,
-            is_sound: calibration.is_some_and(|it| it.claim == Claim::AsModelled),
-            robot: Some(robot),
-            elapsed_s: self.elapsed_s,
-        };
+        let known =
+            Known { observations: &self.observations, calibration, robot: Some(robot), elapsed_s: self.elapsed_s };
         let step = match self.check {
             Some(index) => ChosenStep::Check(guide.check_pose(&known, index, cancel).map(Box::new)),
             None => ChosenStep::Next(Box::new(guide.next(&known, cancel))),

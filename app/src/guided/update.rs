@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use handeye_core::estimate::Method;
 use handeye_core::plan::guided::choose::Proposal;
-use handeye_core::plan::guided::{Ending, GuidedOptions, Next};
+use handeye_core::plan::guided::{CHECKS, Ending, GuidedOptions, Next};
 
-use super::state::{CHECKS, Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits};
+use super::state::{Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits};
 use crate::app::App;
 use crate::model::{CapturePurpose, MotionId, Pane, PoseSequence, Severity, SolveStatus, StopOutcome};
 use crate::text;
@@ -41,8 +41,13 @@ impl App {
     /// because the way to the pose that was left out is another one than was checked.
     pub(crate) fn continue_guided(&mut self) -> bool {
         let is_idle = !self.model.sequence_runs && !self.model.planning;
+        let has_captures = !self.model.document().captures.is_empty();
         let Some(sequence) = self.model.sequence.as_mut().filter(|_| is_idle) else { return false };
         let (visited, Some(guided)) = (sequence.outcomes.len(), sequence.guided.as_deref_mut()) else { return false };
+        if !has_captures {
+            self.calibrate_for_me();
+            return true;
+        }
         guided.waits = Waits::Answer;
         guided.ahead.clear();
         sequence.names.truncate(visited);
@@ -50,17 +55,8 @@ impl App {
             planned.truncate(visited);
         }
         self.model.sequence_runs = true;
-        if self.model.document().captures.is_empty() {
-            self.calibrate_again();
-        }
         self.guided_step();
         true
-    }
-
-    /// From the beginning.
-    fn calibrate_again(&mut self) {
-        self.model.sequence_runs = false;
-        self.calibrate_for_me();
     }
 
     fn guided_mut(&mut self) -> Option<&mut GuidedProgress> {
@@ -186,13 +182,7 @@ impl App {
             return self.guided_ends(Severity::Warning, ending.text());
         }
         sequence.purpose = Some(CapturePurpose::Verify);
-        self.guided_checks();
-    }
-
-    fn guided_checks(&mut self) {
-        if !self.guided_is_over() {
-            self.guided_step();
-        }
+        self.guided_step();
     }
 
     /// Whether the sequence is guided and over: then it has been said how it went.

@@ -260,6 +260,11 @@ impl GuidedCell {
         ViewModel::known(hand_eye, *intrinsics, setup.free_lens, setup.noise, &BOARD)
     }
 
+    /// What a guide is told, with an answer from the views so far.
+    pub fn known<'a>(&'a self, calibration: Option<&'a Calibration>, elapsed_s: f64) -> Known<'a> {
+        Known { observations: &self.observations, calibration, robot: Some(&self.robot), elapsed_s }
+    }
+
     /// The calibration from the views so far.
     pub fn calibrate(&self) -> Option<Calibration> {
         calibrate(&self.observations, Method::Joint, &CancelToken::default()).ok()
@@ -274,13 +279,7 @@ impl GuidedCell {
         let mut times_s = vec![time_s];
         assert!(self.capture(&first), "the board is in view at the beginning");
         loop {
-            let known = Known {
-                observations: &self.observations,
-                calibration: calibration.as_ref(),
-                is_sound: true,
-                robot: Some(&self.robot),
-                elapsed_s: time_s,
-            };
+            let known = self.known(calibration.as_ref(), time_s);
             let plan = match guide.next(&known, &CancelToken::default()) {
                 Next::End(ending) => {
                     let steps = guide.steps().to_vec();

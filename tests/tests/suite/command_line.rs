@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use handeye_core::project::result::CalibrationResult;
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::Value;
 
 use crate::solved::{copy_of_session, handeye, text, utf8};
@@ -240,4 +241,47 @@ fn a_folder_without_a_description_is_answered_with_one_to_fill_in() {
     let empty = tempfile::tempdir().expect("a folder");
     let output = handeye(&["calibrate", utf8(empty.path())]);
     assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
+}
+
+fn isometry(transform: &Value) -> Isometry3<f64> {
+    let numbers = |key: &str| -> Vec<f64> {
+        transform[key].as_array().expect(key).iter().map(|number| number.as_f64().expect(key)).collect()
+    };
+    let (t, q) = (numbers("translation_m"), numbers("rotation_xyzw"));
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2]));
+    Isometry3::from_parts(Translation3::new(t[0], t[1], t[2]), rotation)
+}
+
+#[test]
+fn poses_are_planned_for_a_recorded_session_from_which_the_whole_board_is_seen() {
+    let (_home, session) = copy_of_session();
+    let output = handeye(&["--quiet", "plan", utf8(&session), "--count", "3", "--json", "-"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let plan: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(plan["format"], "handeye-plan");
+    let result: Value =
+        serde_json::from_str(&std::fs::read_to_string(session.join("result.json")).expect("a result")).expect("JSON");
+    let (tip_from_camera, base_from_target) = (isometry(&result["hand_eye"]), isometry(&result["target"]));
+    let of_camera = |key: &str| result["intrinsics"][key].as_f64().expect(key);
+    let poses = plan["poses"].as_array().expect("poses");
+    assert_eq!(poses.len(), 3);
+    let mut before_mm = plan["error_mm"].as_f64().expect("stated");
+    for pose in poses {
+        let error_mm = pose["error_mm"].as_f64().expect("expected");
+        assert!(error_mm < before_mm, "{error_mm} mm is no gain over {before_mm}");
+        before_mm = error_mm;
+        let camera_from_target = (isometry(&pose["base_from_tip"]) * tip_from_camera).inverse() * base_from_target;
+        let said = isometry(&pose["camera_from_target"]);
+        assert!((camera_from_target.translation.vector - said.translation.vector).norm() < 1e-4, "{pose}");
+        // The outermost of the 10×7 corners; the lens of this cell bends nothing.
+        for corner in [[0.0, 0.0], [0.135, 0.0], [0.0, 0.09], [0.135, 0.09]] {
+            let at = camera_from_target * Point3::new(corner[0], corner[1], 0.0);
+            let px = [of_camera("fx") * at.x / at.z + of_camera("cx"), of_camera("fy") * at.y / at.z + of_camera("cy")];
+            assert!(at.z > 0.0 && (0.0..640.0).contains(&px[0]) && (0.0..480.0).contains(&px[1]), "{px:?}");
+        }
+    }
+    let again = handeye(&["--quiet", "plan", utf8(&session), "--count", "3", "--json", "-"]);
+    assert_eq!(again.stdout, output.stdout, "the same every time");
+    let table = text(&handeye(&["--quiet", "plan", utf8(&session)]).stdout);
+    assert!(table.contains("whether the arm reaches them is not checked"), "{table}");
 }

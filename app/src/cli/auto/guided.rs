@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use handeye_core::diagnose::doctor;
 use handeye_core::diagnose::findings::FindingOptions;
-use handeye_core::estimate::claim::Claim;
 use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
 use handeye_core::plan::Obstacle;
 use handeye_core::plan::guided::choose::{Proposal, Robot};
@@ -72,45 +71,43 @@ impl<'a, 's> GuidedSequence<'a, 's> {
                 "the board is not captured from where the arm stands: bring the whole board into the image and begin again"
             )));
         }
-        let ending = loop {
+        let (ending, observations, calibration) = loop {
             let (observations, calibration) = self.solve()?;
             let robot = self.robot()?;
             let known = self.known(&observations, calibration.as_ref(), &robot);
             let next = self.guide.next(&known, self.sequence.cancel);
             self.check_cancelled()?;
             let plan = match next {
-                Next::End(ending) => break ending,
+                Next::End(ending) => break (ending, observations, calibration),
                 Next::Go { plan, why } => {
                     tracing::info!("{}", why.text().say(Language::English));
                     plan
                 }
             };
-            let Some(proposal) = plan.proposals.first() else { break Ending::NothingInReach { candidates: 0 } };
-            if self.visit(&goal(proposal), CapturePurpose::Calibrate)? {
+            let goal = joints(plan.proposals.first())?;
+            if self.visit(&goal, CapturePurpose::Calibrate)? {
                 self.guide.captured();
             } else {
                 self.guide.failed();
             }
         };
         tracing::info!("{}", ending.text().say(Language::English));
-        self.check()?;
+        if calibration.is_some() {
+            self.check(&observations, calibration.as_ref())?;
+        }
         Ok(ending)
     }
 
     /// Captures that were not designed and never enter the fit.
-    fn check(&mut self) -> Result<(), Failure> {
-        let (observations, calibration) = self.solve()?;
-        if calibration.is_none() {
-            return Ok(());
-        }
+    fn check(&mut self, observations: &Observations, calibration: Option<&Calibration>) -> Result<(), Failure> {
         for index in 0..self.checks {
             let robot = self.robot()?;
-            let known = self.known(&observations, calibration.as_ref(), &robot);
+            let known = self.known(observations, calibration, &robot);
             let Some(proposal) = self.guide.check_pose(&known, index, self.sequence.cancel) else {
                 tracing::warn!("there is no further view in reach to check the answer at");
                 break;
             };
-            self.visit(&goal(&proposal), CapturePurpose::Verify)?;
+            self.visit(&joints(Some(&proposal))?, CapturePurpose::Verify)?;
         }
         Ok(())
     }
@@ -124,7 +121,6 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         Known {
             observations,
             calibration,
-            is_sound: calibration.is_some_and(|calibration| calibration.claim == Claim::AsModelled),
             robot: Some(robot),
             elapsed_s: self.time_s.map_or(0.0, |[first, last]| last - first),
         }
@@ -174,9 +170,10 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     }
 }
 
-fn goal(proposal: &Proposal) -> Goal {
-    match &proposal.joints {
-        Some(joints) => Goal::Joints(joints.to_vec()),
-        None => Goal::Tip(proposal.base_from_tip),
-    }
+/// Where the arm goes: to the joint values whose way was checked, and nowhere else.
+fn joints(proposal: Option<&Proposal>) -> Result<Goal, Failure> {
+    let joints = proposal.and_then(|proposal| proposal.joints);
+    let joints =
+        joints.ok_or_else(|| Failure::failed(anyhow::anyhow!("no joint values were chosen for the next pose")))?;
+    Ok(Goal::Joints(joints.to_vec()))
 }

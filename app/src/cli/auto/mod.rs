@@ -11,7 +11,7 @@ use clap::Args;
 use handeye_core::estimate::{Method, Options};
 use handeye_core::plan::Obstacle;
 use handeye_core::plan::guided::record::GUIDED_RECORD;
-use handeye_core::plan::guided::{Guide, GuidedOptions};
+use handeye_core::plan::guided::{CHECKS, Guide, GuidedOptions};
 use handeye_core::project::session::{FolderLock, Session, SessionMeta, Store};
 use handeye_sim_link::cell::scene::ResolvedScene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
@@ -31,9 +31,6 @@ use crate::worker::{timestamp, timestamp_rfc3339};
 use guided::GuidedSequence;
 use poses::{GUIDED, Plan};
 use solve::Solution;
-
-/// Captures that check a guided answer.
-const CHECK_POSES: usize = 3;
 
 /// Options of `handeye auto`.
 #[derive(Debug, Args)]
@@ -196,7 +193,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let mut guide = is_guided.then(|| Guide::new(args.guided.options(seed)));
     let captured = match (&mut guide, &kinematics) {
         (Some(guide), Some(kinematics)) => {
-            let checks = args.guided.check_poses.map_or(CHECK_POSES, |poses| poses as usize);
+            let checks = args.guided.check_poses.map_or(CHECKS, |poses| poses as usize);
             GuidedSequence::new(&mut sequence, guide, kinematics, solids, checks).run().map(Some)
         }
         _ => sequence.run().map(|()| None),

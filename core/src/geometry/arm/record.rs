@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Arm, ArmError, Joint, JointKind, JointRange};
 
+/// How far the length of a unit vector may be from one, by rounding.
+const UNIT: f64 = 1e-12;
+
 #[derive(Serialize, Deserialize)]
 pub(super) struct ArmRecord {
     joints: Vec<JointRecord>,
@@ -50,7 +53,11 @@ impl TryFrom<ArmRecord> for Arm {
             name: joint.name,
             kind: joint.kind,
             previous_from_joint: joint.previous_from_joint,
-            axis: UnitVector3::new_unchecked(joint.axis),
+            // One that is a unit vector stays as it is to the last bit; that of nothing is refused below.
+            axis: match (joint.axis.norm() - 1.0).abs() < UNIT {
+                true => UnitVector3::new_unchecked(joint.axis),
+                false => UnitVector3::new_normalize(joint.axis),
+            },
             range: JointRange {
                 min: joint.min.unwrap_or(f64::NEG_INFINITY),
                 max: joint.max.unwrap_or(f64::INFINITY),
@@ -74,6 +81,12 @@ mod tests {
             let text = serde_json::to_string(&arm).expect("plain data");
             assert_eq!(serde_json::from_str::<Arm>(&text).expect("the same"), arm);
         }
+        let arm = ArmKind::Ur3e.arm();
+        let long = serde_json::to_string(&arm)
+            .expect("plain data")
+            .replace("\"axis\":[0.0,0.0,1.0]", "\"axis\":[0.0,0.0,2.0]");
+        assert!(long.contains("2.0]"), "{long}");
+        assert_eq!(serde_json::from_str::<Arm>(&long).expect("the same directions"), arm);
         let none = r#"{"joints":[],"last_from_flange":{"rotation":[0,0,0,1],"translation":[0,0,0]},
             "base_from_first":{"rotation":[0,0,0,1],"translation":[0,0,0]},
             "flange_from_tip":{"rotation":[0,0,0,1],"translation":[0,0,0]}}"#;

@@ -307,7 +307,7 @@ impl Robot {
     fn way_to(&self, base_from_tip: &Pose<Base, Tip>) -> Way {
         match self.arm.reach(base_from_tip, &self.joints) {
             Some(joints) if self.arm.is_free(&joints, &self.obstacles, self.clearance_m) => {
-                Way::To { joints: Some(joints), travel_s: self.travel_s(&joints) }
+                Way::To { joints: Some(joints), travel_s: self.travel_s(&self.joints, &joints) }
             }
             _ => Way::None,
         }
@@ -318,9 +318,10 @@ impl Robot {
         self.arm.path_is_free(&self.joints, joints, &self.obstacles, self.clearance_m)
     }
 
-    /// How long that takes: up to speed, along, and down again, by the joint that has the longest way.
-    fn travel_s(&self, joints: &JointValues) -> f64 {
-        let way = travel(&self.joints, joints);
+    /// How long the arm takes from one configuration to another: up to speed, along, and down again, by the joint that has
+    /// the longest way. Limits of jerk are not in it.
+    pub fn travel_s(&self, from: &JointValues, to: &JointValues) -> f64 {
+        let way = travel(from, to);
         let ramps = self.speed_rad_s.powi(2) / self.acceleration_rad_s2;
         if way > ramps {
             way / self.speed_rad_s + self.speed_rad_s / self.acceleration_rad_s2

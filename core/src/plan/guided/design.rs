@@ -8,10 +8,11 @@
 //! # Reference
 //! Fedorov 1972, "Theory of optimal experiments" (linear criteria, one view in and out); Woodbury 1950 for the update.
 
-use nalgebra::{Cholesky, DMatrix, Matrix6, Point3};
+use nalgebra::{Cholesky, DMatrix, Matrix6, Point3, Vector3};
 
 use crate::estimate::handeye::joint::ExpectedView;
 use crate::geometry::point_error;
+use crate::targets::TargetSpec;
 
 /// What views say of the unknowns, and what is asked of them.
 #[derive(Debug, Clone)]
@@ -21,10 +22,15 @@ pub struct Design {
     weight: Matrix6<f64>,
 }
 
-/// `W` over points in camera coordinates \[m\], each counting alike.
-pub fn weight_of(points: &[Point3<f64>]) -> Matrix6<f64> {
+/// `W` over a cube as large as the target about a point in camera coordinates \[m\]: its corners and its middle, each counting
+/// alike.
+pub fn weight_about(middle: &Point3<f64>, target: &TargetSpec) -> Matrix6<f64> {
+    let half_m = 0.5 * target.extent().max();
+    let signs = [-half_m, half_m];
+    let corners = signs.iter().flat_map(|&x| signs.iter().flat_map(move |&y| signs.map(|z| Vector3::new(x, y, z))));
+    let points: Vec<Point3<f64>> = corners.chain([Vector3::zeros()]).map(|offset| middle + offset).collect();
     let sum: Matrix6<f64> = points.iter().map(point_error::by_hand_eye).map(|j| j.tr_mul(&j)).sum();
-    sum / points.len().max(1) as f64
+    sum / points.len() as f64
 }
 
 impl Design {

@@ -20,9 +20,9 @@ pub mod design;
 pub mod fan;
 pub mod record;
 
-use nalgebra::{Point3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
+use crate::estimate::claim::Claim;
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
 use crate::estimate::{Calibration, CameraKnowledge, Observations, ViewStatus};
@@ -40,6 +40,8 @@ use design::Design;
 pub const LEAST_VIEWS: usize = 8;
 /// Gain of the best view \[part of the error\] below which more views are not worth their time.
 pub const LEAST_GAIN: f64 = 0.03;
+/// Captures that check the answer afterwards, where nobody says how many.
+pub const CHECKS: usize = 3;
 /// Solves in a row in which the error has to be below the goal.
 const IN_A_ROW: usize = 2;
 /// Probability that the noise levels are below what the end is judged by.
@@ -103,10 +105,9 @@ impl Default for GuidedOptions {
 pub struct Known<'a> {
     /// All views so far.
     pub observations: &'a Observations,
-    /// What they give; `None` while they do not determine an answer.
+    /// What they give; `None` while they do not determine an answer. What was found about it speaks by its
+    /// [`Claim`]: see [`diagnose`](crate::diagnose::doctor::diagnose).
     pub calibration: Option<&'a Calibration>,
-    /// Whether nothing is found that speaks against the answer.
-    pub is_sound: bool,
     /// The arm; `None` where its chain is not known.
     pub robot: Option<&'a Robot>,
     /// Since the beginning, seconds.
@@ -328,7 +329,7 @@ impl Guide {
         match self.plan(known, &model, used, cancel) {
             None => self.without_answer(known),
             Some((plan, modelled_m)) if plan.candidates > 0 => {
-                self.judged(plan, modelled_m, used.len(), known.is_sound)
+                self.judged(plan, modelled_m, used.len(), is_sound(known.calibration))
             }
             // So little is known that no view is surely in the image: more of the small turns.
             Some(_) => self.fan(known),
@@ -403,7 +404,7 @@ impl Guide {
         let target = &known.observations.target;
         let views: Vec<ExpectedView> =
             used.iter().filter_map(|(pose, corners)| model.expected(pose, corners)).collect();
-        let weight = design::weight_of(&box_about(&joint.reference_point, 0.5 * target.extent().max()));
+        let weight = design::weight_about(&joint.reference_point, target);
         let design = Design::new(model.prior(), &views, weight)?;
         let distances =
             used.iter().map(|(pose, _)| (model.camera_from_target(pose).isometry() * target.centre()).coords.norm());
@@ -432,7 +433,7 @@ impl Guide {
             self.solved_views = views;
             let error_m = calibration.tip_error_95_m();
             let is_below = error_at_upper_levels(calibration).is_some_and(|error_m| error_m <= self.options.goal_m);
-            self.below = if is_below && known.is_sound { self.below + 1 } else { 0 };
+            self.below = if is_below && is_sound(known.calibration) { self.below + 1 } else { 0 };
             if let (true, Some(error_m)) = (self.below >= IN_A_ROW, error_m) {
                 return Some(Ending::GoalReached { error_m });
             }
@@ -535,6 +536,11 @@ impl Ground<'_> {
     }
 }
 
+/// Whether nothing was found that speaks against the answer.
+fn is_sound(calibration: Option<&Calibration>) -> bool {
+    calibration.is_some_and(|calibration| calibration.claim == Claim::AsModelled)
+}
+
 /// The error that is stated, at the upper limit of the noise levels, metres; `None` where nothing may be stated.
 pub fn error_at_upper_levels(calibration: &Calibration) -> Option<f64> {
     let stated_m = calibration.tip_error_95_m()?;
@@ -552,13 +558,6 @@ fn upper_level(degrees_of_freedom: f64) -> f64 {
         }
         _ => 1.0,
     }
-}
-
-/// Middle and corners of a cube with so long half edges \[m\].
-fn box_about(middle: &Point3<f64>, half_m: f64) -> Vec<Point3<f64>> {
-    let signs = [-half_m, half_m];
-    let corners = signs.iter().flat_map(|&x| signs.iter().flat_map(move |&y| signs.map(|z| Vector3::new(x, y, z))));
-    corners.chain([Vector3::zeros()]).map(|offset| middle + offset).collect()
 }
 
 /// Reported tip poses of the views that are in the fit, and the indices of the corners found in them.

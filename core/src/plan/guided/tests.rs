@@ -1,3 +1,5 @@
+use nalgebra::Isometry3;
+
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
@@ -93,13 +95,7 @@ fn a_pose_that_failed_is_not_proposed_again_and_many_in_a_row_end_it_as_a_lost_a
     let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 3));
     let _begun = cell.run(GuidedOptions { most_views: 5, ..options(1e-9) });
     let calibration = cell.calibrate();
-    let known = Known {
-        observations: &cell.observations,
-        calibration: calibration.as_ref(),
-        is_sound: true,
-        robot: Some(&cell.robot),
-        elapsed_s: 0.0,
-    };
+    let known = cell.known(calibration.as_ref(), 0.0);
     let mut guide = Guide::new(options(1e-9));
     let mut tried: Vec<Pose<Base, Tip>> = Vec::new();
     for _ in 0..MOST_FAILURES {
@@ -132,13 +128,7 @@ fn a_view_that_is_an_outlier_is_not_proposed_again() {
     let mut proposed: Vec<Pose<Base, Tip>> = Vec::new();
     for _ in 0..3 {
         let calibration = cell.calibrate();
-        let known = Known {
-            observations: &cell.observations,
-            calibration: calibration.as_ref(),
-            is_sound: true,
-            robot: Some(&cell.robot),
-            elapsed_s: 0.0,
-        };
+        let known = cell.known(calibration.as_ref(), 0.0);
         let Next::Go { plan, .. } = guide.next(&known, &CancelToken::default()) else { panic!("there is more") };
         let next = plan.proposals[0].base_from_tip;
         if let Some(before) = proposed.last() {
@@ -159,16 +149,7 @@ fn a_view_that_is_an_outlier_is_not_proposed_again() {
 fn a_board_that_is_never_seen_again_and_an_arm_that_touches_something_end_with_the_reason() {
     let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 5));
     let first = cell.robot.joints;
-    let next = |guide: &mut Guide, cell: &GuidedCell| {
-        let known = Known {
-            observations: &cell.observations,
-            calibration: None,
-            is_sound: true,
-            robot: Some(&cell.robot),
-            elapsed_s: 0.0,
-        };
-        guide.next(&known, &CancelToken::default())
-    };
+    let next = |guide: &mut Guide, cell: &GuidedCell| guide.next(&cell.known(None, 0.0), &CancelToken::default());
     let mut guide = Guide::new(options(1e-3));
     assert_eq!(next(&mut guide, &cell), Next::End(Ending::NoStart), "there is no view of the board yet");
     assert!(cell.capture(&first));
@@ -186,4 +167,78 @@ fn a_board_that_is_never_seen_again_and_an_arm_that_touches_something_end_with_t
         .obstacles
         .push(crate::plan::Obstacle { world_from_centre: *cell.base_from_tip().isometry(), size_m: [0.1; 3] });
     assert_eq!(next(&mut Guide::new(options(1e-3)), &cell), Next::End(Ending::StartBlocked));
+}
+
+/// What the arm is driven along, point by point: tip and camera of every move, by the chain and the true place of the camera.
+fn places_on_the_way(cell: &GuidedCell, from: &JointValues, to: &JointValues) -> Vec<Isometry3<f64>> {
+    (0..=200)
+        .flat_map(|step| {
+            let part = f64::from(step) / 200.0;
+            let joints = JointValues::from_fn(from.len(), |k| from[k] + part * (to[k] - from[k]));
+            let tip = *cell.robot.arm.tip(&joints).expect("its own joints").isometry();
+            [tip, tip * cell.mount_from_camera.isometry()]
+        })
+        .collect()
+}
+
+/// A rod that hangs into the room beside the first pose: without it some ways lead through where it is. Judged by where tip
+/// and camera are, not by the planner's own shapes.
+#[test]
+fn the_arm_is_driven_around_what_stands_in_the_way_and_within_its_ranges() {
+    let mut crossed = 0;
+    for (seed, beside) in [(2, 0.14), (3, -0.14), (11, 0.14), (12, -0.14)] {
+        let mut hits = [0, 0];
+        for (with_rod, hits) in [false, true].into_iter().zip(&mut hits) {
+            let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, seed));
+            let first = cell.robot.joints;
+            let middle = cell.base_from_tip().translation() + nalgebra::Vector3::new(0.0, beside, 0.15);
+            let rod = crate::plan::Obstacle {
+                world_from_centre: Isometry3::translation(middle.x, middle.y, middle.z),
+                size_m: [0.03, 0.03, 0.5],
+            };
+            if with_rod {
+                cell.robot.obstacles.push(rod);
+            }
+            let run = cell.run(GuidedOptions { most_views: 14, least_gain: 0.0, ..options(1e-9) });
+            if with_rod {
+                assert_eq!(run.ending, Ending::MostViews, "seed {seed}");
+            }
+            let stops: Vec<JointValues> =
+                std::iter::once(first).chain(run.steps.iter().filter_map(|step| step.joints)).collect();
+            for way in stops.windows(2) {
+                assert_eq!(cell.robot.arm.chain.first_violation(&way[1]), None);
+                *hits += places_on_the_way(&cell, &way[0], &way[1])
+                    .iter()
+                    .map(|place| (rod.world_from_centre.inverse() * place).translation.vector.abs())
+                    .filter(|beside| beside.x < 0.025 && beside.y < 0.025 && beside.z < 0.26)
+                    .count();
+            }
+        }
+        crossed += hits[0];
+        assert_eq!(hits[1], 0, "seed {seed}");
+    }
+    assert!(crossed > 0, "the rods are in nobody's way: this test asserts nothing");
+}
+
+/// Nothing found is nothing against it; something found keeps it from ending as a success.
+#[test]
+fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error() {
+    let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 1));
+    let _begun = cell.run(GuidedOptions { most_views: 12, least_gain: 0.0, ..options(1e-9) });
+    let endings = [Claim::AsModelled, Claim::Nothing].map(|claim| {
+        let mut guide = Guide::new(GuidedOptions { least_gain: 1.0, ..options(1e-3) });
+        let all = cell.observations.views.clone();
+        let mut ending = None;
+        for count in 11..=all.len() {
+            cell.observations.views = all[..count].to_vec();
+            let mut calibration = cell.calibrate().expect("twelve good views");
+            calibration.claim = claim.clone();
+            if let Next::End(end) = guide.next(&cell.known(Some(&calibration), 0.0), &CancelToken::default()) {
+                ending = Some(end);
+            }
+        }
+        ending
+    });
+    assert!(matches!(endings[0], Some(Ending::GoalReached { .. })), "{endings:?}");
+    assert_eq!(endings[1], Some(Ending::Doubted));
 }
