@@ -54,9 +54,10 @@ impl TryFrom<ArmRecord> for Arm {
             kind: joint.kind,
             previous_from_joint: joint.previous_from_joint,
             // One that is a unit vector stays as it is to the last bit; that of nothing is refused below.
-            axis: match (joint.axis.norm() - 1.0).abs() < UNIT {
-                true => UnitVector3::new_unchecked(joint.axis),
-                false => UnitVector3::new_normalize(joint.axis),
+            axis: if (joint.axis.norm() - 1.0).abs() < UNIT {
+                UnitVector3::new_unchecked(joint.axis)
+            } else {
+                UnitVector3::new_normalize(joint.axis)
             },
             range: JointRange {
                 min: joint.min.unwrap_or(f64::NEG_INFINITY),
