@@ -122,6 +122,12 @@ pub enum Command {
     ContinueSequence,
     /// Choose poses, visit them and capture there until the goal is reached.
     CalibrateForMe,
+    /// Let the arm move to the pose that waits for it.
+    ConfirmMove,
+    /// Leave out the pose that waits, and choose another one.
+    SkipMove,
+    /// Whether each move to a chosen pose waits to be confirmed.
+    SetConfirmMoves(bool),
     /// Have poses planned that are not in the fit, visit them, and capture for verification at each.
     VerifyAtPlanned,
     /// No more poses.

@@ -179,6 +179,9 @@ impl App {
             Command::RunSequence { purpose } => self.run_sequence(purpose),
             Command::ContinueSequence => self.continue_sequence(),
             Command::CalibrateForMe => self.calibrate_for_me(),
+            Command::ConfirmMove => self.confirm_move(),
+            Command::SkipMove => self.skip_move(),
+            Command::SetConfirmMoves(confirm) => self.set_confirm_moves(confirm),
             Command::VerifyAtPlanned => self.plan_verification(),
             Command::StopSequence => self.stop_sequence(),
 

@@ -1,9 +1,14 @@
 use std::time::{Duration, Instant};
 
+use handeye_core::geometry::arm::JointValues;
+use handeye_core::geometry::frames::Pose;
+use handeye_core::plan::guided::choose::{Plan, Proposal};
+use handeye_core::plan::guided::{Next, Why};
 use handeye_core::project::session::CaptureId;
 
 use super::*;
 use crate::gui::testing::sample;
+use crate::guided::state::{Choice, ChosenStep, Waits};
 use crate::model::{
     CapturePurpose, CaptureRefused, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState, Motion,
     MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind, SolveStatus, StopOutcome, ThemeChoice,
@@ -208,6 +213,77 @@ fn a_pause_breaks_a_sequence_off_and_it_is_continued_with_the_pose_that_has_no_c
     bench.app.absorb(Event::Document(Box::new(another)));
     bench.app.apply(Command::ContinueSequence);
     assert!(!bench.app.model().sequence_runs, "its poses are those of another session");
+}
+
+/// The pose that is next is chosen as a worker chooses it.
+fn choose(app: &mut App) {
+    let id = app.numbers.motion;
+    let guided = app.model.sequence.as_mut().and_then(|it| it.guided.as_deref_mut()).expect("a guided sequence");
+    guided.waits = Waits::Choice;
+    let proposal = Proposal {
+        base_from_tip: Pose::identity(),
+        camera_from_target: Pose::identity(),
+        joints: Some([0.1; 6].into()),
+        travel_s: 1.0,
+        error_ratio: 0.9,
+        rotation_part: 0.5,
+    };
+    let plan = Plan { proposals: vec![proposal], best_ratio: 0.9, candidates: 9 };
+    let why = Why::Gain { from_m: 1e-3, to_m: 9e-4, rotation_part: 0.5 };
+    let step = ChosenStep::Next(Box::new(Next::Go { plan, why }));
+    let guide = guided.guide.clone();
+    app.absorb(Event::Guided { id, outcome: Ok(Box::new(Choice { guide, step, views_left: Some(3) })) });
+}
+
+fn waits(app: &App) -> Option<Waits> {
+    app.model().sequence.as_ref().and_then(|it| it.guided.as_deref()).map(|guided| guided.waits)
+}
+
+#[test]
+fn a_chosen_pose_waits_for_a_person_wherever_there_may_be_a_real_arm() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    let mut model = sample::solved();
+    model.source = CellSource::Address("tcp://10.0.0.2:23000".to_owned());
+    app.replace_model(model);
+    app.apply(Command::CalibrateForMe);
+    choose(app);
+    assert_eq!((waits(app), &app.model().motion), (Some(Waits::Confirmation), &Motion::Idle));
+
+    app.apply(Command::SkipMove);
+    assert_ne!(waits(app), Some(Waits::Confirmation), "another one is chosen");
+    assert_eq!(app.model().motion, Motion::Idle);
+
+    choose(app);
+    app.apply(Command::ConfirmMove);
+    assert!(matches!(app.model().motion, Motion::Moving { .. }));
+    app.apply(Command::Stop);
+    assert!(!app.model().sequence_runs);
+    app.apply(Command::ConfirmMove);
+    assert!(!app.model().sequence_runs, "nothing begins after a stop");
+}
+
+/// The way was checked from where the arm was.
+#[test]
+fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(sample::solved());
+    app.apply(Command::SetConfirmMoves(true));
+    app.apply(Command::CalibrateForMe);
+    choose(app);
+    let mut robot = app.model().robot.clone().expect("connected");
+    let mut joints = robot.joints_rad.to_vec();
+    joints[0] += 0.02;
+    robot.joints_rad = JointValues::try_from(&joints[..]).expect("six");
+    app.absorb(Event::Robot(robot));
+    app.apply(Command::ConfirmMove);
+    assert_eq!(app.model().motion, Motion::Idle);
+    assert!(said(app).contains("elsewhere"), "{}", said(app));
+    // Without confirmation the one that waits begins at once.
+    choose(app);
+    app.apply(Command::SetConfirmMoves(false));
+    assert!(matches!(app.model().motion, Motion::Moving { .. }));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use handeye_core::estimate::GOOD_VIEWS;
 use handeye_core::estimate::handeye::motion::MIN_VIEWS;
+use handeye_core::plan::guided::LEAST_VIEWS;
 use handeye_core::project::session::Role;
 
 use super::status::STALE_AFTER_S;
@@ -53,6 +54,10 @@ pub struct Facts {
     pub solved: bool,
     /// Its expected error \[m\], 95 %.
     pub expected_error_m: Option<f64>,
+    /// That is good enough.
+    pub goal_reached: bool,
+    /// The arm visits poses by itself.
+    pub sequence_runs: bool,
     /// Captures for verification.
     pub verifying: usize,
     /// They were compared with the answer.
@@ -74,6 +79,8 @@ impl Facts {
         let seen_now = model.board_seen_s.is_some_and(|seen_s| model.now_s - seen_s < STALE_AFTER_S);
         let captured = model.observed.values().flatten().any(|observed| observed.corners.is_some());
         let current = model.solve.current();
+        let expected_error_m =
+            current.and_then(|solved| solved.result.quality.tip_error_95_mm).map(|error_mm| error_mm * 1e-3);
         Self {
             connected,
             lost: !connected && model.frame.is_some(),
@@ -83,7 +90,9 @@ impl Facts {
             captures_in_use: document.in_use().count(),
             solving: model.solve.is_running(),
             solved: current.is_some(),
-            expected_error_m: current.and_then(|solved| solved.result.quality.tip_error_95_mm).map(|mm| mm * 1e-3),
+            expected_error_m,
+            goal_reached: expected_error_m.is_some_and(|error_m| error_m <= model.view.goal.0),
+            sequence_runs: model.sequence_runs,
             verifying: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
             verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
             exported: model.export.is_present && current.is_some(),
@@ -135,8 +144,9 @@ fn connect(facts: &Facts) -> (StepState, Text) {
 fn target(facts: &Facts) -> (StepState, Text) {
     match (facts.board_in_view, facts.connected && facts.frame_seen, facts.board_captured) {
         (true, ..) => (StepState::Done, text!("Board in view")),
-        (false, true, true) => (StepState::Now, text!("Board out of view")),
-        (false, false, true) => (StepState::Done, text!("Board in the captures")),
+        // A sequence may leave it on the way.
+        (false, true, true) if !facts.sequence_runs => (StepState::Now, text!("Board out of view")),
+        (false, _, true) => (StepState::Done, text!("Board in the captures")),
         (false, true, false) => (StepState::Now, text!("Board not seen yet")),
         (false, false, false) => (StepState::Blocked, text!("Needs an image")),
     }
@@ -144,7 +154,7 @@ fn target(facts: &Facts) -> (StepState, Text) {
 
 fn capture(facts: &Facts) -> (StepState, Text) {
     let Facts { captures_in_use: count, .. } = *facts;
-    if count >= GOOD_VIEWS {
+    if count >= GOOD_VIEWS || (count >= LEAST_VIEWS && facts.goal_reached) {
         (StepState::Done, text!("{count} poses", count = count))
     } else if count > 0 || facts.board_in_view || facts.board_captured {
         (StepState::Now, text!("{count} of {wanted} poses", count = count, wanted = GOOD_VIEWS))
@@ -220,6 +230,15 @@ mod tests {
         assert_eq!(said(&facts)[3].0, StepState::Now, "three poses are enough to solve");
         facts.captures_in_use = 10;
         assert_eq!(said(&facts)[2], (StepState::Done, "10 poses".to_owned()));
+        let enough = Facts { captures_in_use: 9, solved: true, goal_reached: true, ..facts };
+        assert_eq!(said(&enough)[2], (StepState::Done, "9 poses".to_owned()), "the goal needs no more");
+    }
+
+    #[test]
+    fn a_board_that_is_out_of_view_on_the_way_to_a_pose_is_nothing_to_do() {
+        let facts = Facts { connected: true, frame_seen: true, board_captured: true, ..Facts::default() };
+        assert_eq!(said(&facts)[1], (StepState::Now, "Board out of view".to_owned()));
+        assert_eq!(said(&Facts { sequence_runs: true, ..facts })[1].0, StepState::Done);
     }
 
     #[test]

@@ -55,7 +55,7 @@ fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static st
 }
 
 /// How far it is and why the arm goes where it goes; afterwards, how it ended.
-pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
+pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let language = model.view.language;
     let Some(guided) = sequence.guided.as_deref() else { return };
     if !model.sequence_runs {
@@ -67,28 +67,92 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
         }
         return;
     }
-    ui.horizontal(|ui| {
-        ui.add(Spinner::new().size(14.0).color(Palette::of(ui).busy));
+    ui.horizontal_wrapped(|ui| {
+        if guided.waits != Waits::Confirmation {
+            ui.add(Spinner::new().size(14.0).color(Palette::of(ui).busy));
+        }
         ui.label(RichText::new(under_way(sequence, guided).say(language)).strong());
+        if guided.waits == Waits::Confirmation {
+            confirmation_ui(ui, model, outbox);
+        }
     });
     if let Some(why) = &guided.why {
         parts::hint_ui(ui, &why.text().say(language));
     }
     if let Some(error) = error_and_goal(model, guided) {
-        ui.label(error.say(language));
+        let left = left(model, sequence, guided);
+        let said = [Some(error), left].into_iter().flatten().map(|text| text.say(language));
+        ui.label(said.collect::<Vec<_>>().join(" · "));
     }
+    confirm_moves_ui(ui, model, outbox);
+}
+
+/// What a person may do with the pose that waits.
+fn confirmation_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let hindrance = match model.motion {
+        Motion::Idle => None,
+        _ => Some(tr!(language, "The arm is moving: wait until it stands, or stop it")),
+    };
+    let words = RichText::new(tr!(language, "Move there")).strong().color(Marks::of(ui).on_accent);
+    let button = Button::new(words).fill(Palette::of(ui).accent);
+    let what = tr!(
+        language,
+        "The arm moves straight in joint space to the pose that the 3D pane shows; nothing that is known is touched on the way"
+    );
+    if parts::gated_ui(ui, hindrance, button).on_hover_text(what).clicked() {
+        outbox.send(Command::ConfirmMove);
+    }
+    let what = tr!(language, "Leaves this pose and those near it out, and chooses another one");
+    if ui.button(tr!(language, "Skip this pose")).on_hover_text(what).clicked() {
+        outbox.send(Command::SkipMove);
+    }
+}
+
+/// Whether moves wait to be confirmed; switched on while the arm is on its way, it holds before the next pose.
+pub fn confirm_moves_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let mut confirm = model.confirms_moves();
+    let what = tr!(
+        language,
+        "Holds before each pose until you let the arm move. On at first wherever the cell is not the built-in one; it can be \
+         switched at any time"
+    );
+    if ui.checkbox(&mut confirm, tr!(language, "Confirm each move")).on_hover_text(what).changed() {
+        outbox.send(Command::SetConfirmMoves(confirm));
+    }
+}
+
+/// Poses and time that are left, by the plan and the pace so far.
+fn left(model: &Model, sequence: &PoseSequence, guided: &GuidedProgress) -> Option<Text> {
+    let poses = guided.views_left.filter(|poses| *poses > 0)?;
+    let (since_s, before) = guided.since;
+    let done = sequence.outcomes.len().saturating_sub(before);
+    // A pace that has people in it is none, and two poses are no pace.
+    if model.confirms_moves() || done < 2 {
+        return Some(text!("about {n} more {n|pose|poses}", n = poses));
+    }
+    let pose_s = (model.now_s - since_s) / done as f64;
+    let left_s = pose_s * (poses + CHECKS) as f64;
+    // No finer than it is known.
+    let seconds = format!("{:.0}", (left_s / 10.0).ceil() * 10.0);
+    Some(text!("about {n} more {n|pose|poses}, {seconds} s with the checks", n = poses, seconds = seconds))
 }
 
 /// What is done now.
 pub fn under_way(sequence: &PoseSequence, guided: &GuidedProgress) -> Text {
     let number = sequence.outcomes.len() + 1;
     match (guided.waits, guided.ending) {
+        (Waits::Confirmation, Some(_)) => {
+            text!("Check {n} of {of} waits for you", n = guided.checked + 1, of = CHECKS)
+        }
         (_, Some(_)) => {
             text!("Check {n} of {of}: a pose that is not in the fit", n = guided.checked + 1, of = CHECKS)
         }
         (Waits::Nothing, None) => text!("Pose {n}: on the way, then a capture", n = number),
         (Waits::Answer, None) => text!("Solving with {n} {n|pose|poses}", n = number - 1),
         (Waits::Choice, None) => text!("Choosing pose {n}", n = number),
+        (Waits::Confirmation, None) => text!("Pose {n} waits for you", n = number),
     }
 }
 

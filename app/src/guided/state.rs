@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use handeye_core::estimate::Observations;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::guided::choose::{Proposal, Robot};
 use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Why};
 use handeye_core::progress::CancelToken;
@@ -20,8 +20,14 @@ pub struct GuidedProgress {
     pub waits: Waits,
     /// Why the pose that is under way was chosen.
     pub why: Option<Why>,
-    /// Where the tip goes next, and after that as far as it is planned.
-    pub ahead: Vec<Pose<Base, Tip>>,
+    /// The pose that is next, and those after it as far as it is planned.
+    pub ahead: Vec<Proposal>,
+    /// Poses that are expected to lead to the goal; `None` where nobody knows.
+    pub views_left: Option<usize>,
+    /// Where the arm was when the next pose was chosen, from where the way to it was checked.
+    pub chosen_at: Option<JointValues>,
+    /// Since when \[s\], and after how many poses, it has been under way without a pause.
+    pub since: (f64, usize),
     /// How the choice ended; what follows checks the answer.
     pub ending: Option<Ending>,
     /// Captures so far that check it.
@@ -39,16 +45,21 @@ pub enum Waits {
     Answer,
     /// For the next pose.
     Choice,
+    /// For a person who lets the arm move.
+    Confirmation,
 }
 
 impl GuidedProgress {
     /// At the beginning.
-    pub fn new(options: GuidedOptions) -> Self {
+    pub fn new(options: GuidedOptions, now_s: f64) -> Self {
         Self {
             guide: Guide::new(options),
             waits: Waits::Nothing,
             why: None,
             ahead: Vec::new(),
+            views_left: None,
+            chosen_at: None,
+            since: (now_s, 0),
             ending: None,
             checked: 0,
             tried: 0,
@@ -85,6 +96,8 @@ pub struct Choice {
     pub guide: Guide,
     /// What comes next.
     pub step: ChosenStep,
+    /// See [`GuidedProgress::views_left`].
+    pub views_left: Option<usize>,
 }
 
 /// What comes next.
@@ -107,7 +120,14 @@ impl GuideRequest {
             Some(index) => ChosenStep::Check(guide.check_pose(&known, index, cancel).map(Box::new)),
             None => ChosenStep::Next(Box::new(guide.next(&known, cancel))),
         };
-        Choice { guide, step }
+        let views_left = match &step {
+            ChosenStep::Next(next) => match &**next {
+                Next::Go { plan, .. } => guide.views_left(&known, plan),
+                Next::End(_) => None,
+            },
+            ChosenStep::Check(_) => None,
+        };
+        Choice { guide, step, views_left }
     }
 }
 

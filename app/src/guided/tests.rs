@@ -5,7 +5,7 @@ use super::state::{GuidedProgress, Waits};
 use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
-use crate::model::{CapturePurpose, Jog, Model, Motion, PoseSequence, StopOutcome};
+use crate::model::{CapturePurpose, CellSource, Jog, Model, Motion, PoseSequence, StopOutcome};
 use crate::text::Language;
 
 const BUTTON: &str = "Calibrate for me";
@@ -15,7 +15,7 @@ fn pane(model: Model) -> Driven {
         |ui, model, outbox| {
             begin_ui(ui, model, None, 30.0, outbox);
             if let Some(sequence) = &model.sequence {
-                progress_ui(ui, model, sequence);
+                progress_ui(ui, model, sequence, outbox);
             }
         },
         model,
@@ -35,7 +35,7 @@ fn under_way(waits: Waits, ending: Option<Ending>) -> Model {
         waits,
         ending,
         why: Some(Why::Gain { from_m: 8e-4, to_m: 5e-4, rotation_part: 0.9 }),
-        ..GuidedProgress::new(GuidedOptions::default())
+        ..GuidedProgress::new(GuidedOptions::default(), 90.0)
     };
     model.sequence = Some(PoseSequence {
         names: vec!["G1".to_owned(), "G2".to_owned()],
@@ -87,4 +87,36 @@ fn how_it_ended_is_said_in_the_language_of_the_window_and_it_can_begin_again() {
     model.view.language = Language::Chinese;
     let chinese = pane(model);
     assert!(chinese.sees("已达到目标：预期误差为 0.300 mm") && chinese.sees("自动标定"));
+}
+
+fn guided(model: &mut Model) -> &mut GuidedProgress {
+    model.sequence.as_mut().and_then(|sequence| sequence.guided.as_deref_mut()).expect("a guided sequence")
+}
+
+#[test]
+fn a_person_lets_the_arm_move_or_has_another_pose_chosen() {
+    let mut model = under_way(Waits::Confirmation, None);
+    model.source = CellSource::Address("tcp://10.0.0.2:23000".to_owned());
+    let mut waiting = pane(model.clone());
+    assert!(waiting.sees("Pose 2 waits for you"));
+    assert_eq!(waiting.click("Move there"), [Command::ConfirmMove]);
+    assert_eq!(waiting.click("Skip this pose"), [Command::SkipMove]);
+    assert_eq!(waiting.click("Confirm each move"), [Command::SetConfirmMoves(false)], "on behind an address");
+    assert!(waiting.nothing_is_cut_off());
+    model.motion = Motion::Jogging(Jog::Joint { index: 0, forward: true });
+    assert!(!pane(model).is_enabled("Move there"), "not while it moves");
+    let running = pane(under_way(Waits::Nothing, None));
+    assert!(!running.sees("Move there"), "the built-in cell goes on by itself");
+}
+
+#[test]
+fn what_is_left_is_said_in_poses_and_by_the_pace_in_seconds() {
+    let mut model = under_way(Waits::Nothing, None);
+    guided(&mut model).views_left = Some(4);
+    assert!(pane(model.clone()).sees("about 4 more poses"));
+    let now_s = model.now_s;
+    guided(&mut model).since = (now_s - 20.0, 0);
+    model.sequence.as_mut().expect("one").outcomes = vec![StopOutcome::Done; 4];
+    // Five seconds a pose, four poses and three checks.
+    assert!(pane(model).sees("about 4 more poses, 40 s with the checks"));
 }

@@ -3,14 +3,21 @@
 use std::sync::Arc;
 
 use handeye_core::estimate::Method;
+use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::plan::guided::{CHECKS, Ending, GuidedOptions, Next};
+use handeye_core::plan::travel;
 
 use super::state::{Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits};
 use crate::app::App;
 use crate::model::{CapturePurpose, MotionId, Pane, PoseSequence, Severity, SolveStatus, StopOutcome};
+use crate::session::archive::ArchiveTask;
 use crate::text;
 use crate::text::Text;
+
+/// Way of a joint [rad, m of a prismatic one] by which an arm that stands may differ from itself: less than the free space
+/// about a planned way at a reach of 2 m.
+const STANDS: f64 = 5e-3;
 
 impl App {
     /// From the board in view to the goal. Captures that there are count; without any the first is taken here.
@@ -33,7 +40,7 @@ impl App {
             purpose: Some(CapturePurpose::Calibrate),
             outcomes: Vec::new(),
             began_s: self.model.now_s,
-            guided: Some(Box::new(GuidedProgress::new(options))),
+            guided: Some(Box::new(GuidedProgress::new(options, self.model.now_s))),
         });
     }
 
@@ -50,6 +57,7 @@ impl App {
         }
         guided.waits = Waits::Answer;
         guided.ahead.clear();
+        guided.since = (self.model.now_s, visited);
         sequence.names.truncate(visited);
         if let Some(planned) = &mut sequence.planned {
             planned.truncate(visited);
@@ -120,30 +128,99 @@ impl App {
         if id != self.numbers.motion || self.guided_mut().is_none_or(|guided| guided.waits != Waits::Choice) {
             return;
         }
-        let Choice { guide, step } = match outcome {
+        let Choice { guide, step, views_left } = match outcome {
             Ok(choice) => *choice,
             Err(why) => return self.guided_ends(Severity::Warning, why),
         };
+        let chosen_at = self.model.robot.as_ref().map(|robot| robot.joints_rad);
         let Some(guided) = self.guided_mut() else { return };
         guided.guide = guide;
         guided.waits = Waits::Nothing;
+        guided.views_left = views_left;
+        guided.chosen_at = chosen_at;
         match step {
             ChosenStep::Next(next) => match *next {
                 Next::Go { plan, why } => {
                     guided.why = Some(why);
-                    guided.ahead = plan.proposals.iter().map(|proposal| proposal.base_from_tip).collect();
-                    match plan.proposals.first() {
-                        Some(first) => self.guided_goes_to(first),
-                        None => self.choice_ended(Ending::NothingInReach { candidates: plan.candidates }),
+                    guided.ahead = plan.proposals;
+                    if guided.ahead.is_empty() {
+                        self.choice_ended(Ending::NothingInReach { candidates: plan.candidates });
+                    } else {
+                        self.guided_sets_out();
                     }
                 }
                 Next::End(ending) => self.choice_ended(ending),
             },
             ChosenStep::Check(Some(proposal)) => {
-                guided.ahead = vec![proposal.base_from_tip];
-                self.guided_goes_to(&proposal);
+                guided.ahead = vec![*proposal];
+                self.guided_sets_out();
             }
             ChosenStep::Check(None) => self.guided_finished(),
+        }
+        self.keep_guided();
+    }
+
+    /// To the pose that is next, or waits for the person who lets the arm move.
+    fn guided_sets_out(&mut self) {
+        let confirms = self.model.confirms_moves();
+        let Some(guided) = self.guided_mut() else { return };
+        if confirms {
+            guided.waits = Waits::Confirmation;
+        } else if let Some(next) = guided.ahead.first().cloned() {
+            self.guided_goes_to(&next);
+        }
+    }
+
+    /// Whether every move waits for a person. One that waits now begins where that is no longer wanted.
+    pub(crate) fn set_confirm_moves(&mut self, confirm: bool) {
+        self.model.view.confirm_moves = Some(confirm);
+        if !confirm {
+            self.confirm_move();
+        }
+    }
+
+    /// A person lets the arm move to the pose that is next.
+    pub(crate) fn confirm_move(&mut self) {
+        let now = self.model.robot.as_ref().map(|robot| robot.joints_rad);
+        let Some(guided) = self.guided_mut().filter(|guided| guided.waits == Waits::Confirmation) else { return };
+        if has_moved(guided.chosen_at.as_ref(), now.as_ref()) {
+            guided.waits = Waits::Answer;
+            let said = text!(
+                "The arm is elsewhere than when this pose was chosen: another one is chosen from where it is now"
+            );
+            return self.say(Severity::Info, said);
+        }
+        guided.waits = Waits::Nothing;
+        if let Some(next) = guided.ahead.first().cloned() {
+            self.guided_goes_to(&next);
+        }
+    }
+
+    /// A person leaves out the pose that is next.
+    pub(crate) fn skip_move(&mut self) {
+        let Some(guided) = self.guided_mut().filter(|guided| guided.waits == Waits::Confirmation) else { return };
+        guided.ahead.clear();
+        guided.waits = Waits::Answer;
+        if guided.ending.is_some() {
+            guided.tried += 1;
+            if self.guided_is_over() {
+                return;
+            }
+        } else {
+            guided.guide.skipped();
+        }
+        self.guided_step();
+    }
+
+    /// Has what was proposed and what came of it written beside the captures. The next one has it all again, so that one
+    /// for which the disk is too busy is no loss.
+    fn keep_guided(&mut self) {
+        let guided = self.model.sequence.as_ref().and_then(|sequence| sequence.guided.as_deref());
+        if let (Some(guided), Some(folder)) = (guided, self.model.session.folder.clone()) {
+            let task = ArchiveTask::Guided { folder, record: Box::new(guided.guide.record()) };
+            if self.desk.archive(task).is_err() {
+                tracing::debug!("the record of guided capture is written later");
+            }
         }
     }
 
@@ -221,11 +298,20 @@ impl App {
     }
 
     fn guided_ends(&mut self, severity: Severity, why: Text) {
+        self.keep_guided();
         self.model.sequence_runs = false;
         match severity {
             Severity::Info => self.say(severity, why),
             _ => self.say_in(Pane::Poses, severity, why),
         }
+    }
+}
+
+/// Whether the arm was moved between two moments; one that says nothing was.
+fn has_moved(from: Option<&JointValues>, to: Option<&JointValues>) -> bool {
+    match (from, to) {
+        (Some(from), Some(to)) => from.len() != to.len() || travel(from, to) > STANDS,
+        _ => true,
     }
 }
 

@@ -15,6 +15,7 @@ use handeye_core::estimate::handeye::HandEye;
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
+use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::verify::Predictor;
 use serde::{Deserialize, Serialize};
@@ -206,6 +207,8 @@ pub struct ViewSettings {
     pub capture: CaptureOptions,
     /// The error that is good enough.
     pub goal: Goal,
+    /// Whether each move to a chosen pose waits to be confirmed; `None` asks the cell, see [`Model::confirms_moves`].
+    pub confirm_moves: Option<bool>,
     /// Light or dark.
     pub theme: ThemeChoice,
     /// Of all words.
@@ -433,6 +436,18 @@ impl Model {
     /// The newest calibration as what predicts and measures.
     pub fn calibrated(&self) -> Option<&Predictor> {
         self.solve.solved.as_ref()?.calibrated.as_ref()
+    }
+
+    /// Poses that guided capture goes to, the next one first; none while it does not run.
+    pub fn planned_poses(&self) -> &[Proposal] {
+        let sequence = self.sequence.as_ref().filter(|_| self.sequence_runs);
+        sequence.and_then(|sequence| sequence.guided.as_deref()).map_or(&[], |guided| &guided.ahead)
+    }
+
+    /// Whether each move of the arm to a chosen pose waits to be confirmed: as the user wants it, or else wherever the cell is not
+    /// the built-in one, because behind an address there may be a real arm.
+    pub fn confirms_moves(&self) -> bool {
+        self.view.confirm_moves.unwrap_or(self.source != CellSource::BuiltIn)
     }
 
     /// Whether the simulation is known not to run, while the connection works.

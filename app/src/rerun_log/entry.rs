@@ -50,6 +50,8 @@ pub enum Entry {
     Solved(Arc<Solved>),
     /// An image in which the board was tracked.
     Tracked(Arc<Tracked>),
+    /// Tip poses that guided capture goes to, the next one first.
+    Planned(Vec<Pose<Base, Tip>>),
     /// Captures that are selected in the window.
     Selected(Vec<CaptureId>),
     /// The step of the workflow, which decides what is shown.

@@ -120,6 +120,7 @@ fn replaces(entry: &Entry, older: &Entry) -> bool {
         (Entry::Observed { id, .. }, Entry::Observed { id: other, .. }) => id == other,
         (Entry::Cell(_), Entry::Cell(_))
         | (Entry::Document { .. }, Entry::Document { .. })
+        | (Entry::Planned(_), Entry::Planned(_))
         | (Entry::Selected(_), Entry::Selected(_))
         | (Entry::Step(_), Entry::Step(_)) => true,
         _ => false,

@@ -1,5 +1,6 @@
 //! What of the model has been recorded.
 
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::session::CaptureId;
 
 use crate::model::Step;
@@ -9,6 +10,7 @@ use crate::model::Step;
 pub(crate) struct Recorded {
     pub step: Option<Step>,
     pub selection: Vec<CaptureId>,
+    pub planned: Vec<Pose<Base, Tip>>,
     /// Messages with smaller numbers.
     pub said: u64,
 }

@@ -68,6 +68,12 @@ impl App {
             recorded.selection.clone_from(&model.selection);
             recorder.note(Entry::Selected(model.selection.clone()));
         }
+        if recorded.planned.len() != model.planned_poses().len()
+            || recorded.planned.iter().zip(model.planned_poses()).any(|(pose, planned)| *pose != planned.base_from_tip)
+        {
+            recorded.planned = model.planned_poses().iter().map(|planned| planned.base_from_tip).collect();
+            recorder.note(Entry::Planned(recorded.planned.clone()));
+        }
         let unsaid: Vec<_> = model.messages.iter().rev().take_while(|it| it.number >= recorded.said).collect();
         for message in unsaid.into_iter().rev() {
             recorded.said = message.number + 1;

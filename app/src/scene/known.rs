@@ -7,7 +7,7 @@ use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::targets::TargetSpec;
 
-use super::{BoardItem, CameraItem, Fixed, Item, Role};
+use super::{BoardItem, CameraItem, Fixed, Item, PlannedItem, Role};
 use crate::model::{CellFacts, Model, Solved};
 
 /// What of a simulated cell is true.
@@ -136,6 +136,15 @@ impl Known {
     pub fn camera(&self) -> Option<CameraItem> {
         let (role, place) = self.mount()?;
         Some(Item { role, place, shape: Some(self.intrinsics()?) })
+    }
+
+    /// What will be seen at a pose that the arm goes to; `None` where it is not known where on the tip it sits.
+    pub fn planned(&self, base_from_tip: &Pose<Base, Tip>) -> Option<PlannedItem> {
+        if let Some(BoardItem { place: Fixed::Tip(tip_from_target), shape: Some(target), .. }) = self.board() {
+            return Some(PlannedItem::Board(*base_from_tip * tip_from_target, target));
+        }
+        let Fixed::Tip(tip_from_camera) = self.camera()?.place else { return None };
+        Some(PlannedItem::Camera(*base_from_tip * tip_from_camera, self.intrinsics()?))
     }
 
     /// The camera where it truly is.

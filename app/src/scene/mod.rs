@@ -73,6 +73,24 @@ pub type CameraItem = Item<Camera, Intrinsics>;
 /// A board.
 pub type BoardItem = Item<Target, TargetSpec>;
 
+/// What will stand at a pose that the arm goes to.
+#[derive(Debug, Clone, Copy)]
+pub enum PlannedItem {
+    /// The camera on the tip.
+    Camera(Pose<Base, Camera>, Intrinsics),
+    /// The board on the tip.
+    Board(Pose<Base, Target>, TargetSpec),
+}
+
+/// The corners of the end of the pyramid that a camera sees, so far away [m], in its frame: top left, top right, bottom
+/// right, bottom left. The bend of the lens is not in it.
+pub fn frustum_end(intrinsics: &Intrinsics, length_m: f64) -> [Point3<f64>; 4] {
+    let Intrinsics { width, height, fx, fy, cx, cy, .. } = *intrinsics;
+    let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
+    let corner = |u: f64, v: f64| Point3::new((u - cx) / fx, (v - cy) / fy, 1.0) * length_m;
+    [corner(-0.5, -0.5), corner(right, -0.5), corner(right, bottom), corner(-0.5, bottom)]
+}
+
 /// The corners of the outer edge of a board, with the row of squares around the inner corners of a chessboard, wider by a
 /// part of a square: the first beside the origin, then along x.
 pub fn outline(target: &TargetSpec, margin: f64) -> [Point3<f64>; 4] {

@@ -40,7 +40,7 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
         ui.spacing_mut().item_spacing.y = 4.0;
         actions_ui(ui, model, &table, button, outbox);
         if let Some(sequence) = &model.sequence {
-            progress_ui(ui, model, sequence);
+            progress_ui(ui, model, sequence, outbox);
         }
     });
     let room = ui.available_rect_before_wrap();

@@ -16,6 +16,8 @@ pub struct Marks {
     pub excluded: Color32,
     /// The board where the calibration says that it is.
     pub predicted: Color32,
+    /// The board at a pose that the arm goes to next.
+    pub planned: Color32,
     /// Residuals.
     pub residual: Color32,
     /// What is drawn of a recorded image, so that nobody takes it for the live one.
@@ -62,6 +64,7 @@ const OVER_IMAGES: Marks = Marks {
     verify: Color32::from_rgb(190, 140, 255),
     excluded: Color32::from_rgb(160, 166, 178),
     predicted: Color32::from_rgb(64, 224, 255),
+    planned: Color32::from_rgb(255, 255, 255),
     residual: Color32::from_rgb(255, 214, 64),
     review: Color32::from_rgb(240, 176, 64),
     on_review: Color32::from_rgb(30, 22, 6),

@@ -1,6 +1,6 @@
 //! What is drawn over the colour image: corners, axes, the predicted board, coverage, residuals.
 
-use egui::{Color32, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
+use egui::{Align2, Color32, FontId, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 use handeye_core::geometry::frames::{Camera, Pose, Target};
 use handeye_core::geometry::statistics::median_high;
 use handeye_core::targets::TargetSpec;
@@ -13,7 +13,9 @@ use super::place::Place;
 use super::project::{Projector, board_lines};
 use crate::capture::rows::{self, CaptureTable};
 use crate::gui::style::marks::{self, Marks};
+use crate::gui::style::theme::CAPTION;
 use crate::model::Model;
+use crate::tr;
 
 /// How far the axes reach, in squares of the board.
 const AXIS_SQUARES: f64 = 3.0;
@@ -42,6 +44,7 @@ pub fn paint(ui: &Ui, painter: &Painter, model: &Model, shown: &Shown<'_>, place
     let target = &model.document().meta.target;
     if overlays.predicted {
         predicted(painter, model, shown, target, place);
+        next_board(painter, model, shown, target, place);
     }
     let sight = sight(model, shown)?;
     if overlays.corners {
@@ -166,6 +169,27 @@ fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &Targe
         for piece in projector.line(from, to) {
             marks::outlined_line(painter, &piece, 1.8, colour);
         }
+    }
+}
+
+/// Where the board will be at the pose that guided capture goes to next.
+fn next_board(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &TargetSpec, place: &Place) {
+    let next = model.planned_poses().first().filter(|_| shown.capture.is_none());
+    let (Some(calibrated), Some(next)) = (model.calibrated(), next) else { return };
+    let camera_from_target = calibrated.camera_from_target(&next.base_from_tip);
+    let projector = Projector { intrinsics: &calibrated.intrinsics, camera_from_target, place };
+    let palette = Marks::over_images();
+    for [from, to] in &board_lines(target).around {
+        for piece in projector.line(from, to) {
+            painter.line(piece.clone(), Stroke::new(3.2, Color32::from_black_alpha(90)));
+            painter.extend(Shape::dashed_line(&piece, Stroke::new(1.8, palette.planned), 7.0, 5.0));
+        }
+    }
+    if let Some(at) = projector.point(&target.centre()) {
+        let words = tr!(model.view.language, "Next pose");
+        let shadow = at + Vec2::splat(1.0);
+        painter.text(shadow, Align2::CENTER_CENTER, words, FontId::proportional(CAPTION), Color32::BLACK);
+        painter.text(at, Align2::CENTER_CENTER, words, FontId::proportional(CAPTION), palette.planned);
     }
 }
 

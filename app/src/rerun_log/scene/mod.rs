@@ -9,6 +9,7 @@
 //! | `items` | cameras and boards of the scene, those that a simulated cell says are true among them |
 //! | `camera` | the live camera: image, depths, points in the base |
 //! | `captures` | a frustum per capture with image, corners, residuals, boards |
+//! | `planned` | poses that guided capture goes to |
 //! | `result` | the board as calibrated, uncertainties, numbers, report |
 //! | `track` | the board as it is tracked |
 //!
@@ -22,6 +23,7 @@ mod error;
 mod items;
 pub mod paths;
 mod pen;
+mod planned;
 mod result;
 mod robot;
 pub mod style;
@@ -47,6 +49,7 @@ use error::Faults;
 use items::{write_board, write_camera};
 use paths::below;
 use pen::{Clock, Instant, Pen};
+use planned::Planned;
 use robot::Trail;
 
 /// Depths and points of live images are recorded once in this time [s, simulated]: they are ten times the size of the
@@ -65,6 +68,7 @@ pub struct SceneWriter {
     session_trail: Trail,
     connection_trail: Trail,
     captures: Captures,
+    planned: Planned,
     /// Number and time \[s\] of the newest image.
     newest_image: Option<(u64, f64)>,
     depth_at_s: Option<f64>,
@@ -89,6 +93,7 @@ impl SceneWriter {
             session_trail: Trail::new(paths::TRAJECTORY_SESSION, style::PAST_WAY),
             connection_trail: Trail::new(paths::TRAJECTORY_CONNECTION, style::WAY),
             captures: Captures::default(),
+            planned: Planned::default(),
             newest_image: None,
             depth_at_s: None,
             far_plane_m: None,
@@ -134,6 +139,10 @@ impl SceneWriter {
                 known.base_from_target_true = tracked.truth.or(known.base_from_target_true);
                 pen.at(self.clock.live());
                 track::write(pen, &self.known, tracked)
+            }
+            Entry::Planned(poses) => {
+                pen.at(self.clock.now());
+                self.planned.write(pen, &self.known, poses)
             }
             Entry::Selected(ids) => self.selected(pen, ids),
             // The arrangement of the viewer is no part of the scene, see `blueprint`.

@@ -25,6 +25,8 @@ pub const TRAJECTORY_CONNECTION: &str = "base/trajectory/since_connect";
 pub const POINTS: &str = "base/points";
 /// The captures, one entity each, see [`capture`].
 pub const CAPTURES: &str = "base/captures";
+/// Where guided capture goes next: the camera on the tip, or the board on it.
+pub const PLANNED: &str = "base/planned";
 /// The board as it is tracked, `base_from_target`.
 pub const TRACKED_BOARD: &str = "base/track/board";
 /// The board by the newest image alone.
@@ -123,6 +125,11 @@ pub fn link(index: usize) -> String {
 /// The camera at a capture, `base_from_camera`.
 pub fn capture(id: CaptureId) -> String {
     format!("{CAPTURES}/{id}")
+}
+
+/// The pose that is visited as the `index`-th from now.
+pub fn planned(index: usize) -> String {
+    format!("{PLANNED}/{index}")
 }
 
 /// `child` below `parent`.

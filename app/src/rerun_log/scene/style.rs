@@ -44,6 +44,8 @@ pub const NEUTRAL: Color = colour(130, 160, 200);
 pub const EXCLUDED: Color = colour(110, 110, 110);
 /// A capture that the estimate left out as an outlier: beside the green, yellow and red of residuals it must not be mistaken.
 pub const SET_ASIDE: Color = colour(255, 120, 0);
+/// A pose that the arm goes to.
+pub const PLANNED: Color = colour(235, 235, 235);
 /// A capture that is selected.
 pub const SELECTED: Color = colour(255, 255, 255);
 /// The tracked board.

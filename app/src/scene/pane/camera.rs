@@ -6,6 +6,7 @@ use handeye_core::geometry::frames::{Base, Camera, Pose};
 use nalgebra::Point3;
 
 use super::canvas::Canvas;
+use crate::scene::frustum_end;
 
 /// A camera in the base.
 #[derive(Debug, Clone, Copy)]
@@ -21,13 +22,8 @@ pub struct Frustum<'a> {
 impl Frustum<'_> {
     /// The tip of the pyramid and the corners of its end: top left, top right, bottom right, bottom left.
     fn points(&self) -> (Point3<f64>, [Point3<f64>; 4]) {
-        let Intrinsics { width, height, fx, fy, cx, cy, .. } = *self.intrinsics;
-        let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
-        let corner = |u: f64, v: f64| {
-            let in_camera = Point3::new((u - cx) / fx, (v - cy) / fy, 1.0) * self.length_m;
-            self.base_from_camera.isometry() * in_camera
-        };
-        let corners = [corner(-0.5, -0.5), corner(right, -0.5), corner(right, bottom), corner(-0.5, bottom)];
+        let corners =
+            frustum_end(self.intrinsics, self.length_m).map(|corner| self.base_from_camera.isometry() * corner);
         (Point3::from(self.base_from_camera.translation()), corners)
     }
 

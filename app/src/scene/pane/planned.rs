@@ -9,7 +9,7 @@ use super::canvas::Canvas;
 use super::legend::{Entry, Sign};
 use crate::gui::style::theme::Palette;
 use crate::model::Model;
-use crate::scene::{BoardItem, Fixed, Known};
+use crate::scene::{Known, PlannedItem};
 use crate::text::Language;
 use crate::tr;
 
@@ -26,12 +26,12 @@ pub fn planned(
     language: Language,
     palette: &Palette,
 ) -> Option<Entry> {
-    let guided = model.sequence.as_ref().filter(|_| model.sequence_runs)?.guided.as_deref()?;
-    for (index, base_from_tip) in guided.ahead.iter().enumerate() {
+    let planned = model.planned_poses();
+    for (index, proposal) in planned.iter().enumerate() {
         let (width, colour) = if index == 0 { (2.0, palette.text) } else { (1.0, palette.text.gamma_multiply(LATER)) };
-        ghost(canvas, known, base_from_tip, width, colour);
+        ghost(canvas, known, &proposal.base_from_tip, width, colour);
     }
-    (!guided.ahead.is_empty()).then(|| Entry {
+    (!planned.is_empty()).then(|| Entry {
         sign: Sign::Frustum,
         colour: palette.text,
         name: tr!(language, "Planned poses").to_owned(),
@@ -44,19 +44,14 @@ pub fn planned(
 }
 
 fn ghost(canvas: &mut Canvas, known: &Known, base_from_tip: &Pose<Base, Tip>, width: f32, colour: Color32) {
-    if let Some(BoardItem { place: Fixed::Tip(tip_from_target), shape: Some(target), .. }) = known.board() {
-        board::outlined(canvas, &(*base_from_tip * tip_from_target), &target, (width, colour), Line::Dashed);
-        return;
-    }
-    let camera = known.camera().and_then(|camera| match camera.place {
-        Fixed::Tip(tip_from_camera) => Some(*base_from_tip * tip_from_camera),
-        Fixed::Base(_) => None,
-    });
-    match (camera, known.intrinsics()) {
-        (Some(base_from_camera), Some(intrinsics)) => {
+    match known.planned(base_from_tip) {
+        Some(PlannedItem::Board(base_from_target, target)) => {
+            board::outlined(canvas, &base_from_target, &target, (width, colour), Line::Dashed);
+        }
+        Some(PlannedItem::Camera(base_from_camera, intrinsics)) => {
             let frustum = Frustum { base_from_camera, intrinsics: &intrinsics, length_m: LENGTH_M };
             frustum.draw(canvas, width, colour, colour.gamma_multiply(0.06));
         }
-        _ => canvas.dot(&base_from_tip.translation().into(), 3.0 + width, colour),
+        None => canvas.dot(&base_from_tip.translation().into(), 3.0 + width, colour),
     }
 }

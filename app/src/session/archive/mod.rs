@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crossbeam_channel::{Receiver, select};
+use handeye_core::plan::guided::record::{GUIDED_RECORD, GuidedRecord};
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::{Document, Edit, SessionError, SessionMeta, Store};
 use handeye_core::project::taught_poses::TaughtPose;
@@ -66,6 +67,13 @@ pub enum ArchiveTask {
         folder: PathBuf,
         /// The result.
         result: Box<CalibrationResult>,
+    },
+    /// Keep the record of guided capture beside the captures.
+    Guided {
+        /// The session that it is of.
+        folder: PathBuf,
+        /// What was proposed, and what came of it.
+        record: Box<GuidedRecord>,
     },
 }
 
@@ -128,6 +136,7 @@ impl Archive {
             ArchiveTask::Undo => self.change(Store::undo),
             ArchiveTask::Redo => self.change(Store::redo),
             ArchiveTask::Result { folder, result } => self.keep_result(&folder, *result),
+            ArchiveTask::Guided { folder, record } => self.keep_guided(&folder, &record),
         }
     }
 
@@ -237,6 +246,17 @@ impl Archive {
         }
         if let Err(error) = store.write_result(&result) {
             let text = text!("The result was not kept: {error}", error = error);
+            self.outlet.notice(Severity::Warning, text);
+        }
+    }
+
+    fn keep_guided(&self, folder: &Path, record: &GuidedRecord) {
+        // Another session that is open by now does not get it.
+        if self.store.as_ref().is_none_or(|store| store.folder() != folder) {
+            return;
+        }
+        if let Err(error) = record.write(&folder.join(GUIDED_RECORD)) {
+            let text = text!("The record of guided capture was not kept: {error}", error = error);
             self.outlet.notice(Severity::Warning, text);
         }
     }

@@ -30,7 +30,7 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
     ui.label(RichText::new(verdict(curve, now, goal_mm).say(language)).color(Palette::of(ui).text));
     let room = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(room);
-    let chart = Chart::new(curve, axes::plot_rect(room), goal_mm);
+    let chart = Chart::new(curve, axes::plot_rect(room), goal_mm, planned(model, now));
     chart.paint(ui, curve, now, goal_mm, model);
     chart.hover_ui(ui, curve, language);
 }
@@ -64,6 +64,14 @@ struct Chart {
     scale: Scale,
     most_views: usize,
     fewest_views: usize,
+    /// Numbers of poses and errors [mm] that guided capture plans.
+    planned: Vec<(usize, f64)>,
+}
+
+/// What guided capture expects of the poses that it has planned: numbers of poses and errors [mm].
+fn planned(model: &Model, (views, error_m): (usize, f64)) -> Vec<(usize, f64)> {
+    let chosen = model.planned_poses().iter().enumerate().filter(|(_, pose)| pose.error_ratio < 1.0);
+    chosen.map(|(index, pose)| (views + index + 1, error_m * 1e3 * pose.error_ratio)).collect()
 }
 
 fn all(curve: &ErrorCurve) -> impl Iterator<Item = (&ErrorPoint, f64, bool)> {
@@ -74,11 +82,11 @@ fn all(curve: &ErrorCurve) -> impl Iterator<Item = (&ErrorPoint, f64, bool)> {
 }
 
 impl Chart {
-    fn new(curve: &ErrorCurve, plot: Rect, goal_mm: f64) -> Self {
+    fn new(curve: &ErrorCurve, plot: Rect, goal_mm: f64, planned: Vec<(usize, f64)>) -> Self {
         let errors = all(curve).map(|(_, error_mm, _)| error_mm);
-        let scale = Scale::logarithmic(errors.chain(std::iter::once(goal_mm)));
-        let views = || all(curve).map(|(point, _, _)| point.views);
-        Self { plot, scale, most_views: views().max().unwrap_or(1), fewest_views: views().min().unwrap_or(0) }
+        let scale = Scale::logarithmic(errors.chain(planned.iter().map(|(_, mm)| *mm)).chain(std::iter::once(goal_mm)));
+        let views = || all(curve).map(|(point, _, _)| point.views).chain(planned.iter().map(|(views, _)| *views));
+        Self { plot, scale, most_views: views().max().unwrap_or(1), fewest_views: views().min().unwrap_or(0), planned }
     }
 
     fn x(&self, views: usize) -> f32 {
@@ -117,6 +125,17 @@ impl Chart {
         further.splice(0..0, gathered.last().copied());
         painter.extend(Shape::dashed_line(&further, Stroke::new(1.5, colour.gamma_multiply(0.7)), 4.0, 4.0));
         let here = self.at(now.0, now.1 * 1e3);
+        let chosen: Vec<Pos2> =
+            std::iter::once(here).chain(self.planned.iter().map(|(views, mm)| self.at(*views, *mm))).collect();
+        if chosen.len() > 1 {
+            painter.extend(Shape::dashed_line(&chosen, Stroke::new(1.5, palette.text), 4.0, 4.0));
+            for at in &chosen[1..] {
+                painter.circle_stroke(*at, 3.0, Stroke::new(1.5, palette.text));
+            }
+            let words = tr!(language, "Planned poses");
+            let at = chosen[chosen.len() - 1] + egui::vec2(-4.0, 6.0);
+            painter.text(at, Align2::RIGHT_TOP, words, FontId::proportional(CAPTION), palette.text);
+        }
         painter.circle_filled(here, 5.0, colour);
         painter.circle_stroke(here, 5.0, Stroke::new(1.5, palette.card));
         let words = text!("Now {error} mm", error = format!("{:.2}", now.1 * 1e3)).say(language);

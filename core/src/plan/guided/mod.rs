@@ -18,6 +18,7 @@ pub mod candidates;
 pub mod choose;
 pub mod design;
 pub mod fan;
+pub mod outlook;
 pub mod record;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -212,6 +213,8 @@ pub enum Outcome {
     Captured,
     /// No view: no board, blurred, not reached.
     Failed,
+    /// Somebody left it out.
+    Skipped,
 }
 
 impl Step {
@@ -270,6 +273,15 @@ impl Guide {
             self.failed.push(step.base_from_tip);
         }
         self.failures += 1;
+    }
+
+    /// Somebody leaves out the pose proposed last: it is not proposed again, nor its neighbourhood, and says nothing of
+    /// whether the board is lost.
+    pub fn skipped(&mut self) {
+        if let Some(step) = self.steps.last_mut() {
+            step.outcome = Outcome::Skipped;
+            self.failed.push(step.base_from_tip);
+        }
     }
 
     /// The pose proposed last gave a view.

@@ -47,7 +47,7 @@ pub struct StepRecord {
     pub travel_s: f64,
     /// Views that were compared.
     pub candidates: usize,
-    /// `captured`, `failed`, or `pending` where it was stopped on the way.
+    /// `captured`, `failed`, `skipped` by a person, or `pending` where it was stopped on the way.
     pub outcome: String,
 }
 
@@ -88,6 +88,7 @@ impl Guide {
                 Outcome::Pending => "pending",
                 Outcome::Captured => "captured",
                 Outcome::Failed => "failed",
+                Outcome::Skipped => "skipped",
             }
             .to_owned(),
         });
