@@ -4,13 +4,14 @@
 //! cargo run --release -p handeye_core --example guided_capture -- choice 200
 //! cargo run --release -p handeye_core --example guided_capture -- stop 1000
 //! cargo run --release -p handeye_core --example guided_capture -- speed 20
+//! cargo run --release -p handeye_core --example guided_capture -- hand 100
 //! ```
 //!
 //! `choice`: the expected error of the tip over the box about the board, by the true model and the poses that were taken, in
 //! sessions that begin with one view of the board. Farthest rotation and random views know from the beginning where camera
 //! and board are; guided capture does not. The optimum is the best set of so many views out of the same thousand, by
 //! exchange. `stop`: what is true when guided capture ends by itself. `speed`: how long the choice of a pose takes, on one
-//! thread, with a thousand candidates and six poses ahead.
+//! thread, with a thousand candidates and six poses ahead. `hand`: a robot that a person moves.
 
 #![expect(clippy::expect_used, clippy::print_stdout, reason = "a study prints, and stops at what cannot be")]
 
@@ -27,6 +28,7 @@ use handeye_core::plan::guided::design::{Design, weight_about};
 use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Step};
 use handeye_core::progress::CancelToken;
 use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
+use handeye_core::testing::hand;
 use handeye_core::testing::sessions::{BOARD, REALISTIC};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -47,7 +49,44 @@ fn main() {
         "choice" => choice(sessions),
         "stop" => stop(sessions),
         "speed" => speed(sessions),
-        other => println!("{other:?} is none of choice, stop, speed"),
+        "hand" => by_hand(sessions),
+        other => println!("{other:?} is none of choice, stop, speed, hand"),
+    }
+}
+
+/// A trembling hand that is led to ten views: how long a view takes it, and what comes of it.
+fn by_hand(sessions: u64) {
+    println!(
+        "| camera | seconds a view, median, 90 % | refused | given up | error stated, mean, mm | true below stated |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- |");
+    for (mode, name) in [(Mode::EyeInHand, "on the arm"), (Mode::EyeToHand, "beside it")] {
+        let (mut took_s, mut refused, mut skipped) = (Vec::new(), 0, 0);
+        let (mut stated_mm, mut below, mut solved) = (0.0, 0, 0);
+        for seed in 0..sessions {
+            let setup = CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens: false, seed };
+            let mut cell = GuidedCell::new(setup);
+            let run = hand::session(&mut cell, GuidedOptions { goal_m: 1e-9, ..GuidedOptions::default() }, 10, seed);
+            took_s.extend(run.took_s);
+            refused += run.refused;
+            skipped += run.skipped;
+            let errors = run.calibration.as_ref().and_then(|it| Some((it.tip_error_95_m()?, cell.true_error_m(it)?)));
+            if let Some((stated_m, true_m)) = errors {
+                solved += 1;
+                stated_mm += stated_m * 1e3;
+                below += u32::from(true_m <= stated_m);
+            }
+        }
+        took_s.sort_by(f64::total_cmp);
+        let quantile = |part: f64| took_s.get((took_s.len() as f64 * part) as usize).copied().unwrap_or(f64::NAN);
+        let count = f64::from(solved);
+        println!(
+            "| {name} | {:.1}, {:.1} | {refused} | {skipped} | {:.3} | {:.0} % of {solved} |",
+            quantile(0.5),
+            quantile(0.9),
+            stated_mm / count,
+            1e2 * f64::from(below) / count
+        );
     }
 }
 

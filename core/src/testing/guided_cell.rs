@@ -214,8 +214,12 @@ impl GuidedCell {
     /// Drives the arm there and captures; whether the whole board was in the image.
     pub fn capture(&mut self, joints: &JointValues) -> bool {
         self.robot.joints = *joints;
-        let reported_tip = self.base_from_tip();
-        let Some(view) = self.view(&reported_tip) else { return false };
+        self.capture_at(&self.base_from_tip())
+    }
+
+    /// Captures at a tip pose that the robot reports, however it got there; whether the whole board was in the image.
+    pub fn capture_at(&mut self, base_from_tip: &Pose<Base, Tip>) -> bool {
+        let Some(view) = self.view(base_from_tip) else { return false };
         self.observations.views.push(view);
         true
     }

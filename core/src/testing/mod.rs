@@ -11,6 +11,7 @@ pub mod faulty;
 #[cfg(test)]
 pub(crate) mod flat_board;
 pub mod guided_cell;
+pub mod hand;
 mod machine;
 #[cfg(test)]
 #[cfg_attr(not(feature = "opencv"), expect(dead_code, reason = "without the tracker only goals of the TCP use it"))]

@@ -14,6 +14,7 @@
 //! A session whose views determine nothing goes on with the fan. Joint offsets of the robot, where they are estimated, are
 //! not among what a view is expected to tell.
 
+pub mod by_hand;
 pub mod candidates;
 pub mod choose;
 pub mod design;
