@@ -16,6 +16,7 @@ use handeye_core::project::taught_poses::TaughtPose;
 use handeye_core::targets::TargetSpec;
 use serde::{Deserialize, Serialize};
 
+use crate::by_hand::state::HandChoice;
 use crate::guided::state::ChoiceOutcome;
 use crate::model::{
     BoardMotion, CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, DepthScale,
@@ -128,6 +129,13 @@ pub enum Command {
     SkipMove,
     /// Whether each move to a chosen pose waits to be confirmed.
     SetConfirmMoves(bool),
+    /// Say how the board is to look in the image, and capture when it does, until the goal is reached: for an arm that a
+    /// person moves.
+    GuideByHand,
+    /// Leave out the view that is wanted, and ask for another one.
+    SkipView,
+    /// No more views.
+    StopGuiding,
     /// Have poses planned that are not in the fit, visit them, and capture for verification at each.
     VerifyAtPlanned,
     /// No more poses.
@@ -259,6 +267,14 @@ pub enum Event {
         id: MotionId,
         /// What was chosen.
         outcome: ChoiceOutcome,
+    },
+    /// The next view for an arm that a person moves was chosen, or cannot be.
+    #[serde(skip)]
+    ViewChosen {
+        /// The number of the request.
+        number: u64,
+        /// What was chosen.
+        choice: Box<HandChoice>,
     },
     /// Poses to look at the board from were planned, or cannot be.
     Planned {

@@ -2,6 +2,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod app;
+pub mod by_hand;
 pub mod capture;
 pub mod cli;
 pub mod command;

@@ -64,6 +64,8 @@ pub(crate) struct Numbers {
     pub(crate) follow: Option<MotionId>,
     /// The request for poses to verify at that is not answered yet.
     pub(crate) plan: Option<MotionId>,
+    /// The request for a view for a person to bring about.
+    pub(crate) view: u64,
 }
 
 impl App {
@@ -182,6 +184,9 @@ impl App {
             Command::ConfirmMove => self.confirm_move(),
             Command::SkipMove => self.skip_move(),
             Command::SetConfirmMoves(confirm) => self.set_confirm_moves(confirm),
+            Command::GuideByHand => self.guide_by_hand(),
+            Command::SkipView => self.skip_view(),
+            Command::StopGuiding => self.stop_guiding(),
             Command::VerifyAtPlanned => self.plan_verification(),
             Command::StopSequence => self.stop_sequence(),
 
@@ -251,9 +256,11 @@ impl App {
                     self.model.board_seen_s = Some(self.model.now_s);
                 }
                 self.model.detection = Some(*detection);
+                self.look_by_hand();
             }
             Event::Moved { id, outcome } => self.moved(id, outcome),
             Event::Guided { id, outcome } => self.guided_chosen(id, outcome),
+            Event::ViewChosen { number, choice } => self.view_chosen(number, *choice),
             Event::Planned { id, views } => self.planned(id, views),
             Event::JogEnded { why } => self.jog_ended(why),
             Event::CaptureWaits { number, wait } => self.capture_waits(number, wait),
@@ -279,6 +286,7 @@ impl App {
             Event::Notice { severity, text } => self.say(severity, text),
         }
         self.guided_step();
+        self.guided_by_hand_step();
     }
 
     /// Has the settings written.

@@ -27,7 +27,11 @@ impl App {
                 Some(CaptureUnderWay { number, purpose, wait: CaptureWait::Images(Wait::ForImage), since_s });
             self.model.refused = None;
         }
+        let has_begun = asked.is_ok();
         self.expect(text!("There is no capture"), asked);
+        if !has_begun && self.model.sequence_runs {
+            self.break_off();
+        }
     }
 
     pub(crate) fn cancel_capture(&mut self) {
@@ -73,5 +77,6 @@ impl App {
         };
         self.say(Severity::Info, text);
         self.sequence_captured();
+        self.captured_by_hand();
     }
 }

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use handeye_core::estimate::Observations;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::guided::choose::{Proposal, Robot};
-use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Why};
+use handeye_core::plan::guided::{CHECKS, Ending, Guide, GuidedOptions, Known, Next, Why};
 use handeye_core::progress::CancelToken;
 
-use crate::model::Solved;
+use crate::model::{Severity, Solved};
+use crate::text;
 use crate::text::Text;
 
 /// How a guided sequence goes.
@@ -133,3 +134,17 @@ impl GuideRequest {
 
 /// What a choice was, or why there is none.
 pub type ChoiceOutcome = Result<Box<Choice>, Text>;
+
+/// How it ended, after so many checks.
+pub(crate) fn ended(ending: Ending, checked: usize) -> (Severity, Text) {
+    if checked < CHECKS {
+        let said = text!(
+            "{ending}. It was checked at {checked} of {of} poses only: see why in the log, and verify where you can",
+            ending = ending.text(),
+            checked = checked,
+            of = CHECKS
+        );
+        return (Severity::Warning, said);
+    }
+    (if ending.is_success() { Severity::Info } else { Severity::Warning }, ending.text())
+}

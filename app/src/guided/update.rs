@@ -8,7 +8,7 @@ use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::plan::guided::{CHECKS, Ending, GuidedOptions, Next};
 use handeye_core::plan::travel;
 
-use super::state::{Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits};
+use super::state::{Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits, ended};
 use crate::app::App;
 use crate::model::{CapturePurpose, MotionId, Pane, PoseSequence, Severity, SolveStatus, StopOutcome};
 use crate::session::archive::ArchiveTask;
@@ -276,21 +276,13 @@ impl App {
         else {
             return;
         };
-        if checked < CHECKS {
-            let said = text!(
-                "{ending}. It was checked at {checked} of {of} poses only: see why in the log, and verify where you can",
-                ending = ending.text(),
-                checked = checked,
-                of = CHECKS
-            );
-            return self.guided_ends(Severity::Warning, said);
-        }
-        let severity = if ending.is_success() { Severity::Info } else { Severity::Warning };
-        self.guided_ends(severity, ending.text());
+        let (severity, said) = ended(ending, checked);
+        self.guided_ends(severity, said);
     }
 
     /// A guided sequence is of one target and one set-up.
     pub(crate) fn forget_guided(&mut self) {
+        self.model.by_hand = None;
         if self.model.sequence.as_ref().is_some_and(|sequence| sequence.guided.is_some()) {
             self.stop_sequence();
             self.model.sequence = None;

@@ -20,6 +20,7 @@ use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::verify::Predictor;
 use serde::{Deserialize, Serialize};
 
+pub use crate::by_hand::state::ByHand;
 pub use crate::capture::state::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
@@ -278,6 +279,8 @@ pub struct Model {
     pub sequence_runs: bool,
     /// The poses of a sequence are being planned.
     pub planning: bool,
+    /// A person is guided from view to view.
+    pub by_hand: Option<Box<ByHand>>,
     /// The session.
     pub session: SessionState,
     /// Whether a session is being opened.
@@ -364,6 +367,7 @@ impl Model {
             refused: None,
             sequence: None,
             sequence_runs: false,
+            by_hand: None,
             planning: false,
             session: SessionState {
                 folder: None,

@@ -1,4 +1,4 @@
-//! The threads that need no cell: archive, solver, observer and files. They live as long as the application, whatever
+//! The threads that need no cell: archive, solver, observer, choice of views and files. They live as long as the application, whatever
 //! it is connected to.
 
 use std::io;
@@ -9,6 +9,7 @@ use std::time::Instant;
 use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::archive::{Archive, ArchiveTask};
+use crate::by_hand::worker::{HandJob, choose};
 use crate::capture::Measured;
 use crate::command::Event;
 use crate::solve::observer::{self, ObserveJob};
@@ -30,6 +31,7 @@ pub struct SessionThreads {
     files: Option<Sender<FileTask>>,
     observer: NewestWins<ObserveJob>,
     solver: NewestWins<SolveJob>,
+    chooser: NewestWins<HandJob>,
     events: Receiver<Event>,
     sessions: PathBuf,
     threads: Vec<Started>,
@@ -59,15 +61,18 @@ impl SessionThreads {
             NewestWins::start("observer", move |job, cancel| observer::observe(&job, cancel, &out))?;
         let out = outlet();
         let (solver, solving) = NewestWins::start("solver", move |job, cancel| solve(&job, cancel, &out))?;
+        let out = outlet();
+        let (chooser, choosing) = NewestWins::start("views", move |job, cancel| choose(&job, cancel, &out))?;
         Ok(Self {
             archive: Some(archive),
             captures,
             files: Some(files),
             observer,
             solver,
+            chooser,
             events,
             sessions,
-            threads: vec![archiving, filing, observing, solving],
+            threads: vec![archiving, filing, observing, solving, choosing],
         })
     }
 
@@ -114,6 +119,11 @@ impl SessionThreads {
         self.solver.submit(job);
     }
 
+    /// Has the next view chosen for a person who moves the robot.
+    pub fn choose_view(&mut self, job: HandJob) {
+        self.chooser.submit(job);
+    }
+
     /// Cancels the solve.
     pub fn cancel_solve(&self) {
         self.solver.cancel();
@@ -123,6 +133,7 @@ impl SessionThreads {
     pub fn cancel_all(&self) {
         self.observer.cancel();
         self.solver.cancel();
+        self.chooser.cancel();
     }
 
     /// Ends the threads, and waits for them no longer than until `end`. What was handed to the archive is still written;
@@ -130,6 +141,7 @@ impl SessionThreads {
     pub fn end(&mut self, end: Instant) {
         self.observer.end();
         self.solver.end();
+        self.chooser.end();
         self.archive = None;
         self.files = None;
         for thread in self.threads.drain(..) {

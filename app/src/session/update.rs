@@ -153,6 +153,7 @@ impl App {
             // Its poses are those of the other session.
             self.model.sequence = None;
             self.model.sequence_runs = false;
+            self.model.by_hand = None;
         }
         if let Some(names) = &new.export_names
             && let Ok(names) = serde_json::from_value(names.clone())

@@ -1,15 +1,18 @@
 //! A person who brings about the views that are asked for, with a hand that trembles.
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::guided_cell::GuidedCell;
+use super::sessions::{BOARD, seen};
 use crate::estimate::Calibration;
+use crate::estimate::handeye::joint::ViewModel;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::plan::guided::by_hand::{HandGuide, HandNext, Wanted};
 use crate::plan::guided::{Ending, GuidedOptions};
 use crate::progress::CancelToken;
+use crate::targets::observation::Corner;
 
 /// Time between two looks at the image, seconds.
 const LOOK_S: f64 = 0.1;
@@ -77,11 +80,20 @@ pub fn session(cell: &mut GuidedCell, options: GuidedOptions, views: usize, seed
     run
 }
 
+/// What is found in a view; `None` where the board is not whole.
+///
+/// # Panics
+/// Never: there is no noise to draw.
+pub fn corners(truth: &ViewModel, camera_from_target: &Pose<Camera, Target>) -> Option<Vec<Corner>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    seen(&mut rng, truth.intrinsics(), camera_from_target.isometry(), &BOARD.points(), 0.0, |_| Vector2::zeros())
+}
+
 /// Where the hand gets to, and how long it takes.
 fn bring_about(
     wanted: &Wanted,
     from: &Pose<Camera, Target>,
-    truth: &crate::estimate::handeye::joint::ViewModel,
+    truth: &ViewModel,
     rng: &mut ChaCha8Rng,
 ) -> (Pose<Camera, Target>, f64) {
     let mut about = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
@@ -100,11 +112,12 @@ fn bring_about(
             (present.translation.vector + limited(to, STEP.0) + vector(TREMOR.0)).into(),
             UnitQuaternion::from_scaled_axis(limited(turn, STEP.1) + vector(TREMOR.1)) * present.rotation,
         );
-        let seen = Pose::from_isometry(present);
-        if wanted.judge(&seen, &truth.base_from_tip(&seen)).is_good {
+        let there = Pose::from_isometry(present);
+        let corners = corners(truth, &there);
+        if corners.is_some_and(|corners| wanted.judge(&corners, &truth.base_from_tip(&there)).is_good) {
             good += 1;
             if good >= GOOD_LOOKS {
-                return (seen, time_s);
+                return (there, time_s);
             }
         } else {
             good = 0;

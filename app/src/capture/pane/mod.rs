@@ -9,6 +9,7 @@ mod table;
 use egui::{Align, Button, DragValue, Frame, Layout, Margin, RichText, Spinner, Ui, Vec2, WidgetInfo, WidgetType};
 use handeye_core::project::session::CaptureId;
 
+use crate::by_hand;
 use crate::capture::rows::{self, CaptureTable};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::{self, Marks};
@@ -39,7 +40,9 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
         ui.spacing_mut().interact_size.y = ui.spacing().interact_size.y.min(button);
         ui.spacing_mut().item_spacing.y = 4.0;
         actions_ui(ui, model, &table, button, outbox);
-        if let Some(sequence) = &model.sequence {
+        if let Some(hand) = &model.by_hand {
+            by_hand::pane::progress_ui(ui, model, hand, outbox);
+        } else if let Some(sequence) = &model.sequence {
             progress_ui(ui, model, sequence, outbox);
         }
     });
@@ -108,9 +111,13 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
         }
         return;
     }
+    if model.by_hand.is_some() {
+        return;
+    }
     let calibrates = |sequence: &&PoseSequence| sequence.purpose == Some(CapturePurpose::Calibrate);
     if is_wanted(model) {
         begin_ui(ui, model, hindrance, height, outbox);
+        by_hand::pane::begin_ui(ui, model, hindrance, height, outbox);
     }
     if let Some(sequence) = model.sequence.as_ref().filter(calibrates) {
         sequence::continue_ui(ui, model, sequence, outbox);

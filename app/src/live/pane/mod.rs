@@ -10,6 +10,8 @@ mod toolbar;
 pub(crate) mod view;
 
 pub use feedback::{stands_over_image, waiting};
+pub use place::Place;
+pub use project::{Projector, board_lines};
 pub use shown::Shown;
 
 use egui::{Align, CornerRadius, Layout, Pos2, Rect, Ui, UiBuilder, Vec2};

@@ -11,6 +11,7 @@ use nalgebra::{Point3, Vector2};
 use super::Shown;
 use super::place::Place;
 use super::project::{Projector, board_lines};
+use crate::by_hand;
 use crate::capture::rows::{self, CaptureTable};
 use crate::gui::style::marks::{self, Marks};
 use crate::gui::style::theme::CAPTION;
@@ -45,6 +46,9 @@ pub fn paint(ui: &Ui, painter: &Painter, model: &Model, shown: &Shown<'_>, place
     if overlays.predicted {
         predicted(painter, model, shown, target, place);
         next_board(painter, model, shown, target, place);
+    }
+    if shown.capture.is_none() {
+        by_hand::overlay::paint(painter, model, target, place);
     }
     let sight = sight(model, shown)?;
     if overlays.corners {

@@ -5,10 +5,15 @@ use std::path::Path;
 use std::process::{Command as Process, Output};
 
 use handeye_app::command::Command;
-use handeye_app::model::{CellSource, JogSettings, Model, Motion};
+use handeye_app::guided::state::{GuidedProgress, Waits};
+use handeye_app::model::{CellSource, JogSettings, Model, Motion, MotionGoal};
+use handeye_app::text::Text;
+use handeye_core::geometry::planar_pose;
+use handeye_core::nalgebra::Point3;
 use handeye_core::plan::guided::record::GuidedRecord;
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::Role;
+use handeye_core::targets::observation::Corner;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_tests::workbench::Workbench;
@@ -85,6 +90,8 @@ fn connected(folder: &Path) -> (Workbench, CellServer) {
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("the board", |model| model.board_seen_s.is_some());
     bench.click(Command::SetJog(JogSettings { speed: 1.0, ..JogSettings::default() }));
+    // Behind an address there may be a real arm, and each move waits for a person.
+    bench.click(Command::SetConfirmMoves(false));
     (bench, cell)
 }
 
@@ -128,4 +135,79 @@ fn a_stop_ends_it_at_once_and_it_goes_on_from_there_when_wished() {
     bench.click(Command::ContinueSequence);
     bench.until("the end", |model| !model.sequence_runs && count(model, Role::Verification) == 3);
     assert!(count(bench.model(), Role::Calibration) <= kept + 16);
+}
+
+fn guided(model: &Model) -> Option<&GuidedProgress> {
+    model.sequence.as_ref().filter(|_| model.sequence_runs)?.guided.as_deref()
+}
+
+#[test]
+fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut bench, _cell) = connected(folder.path());
+    bench.click(Command::SetConfirmMoves(true));
+    bench.click(Command::CalibrateForMe);
+    let waits = |model: &Model| guided(model).is_some_and(|it| it.waits == Waits::Confirmation);
+    bench.until("a pose that waits", waits);
+    let first = guided(bench.model()).expect("it runs").ahead[0].base_from_tip;
+    bench.click(Command::SkipMove);
+    bench.until("another one", |model| {
+        waits(model) && guided(model).is_some_and(|it| it.ahead[0].base_from_tip != first)
+    });
+    for captures in 2..=4 {
+        let before = bench.model().robot.as_ref().expect("connected").joints_rad;
+        bench.until("a pose that waits", waits);
+        assert_eq!(bench.model().robot.as_ref().expect("connected").joints_rad, before, "it moved by itself");
+        bench.click(Command::ConfirmMove);
+        bench.until("a capture", |model| count(model, Role::Calibration) == captures);
+    }
+    bench.until("a pose that waits", waits);
+    bench.click(Command::Stop);
+    bench.until("the end", |model| !model.sequence_runs);
+    let session = bench.model().session.folder.clone().expect("a session");
+    bench.until("the record", |_| session.join("guided.json").is_file());
+    let kept = std::fs::read_to_string(session.join("guided.json")).expect("the record");
+    let record: GuidedRecord = serde_json::from_str(&kept).expect("JSON");
+    let outcomes: Vec<&str> = record.steps.iter().map(|step| step.outcome.as_str()).collect();
+    assert_eq!(outcomes, ["skipped", "captured", "captured", "captured", "pending"]);
+}
+
+/// The hand is a motion of the arm to where the view that is wanted would be seen; nothing else tells the arm to go.
+#[test]
+fn a_person_who_brings_about_the_views_that_are_asked_for_gets_a_checked_answer() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut bench, _cell) = connected(folder.path());
+    bench.click(Command::GuideByHand);
+    let wanted = |model: &Model| model.by_hand.as_ref().and_then(|hand| hand.wanted.clone());
+    let mut skipped = 0;
+    for _ in 0..100 {
+        bench.until("a view, or the end", |model| model.by_hand.is_none() || wanted(model).is_some());
+        let Some(view) = wanted(bench.model()) else { break };
+        let truth = bench.model().cell.as_ref().and_then(|cell| cell.truth.clone()).expect("a simulated cell");
+        let base_from_target = truth.base_from_target.expect("it says where its board is");
+        // Where the image looks like the one that is wanted, whatever lens that was drawn by.
+        let target = bench.model().document().meta.target;
+        let corner = |(index, point)| {
+            let point: Point3<f64> = view.camera_from_target.isometry() * point;
+            Corner { index, px: view.intrinsics().project(&point).expect("before the camera"), covariance_px2: None }
+        };
+        let alike: Vec<Corner> = target.points().into_iter().enumerate().map(corner).collect();
+        let seen_so = planar_pose::camera_from_target(&alike, &target, &truth.intrinsics).expect("a view");
+        let tip = base_from_target * seen_so.inverse() * truth.tip_from_camera.inverse();
+        bench.click(Command::Move { goal: MotionGoal::Tip(tip), what: Text::verbatim("by hand") });
+        bench.until("the arm at rest", |model| model.motion == Motion::Idle);
+        let at = bench.model().robot.as_ref().expect("connected").base_from_tip;
+        let is_there = |model: &Model| wanted(model).is_none_or(|now| now != view);
+        if at.distance_to(&tip).0 > 0.02 {
+            bench.click(Command::SkipView);
+            skipped += 1;
+        }
+        bench.until("another view", is_there);
+    }
+    bench.until("the checks", |model| model.solve.current().is_some_and(|solved| solved.verified_captures.len() == 3));
+    let model = bench.model();
+    let error_mm = model.solve.current().and_then(|solved| solved.result.quality.tip_error_95_mm).expect("stated");
+    assert!(error_mm <= model.view.goal.0 * 1e3, "{error_mm} mm: {}", bench.said());
+    assert!(count(model, Role::Calibration) >= 8 && skipped < 60, "{skipped} skipped");
+    assert!(bench.said().contains("The goal is reached"), "{}", bench.said());
 }

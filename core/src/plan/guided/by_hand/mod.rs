@@ -15,14 +15,15 @@ pub mod first_views;
 
 pub use deviation::Deviation;
 
-use super::candidates::ViewRange;
 use super::design::Design;
 use super::{Ending, Guide, GuidedOptions, Known, LEAST_NOISE, Next, Why, at_least, used_views};
 use crate::estimate::handeye::joint::ViewModel;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::geometry::planar_pose;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
+use crate::targets::observation::Corner;
 
 /// Part of the gain of the view that is wanted with which another view is as good.
 const WORTH: f64 = 0.8;
@@ -69,6 +70,8 @@ struct Worth {
 /// How the view that there is compares with the one that is wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
+    /// Where the board is, by the lens of the view that is wanted; `None` for corners that no pose explains.
+    pub present: Option<Pose<Camera, Target>>,
     /// What differs; `None` where the board is not before the camera.
     pub deviation: Option<Deviation>,
     /// Whether a capture here is as good, with the whole board in the image.
@@ -178,16 +181,17 @@ impl Wanted {
         &self.intrinsics
     }
 
-    /// Compares with the view that there is, from where the robot says that it is. Some tenths of a millisecond.
-    pub fn judge(&self, camera_from_target: &Pose<Camera, Target>, base_from_tip: &Pose<Base, Tip>) -> Judged {
-        let deviation =
-            Deviation::between(&self.intrinsics, &self.target, camera_from_target, &self.camera_from_target);
+    /// Compares with the view that there is, by the corners found in it and where the robot says that it is. About a
+    /// millisecond.
+    pub fn judge(&self, corners: &[Corner], base_from_tip: &Pose<Base, Tip>) -> Judged {
+        // By the lens that the wanted view is drawn by: one that is wrong yet looks right is the same view.
+        let present = planar_pose::camera_from_target(corners, &self.target, &self.intrinsics).ok();
+        let deviation = present
+            .and_then(|present| Deviation::between(&self.intrinsics, &self.target, &present, &self.camera_from_target));
         let is_near = deviation.is_some_and(|deviation| deviation.is_near());
         // One that is wanted at the edge of the image may be near and cut off.
-        let is_whole =
-            ViewRange::about([(camera_from_target.isometry() * self.target.centre()).coords.norm()].into_iter())
-                .is_some_and(|range| range.shows(&self.intrinsics, &self.target, camera_from_target, None));
-        Judged { deviation, is_good: is_whole && (is_near || self.says_as_much(base_from_tip)) }
+        let is_whole = corners.len() == self.target.len();
+        Judged { present, deviation, is_good: is_whole && (is_near || self.says_as_much(base_from_tip)) }
     }
 
     /// Whether a view from there lowers the error by nearly as much.

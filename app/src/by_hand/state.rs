@@ -1,0 +1,67 @@
+//! A calibration that a person is guided through.
+
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::plan::guided::by_hand::{HandGuide, HandNext, Judged, Wanted};
+use handeye_core::plan::guided::{Ending, GuidedOptions};
+
+/// Where it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ByHand {
+    /// What chooses the views.
+    pub guide: HandGuide,
+    /// What it waits for.
+    pub waits: HandWaits,
+    /// The view that is wanted.
+    pub wanted: Option<Box<Wanted>>,
+    /// How the view in the newest image compares with it; `None` while the board is not seen.
+    pub judged: Option<Judged>,
+    /// Since when \[s\], and where, the robot stands in a view that is good enough.
+    pub rests: Option<(f64, Pose<Base, Tip>)>,
+    /// How the choice ended; what follows checks the answer.
+    pub ending: Option<Ending>,
+    /// Captures so far that check it.
+    pub checked: usize,
+    /// Views that were asked for to check it.
+    pub tried: usize,
+    /// When it began \[s\].
+    pub began_s: f64,
+}
+
+/// What it waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HandWaits {
+    /// For the answer from all captures.
+    Answer,
+    /// For the choice of a view.
+    Choice,
+    /// For the person to bring the view about.
+    View,
+    /// For the capture.
+    Capture,
+}
+
+impl ByHand {
+    /// At the beginning.
+    pub fn new(options: GuidedOptions, waits: HandWaits, began_s: f64) -> Self {
+        Self {
+            guide: HandGuide::new(options),
+            waits,
+            wanted: None,
+            judged: None,
+            rests: None,
+            ending: None,
+            checked: 0,
+            tried: 0,
+            began_s,
+        }
+    }
+}
+
+/// What was chosen.
+#[derive(Debug, Clone)]
+pub struct HandChoice {
+    /// What chose, with what it proposed.
+    pub guide: HandGuide,
+    /// What comes next; `None` where the board of the first view has no pose, or no check is in sight.
+    pub next: Option<HandNext>,
+}

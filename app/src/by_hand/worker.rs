@@ -1,0 +1,53 @@
+//! Chooses the next view for a person who moves the robot.
+
+use std::sync::Arc;
+
+use handeye_core::estimate::Observations;
+use handeye_core::geometry::camera::Intrinsics;
+use handeye_core::geometry::planar_pose;
+use handeye_core::plan::guided::Known;
+use handeye_core::plan::guided::by_hand::{HandGuide, HandNext};
+use handeye_core::progress::CancelToken;
+
+use super::state::HandChoice;
+use crate::command::Event;
+use crate::model::Solved;
+use crate::worker::link::Outlet;
+
+/// A choice that is asked for.
+pub struct HandJob {
+    /// Its number.
+    pub number: u64,
+    /// What chooses.
+    pub guide: HandGuide,
+    /// What was observed.
+    pub observations: Observations,
+    /// The lens by which the first views are drawn.
+    pub intrinsics: Intrinsics,
+    /// The answer from it, where there is one.
+    pub solved: Option<Arc<Solved>>,
+    /// Since the beginning \[s\].
+    pub elapsed_s: f64,
+    /// The number of the check, where a view to check the answer at is asked for.
+    pub check: Option<usize>,
+}
+
+/// Chooses and reports.
+pub fn choose(job: &HandJob, cancel: &CancelToken, outlet: &Outlet) {
+    let mut guide = job.guide.clone();
+    let calibration = job.solved.as_ref().map(|solved| &solved.calibration);
+    let known = Known { observations: &job.observations, calibration, robot: None, elapsed_s: job.elapsed_s };
+    let next = match job.check {
+        Some(index) => guide.check(&known, index, cancel).map(|wanted| HandNext::Take(Box::new(wanted))),
+        None => {
+            let views = job.observations.views.iter().filter(|view| view.in_fit);
+            let first = views.filter_map(|view| view.corners.as_ref()).find_map(|corners| {
+                planar_pose::camera_from_target(corners, &job.observations.target, &job.intrinsics).ok()
+            });
+            first.map(|first| guide.next(&known, &first, &job.intrinsics, cancel))
+        }
+    };
+    if !cancel.is_cancelled() {
+        outlet.report(Event::ViewChosen { number: job.number, choice: Box::new(HandChoice { guide, next }) });
+    }
+}
