@@ -133,7 +133,7 @@ impl Bench {
             }
             let base_from_tip = truth.base_from_tip(&drawn);
             let Some(joints) = cell.robot.arm.reach(&base_from_tip, &cell.robot.joints) else { continue };
-            if !cell.robot.arm.is_free(&joints, &cell.robot.obstacles, cell.robot.clearance_m) {
+            if !cell.robot.arm.is_free(&joints, &cell.robot.around, cell.robot.clearance_m) {
                 continue;
             }
             let Some(view) = truth.expected(&base_from_tip, &all) else { continue };

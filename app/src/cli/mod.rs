@@ -3,7 +3,9 @@
 //! Results go to standard output, progress and messages to standard error. Exit code 0: done, 1: failed, 2: wrong usage
 //! or unreadable input.
 
+mod arm_arg;
 mod auto;
+mod box_arg;
 mod calibrate;
 mod cell;
 mod doctor;

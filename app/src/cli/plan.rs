@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use handeye_core::estimate::handeye::HandEyeError;
+use handeye_core::estimate::uncertainty::quality::TipBox;
 use handeye_core::estimate::{CalibrateError, Method, calibrate};
 use handeye_core::geometry::frames::{Frame, Pose};
 use handeye_core::plan::guided::choose::Proposal;
@@ -12,7 +13,7 @@ use handeye_core::plan::guided::{Guide, GuidedOptions, Known, Next, Why};
 use serde::Serialize;
 
 use super::output::Output;
-use super::{Failure, out, solve};
+use super::{Failure, box_arg, out, solve};
 
 /// Options of `handeye plan`.
 #[derive(Debug, Args)]
@@ -25,6 +26,10 @@ pub struct PlanArgs {
     /// Seed of the views at random that are compared.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Where the tool works, in the camera (x right, y down, z forward): middle and edges, metres. Errors are then those of
+    /// the worst point of it; without it those where the camera saw the board.
+    #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true)]
+    tool_box: Option<TipBox>,
     /// Write the poses as JSON to this file; `-` for standard output instead of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
@@ -82,6 +87,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
         most_views: usize::MAX,
         ahead: args.count as usize,
         seed: args.seed,
+        tool_box: args.tool_box,
         ..GuidedOptions::default()
     };
     let known = Known { observations: &observations, calibration: Some(&calibration), robot: None, elapsed_s: 0.0 };

@@ -1,8 +1,8 @@
 //! The arm of a cell over the remote API, as the motion worker drives it.
 
 use handeye_core::geometry::arm::JointValues;
-use handeye_core::plan::PlanError;
 use handeye_core::plan::guided::choose::Robot;
+use handeye_core::plan::{Contact, PlanError, Surroundings};
 use handeye_sim_link::client::cell::{
     Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes,
     JogEnd, JogObstacle, MotionTolerance, SettleOptions, UnknownKinematics,
@@ -20,16 +20,26 @@ use crate::{limits, text};
 pub(crate) struct LiveMotion {
     arm: Arm,
     kinematics: Result<ArmKinematics, UnknownKinematics>,
+    /// What stands around, as it was when the connection was made, with what holds the board: plans are for one that stands.
+    around: Surroundings,
 }
 
 impl LiveMotion {
     /// Over an arm whose kinematics is looked at once.
     pub fn new(mut arm: Arm) -> Result<Self, LinkError> {
         let kinematics = arm.kinematics()?;
-        if let Err(why) = &kinematics {
-            tracing::warn!(%why, "the kinematics of the arm is not known: goals are not checked beforehand");
+        let mut around = Surroundings::default();
+        match &kinematics {
+            Ok(kinematics) => {
+                let standing = arm.surroundings(kinematics)?;
+                around = standing.all();
+                arm.keep_clear(Some(kinematics.among(standing.around, None)));
+            }
+            Err(why) => {
+                tracing::warn!(%why, "the kinematics of the arm is not known: goals are not checked beforehand");
+            }
         }
-        Ok(Self { arm, kinematics })
+        Ok(Self { arm, kinematics, around })
     }
 
     /// Whether there is a way, before anything moves. What the arm cannot do is `Some` reason.
@@ -127,7 +137,7 @@ impl MotionPort for LiveMotion {
         if kinematics.has_room_to_follow(&limits, board, &reach, &joints) {
             return Ok(Room::Enough);
         }
-        Ok(match kinematics.place_to_follow(&limits, board, &reach, &joints) {
+        Ok(match kinematics.place_to_follow(&limits, board, &reach, &joints, &self.around) {
             Ok(place) => Room::At(place.joints),
             Err(none) => Room::Nowhere(text!(
                 "Of {tried} places that show the whole board none has room for the arm to go along with it: move the board \
@@ -146,7 +156,7 @@ impl MotionPort for LiveMotion {
             }
         };
         let start = self.arm.joint_values().map_err(port_error)?;
-        Ok(kinematics.views_unlike(board, taken, &start, *count).map_err(|why| no_views(&why)))
+        Ok(kinematics.views_unlike(board, taken, &start, &self.around, *count).map_err(|why| no_views(&why)))
     }
 
     fn robot(&mut self) -> Result<Result<Robot, Text>, PortError> {
@@ -156,7 +166,7 @@ impl MotionPort for LiveMotion {
         };
         let joints = self.arm.joint_values().map_err(port_error)?;
         let limits = limits::SEQUENCE;
-        Ok(Ok(kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &[])))
+        Ok(Ok(kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &self.around)))
     }
 
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
@@ -216,6 +226,7 @@ pub fn end_of_following(end: FollowEnd) -> Text {
                  Jog it to where it has more room and start again"
             )
         }
+        FollowEnd::Contact(contact) => contact_text(&contact),
         FollowEnd::NotFollowing { joint } => not_following(joint),
         FollowEnd::OtherTip => other_tip(),
     }
@@ -237,6 +248,7 @@ fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, P
         // These are found out before anything moves.
         error @ (LinkError::JointOutOfRange { .. }
         | LinkError::JointCount { .. }
+        | LinkError::InTheWay { .. }
         | LinkError::BadMotion { .. }
         | LinkError::NoSuchObject { .. }
         | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(said(&error))),
@@ -269,6 +281,7 @@ fn said(error: &LinkError) -> Text {
             got = got,
             need = need
         ),
+        LinkError::InTheWay { contact } => contact_text(contact),
         LinkError::Unreached { distance_mm, angle_deg } => text!(
             "The tip stopped {mm} mm and {deg}° from its goal, which may be out of reach: choose another pose, or go \
              there joint by joint",
@@ -320,6 +333,19 @@ fn obstacle_text(obstacle: &JogObstacle) -> Text {
              move single joints",
             joint = joint
         ),
+        JogObstacle::Contact(contact) => contact_text(contact),
+        other => Text::verbatim(other.to_string()),
+    }
+}
+
+/// What the arm would come too near to.
+fn contact_text(contact: &Contact) -> Text {
+    match contact {
+        Contact::Box { name } => {
+            text!("The arm, or what it carries, would come too near to “{name}”: go another way", name = name)
+        }
+        Contact::Itself => text!("The arm would touch itself, or what it carries: go another way"),
+        Contact::Volume => text!("Tip or camera would leave the work volume: go another way"),
         other => Text::verbatim(other.to_string()),
     }
 }

@@ -311,8 +311,12 @@ impl Calibration {
 
     /// The same where the camera saw the target by the noise alone, as if the model were true whatever was found.
     pub fn modelled_error_95_m(&self) -> Option<f64> {
-        let joint = self.joint.as_ref()?;
-        Some(quality::tip_error_95_at(self.hand_eye_covariance()?, joint.small_sample, &joint.reference_point))
+        self.modelled_error_95_at(&self.joint.as_ref()?.reference_point)
+    }
+
+    /// The same at any `point`, camera coordinates in metres.
+    pub fn modelled_error_95_at(&self, point: &Point3<f64>) -> Option<f64> {
+        Some(quality::tip_error_95_at(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point))
     }
 }
 

@@ -1,22 +1,23 @@
-//! Whether a configuration of the arm touches itself or something else, with the links as capsules.
+//! What a configuration of the arm fills, with the links as capsules, and how near the arm is to itself.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 
+use super::capsule::Capsule;
+use super::carried::Carried;
 use super::links::{self, LinkCapsule};
-use crate::geometry::arm::{self, ArmFrames, JointValues};
+use crate::geometry::arm::{self, ArmFrames, JointKind, JointValues};
 use crate::geometry::frames::{Base, Pose, Tip};
 
 /// How far the upper arm runs beside the plane through the shoulder, along the shoulder axis.
 const UPPER_ARM_BESIDE_M: f64 = 0.136;
 /// The same for the forearm.
 const FOREARM_BESIDE_M: f64 = 0.016;
-/// Distance of two points that are checked along a capsule.
-const SAMPLE_M: f64 = 0.03;
 /// Gap that the arm keeps from itself.
-const SELF_CLEARANCE_M: f64 = 0.01;
-
-/// Largest joint step between two checks of a path: a tool 1 m away moves by 5 cm, half the size of a link.
-const PATH_STEP_RAD: f64 = 0.05;
+pub(super) const SELF_CLEARANCE_M: f64 = 0.01;
+/// Radius of the tool.
+const TOOL_RADIUS_M: f64 = 0.03;
+/// A bound of how far the body of a link is from its axes, metres.
+const BESIDE_AXES_M: f64 = 0.22;
 
 /// Largest joint movement, radians; a metre of a prismatic joint counts as much as a radian.
 pub fn travel(from: &[f64], to: &[f64]) -> f64 {
@@ -39,43 +40,29 @@ impl ArmBody {
     }
 }
 
-/// The arm with a camera on its tip, as far as collisions go.
+/// The arm with what it carries, as far as collisions go.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
     /// Its chain, from the arm frame to the connection, with the ranges of its joints.
     pub chain: arm::Arm,
-    /// What hangs on it.
+    /// How its links fill the room.
     pub body: ArmBody,
     /// Pose of the arm frame in the world.
     pub world_from_arm: Isometry3<f64>,
     /// Pose of the tip in the connection.
     pub connection_from_tip: Isometry3<f64>,
-    /// Pose of the camera in the tip.
-    pub tip_from_camera: Isometry3<f64>,
+    /// What hangs on its tip: the camera, or the board.
+    pub carried: Vec<Carried>,
 }
 
-/// A box that the arm must not touch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Obstacle {
-    /// Pose of its centre in the world.
-    pub world_from_centre: Isometry3<f64>,
-    /// Lengths of its edges, metres.
-    pub size_m: [f64; 3],
-}
-
-/// All points within a radius of a line segment.
-#[derive(Debug, Clone, Copy)]
-struct Capsule {
-    from: Point3<f64>,
-    to: Point3<f64>,
-    radius_m: f64,
-}
-
-/// What a configuration of the arm fills, in the arm frame.
-struct Filled {
-    /// All that can come to touch something else.
-    moving: Vec<Capsule>,
-    touches_itself: bool,
+/// What a configuration of the arm fills.
+pub(super) struct Filled {
+    /// All that can come to touch something else, in the base.
+    pub moving: Vec<Capsule>,
+    /// How near the arm is to itself and to what it carries, metres; infinite for one that cannot be.
+    pub itself_m: f64,
+    /// Tip and camera, in the base.
+    pub watched: Vec<Point3<f64>>,
 }
 
 /// Capsules of the UR5 in the order from base to tool.
@@ -84,34 +71,17 @@ struct Ur5Body {
     upper_arm: Capsule,
     forearm: Capsule,
     wrist: [Capsule; 3],
+    hand: Hand,
+}
+
+/// Tool, and what hangs on it.
+struct Hand {
     tool: Capsule,
-    camera: Capsule,
+    /// Each with whether it is wide.
+    carried: Vec<(Capsule, bool)>,
 }
 
 impl Arm {
-    /// Whether the arm, its tool and its camera keep their distance from the obstacles, and from the arm itself; values
-    /// that are not those of its joints are nowhere free.
-    pub fn is_free(&self, joints: &[f64], obstacles: &[Obstacle], clearance_m: f64) -> bool {
-        let Some(Filled { moving, touches_itself }) = self.filled(joints) else { return false };
-        if touches_itself {
-            return false;
-        }
-        obstacles.iter().all(|obstacle| {
-            let centre_from_arm = obstacle.world_from_centre.inverse() * self.world_from_arm;
-            moving.iter().all(|capsule| capsule.distance_to_box(&centre_from_arm, &obstacle.size_m) >= clearance_m)
-        })
-    }
-
-    /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
-    pub fn path_is_free(&self, from: &[f64], to: &[f64], obstacles: &[Obstacle], clearance_m: f64) -> bool {
-        let steps = (travel(from, to) / PATH_STEP_RAD).ceil().max(1.0) as usize;
-        (1..steps).all(|step| {
-            let part = step as f64 / steps as f64;
-            let joints: Vec<f64> = from.iter().zip(to).map(|(from, to)| from + part * (to - from)).collect();
-            self.is_free(&joints, obstacles, clearance_m)
-        })
-    }
-
     /// The joint values nearest to `seed` that put the tip there, within the ranges of the joints.
     pub fn reach(&self, base_from_tip: &Pose<Base, Tip>, seed: &[f64]) -> Option<JointValues> {
         let arm_from_connection =
@@ -126,50 +96,71 @@ impl Arm {
         Some(Pose::from_isometry(self.world_from_arm * arm_from_connection * self.connection_from_tip))
     }
 
-    fn filled(&self, joints: &[f64]) -> Option<Filled> {
+    /// What it fills with these joint values; `None` for values that are not those of the arm.
+    pub(super) fn filled(&self, joints: &[f64]) -> Option<Filled> {
         let frames = self.chain.frames(joints).ok()?;
         let arm_from_connection = frames.base_from_flange * self.chain.flange_from_tip;
-        Some(match &self.body {
+        let (moving, itself_m) = match &self.body {
             ArmBody::Ur5 => {
                 let body = self.ur5(&frames, &arm_from_connection);
-                Filled { moving: body.moving().to_vec(), touches_itself: body.touches_itself() }
+                (body.moving(), body.distance_from_itself_m())
             }
             ArmBody::Links(capsules) => {
                 let arm_from_links: Vec<Isometry3<f64>> = links::arm_from_links(&frames).collect();
                 let links = capsules.iter().map(|link| {
                     let at = arm_from_links.get(link.link)?;
-                    let capsule = Capsule { from: at * link.from, to: at * link.to, radius_m: link.radius_m };
-                    Some((link.link, capsule))
+                    let capsule = Capsule { from: link.from, to: link.to, radius_m: link.radius_m };
+                    Some((link.link, capsule.moved(at)))
                 });
                 let hand = self.hand(&arm_from_connection);
                 let body = LinksBody { links: links.collect::<Option<_>>()?, hand };
-                Filled { moving: body.moving(), touches_itself: body.touches_itself() }
+                (body.moving(), body.distance_from_itself_m())
             }
+        };
+        let world_from_tip = self.world_from_arm * arm_from_connection * self.connection_from_tip;
+        let cameras = self.carried.iter().filter_map(Carried::watched).map(|camera| world_from_tip * camera);
+        Some(Filled {
+            moving: moving.iter().map(|capsule| capsule.moved(&self.world_from_arm)).collect(),
+            itself_m,
+            watched: std::iter::once(Point3::from(world_from_tip.translation.vector)).chain(cameras).collect(),
         })
     }
 
-    /// Tool and camera.
-    fn hand(&self, arm_from_connection: &Isometry3<f64>) -> [Capsule; 2] {
+    /// A bound of how far any point of the arm and of what it carries moves on the straight path in joint space, metres.
+    pub(super) fn longest_way_m(&self, from: &[f64], to: &[f64]) -> f64 {
+        let Ok(frames) = self.chain.frames(from) else { return f64::INFINITY };
+        let origin = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
+        let connection = origin(&(frames.base_from_flange * self.chain.flange_from_tip));
+        let places: Vec<Point3<f64>> = frames.base_from_joint.iter().map(origin).chain([connection]).collect();
+        let carried_m = self.carried.iter().map(Carried::reach_m).fold(TOOL_RADIUS_M, f64::max);
+        let shifts_m: f64 = (self.chain.joints().iter().zip(from.iter().zip(to)))
+            .filter(|(joint, _)| joint.kind == JointKind::Prismatic)
+            .map(|(_, (from, to))| (to - from).abs())
+            .sum();
+        let mut beyond_m = self.connection_from_tip.translation.vector.norm() + carried_m + BESIDE_AXES_M + shifts_m;
+        let mut way_m = 0.0;
+        for (index, joint) in self.chain.joints().iter().enumerate().rev() {
+            beyond_m += (places[index + 1] - places[index]).norm();
+            let (Some(from), Some(to)) = (from.get(index), to.get(index)) else { return f64::INFINITY };
+            way_m += (to - from).abs() * if joint.kind == JointKind::Prismatic { 1.0 } else { beyond_m };
+        }
+        way_m
+    }
+
+    fn hand(&self, arm_from_connection: &Isometry3<f64>) -> Hand {
         let connection = Point3::from(arm_from_connection.translation.vector);
         let arm_from_tip = arm_from_connection * self.connection_from_tip;
-        let arm_from_camera = arm_from_tip * self.tip_from_camera;
-        let capsule = |from, to, radius_m| Capsule { from, to, radius_m };
-        [
-            capsule(connection, Point3::from(arm_from_tip.translation.vector), 0.03),
-            // The lens is at the origin, the housing behind it.
-            capsule(
-                Point3::from(arm_from_camera.translation.vector),
-                arm_from_camera * Point3::new(0.0, 0.0, -0.03),
-                0.03,
-            ),
-        ]
+        let tip = Point3::from(arm_from_tip.translation.vector);
+        let carried = self.carried.iter().flat_map(|carried| {
+            carried.capsules().iter().map(|capsule| (capsule.moved(&arm_from_tip), carried.is_wide()))
+        });
+        Hand { tool: Capsule { from: connection, to: tip, radius_m: TOOL_RADIUS_M }, carried: carried.collect() }
     }
 
     fn ur5(&self, frames: &ArmFrames, arm_from_connection: &Isometry3<f64>) -> Ur5Body {
         let joint = &frames.base_from_joint;
         let on_axis = |i: usize, along_m: f64| joint[i] * Point3::new(0.0, 0.0, along_m);
         let connection = Point3::from(arm_from_connection.translation.vector);
-        let [tool, camera] = self.hand(arm_from_connection);
         let wrist_1 = joint[3].inverse() * joint[4] * Point3::origin();
         let capsule = |from, to, radius_m| Capsule { from, to, radius_m };
         Ur5Body {
@@ -181,8 +172,7 @@ impl Arm {
                 capsule(on_axis(4, 0.0), on_axis(5, 0.0), 0.04),
                 capsule(on_axis(5, 0.0), connection, 0.04),
             ],
-            tool,
-            camera,
+            hand: self.hand(arm_from_connection),
         }
     }
 }
@@ -191,120 +181,79 @@ fn beside(distance_m: f64) -> Point3<f64> {
     Point3::new(0.0, 0.0, distance_m)
 }
 
+impl Hand {
+    fn all(&self) -> impl Iterator<Item = Capsule> {
+        std::iter::once(self.tool).chain(self.carried.iter().map(|(capsule, _)| *capsule))
+    }
+}
+
 /// Links in their order, each with the number of joints that carry it, and what is on the last one.
 struct LinksBody {
     links: Vec<(usize, Capsule)>,
-    hand: [Capsule; 2],
+    hand: Hand,
 }
 
 impl LinksBody {
     /// What stands on the ground does not move.
     fn moving(&self) -> Vec<Capsule> {
-        self.links.iter().filter(|(link, _)| *link > 0).map(|(_, capsule)| *capsule).chain(self.hand).collect()
+        self.links.iter().filter(|(link, _)| *link > 0).map(|(_, capsule)| *capsule).chain(self.hand.all()).collect()
     }
 
-    /// Two that have no more between them than their own thickness touch by design, and so do those that share a joint.
-    fn touches_itself(&self) -> bool {
-        let all: Vec<Capsule> = self.links.iter().map(|(_, capsule)| *capsule).chain(self.hand).collect();
-        let last_link = self.links.len().saturating_sub(1);
-        (0..all.len()).any(|i| {
-            (i + 2..all.len()).any(|j| {
-                // Tool and camera both sit on the end of the last link.
-                let between = &all[i + 1..=last_link.min(j - 1).max(i)];
-                let gap_m: f64 = between.iter().map(|capsule| (capsule.to - capsule.from).norm()).sum();
-                let thickness_m = all[i].radius_m + all[j].radius_m + SELF_CLEARANCE_M;
-                i < last_link && gap_m > thickness_m && all[i].distance_to(&all[j]) < SELF_CLEARANCE_M
-            })
-        })
+    /// Two that have no more between them than their own thickness touch by design, and so do those that share a joint, and
+    /// what is on the last link does with that one: as far as it reaches back along it, it is on the one before too.
+    fn distance_from_itself_m(&self) -> f64 {
+        let links: Vec<Capsule> = self.links.iter().map(|(_, capsule)| *capsule).collect();
+        // What is between two links, by adding up from the base.
+        let mut before_m = vec![0.0];
+        for link in &links {
+            before_m.push(before_m[before_m.len() - 1] + link.length_m());
+        }
+        let mut least_m = f64::INFINITY;
+        let mut pair = |i: usize, other: &Capsule, gap_m: f64| {
+            if gap_m > links[i].radius_m + other.radius_m + SELF_CLEARANCE_M {
+                least_m = least_m.min(links[i].distance_to(other));
+            }
+        };
+        for i in 0..links.len() {
+            for (j, other) in links.iter().enumerate().skip(i + 2) {
+                pair(i, other, before_m[j] - before_m[i + 1]);
+            }
+        }
+        if let Some((last, inner)) = links.split_last() {
+            let wrist = Capsule { from: last.from, to: last.from, radius_m: 0.0 };
+            for other in self.hand.all() {
+                let from_wrist_m = wrist.distance_to(&other) + other.radius_m;
+                for i in 0..inner.len() {
+                    pair(i, &other, before_m[inner.len()] - before_m[i + 1] + from_wrist_m);
+                }
+            }
+        }
+        least_m
     }
 }
 
 impl Ur5Body {
-    fn moving(&self) -> [Capsule; 7] {
-        let [a, b, c] = self.wrist;
-        [self.upper_arm, self.forearm, a, b, c, self.tool, self.camera]
+    fn moving(&self) -> Vec<Capsule> {
+        [self.upper_arm, self.forearm].into_iter().chain(self.wrist).chain(self.hand.all()).collect()
     }
 
     /// Neighbours are left out: they touch by design.
-    fn touches_itself(&self) -> bool {
-        let [_, wrist_2, wrist_3] = &self.wrist;
-        let ends = [wrist_2, wrist_3, &self.tool, &self.camera];
-        let near = |a: &Capsule, b: &Capsule| a.distance_to(b) < SELF_CLEARANCE_M;
-        near(&self.forearm, &self.column)
-            || ends.iter().any(|end| near(end, &self.column) || near(end, &self.upper_arm))
-            || [wrist_3, &self.tool, &self.camera].iter().any(|end| near(end, &self.forearm))
+    fn distance_from_itself_m(&self) -> f64 {
+        let [wrist_1, wrist_2, wrist_3] = &self.wrist;
+        let far = [wrist_2, wrist_3].into_iter().copied().chain(self.hand.all());
+        let far = far.flat_map(|end| [end.distance_to(&self.column), end.distance_to(&self.upper_arm)]);
+        let near = std::iter::once(*wrist_3).chain(self.hand.all()).map(|end| end.distance_to(&self.forearm));
+        let wide = self.hand.carried.iter().filter(|(_, is_wide)| *is_wide);
+        let wide = wide.map(|(capsule, _)| capsule.distance_to(wrist_1));
+        far.chain(near).chain(wide).fold(self.forearm.distance_to(&self.column), f64::min)
     }
-}
-
-impl Capsule {
-    fn distance_to(&self, other: &Self) -> f64 {
-        segment_distance([self.from, self.to], [other.from, other.to]) - self.radius_m - other.radius_m
-    }
-
-    /// At most half a sample too large.
-    fn distance_to_box(&self, centre_from_arm: &Isometry3<f64>, size_m: &[f64; 3]) -> f64 {
-        let (from, to) = (centre_from_arm * self.from, centre_from_arm * self.to);
-        let steps = ((to - from).norm() / SAMPLE_M).ceil().max(1.0);
-        let half = Vector3::from(*size_m) * 0.5;
-        let nearest = (0..=steps as usize)
-            .map(|step| {
-                let point = from + (to - from) * (step as f64 / steps);
-                (point.coords.abs() - half).map(|v| v.max(0.0)).norm()
-            })
-            .fold(f64::INFINITY, f64::min);
-        nearest - self.radius_m
-    }
-}
-
-/// Shortest distance of two line segments.
-///
-/// Reference: Ericson 2005, "Real-time collision detection", section 5.1.9.
-fn segment_distance(first: [Point3<f64>; 2], second: [Point3<f64>; 2]) -> f64 {
-    let d1 = first[1] - first[0];
-    let d2 = second[1] - second[0];
-    let r = first[0] - second[0];
-    let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
-    // A segment of no length is a point: its parameter is of no consequence.
-    let clamp = |numerator: f64, denominator: f64| {
-        if denominator > 1e-12 { (numerator / denominator).clamp(0.0, 1.0) } else { 0.0 }
-    };
-    let (b, c) = (d1.dot(&d2), d1.dot(&r));
-    let mut s = clamp(b * f - c * e, a * e - b * b);
-    let mut t = clamp(b * s + f, e);
-    s = clamp(b * t - c, a);
-    t = clamp(b * s + f, e);
-    ((first[0] + d1 * s) - (second[0] + d2 * t)).norm()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::arm::ArmKind;
-
-    #[test]
-    fn distances_of_segments_agree_with_a_dense_search() {
-        let p = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
-        let cases = [
-            [p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(0.5, 1.0, -1.0), p(0.5, 1.0, 1.0)],
-            [p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(2.0, 1.0, 0.0), p(3.0, 1.0, 0.0)],
-            [p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(0.2, 0.3, 0.0), p(0.8, 0.3, 0.0)],
-            [p(0.0, 0.0, 0.0), p(0.0, 0.0, 0.0), p(0.2, 0.3, 0.0), p(0.8, -0.3, 0.4)],
-            [p(0.1, 0.2, 0.3), p(-0.4, 0.5, 0.9), p(0.7, -0.6, 0.2), p(0.3, 0.8, -0.5)],
-        ];
-        for [a, b, c, d] in cases {
-            let mut dense = f64::INFINITY;
-            for i in 0..=400 {
-                for j in 0..=400 {
-                    let first = a + (b - a) * (f64::from(i) / 400.0);
-                    let second = c + (d - c) * (f64::from(j) / 400.0);
-                    dense = dense.min((first - second).norm());
-                }
-            }
-            let exact = segment_distance([a, b], [c, d]);
-            // The grid misses the nearest points by at most half its pitch on each segment.
-            assert!(exact <= dense + 1e-12 && exact > dense - 0.004, "{exact} is not {dense}");
-        }
-    }
+    use crate::plan::{Obstacle, Surroundings};
 
     #[test]
     fn a_folded_arm_touches_itself_and_a_stretched_one_does_not() {
@@ -313,11 +262,11 @@ mod tests {
             body: ArmBody::Ur5,
             world_from_arm: Isometry3::identity(),
             connection_from_tip: Isometry3::translation(0.0, 0.0, 0.017),
-            tip_from_camera: Isometry3::translation(0.05, 0.0, 0.0),
+            carried: vec![Carried::camera(&Isometry3::translation(0.05, 0.0, 0.0))],
         };
-        assert!(arm.is_free(&[0.0; 6], &[], 0.02));
+        assert!(arm.is_free(&[0.0; 6], &Surroundings::default(), 0.02));
         // Elbow bent by 170° brings the hand to the shoulder.
-        assert!(!arm.is_free(&[0.0, 0.0, 170_f64.to_radians(), 0.0, 0.0, 0.0], &[], 0.02));
+        assert!(!arm.is_free(&[0.0, 0.0, 170_f64.to_radians(), 0.0, 0.0, 0.0], &Surroundings::default(), 0.02));
     }
 
     #[test]
@@ -327,11 +276,12 @@ mod tests {
             body: ArmBody::Ur5,
             world_from_arm: Isometry3::translation(0.0, 0.0, 0.025),
             connection_from_tip: Isometry3::identity(),
-            tip_from_camera: Isometry3::translation(0.05, 0.0, 0.0),
+            carried: vec![Carried::camera(&Isometry3::translation(0.05, 0.0, 0.0))],
         };
-        let table = Obstacle { world_from_centre: Isometry3::translation(0.0, 0.0, -0.05), size_m: [5.0, 5.0, 0.1] };
+        let table = Obstacle::new("table", Isometry3::translation(0.0, 0.0, -0.05), [5.0, 5.0, 0.1]);
+        let around = Surroundings::of(vec![table]);
         let lifted = |deg: f64| [0.0, deg.to_radians(), 0.0, 0.0, 0.0, 0.0];
-        assert!(arm.is_free(&lifted(60.0), &[table], 0.02));
-        assert!(!arm.is_free(&lifted(95.0), &[table], 0.02));
+        assert!(arm.is_free(&lifted(60.0), &around, 0.02));
+        assert!(!arm.is_free(&lifted(95.0), &around, 0.02));
     }
 }

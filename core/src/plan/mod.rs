@@ -1,20 +1,28 @@
 //! Where to take the next views from: what they would add to the answer, and whether the arm gets there without touching
 //! anything.
 
+mod capsule;
+mod carried;
 mod clearance;
+mod contact;
 pub mod guided;
 pub mod links;
 mod spread;
+pub mod surroundings;
 
-pub use clearance::{Arm, ArmBody, Obstacle, travel};
+pub use capsule::Capsule;
+pub use carried::Carried;
+pub use clearance::{Arm, ArmBody, travel};
+pub use contact::{Contact, Guard};
 pub use spread::{
     PlanError, PlannedView, ViewOptions, ViewSetup, order_by_travel, poses_looking_at, poses_unlike,
     random_poses_looking_at, views_of_board,
 };
+pub use surroundings::{Obstacle, SpeedLimits, Surroundings, WorkVolume};
 
 use nalgebra::Translation3;
 
-use crate::geometry::frames::{Base, Pose, Target};
+use crate::geometry::frames::{Base, Camera, Pose, Target};
 use crate::targets::TargetSpec;
 
 /// What is printed on has an edge about the pattern; this much of it on each side, in squares.
@@ -22,12 +30,23 @@ const SHEET_EDGE_SQUARES: f64 = 2.0;
 /// Thickness of what is printed on \[m\].
 const SHEET_M: f64 = 0.002;
 
-/// The board as something that the arm must not touch.
-pub fn sheet(target: &TargetSpec, base_from_target: &Pose<Base, Target>) -> Obstacle {
+/// Edge of the cube that a camera beside the robot is taken for, metres: a usual housing with its cable.
+const CAMERA_M: f64 = 0.1;
+/// How far the middle of that cube is behind the lens, metres.
+const CAMERA_BEHIND_LENS_M: f64 = 0.03;
+
+/// The board as something that the arm must not touch, with some room about it, metres.
+pub fn sheet(target: &TargetSpec, base_from_target: &Pose<Base, Target>, room_m: f64) -> Obstacle {
     let (centre, extent, square_m) = (target.centre(), target.extent(), target.grid().square_m);
     let edge_m = |points_m: f64| points_m + 2.0 * SHEET_EDGE_SQUARES * square_m;
-    Obstacle {
-        world_from_centre: base_from_target.isometry() * Translation3::new(centre.x, centre.y, SHEET_M / 2.0),
-        size_m: [edge_m(extent.x), edge_m(extent.y), SHEET_M],
-    }
+    let centre = base_from_target.isometry() * Translation3::new(centre.x, centre.y, SHEET_M / 2.0);
+    let size_m = [edge_m(extent.x), edge_m(extent.y), SHEET_M].map(|edge_m| edge_m + 2.0 * room_m);
+    Obstacle::new("board", centre, size_m)
+}
+
+/// A camera beside the robot as something that the arm must not touch, with some room about it, metres: a cube of 10 cm, of
+/// which the lens is 2 cm behind the front.
+pub fn housing(base_from_camera: &Pose<Base, Camera>, room_m: f64) -> Obstacle {
+    let centre = base_from_camera.isometry() * Translation3::new(0.0, 0.0, -CAMERA_BEHIND_LENS_M);
+    Obstacle::new("camera", centre, [CAMERA_M + 2.0 * room_m; 3])
 }

@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::clearance::{Arm, Obstacle, travel};
+use super::clearance::{Arm, travel};
+use super::surroundings::Surroundings;
 use crate::geometry::arm::JointValues;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -26,8 +27,8 @@ pub struct ViewSetup {
     pub arm: Arm,
     /// Configuration to start from; poses are reached without changing over to another branch where possible.
     pub start_joints: JointValues,
-    /// What the arm must not touch.
-    pub obstacles: Vec<Obstacle>,
+    /// What stands around, the board included.
+    pub around: Surroundings,
 }
 
 /// What kind of views are wanted.
@@ -241,12 +242,12 @@ impl ViewSetup {
 
     /// Whether the arm touches neither itself nor anything else there.
     pub fn is_free(&self, joints: &[f64], clearance_m: f64) -> bool {
-        self.arm.is_free(joints, &self.obstacles, clearance_m)
+        self.arm.is_free(joints, &self.around, clearance_m)
     }
 
     /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
     pub fn path_is_free(&self, from: &[f64], to: &[f64], clearance_m: f64) -> bool {
-        self.arm.path_is_free(from, to, &self.obstacles, clearance_m)
+        self.arm.path_is_free(from, to, &self.around, clearance_m)
     }
 }
 

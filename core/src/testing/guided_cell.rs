@@ -14,7 +14,7 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use crate::plan::guided::choose::Robot;
 use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Step};
-use crate::plan::{self, ArmBody, Obstacle};
+use crate::plan::{self, ArmBody, Carried, Obstacle, Surroundings};
 use crate::progress::CancelToken;
 
 /// Arms of the cell.
@@ -152,9 +152,15 @@ impl GuidedCell {
             }
         };
         let chain = setup.arm.chain();
-        let tip_from_camera = match setup.mode {
-            Mode::EyeInHand => mount_from_camera,
-            Mode::EyeToHand => anchor_from_target * Translation3::from(BOARD.centre().coords),
+        let (carried, beside) = match setup.mode {
+            Mode::EyeInHand => {
+                let board = plan::sheet(&BOARD, &Pose::from_isometry(anchor_from_target), 0.0);
+                (Carried::camera(&mount_from_camera), board)
+            }
+            Mode::EyeToHand => {
+                let camera = plan::housing(&Pose::from_isometry(mount_from_camera), 0.0);
+                (Carried::board(&BOARD, &Pose::from_isometry(anchor_from_target), 0.0), camera)
+            }
         };
         let home = setup.arm.home();
         let arm = plan::Arm {
@@ -162,15 +168,16 @@ impl GuidedCell {
             chain,
             world_from_arm: Isometry3::identity(),
             connection_from_tip: Isometry3::identity(),
-            tip_from_camera,
+            carried: vec![carried],
         };
-        let table =
-            Obstacle { world_from_centre: Isometry3::translation(0.0, 0.0, -TABLE[2] / 2.0 - 0.01), size_m: TABLE };
-        let obstacles = vec![table];
+        let table = Obstacle::new("table", Isometry3::translation(0.0, 0.0, -TABLE[2] / 2.0 - 0.01), TABLE);
+        let mut around = Surroundings::of(vec![table, beside]);
         let joints = arm.reach(&Pose::from_isometry(first_tip), &home)?;
-        if !arm.is_free(&joints, &obstacles, CLEARANCE_M) {
+        if !arm.is_free(&joints, &around, CLEARANCE_M) {
             return None;
         }
+        // Where the other of camera and board is the guide has to find out.
+        around.obstacles.pop();
         // With all that is estimated of a lens by default, of which it has none.
         let free = Intrinsics { distortion: DEFAULT_MODEL, ..camera() };
         let (intrinsics, knowledge) = if setup.free_lens {
@@ -184,14 +191,7 @@ impl GuidedCell {
             intrinsics,
             mount_from_camera: Pose::from_isometry(mount_from_camera),
             anchor_from_target: Pose::from_isometry(anchor_from_target),
-            robot: Robot {
-                arm,
-                obstacles,
-                clearance_m: CLEARANCE_M,
-                joints,
-                speed_rad_s: 1.0,
-                acceleration_rad_s2: 2.0,
-            },
+            robot: Robot { arm, around, clearance_m: CLEARANCE_M, joints, speed_rad_s: 1.0, acceleration_rad_s2: 2.0 },
             observations: Observations {
                 mode: Some(setup.mode),
                 target: BOARD,

@@ -5,6 +5,7 @@
 
 pub mod arms;
 mod board_views;
+pub mod clutter;
 mod drawn;
 mod exact;
 pub mod faulty;

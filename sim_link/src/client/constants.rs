@@ -31,6 +31,15 @@ pub const DEPTH_IN_METRES: i64 = 1;
 /// Integer parameter: version, 41000 is 4.10.0.
 pub const INT_PROGRAM_VERSION: i64 = 1;
 
+/// Stands for the whole scene as the base of a tree.
+pub const HANDLE_SCENE: i64 = -12;
+/// Float parameters of an object: the corner of its bounding box with the smallest coordinates, in its frame (m).
+pub const BOUNDS_MIN: [i64; 3] = [15, 16, 17];
+/// The corner with the largest coordinates.
+pub const BOUNDS_MAX: [i64; 3] = [18, 19, 20];
+
+/// Type of an object: a shape.
+pub const OBJECT_SHAPE: i64 = 0;
 /// Type of an object: a joint.
 pub const OBJECT_JOINT: i64 = 1;
 /// Type of a joint: it turns about one axis.

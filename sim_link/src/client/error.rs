@@ -254,6 +254,12 @@ pub enum LinkError {
         /// Where it should be.
         goal: JointQuantity,
     },
+    /// The arm would come nearer to something on its way than it may; nothing was moved.
+    #[error("nothing was moved: {contact}")]
+    InTheWay {
+        /// To what.
+        contact: handeye_core::plan::Contact,
+    },
     /// No motion fits the limits.
     #[error("no motion fits these limits of velocity, acceleration and jerk: {reason}")]
     NoProfile {

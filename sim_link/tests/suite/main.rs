@@ -8,6 +8,7 @@ mod board;
 mod client_faults;
 mod joint_offsets;
 mod other_arms;
+mod surroundings;
 mod vendor;
 
 mod slow {

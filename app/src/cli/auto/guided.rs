@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use handeye_core::diagnose::doctor;
 use handeye_core::diagnose::findings::FindingOptions;
 use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
-use handeye_core::plan::Obstacle;
+use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::choose::{Proposal, Robot};
 use handeye_core::plan::guided::{Ending, Guide, Known, LEAST_VIEWS, Next};
 use handeye_core::progress::CancelToken;
@@ -27,8 +27,8 @@ pub struct GuidedSequence<'a, 's> {
     pub guide: &'a mut Guide,
     /// The chain of the arm.
     pub kinematics: &'a ArmKinematics,
-    /// What stands around, besides the plane that the arm stands on and the board.
-    pub solids: Vec<Obstacle>,
+    /// What stands around, besides the board.
+    pub around: Surroundings,
     /// Captures that check the answer afterwards.
     pub checks: usize,
     /// What was found in the captures.
@@ -46,14 +46,14 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         sequence: &'a mut PoseSequence<'s>,
         guide: &'a mut Guide,
         kinematics: &'a ArmKinematics,
-        solids: Vec<Obstacle>,
+        around: Surroundings,
         checks: usize,
     ) -> Self {
         Self {
             sequence,
             guide,
             kinematics,
-            solids,
+            around,
             checks,
             corners: BTreeMap::new(),
             image_size: (0, 0),
@@ -166,7 +166,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     fn robot(&mut self) -> Result<Robot, Failure> {
         let joints = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
         let limits = self.sequence.plan.limits;
-        Ok(self.kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &self.solids))
+        Ok(self.kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &self.around))
     }
 }
 

@@ -8,19 +8,19 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use handeye_core::estimate::uncertainty::quality::TipBox;
 use handeye_core::estimate::{Method, Options};
-use handeye_core::plan::Obstacle;
+use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::record::GUIDED_RECORD;
 use handeye_core::plan::guided::{CHECKS, Guide, GuidedOptions};
 use handeye_core::project::session::{FolderLock, Session, SessionMeta, Store};
-use handeye_sim_link::cell::scene::ResolvedScene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{CellClient, CellPaths};
+use handeye_sim_link::client::cell::{Arm, ArmKinematics, CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
 
 use super::cell::SceneArg;
 use super::output::Output;
-use super::{Failure, RerunArg, out, record, rerun_arg, solve};
+use super::{Failure, RerunArg, arm_arg, box_arg, out, record, rerun_arg, solve};
 use crate::cli::auto::sequence::PoseSequence;
 use crate::model::{CaptureOptions, Step, Truth};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
@@ -29,7 +29,7 @@ use crate::shortfall;
 use crate::text::Language;
 use crate::worker::{timestamp, timestamp_rfc3339};
 use guided::GuidedSequence;
-use poses::{GUIDED, Plan};
+use poses::{GUIDED, Plan, REFERENCE};
 use solve::Solution;
 
 /// Options of `handeye auto`.
@@ -39,11 +39,20 @@ pub struct AutoArgs {
     #[arg(long, value_name = "ADDR")]
     connect: Option<String>,
     /// `seed10` (the ten reference poses), a pose file, `auto` (planned views of the board), or `guided` (each pose chosen
-    /// by what the captures so far leave open, until the goal is reached).
-    #[arg(long, value_name = "seed10|FILE|auto|guided", default_value = "seed10")]
-    poses: String,
+    /// by what the captures so far leave open, until the goal is reached). `seed10` if not given, and `guided` with an option
+    /// of guided capture.
+    #[arg(long, value_name = "seed10|FILE|auto|guided")]
+    poses: Option<String>,
     #[command(flatten)]
     guided: GuidedArgs,
+    /// What the arm must not touch, besides what the scene has: a file of boxes, with a work volume and limits of speed if wanted
+    /// (docs/surroundings.md). Every motion to joint values is then checked before it begins.
+    #[arg(long, value_name = "FILE")]
+    keep_out: Option<PathBuf>,
+    /// The chain of the arm by a built-in name or a URDF file, in place of the one that is read from the simulation. One
+    /// that puts the tip elsewhere than the robot reports it is refused.
+    #[arg(long, value_name = "NAME|URDF")]
+    arm: Option<String>,
     /// Folder of the session; a new one under `sessions` if not given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -81,6 +90,10 @@ struct GuidedArgs {
     /// Captures afterwards, at poses at random, that never enter the fit and check the answer; 3 if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100))]
     check_poses: Option<u32>,
+    /// Where the tool works, in the camera (x right, y down, z forward): middle and edges, metres. The goal then holds for
+    /// the worst point of it; without it for where the camera saw the board.
+    #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true)]
+    tool_box: Option<TipBox>,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -96,6 +109,7 @@ impl GuidedArgs {
             ("--max-poses", self.max_poses.is_some()),
             ("--max-minutes", self.max_minutes.is_some()),
             ("--check-poses", self.check_poses.is_some()),
+            ("--box", self.tool_box.is_some()),
         ];
         given.into_iter().find_map(|(name, is_given)| is_given.then_some(name))
     }
@@ -107,6 +121,7 @@ impl GuidedArgs {
             most_views: self.max_poses.map_or(default.most_views, |poses| poses as usize),
             most_s: self.max_minutes.map_or(default.most_s, |minutes| minutes * 60.0),
             seed,
+            tool_box: self.tool_box,
             ..default
         }
     }
@@ -119,18 +134,19 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
             "--scene describes the built-in cell and --connect takes another: give one of them"
         )));
     }
-    let is_guided = args.poses == GUIDED;
+    let by_default = if args.guided.given().is_some() { GUIDED } else { REFERENCE };
+    let poses = args.poses.as_deref().unwrap_or(by_default);
+    let is_guided = poses == GUIDED;
     if let Some(option) = args.guided.given().filter(|_| !is_guided) {
         return Err(Failure::unusable(anyhow::anyhow!("{option} goes with --poses guided")));
     }
     let scene = args.scene.load()?;
     let plan = match args.connect {
         Some(_) if is_guided => Plan::from_here(),
-        _ => Plan::find(&args.poses, &scene, args.seed)?,
+        _ => Plan::find(poses, &scene, args.seed)?,
     };
-    // What stands around is in the scene file; of another cell only the plane under the arm is known.
-    let solids =
-        if is_guided && args.connect.is_none() { solids(&poses::meant(&scene, args.seed)?) } else { Vec::new() };
+    // Read before anything moves.
+    let keep_out = args.keep_out.as_deref().map(Surroundings::read).transpose().map_err(Failure::unusable)?;
     let seed = args.seed.unwrap_or(scene.seed);
     let recorder = args.rerun.start(RerunChoice::Record, Pace::Everything, true)?;
     let server = match args.connect {
@@ -165,7 +181,17 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
             "guided capture takes an arm whose chain is known: {unknown}; give the poses by a file, --poses FILE"
         )));
     }
-    let kinematics = kinematics.ok();
+    let kinematics = match &args.arm {
+        None => kinematics.ok(),
+        Some(named) => {
+            let read = kinematics.map_err(|unknown| {
+                Failure::failed(anyhow::anyhow!("--arm {named} cannot be checked against the robot: {unknown}"))
+            })?;
+            let here = cell.arm().joint_values().map_err(Failure::failed)?;
+            Some(arm_arg::checked(named, &read, &here)?)
+        }
+    };
+    let around = surroundings(cell.arm(), kinematics.as_ref(), is_guided, keep_out)?;
     if let Some(shortfall) = shortfall::of(cell.info().support(), kinematics.is_some()) {
         tracing::warn!("{}", shortfall.say(Language::English));
     }
@@ -194,7 +220,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let captured = match (&mut guide, &kinematics) {
         (Some(guide), Some(kinematics)) => {
             let checks = args.guided.check_poses.map_or(CHECKS, |poses| poses as usize);
-            GuidedSequence::new(&mut sequence, guide, kinematics, solids, checks).run().map(Some)
+            GuidedSequence::new(&mut sequence, guide, kinematics, around, checks).run().map(Some)
         }
         _ => sequence.run().map(|()| None),
     };
@@ -232,10 +258,30 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     }
 }
 
-/// What stands in a scene.
-fn solids(scene: &ResolvedScene) -> Vec<Obstacle> {
-    let solids = scene.solids.iter();
-    solids.map(|solid| Obstacle { world_from_centre: solid.world_from_solid, size_m: solid.size_m }).collect()
+/// What stands around: in the scene, and in the file where one is given. With a file every motion is checked, and kept within
+/// its limits; without one only guided capture, which chooses its poses so, asks for it.
+fn surroundings(
+    arm: &mut Arm,
+    kinematics: Option<&ArmKinematics>,
+    is_guided: bool,
+    keep_out: Option<Surroundings>,
+) -> Result<Surroundings, Failure> {
+    let kinematics = match (kinematics, &keep_out) {
+        (Some(kinematics), Some(_)) => kinematics,
+        (Some(kinematics), None) if is_guided => kinematics,
+        (_, None) => return Ok(Surroundings::default()),
+        (None, Some(_)) => {
+            return Err(Failure::failed(anyhow::anyhow!(
+                "--keep-out needs an arm whose chain is known, or nobody can say what it would touch: leave the option out, or \
+                 give the scene an arm whose tip hangs on its base (docs/arms.md)"
+            )));
+        }
+    };
+    let standing = arm.surroundings(kinematics).map_err(Failure::failed)?.all();
+    let Some(keep_out) = keep_out else { return Ok(standing) };
+    let around = standing.and(keep_out);
+    arm.keep_clear(Some(kinematics.among(around.clone(), None)));
+    Ok(around)
 }
 
 fn finish(session: &Store, json: Option<&Output>, solution: &Solution) -> Result<(), Failure> {

@@ -15,6 +15,8 @@ const FIRST_TILT_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// How many views `--poses auto` plans.
 const PLANNED_VIEWS: usize = 20;
 
+/// The ten reference poses.
+pub const REFERENCE: &str = "seed10";
 /// Poses that are chosen on the way.
 pub const GUIDED: &str = "guided";
 
@@ -32,8 +34,8 @@ impl Plan {
     /// The poses of that name or file; `auto` plans views of the scene's board.
     pub fn find(what: &str, scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
         match what {
-            "seed10" => {
-                let poses = TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES).map_err(Failure::failed)?;
+            REFERENCE => {
+                let poses = TaughtPoses::parse(Path::new(REFERENCE), REFERENCE_POSES).map_err(Failure::failed)?;
                 Ok(Self::taught(&poses))
             }
             "auto" => Self::planned(scene, seed),
@@ -98,7 +100,7 @@ impl Plan {
 }
 
 /// The scene with board and camera where they are meant to be.
-pub fn meant(scene: &Scene, seed: Option<u64>) -> Result<ResolvedScene, Failure> {
+fn meant(scene: &Scene, seed: Option<u64>) -> Result<ResolvedScene, Failure> {
     let mut meant = scene.clone();
     meant.camera.random_offset_mm = 0.0;
     meant.camera.random_offset_deg = 0.0;

@@ -88,7 +88,9 @@ impl PoseSequence<'_> {
     ) -> Result<Option<(CaptureId, Box<Measured>)>, Failure> {
         let visit = self.persisting(&format!("pose {name:?}"), |sequence| {
             match sequence.go_to(goal) {
-                Err(error @ LinkError::Unreached { .. }) => return Ok(Visit::Unreached(error)),
+                Err(error @ (LinkError::Unreached { .. } | LinkError::InTheWay { .. })) => {
+                    return Ok(Visit::Unreached(error));
+                }
                 arrived => arrived?,
             }
             let (options, document) = (sequence.options, sequence.session.document());

@@ -153,6 +153,8 @@ impl Live {
         let end = CancelToken::default();
         line.begin(wish);
         let kinematics = arm.kinematics().map_err(Failure::failed)?.map_err(Failure::failed)?;
+        let standing = arm.surroundings(&kinematics).map_err(Failure::failed)?;
+        arm.keep_clear(Some(kinematics.among(standing.around, None)));
         let (end_of_arm, line_of_arm) = (end.clone(), Arc::clone(&line));
         let arm_thread = Builder::new()
             .name("follow".to_owned())

@@ -9,7 +9,8 @@ use super::design::Design;
 use crate::estimate::handeye::joint::{ExpectedView, ViewModel};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use crate::plan::clearance::{Arm, Obstacle, travel};
+use crate::plan::clearance::{Arm, travel};
+use crate::plan::surroundings::Surroundings;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 
@@ -30,8 +31,8 @@ const FAILED_NEAR: (f64, f64) = (0.04, 8.0 * std::f64::consts::PI / 180.0);
 pub struct Robot {
     /// The arm, with what is on its tip.
     pub arm: Arm,
-    /// What it must not touch, besides the board.
-    pub obstacles: Vec<Obstacle>,
+    /// What stands around, besides the board.
+    pub around: Surroundings,
     /// Free space around arm and tool, metres.
     pub clearance_m: f64,
     /// Where its joints are, radians; of a prismatic joint metres.
@@ -306,7 +307,7 @@ impl Chooser<'_> {
 impl Robot {
     fn way_to(&self, base_from_tip: &Pose<Base, Tip>) -> Way {
         match self.arm.reach(base_from_tip, &self.joints) {
-            Some(joints) if self.arm.is_free(&joints, &self.obstacles, self.clearance_m) => {
+            Some(joints) if self.arm.is_free(&joints, &self.around, self.clearance_m) => {
                 Way::To { joints: Some(joints), travel_s: self.travel_s(&self.joints, &joints) }
             }
             _ => Way::None,
@@ -315,16 +316,17 @@ impl Robot {
 
     /// Whether the arm can be driven there on a straight path in joint space without touching anything.
     pub fn path_is_free(&self, joints: &JointValues) -> bool {
-        self.arm.path_is_free(&self.joints, joints, &self.obstacles, self.clearance_m)
+        self.arm.path_is_free(&self.joints, joints, &self.around, self.clearance_m)
     }
 
     /// How long the arm takes from one configuration to another: up to speed, along, and down again, by the joint that has
-    /// the longest way. Limits of jerk are not in it.
+    /// the longest way, within the limits of what stands around. Limits of jerk are not in it.
     pub fn travel_s(&self, from: &JointValues, to: &JointValues) -> f64 {
         let way = travel(from, to);
-        let ramps = self.speed_rad_s.powi(2) / self.acceleration_rad_s2;
+        let speed_rad_s = self.arm.joint_speed(from, to, &self.around, self.speed_rad_s);
+        let ramps = speed_rad_s.powi(2) / self.acceleration_rad_s2;
         if way > ramps {
-            way / self.speed_rad_s + self.speed_rad_s / self.acceleration_rad_s2
+            way / speed_rad_s + speed_rad_s / self.acceleration_rad_s2
         } else {
             2.0 * (way / self.acceleration_rad_s2).sqrt()
         }

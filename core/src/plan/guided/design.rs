@@ -29,8 +29,13 @@ pub fn weight_about(middle: &Point3<f64>, target: &TargetSpec) -> Matrix6<f64> {
     let signs = [-half_m, half_m];
     let corners = signs.iter().flat_map(|&x| signs.iter().flat_map(move |&y| signs.map(|z| Vector3::new(x, y, z))));
     let points: Vec<Point3<f64>> = corners.chain([Vector3::zeros()]).map(|offset| middle + offset).collect();
+    weight_over(&points)
+}
+
+/// `W` over points in camera coordinates \[m\], each counting alike.
+pub fn weight_over(points: &[Point3<f64>]) -> Matrix6<f64> {
     let sum: Matrix6<f64> = points.iter().map(point_error::by_hand_eye).map(|j| j.tr_mul(&j)).sum();
-    sum / points.len() as f64
+    sum / points.len().max(1) as f64
 }
 
 impl Design {

@@ -22,16 +22,18 @@ pub mod fan;
 pub mod outlook;
 pub mod record;
 
+use nalgebra::Point3;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::estimate::claim::Claim;
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
+use crate::estimate::uncertainty::quality::TipBox;
 use crate::estimate::{Calibration, CameraKnowledge, Observations, ViewStatus};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::point_error;
-use crate::plan::travel;
+use crate::plan::{Carried, travel};
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use candidates::ViewRange;
@@ -85,6 +87,9 @@ pub struct GuidedOptions {
     pub dwell_s: f64,
     /// Seed of everything random.
     pub seed: u64,
+    /// Where the tool works: the goal holds for the worst point of it, and views are chosen by the mean square over it. Where the
+    /// camera saw the board, and over a cube as large as the board about that, without one.
+    pub tool_box: Option<TipBox>,
 }
 
 impl Default for GuidedOptions {
@@ -98,6 +103,7 @@ impl Default for GuidedOptions {
             ahead: 6,
             dwell_s: 1.5,
             seed: 1,
+            tool_box: None,
         }
     }
 }
@@ -297,7 +303,8 @@ impl Guide {
     pub fn next(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
         let used = used_views(known.observations, known.calibration);
         if let Some(step) = self.steps.last_mut().filter(|step| step.outcome == Outcome::Captured) {
-            step.achieved_m = known.calibration.and_then(Calibration::modelled_error_95_m);
+            let modelled_m = |calibration| modelled_error_m(calibration, self.options.tool_box.as_ref());
+            step.achieved_m = known.calibration.and_then(modelled_m);
             let last = known.observations.views.len().wrapping_sub(1);
             if known.calibration.is_some_and(|it| it.views.get(last).is_some_and(|v| v.status == ViewStatus::Outlier)) {
                 // It says nothing, and would be proposed again.
@@ -330,7 +337,7 @@ impl Guide {
         if self.failures >= MOST_FAILURES && self.range.is_some() {
             return Next::End(Ending::BoardLost { poses: self.failures });
         }
-        let is_blocked = |robot: &Robot| !robot.arm.is_free(&robot.joints, &robot.obstacles, robot.clearance_m);
+        let is_blocked = |robot: &Robot| !robot.arm.is_free(&robot.joints, &robot.around, robot.clearance_m);
         if used.len() <= 1 && known.robot.is_some_and(is_blocked) {
             return Next::End(Ending::StartBlocked);
         }
@@ -362,7 +369,7 @@ impl Guide {
         used: &[(Pose<Base, Tip>, Vec<usize>)],
         cancel: &CancelToken,
     ) -> Option<(Plan, f64)> {
-        let modelled_m = known.calibration?.modelled_error_95_m()?;
+        let modelled_m = modelled_error_m(known.calibration?, self.options.tool_box.as_ref())?;
         let ground = self.ground(known, model, used, cancel)?;
         self.range = Some(ground.range);
         let options = ChooseOptions {
@@ -417,7 +424,10 @@ impl Guide {
         let target = &known.observations.target;
         let views: Vec<ExpectedView> =
             used.iter().filter_map(|(pose, corners)| model.expected(pose, corners)).collect();
-        let weight = design::weight_about(&joint.reference_point, target);
+        let weight = match &self.options.tool_box {
+            None => design::weight_about(&joint.reference_point, target),
+            Some(tool_box) => design::weight_over(&tool_box.corners_and_middle()),
+        };
         let design = Design::new(model.prior(), &views, weight)?;
         let distances =
             used.iter().map(|(pose, _)| (model.camera_from_target(pose).isometry() * target.centre()).coords.norm());
@@ -444,8 +454,10 @@ impl Guide {
     fn ending(&mut self, known: &Known<'_>, views: usize) -> Option<Ending> {
         if let Some(calibration) = known.calibration.filter(|_| views >= LEAST_VIEWS && views != self.solved_views) {
             self.solved_views = views;
-            let error_m = calibration.tip_error_95_m();
-            let is_below = error_at_upper_levels(calibration).is_some_and(|error_m| error_m <= self.options.goal_m);
+            let tool_box = self.options.tool_box.as_ref();
+            let error_m = worst(calibration, tool_box, |point| calibration.error_95_m(point));
+            let is_below =
+                error_over_at_upper_levels(calibration, tool_box).is_some_and(|error_m| error_m <= self.options.goal_m);
             self.below = if is_below && is_sound(known.calibration) { self.below + 1 } else { 0 };
             if let (true, Some(error_m)) = (self.below >= IN_A_ROW, error_m) {
                 return Some(Ending::GoalReached { error_m });
@@ -486,7 +498,7 @@ impl Guide {
                     let reached = robot.arm.reach(&base_from_tip, &robot.joints);
                     let free = reached.filter(|joints| {
                         travel(&robot.joints, joints) <= LARGEST_FAN_WAY_RAD
-                            && robot.arm.is_free(joints, &robot.obstacles, robot.clearance_m)
+                            && robot.arm.is_free(joints, &robot.around, robot.clearance_m)
                             && robot.path_is_free(joints)
                     });
                     let Some(joints) = free else { continue };
@@ -508,20 +520,19 @@ impl Guide {
     }
 }
 
-/// The arm with what is on its tip, the camera or the middle of the board, where the estimate has it; and the board among what
-/// it must not touch where it is not on the tip, with some room about it.
+/// The arm with what is on its tip, the camera or the board, where the estimate has it; and the other one of the two among
+/// what stands around, with some room about the board wherever it is, and about a camera beside the robot.
 fn with_board(robot: &Robot, model: &ViewModel, observations: &Observations, room_m: f64) -> Robot {
     let mut robot = robot.clone();
+    let target = &observations.target;
     match model.hand_eye() {
         HandEye::EyeInHand { tip_from_camera, base_from_target } => {
-            robot.arm.tip_from_camera = *tip_from_camera.isometry();
-            let mut sheet = super::sheet(&observations.target, base_from_target);
-            sheet.size_m = sheet.size_m.map(|edge_m| edge_m + 2.0 * room_m);
-            robot.obstacles.push(sheet);
+            robot.arm.carried = vec![Carried::camera(tip_from_camera.isometry())];
+            robot.around.obstacles.push(super::sheet(target, base_from_target, room_m));
         }
-        HandEye::EyeToHand { tip_from_target, .. } => {
-            let centre = observations.target.centre();
-            robot.arm.tip_from_camera = tip_from_target.isometry() * nalgebra::Translation3::from(centre.coords);
+        HandEye::EyeToHand { base_from_camera, tip_from_target } => {
+            robot.arm.carried = vec![Carried::board(target, tip_from_target, room_m)];
+            robot.around.obstacles.push(super::housing(base_from_camera, room_m));
         }
     }
     robot
@@ -556,11 +567,38 @@ fn is_sound(calibration: Option<&Calibration>) -> bool {
 
 /// The error that is stated, at the upper limit of the noise levels, metres; `None` where nothing may be stated.
 pub fn error_at_upper_levels(calibration: &Calibration) -> Option<f64> {
-    let stated_m = calibration.tip_error_95_m()?;
+    error_over_at_upper_levels(calibration, None)
+}
+
+/// The same at the worst point of a box.
+pub fn error_over_at_upper_levels(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
     let joint = calibration.joint.as_ref()?;
-    let covariance = point_error::covariance(calibration.hand_eye_covariance()?, &joint.reference_point);
-    let plain_m = point_error::radius_95(&(covariance / joint.small_sample.scale));
-    Some(stated_m.max(plain_m * upper_level(joint.small_sample.degrees_of_freedom)))
+    let hand_eye = calibration.hand_eye_covariance()?;
+    worst(calibration, tool_box, |point| {
+        let stated_m = calibration.error_95_m(point)?;
+        let plain_m = point_error::radius_95(&(point_error::covariance(hand_eye, point) / joint.small_sample.scale));
+        Some(stated_m.max(plain_m * upper_level(joint.small_sample.degrees_of_freedom)))
+    })
+}
+
+/// The error by the noise alone where the goal is judged, metres.
+fn modelled_error_m(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
+    worst(calibration, tool_box, |point| calibration.modelled_error_95_at(point))
+}
+
+/// The largest value over the corners of a box, where errors are largest, or that where the camera saw the board.
+fn worst(
+    calibration: &Calibration,
+    tool_box: Option<&TipBox>,
+    error_m: impl Fn(&Point3<f64>) -> Option<f64>,
+) -> Option<f64> {
+    match tool_box {
+        None => error_m(&calibration.joint.as_ref()?.reference_point),
+        Some(tool_box) => {
+            let errors: Option<Vec<f64>> = tool_box.corners_and_middle().iter().map(error_m).collect();
+            errors?.into_iter().reduce(f64::max)
+        }
+    }
 }
 
 /// The upper limit of a noise level over its estimate from so many numbers.

@@ -18,6 +18,10 @@ pub const GUIDED_RECORD: &str = "guided.json";
 pub struct GuidedRecord {
     /// The 95 % error that was asked for, millimetres.
     pub goal_mm: f64,
+    /// The box in camera coordinates that the goal holds for, millimetres: smallest and largest coordinates. `None` for where the
+    /// camera saw the board.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_mm: Option<[[f64; 3]; 2]>,
     /// Seed of the candidates.
     pub seed: u64,
     /// Every pose that was proposed, in order.
@@ -94,7 +98,14 @@ impl Guide {
         });
         let ending =
             self.ended.map(|ending| EndingRecord { code: ending.code().to_owned(), text: ending.text().say(English) });
-        GuidedRecord { goal_mm: mm(self.options.goal_m), seed: self.options.seed, steps: steps.collect(), ending }
+        let box_mm = self.options.tool_box.map(|tool_box| tool_box.bounds().map(|corner| (corner * 1e3).into()));
+        GuidedRecord {
+            goal_mm: mm(self.options.goal_m),
+            box_mm,
+            seed: self.options.seed,
+            steps: steps.collect(),
+            ending,
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the planner of views has to know, of a simulated cell.
 
 use handeye_core::geometry::arm::ArmKind;
-use handeye_core::plan::{Arm, ArmBody, Obstacle, ViewSetup};
+use handeye_core::plan::{Arm, ArmBody, Carried, Obstacle, Surroundings, ViewSetup};
 use nalgebra::Translation3;
 
 use super::ResolvedScene;
@@ -9,11 +9,9 @@ use super::ResolvedScene;
 impl From<&ResolvedScene> for ViewSetup {
     /// A simulated cell as it truly is.
     fn from(scene: &ResolvedScene) -> Self {
-        let sheet = Obstacle {
-            world_from_centre: scene.world_from_plane * Translation3::new(0.0, 0.0, -0.001),
-            size_m: [scene.paper_m[0], scene.paper_m[1], 0.002],
-        };
-        let solids = scene.solids.iter().map(|s| Obstacle { world_from_centre: s.world_from_solid, size_m: s.size_m });
+        let middle = scene.world_from_plane * Translation3::new(0.0, 0.0, -0.001);
+        let sheet = Obstacle::new("board", middle, [scene.paper_m[0], scene.paper_m[1], 0.002]);
+        let solids = scene.solids.iter().map(|s| Obstacle::new(s.name.clone(), s.world_from_solid, s.size_m));
         Self {
             base_from_target: scene.base_from_target,
             target: scene.target,
@@ -27,10 +25,10 @@ impl From<&ResolvedScene> for ViewSetup {
                 },
                 world_from_arm: scene.world_from_arm,
                 connection_from_tip: scene.connection_from_tip,
-                tip_from_camera: *scene.tip_from_camera.isometry(),
+                carried: vec![Carried::camera(scene.tip_from_camera.isometry())],
             },
             start_joints: scene.start_joints,
-            obstacles: std::iter::once(sheet).chain(solids).collect(),
+            around: Surroundings::of(std::iter::once(sheet).chain(solids).collect()),
         }
     }
 }

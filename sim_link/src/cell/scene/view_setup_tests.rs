@@ -87,9 +87,9 @@ fn moves_between_any_two_views_keep_tip_and_camera_out_of_floor_and_board() {
 #[test]
 fn an_obstacle_is_driven_around_between_all_views() {
     let [free, _] = scenes();
-    let rod = Obstacle { world_from_centre: Isometry3::translation(-0.35, -0.05, 1.2), size_m: [0.03, 0.03, 0.8] };
+    let rod = Obstacle::new("rod", Isometry3::translation(-0.35, -0.05, 1.2), [0.03, 0.03, 0.8]);
     let mut blocked = free.clone();
-    blocked.obstacles.push(rod);
+    blocked.around.obstacles.push(rod.clone());
     let options = ViewOptions { count: 12, ..ViewOptions::default() };
     // Pairs between which the tip or the camera would come within a centimetre of the rod.
     let hits = |setup: &ViewSetup| {
@@ -104,7 +104,7 @@ fn an_obstacle_is_driven_around_between_all_views() {
                     let tip = setup.arm.world_from_arm
                         * setup.arm.chain.forward(&joints).unwrap().isometry()
                         * setup.arm.connection_from_tip;
-                    [tip, tip * setup.arm.tip_from_camera].iter().any(|place| {
+                    [tip, tip * setup.tip_from_camera.isometry()].iter().any(|place| {
                         let beside = (rod.world_from_centre.inverse() * place).translation.vector.abs();
                         beside.x < 0.025 && beside.y < 0.025 && beside.z < 0.41
                     })
@@ -121,7 +121,7 @@ fn an_obstacle_is_driven_around_between_all_views() {
 fn assert_keeps_away(setup: &ViewSetup, joints: &[f64]) {
     let connection = setup.arm.world_from_arm * setup.arm.chain.forward(joints).unwrap().isometry();
     let tip = connection * setup.arm.connection_from_tip;
-    let camera = tip * setup.arm.tip_from_camera;
+    let camera = tip * setup.tip_from_camera.isometry();
     for place in [tip, camera] {
         let in_world = Point3::from(place.translation.vector);
         assert!(in_world.z > 0.02, "{in_world} is in the floor");

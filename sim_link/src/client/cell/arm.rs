@@ -11,6 +11,7 @@ use super::hold::Hold;
 use super::joint_elsewhere::joint_elsewhere;
 use super::joints::{largest_change, of_rad, read_joint_values};
 use super::objects::CellObjects;
+use super::surroundings::Among;
 use super::truth::{self, GroundTruth};
 use super::{CellInfo, CellPaths, discover, require_running};
 use crate::client::endpoint::Endpoint;
@@ -72,11 +73,13 @@ pub struct Arm {
     pub(super) objects: Arc<CellObjects>,
     pub(super) info: Arc<CellInfo>,
     pub(super) hold: Hold,
+    /// What its motions keep clear of.
+    pub(super) among: Option<Arc<Among>>,
 }
 
 impl Arm {
     pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
-        Self { sim, objects, info, hold: Hold::default() }
+        Self { sim, objects, info, hold: Hold::default(), among: None }
     }
 
     /// Connects once, for an arm without its camera.

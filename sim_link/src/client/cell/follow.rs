@@ -71,7 +71,10 @@ impl Arm {
         if !kinematics.fits(&start, &self.base_from_tip()?) {
             return Ok(FollowEnd::OtherTip);
         }
-        match FollowPlan::new(kinematics, limits, start, self.info.time_step_s) {
+        let among = self.among.clone();
+        let limits = among.as_ref().map_or(*limits, |among| limits.within(&among.around.limits));
+        let guard = among.as_deref().map(|among| among.guard(&start));
+        match FollowPlan::new(kinematics, &limits, guard, start, self.info.time_step_s) {
             Ok(plan) => {
                 let mut stream = Stream::begin(self, start, TASK)?;
                 let outcome = self.send_follow(plan, &mut stream, wish);

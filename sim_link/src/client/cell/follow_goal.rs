@@ -1,6 +1,7 @@
 //! Where an arm that follows is sent, within which limits, and how it ends.
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::plan::{Contact, SpeedLimits};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::client::error::LinkError;
@@ -42,6 +43,12 @@ impl Default for FollowLimits {
 }
 
 impl FollowLimits {
+    /// No faster than what stands around allows.
+    #[must_use]
+    pub fn within(&self, limits: &SpeedLimits) -> Self {
+        Self { speed_m_s: limits.tip(self.speed_m_s), joint_speed_rad_s: limits.joint(self.joint_speed_rad_s), ..*self }
+    }
+
     /// Whether all of it makes sense.
     ///
     /// # Errors
@@ -133,7 +140,7 @@ pub(super) fn moved(base_from_tip: &Isometry3<f64>, shift: &Vector3<f64>, turn: 
 }
 
 /// How following ended; the arm stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum FollowEnd {
     /// The caller wanted it.
     Released,
@@ -148,6 +155,8 @@ pub enum FollowEnd {
     },
     /// The arm is nearly stretched or folded so that some direction needs joints faster than they are.
     Singular,
+    /// The arm would come nearer to something than it may.
+    Contact(Contact),
     /// Something else moves this joint, counted from 1 at the base, or holds it.
     NotFollowing {
         /// Which joint.

@@ -2,12 +2,13 @@
 //!
 //! In every pass the plan knows how it would come to rest from where it is: all joints slow down together, so that each
 //! keeps its direction. A step is taken only if that way to rest, from where the step leads, keeps all limits, the
-//! ranges of the joints and the workspace; otherwise less of the step is taken, in the worst case none, and the arm
-//! brakes. So whatever goals come, the limits hold from the first pass to the last, and the arm can always be stopped.
+//! ranges of the joints and the workspace, and touches nothing; otherwise less of the step is taken, in the worst case
+//! none, and the arm brakes. So whatever goals come, the limits hold from the first pass to the last, and the arm can always be stopped.
 
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3::rotation_vector;
+use handeye_core::plan::{Contact, Guard};
 use nalgebra::{Isometry3, Vector3};
 
 use super::follow_goal::{FollowEnd, FollowGoal, FollowLimits, moved};
@@ -83,6 +84,7 @@ impl Moving {
 #[derive(Debug)]
 pub(super) struct FollowPlan<'a> {
     kinematics: &'a ArmKinematics,
+    guard: Option<Guard<'a>>,
     limits: FollowLimits,
     dt_s: f64,
     now: Moving,
@@ -97,6 +99,7 @@ impl<'a> FollowPlan<'a> {
     pub fn new(
         kinematics: &'a ArmKinematics,
         limits: &FollowLimits,
+        guard: Option<Guard<'a>>,
         joints: JointValues,
         dt_s: f64,
     ) -> Result<Self, FollowEnd> {
@@ -107,7 +110,7 @@ impl<'a> FollowPlan<'a> {
         if !limits.workspace.contains(&now.base_from_tip.translation.vector) {
             return Err(FollowEnd::Workspace);
         }
-        Ok(Self { kinematics, limits: *limits, dt_s, now, obstacle: None })
+        Ok(Self { kinematics, guard, limits: *limits, dt_s, now, obstacle: None })
     }
 
     /// The joints as they were last sent \[rad\].
@@ -122,7 +125,7 @@ impl<'a> FollowPlan<'a> {
 
     /// What was in the way; the arm comes to rest, and goals are no longer looked at.
     pub fn obstacle(&self) -> Option<FollowEnd> {
-        self.obstacle
+        self.obstacle.clone()
     }
 
     /// Whether it stands.
@@ -182,12 +185,16 @@ impl<'a> FollowPlan<'a> {
                 Ok(joints) => {
                     let (_, by_rad) = largest_change(self.kinematics.kinds(), &self.now.joints, &joints);
                     if by_rad <= largest_step {
+                        if let Some(contact) = self.contact(&joints) {
+                            return Err(FollowEnd::Contact(contact));
+                        }
                         let rate = |i: usize| (joints[i] - self.now.joints[i]) / self.dt_s;
                         return Ok(JointValues::from_fn(joints.len(), rate));
                     }
                     (largest_step / by_rad).min(LEAST_SLOWING)
                 }
                 Err(JogObstacle::JointRange { joint, .. }) => return Err(FollowEnd::JointLimit { joint }),
+                Err(JogObstacle::Contact(contact)) => return Err(FollowEnd::Contact(contact)),
                 Err(JogObstacle::Reach(_) | JogObstacle::Singular { .. }) => 0.5,
             };
             if share * share_of_limits < CRAWL {
@@ -279,6 +286,12 @@ impl<'a> FollowPlan<'a> {
             && is_within((to.turn_rad_s - from.turn_rad_s).norm(), limits.turn_acceleration_rad_s2 * self.dt_s)
             && limits.workspace.contains(&to.base_from_tip.translation.vector)
             && self.kinematics.arm().first_violation(&to.joints).is_none()
+            && self.contact(&to.joints).is_none()
+    }
+
+    /// What the arm would come too near to.
+    fn contact(&self, joints: &JointValues) -> Option<Contact> {
+        self.guard.as_ref().and_then(|guard| guard.contact(joints))
     }
 }
 

@@ -6,8 +6,10 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::super::follow_goal::Workspace;
+use super::super::surroundings::Among;
 use super::*;
 use handeye_core::geometry::arm::{ArmKind, JointRange};
+use handeye_core::plan as planning;
 
 const DT_S: f64 = 0.05;
 
@@ -53,7 +55,7 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn new(arm: &'a ArmKinematics, limits: &FollowLimits, start: JointValues, dt_s: f64) -> Self {
-        let plan = FollowPlan::new(arm, limits, start, dt_s).expect("nothing forbids to move");
+        let plan = FollowPlan::new(arm, limits, None, start, dt_s).expect("nothing forbids to move");
         Self { arm, plan, dt_s, points: vec![start] }
     }
 
@@ -61,6 +63,13 @@ impl<'a> Run<'a> {
         let joints = self.plan.advance(goal);
         self.points.push(joints);
         self.arm.tip(&joints)
+    }
+
+    /// Among boxes, with a centimetre of free space.
+    fn among(arm: &'a ArmKinematics, limits: &FollowLimits, among: &'a Among) -> Self {
+        let guard = Some(among.guard(&START));
+        let plan = FollowPlan::new(arm, limits, guard, START, DT_S).expect("nothing forbids to move");
+        Self { arm, plan, dt_s: DT_S, points: vec![START] }
     }
 
     /// Brakes until it stands, in how many passes.
@@ -233,7 +242,8 @@ fn a_goal_that_leaves_the_workspace_ends_it_with_the_tip_inside() {
         assert_eq!(run.broken_limit(&limits), None);
     }
     assert_eq!(
-        FollowPlan::new(&arm, &boxed(Point3::new(-2.0, -2.0, 1.9), Point3::new(2.0, 2.0, 2.0)), START, DT_S).err(),
+        FollowPlan::new(&arm, &boxed(Point3::new(-2.0, -2.0, 1.9), Point3::new(2.0, 2.0, 2.0)), None, START, DT_S)
+            .err(),
         Some(FollowEnd::Workspace),
         "outside nothing begins"
     );
@@ -481,4 +491,37 @@ proptest! {
         );
         prop_assert_eq!(run.broken_limit(&limits), None);
     }
+}
+
+#[test]
+fn a_goal_behind_a_box_is_followed_until_the_box_and_the_end_names_it() {
+    let arm = arm();
+    let start = arm.tip(&START);
+    let at = start.translation() + Vector3::new(0.25, 0.0, 0.0);
+    let wall = planning::Obstacle::new("wall", Isometry3::from(at), [0.02, 0.3, 0.3]);
+    let among = arm.among(planning::Surroundings::of(vec![wall]), None);
+    let limits = open();
+    let mut run = Run::among(&arm, &limits, &among);
+    let goal = shifted(&start, Vector3::new(0.5, 0.0, 0.0));
+    for _ in 0..400 {
+        run.pass(Some(&goal));
+        if run.plan.obstacle().is_some() && run.plan.is_at_rest() {
+            break;
+        }
+    }
+    assert_eq!(run.plan.obstacle(), Some(FollowEnd::Contact(Contact::Box { name: "wall".to_owned() })));
+    for joints in &run.points {
+        assert_eq!(among.guard(&START).contact(joints), None, "{joints:?}");
+    }
+    let went_m = run.arm.tip(run.plan.joints()).distance_to(&start).0;
+    assert!((0.05..0.25).contains(&went_m), "{went_m} m");
+
+    // The other way nothing keeps it.
+    let mut run = Run::among(&arm, &limits, &among);
+    let away = shifted(&start, Vector3::new(-0.1, 0.0, 0.0));
+    for _ in 0..200 {
+        run.pass(Some(&away));
+    }
+    assert_eq!(run.plan.obstacle(), None);
+    assert!(run.arm.tip(run.plan.joints()).distance_to(&away.base_from_tip).0 < 1e-3);
 }

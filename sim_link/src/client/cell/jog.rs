@@ -7,7 +7,7 @@ use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use nalgebra::Vector3;
 
-use super::jog_plan::{JogObstacle, JogPlan, Path};
+use super::jog_plan::{JogObstacle, JogPlan, Path, Watch};
 use super::reach::ArmKinematics;
 use super::stream::{Pass, Point, Stream};
 use super::{Arm, require_running};
@@ -59,7 +59,7 @@ pub enum JogAxes {
 }
 
 /// How a jog ended; the arm stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum JogEnd {
     /// It was let go.
     Released,
@@ -103,7 +103,9 @@ impl Arm {
             return Ok(JogEnd::OtherTip);
         }
         let path = self.path(jog, &start)?;
-        match JogPlan::new(path, start, self.info.time_step_s, length) {
+        let among = self.among.clone();
+        let among = among.as_deref().map(|among| Watch { guard: among.guard(&start), arm: &among.arm });
+        match JogPlan::new(path, among, start, self.info.time_step_s, length) {
             Ok(plan) => {
                 let mut stream = Stream::begin(self, start, TASK)?;
                 let outcome = self.send_jog(plan, &mut stream, held);
@@ -135,7 +137,7 @@ impl Arm {
                 Pass::Sent if plan.is_at_rest() => match plan.obstacle() {
                     _ if stream.is_stopped() => return Ok(JogEnd::Stopped),
                     _ if share.is_none() => return Ok(JogEnd::Released),
-                    Some(obstacle) => return Ok(JogEnd::Obstacle(obstacle)),
+                    Some(obstacle) => return Ok(JogEnd::Obstacle(obstacle.clone())),
                     // Held at a speed of nothing.
                     None => {}
                 },

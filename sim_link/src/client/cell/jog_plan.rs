@@ -3,6 +3,8 @@
 
 use handeye_core::geometry::arm::{IkError, JointKind, JointQuantity, JointRange, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+pub use handeye_core::plan::Contact;
+use handeye_core::plan::{self as planning, Guard, SpeedLimits};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::joints::{CellJoint, in_rad, largest_change};
@@ -42,6 +44,9 @@ const JUMP_RAD: f64 = 0.5;
 /// Dimensions of a pose: joints beyond these are to spare.
 const POSE: usize = 6;
 
+/// What a limit of speed may be exceeded by through rounding \[relative\].
+const ROUNDING: f64 = 1e-6;
+
 /// How often a step that is too fast is halved before it is given up: to less than the crawl.
 const SLOWER_STEPS: usize = 6;
 
@@ -49,7 +54,7 @@ const SLOWER_STEPS: usize = 6;
 const AT_END: f64 = 1e-9;
 
 /// Why a jog goes no further.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum JogObstacle {
     /// A joint is at the end of its range.
@@ -72,6 +77,9 @@ pub enum JogObstacle {
         /// The fastest joint, counted from 1 at the base.
         joint: usize,
     },
+    /// The arm would come nearer to something than it may.
+    #[error(transparent)]
+    Contact(Contact),
 }
 
 /// Where a jog leads.
@@ -178,10 +186,35 @@ fn stopping_speed(distance: f64, acceleration: f64, dt_s: f64) -> f64 {
     2.0 * left / (dt_s + (dt_s * dt_s + 2.0 * left / acceleration).sqrt())
 }
 
+/// What a jog is kept clear of, and where its tip is.
+#[derive(Debug)]
+pub(super) struct Watch<'a> {
+    /// What it may come near to.
+    pub guard: Guard<'a>,
+    /// The arm.
+    pub arm: &'a planning::Arm,
+}
+
+impl Watch<'_> {
+    fn limits(&self) -> SpeedLimits {
+        self.guard.surroundings().limits
+    }
+
+    /// The speed along a path at which the tip has its limit, from two points that are so far apart on it.
+    fn tip_limit(&self, from: &JointValues, to: &JointValues, between: f64) -> f64 {
+        let Some(tip_m_s) = self.limits().tip_m_s else { return f64::INFINITY };
+        match (self.arm.tip(from), self.arm.tip(to)) {
+            (Some(from), Some(to)) => tip_m_s * between / from.distance_to(&to).0.max(f64::MIN_POSITIVE),
+            _ => f64::INFINITY,
+        }
+    }
+}
+
 /// A jog under way.
 #[derive(Debug)]
 pub(super) struct JogPlan<'a> {
     path: Path<'a>,
+    among: Option<Watch<'a>>,
     dt_s: f64,
     /// Where it ends by itself.
     length: Option<f64>,
@@ -196,8 +229,14 @@ impl<'a> JogPlan<'a> {
     ///
     /// # Errors
     /// What is in the way of a given length.
-    pub fn new(path: Path<'a>, joints: JointValues, dt_s: f64, length: Option<f64>) -> Result<Self, JogObstacle> {
-        let plan = Self { path, dt_s, length, distance: 0.0, speed: 0.0, joints, obstacle: None };
+    pub fn new(
+        path: Path<'a>,
+        among: Option<Watch<'a>>,
+        joints: JointValues,
+        dt_s: f64,
+        length: Option<f64>,
+    ) -> Result<Self, JogObstacle> {
+        let plan = Self { path, among, dt_s, length, distance: 0.0, speed: 0.0, joints, obstacle: None };
         plan.check_length()?;
         Ok(plan)
     }
@@ -209,11 +248,11 @@ impl<'a> JogPlan<'a> {
         {
             return Err(obstacle);
         }
-        let [fastest, _] = self.path.limits();
+        let [fastest, _] = self.limits();
         let mut joints = self.joints;
         for sample in 1..=STEP_SAMPLES {
             let between = length / STEP_SAMPLES as f64;
-            let next = self.path.joints_at(between * sample as f64, &joints)?;
+            let next = self.joints_at(between * sample as f64, &joints)?;
             self.rate_limit(&joints, &next, between, fastest)?;
             joints = next;
         }
@@ -222,7 +261,7 @@ impl<'a> JogPlan<'a> {
 
     /// The joints for the next pass; `share` of the fastest speed is wanted, and a standstill with `None`.
     pub fn advance(&mut self, share: Option<f64>) -> JointValues {
-        let [fastest, acceleration] = self.path.limits();
+        let [fastest, acceleration] = self.limits();
         let wanted = share.filter(|share| share.is_finite()).map_or(0.0, |share| share.clamp(0.0, 1.0) * fastest);
         let change = acceleration * self.dt_s;
         let next = wanted.clamp((self.speed - change).max(0.0), self.speed + change);
@@ -244,9 +283,14 @@ impl<'a> JogPlan<'a> {
             {
                 distance = length;
             }
-            let joints = self.path.joints_at(distance, &self.joints)?;
+            let joints = self.joints_at(distance, &self.joints)?;
             let (fastest, by_rad) = self.path.largest_change(&self.joints, &joints);
-            if by_rad <= JOINT_RATE * self.dt_s {
+            let moved = distance - self.distance;
+            let tip_limit = self
+                .among
+                .as_ref()
+                .map_or(f64::INFINITY, |among| among.tip_limit(&self.joints, &joints, moved.max(f64::MIN_POSITIVE)));
+            if by_rad <= self.joint_rate() * self.dt_s && moved <= tip_limit * self.dt_s * (1.0 + ROUNDING) {
                 (self.joints, self.distance) = (joints, distance);
                 return Ok(());
             }
@@ -254,6 +298,32 @@ impl<'a> JogPlan<'a> {
             self.speed /= 2.0;
         }
         Err(JogObstacle::Singular { joint })
+    }
+
+    /// Fastest speed and acceleration along the path.
+    fn limits(&self) -> [f64; 2] {
+        let [speed, acceleration] = self.path.limits();
+        let Some(limits) = self.among.as_ref().map(Watch::limits) else { return [speed, acceleration] };
+        let speed = match self.path {
+            Path::Joint { joint: CellJoint { kind: JointKind::Revolute, .. }, .. } => limits.joint(speed),
+            Path::Joint { .. } | Path::Line { .. } => limits.tip(speed),
+            Path::Turn { .. } => speed,
+        };
+        [speed, acceleration]
+    }
+
+    /// The fastest joint while the tip is jogged \[rad/s\].
+    fn joint_rate(&self) -> f64 {
+        self.among.as_ref().map_or(JOINT_RATE, |among| among.limits().joint(JOINT_RATE))
+    }
+
+    /// The joints after a distance, from those at a point shortly before, where nothing is in the way.
+    fn joints_at(&self, distance: f64, before: &JointValues) -> Result<JointValues, JogObstacle> {
+        let joints = self.path.joints_at(distance, before)?;
+        match self.among.as_ref().and_then(|among| among.guard.contact(&joints)) {
+            Some(contact) => Err(JogObstacle::Contact(contact)),
+            None => Ok(joints),
+        }
     }
 
     /// Whether it stands.
@@ -267,13 +337,13 @@ impl<'a> JogPlan<'a> {
     }
 
     /// What is in the way, once it slows down for it.
-    pub fn obstacle(&self) -> Option<JogObstacle> {
-        self.obstacle
+    pub fn obstacle(&self) -> Option<&JogObstacle> {
+        self.obstacle.as_ref()
     }
 
     /// The fastest speed up to `speed` that leaves the way to stop, and no joint faster than it may be.
     fn free_speed(&mut self, speed: f64) -> f64 {
-        let [fastest, acceleration] = self.path.limits();
+        let [fastest, acceleration] = self.limits();
         let stopping = |distance: f64| stopping_speed(distance, acceleration, self.dt_s);
         let mut free = speed;
         self.obstacle = None;
@@ -285,6 +355,8 @@ impl<'a> JogPlan<'a> {
             if bound < free {
                 (free, self.obstacle) = (bound, Some(obstacle));
             }
+        }
+        if self.among.is_none() && matches!(self.path, Path::Joint { .. }) {
             return free;
         }
         let between = (speed * self.dt_s + speed * speed / (2.0 * acceleration)) / LOOK_AHEAD as f64;
@@ -294,7 +366,7 @@ impl<'a> JogPlan<'a> {
         let mut joints = self.joints;
         for sample in 1..=LOOK_AHEAD {
             let behind = between * (sample - 1) as f64;
-            let ahead = self.path.joints_at(self.distance + between * sample as f64, &joints).and_then(|next| {
+            let ahead = self.joints_at(self.distance + between * sample as f64, &joints).and_then(|next| {
                 let rate_limit = self.rate_limit(&joints, &next, between, fastest)?;
                 Ok((next, rate_limit))
             });
@@ -314,12 +386,17 @@ impl<'a> JogPlan<'a> {
 
     /// The speed along the path at which the fastest joint has its rate.
     fn rate_limit(&self, from: &JointValues, to: &JointValues, between: f64, fastest: f64) -> Result<f64, JogObstacle> {
+        let tip_limit = self.among.as_ref().map_or(f64::INFINITY, |among| among.tip_limit(from, to, between));
         if matches!(self.path, Path::Joint { .. }) {
-            return Ok(fastest);
+            return Ok(fastest.min(tip_limit));
         }
         let (joint, by_rad) = self.path.largest_change(from, to);
-        let limit = JOINT_RATE * between / by_rad.max(f64::MIN_POSITIVE);
-        if limit < CRAWL * fastest { Err(JogObstacle::Singular { joint: joint + 1 }) } else { Ok(limit.min(fastest)) }
+        let limit = self.joint_rate() * between / by_rad.max(f64::MIN_POSITIVE);
+        if limit < CRAWL * fastest {
+            Err(JogObstacle::Singular { joint: joint + 1 })
+        } else {
+            Ok(limit.min(fastest).min(tip_limit))
+        }
     }
 }
 

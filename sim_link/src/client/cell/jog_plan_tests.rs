@@ -44,7 +44,7 @@ fn speeds(start: f64, values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 #[test]
 fn a_joint_moves_in_the_first_pass_and_keeps_its_limits_from_start_to_rest() {
-    let mut plan = JogPlan::new(joint(2, -1.0, [-3.0, 3.0]), START, DT_S, None).expect("nothing is in the way");
+    let mut plan = JogPlan::new(joint(2, -1.0, [-3.0, 3.0]), None, START, DT_S, None).expect("nothing is in the way");
     let points = run(&mut plan, |pass| (pass < 10).then_some(0.5));
     assert!(points[0][2] < START[2], "it moves at once");
     let speeds = speeds(START[2], points.iter().map(|q| q[2]));
@@ -59,11 +59,14 @@ fn a_joint_moves_in_the_first_pass_and_keeps_its_limits_from_start_to_rest() {
 
 #[test]
 fn a_joint_comes_to_rest_at_the_end_of_its_range_and_says_so() {
-    let mut plan = JogPlan::new(joint(0, 1.0, [-1.0, 0.9]), START, DT_S, None).expect("there is room");
+    let mut plan = JogPlan::new(joint(0, 1.0, [-1.0, 0.9]), None, START, DT_S, None).expect("there is room");
     let points = run(&mut plan, |_| Some(1.0));
     assert_relative_eq!(points.last().expect("points")[0], 0.9, epsilon = 1e-6);
     assert!(points.iter().all(|q| q[0] <= 0.9 + 1e-12));
-    assert_eq!(plan.obstacle(), Some(JogObstacle::JointRange { joint: 1, limit: JointKind::Revolute.quantity(0.9) }));
+    assert_eq!(
+        plan.obstacle().cloned(),
+        Some(JogObstacle::JointRange { joint: 1, limit: JointKind::Revolute.quantity(0.9) })
+    );
     for pair in speeds(START[0], points.iter().map(|q| q[0])).windows(2) {
         assert!((pair[1] - pair[0]).abs() <= JOINT_ACCELERATION * DT_S + 1e-9);
     }
@@ -73,7 +76,7 @@ fn a_joint_comes_to_rest_at_the_end_of_its_range_and_says_so() {
 fn a_step_ends_exactly_where_it_was_asked_to() {
     let arm = arm();
     for (length, along) in [(1e-4, Vector3::x()), (0.01, Vector3::y()), (0.05, -Vector3::z())] {
-        let mut plan = JogPlan::new(line(&arm, START, along), START, DT_S, Some(length)).expect("it is near");
+        let mut plan = JogPlan::new(line(&arm, START, along), None, START, DT_S, Some(length)).expect("it is near");
         let points = run(&mut plan, |_| Some(0.25));
         let moved = arm.tip(points.last().expect("points")).translation() - arm.tip(&START).translation();
         assert_relative_eq!(moved, along * length, epsilon = 1e-9);
@@ -84,9 +87,9 @@ fn a_step_ends_exactly_where_it_was_asked_to() {
 #[test]
 fn a_step_that_leads_out_of_reach_or_range_is_not_begun() {
     let arm = arm();
-    let far = JogPlan::new(line(&arm, START, Vector3::z()), START, DT_S, Some(2.0)).expect_err("two metres up");
+    let far = JogPlan::new(line(&arm, START, Vector3::z()), None, START, DT_S, Some(2.0)).expect_err("two metres up");
     assert!(matches!(far, JogObstacle::Reach(_) | JogObstacle::Singular { .. }), "{far}");
-    let error = JogPlan::new(joint(5, -1.0, [-0.6, 0.6]), START, DT_S, Some(0.2)).expect_err("out of range");
+    let error = JogPlan::new(joint(5, -1.0, [-0.6, 0.6]), None, START, DT_S, Some(0.2)).expect_err("out of range");
     assert!(matches!(error, JogObstacle::JointRange { joint: 6, .. }), "{error}");
 }
 
@@ -97,7 +100,7 @@ fn a_turn_keeps_its_centre() {
     let centre = start.translation() + Vector3::new(0.05, -0.02, 0.1);
     let path = Path::Turn { kinematics: &arm, start, about: Vector3::y(), centre };
     let tip_from_centre = start.inverse().isometry() * nalgebra::Point3::from(centre);
-    let mut plan = JogPlan::new(path, START, DT_S, None).expect("open");
+    let mut plan = JogPlan::new(path, None, START, DT_S, None).expect("open");
     let points = run(&mut plan, |pass| (pass < 20).then_some(0.5));
     for q in &points {
         let now = arm.tip(q).isometry() * tip_from_centre;
@@ -112,7 +115,7 @@ fn out_of_a_singular_position_the_tip_goes_as_slowly_as_the_joints_need() {
     let arm = arm();
     // Stretched straight up: at first the tip hardly moves however fast the elbow turns.
     let upright = JointValues::zeros(6);
-    let mut plan = JogPlan::new(line(&arm, upright, -Vector3::z()), upright, DT_S, None).expect("no length");
+    let mut plan = JogPlan::new(line(&arm, upright, -Vector3::z()), None, upright, DT_S, None).expect("no length");
     let points = run(&mut plan, |pass| (pass < 100).then_some(1.0));
     assert!(pass_rates(&upright, &points) <= JOINT_RATE * (1.0 + 1e-9));
     let first_m = arm.tip(&upright).distance_to(&arm.tip(&points[0])).0;
@@ -135,7 +138,7 @@ fn a_joint_to_spare_gives_way_where_another_one_comes_to_the_end_of_its_range() 
     let axes = [Vector3::x(), Vector3::y(), Vector3::z(), -Vector3::x(), -Vector3::y(), -Vector3::z()];
     for about in axes.map(|axis| tip.rotation() * axis) {
         let path = Path::Turn { kinematics: &arm, start: tip, about, centre: tip.translation() };
-        let mut plan = JogPlan::new(path, start, DT_S, None).expect("no length");
+        let mut plan = JogPlan::new(path, None, start, DT_S, None).expect("no length");
         let mut before = start;
         for joints in run(&mut plan, |pass| (pass < 40).then_some(0.5)) {
             assert_eq!(arm.arm().first_violation(&joints), None, "{joints:?}");
@@ -188,7 +191,7 @@ mod slow {
             } else {
                 Path::Line { kinematics: &arm, start: tip, along }
             };
-            let mut plan = JogPlan::new(path, start, DT_S, None).expect("no length");
+            let mut plan = JogPlan::new(path, None, start, DT_S, None).expect("no length");
             // Three metres of line, or more than a turn: most ways end at an obstacle before.
             let points = run(&mut plan, |pass| (pass < 2000).then_some(share));
             let rate = pass_rates(&start, &points);

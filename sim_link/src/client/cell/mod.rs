@@ -30,6 +30,7 @@ mod sentinel;
 mod served;
 mod stream;
 mod support;
+mod surroundings;
 mod truth;
 mod views;
 
@@ -45,13 +46,14 @@ pub use follow::{FollowMoment, FollowWish};
 pub use follow_goal::{FollowEnd, FollowGoal, FollowLimits, Workspace};
 pub use jog::{ArmJog, JogAxes, JogEnd};
 pub use jog_plan::{
-    JOINT_SPEED as JOG_JOINT_SPEED_RAD_S, JogObstacle, LINE_SPEED as JOG_LINE_SPEED_M_S,
+    Contact, JOINT_SPEED as JOG_JOINT_SPEED_RAD_S, JogObstacle, LINE_SPEED as JOG_LINE_SPEED_M_S,
     TURN_SPEED as JOG_TURN_SPEED_RAD_S,
 };
 pub use joints::{CellJoint, RAD_PER_M};
 pub use reach::{ArmKinematics, UnknownKinematics};
 pub use room::{BoardReach, FollowPlace, NoPlace};
 pub use support::{Support, version_name};
+pub use surroundings::{Among, Standing};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
 pub use views::BoardInView;
 
@@ -79,6 +81,8 @@ pub struct CellPaths {
     pub camera: String,
     /// The vision sensor for depth, at the same place.
     pub depth: String,
+    /// The shape that the board is printed on, which is not among what stands around; there need not be one.
+    pub board: String,
 }
 
 impl Default for CellPaths {
@@ -91,6 +95,7 @@ impl Default for CellPaths {
             target: "/UR5/Target".to_owned(),
             camera: "/UR5/3D_camera".to_owned(),
             depth: "/UR5/3D_camera/depth".to_owned(),
+            board: "/Plane".to_owned(),
         }
     }
 }

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::plan::travel;
 use handeye_core::progress::CancelToken;
 
 use super::arm::{MotionTolerance, SettleOptions};
@@ -50,6 +51,12 @@ const LINE_BRAKE: [f64; 2] = [6.0, 240.0];
 /// Joints that move by less in a pass stand \[rad\], and passes after which an arm stands that does not come nearer.
 const STANDS_RAD: f64 = 1e-5;
 const LONGEST_OVERTIME_PASSES: u32 = 100;
+
+/// Steps in which a line of the tip is looked at for what is in its way \[m, rad\].
+const LINE_STEP_M: f64 = 0.01;
+const LINE_STEP_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
+/// Of a cube with edges of 1.
+const SPACE_DIAGONAL: f64 = 1.732_050_807_568_877_2;
 
 /// How far from its goal a joint may stand when a motion is over that a controller moves \[rad\]: a load keeps it from its
 /// target by a little.
@@ -258,11 +265,12 @@ fn unplanned(error: &motion::MotionError) -> LinkError {
 }
 
 impl Arm {
-    /// Moves the joints to `goal` (rad, or m of a prismatic joint) within `limits`, and returns when they are there and, where a controller moves
-    /// them, at rest.
+    /// Moves the joints to `goal` (rad, or m of a prismatic joint) within `limits` and those of what stands around, and
+    /// returns when they are there and, where a controller moves them, at rest.
     ///
     /// # Errors
-    /// [`LinkError::JointCount`], [`LinkError::JointOutOfRange`] or [`LinkError::BadMotion`] before anything moves; [`LinkError::NotRunning`];
+    /// [`LinkError::JointCount`], [`LinkError::JointOutOfRange`], [`LinkError::InTheWay`] or [`LinkError::BadMotion`]
+    /// before anything moves; [`LinkError::NotRunning`];
     /// [`LinkError::Cancelled`] with the arm at rest, [`LinkError::MotionStopped`] when it was another client that
     /// stopped it; [`LinkError::JointElsewhere`] when something else moves or holds a joint.
     pub fn move_to_joints(
@@ -275,6 +283,7 @@ impl Arm {
         let goal = self.check_range(goal)?;
         limits.validate(goal.len())?;
         let start = self.ready(TASK, cancel)?;
+        let limits = &self.limits_to(&start, &goal, limits)?;
         let dynamic = self.send_motion(
             Way::joints(&start, &goal, limits, self.info.joint_kinds().collect())?,
             start,
@@ -318,6 +327,7 @@ impl Arm {
         let kinematics = self.kinematics()?.ok();
         match &kinematics {
             Some(kinematics) => {
+                let limits = &self.limits_along(kinematics, &start, goal, limits)?;
                 self.send_motion(Way::line(kinematics, &start, goal, limits)?, start, TASK, cancel)?;
             }
             None => self.move_by_server(goal, limits, TASK, cancel)?,
@@ -328,6 +338,64 @@ impl Arm {
             return Ok(());
         }
         Err(LinkError::Unreached { distance_mm: distance_m * 1e3, angle_deg: angle_rad.to_degrees() })
+    }
+
+    /// The limits of a motion of the joints, no faster than what stands around allows, where nothing is in its way.
+    fn limits_to(
+        &self,
+        start: &JointValues,
+        goal: &JointValues,
+        limits: &MotionLimits,
+    ) -> Result<MotionLimits, LinkError> {
+        let Some(among) = &self.among else { return Ok(limits.clone()) };
+        if let Some(contact) = among.contact(start, goal) {
+            return Err(LinkError::InTheWay { contact });
+        }
+        let mut limits = limits.clone();
+        // All joints go in phase, so the one that is slowest for its way holds up the others.
+        let duration_s = (0..goal.len()).map(|i| (goal[i] - start[i]).abs() / limits.velocity[i]).fold(0.0, f64::max);
+        if duration_s > 0.0 {
+            let wanted_rad_s = travel(start, goal) / duration_s;
+            let share = among.arm.joint_speed(start, goal, &among.around, wanted_rad_s) / wanted_rad_s;
+            for velocity in &mut limits.velocity {
+                *velocity *= share;
+            }
+        }
+        Ok(limits)
+    }
+
+    /// The same of a motion of the tip along a line, as far as its joints can be found.
+    fn limits_along(
+        &self,
+        kinematics: &ArmKinematics,
+        start: &JointValues,
+        goal: &Pose<Base, Tip>,
+        limits: &MotionLimits,
+    ) -> Result<MotionLimits, LinkError> {
+        let Some(among) = &self.among else { return Ok(limits.clone()) };
+        let guard = among.guard(start);
+        let from = kinematics.tip(start);
+        let (distance_m, angle_rad) = from.distance_to(goal);
+        let steps = (distance_m / LINE_STEP_M).max(angle_rad / LINE_STEP_RAD).ceil().max(1.0);
+        let mut before = *start;
+        for step in 1..=steps as usize {
+            let part = step as f64 / steps;
+            // Either way round is a half turn: which it will be is not known beforehand, nor how the tip leaves its line where
+            // that leads out of reach.
+            let Some(between) = from.isometry().try_lerp_slerp(goal.isometry(), part, 1e-9) else { break };
+            let Ok(joints) = kinematics.reach(&Pose::from_isometry(between), &before) else { break };
+            let contact = guard.contact(&joints).or_else(|| guard.contact_on_path(&before, &joints));
+            if let Some(contact) = contact {
+                return Err(LinkError::InTheWay { contact });
+            }
+            before = joints;
+        }
+        let mut limits = limits.clone();
+        for velocity in limits.velocity.iter_mut().take(3) {
+            // Along all three axes at once the tip is no faster than allowed.
+            *velocity = among.around.limits.tip(*velocity * SPACE_DIAGONAL) / SPACE_DIAGONAL;
+        }
+        Ok(limits)
     }
 
     /// Where the joints stand, ready to be moved.

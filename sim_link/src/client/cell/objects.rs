@@ -22,6 +22,7 @@ pub(super) struct CellObjects {
     pub target_path: String,
     pub camera: ObjectHandle,
     pub depth: ObjectHandle,
+    pub board: Option<ObjectHandle>,
 }
 
 impl CellObjects {
@@ -49,6 +50,7 @@ impl CellObjects {
             target_path: paths.target.clone(),
             camera: named(sim.get_object(&paths.camera), &paths.camera, "colour sensor")?,
             depth: named(sim.get_object(&paths.depth), &paths.depth, "depth sensor")?,
+            board: sim.find_object(&paths.board)?,
         })
     }
 }

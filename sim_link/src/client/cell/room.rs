@@ -14,7 +14,7 @@ use super::jog_plan::nearest;
 use super::joints::in_rad;
 use super::reach::ArmKinematics;
 use super::views::BoardInView;
-use handeye_core::plan::{self as planning, PlannedView, ViewOptions};
+use handeye_core::plan::{self as planning, PlannedView, Surroundings, ViewOptions};
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.
@@ -117,7 +117,7 @@ impl ArmKinematics {
 
     /// The nearest place from which the whole board is seen and the arm has room to go along with it over half as much again
     /// as `reach`; where there is none, over `reach`, and where none has enough the one with most. The way there, straight
-    /// for the joints, touches neither arm, board nor table.
+    /// for the joints, touches neither arm, board nor what stands around.
     ///
     /// # Errors
     /// [`NoPlace`].
@@ -127,8 +127,9 @@ impl ArmKinematics {
         board: &BoardInView,
         reach: &BoardReach,
         from: &JointValues,
+        around: &Surroundings,
     ) -> Result<FollowPlace, NoPlace> {
-        let setup = self.view_setup(board, from);
+        let setup = self.view_setup(board, from, around);
         let distance_m = board.distance_m(&self.tip(from));
         let options = ViewOptions {
             distance_m: DISTANCES.map(|times| distance_m * times),

@@ -52,7 +52,7 @@ fn followed(
 ) -> Result<f64, f64> {
     let course = Course::new(motion, scene.seed);
     let limits = FollowLimits::default();
-    let mut plan = FollowPlan::new(arm, &limits, joints, DT_S).expect("nothing forbids to move");
+    let mut plan = FollowPlan::new(arm, &limits, None, joints, DT_S).expect("nothing forbids to move");
     let kept = board_at(scene, &course, from_s).inverse() * arm.tip(&joints);
     let mut worst_m: f64 = 0.0;
     for pass in 1..=(seconds / DT_S) as u32 {
@@ -101,7 +101,7 @@ fn from_the_place_that_is_found_every_path_of_the_board_is_followed_for_minutes(
     let (scene, arm, board, sequence) = after_the_sequence();
     let (limits, reach) = (FollowLimits::default(), BoardReach::default());
     for (index, from) in sequence.iter().enumerate() {
-        let place = arm.place_to_follow(&limits, &board, &reach, from).expect("there is room");
+        let place = arm.place_to_follow(&limits, &board, &reach, from, &arm.plane()).expect("there is room");
         assert!(place.room >= ENOUGH, "{}", place.room);
         let travel_deg = planning::travel(from, &place.joints).to_degrees();
         println!("pose {}: room {:.3}, after {travel_deg:.0}° for the joint that turns most", index + 1, place.room);
@@ -135,7 +135,9 @@ fn a_place_that_is_found_amid_the_path_of_the_board_has_room_for_all_of_the_path
         let course = Course::new(&motion, scene.seed);
         for from_s in [5.0, 11.0, 17.5, 33.0] {
             let board = BoardInView { base_from_target: board_at(&scene, &course, from_s), ..board };
-            let place = arm.place_to_follow(&limits, &board, &BoardReach::default(), &from).expect("there is room");
+            let place = arm
+                .place_to_follow(&limits, &board, &BoardReach::default(), &from, &arm.plane())
+                .expect("there is room");
             let worst = followed((&scene, &arm), place.joints, &motion, from_s, 60.0);
             assert!(worst.is_ok(), "{path} from {from_s} s on ended after {worst:?} s");
         }
@@ -146,7 +148,13 @@ fn a_place_that_is_found_amid_the_path_of_the_board_has_room_for_all_of_the_path
 fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
     let (scene, arm, board, sequence) = after_the_sequence();
     let place = arm
-        .place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), sequence.last().expect("ten poses"))
+        .place_to_follow(
+            &FollowLimits::default(),
+            &board,
+            &BoardReach::default(),
+            sequence.last().expect("ten poses"),
+            &arm.plane(),
+        )
         .expect("there is room");
     let camera_from_target = (place.base_from_tip * board.tip_from_camera).inverse() * board.base_from_target;
     for point in board.target.points() {
@@ -163,10 +171,11 @@ fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
 fn where_there_is_room_the_nearest_place_is_near() {
     let (_, arm, board, sequence) = after_the_sequence();
     let (limits, reach) = (FollowLimits::default(), BoardReach::default());
-    let first =
-        arm.place_to_follow(&limits, &board, &reach, sequence.last().expect("ten poses")).expect("there is room");
+    let first = arm
+        .place_to_follow(&limits, &board, &reach, sequence.last().expect("ten poses"), &arm.plane())
+        .expect("there is room");
     assert!(arm.has_room_to_follow(&limits, &board, &reach, &first.joints), "following begins there without a move");
-    let again = arm.place_to_follow(&limits, &board, &reach, &first.joints).expect("there is room");
+    let again = arm.place_to_follow(&limits, &board, &reach, &first.joints, &arm.plane()).expect("there is room");
     let travel_deg = planning::travel(&first.joints, &again.joints).to_degrees();
     assert!(travel_deg < 20.0, "{travel_deg}°");
 }
@@ -177,6 +186,6 @@ fn a_board_out_of_reach_has_no_place() {
     let far = Pose::from_isometry(Translation3::new(0.0, -2.0, 0.0) * board.base_from_target.isometry());
     let board = BoardInView { base_from_target: far, ..board };
     let from = sequence.last().expect("ten poses");
-    let none = arm.place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), from);
+    let none = arm.place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), from, &arm.plane());
     assert!(matches!(none, Err(NoPlace { .. })), "{none:?}");
 }

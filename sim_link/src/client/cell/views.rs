@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 
 use super::reach::ArmKinematics;
 use handeye_core::plan::guided::choose::Robot;
-use handeye_core::plan::{self as planning, Obstacle, PlanError, ViewOptions, ViewSetup};
+use handeye_core::plan::{self as planning, Obstacle, PlanError, Surroundings, ViewOptions, ViewSetup};
 
 /// How far below its frame the arm is mounted \[m\]. What it stands on is taken for a table.
 const TABLE_BELOW_ARM_M: f64 = 0.0147;
@@ -45,7 +45,7 @@ impl ArmKinematics {
     /// other: up to `count` of them, at least two, in an order with short ways. Nothing that is known is touched on the
     /// way from `start` to the first and from each to the next.
     ///
-    /// What is known is the arm itself, the board, and the plane that the arm stands on.
+    /// What is known is the arm itself, the board, and what stands around.
     ///
     /// # Errors
     /// [`PlanError`] says what was in the way.
@@ -54,9 +54,10 @@ impl ArmKinematics {
         board: &BoardInView,
         taken: &[Pose<Base, Tip>],
         start: &JointValues,
+        around: &Surroundings,
         count: usize,
     ) -> Result<Vec<JointValues>, PlanError> {
-        let setup = self.view_setup(board, start);
+        let setup = self.view_setup(board, start, around);
         let mut options = ViewOptions { count, ..ViewOptions::default() };
         let distances = taken.iter().map(|pose| board.distance_m(pose));
         if let Some([nearest, farthest]) = distances.fold(None, |range: Option<[f64; 2]>, distance_m| {
@@ -76,7 +77,8 @@ impl ArmKinematics {
     }
 
     /// What the planner knows of this arm.
-    pub(super) fn view_setup(&self, board: &BoardInView, start: &JointValues) -> ViewSetup {
+    pub(super) fn view_setup(&self, board: &BoardInView, start: &JointValues, around: &Surroundings) -> ViewSetup {
+        let sheet = planning::sheet(&board.target, &board.base_from_target, 0.0);
         ViewSetup {
             base_from_target: board.base_from_target,
             target: board.target,
@@ -84,22 +86,22 @@ impl ArmKinematics {
             tip_from_camera: board.tip_from_camera,
             arm: self.as_planned(*board.tip_from_camera.isometry()),
             start_joints: *start,
-            obstacles: vec![planning::sheet(&board.target, &board.base_from_target), self.table()],
+            around: Surroundings::of(vec![sheet]).and(around.clone()),
         }
     }
 
-    /// The arm as guided capture drives it from `joints`, at these speeds, with `solids` and the plane that it stands on
-    /// around it. Where the camera sits is not known before there is an estimate.
+    /// The arm as guided capture drives it from `joints`, at these speeds, among what stands around. Where the camera sits is
+    /// not known before there is an estimate.
     pub fn guided_robot(
         &self,
         joints: &JointValues,
         speed_rad_s: f64,
         acceleration_rad_s2: f64,
-        solids: &[Obstacle],
+        around: &Surroundings,
     ) -> Robot {
         Robot {
             arm: self.as_planned(Isometry3::identity()),
-            obstacles: std::iter::once(self.table()).chain(solids.iter().copied()).collect(),
+            around: around.clone(),
             clearance_m: ViewOptions::default().clearance_m,
             joints: *joints,
             speed_rad_s,
@@ -107,20 +109,20 @@ impl ArmKinematics {
         }
     }
 
-    fn as_planned(&self, tip_from_camera: Isometry3<f64>) -> planning::Arm {
+    pub(super) fn as_planned(&self, tip_from_camera: Isometry3<f64>) -> planning::Arm {
         planning::Arm {
             chain: self.arm().clone(),
             body: if self.is_ur5() { planning::ArmBody::Ur5 } else { planning::ArmBody::of(self.arm()) },
             world_from_arm: *self.base_from_arm(),
             connection_from_tip: *self.connection_from_tip(),
-            tip_from_camera,
+            carried: vec![planning::Carried::camera(&tip_from_camera)],
         }
     }
 
-    /// The plane that the arm stands on.
-    fn table(&self) -> Obstacle {
+    /// The plane that the arm stands on, for who knows nothing else of what stands around.
+    pub fn plane(&self) -> Surroundings {
         let below = Isometry3::translation(0.0, 0.0, -TABLE_BELOW_ARM_M - TABLE_M[2] / 2.0);
-        Obstacle { world_from_centre: self.base_from_arm() * below, size_m: TABLE_M }
+        Surroundings::of(vec![Obstacle::new("plane under the arm", self.base_from_arm() * below, TABLE_M)])
     }
 }
 

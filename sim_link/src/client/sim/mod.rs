@@ -7,12 +7,14 @@ mod control;
 mod motion;
 mod objects;
 mod sensors;
+mod shapes;
 mod simulation_state;
 
 use ciborium::Value;
 
 pub use motion::{MotionLimits, MotionState, MotionStatus, PoseMotion};
 pub use sensors::SensorOptics;
+
 pub use simulation_state::SimulationState;
 
 use super::connection::Connection;

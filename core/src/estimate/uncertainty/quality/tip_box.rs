@@ -28,6 +28,19 @@ impl TipBox {
         Self { camera_from_box: *camera_from_base.isometry(), ..Self::in_camera(a, b) }
     }
 
+    /// Its eight corners and its middle, in camera coordinates \[m\].
+    pub fn corners_and_middle(&self) -> [Point3<f64>; 9] {
+        std::array::from_fn(|k| {
+            let bit = |axis: usize| if k == 8 { 0.5 } else { (k >> axis & 1) as f64 };
+            self.camera_from_box * self.at(&Vector3::new(bit(0), bit(1), bit(2)))
+        })
+    }
+
+    /// Opposite corners in the frame that it was given in \[m\]: the smallest coordinates and the largest.
+    pub fn bounds(&self) -> [Point3<f64>; 2] {
+        [self.low, self.high]
+    }
+
     /// A point of the box by its place between the two corners, 0 to 1 on every axis.
     fn at(&self, part: &Vector3<f64>) -> Point3<f64> {
         self.low + (self.high - self.low).component_mul(part)

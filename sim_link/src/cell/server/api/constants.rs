@@ -3,6 +3,12 @@
 /// Names and numbers.
 pub(super) const CONSTANTS: &[(&str, i64)] = &[
     ("handle_world", -1),
+    ("objfloatparam_objbbox_min_x", 15),
+    ("objfloatparam_objbbox_min_y", 16),
+    ("objfloatparam_objbbox_min_z", 17),
+    ("objfloatparam_objbbox_max_x", 18),
+    ("objfloatparam_objbbox_max_y", 19),
+    ("objfloatparam_objbbox_max_z", 20),
     ("handle_all", -2),
     ("handle_all_except_explicit", -3),
     ("handle_self", -4),

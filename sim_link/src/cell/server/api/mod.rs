@@ -12,6 +12,7 @@ mod params;
 mod poses;
 mod remote;
 mod sensors;
+mod shapes;
 mod signals;
 mod simulation;
 
@@ -64,6 +65,7 @@ const SIM: &[Table] = &[
     poses::FUNCTIONS,
     matrices::FUNCTIONS,
     sensors::FUNCTIONS,
+    shapes::FUNCTIONS,
     joints::FUNCTIONS,
     simulation::FUNCTIONS,
     params::FUNCTIONS,

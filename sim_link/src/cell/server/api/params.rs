@@ -2,7 +2,7 @@
 
 use ciborium::Value;
 
-use super::{Call, Outcome, Table, nothing, one};
+use super::{Call, Outcome, Table, nothing, one, shapes};
 use crate::cell::server::args::ApiError;
 use crate::cell::world::{Handle, Kind, VisionSensor, WorldError};
 use crate::wire;
@@ -60,6 +60,9 @@ mod vision {
     pub const RGB_IGNORED: i64 = 1020;
     pub const DEPTH_IGNORED: i64 = 1021;
 }
+
+/// Of a shape: the corner with the smallest coordinates, x, y, z, and then that with the largest.
+const BOUNDS: std::ops::RangeInclusive<i64> = 15..=20;
 
 /// The cell has no files, so all paths are empty.
 fn get_string_param(call: &mut Call<'_>) -> Outcome {
@@ -148,6 +151,11 @@ fn optional(value: Option<impl Into<Value>>) -> Outcome {
 
 fn get_object_float_param(call: &mut Call<'_>) -> Outcome {
     let (handle, parameter) = (call.args.handle(0)?, call.args.integer(1)?);
+    if BOUNDS.contains(&parameter) && matches!(call.cell.world.tree.get(handle)?.kind, Kind::Shape) {
+        let bounds = shapes::bounds(call.cell, handle);
+        let at = (parameter - BOUNDS.start()) as usize;
+        return one(bounds[at / 3][at % 3]);
+    }
     optional(sensor(call, handle)?.and_then(|sensor| match parameter {
         vision::NEAR => Some(sensor.near_m),
         vision::FAR => Some(sensor.far_m),

@@ -231,7 +231,7 @@ fn views_of_the_board_are_found_for_the_arms_of_shipped_scenes_and_a_session_wit
 fn an_arm_that_is_folded_into_itself_or_lies_on_the_floor_is_in_the_way() {
     let truth = shipped("panda.toml").resolve(1).expect("valid");
     let setup = ViewSetup::from(&truth);
-    let is_free = |joints_deg: [f64; 7]| setup.arm.is_free(&joints_deg.map(f64::to_radians), &setup.obstacles, 0.02);
+    let is_free = |joints_deg: [f64; 7]| setup.arm.is_free(&joints_deg.map(f64::to_radians), &setup.around, 0.02);
     assert!(is_free([0.0, -40.0, 0.0, -130.0, 0.0, 90.0, 45.0]));
     assert!(is_free([0.0, 0.0, 0.0, -90.0, 0.0, 90.0, 0.0]));
     // The hand is turned back to the upper arm.
