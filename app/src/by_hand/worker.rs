@@ -37,15 +37,14 @@ pub fn choose(job: &HandJob, cancel: &CancelToken, outlet: &Outlet) {
     let mut guide = job.guide.clone();
     let calibration = job.solved.as_ref().map(|solved| &solved.calibration);
     let known = Known { observations: &job.observations, calibration, robot: None, elapsed_s: job.elapsed_s };
-    let next = match job.check {
-        Some(index) => guide.check(&known, index, cancel).map(|wanted| HandNext::Take(Box::new(wanted))),
-        None => {
-            let views = job.observations.views.iter().filter(|view| view.in_fit);
-            let first = views.filter_map(|view| view.corners.as_ref()).find_map(|corners| {
-                planar_pose::camera_from_target(corners, &job.observations.target, &job.intrinsics).ok()
-            });
-            first.map(|first| guide.next(&known, &first, &job.intrinsics, cancel))
-        }
+    let next = if let Some(index) = job.check {
+        guide.check(&known, index, cancel).map(|wanted| HandNext::Take(Box::new(wanted)))
+    } else {
+        let views = job.observations.views.iter().filter(|view| view.in_fit);
+        let first = views.filter_map(|view| view.corners.as_ref()).find_map(|corners| {
+            planar_pose::camera_from_target(corners, &job.observations.target, &job.intrinsics).ok()
+        });
+        first.map(|first| guide.next(&known, &first, &job.intrinsics, cancel))
     };
     if !cancel.is_cancelled() {
         outlet.report(Event::ViewChosen { number: job.number, choice: Box::new(HandChoice { guide, next }) });

@@ -1,7 +1,6 @@
 //! The button that begins, and what is under way.
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
-use handeye_core::estimate::handeye::Mode;
 use handeye_core::plan::guided::CHECKS;
 
 use super::state::{GuidedProgress, Waits};
@@ -43,8 +42,6 @@ fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static st
         Some(why)
     } else if model.cell.as_ref().is_none_or(|cell| cell.arm.is_none()) {
         Some(tr!(language, "This arm's kinematics is not known, so no poses can be chosen: move it yourself"))
-    } else if model.document().meta.mode == Mode::EyeToHand {
-        Some(tr!(language, "Poses are chosen for a camera on the tip only: take these captures yourself"))
     } else if model.motion != Motion::Idle {
         Some(tr!(language, "The arm is moving: wait until it stands, or stop it"))
     } else if model.board_seen_s.is_none() && model.document().captures.is_empty() {

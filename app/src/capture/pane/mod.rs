@@ -58,8 +58,8 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
         if table.rows.is_empty() {
             let detail = tr!(
                 language,
-                "Move the arm to where the camera sees the whole board, then press Space. Ten poses with the board \
-                 tilted and turned to all sides make a good calibration."
+                "With the whole board in the image, Calibrate for me moves the arm from pose to pose, and Guide me says how \
+                 to move it yourself. Or press Space at ten poses with the board tilted and turned to all sides."
             );
             marks::nothing_yet_ui(ui, tr!(language, "No captures yet"), detail);
         } else {

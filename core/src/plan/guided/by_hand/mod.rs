@@ -28,6 +28,9 @@ use crate::targets::observation::Corner;
 /// Part of the gain of the view that is wanted with which another view is as good.
 const WORTH: f64 = 0.8;
 
+/// A first view that is turned by less against the one that there is says little: twice what a hand is off by.
+const LEAST_FIRST_TURN_RAD: f64 = 16.0 * std::f64::consts::PI / 180.0;
+
 /// Proposes the views of one calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandGuide {
@@ -132,7 +135,8 @@ impl HandGuide {
                 self.guide.steps.pop();
                 while self.first_views < super::MOST_FAN {
                     self.first_views += 1;
-                    let view = first_views::view(intrinsics, target, first, self.first_views - 1);
+                    let view = first_views::view(intrinsics, target, first, self.first_views - 1)
+                        .filter(|view| view.rotation().angle_to(&first.rotation()) > LEAST_FIRST_TURN_RAD);
                     if let Some(camera_from_target) = view {
                         let (intrinsics, target) = (*intrinsics, *target);
                         let (why, views_left, worth) = (None, None, None);

@@ -51,6 +51,9 @@ fn first_views_are_asked_for_by_how_they_look_and_what_is_skipped_does_not_come_
     };
     let (one, other) = (next(&mut guide, None), next(&mut guide, None));
     assert!(one.why.is_none() && other.why.is_none());
+    for wanted in [&one, &other] {
+        assert!(wanted.camera_from_target.rotation().angle_to(&first.rotation()) > 0.27, "hardly another view");
+    }
     assert!(one.camera_from_target.rotation().angle_to(&other.camera_from_target.rotation()) > 0.3);
     // The view that there is, is not the one that is wanted; that one is.
     let judged = |pose: &Pose<Camera, Target>| {
