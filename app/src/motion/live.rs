@@ -4,8 +4,8 @@ use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::guided::choose::Robot;
 use handeye_core::plan::{Contact, PlanError, Surroundings};
 use handeye_sim_link::client::cell::{
-    Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes,
-    JogEnd, JogObstacle, MotionTolerance, SettleOptions, UnknownKinematics,
+    Among, Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish,
+    JogAxes, JogEnd, JogObstacle, MotionTolerance, SettleOptions, UnknownKinematics,
 };
 use handeye_sim_link::client::{CancelToken, LinkError, SimulationState};
 use nalgebra::Vector3;
@@ -22,6 +22,8 @@ pub(crate) struct LiveMotion {
     kinematics: Result<ArmKinematics, UnknownKinematics>,
     /// What stands around, as it was when the connection was made, with what holds the board: plans are for one that stands.
     around: Surroundings,
+    /// The arm among all of it that does not go along with the board.
+    among: Option<Among>,
 }
 
 impl LiveMotion {
@@ -29,17 +31,19 @@ impl LiveMotion {
     pub fn new(mut arm: Arm) -> Result<Self, LinkError> {
         let kinematics = arm.kinematics()?;
         let mut around = Surroundings::default();
+        let mut among = None;
         match &kinematics {
             Ok(kinematics) => {
                 let standing = arm.surroundings(kinematics)?;
                 around = standing.all();
-                arm.keep_clear(Some(kinematics.among(standing.around, None)));
+                among = Some(kinematics.among(standing.around, None));
+                arm.keep_clear(among.clone());
             }
             Err(why) => {
                 tracing::warn!(%why, "the kinematics of the arm is not known: goals are not checked beforehand");
             }
         }
-        Ok(Self { arm, kinematics, around })
+        Ok(Self { arm, kinematics, around, among })
     }
 
     /// Whether there is a way, before anything moves. What the arm cannot do is `Some` reason.
@@ -134,10 +138,10 @@ impl MotionPort for LiveMotion {
         let Ok(kinematics) = &self.kinematics else { return Ok(Room::Enough) };
         let joints = self.arm.joint_values().map_err(port_error)?;
         let (limits, reach) = (FollowLimits::default(), BoardReach::default());
-        if kinematics.has_room_to_follow(&limits, board, &reach, &joints) {
+        if kinematics.has_room_to_follow(&limits, board, &reach, &joints, self.among.as_ref()) {
             return Ok(Room::Enough);
         }
-        Ok(match kinematics.place_to_follow(&limits, board, &reach, &joints, &self.around) {
+        Ok(match kinematics.place_to_follow(&limits, board, &reach, &joints, &self.around, self.among.as_ref()) {
             Ok(place) => Room::At(place.joints),
             Err(none) => Room::Nowhere(text!(
                 "Of {tried} places that show the whole board none has room for the arm to go along with it: move the board \

@@ -2,8 +2,8 @@
 //!
 //! A camera that keeps its view goes wherever the board goes, and about it when the board turns. Where the arm is close to
 //! its column, nearly stretched, or has two axes in line, some direction needs joints faster than they are, and following
-//! ends there. So a place is judged by the worst of all poses of the board within a reach: by the share of its limits that
-//! the tip can have there in every direction at once.
+//! ends there; it ends as well before the arm touches something. So a place is judged by the worst of all poses of the board
+//! within a reach: by the share of its limits that the tip can have there in every direction at once, if nothing is touched.
 
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
@@ -13,8 +13,9 @@ use super::follow_goal::FollowLimits;
 use super::jog_plan::nearest;
 use super::joints::in_rad;
 use super::reach::ArmKinematics;
+use super::surroundings::Among;
 use super::views::BoardInView;
-use handeye_core::plan::{self as planning, PlannedView, Surroundings, ViewOptions};
+use handeye_core::plan::{self as planning, Guard, PlannedView, Surroundings, ViewOptions};
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.
@@ -104,20 +105,22 @@ pub struct NoPlace {
 
 impl ArmKinematics {
     /// Whether the tip can follow the board at a usual speed from these joints, wherever it goes within `reach` while its
-    /// view is kept.
+    /// view is kept, and touches nothing of what it is kept clear of.
     pub fn has_room_to_follow(
         &self,
         limits: &FollowLimits,
         board: &BoardInView,
         reach: &BoardReach,
         joints: &JointValues,
+        among: Option<&Among>,
     ) -> bool {
-        self.room_over(limits, board, reach, joints, ENOUGH) >= ENOUGH
+        let guard = among.map(Among::strict);
+        self.room_over(limits, board, reach, joints, ENOUGH, guard.as_ref()) >= ENOUGH
     }
 
     /// The nearest place from which the whole board is seen and the arm has room to go along with it over half as much again
-    /// as `reach`; where there is none, over `reach`, and where none has enough the one with most. The way there, straight
-    /// for the joints, touches neither arm, board nor what stands around.
+    /// as `reach`; where there is none, over `reach`, and where none has enough the one with most. Following keeps clear of what
+    /// it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around.
     ///
     /// # Errors
     /// [`NoPlace`].
@@ -128,8 +131,10 @@ impl ArmKinematics {
         reach: &BoardReach,
         from: &JointValues,
         around: &Surroundings,
+        among: Option<&Among>,
     ) -> Result<FollowPlace, NoPlace> {
         let setup = self.view_setup(board, from, around);
+        let guard = among.map(Among::strict);
         let distance_m = board.distance_m(&self.tip(from));
         let options = ViewOptions {
             distance_m: DISTANCES.map(|times| distance_m * times),
@@ -145,7 +150,7 @@ impl ArmKinematics {
             |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
         for reach in [&reach.wider(), reach] {
             for view in &views {
-                let room = self.room_over(limits, board, reach, &view.joints, ENOUGH);
+                let room = self.room_over(limits, board, reach, &view.joints, ENOUGH, guard.as_ref());
                 if room >= ENOUGH && is_free(&view.joints) {
                     return Ok(place(view, room));
                 }
@@ -154,7 +159,7 @@ impl ArmKinematics {
         let mut best: Option<FollowPlace> = None;
         for view in &views {
             let wanted = best.map_or(LEAST, |best| best.room);
-            let room = self.room_over(limits, board, reach, &view.joints, wanted);
+            let room = self.room_over(limits, board, reach, &view.joints, wanted, guard.as_ref());
             if room > wanted && is_free(&view.joints) {
                 best = Some(place(view, room));
             }
@@ -163,7 +168,7 @@ impl ArmKinematics {
     }
 
     /// The least share of its limits that the tip can have in every direction from these joints, wherever the board goes
-    /// within `reach` while its view is kept; 0 where some of it cannot be followed at all. Given up with any smaller value
+    /// within `reach` while its view is kept; 0 where some of it cannot be followed at all, or not without touching something. Given up with any smaller value
     /// as soon as it is below `wanted`.
     fn room_over(
         &self,
@@ -172,10 +177,15 @@ impl ArmKinematics {
         reach: &BoardReach,
         joints: &JointValues,
         wanted: f64,
+        guard: Option<&Guard<'_>>,
     ) -> f64 {
         let base_from_target = board.base_from_target.isometry();
         let centre = board.target.centre();
         let target_from_tip = base_from_target.inverse() * self.tip(joints).isometry();
+        let touches = |joints: &JointValues| guard.is_some_and(|guard| guard.contact(joints).is_some());
+        if touches(joints) {
+            return 0.0;
+        }
         let mut room = self.share_of_limits(limits, joints);
         for (shift, turn) in reach.ends() {
             let mut before = *joints;
@@ -189,6 +199,9 @@ impl ArmKinematics {
                     return 0.0;
                 }
                 let Ok(next) = nearest(self, &Pose::from_isometry(tip), &before) else { return 0.0 };
+                if touches(&next) {
+                    return 0.0;
+                }
                 room = room.min(self.share_of_limits(limits, &next));
                 before = next;
             }

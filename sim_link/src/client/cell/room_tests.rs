@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use handeye_core::geometry::frames::Target;
+use handeye_core::plan::Obstacle;
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 
 use super::super::follow_goal::FollowGoal;
@@ -90,7 +91,7 @@ fn from_where_the_reference_sequence_ends_a_board_on_a_circle_cannot_be_followed
     let (scene, arm, board, sequence) = after_the_sequence();
     let last = *sequence.last().expect("ten poses");
     let limits = FollowLimits::default();
-    assert!(!arm.has_room_to_follow(&limits, &board, &BoardReach::default(), &last));
+    assert!(!arm.has_room_to_follow(&limits, &board, &BoardReach::default(), &last, None));
     let ended = followed((&scene, &arm), last, &moving(BoardPath::Circle, 0.05), 0.0, 60.0);
     println!("the circle from the tenth pose: {ended:?}");
     assert!(ended.is_err_and(|after_s| after_s < 30.0), "{ended:?}");
@@ -101,7 +102,7 @@ fn from_the_place_that_is_found_every_path_of_the_board_is_followed_for_minutes(
     let (scene, arm, board, sequence) = after_the_sequence();
     let (limits, reach) = (FollowLimits::default(), BoardReach::default());
     for (index, from) in sequence.iter().enumerate() {
-        let place = arm.place_to_follow(&limits, &board, &reach, from, &arm.plane()).expect("there is room");
+        let place = arm.place_to_follow(&limits, &board, &reach, from, &arm.plane(), None).expect("there is room");
         assert!(place.room >= ENOUGH, "{}", place.room);
         let travel_deg = planning::travel(from, &place.joints).to_degrees();
         println!("pose {}: room {:.3}, after {travel_deg:.0}° for the joint that turns most", index + 1, place.room);
@@ -136,7 +137,7 @@ fn a_place_that_is_found_amid_the_path_of_the_board_has_room_for_all_of_the_path
         for from_s in [5.0, 11.0, 17.5, 33.0] {
             let board = BoardInView { base_from_target: board_at(&scene, &course, from_s), ..board };
             let place = arm
-                .place_to_follow(&limits, &board, &BoardReach::default(), &from, &arm.plane())
+                .place_to_follow(&limits, &board, &BoardReach::default(), &from, &arm.plane(), None)
                 .expect("there is room");
             let worst = followed((&scene, &arm), place.joints, &motion, from_s, 60.0);
             assert!(worst.is_ok(), "{path} from {from_s} s on ended after {worst:?} s");
@@ -154,6 +155,7 @@ fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
             &BoardReach::default(),
             sequence.last().expect("ten poses"),
             &arm.plane(),
+            None,
         )
         .expect("there is room");
     let camera_from_target = (place.base_from_tip * board.tip_from_camera).inverse() * board.base_from_target;
@@ -172,12 +174,31 @@ fn where_there_is_room_the_nearest_place_is_near() {
     let (_, arm, board, sequence) = after_the_sequence();
     let (limits, reach) = (FollowLimits::default(), BoardReach::default());
     let first = arm
-        .place_to_follow(&limits, &board, &reach, sequence.last().expect("ten poses"), &arm.plane())
+        .place_to_follow(&limits, &board, &reach, sequence.last().expect("ten poses"), &arm.plane(), None)
         .expect("there is room");
-    assert!(arm.has_room_to_follow(&limits, &board, &reach, &first.joints), "following begins there without a move");
-    let again = arm.place_to_follow(&limits, &board, &reach, &first.joints, &arm.plane()).expect("there is room");
+    assert!(
+        arm.has_room_to_follow(&limits, &board, &reach, &first.joints, None),
+        "following begins there without a move"
+    );
+    let again = arm.place_to_follow(&limits, &board, &reach, &first.joints, &arm.plane(), None).expect("there is room");
     let travel_deg = planning::travel(&first.joints, &again.joints).to_degrees();
     assert!(travel_deg < 20.0, "{travel_deg}°");
+}
+
+#[test]
+fn where_something_stands_in_the_way_of_the_board_there_is_no_room_and_another_place_is_found() {
+    let (_, arm, board, sequence) = after_the_sequence();
+    let (limits, reach, from) = (FollowLimits::default(), BoardReach::default(), sequence.last().expect("ten poses"));
+    let free = arm.place_to_follow(&limits, &board, &reach, from, &arm.plane(), None).expect("there is room");
+    // A post where the tip gets to when the board goes 8 cm along its rows.
+    let along = board.base_from_target.rotation() * Vector3::new(0.08, 0.0, 0.0);
+    let at = Translation3::from(free.base_from_tip.translation() + along);
+    let post = Obstacle::new("post", at.into(), [0.02; 3]);
+    let around = Surroundings::of(vec![post]).and(arm.plane());
+    let among = arm.among(around.clone(), None);
+    assert!(!arm.has_room_to_follow(&limits, &board, &reach, &free.joints, Some(&among)));
+    let other = arm.place_to_follow(&limits, &board, &reach, from, &around, Some(&among)).expect("room elsewhere");
+    assert!(arm.has_room_to_follow(&limits, &board, &reach, &other.joints, Some(&among)));
 }
 
 #[test]
@@ -186,6 +207,6 @@ fn a_board_out_of_reach_has_no_place() {
     let far = Pose::from_isometry(Translation3::new(0.0, -2.0, 0.0) * board.base_from_target.isometry());
     let board = BoardInView { base_from_target: far, ..board };
     let from = sequence.last().expect("ten poses");
-    let none = arm.place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), from, &arm.plane());
+    let none = arm.place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), from, &arm.plane(), None);
     assert!(matches!(none, Err(NoPlace { .. })), "{none:?}");
 }

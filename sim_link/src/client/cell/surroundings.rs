@@ -57,6 +57,11 @@ impl Among {
         Guard::from(&self.arm, &self.around, joints, self.clearance_m)
     }
 
+    /// For places from which a motion is to keep the whole free space.
+    pub fn strict(&self) -> Guard<'_> {
+        Guard::strict(&self.arm, &self.around, self.clearance_m)
+    }
+
     /// What is in the way of a motion from one configuration straight in joint space to another.
     pub(super) fn contact(&self, from: &[f64], to: &[f64]) -> Option<Contact> {
         let guard = self.guard(from);
