@@ -1,6 +1,6 @@
 //! What is drawn over the colour image: corners, axes, the predicted board, coverage, residuals.
 
-use egui::{Align2, Color32, FontId, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
+use egui::{Color32, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 use handeye_core::geometry::frames::{Camera, Pose, Target};
 use handeye_core::geometry::statistics::median_high;
 use handeye_core::targets::TargetSpec;
@@ -14,7 +14,6 @@ use super::project::{Projector, board_lines};
 use crate::by_hand;
 use crate::capture::rows::{self, CaptureTable};
 use crate::gui::style::marks::{self, Marks};
-use crate::gui::style::theme::CAPTION;
 use crate::model::Model;
 use crate::tr;
 
@@ -191,9 +190,7 @@ fn next_board(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &Targ
     }
     if let Some(at) = projector.point(&target.centre()) {
         let words = tr!(model.view.language, "Next pose");
-        let shadow = at + Vec2::splat(1.0);
-        painter.text(shadow, Align2::CENTER_CENTER, words, FontId::proportional(CAPTION), Color32::BLACK);
-        painter.text(at, Align2::CENTER_CENTER, words, FontId::proportional(CAPTION), palette.planned);
+        marks::plate(painter, at, words, palette.planned);
     }
 }
 

@@ -8,7 +8,7 @@ use super::axes::{self, Scale};
 use super::instead_ui;
 use crate::gui::style::marks::Marks;
 use crate::gui::style::theme::{CAPTION, Palette};
-use crate::model::Model;
+use crate::model::{CapturePurpose, Model};
 use crate::text::{Language, Text};
 use crate::{text, tr};
 
@@ -70,7 +70,9 @@ struct Chart {
 
 /// What guided capture expects of the poses that it has planned: numbers of poses and errors [mm].
 fn planned(model: &Model, (views, error_m): (usize, f64)) -> Vec<(usize, f64)> {
-    let chosen = model.planned_poses().iter().enumerate().filter(|(_, pose)| pose.error_ratio < 1.0);
+    // A check is not for the fit, and of a first turn nobody knows what it gives.
+    let is_fit = model.sequence.as_ref().is_some_and(|sequence| sequence.purpose == Some(CapturePurpose::Calibrate));
+    let chosen = model.planned_poses().iter().enumerate().filter(|(_, pose)| is_fit && pose.error_ratio < 1.0);
     chosen.map(|(index, pose)| (views + index + 1, error_m * 1e3 * pose.error_ratio)).collect()
 }
 
