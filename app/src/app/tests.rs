@@ -1,17 +1,19 @@
 use std::time::{Duration, Instant};
 
+use handeye_core::estimate::handeye::Mode;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::plan::guided::choose::{Plan, Proposal};
-use handeye_core::plan::guided::{Next, Why};
-use handeye_core::project::session::CaptureId;
+use handeye_core::plan::guided::{Ending, GuidedOptions, Next, Why};
+use handeye_core::project::session::{CaptureId, Role};
 
 use super::*;
+use crate::by_hand::state::HandWaits;
 use crate::gui::testing::sample;
 use crate::guided::state::{Choice, ChosenStep, Waits};
 use crate::model::{
-    CapturePurpose, CaptureRefused, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState, Motion,
-    MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind, SolveStatus, StopOutcome, ThemeChoice,
+    ByHand, CapturePurpose, CaptureRefused, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState,
+    Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind, SolveStatus, StopOutcome, ThemeChoice,
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
@@ -232,7 +234,8 @@ fn choose(app: &mut App) {
     let why = Why::Gain { from_m: 1e-3, to_m: 9e-4, rotation_part: 0.5 };
     let step = ChosenStep::Next(Box::new(Next::Go { plan, why }));
     let guide = guided.guide.clone();
-    app.absorb(Event::Guided { id, outcome: Ok(Box::new(Choice { guide, step, views_left: Some(3) })) });
+    let chosen_at = app.model.robot.as_ref().expect("connected").joints_rad;
+    app.absorb(Event::Guided { id, outcome: Ok(Box::new(Choice { guide, step, views_left: Some(3), chosen_at })) });
 }
 
 fn waits(app: &App) -> Option<Waits> {
@@ -284,6 +287,38 @@ fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
     choose(app);
     app.apply(Command::SetConfirmMoves(false));
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
+}
+
+/// A person is led, with a view that is wanted.
+fn led(ending: Option<Ending>) -> Model {
+    let mut model = sample::solved();
+    let hand = ByHand { ending, ..ByHand::new(GuidedOptions::default(), HandWaits::View, 0.0) };
+    model.by_hand = Some(Box::new(hand));
+    model
+}
+
+#[test]
+fn nobody_is_led_any_longer_once_the_arm_goes_by_itself_or_is_another_one() {
+    let another = Command::Connect(CellSource::Address("tcp://127.0.0.1:9".to_owned()));
+    for command in [Command::CalibrateForMe, another, Command::SetMode(Mode::EyeToHand)] {
+        let mut bench = bench(&FakeCell::new(0));
+        bench.app.replace_model(led(None));
+        bench.app.apply(command.clone());
+        assert_eq!(bench.app.model().by_hand, None, "{command:?}");
+    }
+}
+
+#[test]
+fn only_a_capture_for_verification_checks_an_answer_by_hand() {
+    let mut bench = bench(&FakeCell::new(0));
+    bench.app.replace_model(led(Some(Ending::GoalReached { error_m: 1e-4 })));
+    let checked = |app: &App| app.model().by_hand.as_ref().map(|hand| hand.checked);
+    let of = |app: &App, role| app.model().document().captures.iter().find(|it| it.role == role).map(|it| it.id);
+    let calibrates = of(&bench.app, Role::Calibration).expect("a capture in the fit");
+    bench.app.absorb(Event::Captured { number: 99, id: calibrates });
+    assert_eq!(checked(&bench.app), Some(0));
+    bench.app.captured_by_hand(Some(Role::Verification));
+    assert_eq!(checked(&bench.app), Some(1));
 }
 
 #[test]

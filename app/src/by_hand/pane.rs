@@ -84,6 +84,9 @@ pub fn to_do(hand: &ByHand) -> Text {
         }
         (HandWaits::Choice, _) => text!("Choosing the next view"),
         (HandWaits::Capture, _) => text!("Hold still"),
+        (HandWaits::View, Some(_)) if hand.refused_at.is_some() => {
+            text!("There was no capture here: move on, and hold still in another place")
+        }
         (HandWaits::View, None) => text!("The board is not seen: bring the whole board into the image"),
         (HandWaits::View, Some(judged)) if judged.is_good => text!("Good: hold still"),
         (HandWaits::View, Some(judged)) => {

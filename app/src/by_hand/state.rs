@@ -17,6 +17,8 @@ pub struct ByHand {
     pub judged: Option<Judged>,
     /// Since when \[s\], and where, the robot stands in a view that is good enough.
     pub rests: Option<(f64, Pose<Base, Tip>)>,
+    /// Where a capture was refused: it is not tried there again.
+    pub refused_at: Option<Pose<Base, Tip>>,
     /// How the choice ended; what follows checks the answer.
     pub ending: Option<Ending>,
     /// Captures so far that check it.
@@ -49,6 +51,7 @@ impl ByHand {
             wanted: None,
             judged: None,
             rests: None,
+            refused_at: None,
             ending: None,
             checked: 0,
             tried: 0,

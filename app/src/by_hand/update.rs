@@ -5,12 +5,13 @@ use std::sync::Arc;
 use handeye_core::estimate::Method;
 use handeye_core::plan::guided::by_hand::HandNext;
 use handeye_core::plan::guided::{CHECKS, Ending, GuidedOptions};
+use handeye_core::project::session::Role;
 
 use super::state::{ByHand, HandChoice, HandWaits};
 use super::worker::HandJob;
 use crate::app::App;
 use crate::guided::state::ended;
-use crate::model::{CapturePurpose, Pane, Severity, SolveStatus};
+use crate::model::{CapturePurpose, Motion, Pane, Severity, SolveStatus};
 use crate::text;
 use crate::text::Text;
 
@@ -20,6 +21,9 @@ const REST_S: f64 = 0.4;
 const MOST_CHECK_VIEWS: usize = 30;
 /// How far it may move meanwhile [m, rad]. The capture itself waits until robot and image have settled.
 const RESTS_WITHIN: (f64, f64) = (2e-3, 0.01);
+
+/// How far the robot has to go from where a capture was refused before another one is tried [m, rad].
+const OTHER_PLACE: (f64, f64) = (0.02, 0.07);
 
 impl App {
     /// Guides a person from the board in view to the goal. Captures that there are count; without any the first is taken here.
@@ -102,6 +106,10 @@ impl App {
                 hand.rests = None;
                 hand.waits = HandWaits::View;
             }
+            Some(HandNext::End(_)) if matches!(self.model.solve.status, SolveStatus::Running { .. }) => {
+                // The captures or the goal are others than those that were chosen by.
+                hand.goes_on();
+            }
             Some(HandNext::End(ending)) => {
                 hand.ending = Some(ending);
                 hand.goes_on();
@@ -117,11 +125,19 @@ impl App {
     /// Compares the newest image with the view that is wanted, and captures where it is good and the robot stands.
     pub(crate) fn look_by_hand(&mut self) {
         let now_s = self.model.now_s;
+        if self.model.motion != Motion::Idle || self.model.sequence_runs {
+            return;
+        }
         let Some(hand) = self.model.by_hand.as_deref_mut().filter(|hand| hand.waits == HandWaits::View) else { return };
         let (Some(wanted), Some(detection)) = (&hand.wanted, &self.model.detection) else { return };
         let seen = detection.corners.as_ref();
         hand.judged = seen.map(|corners| wanted.judge(corners, &detection.base_from_tip));
         let tip = detection.base_from_tip;
+        if hand.refused_at.is_some_and(|at| !has_left(at.distance_to(&tip))) {
+            hand.rests = None;
+            return;
+        }
+        hand.refused_at = None;
         hand.rests = match (hand.judged.is_some_and(|judged| judged.is_good), hand.rests) {
             (false, _) => None,
             (true, Some((since_s, at))) if rests(at.distance_to(&tip)) => Some((since_s, at)),
@@ -137,14 +153,15 @@ impl App {
     }
 
     /// A capture is on the disk, whoever asked for it.
-    pub(crate) fn captured_by_hand(&mut self) {
+    pub(crate) fn captured_by_hand(&mut self, role: Option<Role>) {
         let Some(hand) = self.model.by_hand.as_deref_mut().filter(|hand| hand.waits != HandWaits::Choice) else {
             return;
         };
-        if hand.ending.is_some() {
-            hand.checked += 1;
-        } else {
-            hand.guide.captured();
+        match (role, hand.ending) {
+            (Some(Role::Verification), Some(_)) => hand.checked += 1,
+            (Some(Role::Calibration), None) => hand.guide.captured(),
+            // What somebody took besides answers no question of the guide.
+            _ => {}
         }
         hand.goes_on();
     }
@@ -155,6 +172,7 @@ impl App {
         hand.rests = None;
         if hand.wanted.is_some() {
             hand.waits = HandWaits::View;
+            hand.refused_at = self.model.detection.as_ref().map(|detection| detection.base_from_tip);
         } else {
             let said =
                 text!("The board was not captured: bring the whole board into the image, hold still and begin again");
@@ -188,6 +206,11 @@ impl ByHand {
         self.judged = None;
         self.rests = None;
     }
+}
+
+/// Whether it is another place than that of a capture that was refused.
+fn has_left((m, rad): (f64, f64)) -> bool {
+    m > OTHER_PLACE.0 || rad > OTHER_PLACE.1
 }
 
 fn rests((m, rad): (f64, f64)) -> bool {

@@ -1,5 +1,6 @@
 //! Chooses the next view for a person who moves the robot.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use handeye_core::estimate::Observations;
@@ -37,16 +38,25 @@ pub fn choose(job: &HandJob, cancel: &CancelToken, outlet: &Outlet) {
     let mut guide = job.guide.clone();
     let calibration = job.solved.as_ref().map(|solved| &solved.calibration);
     let known = Known { observations: &job.observations, calibration, robot: None, elapsed_s: job.elapsed_s };
-    let next = if let Some(index) = job.check {
-        guide.check(&known, index, cancel).map(|wanted| HandNext::Take(Box::new(wanted)))
+    let chosen = catch_unwind(AssertUnwindSafe(|| chosen(job, &mut guide, &known, cancel)));
+    let next = chosen.unwrap_or_else(|_panic| {
+        // It must not take the thread along, nor leave a person waiting.
+        tracing::error!("the choice of a view failed by a defect of this program: report it");
+        None
+    });
+    if !cancel.is_cancelled() {
+        outlet.report(Event::ViewChosen { number: job.number, choice: Box::new(HandChoice { guide, next }) });
+    }
+}
+
+fn chosen(job: &HandJob, guide: &mut HandGuide, known: &Known<'_>, cancel: &CancelToken) -> Option<HandNext> {
+    if let Some(index) = job.check {
+        guide.check(known, index, cancel).map(|wanted| HandNext::Take(Box::new(wanted)))
     } else {
         let views = job.observations.views.iter().filter(|view| view.in_fit);
         let first = views.filter_map(|view| view.corners.as_ref()).find_map(|corners| {
             planar_pose::camera_from_target(corners, &job.observations.target, &job.intrinsics).ok()
         });
-        first.map(|first| guide.next(&known, &first, &job.intrinsics, cancel))
-    };
-    if !cancel.is_cancelled() {
-        outlet.report(Event::ViewChosen { number: job.number, choice: Box::new(HandChoice { guide, next }) });
+        first.map(|first| guide.next(known, &first, &job.intrinsics, cancel))
     }
 }

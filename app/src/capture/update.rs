@@ -76,7 +76,8 @@ impl App {
             (None, _) => text!("Capture {id} is kept", id = id),
         };
         self.say(Severity::Info, text);
+        let role = self.model.document().capture(id).map(|it| it.role);
         self.sequence_captured();
-        self.captured_by_hand();
+        self.captured_by_hand(role);
     }
 }

@@ -45,9 +45,14 @@ pub fn checked(named: &str, read: &ArmKinematics, here: &JointValues) -> Result<
         )));
     }
     tracing::info!("the chain of {named} agrees with the robot to {:.2} mm and {off_deg:.3}°", off_m * 1e3);
+    let within: Vec<JointRange> = placed.arm.ranges().iter().zip(&ranges).map(|(a, b)| both(a, b)).collect();
+    if read.is_ur5() {
+        // Its housings are known, which no other description has.
+        return ArmKinematics::ur5(*read.base_from_arm(), *read.connection_from_tip(), &within)
+            .map_err(Failure::unusable);
+    }
     let base_from_arm = *read.base_from_arm();
     let (base_from_first, flange_from_tip) = (placed.arm.base_from_first, placed.arm.flange_from_tip);
-    let within: Vec<JointRange> = placed.arm.ranges().iter().zip(&ranges).map(|(a, b)| both(a, b)).collect();
     let arm = placed.arm.mounted(base_from_arm.inverse() * base_from_first, flange_from_tip);
     let arm = arm.with_ranges(&within).map_err(Failure::unusable)?;
     let known = ArmKinematics::new(arm, base_from_arm);

@@ -63,6 +63,7 @@ impl App {
         self.model.sequence = None;
         self.model.sequence_runs = false;
         self.model.planning = false;
+        self.model.by_hand = None;
         self.model.motion = Motion::Idle;
         let first = LinkState::first(&source);
         self.model.control = first.clone();

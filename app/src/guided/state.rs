@@ -99,6 +99,8 @@ pub struct Choice {
     pub step: ChosenStep,
     /// See [`GuidedProgress::views_left`].
     pub views_left: Option<usize>,
+    /// Where the arm stood when it was chosen.
+    pub chosen_at: JointValues,
 }
 
 /// What comes next.
@@ -128,7 +130,7 @@ impl GuideRequest {
             },
             ChosenStep::Check(_) => None,
         };
-        Choice { guide, step, views_left }
+        Choice { guide, step, views_left, chosen_at: robot.joints }
     }
 }
 

@@ -128,16 +128,15 @@ impl App {
         if id != self.numbers.motion || self.guided_mut().is_none_or(|guided| guided.waits != Waits::Choice) {
             return;
         }
-        let Choice { guide, step, views_left } = match outcome {
+        let Choice { guide, step, views_left, chosen_at } = match outcome {
             Ok(choice) => *choice,
             Err(why) => return self.guided_ends(Severity::Warning, why),
         };
-        let chosen_at = self.model.robot.as_ref().map(|robot| robot.joints_rad);
         let Some(guided) = self.guided_mut() else { return };
         guided.guide = guide;
         guided.waits = Waits::Nothing;
         guided.views_left = views_left;
-        guided.chosen_at = chosen_at;
+        guided.chosen_at = Some(chosen_at);
         match step {
             ChosenStep::Next(next) => match *next {
                 Next::Go { plan, why } => {
@@ -162,11 +161,28 @@ impl App {
 
     /// To the pose that is next, or waits for the person who lets the arm move.
     fn guided_sets_out(&mut self) {
-        let confirms = self.model.confirms_moves();
+        if self.model.confirms_moves() {
+            if let Some(guided) = self.guided_mut() {
+                guided.waits = Waits::Confirmation;
+            }
+        } else {
+            self.guided_goes();
+        }
+    }
+
+    /// To the pose that is next, or to another one where the arm is not where the way to that was checked from.
+    fn guided_goes(&mut self) {
+        let now = self.model.robot.as_ref().map(|robot| robot.joints_rad);
         let Some(guided) = self.guided_mut() else { return };
-        if confirms {
-            guided.waits = Waits::Confirmation;
-        } else if let Some(next) = guided.ahead.first().cloned() {
+        if has_moved(guided.chosen_at.as_ref(), now.as_ref()) {
+            guided.waits = Waits::Answer;
+            let said = text!(
+                "The arm is elsewhere than when this pose was chosen: another one is chosen from where it is now"
+            );
+            return self.say(Severity::Info, said);
+        }
+        guided.waits = Waits::Nothing;
+        if let Some(next) = guided.ahead.first().cloned() {
             self.guided_goes_to(&next);
         }
     }
@@ -181,18 +197,8 @@ impl App {
 
     /// A person lets the arm move to the pose that is next.
     pub(crate) fn confirm_move(&mut self) {
-        let now = self.model.robot.as_ref().map(|robot| robot.joints_rad);
-        let Some(guided) = self.guided_mut().filter(|guided| guided.waits == Waits::Confirmation) else { return };
-        if has_moved(guided.chosen_at.as_ref(), now.as_ref()) {
-            guided.waits = Waits::Answer;
-            let said = text!(
-                "The arm is elsewhere than when this pose was chosen: another one is chosen from where it is now"
-            );
-            return self.say(Severity::Info, said);
-        }
-        guided.waits = Waits::Nothing;
-        if let Some(next) = guided.ahead.first().cloned() {
-            self.guided_goes_to(&next);
+        if self.guided_mut().is_some_and(|guided| guided.waits == Waits::Confirmation) {
+            self.guided_goes();
         }
     }
 

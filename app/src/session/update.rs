@@ -143,6 +143,10 @@ impl App {
         if old.meta.target != new.meta.target || another {
             self.model.observed.clear();
         }
+        if before.folder.is_some() && (old.meta.target != new.meta.target || old.meta.mode != new.meta.mode) {
+            // Also by undo: what was chosen is of another board, or of another end of the arm.
+            self.forget_guided();
+        }
         if old.captures != new.captures || old.meta != new.meta {
             self.model.export.is_present = false;
         }

@@ -33,6 +33,8 @@ impl App {
     }
 
     pub(crate) fn begin_sequence(&mut self, sequence: PoseSequence) {
+        // What the arm does is then no longer what a person does.
+        self.model.by_hand = None;
         self.model.sequence = Some(sequence);
         self.model.sequence_runs = true;
         self.next_stop();
@@ -40,6 +42,10 @@ impl App {
 
     /// Goes on with a sequence that was broken off: the pose at which that was is visited again.
     pub(crate) fn continue_sequence(&mut self) {
+        if self.model.capture.is_some() {
+            // It would be taken for that of the pose.
+            return self.say(Severity::Warning, text!("A capture is under way: wait until it is kept"));
+        }
         if self.continue_guided() {
             return;
         }
@@ -179,7 +185,9 @@ impl App {
 
     /// The capture of the sequence is on the disk.
     pub(crate) fn sequence_captured(&mut self) {
-        if self.model.sequence_runs {
+        // One that somebody took between two poses is none of the sequence's.
+        let is_at_pose = self.model.sequence.as_ref().is_some_and(|sequence| sequence.current().is_some());
+        if self.model.sequence_runs && is_at_pose {
             self.end_stop(StopOutcome::Done);
         }
     }

@@ -72,10 +72,12 @@ mod tests {
     fn the_newest_job_cancels_the_running_one_and_replaces_the_waiting_ones() {
         let (began, beginnings) = bounded(16);
         let (ended, endings) = bounded(16);
+        let (release, released) = bounded::<()>(1);
         let (mut worker, started) = NewestWins::start("test", move |job: u32, cancel: &CancelToken| {
             began.send(job).expect("the test listens");
-            while job == 0 && !cancel.is_cancelled() {
-                std::thread::yield_now();
+            if job == 0 {
+                // Not before the last one waits, or a fast thread begins those between.
+                released.recv_timeout(SOON).expect("the test goes on");
             }
             ended.send((job, cancel.is_cancelled())).expect("the test listens");
         })
@@ -85,6 +87,7 @@ mod tests {
         for job in 1..=3 {
             worker.submit(job);
         }
+        release.send(()).expect("job 0 waits");
         assert_eq!(endings.recv_timeout(SOON), Ok((0, true)), "the first job was cancelled");
         assert_eq!(endings.recv_timeout(SOON).map(|(job, _)| job), Ok(3), "jobs 1 and 2 were never begun");
         worker.end();

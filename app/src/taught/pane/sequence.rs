@@ -66,7 +66,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
 pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let done = sequence.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
     let skipped = sequence.outcomes.len() - done;
-    let left = sequence.names.len() - sequence.outcomes.len();
+    let left = sequence.names.len().saturating_sub(sequence.outcomes.len());
     let said = text!(
         "Last sequence: {done} of {of} done, {skipped} skipped, {left} not visited",
         done = done,

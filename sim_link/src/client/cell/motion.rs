@@ -52,9 +52,8 @@ const LINE_BRAKE: [f64; 2] = [6.0, 240.0];
 const STANDS_RAD: f64 = 1e-5;
 const LONGEST_OVERTIME_PASSES: u32 = 100;
 
-/// Steps in which a line of the tip is looked at for what is in its way \[m, rad\].
-const LINE_STEP_M: f64 = 0.01;
-const LINE_STEP_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
+/// Passes of a line that are gone through beforehand at most.
+const MOST_PASSES: usize = 100_000;
 /// Of a cube with edges of 1.
 const SPACE_DIAGONAL: f64 = 1.732_050_807_568_877_2;
 
@@ -84,6 +83,8 @@ struct Line<'a> {
     kinematics: &'a ArmKinematics,
     motion: motion::PoseMotion,
     limits: motion::MotionLimits,
+    /// Fastest joint while the tip is off its line, and the most that is allowed on it.
+    joint_speed_rad_s: f64,
     goal: Pose<Base, Tip>,
     joints: JointValues,
     /// Of the tip, along x, y, z and about its axis.
@@ -114,6 +115,7 @@ impl<'a> Way<'a> {
         start: &JointValues,
         goal: &Pose<Base, Tip>,
         limits: &MotionLimits,
+        joint_speed_rad_s: f64,
     ) -> Result<Self, LinkError> {
         let limits = generator_limits(limits);
         let tip = kinematics.tip(start);
@@ -123,6 +125,7 @@ impl<'a> Way<'a> {
             kinematics,
             motion,
             limits,
+            joint_speed_rad_s,
             goal: *goal,
             joints: *start,
             speeds: vec![0.0; 4],
@@ -227,7 +230,7 @@ impl Line<'_> {
     /// as it takes, and comes back to it as fast as the joints may.
     fn next(&mut self, time_step_s: f64) -> JointValues {
         let step = self.motion.step(time_step_s);
-        let most_rad = LINE_JOINT_SPEED_RAD_S * time_step_s;
+        let most_rad = self.joint_speed_rad_s * time_step_s;
         let on_line = Pose::from_isometry(step.pose);
         let solved = self.kinematics.reach(&on_line, &self.joints).ok();
         let kinematics = self.kinematics;
@@ -327,8 +330,8 @@ impl Arm {
         let kinematics = self.kinematics()?.ok();
         match &kinematics {
             Some(kinematics) => {
-                let limits = &self.limits_along(kinematics, &start, goal, limits)?;
-                self.send_motion(Way::line(kinematics, &start, goal, limits)?, start, TASK, cancel)?;
+                let way = self.line_among(kinematics, &start, goal, limits)?;
+                self.send_motion(way, start, TASK, cancel)?;
             }
             None => self.move_by_server(goal, limits, TASK, cancel)?,
         }
@@ -364,38 +367,39 @@ impl Arm {
         Ok(limits)
     }
 
-    /// The same of a motion of the tip along a line, as far as its joints can be found.
-    fn limits_along(
+    /// A motion of the tip along a line within the limits of what stands around, where nothing is in its way. All of it is gone
+    /// through as it will be sent, also where it leads out of reach and leaves its line.
+    fn line_among<'k>(
         &self,
-        kinematics: &ArmKinematics,
+        kinematics: &'k ArmKinematics,
         start: &JointValues,
         goal: &Pose<Base, Tip>,
         limits: &MotionLimits,
-    ) -> Result<MotionLimits, LinkError> {
-        let Some(among) = &self.among else { return Ok(limits.clone()) };
-        let guard = among.guard(start);
-        let from = kinematics.tip(start);
-        let (distance_m, angle_rad) = from.distance_to(goal);
-        let steps = (distance_m / LINE_STEP_M).max(angle_rad / LINE_STEP_RAD).ceil().max(1.0);
-        let mut before = *start;
-        for step in 1..=steps as usize {
-            let part = step as f64 / steps;
-            // Either way round is a half turn: which it will be is not known beforehand, nor how the tip leaves its line where
-            // that leads out of reach.
-            let Some(between) = from.isometry().try_lerp_slerp(goal.isometry(), part, 1e-9) else { break };
-            let Ok(joints) = kinematics.reach(&Pose::from_isometry(between), &before) else { break };
-            let contact = guard.contact(&joints).or_else(|| guard.contact_on_path(&before, &joints));
-            if let Some(contact) = contact {
-                return Err(LinkError::InTheWay { contact });
-            }
-            before = joints;
-        }
+    ) -> Result<Way<'k>, LinkError> {
+        let Some(among) = &self.among else {
+            return Way::line(kinematics, start, goal, limits, LINE_JOINT_SPEED_RAD_S);
+        };
         let mut limits = limits.clone();
         for velocity in limits.velocity.iter_mut().take(3) {
             // Along all three axes at once the tip is no faster than allowed.
             *velocity = among.around.limits.tip(*velocity * SPACE_DIAGONAL) / SPACE_DIAGONAL;
         }
-        Ok(limits)
+        let joint_speed_rad_s = among.around.limits.joint(LINE_JOINT_SPEED_RAD_S);
+        let way = || Way::line(kinematics, start, goal, &limits, joint_speed_rad_s);
+        let guard = among.guard(start);
+        let (mut tried, mut before) = (way()?, *start);
+        for _ in 0..MOST_PASSES {
+            let next = tried.next(self.info.time_step_s);
+            let contact = guard.contact(&next).or_else(|| guard.contact_on_path(&before, &next));
+            if let Some(contact) = contact {
+                return Err(LinkError::InTheWay { contact });
+            }
+            before = next;
+            if tried.is_over() {
+                break;
+            }
+        }
+        way()
     }
 
     /// Where the joints stand, ready to be moved.
@@ -506,7 +510,7 @@ mod tests {
         let mut behind = start;
         behind[0] += 2.5;
         let (goal, limits) = (kinematics.tip(&behind), MotionLimits::uniform(4, 0.5, 2.0, 20.0));
-        let mut way = Way::line(&kinematics, &start, &goal, &limits).expect("a profile");
+        let mut way = Way::line(&kinematics, &start, &goal, &limits, LINE_JOINT_SPEED_RAD_S).expect("a profile");
         let is_astray = |way: &Way<'_>| matches!(way, Way::Line(line) if line.astray.is_some_and(|v| v[0].abs() > 0.5));
         let mut joints = start;
         for _ in 0..400 {

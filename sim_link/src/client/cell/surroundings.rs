@@ -136,9 +136,16 @@ fn read(
         tracing::warn!("the scene has {} shapes: the arm is kept clear of the first {MOST_SHAPES} only", shapes.len());
     }
     let foot = kinematics.base_from_arm() * Point3::new(0.0, 0.0, ABOVE_FOOT_M);
+    let below_foot = kinematics.base_from_arm() * Point3::new(0.0, 0.0, -ABOVE_FOOT_M);
+    let mut is_hollow = false;
     let mut boxes: Vec<(f64, bool, Obstacle)> = Vec::new();
     for shape in shapes.into_iter().take(MOST_SHAPES) {
-        let Some(found) = sim.get_shape_box(shape)? else { return Ok(None) };
+        let Some(found) = sim.get_shape_box(shape)? else {
+            if boxes.is_empty() {
+                return Ok(None);
+            }
+            continue;
+        };
         let base_from_shape = *sim.get_object_pose::<Base, Base>(shape, ObjectHandle::WORLD)?.isometry();
         if found.size_m.iter().any(|edge_m| !edge_m.is_finite()) || found.size_m.iter().all(|edge_m| *edge_m <= 0.0) {
             continue;
@@ -148,6 +155,7 @@ fn read(
         let obstacle = Obstacle::new(name, base_from_shape * found.shape_from_middle, size_m);
         let distance_m = obstacle.distance_to(&foot);
         if distance_m < 0.0 {
+            is_hollow = true;
             tracing::warn!(
                 "the arm stands in the box about {:?}, which is taken for hollow: the arm is not kept clear of it",
                 obstacle.name
@@ -161,7 +169,12 @@ fn read(
         tracing::warn!("{} boxes stand around: the arm is kept clear of the {MOST_BOXES} nearest", boxes.len());
         boxes.truncate(MOST_BOXES);
     }
+    let stands_on = boxes.iter().any(|(_, _, obstacle)| obstacle.distance_to(&below_foot) <= ABOVE_FOOT_M);
     let mut standing = Standing::default();
+    if is_hollow || !stands_on {
+        // Whatever the arm stands on is not among the boxes: that is then its plane.
+        standing.around = kinematics.plane();
+    }
     for (_, is_on_board, obstacle) in boxes {
         if is_on_board {
             standing.on_board.push(obstacle);

@@ -36,6 +36,8 @@ const LEAST_FIRST_TURN_RAD: f64 = 16.0 * std::f64::consts::PI / 180.0;
 pub struct HandGuide {
     guide: Guide,
     first_views: usize,
+    /// Whether what was proposed last is one of the first views, of which the guide knows nothing.
+    is_first: bool,
 }
 
 /// What comes next.
@@ -84,7 +86,7 @@ pub struct Judged {
 impl HandGuide {
     /// Nothing is captured yet.
     pub fn new(options: GuidedOptions) -> Self {
-        Self { guide: Guide::new(options), first_views: 0 }
+        Self { guide: Guide::new(options), first_views: 0, is_first: false }
     }
 
     /// Every view that was proposed from an answer, and what came of it.
@@ -94,12 +96,16 @@ impl HandGuide {
 
     /// There is a view of what was proposed last.
     pub fn captured(&mut self) {
-        self.guide.captured();
+        if !self.is_first {
+            self.guide.captured();
+        }
     }
 
     /// A person leaves out what was proposed last.
     pub fn skipped(&mut self) {
-        self.guide.skipped();
+        if !self.is_first {
+            self.guide.skipped();
+        }
     }
 
     /// What to do next; `first` is how the board was seen at the first view, with the lens that is known or assumed.
@@ -113,6 +119,7 @@ impl HandGuide {
     ) -> HandNext {
         let known = Known { robot: None, ..*known };
         let target = &known.observations.target;
+        self.is_first = false;
         match self.guide.next(&known, cancel) {
             Next::End(ending) => HandNext::End(ending),
             Next::Go { plan, why: why @ Why::Gain { .. } } => {
@@ -133,6 +140,7 @@ impl HandGuide {
             Next::Go { why: Why::FirstTurns { .. }, .. } => {
                 // A turn of the tip says nothing to somebody who looks at the image, and is nowhere to be avoided.
                 self.guide.steps.pop();
+                self.is_first = true;
                 while self.first_views < super::MOST_FAN {
                     self.first_views += 1;
                     let view = first_views::view(intrinsics, target, first, self.first_views - 1)
