@@ -23,6 +23,7 @@ use handeye_core::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use handeye_core::plan::guided::by_hand::{HandGuide, HandNext};
 use handeye_core::plan::guided::candidates::ViewRange;
 use handeye_core::plan::guided::design::{Design, weight_about};
 use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Step};
@@ -351,9 +352,36 @@ fn speed(sessions: u64) {
                 })
                 .collect();
             times.sort_by(f64::total_cmp);
+            if !free_lens {
+                looks(arm, mode, sessions);
+            }
             let lens = if free_lens { "lens estimated" } else { "lens known" };
             println!("{arm:?}, {mode:?}, {lens}: {:.0}", times[times.len() / 2]);
         }
+    }
+}
+
+/// What it takes to compare a view with the one that a person is asked for.
+fn looks(arm: CellArm, mode: Mode, sessions: u64) {
+    let mut times: Vec<f64> = Vec::new();
+    for seed in 0..sessions {
+        let mut cell = GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens: false, seed });
+        let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
+        let calibration = cell.calibrate();
+        let truth = cell.truth();
+        let tip = cell.base_from_tip();
+        let seen = truth.camera_from_target(&tip);
+        let known = cell.known(calibration.as_ref(), 0.0);
+        let mut guide = HandGuide::new(GuidedOptions { goal_m: 0.0, ..GuidedOptions::default() });
+        let next = guide.next(&known, &seen, truth.intrinsics(), &CancelToken::default());
+        let (HandNext::Take(wanted), Some(corners)) = (next, hand::corners(&truth, &seen)) else { continue };
+        let began = Instant::now();
+        let _judged = wanted.judge(&corners, &tip);
+        times.push(began.elapsed().as_secs_f64() * 1e3);
+    }
+    times.sort_by(f64::total_cmp);
+    if let (Some(median), Some(longest)) = (times.get(times.len() / 2), times.last()) {
+        println!("{arm:?}, {mode:?}, a look at a view by hand: {median:.2}, longest {longest:.2}");
     }
 }
 

@@ -3,9 +3,12 @@ use std::time::{Duration, Instant};
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::Pose;
+use handeye_core::plan::guided::by_hand::{HandGuide, HandNext, Wanted};
 use handeye_core::plan::guided::choose::{Plan, Proposal};
-use handeye_core::plan::guided::{Ending, GuidedOptions, Next, Why};
+use handeye_core::plan::guided::{Ending, GuidedOptions, Known, Next, Why};
+use handeye_core::progress::CancelToken;
 use handeye_core::project::session::{CaptureId, Role};
+use handeye_core::targets::observation::Corner;
 
 use super::*;
 use crate::by_hand::state::HandWaits;
@@ -13,7 +16,8 @@ use crate::gui::testing::sample;
 use crate::guided::state::{Choice, ChosenStep, Waits};
 use crate::model::{
     ByHand, CapturePurpose, CaptureRefused, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState,
-    Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind, SolveStatus, StopOutcome, ThemeChoice,
+    LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind, SolveStatus, StopOutcome,
+    ThemeChoice,
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
@@ -319,6 +323,51 @@ fn only_a_capture_for_verification_checks_an_answer_by_hand() {
     assert_eq!(checked(&bench.app), Some(0));
     bench.app.captured_by_hand(Some(Role::Verification));
     assert_eq!(checked(&bench.app), Some(1));
+}
+
+/// A view that is wanted, and a detection in which the board looks so.
+fn wanted_and_seen(app: &App) -> (Box<Wanted>, LiveDetection) {
+    let document = Arc::clone(&app.model.session.document);
+    let observations = app.seen(&document).observations;
+    let solved = app.model.solve.solved.clone().expect("solved");
+    let known =
+        Known { observations: &observations, calibration: Some(&solved.calibration), robot: None, elapsed_s: 0.0 };
+    let intrinsics = app.model.intrinsics().expect("calibrated");
+    let mut guide = HandGuide::new(GuidedOptions { goal_m: 1e-9, least_gain: 0.0, ..GuidedOptions::default() });
+    let next = guide.next(&known, &Pose::identity(), &intrinsics, &CancelToken::default());
+    let HandNext::Take(wanted) = next else { panic!("{next:?}") };
+    let corner = |(index, point)| {
+        let px = wanted.intrinsics().project(&(wanted.camera_from_target.isometry() * point));
+        Corner::new(index, px.expect("before the camera"))
+    };
+    let corners = document.meta.target.points().into_iter().enumerate().map(corner).collect();
+    let detection = app.model.detection.clone().expect("seen");
+    (wanted, LiveDetection { corners: Some(corners), ..detection })
+}
+
+/// Nothing else would change there, and a person would read "hold still" for ever.
+#[test]
+fn where_a_capture_by_hand_was_refused_it_is_not_tried_again() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(led(None));
+    let (wanted, seen) = wanted_and_seen(app);
+    app.model.by_hand.as_mut().expect("led").wanted = Some(wanted);
+    let stand = |app: &mut App, seen: &LiveDetection| {
+        for _ in 0..2 {
+            app.absorb(Event::Tick { now_s: app.model.now_s + 0.5 });
+            app.absorb(Event::Detection(Box::new(seen.clone())));
+        }
+        app.model.capture.is_some()
+    };
+    assert!(stand(app, &seen), "at rest in a good view");
+    let number = app.numbers.capture;
+    let why = Text::verbatim("too similar");
+    let refused = CaptureRefused { kind: RefusalKind::TooSimilar, why, at_s: 3.0 };
+    app.absorb(Event::CaptureRefused { number, refused });
+    assert!(!stand(app, &seen), "the same place");
+    let moved = Pose::from_isometry(*seen.base_from_tip.isometry() * nalgebra::Translation3::new(0.0, 0.0, 0.05));
+    assert!(stand(app, &LiveDetection { base_from_tip: moved, ..seen }), "another place");
 }
 
 #[test]

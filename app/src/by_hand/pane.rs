@@ -7,6 +7,7 @@ use super::state::{ByHand, HandWaits};
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
+use crate::guided::pane::error_ui;
 use crate::model::Model;
 use crate::text::Text;
 use crate::{text, tr};
@@ -46,23 +47,11 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, hand: &ByHand, outbox: &mut Outbo
         }
         ui.label(RichText::new(to_do(hand).say(language)).strong().size(15.0));
     });
-    if let Some(hand) = hand.wanted.as_ref().and_then(|wanted| wanted.why) {
-        parts::hint_ui(ui, &hand.text().say(language));
+    if let Some(why) = hand.wanted.as_ref().and_then(|wanted| wanted.why) {
+        parts::hint_ui(ui, &why.text().say(language));
     }
-    let error_mm = model.solve.solved.as_ref().and_then(|solved| solved.result.quality.tip_error_95_mm);
-    let error = error_mm.map(|error_mm| {
-        text!(
-            "Expected error {error} mm (95 %), goal {goal} mm",
-            error = format!("{error_mm:.3}"),
-            goal = format!("{:.3}", hand.guide.guide().options().goal_m * 1e3)
-        )
-    });
     let left = hand.wanted.as_ref().and_then(|wanted| wanted.views_left).filter(|views| *views > 0);
-    let left = left.map(|views| text!("about {n} more {n|pose|poses}", n = views));
-    let said: Vec<String> = [error, left].into_iter().flatten().map(|text| text.say(language)).collect();
-    if !said.is_empty() {
-        ui.label(said.join(" · "));
-    }
+    error_ui(ui, model, hand.guide.guide(), left.map(|views| text!("about {n} more {n|pose|poses}", n = views)));
     ui.horizontal_wrapped(|ui| {
         let what = tr!(language, "Leaves this view and those near it out, and asks for another one");
         let button = ui.add_enabled(hand.waits == HandWaits::View, Button::new(tr!(language, "Skip this view")));

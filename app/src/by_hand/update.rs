@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use handeye_core::estimate::Method;
 use handeye_core::plan::guided::by_hand::HandNext;
-use handeye_core::plan::guided::{CHECKS, Ending, GuidedOptions};
+use handeye_core::plan::guided::{CHECKS, Ending};
 use handeye_core::project::session::Role;
 
 use super::state::{ByHand, HandChoice, HandWaits};
 use super::worker::HandJob;
 use crate::app::App;
-use crate::guided::state::ended;
+use crate::guided::state::{ended, options};
 use crate::model::{CapturePurpose, Motion, Pane, Severity, SolveStatus};
 use crate::text;
 use crate::text::Text;
@@ -32,9 +32,7 @@ impl App {
             return;
         }
         let views = self.model.document().in_use().filter(|it| self.corners(it.id).is_some()).count();
-        let default = GuidedOptions::default();
-        let options =
-            GuidedOptions { goal_m: self.model.view.goal.0, most_views: default.most_views + views, ..default };
+        let options = options(self.model.view.goal.0, views);
         // What a view adds is known of the joint estimate alone.
         self.set_method(Method::Joint.name());
         self.model.messages.is_over_in(Pane::Poses);

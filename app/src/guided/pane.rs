@@ -1,7 +1,7 @@
 //! The button that begins, and what is under way.
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
-use handeye_core::plan::guided::CHECKS;
+use handeye_core::plan::guided::{CHECKS, Guide};
 
 use super::state::{GuidedProgress, Waits};
 use crate::command::{Command, Outbox};
@@ -76,11 +76,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     if let Some(why) = &guided.why {
         parts::hint_ui(ui, &why.text().say(language));
     }
-    if let Some(error) = error_and_goal(model, guided) {
-        let left = left(model, sequence, guided);
-        let said = [Some(error), left].into_iter().flatten().map(|text| text.say(language));
-        ui.label(said.collect::<Vec<_>>().join(" · "));
-    }
+    error_ui(ui, model, &guided.guide, left(model, sequence, guided));
     confirm_moves_ui(ui, model, outbox);
 }
 
@@ -153,11 +149,16 @@ pub fn under_way(sequence: &PoseSequence, guided: &GuidedProgress) -> Text {
     }
 }
 
-fn error_and_goal(model: &Model, guided: &GuidedProgress) -> Option<Text> {
-    let error_mm = model.solve.solved.as_ref()?.result.quality.tip_error_95_mm?;
-    Some(text!(
+/// The error beside the goal, and what is left; nothing before there is an error.
+pub fn error_ui(ui: &mut Ui, model: &Model, guide: &Guide, left: Option<Text>) {
+    let language = model.view.language;
+    let error_mm = model.solve.solved.as_ref().and_then(|solved| solved.result.quality.tip_error_95_mm);
+    let Some(error_mm) = error_mm else { return };
+    let error = text!(
         "Expected error {error} mm (95 %), goal {goal} mm",
         error = format!("{error_mm:.3}"),
-        goal = format!("{:.3}", guided.guide.options().goal_m * 1e3)
-    ))
+        goal = format!("{:.3}", guide.options().goal_m * 1e3)
+    );
+    let said = std::iter::once(error).chain(left).map(|text| text.say(language));
+    ui.label(said.collect::<Vec<_>>().join(" · "));
 }

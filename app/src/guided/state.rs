@@ -137,6 +137,12 @@ impl GuideRequest {
 /// What a choice was, or why there is none.
 pub type ChoiceOutcome = Result<Box<Choice>, Text>;
 
+/// What is asked for, beyond captures that there are.
+pub(crate) fn options(goal_m: f64, views: usize) -> GuidedOptions {
+    let default = GuidedOptions::default();
+    GuidedOptions { goal_m, most_views: default.most_views + views, ..default }
+}
+
 /// How it ended, after so many checks.
 pub(crate) fn ended(ending: Ending, checked: usize) -> (Severity, Text) {
     if checked < CHECKS {

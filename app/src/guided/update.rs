@@ -5,10 +5,10 @@ use std::sync::Arc;
 use handeye_core::estimate::Method;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::guided::choose::Proposal;
-use handeye_core::plan::guided::{CHECKS, Ending, GuidedOptions, Next};
+use handeye_core::plan::guided::{CHECKS, Ending, Next};
 use handeye_core::plan::travel;
 
-use super::state::{Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits, ended};
+use super::state::{Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits, ended, options};
 use crate::app::App;
 use crate::model::{CapturePurpose, MotionId, Pane, PoseSequence, Severity, SolveStatus, StopOutcome};
 use crate::session::archive::ArchiveTask;
@@ -27,9 +27,7 @@ impl App {
         }
         let Some(joints) = self.model.robot.as_ref().map(|robot| robot.joints_rad) else { return };
         let views = self.model.document().in_use().filter(|it| self.corners(it.id).is_some()).count();
-        let default = GuidedOptions::default();
-        let most_views = default.most_views + views;
-        let options = GuidedOptions { goal_m: self.model.view.goal.0, most_views, ..default };
+        let options = options(self.model.view.goal.0, views);
         // What a view adds is known of the joint estimate alone.
         self.set_method(Method::Joint.name());
         self.model.messages.is_over_in(Pane::Poses);

@@ -1,10 +1,11 @@
 //! What stands around, read from a running cell, and motions that end before it.
 
+use handeye_core::geometry::frames::Pose;
 use handeye_core::plan::{Obstacle, SpeedLimits, Surroundings};
 use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::client::cell::{ArmJog, Contact, JogAxes, JogEnd, JogObstacle};
+use handeye_sim_link::client::cell::{ArmJog, Contact, JogAxes, JogEnd, JogObstacle, MotionTolerance};
 use handeye_sim_link::client::{CancelToken, LinkError, MotionLimits};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Translation3, Vector3};
 
 use crate::other_arms::Bench;
 
@@ -118,4 +119,25 @@ fn a_goal_behind_a_box_is_refused_before_anything_moves_and_limits_of_speed_are_
     let radius_m = kinematics.tip(&start).translation().xy().norm();
     let least_s = 0.8 * radius_m / 0.1;
     assert!(took_s >= least_s, "{took_s} s for a way of at least {least_s} s");
+}
+
+/// Out of reach the tip leaves its line and ends as near as it gets: what stands there is in the way as well.
+#[test]
+fn a_line_that_leads_out_of_reach_is_gone_through_to_its_end_before_anything_moves() {
+    let mut bench = realistic();
+    let kinematics = bench.kinematics();
+    let start = bench.arm.joint_values().expect("a call");
+    let far = Pose::from_isometry(Translation3::new(1.5, 0.0, 0.0) * bench.tip().isometry());
+    let (limits, none) = (MotionLimits::uniform(4, 0.5, 2.0, 20.0), CancelToken::default());
+    let go = |bench: &mut Bench| bench.arm.move_to_pose(&far, &limits, &MotionTolerance::default(), &none);
+    let unreached = go(&mut bench);
+    assert!(matches!(unreached, Err(LinkError::Unreached { .. })), "{unreached:?}");
+    let end = bench.tip().translation();
+    bench.arm.move_to_joints(&start, &MotionLimits::uniform(6, 1.0, 3.0, 30.0), &none).expect("back again");
+    let post = Obstacle::new("post", Isometry3::from(end), [0.02; 3]);
+    bench.arm.keep_clear(Some(kinematics.among(Surroundings::of(vec![post]), None)));
+    let before = bench.arm.joint_values().expect("a call");
+    let refused = go(&mut bench);
+    assert!(matches!(refused, Err(LinkError::InTheWay { .. })), "{refused:?}");
+    assert_eq!(bench.arm.joint_values().expect("a call"), before);
 }

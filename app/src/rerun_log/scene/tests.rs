@@ -60,6 +60,26 @@ impl Bench {
     }
 }
 
+#[test]
+fn planned_poses_are_drawn_where_the_camera_will_be_and_go_when_they_are_over() {
+    let model = sample::solved();
+    let mut bench = Bench::new();
+    bench.begin();
+    for entry in all(&model) {
+        bench.write(&entry);
+    }
+    let solved = model.solve.solved.clone().expect("solved");
+    bench.write(&Entry::Solved(solved));
+    let tip = model.robot.as_ref().expect("connected").base_from_tip;
+    let planned = bench.write(&Entry::Planned(vec![tip; 3]));
+    let paths: Vec<&str> = planned.keys().map(String::as_str).collect();
+    assert_eq!(paths, ["/base/planned/0", "/base/planned/1", "/base/planned/2"]);
+    assert!(planned.values().all(|entity| entity.components.iter().any(|it| it.contains("strips"))), "{planned:?}");
+    // One is left; the other two are written anew, empty.
+    assert_eq!(bench.write(&Entry::Planned(vec![tip])).len(), 3);
+    assert_eq!(bench.write(&Entry::Planned(Vec::new())).len(), 1);
+}
+
 fn document(model: &Model) -> Entry {
     // Without a folder no files are looked for.
     Entry::Document { folder: None, document: Arc::clone(&model.session.document) }

@@ -457,7 +457,7 @@ impl Guide {
             let tool_box = self.options.tool_box.as_ref();
             let error_m = worst(calibration, tool_box, |point| calibration.error_95_m(point));
             let is_below =
-                error_over_at_upper_levels(calibration, tool_box).is_some_and(|error_m| error_m <= self.options.goal_m);
+                error_at_upper_levels(calibration, tool_box).is_some_and(|error_m| error_m <= self.options.goal_m);
             self.below = if is_below && is_sound(known.calibration) { self.below + 1 } else { 0 };
             if let (true, Some(error_m)) = (self.below >= IN_A_ROW, error_m) {
                 return Some(Ending::GoalReached { error_m });
@@ -565,13 +565,9 @@ fn is_sound(calibration: Option<&Calibration>) -> bool {
     calibration.is_some_and(|calibration| calibration.claim == Claim::AsModelled)
 }
 
-/// The error that is stated, at the upper limit of the noise levels, metres; `None` where nothing may be stated.
-pub fn error_at_upper_levels(calibration: &Calibration) -> Option<f64> {
-    error_over_at_upper_levels(calibration, None)
-}
-
-/// The same at the worst point of a box.
-pub fn error_over_at_upper_levels(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
+/// The error that is stated, at the upper limit of the noise levels, metres: where the camera saw the board, or at the worst point
+/// of a box. `None` where nothing may be stated.
+pub fn error_at_upper_levels(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
     let joint = calibration.joint.as_ref()?;
     let hand_eye = calibration.hand_eye_covariance()?;
     worst(calibration, tool_box, |point| {

@@ -10,7 +10,7 @@ impl Guide {
     /// Within the plan the error falls as the plan says, beyond it as the square root of the number of views. By the noise
     /// levels as estimated now: with few views they may be off by half.
     pub fn views_left(&self, known: &Known<'_>, plan: &Plan) -> Option<usize> {
-        let ratio = self.options.goal_m / error_at_upper_levels(known.calibration?)?;
+        let ratio = self.options.goal_m / error_at_upper_levels(known.calibration?, self.options.tool_box.as_ref())?;
         let views = used_views(known.observations, known.calibration).len();
         let by_error = if ratio >= 1.0 { 0 } else { views_to(ratio, views, plan)? };
         // One answer that is good enough may be luck.

@@ -254,7 +254,7 @@ fn an_end_is_judged_at_the_upper_limit_of_the_noise_levels() {
     let mut cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 1));
     let _begun = cell.run(GuidedOptions { most_views: 8, least_gain: 0.0, ..options(1e-9) });
     let calibration = cell.calibrate().expect("eight good views");
-    let (stated_m, upper_m) = (calibration.tip_error_95_m(), error_at_upper_levels(&calibration));
+    let (stated_m, upper_m) = (calibration.tip_error_95_m(), error_at_upper_levels(&calibration, None));
     let ratio = upper_m.expect("known") / stated_m.expect("stated");
     assert!((1.01..2.0).contains(&ratio), "{ratio}");
 }

@@ -385,9 +385,9 @@ impl Arm {
             *velocity = among.around.limits.tip(*velocity * SPACE_DIAGONAL) / SPACE_DIAGONAL;
         }
         let joint_speed_rad_s = among.around.limits.joint(LINE_JOINT_SPEED_RAD_S);
-        let way = || Way::line(kinematics, start, goal, &limits, joint_speed_rad_s);
+        let way = Way::line(kinematics, start, goal, &limits, joint_speed_rad_s)?;
         let guard = among.guard(start);
-        let (mut tried, mut before) = (way()?, *start);
+        let (mut tried, mut before) = (way.clone(), *start);
         for _ in 0..MOST_PASSES {
             let next = tried.next(self.info.time_step_s);
             let contact = guard.contact(&next).or_else(|| guard.contact_on_path(&before, &next));
@@ -399,7 +399,7 @@ impl Arm {
                 break;
             }
         }
-        way()
+        Ok(way)
     }
 
     /// Where the joints stand, ready to be moved.

@@ -123,8 +123,8 @@ enum Part {
     Roll,
 }
 
-/// A rotation as a turn about an axis across z (a rotation vector) after a turn about z \[rad\].
-fn swing_and_twist(turn: &UnitQuaternion<f64>) -> (Vector3<f64>, f64) {
+/// A rotation as a turn about an axis across z (a rotation vector) after a turn about z \[rad\], which is the line of sight.
+pub(super) fn swing_and_twist(turn: &UnitQuaternion<f64>) -> (Vector3<f64>, f64) {
     let twist_rad = 2.0 * turn.k.atan2(turn.w);
     // The same turn by less than half a revolution.
     let twist_rad = twist_rad - std::f64::consts::TAU * (twist_rad / std::f64::consts::TAU).round();

@@ -3,6 +3,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use super::deviation::swing_and_twist;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::plan::guided::candidates::ViewRange;
@@ -32,21 +33,16 @@ pub fn view(
     let centre = target.centre();
     let distance_m = (first.isometry() * centre).coords.norm();
     let range = ViewRange::about([distance_m].into_iter())?;
-    let upright = twist(&first.rotation());
+    let (_, rolled_rad) = swing_and_twist(&first.rotation());
     let turn = TURNS_DEG[index % TURNS_DEG.len()].map(f64::to_radians);
     TRIES.iter().find_map(|(part, farther)| {
         let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(turn[0], turn[1], 0.0) * *part);
-        let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn[2] * part);
+        let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), rolled_rad + turn[2] * part);
         let place = Translation3::new(0.0, 0.0, distance_m * farther);
-        let pose = Isometry3::from_parts(place, tilt * roll * upright) * Translation3::from(-centre.coords);
+        let pose = Isometry3::from_parts(place, tilt * roll) * Translation3::from(-centre.coords);
         let pose = Pose::from_isometry(pose);
         range.shows(intrinsics, target, &pose, None).then_some(pose)
     })
-}
-
-/// The part of a rotation that is about the line of sight.
-fn twist(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * rotation.k.atan2(rotation.w))
 }
 
 #[cfg(test)]
