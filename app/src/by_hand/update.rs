@@ -75,7 +75,7 @@ impl App {
         if hand.checked >= CHECKS || hand.tried >= MOST_CHECK_VIEWS {
             return self.guiding_finished();
         }
-        let check = hand.ending.map(|_| hand.tried);
+        let check = hand.ending.map(|_| (hand.tried, hand.tried.saturating_sub(hand.checked)));
         let (guide, elapsed_s) = (hand.guide.clone(), self.model.now_s - hand.began_s);
         let solved = self.model.solve.solved.clone().filter(|_| self.model.solve.fresh);
         let document = Arc::clone(&self.model.session.document);

@@ -29,8 +29,8 @@ pub struct HandJob {
     pub solved: Option<Arc<Solved>>,
     /// Since the beginning \[s\].
     pub elapsed_s: f64,
-    /// The number of the check, where a view to check the answer at is asked for.
-    pub check: Option<usize>,
+    /// The number of the check and how many were left out, where a view to check the answer at is asked for.
+    pub check: Option<(usize, usize)>,
 }
 
 /// Chooses and reports.
@@ -50,8 +50,8 @@ pub fn choose(job: &HandJob, cancel: &CancelToken, outlet: &Outlet) {
 }
 
 fn chosen(job: &HandJob, guide: &mut HandGuide, known: &Known<'_>, cancel: &CancelToken) -> Option<HandNext> {
-    if let Some(index) = job.check {
-        guide.check(known, index, cancel).map(|wanted| HandNext::Take(Box::new(wanted)))
+    if let Some((index, skips)) = job.check {
+        guide.check(known, index, skips, cancel).map(|wanted| HandNext::Take(Box::new(wanted)))
     } else {
         let views = job.observations.views.iter().filter(|view| view.in_fit);
         let first = views.filter_map(|view| view.corners.as_ref()).find_map(|corners| {

@@ -120,7 +120,7 @@ impl GuideRequest {
         let known =
             Known { observations: &self.observations, calibration, robot: Some(robot), elapsed_s: self.elapsed_s };
         let step = match self.check {
-            Some(index) => ChosenStep::Check(guide.check_pose(&known, index, cancel).map(Box::new)),
+            Some(index) => ChosenStep::Check(guide.check_pose(&known, index, 0, cancel).map(Box::new)),
             None => ChosenStep::Next(Box::new(guide.next(&known, cancel))),
         };
         let views_left = match &step {

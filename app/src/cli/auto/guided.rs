@@ -103,7 +103,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         for index in 0..self.checks {
             let robot = self.robot()?;
             let known = self.known(observations, calibration, &robot);
-            let Some(proposal) = self.guide.check_pose(&known, index, self.sequence.cancel) else {
+            let Some(proposal) = self.guide.check_pose(&known, index, 0, self.sequence.cancel) else {
                 tracing::warn!("there is no further view in reach to check the answer at");
                 break;
             };

@@ -55,6 +55,10 @@ const LEVEL_SURE: f64 = 0.8;
 const TURN_PER_VIEW_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Views with a limit of that.
 const CAREFUL_VIEWS: usize = 6;
+/// Part of that which is left after each pose that somebody leaves out.
+const NEARER_PER_SKIP: f64 = 0.7;
+/// And what is left of it at the end: less is hardly another view.
+const LEAST_TURN_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Further free space around the board, metres, while there are fewer views than that: it is not where it is taken to be.
 const CAREFUL_ROOM_M: f64 = 0.03;
 /// Largest way of a joint to a pose of the fan, radians: more is another configuration, not a small turn.
@@ -243,6 +247,8 @@ pub struct Guide {
     /// Where the board was when the first choice was made: what a person chose, not the guide.
     range: Option<ViewRange>,
     failures: usize,
+    /// Views that somebody left out, one less for each that was taken.
+    skips: usize,
     steps: Vec<Step>,
     ended: Option<Ending>,
 }
@@ -258,6 +264,7 @@ impl Guide {
             solved_views: 0,
             range: None,
             failures: 0,
+            skips: 0,
             steps: Vec::new(),
             ended: None,
         }
@@ -283,8 +290,9 @@ impl Guide {
     }
 
     /// Somebody leaves out the pose proposed last: it is not proposed again, nor its neighbourhood, and says nothing of
-    /// whether the board is lost.
+    /// whether the board is lost. The next ones are nearer to where the arm has been.
     pub fn skipped(&mut self) {
+        self.skips += 1;
         if let Some(step) = self.steps.last_mut() {
             step.outcome = Outcome::Skipped;
             self.failed.push(step.base_from_tip);
@@ -297,6 +305,8 @@ impl Guide {
             step.outcome = Outcome::Captured;
         }
         self.failures = 0;
+        // What kept a person from the others is still there.
+        self.skips = self.skips.saturating_sub(1);
     }
 
     /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which mean nothing.
@@ -383,9 +393,9 @@ impl Guide {
             dwell_s: self.options.dwell_s,
             failed: &self.failed,
             turn_rad: if used.len() < CAREFUL_VIEWS {
-                TURN_PER_VIEW_RAD * used.len() as f64
+                (TURN_PER_VIEW_RAD * used.len() as f64).min(turn_after(self.skips))
             } else {
-                std::f64::consts::TAU
+                turn_after(self.skips)
             },
         };
         let chooser = ground.chooser(model, &known.observations.target);
@@ -393,8 +403,8 @@ impl Guide {
     }
 
     /// A pose that was not designed, to check the answer at: a view at random that the arm gets to. `index` counts the
-    /// checks. `None` where there is no answer, or no such view.
-    pub fn check_pose(&self, known: &Known<'_>, index: usize, cancel: &CancelToken) -> Option<Proposal> {
+    /// checks, `skips` those that somebody left out. `None` where there is no answer, or no such view.
+    pub fn check_pose(&self, known: &Known<'_>, index: usize, skips: usize, cancel: &CancelToken) -> Option<Proposal> {
         let target = &known.observations.target;
         let model = ViewModel::new(known.calibration?, target)?;
         let model = model.clone().with_noise(at_least(model.noise(), &LEAST_NOISE));
@@ -407,7 +417,7 @@ impl Guide {
             seed: self.options.seed.wrapping_add(1_000_003 * (index as u64 + 1)),
             dwell_s: self.options.dwell_s,
             failed: &self.failed,
-            turn_rad: std::f64::consts::TAU,
+            turn_rad: turn_after(skips),
         };
         ground.chooser(&model, target).at_random(&ground.design, &options)
     }
@@ -558,6 +568,12 @@ impl Ground<'_> {
             cancel: self.cancel,
         }
     }
+}
+
+/// How far the tip may turn from the nearest view so far, after so many more poses that somebody left out than took, radians:
+/// where the arm has been it gets to again.
+fn turn_after(skips: usize) -> f64 {
+    (std::f64::consts::PI * NEARER_PER_SKIP.powf(skips as f64)).max(LEAST_TURN_RAD)
 }
 
 /// Whether nothing was found that speaks against the answer.

@@ -163,10 +163,10 @@ impl HandGuide {
         }
     }
 
-    /// A view that was not designed, to check the answer at; `None` where there is no answer.
-    pub fn check(&self, known: &Known<'_>, index: usize, cancel: &CancelToken) -> Option<Wanted> {
+    /// A view that was not designed, to check the answer at, see [`Guide::check_pose`]; `None` where there is no answer.
+    pub fn check(&self, known: &Known<'_>, index: usize, skips: usize, cancel: &CancelToken) -> Option<Wanted> {
         let known = Known { robot: None, ..*known };
-        let proposal = self.guide.check_pose(&known, index, cancel)?;
+        let proposal = self.guide.check_pose(&known, index, skips, cancel)?;
         Some(Wanted {
             camera_from_target: proposal.camera_from_target,
             why: None,
