@@ -65,7 +65,8 @@ fn by_hand(sessions: u64) {
         let (mut took_s, mut refused, mut skipped) = (Vec::new(), 0, 0);
         let (mut stated_mm, mut below, mut solved) = (0.0, 0, 0);
         for seed in 0..sessions {
-            let setup = CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens: false, seed };
+            let setup =
+                CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens: false, straight: false, seed };
             let mut cell = GuidedCell::new(setup);
             let run = hand::session(&mut cell, GuidedOptions { goal_m: 1e-9, ..GuidedOptions::default() }, 10, seed);
             took_s.extend(run.took_s);
@@ -291,7 +292,7 @@ fn choice(sessions: u64) {
         let all: Vec<([Way; 4], Vec<f64>)> = (0..sessions)
             .into_par_iter()
             .map(|seed| {
-                let setup = CellSetup { arm, mode, noise: REALISTIC, free_lens: false, seed };
+                let setup = CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: false, seed };
                 let bench = Bench::new(setup);
                 let cell = GuidedCell::new(setup);
                 let ways = [bench.guided(), bench.farthest(&cell), bench.random(&cell), bench.easy_handeye(&cell)];
@@ -341,7 +342,8 @@ fn speed(sessions: u64) {
         for free_lens in [false, true] {
             let mut times: Vec<f64> = (0..sessions)
                 .map(|seed| {
-                    let mut cell = GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens, seed });
+                    let mut cell =
+                        GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens, straight: false, seed });
                     let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
                     let calibration = cell.calibrate();
                     let known = cell.known(calibration.as_ref(), 0.0);
@@ -365,7 +367,8 @@ fn speed(sessions: u64) {
 fn looks(arm: CellArm, mode: Mode, sessions: u64) {
     let mut times: Vec<f64> = Vec::new();
     for seed in 0..sessions {
-        let mut cell = GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens: false, seed });
+        let mut cell =
+            GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: false, seed });
         let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
         let calibration = cell.calibrate();
         let truth = cell.truth();
@@ -405,15 +408,14 @@ fn stop(sessions: u64) {
     ];
     for (name, goal_m, noise, free_lens) in rows {
         for mode in [Mode::EyeInHand, Mode::EyeToHand] {
-            let runs: Vec<_> =
-                (0..sessions)
-                    .into_par_iter()
-                    .map(|seed| {
-                        let arm = CellArm::ALL[seed as usize % 3];
-                        GuidedCell::new(CellSetup { arm, mode, noise, free_lens, seed: 1000 + seed })
-                            .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
-                    })
-                    .collect();
+            let runs: Vec<_> = (0..sessions)
+                .into_par_iter()
+                .map(|seed| {
+                    let arm = CellArm::ALL[seed as usize % 3];
+                    GuidedCell::new(CellSetup { arm, mode, noise, free_lens, straight: false, seed: 1000 + seed })
+                        .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
+                })
+                .collect();
             let ended: Vec<_> = runs.iter().filter_map(|run| run.history.last().map(|last| (run, *last))).collect();
             let share = |of: &dyn Fn(&(usize, f64, f64)) -> bool, among: &dyn Fn(&Ending) -> bool| {
                 let among: Vec<_> = ended.iter().filter(|(run, _)| among(&run.ending)).collect();

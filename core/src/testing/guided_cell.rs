@@ -63,6 +63,8 @@ pub struct CellSetup {
     pub noise: Noise,
     /// Whether the lens is to be estimated.
     pub free_lens: bool,
+    /// Whether the first view is straight on, with the board close to the edge of the image.
+    pub straight: bool,
     /// Seed of places and noise.
     pub seed: u64,
 }
@@ -132,6 +134,12 @@ impl GuidedCell {
             Vector3::new(about(0.03), about(0.03), distance_m).into(),
             tilt(about(0.2), about(0.2)) * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.5)),
         ) * Translation3::from(-BOARD.centre().coords);
+        let seen_first = if setup.straight {
+            // Some 40 px from the edge of the image of 640 px.
+            Isometry3::translation(0.31 * distance_m, 0.0, distance_m) * Translation3::from(-BOARD.centre().coords)
+        } else {
+            seen_first
+        };
         let (mount_from_camera, anchor_from_target, first_tip) = match setup.mode {
             Mode::EyeInHand => {
                 let first_tip = lying * seen_first.inverse() * beside.inverse();

@@ -105,6 +105,30 @@ impl HandEye {
             Self::EyeToHand { tip_from_target, .. } => tip_from_target.relabel(),
         }
     }
+
+    /// Where the target is in a view from a tip pose.
+    pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
+        match *self {
+            Self::EyeInHand { tip_from_camera, base_from_target } => {
+                tip_from_camera.inverse() * base_from_tip.inverse() * base_from_target
+            }
+            Self::EyeToHand { base_from_camera, tip_from_target } => {
+                base_from_camera.inverse() * *base_from_tip * tip_from_target
+            }
+        }
+    }
+
+    /// From where the robot sees the target so.
+    pub fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
+        match *self {
+            Self::EyeInHand { tip_from_camera, base_from_target } => {
+                base_from_target * camera_from_target.inverse() * tip_from_camera.inverse()
+            }
+            Self::EyeToHand { base_from_camera, tip_from_target } => {
+                base_from_camera * *camera_from_target * tip_from_target.inverse()
+            }
+        }
+    }
 }
 
 /// One view as the closed-form solvers see it: the robot's pose and the target's pose in the camera.

@@ -21,6 +21,7 @@ pub mod design;
 pub mod fan;
 pub mod outlook;
 pub mod record;
+mod start;
 
 use nalgebra::Point3;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -29,11 +30,11 @@ use crate::estimate::claim::Claim;
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
 use crate::estimate::uncertainty::quality::TipBox;
-use crate::estimate::{Calibration, CameraKnowledge, Observations, ViewStatus};
+use crate::estimate::{Calibration, Observations, ViewStatus};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::point_error;
-use crate::plan::{Carried, travel};
+use crate::plan::Carried;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use candidates::ViewRange;
@@ -148,6 +149,11 @@ pub enum Why {
         /// The turn.
         turn_rad: f64,
     },
+    /// A tilt of the camera about the board by a rough answer, because the small turns determine none. Radians.
+    FirstTilts {
+        /// The tilt, from the first view.
+        turn_rad: f64,
+    },
     /// What it lowers the error from and to, metres, and how much of that is rotation of the camera.
     Gain {
         /// The 95 % error now, by the noise alone.
@@ -242,6 +248,7 @@ pub struct Guide {
     options: GuidedOptions,
     failed: Vec<Pose<Base, Tip>>,
     fan_tried: usize,
+    tilts_tried: usize,
     below: usize,
     solved_views: usize,
     /// Where the board was when the first choice was made: what a person chose, not the guide.
@@ -260,6 +267,7 @@ impl Guide {
             options,
             failed: Vec::new(),
             fan_tried: 0,
+            tilts_tried: 0,
             below: 0,
             solved_views: 0,
             range: None,
@@ -353,22 +361,22 @@ impl Guide {
         }
         let target = &known.observations.target;
         let model = known.calibration.and_then(|calibration| ViewModel::new(calibration, target));
-        let Some(model) = model else { return self.without_answer(known) };
+        let Some(model) = model else { return self.without_answer(known, cancel) };
         let noise = at_least(model.noise(), &LEAST_NOISE);
         let model = model.with_noise(noise);
         match self.plan(known, &model, used, cancel) {
-            None => self.without_answer(known),
+            None => self.without_answer(known, cancel),
             Some((plan, modelled_m)) if plan.candidates > 0 => {
                 self.judged(plan, modelled_m, used.len(), is_sound(known.calibration))
             }
             // So little is known that no view is surely in the image: more of the small turns.
-            Some(_) => self.fan(known),
+            Some(_) => self.first_poses(known, cancel),
         }
     }
 
     /// The first turns are for before there is an answer: later the arm is elsewhere, and they are no small moves.
-    fn without_answer(&mut self, known: &Known<'_>) -> Next {
-        if self.range.is_some() { Next::End(Ending::AnswerLost) } else { self.fan(known) }
+    fn without_answer(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
+        if self.range.is_some() { Next::End(Ending::AnswerLost) } else { self.first_poses(known, cancel) }
     }
 
     /// The plan from an estimate, and its error now by the noise alone, metres; `None` where the views so far determine nothing.
@@ -444,7 +452,7 @@ impl Guide {
         let range = self.range.or_else(|| ViewRange::about(distances))?;
         let taken = used.iter().map(|(pose, _)| *pose).collect();
         let room_m = if used.len() < CAREFUL_VIEWS { CAREFUL_ROOM_M } else { 0.0 };
-        let robot = known.robot.map(|robot| with_board(robot, model, known.observations, room_m));
+        let robot = known.robot.map(|robot| with_board(robot, model.hand_eye(), known.observations, room_m));
         Some(Ground { design, range, robot, taken, cancel })
     }
 
@@ -479,63 +487,14 @@ impl Guide {
         }
         (known.elapsed_s >= self.options.most_s).then_some(Ending::MostTime)
     }
-
-    /// A small turn about the first view.
-    fn fan(&mut self, known: &Known<'_>) -> Next {
-        let observations = known.observations;
-        let first = observations.views.iter().find_map(|view| {
-            let corners = view.corners.as_ref().filter(|corners| view.in_fit && corners.len() >= 4)?;
-            Some((view.base_from_tip?, corners))
-        });
-        let Some((about, corners)) = first else { return Next::End(Ending::NoStart) };
-        if self.fan_tried >= MOST_FAN {
-            return Next::End(Ending::NoStart);
-        }
-        let focal_px = match observations.camera {
-            CameraKnowledge::Fixed(intrinsics) | CameraKnowledge::Estimate { start: Some(intrinsics), .. } => {
-                intrinsics.fx
-            }
-            // A usual lens; one that is twice as long halves the room that is left.
-            CameraKnowledge::Estimate { start: None, .. } => f64::from(observations.image_size.0),
-        };
-        let turn_rad = fan::free_turn_rad(corners.iter().map(|corner| corner.px), observations.image_size, focal_px);
-        while self.fan_tried < MOST_FAN {
-            let (base_from_tip, turn_rad) = fan::pose(&about, self.fan_tried, turn_rad);
-            self.fan_tried += 1;
-            let joints = match known.robot {
-                None => None,
-                Some(robot) => {
-                    let reached = robot.arm.reach(&base_from_tip, &robot.joints);
-                    let free = reached.filter(|joints| {
-                        travel(&robot.joints, joints) <= LARGEST_FAN_WAY_RAD
-                            && robot.arm.is_free(joints, &robot.around, robot.clearance_m)
-                            && robot.path_is_free(joints)
-                    });
-                    let Some(joints) = free else { continue };
-                    Some(joints)
-                }
-            };
-            let proposal = Proposal {
-                base_from_tip,
-                camera_from_target: Pose::identity(),
-                joints,
-                travel_s: 0.0,
-                error_ratio: 1.0,
-                rotation_part: 1.0,
-            };
-            let plan = Plan { proposals: vec![proposal], best_ratio: 1.0, candidates: 1 };
-            return Next::Go { plan, why: Why::FirstTurns { turn_rad } };
-        }
-        Next::End(Ending::NoStart)
-    }
 }
 
 /// The arm with what is on its tip, the camera or the board, where the estimate has it; and the other one of the two among
 /// what stands around, with some room about the board wherever it is, and about a camera beside the robot.
-fn with_board(robot: &Robot, model: &ViewModel, observations: &Observations, room_m: f64) -> Robot {
+fn with_board(robot: &Robot, hand_eye: &HandEye, observations: &Observations, room_m: f64) -> Robot {
     let mut robot = robot.clone();
     let target = &observations.target;
-    match model.hand_eye() {
+    match hand_eye {
         HandEye::EyeInHand { tip_from_camera, base_from_target } => {
             robot.arm.carried = vec![Carried::camera(tip_from_camera.isometry())];
             robot.around.obstacles.push(super::sheet(target, base_from_target, room_m));

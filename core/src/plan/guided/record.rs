@@ -113,7 +113,7 @@ impl Why {
     /// The 95 % error that is stated now and the one that is promised, metres.
     pub fn errors_m(&self) -> Option<(f64, f64)> {
         match *self {
-            Self::FirstTurns { .. } => None,
+            Self::FirstTurns { .. } | Self::FirstTilts { .. } => None,
             Self::Gain { from_m, to_m, .. } => Some((from_m, to_m)),
         }
     }
@@ -124,6 +124,10 @@ impl Why {
             Self::FirstTurns { turn_rad } => text!(
                 "A turn of {turn}° about the TCP: where the camera sits is not known yet, so the first moves are small",
                 turn = format!("{:.1}", turn_rad.to_degrees())
+            ),
+            Self::FirstTilts { turn_rad } => text!(
+                "Tilted by {turn}° from the first view: small turns do not determine the lens",
+                turn = format!("{:.0}", turn_rad.to_degrees())
             ),
             Self::Gain { from_m, to_m, rotation_part } => {
                 let (from, to) = (format!("{:.3}", from_m * 1e3), format!("{:.3}", to_m * 1e3));

@@ -164,14 +164,7 @@ impl ViewModel {
 
     /// From where the robot would see the target so, without its field.
     pub fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
-        match self.hand_eye {
-            HandEye::EyeInHand { tip_from_camera, base_from_target } => {
-                base_from_target * camera_from_target.inverse() * tip_from_camera.inverse()
-            }
-            HandEye::EyeToHand { base_from_camera, tip_from_target } => {
-                base_from_camera * *camera_from_target * tip_from_target.inverse()
-            }
-        }
+        self.hand_eye.base_from_tip(camera_from_target)
     }
 
     /// What a view from a reported tip pose says, in which the corners with these indices are found; `None` where they do

@@ -137,7 +137,7 @@ impl HandGuide {
                     worth,
                 }))
             }
-            Next::Go { why: Why::FirstTurns { .. }, .. } => {
+            Next::Go { why: Why::FirstTurns { .. } | Why::FirstTilts { .. }, .. } => {
                 // A turn of the tip says nothing to somebody who looks at the image, and is nowhere to be avoided.
                 self.guide.steps.pop();
                 self.is_first = true;
