@@ -14,6 +14,7 @@ use handeye_core::project::export::ExportNames;
 use handeye_core::project::session::CaptureId;
 use handeye_core::project::taught_poses::TaughtPose;
 use handeye_core::targets::TargetSpec;
+use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
 use crate::by_hand::state::HandChoice;
@@ -69,6 +70,8 @@ pub enum Command {
     SetCaptureOptions(CaptureOptions),
     /// Work with another cell.
     Connect(CellSource),
+    /// Say where the scene has the parts of the cell, and connect again.
+    SetObjects(CellPaths),
     /// Which step of the work is in front.
     GoToStep(Step),
     /// Which dialog is open.

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use directories::BaseDirs;
 use handeye_core::depth::ColourMap;
+use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, ValueDeserializer};
 
@@ -38,6 +39,8 @@ pub struct Settings {
     sessions: String,
     /// Addresses that were connected to, newest first.
     pub addresses: Vec<String>,
+    /// Where a scene other than the built-in one has the parts of the cell.
+    pub objects: CellPaths,
 }
 
 /// Something in the settings that was left out, and where.
@@ -151,6 +154,8 @@ pub struct SettingsFile {
     in_file: Settings,
     /// How the window looked when it was last compared.
     last_view: ViewSettings,
+    /// Objects of the scene when they were last compared.
+    last_objects: CellPaths,
 }
 
 impl SettingsFile {
@@ -167,13 +172,21 @@ impl SettingsFile {
         }
         let mut settings = in_file.clone();
         warnings.extend(settings.read_environment(variable));
-        let last_view = settings.view();
-        (Self { path, in_file, last_view }, settings, warnings)
+        let (last_view, last_objects) = (settings.view(), settings.objects.clone());
+        (Self { path, in_file, last_view, last_objects }, settings, warnings)
     }
 
-    /// What is to be written when the user has changed how the window looks, or an address is new; a worker does it.
-    pub fn keep(&mut self, view: ViewSettings, addresses: &[String]) -> Option<SettingsWrite> {
-        if view == self.last_view && *addresses == self.in_file.addresses {
+    /// Objects of the scene that are given for this run alone and do not get into the file.
+    #[must_use]
+    pub fn with_objects(mut self, objects: &CellPaths) -> Self {
+        self.last_objects = objects.clone();
+        self
+    }
+
+    /// What is to be written when the user has changed how the window looks or where the scene has its objects, or an
+    /// address is new; a worker does it.
+    pub fn keep(&mut self, view: ViewSettings, addresses: &[String], objects: &CellPaths) -> Option<SettingsWrite> {
+        if view == self.last_view && *addresses == self.in_file.addresses && *objects == self.last_objects {
             return None;
         }
         let before_text = self.in_file.written();
@@ -187,6 +200,10 @@ impl SettingsFile {
         keep(&mut kept.depth_colours, before.depth_colours, depth_colours);
         self.last_view = view;
         self.in_file.addresses = addresses.to_vec();
+        if self.last_objects != *objects {
+            self.last_objects = objects.clone();
+            self.in_file.objects = objects.clone();
+        }
         let content = self.in_file.written();
         let path = self.path.clone().filter(|_| content != before_text)?;
         Some(SettingsWrite { path, content })

@@ -135,11 +135,12 @@ fn recorded(
     let began = Instant::now();
     let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
     let waker: Waker = Arc::new(|| {});
-    let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
+    let connect: Connect = Arc::new(|source, objects| Arc::new(LiveConnector::new(source.clone(), objects.clone())));
     let start = Start {
         source,
         view: ViewSettings::default(),
         addresses: Vec::new(),
+        objects: CellPaths::default(),
         // A session, so that there is a file to record into.
         open: Some(sessions.join("session")),
         sessions: sessions.clone(),

@@ -10,6 +10,7 @@ use handeye_app::model::{CellSource, Model, ViewSettings};
 use handeye_app::rerun_log::RerunChoice;
 use handeye_app::text::Language;
 use handeye_app::worker::{Clock, LiveConnector, Waker};
+use handeye_sim_link::client::cell::CellPaths;
 
 /// Longer than anything that a test waits for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(6);
@@ -41,11 +42,13 @@ impl Workbench {
         });
         let began = Instant::now();
         let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
-        let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
+        let connect: Connect =
+            Arc::new(|source, objects| Arc::new(LiveConnector::new(source.clone(), objects.clone())));
         let start = Start {
             source,
             view: ViewSettings::default(),
             addresses: Vec::new(),
+            objects: CellPaths::default(),
             sessions: sessions.to_path_buf(),
             open,
             rerun,

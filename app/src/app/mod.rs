@@ -10,6 +10,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
+use handeye_sim_link::client::cell::CellPaths;
+
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
 use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice};
@@ -18,7 +20,7 @@ use crate::text;
 use crate::worker::{Clock, Connector, FileTask, SessionThreads, Waker, Workers};
 
 /// Makes what connects to a cell.
-pub type Connect = Arc<dyn Fn(&CellSource) -> Arc<dyn Connector> + Send + Sync>;
+pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Connector> + Send + Sync>;
 
 /// What an application begins with.
 pub struct Start {
@@ -28,6 +30,8 @@ pub struct Start {
     pub view: ViewSettings,
     /// Addresses that were connected to before, newest first.
     pub addresses: Vec<String>,
+    /// Where a scene other than the built-in one has the parts of the cell.
+    pub objects: CellPaths,
     /// Where new sessions go.
     pub sessions: PathBuf,
     /// A session or data set to open at once; where there is none, a session is begun there.
@@ -74,7 +78,7 @@ impl App {
     /// # Errors
     /// When the system has no more threads, or the file of the recording cannot be made.
     pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
-        let Start { source, view, addresses, sessions, open, rerun } = start;
+        let Start { source, view, addresses, objects, sessions, open, rerun } = start;
         let recorder = Recorder::start(RecorderOptions {
             choice: rerun,
             pace: Pace::Live,
@@ -83,8 +87,8 @@ impl App {
             waker: Arc::clone(&waker),
         })?;
         let desk = SessionThreads::start(sessions, &clock, &waker)?;
-        let workers = Workers::start(&source, &view, &connect(&source), desk.captures(), &clock, &waker)?;
-        let model = Model { addresses, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
+        let workers = Workers::start(&source, &view, &connect(&source, &objects), desk.captures(), &clock, &waker)?;
+        let model = Model { addresses, objects, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
         let numbers = Numbers::default();
         let recorded = crate::rerun_log::recorded::Recorded::default();
         let mut app = Self {
@@ -147,6 +151,7 @@ impl App {
             Command::StartSimulation => self.start_simulation(),
             Command::Reconnect => self.reconnect(),
             Command::Connect(source) => self.connect(source),
+            Command::SetObjects(objects) => self.set_objects(objects),
 
             Command::SetTheme(theme) => self.model.view.theme = theme,
             Command::SetLanguage(language) => self.model.view.language = language,

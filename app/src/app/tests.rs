@@ -29,7 +29,7 @@ struct Bench {
 
 fn bench(cell: &FakeCell) -> Bench {
     let cell = cell.clone();
-    let connect: Connect = Arc::new(move |_source| Arc::new(cell.clone()) as Arc<dyn Connector>);
+    let connect: Connect = Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Connector>);
     let clock: Clock = Arc::new(|| 3.0);
     let waker: Waker = Arc::new(|| {});
     let sessions = tempfile::tempdir().expect("a folder");
@@ -37,6 +37,7 @@ fn bench(cell: &FakeCell) -> Bench {
         source: CellSource::BuiltIn,
         view: ViewSettings::default(),
         addresses: Vec::new(),
+        objects: CellPaths::default(),
         sessions: sessions.path().to_path_buf(),
         open: None,
         rerun: RerunChoice::Off,

@@ -8,6 +8,7 @@ use handeye_core::estimate::{Method, Options};
 use super::gate::{self, Gate};
 use super::output::Output;
 use super::{Failure, RerunArg, rerun_arg, shared, solve};
+use crate::model::Goal;
 use crate::rerun_log::{Pace, RerunChoice};
 
 /// At the end of its help.
@@ -67,7 +68,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     };
     let cancel = solve::cancel_on_ctrl_c();
     let recorder = args.rerun.start(RerunChoice::Off, Pace::Everything, false)?;
-    let solution = solve::folder(path, method, args.options(), None, &cancel)?;
+    let solution = solve::folder(path, method, args.options(), Goal::default().0, None, &cancel)?;
     let result = solution.result();
     if let Some(folder) = &args.out {
         solve::write_exports(folder, result)?;

@@ -12,6 +12,7 @@ mod doctor;
 mod export;
 mod failure;
 mod gate;
+mod object_arg;
 mod out;
 mod output;
 mod plan;
@@ -31,6 +32,7 @@ use tracing_subscriber::EnvFilter;
 use crate::gui::GuiArgs;
 
 pub use failure::Failure;
+pub use object_arg::ObjectArgs;
 pub use rerun_arg::RerunArg;
 
 /// Calibrates a robot's camera: live in a window, or from the command line.

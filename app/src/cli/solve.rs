@@ -179,16 +179,17 @@ impl Solution {
 }
 
 /// Reads a folder, finds the target in its images, calibrates, and checks the answer on the captures that are kept for it.
-/// The truth is only compared with.
+/// `goal_m` is the expected error (95 %) to reach, metres; the truth is only compared with.
 pub fn folder(
     path: &Path,
     method: Method,
     options: Options,
+    goal_m: f64,
     truth: Option<Truth>,
     cancel: &CancelToken,
 ) -> Result<Solution, Failure> {
     let input = read(path, cancel)?;
-    let job = SolveJob { truth, ..job(&input, method, options) };
+    let job = SolveJob { goal_m, truth, ..job(&input, method, options) };
     let solved = worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path))?;
     Ok(Solution::new(path, input, solved))
 }

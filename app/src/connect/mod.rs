@@ -1,6 +1,7 @@
 //! The connection to a cell: choosing it, its state, starting and stopping its simulation.
 
 pub(crate) mod dialog;
+mod objects;
 pub(crate) mod pane;
 pub(crate) mod update;
 pub(crate) mod worker;

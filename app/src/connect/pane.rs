@@ -4,6 +4,7 @@ use egui::text::LayoutJob;
 use egui::{Align, Button, ComboBox, FontSelection, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::{BadEndpoint, Endpoint};
 
+use super::objects;
 use crate::command::{Command, Outbox};
 use crate::connect::server_name;
 use crate::gui::status;
@@ -20,6 +21,8 @@ struct Draft {
     remote: Option<bool>,
     /// The address; `None` while nothing was typed.
     address: Option<String>,
+    /// Where the scene there has the parts of the cell.
+    objects: objects::Draft,
 }
 
 /// The pane.
@@ -47,6 +50,9 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if let Err(error) = wanted.inner {
             let colour = Palette::of(ui).bad;
             ui.add(Label::new(RichText::new(error.to_string()).color(colour)).wrap());
+        }
+        if remote {
+            objects::objects_ui(ui, model, &mut draft.objects, outbox);
         }
         ui.add_space(4.0);
         state_ui(ui, model);

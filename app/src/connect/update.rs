@@ -2,6 +2,8 @@
 
 use std::thread::Builder;
 
+use handeye_sim_link::client::cell::CellPaths;
+
 use crate::app::App;
 use crate::connect::server_name;
 use crate::model::{BoardMotion, CellFacts, CellSource, Link, LinkState, Motion, Severity, Trail};
@@ -69,7 +71,7 @@ impl App {
         self.model.control = first.clone();
         self.model.camera = first.clone();
         self.model.mover = first;
-        let connector = (self.connect)(&source);
+        let connector = (self.connect)(&source, &self.model.objects);
         let captures = self.desk.captures();
         match Workers::start(&source, &self.model.view, &connector, captures, &self.clock, &self.waker) {
             Ok(workers) => {
@@ -89,6 +91,12 @@ impl App {
         self.model.trail = Trail::default();
         self.send_target();
         self.send_tracking();
+    }
+
+    /// The objects of the scene are others: everything that was read of them is, too.
+    pub(crate) fn set_objects(&mut self, objects: CellPaths) {
+        self.model.objects = objects;
+        self.connect(self.model.source.clone());
     }
 
     pub(crate) fn cell_found(&mut self, facts: CellFacts) {

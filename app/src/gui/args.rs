@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::cli::RerunArg;
+use crate::cli::{ObjectArgs, RerunArg};
 
 /// Options of the workbench.
 #[derive(Debug, Args, Default)]
@@ -10,6 +10,9 @@ pub struct GuiArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
     #[arg(long, value_name = "ADDR")]
     pub connect: Option<String>,
+    /// Where its scene has the parts of the cell; as in the settings if not given.
+    #[command(flatten)]
+    pub objects: ObjectArgs,
     /// Session folder to open, or to create.
     #[arg(long, value_name = "DIR")]
     pub session: Option<std::path::PathBuf>,

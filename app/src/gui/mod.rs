@@ -51,6 +51,8 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
     let variable = |name: &str| std::env::var(name).ok();
     let (file, settings, warnings) = SettingsFile::open(settings::default_path(), variable);
     let source = args.connect.map_or_else(|| settings.source(), CellSource::Address);
+    let objects = args.objects.paths(settings.objects.clone());
+    let file = file.with_objects(&objects);
     let options = NativeOptions {
         viewport: ViewportBuilder::default()
             .with_app_id(settings::FOLDER)
@@ -68,12 +70,14 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let waker: Waker = Arc::new(move || ctx.request_repaint_after(GATHER));
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
-        let connect: Connect = Arc::new(|source| Arc::new(LiveConnector::new(source.clone())));
+        let connect: Connect =
+            Arc::new(|source, objects| Arc::new(LiveConnector::new(source.clone(), objects.clone())));
         let remembered = Remembered::stored(creation.storage);
         let start = Start {
             source,
             view: remembered.view(settings.view()),
             addresses: settings.addresses.clone(),
+            objects,
             sessions: settings.sessions_folder(),
             open: args.session,
             rerun: args.rerun.choice(RerunChoice::Record),

@@ -18,6 +18,7 @@ use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::verify::Predictor;
+use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
 pub use crate::by_hand::state::ByHand;
@@ -265,6 +266,8 @@ pub struct Model {
     pub messages: Messages,
     /// Addresses that were connected to before, newest first.
     pub addresses: Vec<String>,
+    /// Where a scene other than the built-in one has the parts of the cell.
+    pub objects: CellPaths,
     /// The board in the newest image that was searched.
     pub detection: Option<LiveDetection>,
     /// When the board was last found in the live image.
@@ -361,6 +364,7 @@ impl Model {
             view,
             messages: Messages::default(),
             addresses: Vec::new(),
+            objects: CellPaths::default(),
             detection: None,
             board_seen_s: None,
             capture: None,

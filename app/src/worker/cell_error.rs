@@ -20,6 +20,17 @@ pub(crate) fn port_error(error: LinkError) -> PortError {
              enabled and which port its status bar shows (usually 23000).",
             endpoint = endpoint
         ),
+        LinkError::NoSuchObject { path, there, .. } if there.is_empty() => text!(
+            "The scene has no {path}. Open the scene of the cell, or say under Connect, Objects of the scene, where it has \
+             that part",
+            path = path
+        ),
+        LinkError::NoSuchObject { path, there, .. } => text!(
+            "The scene has no {path}, but {there}. Say under Connect, Objects of the scene, which it is, or open the scene \
+             of the cell",
+            path = path,
+            there = there.join(", ")
+        ),
         LinkError::Disconnected { .. } => closed(),
         other => Text::verbatim(other.to_string()),
     };

@@ -25,9 +25,13 @@ pub struct LiveConnector {
 }
 
 impl LiveConnector {
-    /// Nothing is started or connected yet.
-    pub fn new(source: CellSource) -> Self {
-        Self { source, paths: CellPaths::default(), server: Mutex::new(None) }
+    /// Nothing is started or connected yet. `objects` is where another scene than the built-in one has its parts.
+    pub fn new(source: CellSource, objects: CellPaths) -> Self {
+        let paths = match source {
+            CellSource::BuiltIn => CellPaths::default(),
+            CellSource::Address(_) => objects,
+        };
+        Self { source, paths, server: Mutex::new(None) }
     }
 
     /// Where to connect to. Starts the built-in cell when that is needed; the other workers wait for the first.

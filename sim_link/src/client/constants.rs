@@ -38,10 +38,17 @@ pub const BOUNDS_MIN: [i64; 3] = [15, 16, 17];
 /// The corner with the largest coordinates.
 pub const BOUNDS_MAX: [i64; 3] = [18, 19, 20];
 
+/// Option of the name of an object: the shortest path that leads to it.
+pub const ALIAS_SHORTEST_PATH: i64 = 1;
+
 /// Type of an object: a shape.
 pub const OBJECT_SHAPE: i64 = 0;
 /// Type of an object: a joint.
 pub const OBJECT_JOINT: i64 = 1;
+/// Type of an object: a dummy.
+pub const OBJECT_DUMMY: i64 = 4;
+/// Type of an object: a vision sensor.
+pub const OBJECT_VISION_SENSOR: i64 = 9;
 /// Type of a joint: it turns about one axis.
 pub const JOINT_REVOLUTE: i64 = 10;
 /// Type of a joint: it shifts along one axis.

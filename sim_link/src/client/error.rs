@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use handeye_core::geometry::arm::JointQuantity;
 
+use super::cell::CellPart;
 use super::convert::ConvertError;
 use super::endpoint::{BadEndpoint, Endpoint};
 use super::sim::SimulationState;
@@ -136,17 +137,22 @@ pub enum LinkError {
         needs: &'static str,
     },
     /// The scene lacks an object.
-    #[error("the scene has no {path} ({what}); open the cell's scene, or set the path of the {what} in the settings")]
+    #[error(
+        "the scene has no {path} ({}){}: open the cell's scene, or say where this one has it by the object path {:?}",
+        part.what(), listed(*part, there), part.key()
+    )]
     NoSuchObject {
         /// The path asked for.
         path: String,
         /// What it is for.
-        what: &'static str,
+        part: CellPart,
+        /// Paths of objects of that kind that the scene has.
+        there: Vec<String>,
     },
     /// An arm with more joints than are driven.
     #[error(
-        "{count} joints carry the tip and at most {} are driven; set the path of the arm in the settings to the object \
-         that its first joint hangs on",
+        "{count} joints carry the tip and at most {} are driven; set the object path \"arm\" to the object that its first \
+         joint hangs on",
         handeye_core::geometry::arm::MAX_JOINTS
     )]
     TooManyJoints {
@@ -348,6 +354,11 @@ fn without_place(message: &str) -> &str {
     let line = place.rsplit(':').next().unwrap_or(place);
     let is_line = !line.is_empty() && line.bytes().all(|byte| byte.is_ascii_digit());
     if is_line { what } else { message }
+}
+
+/// What of that kind the scene has.
+fn listed(part: CellPart, there: &[String]) -> String {
+    if there.is_empty() { String::new() } else { format!("; its {} are {}", part.kind().1, there.join(", ")) }
 }
 
 fn advice_on_bytes(has_spoken: bool) -> &'static str {

@@ -7,9 +7,10 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{
-    Arm, ArmJog, ArmKinematics, BoardInView, CameraFeed, CellPaths, JogAxes, JogEnd, MotionTolerance, UnknownKinematics,
+    Arm, ArmJog, ArmKinematics, BoardInView, CameraFeed, CellPart, CellPaths, JogAxes, JogEnd, MotionTolerance,
+    UnknownKinematics,
 };
-use handeye_sim_link::client::{CallOptions, CancelToken, ConnectionOptions, MotionLimits, ObjectHandle};
+use handeye_sim_link::client::{CallOptions, CancelToken, ConnectionOptions, LinkError, MotionLimits, ObjectHandle};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// Of a chain that was read as `f64`; searched joint values agree with a pose to 1e-8.
@@ -198,6 +199,35 @@ fn the_camera_of_an_arm_with_seven_joints_is_seen() {
     let levels = frame.rgb.as_raw().chunks_exact(3).map(grey);
     let (dark, bright) = levels.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| (low.min(v), high.max(v)));
     assert!(bright > 2.0 * dark + 100.0, "the board's squares: {dark} to {bright}");
+}
+
+/// Anybody's scene: the arm has a name of its own, and one sensor takes colour and depth.
+#[test]
+fn an_arm_of_another_name_is_found_by_its_object_paths_and_without_them_the_scene_says_what_it_has() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes/panda.toml");
+    let mut scene = Scene::load(&file).expect("valid");
+    scene.robot.name = "Franka".to_owned();
+    let server = CellServer::start(CellConfig { real_time: Some(false), ..CellConfig::new(scene) }).expect("a port");
+    let endpoint = server.endpoint().parse().expect("an address");
+    let connect = |paths: &CellPaths| Arm::connect(&endpoint, &ConnectionOptions::default(), paths);
+    let missing = |paths: &CellPaths| match connect(paths).err() {
+        Some(LinkError::NoSuchObject { part, there, .. }) => (part, there),
+        other => panic!("{other:?}"),
+    };
+    let (part, there) = missing(&CellPaths::default());
+    assert_eq!((part, there), (CellPart::Tip, vec!["/Target".to_owned(), "/Tip".to_owned()]));
+    let whole = CellPaths::below("Franka");
+    let (part, there) = missing(&CellPaths { camera: "/Franka/eye".to_owned(), ..whole.clone() });
+    assert_eq!((part, there), (CellPart::Camera, vec!["/3D_camera".to_owned(), "/depth".to_owned()]));
+
+    let mut arm =
+        connect(&CellPaths { depth: String::new(), target: String::new(), ..whole }).expect("all that it needs");
+    assert_eq!((arm.info().joints.len(), arm.info().depth_optics), (7, arm.info().optics));
+    let kinematics = arm.kinematics().expect("calls").unwrap_or_else(|unknown| panic!("{unknown}"));
+    let (joints, tip) = (arm.joint_values().expect("a call"), arm.base_from_tip().expect("a call"));
+    assert!(kinematics.tip(&joints).distance_to(&tip).0 < READ_M);
+    let here = connect(&CellPaths { tip: "/Tip".to_owned(), ..CellPaths::below("Franka") }).expect("as it was listed");
+    assert_eq!(here.info().joints.len(), 7);
 }
 
 #[test]

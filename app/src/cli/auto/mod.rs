@@ -20,9 +20,9 @@ use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
 
 use super::cell::SceneArg;
 use super::output::Output;
-use super::{Failure, RerunArg, arm_arg, box_arg, out, record, rerun_arg, solve};
+use super::{Failure, ObjectArgs, RerunArg, arm_arg, box_arg, out, record, rerun_arg, solve};
 use crate::cli::auto::sequence::PoseSequence;
-use crate::model::{CaptureOptions, Step, Truth};
+use crate::model::{CaptureOptions, Goal, Step, Truth};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
 use crate::session::start;
 use crate::shortfall;
@@ -38,6 +38,8 @@ pub struct AutoArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
     #[arg(long, value_name = "ADDR")]
     connect: Option<String>,
+    #[command(flatten)]
+    objects: ObjectArgs,
     /// `seed10` (the ten reference poses), a pose file, `auto` (planned views of the board), or `guided` (each pose chosen
     /// by what the captures so far leave open, until the goal is reached). `seed10` if not given, and `guided` with an option
     /// of guided capture.
@@ -149,6 +151,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let keep_out = args.keep_out.as_deref().map(Surroundings::read).transpose().map_err(Failure::unusable)?;
     let seed = args.seed.unwrap_or(scene.seed);
     let recorder = args.rerun.start(RerunChoice::Record, Pace::Everything, true)?;
+    let paths = if args.connect.is_some() { CellPaths::default() } else { CellPaths::below(&scene.robot.name) };
     let server = match args.connect {
         Some(_) => None,
         None => Some(
@@ -166,9 +169,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         (None, None) => String::new(),
     };
     let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
+    let paths = args.objects.paths(paths);
     let folder = args.out.clone().unwrap_or_else(|| Path::new("sessions").join(timestamp()));
-    let mut cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())
-        .map_err(Failure::failed)?;
+    let mut cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &paths).map_err(Failure::failed)?;
     plan.check_joints(cell.info().joints.len())?;
     let truth = cell.camera().ground_truth().map_err(Failure::failed)?;
     let ran_before = cell.arm().sim().get_simulation_state().map_err(Failure::failed)? != SimulationState::Stopped;
@@ -245,7 +248,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     drop(cell);
     drop(server);
 
-    let mut solution = solve::folder(&folder, Method::Joint, Options::default(), Some(Truth::from(&truth)), &cancel)?;
+    let goal_m = guide.as_ref().map_or(Goal::default().0, |guide| guide.options().goal_m);
+    let truth = Some(Truth::from(&truth));
+    let mut solution = solve::folder(&folder, Method::Joint, Options::default(), goal_m, truth, &cancel)?;
     solution.guided_by(guide.as_ref().map(Guide::record));
     finish(&session, args.json.as_ref(), &solution)?;
     solution.note(&recorder);

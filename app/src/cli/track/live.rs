@@ -114,9 +114,8 @@ impl Squares {
 
 impl Live {
     /// Connects to arm and camera.
-    pub fn connect(endpoint: &Endpoint) -> Result<Self, Failure> {
-        let cell = CellClient::connect(endpoint, &ConnectionOptions::default(), &CellPaths::default())
-            .map_err(Failure::failed)?;
+    pub fn connect(endpoint: &Endpoint, paths: &CellPaths) -> Result<Self, Failure> {
+        let cell = CellClient::connect(endpoint, &ConnectionOptions::default(), paths).map_err(Failure::failed)?;
         if let Some(shortfall) = shortfall::of(cell.info().support(), true) {
             tracing::warn!("{}", shortfall.say(Language::English));
         }

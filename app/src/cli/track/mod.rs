@@ -10,11 +10,12 @@ use clap::Args;
 use handeye_core::track::{MotionModel, Setup};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::Endpoint;
+use handeye_sim_link::client::cell::CellPaths;
 use handeye_sim_link::client::cell::{BoardMotion, BoardPath};
 
 use super::cell::SceneArg;
 use super::output::Output;
-use super::{Failure, RerunArg, out, rerun_arg, solve};
+use super::{Failure, ObjectArgs, RerunArg, out, rerun_arg, solve};
 use crate::model::{FollowWish, Tracked};
 use crate::rerun_log::{Pace, RerunChoice};
 use live::{Job, Live, Summary, Taken, Task};
@@ -25,6 +26,8 @@ pub struct TrackArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started, with a board that moves.
     #[arg(long, value_name = "ADDR")]
     connect: Option<String>,
+    #[command(flatten)]
+    objects: ObjectArgs,
     /// The calibration: a result JSON, or a session that is solved.
     #[arg(long, value_name = "FILE")]
     calibration: PathBuf,
@@ -91,6 +94,8 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         tilt_deg: Some(motion.tilt_deg),
         ..BoardMotion::along(path, args.board_speed.unwrap_or(motion.speed_m_s))
     };
+    let paths = if args.connect.is_some() { CellPaths::default() } else { CellPaths::below(&scene.robot.name) };
+    let paths = args.objects.paths(paths);
     let server = if args.connect.is_some() {
         None
     } else {
@@ -133,7 +138,7 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         Ok(())
     };
     let mut summary = Summary::default();
-    let tracked = Live::connect(&endpoint)
+    let tracked = Live::connect(&endpoint, &paths)
         .and_then(|live| live.run(&job, &cancel, &mut Taken { publish: &mut add, summary: &mut summary }));
     // What was tracked before an error is as good as the rest.
     document.finish(&summary, tracked.as_ref().err())?;

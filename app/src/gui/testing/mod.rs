@@ -9,6 +9,7 @@ use egui_kittest::{Harness, HarnessBuilder};
 use handeye_core::depth::DepthImage;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
+use handeye_sim_link::client::cell::CellPaths;
 
 use super::shell::layout::Layout;
 use super::window::Window;
@@ -51,7 +52,7 @@ impl Silent {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
         cell.script().refusals = vec![PortError::Hopeless(Text::verbatim("not in this test")); 2];
-        let connect: Connect = Arc::new(move |_source| Arc::new(cell.clone()) as Arc<dyn Connector>);
+        let connect: Connect = Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Connector>);
         let clock: Clock = Arc::new(|| 100.0);
         let (wake, woken) = crossbeam_channel::bounded(1);
         let waker: Waker = wakes(wake);
@@ -60,6 +61,7 @@ impl Silent {
             source,
             view: ViewSettings::default(),
             addresses: Vec::new(),
+            objects: CellPaths::default(),
             sessions: folder.path().to_path_buf(),
             rerun: RerunChoice::Off,
             open: None,

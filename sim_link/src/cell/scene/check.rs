@@ -96,6 +96,7 @@ fn each_joint(field: &str, values: &JointValues, arm: &Arm) -> Check {
 fn check_robot(robot: &RobotSpec, chain: Arm) -> Result<Arm, Violation> {
     let RobotSpec {
         model: _,
+        name,
         arm,
         tip,
         start_joints_deg,
@@ -106,6 +107,9 @@ fn check_robot(robot: &RobotSpec, chain: Arm) -> Result<Arm, Violation> {
         repeatability_deg,
         joint_offset_deg,
     } = robot;
+    if name.is_empty() || name.len() > 100 || name.contains(|c: char| "/[]{}*?".contains(c) || c.is_control()) {
+        return violation("robot.name", name, "1 to 100 characters, none of them / [ ] { } * ?");
+    }
     pose("robot.arm", arm)?;
     pose("robot.tip", tip)?;
     let given = [

@@ -38,8 +38,10 @@ pub struct ResolvedScene {
     pub far_m: f64,
     /// The arm, from the arm frame (`/UR5`) to the connection, with the ranges of its joints.
     pub arm: Arm,
-    /// What the scene file calls it.
+    /// Which one it is.
     pub arm_model: ArmSpec,
+    /// What it is called in the tree of objects.
+    pub arm_name: String,
     /// Pose of the arm frame in the world.
     pub world_from_arm: Isometry3<f64>,
     /// Pose of the tip (`/UR5/Tip`) in the connection.
@@ -149,6 +151,7 @@ pub(super) fn resolve(scene: &Scene, arm: Arm, seed: u64) -> ResolvedScene {
         robot_errors: RobotErrors::new(robot, arm.joint_count(), seed),
         arm,
         arm_model: robot.model.clone(),
+        arm_name: robot.name.clone(),
         image: *image,
         depth: *depth,
         light: *light,

@@ -73,6 +73,8 @@ pub enum JointModeSpec {
 pub struct RobotSpec {
     /// Which one it is.
     pub model: ArmSpec,
+    /// What it is called in the tree of objects: `/UR5` if absent, whatever arm it is.
+    pub name: String,
     /// Pose of the arm frame (`/UR5`, of CoppeliaSim's model 14.65 mm above its mounting plane) in the world.
     pub arm: PoseSpec,
     /// Pose of the tip (`/UR5/Tip`) in the connection at the end of the arm.
@@ -100,6 +102,7 @@ impl Default for RobotSpec {
     fn default() -> Self {
         Self {
             model: ArmSpec::default(),
+            name: "UR5".to_owned(),
             arm: PoseSpec { position_m: [0.0, 0.0, 0.025], ..PoseSpec::default() },
             tip: PoseSpec { position_m: [0.0, 0.0, 0.017], ..PoseSpec::default() },
             start_joints_deg: JointValues::from([0.0, 45.0, -60.0, 0.0, 90.0, 0.0]),

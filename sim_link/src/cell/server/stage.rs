@@ -13,7 +13,7 @@ use handeye_core::geometry::arm::{Arm, JointValues};
 /// Handles of the objects that the cell itself has to find again.
 #[derive(Debug, Clone)]
 pub struct Stage {
-    /// `/UR5`, whatever arm it is: clients look for it by this name.
+    /// `/UR5` unless the scene calls it otherwise, whatever arm it is.
     pub arm: Handle,
     /// Its chain, from there to the connection.
     pub chain: Arm,
@@ -78,7 +78,7 @@ impl Builder {
     /// The arm as the tree of the simulator has one: a joint moves along or about the z axis of its frame, and what it
     /// carries has the same axes.
     fn arm(&mut self, resolved: &ResolvedScene) -> Result<(Handle, Vec<Handle>, Handle), WorldError> {
-        let arm = self.tree.add("UR5", Kind::Shape, None, resolved.world_from_arm)?;
+        let arm = self.tree.add(&resolved.arm_name, Kind::Shape, None, resolved.world_from_arm)?;
         self.tree.get_mut(arm)?.model_base = true;
         let chain = &resolved.arm;
         let at_zero = chain.frames(&vec![0.0; chain.joint_count()]).ok().ok_or(WorldError::InvalidData)?;

@@ -24,6 +24,7 @@ mod joint_elsewhere;
 mod joints;
 mod motion;
 mod objects;
+mod paths;
 mod reach;
 mod room;
 mod sentinel;
@@ -50,6 +51,7 @@ pub use jog_plan::{
     TURN_SPEED as JOG_TURN_SPEED_RAD_S,
 };
 pub use joints::{CellJoint, RAD_PER_M};
+pub use paths::{BadCellPath, CellPart, CellPaths};
 pub use reach::{ArmKinematics, UnknownKinematics};
 pub use room::{BoardReach, FollowPlace, NoPlace};
 pub use support::{Support, version_name};
@@ -64,41 +66,6 @@ use super::error::LinkError;
 use super::options::ConnectionOptions;
 use super::protocol::ProtocolVersion;
 use super::sim::{SensorOptics, Sim, SimulationState};
-
-/// Where the parts of the cell are in the scene.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CellPaths {
-    /// The base of the arm; without it the kinematics of the arm is not known. All joints between it and the tip are
-    /// driven, whatever they are called.
-    pub arm: String,
-    /// The joints of an arm whose tip does not hang on that base: all matches in the order of the tree, from the base up.
-    pub joints: String,
-    /// The dummy whose pose the controller reports.
-    pub tip: String,
-    /// The dummy that inverse kinematics follows; without it there are no motions to a pose.
-    pub target: String,
-    /// The vision sensor for colour.
-    pub camera: String,
-    /// The vision sensor for depth, at the same place.
-    pub depth: String,
-    /// The shape that the board is printed on, which is not among what stands around; there need not be one.
-    pub board: String,
-}
-
-impl Default for CellPaths {
-    /// The public UR5 hand-eye scene, which the built-in cell mimics.
-    fn default() -> Self {
-        Self {
-            arm: "/UR5".to_owned(),
-            joints: "/UR5/joint".to_owned(),
-            tip: "/UR5/Tip".to_owned(),
-            target: "/UR5/Target".to_owned(),
-            camera: "/UR5/3D_camera".to_owned(),
-            depth: "/UR5/3D_camera/depth".to_owned(),
-            board: "/Plane".to_owned(),
-        }
-    }
-}
 
 /// What is known about a cell once it has been found.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,13 +2,15 @@
 
 use handeye_core::geometry::arm::MAX_JOINTS;
 
-use super::CellPaths;
+use super::{CellPart, CellPaths};
 use crate::client::constants;
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
 
 /// Objects between the tip and the base, at most; more is a loop.
 const LONGEST_CHAIN: usize = 64;
+/// Objects that are named where one is missing, at most: each takes a call.
+const MOST_LISTED: usize = 20;
 
 /// Handles of the cell's objects.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,8 +29,8 @@ pub(super) struct CellObjects {
 
 impl CellObjects {
     pub fn find(sim: &mut Sim, paths: &CellPaths) -> Result<Self, LinkError> {
-        let tip = named(sim.get_object(&paths.tip), &paths.tip, "tip")?;
-        let arm = sim.find_object(&paths.arm)?;
+        let tip = required(sim, paths, CellPart::Tip)?;
+        let arm = optional(sim, &paths.arm)?;
         let carriers = Carriers::of(sim, tip, arm)?;
         let joints = if carriers.reach_base && !carriers.joints.is_empty() {
             carriers.joints
@@ -41,16 +43,19 @@ impl CellObjects {
         if joints.len() > MAX_JOINTS {
             return Err(LinkError::TooManyJoints { count: joints.len() });
         }
+        let target = optional(sim, &paths.target)?;
+        let camera = required(sim, paths, CellPart::Camera)?;
+        let depth = if paths.depth.is_empty() { camera } else { required(sim, paths, CellPart::Depth)? };
         Ok(Self {
             arm,
             arm_path: paths.arm.clone(),
             joints,
             tip,
-            target: sim.find_object(&paths.target)?,
+            target,
             target_path: paths.target.clone(),
-            camera: named(sim.get_object(&paths.camera), &paths.camera, "colour sensor")?,
-            depth: named(sim.get_object(&paths.depth), &paths.depth, "depth sensor")?,
-            board: sim.find_object(&paths.board)?,
+            camera,
+            depth,
+            board: optional(sim, &paths.board)?,
         })
     }
 }
@@ -91,22 +96,40 @@ fn named_joints(sim: &mut Sim, paths: &CellPaths) -> Result<Vec<ObjectHandle>, L
     while joints.len() <= MAX_JOINTS {
         let path = format!("{} [{}]", paths.joints, joints.len());
         let found = sim.get_object_index(&paths.joints, joints.len() as u32);
-        match named(found, &path, "joint of the arm") {
-            Ok(joint) => joints.push(joint),
-            Err(LinkError::NoSuchObject { .. }) if !joints.is_empty() => break,
-            Err(error) => return Err(error),
+        match present(found)? {
+            Some(joint) => joints.push(joint),
+            None if joints.is_empty() => return Err(missing(sim, &path, CellPart::Joints)),
+            None => break,
         }
     }
     Ok(joints)
 }
 
-/// An object that the scene has to have. Only when the server says that there is none it is so; another refusal is the
-/// server's to explain.
-fn named(found: Result<ObjectHandle, LinkError>, path: &str, what: &'static str) -> Result<ObjectHandle, LinkError> {
+/// An object that the scene may lack; an empty path names none.
+fn optional(sim: &mut Sim, path: &str) -> Result<Option<ObjectHandle>, LinkError> {
+    if path.is_empty() { Ok(None) } else { sim.find_object(path) }
+}
+
+/// An object that the scene has to have.
+fn required(sim: &mut Sim, paths: &CellPaths, part: CellPart) -> Result<ObjectHandle, LinkError> {
+    let path = paths.get(part);
+    let found = sim.get_object(path);
+    present(found)?.ok_or_else(|| missing(sim, path, part))
+}
+
+/// Only when the server says that there is none it is so; another refusal is the server's to explain.
+fn present(found: Result<ObjectHandle, LinkError>) -> Result<Option<ObjectHandle>, LinkError> {
     match found {
-        Ok(handle) if handle.0 >= 0 => Ok(handle),
-        Ok(_) => Err(LinkError::NoSuchObject { path: path.to_owned(), what }),
-        Err(error) if error.is_missing_object() => Err(LinkError::NoSuchObject { path: path.to_owned(), what }),
+        Ok(handle) => Ok((handle.0 >= 0).then_some(handle)),
+        Err(error) if error.is_missing_object() => Ok(None),
         Err(error) => Err(error),
     }
+}
+
+/// With the objects of that kind which the scene has, as far as the server lists them.
+fn missing(sim: &mut Sim, path: &str, part: CellPart) -> LinkError {
+    let objects = sim.get_objects_in_tree(None, part.kind().0).unwrap_or_default();
+    let paths = objects.into_iter().take(MOST_LISTED).map(|object| sim.get_object_path(object));
+    let there = paths.collect::<Result<_, _>>().unwrap_or_default();
+    LinkError::NoSuchObject { path: path.to_owned(), part, there }
 }

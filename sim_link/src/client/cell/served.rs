@@ -10,8 +10,8 @@ use std::time::Instant;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
-use super::Arm;
 use super::motion::{BRAKE_GRACE, LONGEST_BRAKING, LONGEST_MOTION};
+use super::{Arm, CellPart};
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::sim::{MotionLimits, MotionState, MotionStatus, PoseMotion};
@@ -27,7 +27,7 @@ impl Arm {
     ) -> Result<(), LinkError> {
         let Some(target) = self.objects.target else {
             let path = self.objects.target_path.clone();
-            return Err(LinkError::NoSuchObject { path, what: "target dummy of motions" });
+            return Err(LinkError::NoSuchObject { path, part: CellPart::Target, there: Vec::new() });
         };
         let motion = PoseMotion { tip: self.objects.tip, target, target_pose: *goal, limits: limits.clone() };
         match self.sim.move_to_pose_init(&motion) {

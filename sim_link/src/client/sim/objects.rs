@@ -46,6 +46,32 @@ impl Sim {
         Ok(self.call("sim.getObjectAlias", vec![object.to_value()])?.text(0)?.to_owned())
     }
 
+    /// The shortest path by which [`Self::get_object`] finds an object.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn get_object_path(&mut self, object: ObjectHandle) -> Result<String, LinkError> {
+        let args = vec![object.to_value(), Value::from(constants::ALIAS_SHORTEST_PATH)];
+        Ok(self.call("sim.getObjectAlias", args)?.text(0)?.to_owned())
+    }
+
+    /// All objects of a type (see [`crate::client::constants`]) in the scene, or in the tree of an object with that object
+    /// itself.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call.
+    pub fn get_objects_in_tree(
+        &mut self,
+        base: Option<ObjectHandle>,
+        kind: i64,
+    ) -> Result<Vec<ObjectHandle>, LinkError> {
+        let base = base.map_or(constants::HANDLE_SCENE, |base| base.0);
+        let args = vec![Value::from(base), Value::from(kind), Value::from(0)];
+        let handles = self.call("sim.getObjectsInTree", args)?.numbers(0)?;
+        // Handles are whole numbers, which a float holds exactly.
+        Ok(handles.into_iter().map(|handle| ObjectHandle(handle as i64)).collect())
+    }
+
     /// The parent of an object; `None` at the top of the scene.
     ///
     /// # Errors

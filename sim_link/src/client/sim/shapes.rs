@@ -22,11 +22,7 @@ impl Sim {
     /// # Errors
     /// Any [`LinkError`] of a call.
     pub fn get_shapes(&mut self, base: Option<ObjectHandle>) -> Result<Vec<ObjectHandle>, LinkError> {
-        let base = base.map_or(constants::HANDLE_SCENE, |base| base.0);
-        let args = vec![Value::from(base), Value::from(constants::OBJECT_SHAPE), Value::from(0)];
-        let handles = self.call("sim.getObjectsInTree", args)?.numbers(0)?;
-        // Handles are whole numbers, which a float holds exactly.
-        Ok(handles.into_iter().map(|handle| ObjectHandle(handle as i64)).collect())
+        self.get_objects_in_tree(base, constants::OBJECT_SHAPE)
     }
 
     /// The box about a shape; `None` from a server that does not tell.

@@ -7,7 +7,7 @@ use handeye_core::project::dataset::Dataset;
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::Session;
 use handeye_core::testing::python;
-use handeye_tests::{handeye_binary, workspace_root};
+use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 
 fn handeye(arguments: &[&str]) -> Output {
     Command::new(handeye_binary()).args(arguments).output().expect("the binary is built: cargo build -p handeye_app")
@@ -83,6 +83,42 @@ fn a_panda_is_calibrated_within_what_it_states_keeps_seven_joints_and_follows_th
     let tracked: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     println!("{}", tracked["summary"]);
     assert!(tracked["summary"]["follow_ended"].is_null(), "{}", tracked["summary"]);
+}
+
+/// A scene of somebody else's: the arm is a Panda and is called so.
+#[test]
+fn an_arm_of_another_name_is_calibrated_once_the_objects_of_its_scene_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let shipped = workspace_root().join("assets/scenes");
+    let scene = std::fs::read_to_string(shipped.join("panda.toml")).expect("it is there");
+    let arms = shipped.with_file_name("arms");
+    let named = scene.replace("../arms", arms.to_str().expect("UTF-8")).replacen(
+        "[robot]\n",
+        "[robot]\nname = \"Franka\"\n",
+        1,
+    );
+    assert!(named.contains("Franka"));
+    let file = folder.path().join("franka.toml");
+    std::fs::write(&file, named).expect("written");
+    let cell = CellProcess::start(&["--fast", "--scene", file.to_str().expect("UTF-8")]);
+    let address = format!("tcp://127.0.0.1:{}", cell.port());
+    let connected = ["--connect", &address, "--poses", "guided", "--goal", "0.3"];
+    let lost = handeye(&[&["auto", "--quiet"][..], &connected].concat());
+    let said = String::from_utf8_lossy(&lost.stderr).into_owned();
+    assert_eq!(lost.status.code(), Some(1), "{said}");
+    assert!(said.contains("/UR5/Tip") && said.contains("its dummies are /Target, /Tip"), "{said}");
+    let wrong = handeye(&["auto", "--object", "flange=/Franka"]);
+    assert_eq!(wrong.status.code(), Some(2), "{}", String::from_utf8_lossy(&wrong.stderr));
+
+    let objects = ["arm=/Franka", "tip=/Franka/Tip", "camera=/Franka/3D_camera", "depth=/Franka/3D_camera/depth"];
+    let objects: Vec<&str> = objects.into_iter().flat_map(|object| ["--object", object]).collect();
+    let result = auto(folder.path(), &[&connected[..], &objects].concat());
+    let (mm, deg, _) = errors(&result);
+    println!("Panda called Franka: {mm:.4} mm, {deg:.4}°");
+    let reached = result.findings.iter().find(|finding| finding.code == "goal_reached").expect("it is");
+    assert!(reached.message.contains("goal of 0.300 mm"), "{}", reached.message);
+    let stated_mm = result.quality.tip_error_95_mm.expect("stated");
+    assert!(mm < 3.0 * stated_mm, "{mm} mm, stated {stated_mm} mm");
 }
 
 #[test]

@@ -229,7 +229,7 @@ fn arm_ik(cell: &mut Cell, ik: &Fields<'_>) -> Result<(ArmIk, Isometry3<f64>), A
     tree.get(tip)?;
     let is_of_the_arm = |joints: &Vec<Handle>| joints.is_empty() || joints[..] == cell.stage.joints;
     if tree.ancestors(tip).all(|above| above != cell.stage.connection) {
-        let text = "the built-in cell solves inverse kinematics for what hangs on the end of /UR5: 'tip' does not.";
+        let text = "the built-in cell solves inverse kinematics for what hangs on the end of its arm: 'tip' does not.";
         return Err(ApiError::Other(text.to_owned()));
     }
     if ik.handles("joints")?.is_some_and(|joints| !is_of_the_arm(&joints)) {
