@@ -8,6 +8,8 @@ use std::sync::Arc;
 use handeye_core::depth::ColourMap;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::geometry::arm::JointValues;
+use handeye_core::plan::Surroundings;
+use handeye_core::plan::surroundings::KeepOutFile;
 use handeye_core::progress::Stage;
 use handeye_core::project::dataset::CameraInput;
 use handeye_core::project::export::ExportNames;
@@ -72,6 +74,12 @@ pub enum Command {
     Connect(CellSource),
     /// Say where the scene has the parts of the cell, and connect again.
     SetObjects(CellPaths),
+    /// The boxes that the arm keeps out of are these.
+    SetKeepOut(Box<KeepOutFile>),
+    /// Read them from a file.
+    ImportKeepOut(PathBuf),
+    /// Write them to a file.
+    ExportKeepOut(PathBuf),
     /// Which step of the work is in front.
     GoToStep(Step),
     /// Which dialog is open.
@@ -368,6 +376,11 @@ pub enum Event {
     Previews(Vec<(String, Preview)>),
     /// Exports were written, or not.
     Exported(Written),
+    /// What the cell says stands around.
+    #[serde(skip)]
+    Standing(Arc<Surroundings>),
+    /// Boxes to keep out of, from a file.
+    KeepOutRead(Box<KeepOutFile>),
     /// Taught poses were read from a file.
     PosesRead {
         /// Them.

@@ -141,6 +141,7 @@ fn recorded(
         view: ViewSettings::default(),
         addresses: Vec::new(),
         objects: CellPaths::default(),
+        keep_out: None,
         // A session, so that there is a file to record into.
         open: Some(sessions.join("session")),
         sessions: sessions.clone(),

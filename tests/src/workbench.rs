@@ -49,6 +49,7 @@ impl Workbench {
             view: ViewSettings::default(),
             addresses: Vec::new(),
             objects: CellPaths::default(),
+            keep_out: None,
             sessions: sessions.to_path_buf(),
             open,
             rerun,

@@ -25,6 +25,7 @@ impl App {
         }
         self.leave_by = Some(Instant::now() + ALL);
         self.model.sequence_runs = false;
+        self.keep_keep_out(true);
         // Another client's motions are none of our business.
         if self.workers.is_moving() {
             self.workers.press_stop();

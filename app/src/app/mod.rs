@@ -32,6 +32,8 @@ pub struct Start {
     pub addresses: Vec<String>,
     /// Where a scene other than the built-in one has the parts of the cell.
     pub objects: CellPaths,
+    /// Where the boxes that the arm keeps out of are kept; nowhere if not given.
+    pub keep_out: Option<PathBuf>,
     /// Where new sessions go.
     pub sessions: PathBuf,
     /// A session or data set to open at once; where there is none, a session is begun there.
@@ -78,7 +80,7 @@ impl App {
     /// # Errors
     /// When the system has no more threads, or the file of the recording cannot be made.
     pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
-        let Start { source, view, addresses, objects, sessions, open, rerun } = start;
+        let Start { source, view, addresses, objects, keep_out, sessions, open, rerun } = start;
         let recorder = Recorder::start(RecorderOptions {
             choice: rerun,
             pace: Pace::Live,
@@ -89,6 +91,8 @@ impl App {
         let desk = SessionThreads::start(sessions, &clock, &waker)?;
         let workers = Workers::start(&source, &view, &connect(&source, &objects), desk.captures(), &clock, &waker)?;
         let model = Model { addresses, objects, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
+        let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
+        let model = Model { keep_out, ..model };
         let numbers = Numbers::default();
         let recorded = crate::rerun_log::recorded::Recorded::default();
         let mut app = Self {
@@ -104,8 +108,12 @@ impl App {
             recorded,
             leave_by: None,
         };
+        if let Some(fault) = fault {
+            app.say(Severity::Error, fault);
+        }
         app.prepare_session();
         app.send_target();
+        app.send_keep_out();
         if let Some(folder) = open {
             app.open_or_begin(folder);
         }
@@ -152,6 +160,9 @@ impl App {
             Command::Reconnect => self.reconnect(),
             Command::Connect(source) => self.connect(source),
             Command::SetObjects(objects) => self.set_objects(objects),
+            Command::SetKeepOut(content) => self.set_keep_out(*content),
+            Command::ImportKeepOut(file) => self.import_keep_out(file),
+            Command::ExportKeepOut(file) => self.export_keep_out(file),
 
             Command::SetTheme(theme) => self.model.view.theme = theme,
             Command::SetLanguage(language) => self.model.view.language = language,
@@ -241,7 +252,12 @@ impl App {
     pub fn absorb(&mut self, event: Event) {
         self.record(&event);
         match event {
-            Event::Tick { now_s } => self.model.now_s = now_s,
+            Event::Tick { now_s } => {
+                self.model.now_s = now_s;
+                self.keep_keep_out(false);
+            }
+            Event::Standing(standing) => self.model.keep_out.standing = Some(standing),
+            Event::KeepOutRead(content) => self.keep_out_read(*content),
             Event::Link { link, state } => self.link_changed(link, state),
             Event::Robot(robot) => {
                 self.model.trail.add(robot.base_from_tip.translation().into());

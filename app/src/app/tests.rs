@@ -38,6 +38,7 @@ fn bench(cell: &FakeCell) -> Bench {
         view: ViewSettings::default(),
         addresses: Vec::new(),
         objects: CellPaths::default(),
+        keep_out: None,
         sessions: sessions.path().to_path_buf(),
         open: None,
         rerun: RerunChoice::Off,

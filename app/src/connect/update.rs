@@ -89,7 +89,9 @@ impl App {
         self.model.track.board = BoardMotion::default();
         self.model.track.board_hidden = false;
         self.model.trail = Trail::default();
+        self.model.keep_out.standing = None;
         self.send_target();
+        self.send_keep_out();
         self.send_tracking();
     }
 

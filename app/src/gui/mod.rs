@@ -43,6 +43,9 @@ pub use window::Window;
 /// What the workers report within this time is drawn at once: an image and the board in it, the robot's state.
 const GATHER: Duration = Duration::from_millis(20);
 
+/// Name of the file of boxes beside the settings.
+const KEEP_OUT_FILE: &str = "keep_out.toml";
+
 /// Opens the window and returns when it is closed, by a person or by a signal that asks for the end.
 ///
 /// # Errors
@@ -78,6 +81,7 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
             view: remembered.view(settings.view()),
             addresses: settings.addresses.clone(),
             objects,
+            keep_out: args.keep_out.or_else(|| settings::default_path().map(|path| path.with_file_name(KEEP_OUT_FILE))),
             sessions: settings.sessions_folder(),
             open: args.session,
             rerun: args.rerun.choice(RerunChoice::Record),

@@ -48,6 +48,7 @@ pub use crate::track::trail::{MAX_TRAIL_POINTS, Trail};
 pub use handeye_sim_link::client::cell::BoardPath;
 pub use workflow::{Dialog, Pane, Step};
 
+use crate::keep_out::state::KeepOut;
 use crate::session::start;
 use crate::text::{Language, Text};
 
@@ -268,6 +269,8 @@ pub struct Model {
     pub addresses: Vec<String>,
     /// Where a scene other than the built-in one has the parts of the cell.
     pub objects: CellPaths,
+    /// What the arm keeps out of.
+    pub keep_out: KeepOut,
     /// The board in the newest image that was searched.
     pub detection: Option<LiveDetection>,
     /// When the board was last found in the live image.
@@ -365,6 +368,7 @@ impl Model {
             messages: Messages::default(),
             addresses: Vec::new(),
             objects: CellPaths::default(),
+            keep_out: KeepOut::default(),
             detection: None,
             board_seen_s: None,
             capture: None,

@@ -102,6 +102,10 @@ pub enum Dialog {
     ImportPoses,
     /// Where taught poses are written.
     ExportPoses,
+    /// Which file of boxes to keep out of to read.
+    ImportKeepOut,
+    /// Where boxes to keep out of are written.
+    ExportKeepOut,
     /// Where exports go.
     ExportFolder,
 }

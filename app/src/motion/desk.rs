@@ -1,8 +1,9 @@
 //! What the arm is asked to do. There is one place, not a queue: what comes while the arm moves is refused with a
 //! reason, and a stop leaves nothing that could begin later.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use handeye_core::plan::Surroundings;
 use handeye_sim_link::client::CancelToken;
 
 use super::jog_line::{HELD_S, Held, JogLine};
@@ -107,6 +108,10 @@ struct Inner {
     owes_end: bool,
     /// What the window has to hear from here.
     said: Vec<Event>,
+    /// What a person keeps the arm out of.
+    keep_out: Arc<Surroundings>,
+    /// The connection does not know of it yet.
+    owes_keep_out: bool,
 }
 
 /// Shared by the application and the motion worker.
@@ -163,6 +168,19 @@ impl MotionQueue {
         }
     }
 
+    /// What the arm is to keep out of, from its next motion on and over every connection.
+    pub fn keep_out(&self, keep_out: Arc<Surroundings>) {
+        let mut inner = self.inner();
+        inner.keep_out = keep_out;
+        inner.owes_keep_out = true;
+    }
+
+    /// The same for the worker, once for each change and for each connection.
+    pub fn take_keep_out(&self) -> Option<Arc<Surroundings>> {
+        let mut inner = self.inner();
+        std::mem::take(&mut inner.owes_keep_out).then(|| Arc::clone(&inner.keep_out))
+    }
+
     /// Ends what moves, and forgets what was to move next.
     pub fn cancel(&self, now_s: f64) {
         let mut inner = self.inner();
@@ -193,7 +211,9 @@ impl MotionQueue {
 
     /// The worker has a connection.
     pub fn connected(&self) {
-        self.inner().connected = true;
+        let mut inner = self.inner();
+        inner.connected = true;
+        inner.owes_keep_out = true;
     }
 
     /// The worker has none now. What it had not begun is refused.

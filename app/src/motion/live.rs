@@ -5,7 +5,7 @@ use handeye_core::plan::guided::choose::Robot;
 use handeye_core::plan::{Contact, PlanError, Surroundings};
 use handeye_sim_link::client::cell::{
     Among, Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish,
-    JogAxes, JogEnd, JogObstacle, MotionTolerance, SettleOptions, UnknownKinematics,
+    JogAxes, JogEnd, JogObstacle, MotionTolerance, SettleOptions, Standing, UnknownKinematics,
 };
 use handeye_sim_link::client::{CancelToken, LinkError, SimulationState};
 use nalgebra::Vector3;
@@ -20,7 +20,9 @@ use crate::{limits, text};
 pub(crate) struct LiveMotion {
     arm: Arm,
     kinematics: Result<ArmKinematics, UnknownKinematics>,
-    /// What stands around, as it was when the connection was made, with what holds the board: plans are for one that stands.
+    /// What the cell says stands around, as it was when the connection was made.
+    standing: Standing,
+    /// All of it with what a person keeps the arm out of, and with what holds the board: plans are for one that stands.
     around: Surroundings,
     /// The arm among all of it that does not go along with the board.
     among: Option<Among>,
@@ -30,20 +32,24 @@ impl LiveMotion {
     /// Over an arm whose kinematics is looked at once.
     pub fn new(mut arm: Arm) -> Result<Self, LinkError> {
         let kinematics = arm.kinematics()?;
-        let mut around = Surroundings::default();
-        let mut among = None;
-        match &kinematics {
-            Ok(kinematics) => {
-                let standing = arm.surroundings(kinematics)?;
-                around = standing.all();
-                among = Some(kinematics.among(standing.around, None));
-                arm.keep_clear(among.clone());
-            }
+        let standing = match &kinematics {
+            Ok(kinematics) => arm.surroundings(kinematics)?,
             Err(why) => {
                 tracing::warn!(%why, "the kinematics of the arm is not known: goals are not checked beforehand");
+                Standing::default()
             }
-        }
-        Ok(Self { arm, kinematics, around, among })
+        };
+        let mut live = Self { arm, kinematics, standing, around: Surroundings::default(), among: None };
+        live.keep_to(&Surroundings::default());
+        Ok(live)
+    }
+
+    /// From the next motion on: to what stands around and to what a person keeps it out of.
+    fn keep_to(&mut self, keep_out: &Surroundings) {
+        let Ok(kinematics) = &self.kinematics else { return };
+        self.around = self.standing.all().and(keep_out.clone());
+        self.among = Some(kinematics.among(self.standing.around.clone().and(keep_out.clone()), None));
+        self.arm.keep_clear(self.among.clone());
     }
 
     /// Whether there is a way, before anything moves. What the arm cannot do is `Some` reason.
@@ -171,6 +177,14 @@ impl MotionPort for LiveMotion {
         let joints = self.arm.joint_values().map_err(port_error)?;
         let limits = limits::SEQUENCE;
         Ok(Ok(kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &self.around)))
+    }
+
+    fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text> {
+        self.keep_to(keep_out);
+        match &self.kinematics {
+            Ok(_known) => Ok(self.standing.all()),
+            Err(why) => Err(text!("The kinematics of the arm is not known: {why}", why = why)),
+        }
     }
 
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {

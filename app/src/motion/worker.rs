@@ -4,6 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
+use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{FollowMoment, FollowWish as ArmWish};
@@ -158,7 +159,20 @@ impl Motions {
         ended
     }
 
+    /// Before anything moves.
+    fn keep_out(&self, port: &mut dyn MotionPort, outlet: &Outlet) {
+        let Some(keep_out) = self.desk.take_keep_out() else { return };
+        match port.keep_out(&keep_out) {
+            Ok(standing) => outlet.report(Event::Standing(Arc::new(standing))),
+            Err(_why) if *keep_out == Surroundings::default() => {}
+            Err(why) => {
+                outlet.notice(Severity::Warning, text!("The arm is not kept out of the boxes: {why}", why = why));
+            }
+        }
+    }
+
     fn work(&self, port: &mut dyn MotionPort, outlet: &Outlet) -> Result<Duration, PortError> {
+        self.keep_out(port, outlet);
         match self.desk.take(outlet.now_s()) {
             Work::Motion(task, cancel) => self.run(port, &task, &cancel, outlet)?,
             Work::Jog(request) => self.jog(port, &request, outlet)?,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::plan::Surroundings;
 use handeye_core::project::session::{CaptureId, Document};
 
 use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved, Step, Tracked};
@@ -52,6 +53,13 @@ pub enum Entry {
     Tracked(Arc<Tracked>),
     /// Tip poses that guided capture goes to, the next one first.
     Planned(Vec<Pose<Base, Tip>>),
+    /// What the arm keeps clear of.
+    KeepOut {
+        /// What the cell says stands around.
+        standing: Arc<Surroundings>,
+        /// What a person keeps the arm out of.
+        own: Arc<Surroundings>,
+    },
     /// Captures that are selected in the window.
     Selected(Vec<CaptureId>),
     /// The step of the workflow, which decides what is shown.

@@ -110,7 +110,7 @@ impl Lasting {
 
     /// Keeps what is true of every recording: the cell, and what the window shows.
     pub fn begin_another(&mut self) {
-        self.items.retain(|item| matches!(item, Item::Entry(Entry::Cell(_) | Entry::Step(_))));
+        self.items.retain(|item| matches!(item, Item::Entry(Entry::Cell(_) | Entry::KeepOut { .. } | Entry::Step(_))));
     }
 }
 
@@ -120,6 +120,7 @@ fn replaces(entry: &Entry, older: &Entry) -> bool {
         (Entry::Observed { id, .. }, Entry::Observed { id: other, .. }) => id == other,
         (Entry::Cell(_), Entry::Cell(_))
         | (Entry::Document { .. }, Entry::Document { .. })
+        | (Entry::KeepOut { .. }, Entry::KeepOut { .. })
         | (Entry::Planned(_), Entry::Planned(_))
         | (Entry::Selected(_), Entry::Selected(_))
         | (Entry::Step(_), Entry::Step(_)) => true,

@@ -1,6 +1,9 @@
 //! What of the model has been recorded.
 
+use std::sync::Arc;
+
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::plan::Surroundings;
 use handeye_core::project::session::CaptureId;
 
 use crate::model::Step;
@@ -11,6 +14,8 @@ pub(crate) struct Recorded {
     pub step: Option<Step>,
     pub selection: Vec<CaptureId>,
     pub planned: Vec<Pose<Base, Tip>>,
+    /// What the cell says stands around, and what a person keeps the arm out of.
+    pub around: Option<[Arc<Surroundings>; 2]>,
     /// Messages with smaller numbers.
     pub said: u64,
 }

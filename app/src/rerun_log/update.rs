@@ -74,6 +74,12 @@ impl App {
             recorded.planned = model.planned_poses().iter().map(|planned| planned.base_from_tip).collect();
             recorder.note(Entry::Planned(recorded.planned.clone()));
         }
+        let around = [model.keep_out.standing.clone().unwrap_or_default(), Arc::clone(&model.keep_out.around)];
+        if recorded.around.as_ref() != Some(&around) {
+            let [standing, own] = around.clone();
+            recorded.around = Some(around);
+            recorder.note(Entry::KeepOut { standing, own });
+        }
         let unsaid: Vec<_> = model.messages.iter().rev().take_while(|it| it.number >= recorded.said).collect();
         for message in unsaid.into_iter().rev() {
             recorded.said = message.number + 1;

@@ -8,6 +8,7 @@ use handeye_core::geometry::arm::{ArmKind, JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
+use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish, Support};
@@ -59,6 +60,8 @@ pub struct Script {
     pub views: Result<Vec<JointValues>, Text>,
     /// The arm as guided capture drives it.
     pub robot: Result<Robot, Text>,
+    /// What the arm was told to keep out of.
+    pub keep_out: Surroundings,
     /// Motions that were begun.
     pub moved: Vec<MotionGoal>,
     /// Jogs and steps that were begun.
@@ -91,6 +94,7 @@ impl FakeCell {
             room: Room::Enough,
             views: Ok(Vec::new()),
             robot: Err(text!("The kinematics of the arm is not known")),
+            keep_out: Surroundings::default(),
             moved: Vec::new(),
             jogged: Vec::new(),
             board: BoardMotion::default(),
@@ -284,6 +288,11 @@ impl MotionPort for FakeCell {
 
     fn robot(&mut self) -> Result<Result<Robot, Text>, PortError> {
         Ok(self.answer()?.robot.clone())
+    }
+
+    fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text> {
+        self.script().keep_out = keep_out.clone();
+        Ok(Surroundings::default())
     }
 
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::thread::Builder;
 
 use handeye_core::depth::{ColourMap, DepthImage};
+use handeye_core::plan::surroundings::KeepOutFile;
 use handeye_core::project::dataset;
 use handeye_core::project::export::{self, ExportInput, ExportNames, ExportView, Format};
 use handeye_core::project::result::CalibrationResult;
@@ -14,6 +15,7 @@ use handeye_core::project::taught_poses::{TaughtPose, TaughtPoses};
 
 use super::link::Outlet;
 use crate::command::Event;
+use crate::keep_out;
 use crate::live::depth;
 use crate::model::{FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written};
 use crate::settings::SettingsWrite;
@@ -47,6 +49,17 @@ pub enum FileTask {
     },
     /// Read taught poses.
     ReadPoses(PathBuf),
+    /// Read boxes to keep out of.
+    ReadKeepOut(PathBuf),
+    /// Write boxes to keep out of.
+    WriteKeepOut {
+        /// Where.
+        file: PathBuf,
+        /// What.
+        text: String,
+        /// Whether a person waits for it to be said.
+        is_wished: bool,
+    },
     /// Write the settings.
     Settings(SettingsWrite),
     /// Write taught poses.
@@ -93,6 +106,22 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
                 outlet.report(warning.into());
             }
         }
+        FileTask::ReadKeepOut(file) => {
+            match KeepOutFile::read(&file).and_then(|content| content.surroundings(&file).map(|_around| content)) {
+                Ok(content) => outlet.report(Event::KeepOutRead(Box::new(content))),
+                Err(error) => outlet.notice(Severity::Error, text!("The boxes were not read: {error}", error = error)),
+            }
+        }
+        FileTask::WriteKeepOut { file, text, is_wished } => match keep_out::update::write(&file, &text) {
+            Ok(()) if is_wished => {
+                outlet.notice(Severity::Info, text!("Boxes written to {file}", file = file.display()));
+            }
+            Ok(()) => {}
+            Err(error) => {
+                let text = text!("The boxes were not written to {file}: {error}", file = file.display(), error = error);
+                outlet.notice(Severity::Error, text);
+            }
+        },
         FileTask::ReadPoses(file) => match TaughtPoses::read(&file) {
             Ok(taught) => outlet.report(Event::PosesRead { poses: taught.poses }),
             Err(error) => outlet.notice(Severity::Error, text!("The poses were not read: {error}", error = error)),

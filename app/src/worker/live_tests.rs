@@ -5,12 +5,14 @@ use std::thread::JoinHandle;
 
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::Base;
+use handeye_core::plan::Obstacle;
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CellPaths};
 use handeye_sim_link::client::{CallOptions, ConnectionOptions, Endpoint, Sim, SimulationState};
 use handeye_sim_link::wire;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::fake::FakeCell;
 use super::motion_tests::Bench;
@@ -174,6 +176,28 @@ fn a_stop_ends_our_own_motion_where_it_is() {
     assert_eq!(live.bench.moved(1), MotionOutcome::Stopped);
     assert!(live.is_at_rest());
     assert!((live.joints()[0] - goal[0]).abs() > 1.0);
+}
+
+/// Over this connection and over the next one.
+#[test]
+fn the_arm_does_not_go_into_a_box_that_a_person_keeps_it_out_of() {
+    let mut live = Live::new(false);
+    let (start, tip) = (live.joints(), live.tip());
+    let mut goal = start;
+    goal[0] += 1.0;
+    let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 1.0) * tip.translation();
+    let post = Obstacle::new("post", Isometry3::translation(turned.x, turned.y, turned.z), [0.1; 3]);
+    live.bench.workers.keep_out(Arc::new(Surroundings::of(vec![post])));
+    live.bench.move_to(1, MotionGoal::Joints(goal), 0.5);
+    let MotionOutcome::Refused(why) = live.bench.moved(1) else { panic!("it goes into the post") };
+    assert!(why.say(Language::English).contains("post"), "{}", why.say(Language::English));
+    assert_eq!(live.joints(), start);
+    live.bench.workers.reconnect().expect("asked");
+    live.bench.move_to(2, MotionGoal::Joints(goal), 0.5);
+    assert!(matches!(live.bench.moved(2), MotionOutcome::Refused(_)));
+    live.bench.workers.keep_out(Arc::default());
+    live.bench.move_to(3, MotionGoal::Joints(goal), 1.0);
+    assert_eq!(live.bench.moved(3), MotionOutcome::Arrived);
 }
 
 #[test]

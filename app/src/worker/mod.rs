@@ -34,6 +34,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use handeye_core::geometry::frames::{Camera as CameraFrame, Pose, Tip};
+use handeye_core::plan::Surroundings;
 use handeye_sim_link::client::CancelToken;
 
 pub use crate::connect::worker::{ControlTask, StopLine};
@@ -203,6 +204,11 @@ impl Workers {
         // Only to wake a resting worker: one that is too busy to take it looks at the stop line by itself.
         let woken = self.ask_control(Request::Do(ControlTask::CheckStop));
         tracing::debug!(?woken, "stop pressed");
+    }
+
+    /// Has the arm keep out of these from its next motion on, also over the next connection.
+    pub fn keep_out(&self, keep_out: Arc<Surroundings>) {
+        self.desk.keep_out(keep_out);
     }
 
     /// Asks for a motion. However it ends, [`Event::Moved`] tells once, also when it is refused because something moves

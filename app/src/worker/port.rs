@@ -4,6 +4,7 @@ use handeye_core::depth::DepthImage;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
+use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish};
@@ -181,6 +182,13 @@ pub trait MotionPort: Send {
     /// # Errors
     /// As [`Self::move_to`].
     fn robot(&mut self) -> Result<Result<Robot, Text>, PortError>;
+
+    /// Has the arm keep out of these, too, from its next motion on. Gives what the cell says stands around; or why nothing can be
+    /// kept out of.
+    ///
+    /// # Errors
+    /// The reason, where the kinematics is not known.
+    fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text>;
 
     /// Leads the tip where `wish` wants it, pass by pass, and returns when the arm stands: [`MotionOutcome::Stopped`] when
     /// that was wished or a stop came, and why otherwise.

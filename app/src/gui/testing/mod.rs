@@ -62,6 +62,7 @@ impl Silent {
             view: ViewSettings::default(),
             addresses: Vec::new(),
             objects: CellPaths::default(),
+            keep_out: None,
             sessions: folder.path().to_path_buf(),
             rerun: RerunChoice::Off,
             open: None,

@@ -16,6 +16,7 @@
 //! What happens between captures has no time on the time line `capture`; there robot and camera are as they were when
 //! the capture was taken, so that stepping through it shows one capture after the other.
 
+mod boxes;
 mod camera;
 mod captures;
 mod convert;
@@ -143,6 +144,10 @@ impl SceneWriter {
             Entry::Planned(poses) => {
                 pen.at(self.clock.now());
                 self.planned.write(pen, &self.known, poses)
+            }
+            Entry::KeepOut { standing, own } => {
+                pen.at(self.clock.now());
+                boxes::write(pen, standing, own)
             }
             Entry::Selected(ids) => self.selected(pen, ids),
             // The arrangement of the viewer is no part of the scene, see `blueprint`.

@@ -27,6 +27,10 @@ pub const POINTS: &str = "base/points";
 pub const CAPTURES: &str = "base/captures";
 /// Where guided capture goes next: the camera on the tip, or the board on it.
 pub const PLANNED: &str = "base/planned";
+/// Boxes about the shapes that the cell says stand around.
+pub const STANDING: &str = "base/around/scene";
+/// Boxes that a person keeps the arm out of.
+pub const KEEP_OUT: &str = "base/around/keep_out";
 /// The board as it is tracked, `base_from_target`.
 pub const TRACKED_BOARD: &str = "base/track/board";
 /// The board by the newest image alone.

@@ -46,6 +46,10 @@ pub const EXCLUDED: Color = colour(110, 110, 110);
 pub const SET_ASIDE: Color = colour(255, 120, 0);
 /// A pose that the arm goes to.
 pub const PLANNED: Color = colour(235, 235, 235);
+/// The box about a shape of the scene.
+pub const STANDING: Color = colour(120, 120, 130);
+/// A box that a person keeps the arm out of.
+pub const KEEP_OUT: Color = colour(220, 60, 60);
 /// A capture that is selected.
 pub const SELECTED: Color = colour(255, 255, 255);
 /// The tracked board.

@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use handeye_core::plan::{Obstacle, Surroundings};
 use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::track::{Estimate, State, Update};
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 use rerun::RecordingStreamBuilder;
 use rerun::log::{Chunk, LogMsg};
 
@@ -78,6 +79,20 @@ fn planned_poses_are_drawn_where_the_camera_will_be_and_go_when_they_are_over() 
     // One is left; the other two are written anew, empty.
     assert_eq!(bench.write(&Entry::Planned(vec![tip])).len(), 3);
     assert_eq!(bench.write(&Entry::Planned(Vec::new())).len(), 1);
+}
+
+#[test]
+fn boxes_to_keep_clear_of_are_drawn_with_their_names_and_go_with_them() {
+    let mut bench = Bench::new();
+    bench.begin();
+    let post = Obstacle::new("post", Isometry3::translation(0.4, 0.0, 0.2), [0.1, 0.1, 0.4]);
+    let standing = Arc::new(Surroundings::of(vec![post.clone()]));
+    let written =
+        bench.write(&Entry::KeepOut { standing: Arc::clone(&standing), own: Arc::new(Surroundings::of(vec![post])) });
+    let labels = |path: &str| written[path].components.iter().any(|it| it.contains("labels"));
+    assert!(labels("/base/around/keep_out") && !labels("/base/around/scene"), "{written:?}");
+    let none = bench.write(&Entry::KeepOut { standing, own: Arc::default() });
+    assert!(none.contains_key("/base/around/keep_out"), "written anew without a box: {none:?}");
 }
 
 fn document(model: &Model) -> Entry {

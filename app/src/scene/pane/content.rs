@@ -7,6 +7,7 @@ use nalgebra::Point3;
 
 use super::arm;
 use super::board::{self, Line};
+use super::boxes;
 use super::camera::Frustum;
 use super::canvas::Canvas;
 use super::captures::{self, Spot};
@@ -52,6 +53,7 @@ pub fn draw(canvas: &mut Canvas, ui: &Ui, model: &Model, table: &CaptureTable, p
         }
         canvas.axes(robot.base_from_tip.isometry(), AXES_M, 2.2, marks.axes);
     }
+    entries.extend(boxes::boxes(canvas, &model.keep_out, language, palette));
     live_camera(canvas, &known, language, palette, &mut entries);
     let spots = captures::captures(canvas, model, &known, palette, marks, pointed);
     entries.extend(planned::planned(canvas, model, &known, language, palette));

@@ -117,6 +117,14 @@ impl Eye {
         seen
     }
 
+    /// What of the ground, the plane z = 0, is behind a point on the screen; `None` over the horizon.
+    pub fn on_ground(&self, at: Pos2) -> Option<Point3<f64>> {
+        let offset = at - self.middle;
+        let sight = self.forward * self.focal + self.right * f64::from(offset.x) - self.up * f64::from(offset.y);
+        let along = -self.at.z / sight.z;
+        (along.is_finite() && along > 0.0).then(|| self.at + sight * along)
+    }
+
     /// Whether a face with this normal is seen from its front.
     pub fn faces(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> bool {
         (self.at - point).dot(normal) > 0.0

@@ -5,6 +5,7 @@
 
 mod arm;
 mod board;
+mod boxes;
 mod camera;
 mod canvas;
 mod captures;
@@ -24,6 +25,8 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::marks;
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
+use crate::keep_out;
+use crate::keep_out::state::with_drawn;
 use crate::model::{Model, SceneView};
 use crate::text::Language;
 use crate::{text, tr};
@@ -78,6 +81,7 @@ fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             outbox.send(Command::SetSceneView(view));
         }
     }
+    keep_out::pane::header_ui(ui, model);
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let hint = tr!(language, "Drag to turn, Shift-drag to shift, wheel to zoom");
         let hint = RichText::new(hint).size(crate::gui::style::theme::CAPTION).color(Palette::of(ui).weak);
@@ -99,15 +103,45 @@ fn room_ui(ui: &mut Ui, room: Rect, model: &Model, table: &CaptureTable, outbox:
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, tr!(language, "The cell in 3D")));
     let key = ui.id().with("pointed at");
     let pointed: Option<CaptureId> = parts::remembered(ui, key);
-    let mut canvas = Canvas::new(Eye::new(&model.scene, room), Palette::of(ui).ink);
+    let eye = Eye::new(&model.scene, keep_out::pane::room_beside(ui, room));
+    let mut canvas = Canvas::new(eye, Palette::of(ui).ink);
     let drawn = content::draw(&mut canvas, ui, model, table, pointed);
+    let is_drawing = keep_out::pane::is_drawing(ui);
+    if is_drawing {
+        draw_box(ui, &response, &mut canvas, model, outbox);
+    }
     canvas.paint(ui.painter());
     legend::legend_ui(ui, room, &drawn.entries);
     let now = spots_ui(ui, room, model, table, &drawn.spots, outbox);
     if now != pointed {
         parts::remember(ui, key, now);
     }
-    navigate(ui, &response, room, model, outbox);
+    if !is_drawing {
+        navigate(ui, &response, room, model, outbox);
+    }
+    keep_out::pane::editor_ui(ui, room, model, outbox);
+}
+
+/// A box over the rectangle of the ground that is dragged over.
+fn draw_box(ui: &Ui, response: &Response, canvas: &mut Canvas, model: &Model, outbox: &mut Outbox) {
+    let ends = ui.input(|input| Some([input.pointer.press_origin()?, input.pointer.latest_pos()?]));
+    let key = ui.id().with("drawn rectangle");
+    if response.dragged()
+        && let Some([from, to]) = ends
+        && let (Some(from), Some(to)) = (canvas.eye.on_ground(from), canvas.eye.on_ground(to))
+    {
+        boxes::rectangle(canvas, [from, to], Palette::of(ui));
+        parts::remember(ui, key, Some([[from.x, from.y], [to.x, to.y]]));
+    }
+    if response.drag_stopped()
+        && let Some([from, to]) = parts::remembered::<Option<[[f64; 2]; 2]>>(ui, key)
+    {
+        parts::remember(ui, key, None::<[[f64; 2]; 2]>);
+        if let Some(content) = with_drawn(&model.keep_out.content, from, to) {
+            outbox.send(Command::SetKeepOut(Box::new(content)));
+            keep_out::pane::set_drawing(ui, false);
+        }
+    }
 }
 
 /// What the pointer does to captures; gives the one that it is over.

@@ -1,5 +1,6 @@
 use egui::{Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
+use handeye_core::plan::surroundings::KeepOutFile;
 
 use super::*;
 use crate::gui::testing::pane_harness::PaneHarness;
@@ -143,6 +144,58 @@ fn what_is_drawn_is_named_by_where_it_comes_from() {
     }
     let without = pane(without);
     assert!(!legend(&without, "Camera, as the cell says") && !legend(&without, "Board, true"));
+}
+
+#[test]
+fn a_box_to_keep_out_of_is_drawn_on_the_ground_named_and_deleted() {
+    let mut model = sample::connected();
+    model.scene = Side::Top.view(model.scene);
+    let mut pane = pane(model);
+    pane.click("Keep-out boxes");
+    pane.steps();
+    pane.click("Draw a box");
+    pane.steps();
+    let from = pane.rect(VIEW).left_bottom() + vec2(60.0, -60.0);
+    let to = from + vec2(80.0, -50.0);
+    let room = pane.rect(VIEW);
+    let eye = Eye::new(&pane.model().scene, Rect::from_min_max(room.min, room.max - vec2(268.0, 0.0)));
+    let press = |pos, pressed| egui::Event::PointerButton {
+        pos,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::NONE,
+    };
+    pane.commands();
+    pane.harness.hover_at(from);
+    pane.harness.step();
+    pane.harness.event(press(from, true));
+    pane.harness.step();
+    pane.harness.event(egui::Event::PointerMoved(to));
+    pane.harness.step();
+    pane.harness.event(press(to, false));
+    pane.steps();
+    let commands = pane.commands();
+    let [Command::SetKeepOut(content)] = &commands[..] else { panic!("the view is not turned by it: {commands:?}") };
+    let ends = [from, to].map(|at| eye.on_ground(at).expect("seen from above"));
+    let drawn = &content.boxes[0];
+    for axis in 0..2 {
+        // Rounded to millimetres.
+        assert!((drawn.size_m[axis] - (ends[1][axis] - ends[0][axis]).abs()).abs() < 1e-3, "{drawn:?} {ends:?}");
+        assert!(
+            (drawn.centre_m[axis] - f64::midpoint(ends[0][axis], ends[1][axis])).abs() < 1e-3,
+            "{drawn:?} {ends:?}"
+        );
+    }
+    assert!((drawn.size_m[2], drawn.centre_m[2]) == (0.2, 0.1), "it stands on the ground");
+
+    let content = KeepOutFile::clone(content);
+    pane.model().keep_out.set(content);
+    pane.steps();
+    assert!(pane.sees("Keep-out boxes: 1"));
+    let deleted = pane.click("Delete box 1");
+    assert_eq!(deleted, [Command::SetKeepOut(Box::default())]);
+    let drags = drag(&mut pane, vec2(-30.0, 10.0), PointerButton::Secondary, Modifiers::NONE);
+    assert!(matches!(drags[..], [Command::SetSceneView(_)]), "one box is one drag: {drags:?}");
 }
 
 #[test]

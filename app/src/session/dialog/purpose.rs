@@ -9,6 +9,8 @@ use crate::tr;
 
 /// Name of a new file of poses.
 const POSES_FILE: &str = "poses.toml";
+/// Name of a new file of boxes to keep out of.
+const KEEP_OUT_FILE: &str = "keep_out.toml";
 
 /// A dialog.
 pub struct Purpose {
@@ -48,6 +50,16 @@ impl Purpose {
                 tr!(language, "A file that can be read, edited and imported again."),
                 tr!(language, "Write"),
             ),
+            Dialog::ImportKeepOut => (
+                tr!(language, "Read keep-out boxes"),
+                tr!(language, "The boxes of the file come in place of those that are there."),
+                tr!(language, "Read"),
+            ),
+            Dialog::ExportKeepOut => (
+                tr!(language, "Write keep-out boxes"),
+                tr!(language, "A file that “handeye auto --keep-out” takes, too."),
+                tr!(language, "Write"),
+            ),
             Dialog::ExportFolder => (
                 tr!(language, "Folder for exports"),
                 tr!(language, "A folder that is not there is made."),
@@ -74,17 +86,17 @@ impl Purpose {
 
     /// Whether the last part of the path is a new name, which stays when another folder is listed.
     pub fn is_named(&self) -> bool {
-        matches!(self.dialog, Dialog::SaveAs | Dialog::New | Dialog::ExportPoses)
+        matches!(self.dialog, Dialog::SaveAs | Dialog::New | Dialog::ExportPoses | Dialog::ExportKeepOut)
     }
 
     /// Whether Enter on a path that was typed lists it first.
     pub fn enters_typed(&self) -> bool {
-        matches!(self.dialog, Dialog::Open | Dialog::ImportPoses)
+        matches!(self.dialog, Dialog::Open | Dialog::ImportPoses | Dialog::ImportKeepOut)
     }
 
     /// Whether files are shown.
     pub fn shows_files(&self) -> bool {
-        matches!(self.dialog, Dialog::ImportPoses | Dialog::ExportPoses)
+        matches!(self.dialog, Dialog::ImportPoses | Dialog::ExportPoses | Dialog::ImportKeepOut | Dialog::ExportKeepOut)
     }
 
     /// Whether the dialog stays until it is known how it went.
@@ -98,6 +110,7 @@ impl Purpose {
         match &self.dialog {
             Dialog::New => String::new(),
             Dialog::ExportPoses => joined(&folder, POSES_FILE),
+            Dialog::ExportKeepOut => joined(&folder, KEEP_OUT_FILE),
             Dialog::SaveAs => {
                 let name = model.session.name().unwrap_or_else(|| "session".to_owned());
                 joined(&folder, &format!("{name}-copy"))
@@ -132,10 +145,12 @@ impl Purpose {
             Dialog::SaveAs => Some(Command::SaveAs(path)),
             Dialog::New => Some(Command::NewSession(Some(path))),
             Dialog::ImportPoses => is_file.then_some(Command::ImportTaught(path)),
-            Dialog::ExportPoses => {
+            Dialog::ExportPoses | Dialog::ExportKeepOut => {
                 let named = if is_file { path } else { PathBuf::from(format!("{typed}.toml")) };
-                Some(Command::ExportTaught(named))
+                let is_poses = self.dialog == Dialog::ExportPoses;
+                Some(if is_poses { Command::ExportTaught(named) } else { Command::ExportKeepOut(named) })
             }
+            Dialog::ImportKeepOut => is_file.then_some(Command::ImportKeepOut(path)),
             Dialog::ExportFolder => Some(Command::SetExportFolder(Some(path))),
             Dialog::Help | Dialog::Palette | Dialog::About | Dialog::RerunAddress => None,
         }

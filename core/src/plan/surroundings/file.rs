@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Obstacle, SpeedLimits, Surroundings, WorkVolume};
 
@@ -108,37 +108,59 @@ pub enum EntryFault {
     SameName,
 }
 
-#[derive(Deserialize)]
+/// What a file of surroundings says, in its own units; [`Self::surroundings`] is what it means.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawFile {
-    #[serde(default, rename = "box")]
-    boxes: Vec<RawBox>,
-    volume: Option<RawVolume>,
-    limits: Option<RawLimits>,
+pub struct KeepOutFile {
+    /// What must not be touched.
+    #[serde(default, rename = "box", skip_serializing_if = "Vec::is_empty")]
+    pub boxes: Vec<KeepOutBox>,
+    /// Where tip and camera have to stay.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume: Option<KeepInVolume>,
+    /// How fast the arm may go.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<KeepBelow>,
 }
 
-#[derive(Deserialize)]
+/// A box of a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawBox {
-    name: String,
-    centre_m: [f64; 3],
-    size_m: [f64; 3],
-    rotation_xyzw: Option<[f64; 4]>,
-    yaw_deg: Option<f64>,
+pub struct KeepOutBox {
+    /// What it is called in messages; no two alike.
+    pub name: String,
+    /// Its middle in the base, metres.
+    pub centre_m: [f64; 3],
+    /// Whole edges, metres.
+    pub size_m: [f64; 3],
+    /// Any rotation, a unit quaternion; not together with `yaw_deg`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation_xyzw: Option<[f64; 4]>,
+    /// About z of the base, degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub yaw_deg: Option<f64>,
 }
 
-#[derive(Deserialize)]
+/// The work volume of a file: a box along the axes of the base.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawVolume {
-    min_m: [f64; 3],
-    max_m: [f64; 3],
+pub struct KeepInVolume {
+    /// The corner with the smallest coordinates, metres.
+    pub min_m: [f64; 3],
+    /// The corner with the largest coordinates, metres.
+    pub max_m: [f64; 3],
 }
 
-#[derive(Deserialize)]
+/// The limits of speed of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawLimits {
-    tip_speed_m_s: Option<f64>,
-    joint_speed_deg_s: Option<f64>,
+pub struct KeepBelow {
+    /// Of the tip, m/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_speed_m_s: Option<f64>,
+    /// Of every joint that turns, degrees/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_speed_deg_s: Option<f64>,
 }
 
 impl Surroundings {
@@ -146,6 +168,16 @@ impl Surroundings {
     ///
     /// # Errors
     /// [`SurroundingsError`] names the file and the entry.
+    pub fn read(file: &Path) -> Result<Self, SurroundingsError> {
+        KeepOutFile::read(file)?.surroundings(file)
+    }
+}
+
+impl KeepOutFile {
+    /// Out of a file.
+    ///
+    /// # Errors
+    /// [`SurroundingsError::Unreadable`] and [`SurroundingsError::Syntax`]; what the values mean is not looked at.
     pub fn read(file: &Path) -> Result<Self, SurroundingsError> {
         let text = fs::read_to_string(file)
             .map_err(|source| SurroundingsError::Unreadable { file: file.to_owned(), source })?;
@@ -155,27 +187,43 @@ impl Surroundings {
     /// Out of the text of a file; its name is for messages.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// [`SurroundingsError::Syntax`].
     pub fn parse(file: &Path, text: &str) -> Result<Self, SurroundingsError> {
-        let raw: RawFile = toml::from_str(text).map_err(|error| SurroundingsError::Syntax {
+        toml::from_str(text).map_err(|error| SurroundingsError::Syntax {
             file: file.to_owned(),
             message: error.to_string().trim_end().to_owned(),
-        })?;
+        })
+    }
+
+    /// The text of such a file.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("names and numbers can be written as TOML")
+    }
+
+    /// What it means; the name of the file is for messages.
+    ///
+    /// # Errors
+    /// [`SurroundingsError::Entry`] for the first entry that makes no sense.
+    pub fn surroundings(&self, file: &Path) -> Result<Surroundings, SurroundingsError> {
         let at = |entry: String| move |fault| SurroundingsError::Entry { file: file.to_owned(), entry, fault };
-        let mut obstacles: Vec<Obstacle> = Vec::with_capacity(raw.boxes.len());
-        for (index, raw) in raw.boxes.iter().enumerate() {
-            let is_known = obstacles.iter().any(|earlier| earlier.name == raw.name);
-            let read = if is_known { Err(EntryFault::SameName) } else { raw.obstacle() };
-            obstacles.push(read.map_err(at(format!("box {} {:?}", index + 1, raw.name)))?);
+        let mut obstacles: Vec<Obstacle> = Vec::with_capacity(self.boxes.len());
+        for (index, entry) in self.boxes.iter().enumerate() {
+            let is_known = obstacles.iter().any(|earlier| earlier.name == entry.name);
+            let read = if is_known { Err(EntryFault::SameName) } else { entry.obstacle() };
+            obstacles.push(read.map_err(at(format!("box {} {:?}", index + 1, entry.name)))?);
         }
-        let volume = raw.volume.map(|raw| raw.volume().map_err(at("[volume]".to_owned()))).transpose()?;
-        let limits = raw.limits.map(|raw| raw.limits().map_err(at("[limits]".to_owned()))).transpose()?;
-        Ok(Self { obstacles, volume, limits: limits.unwrap_or_default() })
+        let volume = self.volume.map(|volume| volume.volume().map_err(at("[volume]".to_owned()))).transpose()?;
+        let limits = self.limits.map(|limits| limits.limits().map_err(at("[limits]".to_owned()))).transpose()?;
+        Ok(Surroundings { obstacles, volume, limits: limits.unwrap_or_default() })
     }
 }
 
-impl RawBox {
-    fn obstacle(&self) -> Result<Obstacle, EntryFault> {
+impl KeepOutBox {
+    /// What it means.
+    ///
+    /// # Errors
+    /// [`EntryFault`] says which value makes no sense.
+    pub fn obstacle(&self) -> Result<Obstacle, EntryFault> {
         if self.name.trim().is_empty() {
             return Err(EntryFault::NoName);
         }
@@ -205,7 +253,7 @@ impl RawBox {
     }
 }
 
-impl RawVolume {
+impl KeepInVolume {
     fn volume(&self) -> Result<WorkVolume, EntryFault> {
         metres("min_m", &self.min_m)?;
         metres("max_m", &self.max_m)?;
@@ -216,7 +264,7 @@ impl RawVolume {
     }
 }
 
-impl RawLimits {
+impl KeepBelow {
     fn limits(&self) -> Result<SpeedLimits, EntryFault> {
         let speeds = [("tip_speed_m_s", self.tip_speed_m_s), ("joint_speed_deg_s", self.joint_speed_deg_s)];
         for (key, value) in speeds.into_iter().filter_map(|(key, value)| Some((key, value?))) {
@@ -271,7 +319,8 @@ joint_speed_deg_s = 30.0
 "#;
 
     fn parse(text: &str) -> Result<Surroundings, SurroundingsError> {
-        Surroundings::parse(Path::new("keep_out.toml"), text)
+        let file = Path::new("keep_out.toml");
+        KeepOutFile::parse(file, text)?.surroundings(file)
     }
 
     #[test]
@@ -283,6 +332,15 @@ joint_speed_deg_s = 30.0
         assert_eq!(read.volume.expect("a volume").max_m.z, 1.2);
         assert!((read.limits.joint(10.0) - 30_f64.to_radians()).abs() < 1e-12 && read.limits.tip(1.0) == 0.25);
         assert_eq!(parse("").expect("nothing is nothing"), Surroundings::default());
+    }
+
+    #[test]
+    fn what_is_written_reads_as_it_was() {
+        let file = Path::new("keep_out.toml");
+        for text in [GOOD, ""] {
+            let read = KeepOutFile::parse(file, text).expect("a good file");
+            assert_eq!(KeepOutFile::parse(file, &read.to_toml()).expect("as good"), read);
+        }
     }
 
     #[test]

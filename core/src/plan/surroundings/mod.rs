@@ -2,7 +2,7 @@
 
 mod file;
 
-pub use file::{EntryFault, SurroundingsError};
+pub use file::{EntryFault, KeepBelow, KeepInVolume, KeepOutBox, KeepOutFile, SurroundingsError};
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -79,6 +79,14 @@ impl Obstacle {
     /// A box of this name; its pose is that of its centre in the base, its edges are metres.
     pub fn new(name: impl Into<String>, world_from_centre: Isometry3<f64>, size_m: [f64; 3]) -> Self {
         Self { name: name.into(), world_from_centre, size_m }
+    }
+
+    /// Its corners in the base, metres: the one at the smallest coordinates of the box first, then x fastest and z slowest.
+    pub fn corners(&self) -> [Point3<f64>; 8] {
+        std::array::from_fn(|corner| {
+            let side = |axis: usize| if corner >> axis & 1 == 1 { 0.5 } else { -0.5 } * self.size_m[axis];
+            self.world_from_centre * Point3::new(side(0), side(1), side(2))
+        })
     }
 
     /// Distance of a point of the base from its surface, metres; below zero inside.

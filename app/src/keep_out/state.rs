@@ -1,0 +1,108 @@
+//! What the arm keeps out of.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use handeye_core::plan::Surroundings;
+use handeye_core::plan::surroundings::{KeepOutBox, KeepOutFile};
+
+use crate::text::Text;
+
+/// Height of a box that is drawn on the ground \[m\].
+const DRAWN_HEIGHT_M: f64 = 0.2;
+/// Least edge of a box that is drawn \[m\]: less is a slip of the hand.
+const LEAST_DRAWN_M: f64 = 0.01;
+
+/// The boxes, and what the cell says.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct KeepOut {
+    /// As they are edited.
+    pub content: KeepOutFile,
+    /// What the arm keeps to: what the newest content that makes sense means.
+    pub around: Arc<Surroundings>,
+    /// Why the content is not what the arm keeps to.
+    pub fault: Option<Text>,
+    /// Where they are kept; nowhere where that cannot be read or the system has no folder for it.
+    pub file: Option<PathBuf>,
+    /// Since when \[s\] they are to be written.
+    pub unwritten_since_s: Option<f64>,
+    /// What the cell says stands around; `None` before it has said so.
+    pub standing: Option<Arc<Surroundings>>,
+}
+
+impl KeepOut {
+    /// Takes in other boxes. What makes no sense is shown and not kept to.
+    pub fn set(&mut self, content: KeepOutFile) {
+        let file = self.file.as_deref().unwrap_or_else(|| Path::new("keep-out boxes"));
+        match content.surroundings(file) {
+            Ok(around) => {
+                self.around = Arc::new(around);
+                self.fault = None;
+            }
+            Err(error) => self.fault = Some(Text::verbatim(error.to_string())),
+        }
+        self.content = content;
+    }
+}
+
+/// A name that no box has.
+fn free_name(boxes: &[KeepOutBox]) -> String {
+    let is_free = |name: &String| boxes.iter().all(|other| other.name != *name);
+    // One of them is free: there are more numbers than boxes.
+    (1..=boxes.len() + 1).map(|number| format!("box {number}")).find(is_free).unwrap_or_default()
+}
+
+/// With a box more, over a rectangle of the ground from one corner to the opposite one \[m\]; `None` where that is hardly one.
+pub fn with_drawn(content: &KeepOutFile, from: [f64; 2], to: [f64; 2]) -> Option<KeepOutFile> {
+    let edge = |axis: usize| (to[axis] - from[axis]).abs();
+    if edge(0) < LEAST_DRAWN_M || edge(1) < LEAST_DRAWN_M {
+        return None;
+    }
+    let millimetres = |m: f64| (m * 1e3).round() / 1e3;
+    let middle = |axis: usize| millimetres(f64::midpoint(from[axis], to[axis]));
+    let mut content = content.clone();
+    content.boxes.push(KeepOutBox {
+        name: free_name(&content.boxes),
+        centre_m: [middle(0), middle(1), DRAWN_HEIGHT_M / 2.0],
+        size_m: [millimetres(edge(0)), millimetres(edge(1)), DRAWN_HEIGHT_M],
+        rotation_xyzw: None,
+        yaw_deg: None,
+    });
+    Some(content)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_makes_no_sense_is_shown_and_the_arm_keeps_to_what_was_before() {
+        let mut keep_out = KeepOut::default();
+        let one = with_drawn(&keep_out.content, [0.5, 0.3], [0.2, -0.1]).expect("a rectangle");
+        keep_out.set(one.clone());
+        assert_eq!((keep_out.around.obstacles.len(), keep_out.fault.is_some()), (1, false));
+        let [size, centre] = [keep_out.content.boxes[0].size_m, keep_out.content.boxes[0].centre_m];
+        assert_eq!((size, centre), ([0.3, 0.4, 0.2], [0.35, 0.1, 0.1]));
+        let mut flat = one.clone();
+        flat.boxes[0].size_m[1] = 0.0;
+        keep_out.set(flat.clone());
+        assert_eq!((keep_out.around.obstacles[0].size_m, keep_out.content.clone()), ([0.3, 0.4, 0.2], flat));
+        assert!(keep_out.fault.is_some());
+        keep_out.set(one);
+        assert_eq!(keep_out.fault, None);
+    }
+
+    #[test]
+    fn a_slip_of_the_hand_is_no_box_and_names_are_told_apart() {
+        let none = KeepOutFile::default();
+        assert_eq!(with_drawn(&none, [0.1, 0.1], [0.4, 0.105]), None);
+        let mut content = none;
+        for _ in 0..3 {
+            content = with_drawn(&content, [0.0, 0.0], [0.1, 0.1]).expect("a rectangle");
+        }
+        content.boxes.remove(0);
+        content = with_drawn(&content, [0.0, 0.0], [0.1, 0.1]).expect("a rectangle");
+        let names: Vec<&str> = content.boxes.iter().map(|it| it.name.as_str()).collect();
+        assert_eq!(names, ["box 2", "box 3", "box 1"]);
+    }
+}
