@@ -376,9 +376,9 @@ pub enum Event {
     Previews(Vec<(String, Preview)>),
     /// Exports were written, or not.
     Exported(Written),
-    /// What the cell says stands around.
+    /// What the cell says stands around, now that the arm keeps out of the boxes, too; or why it does not.
     #[serde(skip)]
-    Standing(Arc<Surroundings>),
+    Standing(Result<Arc<Surroundings>, Text>),
     /// Boxes to keep out of, from a file.
     KeepOutRead(Box<KeepOutFile>),
     /// Taught poses were read from a file.

@@ -122,8 +122,10 @@ fn objects_of_the_scene_are_in_the_file_once_they_are_changed_and_not_those_of_o
     write(file.keep(settings.view(), &[], &chosen)).expect("it can be written");
     assert_eq!(SettingsFile::open(Some(path), nothing).1.objects, chosen);
     let mut read = Settings::default();
-    let warnings = said(&read.read("settings.toml", "[objects]\nflange = \"/Panda\"\n"));
-    assert!(warnings[0].contains("flange") && read == Settings::default(), "{warnings:?}");
+    for (line, why) in [("flange = \"/Panda\"", "flange"), ("tip = \"Panda\"", "begins with /")] {
+        let warnings = said(&read.read("settings.toml", &format!("[objects]\n{line}\n")));
+        assert!(warnings[0].contains(why) && read == Settings::default(), "{warnings:?}");
+    }
 }
 
 #[test]

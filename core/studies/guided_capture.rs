@@ -66,7 +66,7 @@ fn by_hand(sessions: u64) {
         let (mut stated_mm, mut below, mut solved) = (0.0, 0, 0);
         for seed in 0..sessions {
             let setup =
-                CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens: false, straight: false, seed };
+                CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens: false, straight: None, seed };
             let mut cell = GuidedCell::new(setup);
             let run = hand::session(&mut cell, GuidedOptions { goal_m: 1e-9, ..GuidedOptions::default() }, 10, seed);
             took_s.extend(run.took_s);
@@ -292,7 +292,7 @@ fn choice(sessions: u64) {
         let all: Vec<([Way; 4], Vec<f64>)> = (0..sessions)
             .into_par_iter()
             .map(|seed| {
-                let setup = CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: false, seed };
+                let setup = CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, seed };
                 let bench = Bench::new(setup);
                 let cell = GuidedCell::new(setup);
                 let ways = [bench.guided(), bench.farthest(&cell), bench.random(&cell), bench.easy_handeye(&cell)];
@@ -343,7 +343,7 @@ fn speed(sessions: u64) {
             let mut times: Vec<f64> = (0..sessions)
                 .map(|seed| {
                     let mut cell =
-                        GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens, straight: false, seed });
+                        GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens, straight: None, seed });
                     let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
                     let calibration = cell.calibrate();
                     let known = cell.known(calibration.as_ref(), 0.0);
@@ -368,7 +368,7 @@ fn looks(arm: CellArm, mode: Mode, sessions: u64) {
     let mut times: Vec<f64> = Vec::new();
     for seed in 0..sessions {
         let mut cell =
-            GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: false, seed });
+            GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, seed });
         let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
         let calibration = cell.calibrate();
         let truth = cell.truth();
@@ -412,7 +412,7 @@ fn stop(sessions: u64) {
                 .into_par_iter()
                 .map(|seed| {
                     let arm = CellArm::ALL[seed as usize % 3];
-                    GuidedCell::new(CellSetup { arm, mode, noise, free_lens, straight: false, seed: 1000 + seed })
+                    GuidedCell::new(CellSetup { arm, mode, noise, free_lens, straight: None, seed: 1000 + seed })
                         .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
                 })
                 .collect();

@@ -48,5 +48,5 @@ fn row(name: &str, moves: usize, is_known: bool) {
 fn setup(seed: u64) -> CellSetup {
     let arm = CellArm::ALL[(seed % 3) as usize];
     let mode = if (seed / 3).is_multiple_of(2) { Mode::EyeInHand } else { Mode::EyeToHand };
-    CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: false, seed }
+    CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, seed }
 }

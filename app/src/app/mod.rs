@@ -256,7 +256,7 @@ impl App {
                 self.model.now_s = now_s;
                 self.keep_keep_out(false);
             }
-            Event::Standing(standing) => self.model.keep_out.standing = Some(standing),
+            Event::Standing(standing) => self.standing_found(standing),
             Event::KeepOutRead(content) => self.keep_out_read(*content),
             Event::Link { link, state } => self.link_changed(link, state),
             Event::Robot(robot) => {

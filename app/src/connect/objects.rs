@@ -1,6 +1,6 @@
 //! Where the scene has the parts of the cell.
 
-use egui::{CollapsingHeader, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
+use egui::{CollapsingHeader, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::cell::{BadCellPath, CellPart, CellPaths};
 
 use crate::command::{Command, Outbox};
@@ -13,14 +13,18 @@ use crate::{text, tr};
 /// The paths as they are typed; `None` while nothing was.
 pub(super) type Draft = Option<[String; CellPart::ALL.len()]>;
 
-/// A path for each part, folded while those of the public scene are in use and found.
+/// A path for each part, folded while those of the public scene are in use; unfolded when a search fails.
 pub(super) fn objects_ui(ui: &mut Ui, model: &Model, draft: &mut Draft, outbox: &mut Outbox) {
     let language = model.view.language;
-    let is_found = !matches!(model.control, LinkState::Failed { .. } | LinkState::Retrying { .. });
-    let is_open = model.objects != CellPaths::default() || !is_found;
+    let key = Id::new("objects were not found");
+    // A search that has failed once: nothing answers there, or something is missing.
+    let is_missed = matches!(model.control, LinkState::Searching { attempt: 2.., .. } | LinkState::Failed { .. });
+    let was_missed: bool = parts::remembered(ui, key);
+    parts::remember(ui, key, is_missed);
     CollapsingHeader::new(tr!(language, "Objects of the scene"))
         .id_salt("objects of the scene")
-        .default_open(is_open)
+        .default_open(model.objects != CellPaths::default())
+        .open((is_missed && !was_missed).then_some(true))
         .show(ui, |ui| {
             let hint = tr!(language, "Paths as in the scene hierarchy of CoppeliaSim, such as /Panda/Tip");
             parts::hint_ui(ui, hint);

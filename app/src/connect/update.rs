@@ -44,7 +44,11 @@ impl App {
         self.expect(text!("The simulation was not started"), asked);
     }
 
+    /// Tries now what is being tried. A connection that works is made anew, because the scene may be another one.
     pub(crate) fn reconnect(&mut self) {
+        if self.model.control.is_connected() && matches!(self.model.source, CellSource::Address(_)) {
+            return self.connect(self.model.source.clone());
+        }
         let asked = self.workers.reconnect();
         self.expect(text!("The connection was not tried again"), asked);
     }
@@ -90,6 +94,7 @@ impl App {
         self.model.track.board_hidden = false;
         self.model.trail = Trail::default();
         self.model.keep_out.standing = None;
+        self.model.keep_out.unkept = None;
         self.send_target();
         self.send_keep_out();
         self.send_tracking();
@@ -98,7 +103,9 @@ impl App {
     /// The objects of the scene are others: everything that was read of them is, too.
     pub(crate) fn set_objects(&mut self, objects: CellPaths) {
         self.model.objects = objects;
-        self.connect(self.model.source.clone());
+        if matches!(self.model.source, CellSource::Address(_)) {
+            self.connect(self.model.source.clone());
+        }
     }
 
     pub(crate) fn cell_found(&mut self, facts: CellFacts) {

@@ -13,8 +13,8 @@ pub struct GuiArgs {
     /// Where its scene has the parts of the cell; as in the settings if not given.
     #[command(flatten)]
     pub objects: ObjectArgs,
-    /// File of boxes that the arm keeps out of, which is written when they are changed; `keep_out.toml` beside the settings if
-    /// not given.
+    /// File of boxes that the arm keeps out of, which is there and is written when they are changed; `keep_out.toml` beside the
+    /// settings if not given.
     #[arg(long, value_name = "FILE")]
     pub keep_out: Option<std::path::PathBuf>,
     /// Session folder to open, or to create.

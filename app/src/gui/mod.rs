@@ -28,6 +28,7 @@ use std::time::{Duration, Instant};
 use anyhow::anyhow;
 use eframe::NativeOptions;
 use egui::ViewportBuilder;
+use handeye_core::plan::Surroundings;
 
 use crate::app::{App, Connect, Start};
 use crate::command::Event;
@@ -56,6 +57,10 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
     let source = args.connect.map_or_else(|| settings.source(), CellSource::Address);
     let objects = args.objects.paths(settings.objects.clone());
     let file = file.with_objects(&objects);
+    if let Some(file) = &args.keep_out {
+        // A window that moves the arm without them would be worse than none.
+        Surroundings::read(file)?;
+    }
     let options = NativeOptions {
         viewport: ViewportBuilder::default()
             .with_app_id(settings::FOLDER)

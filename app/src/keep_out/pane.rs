@@ -6,6 +6,7 @@ use egui::{
 };
 use handeye_core::plan::surroundings::{KeepOutBox, KeepOutFile};
 
+use super::state::with_drawn;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
@@ -48,6 +49,9 @@ pub fn header_ui(ui: &mut Ui, model: &Model) {
         count => text!("Keep-out boxes: {count}", count = count).say(language),
     };
     let what = tr!(language, "What the arm must not touch, besides what the cell says stands around it");
+    let keep_out = &model.keep_out;
+    let is_wrong = keep_out.fault.is_some() || keep_out.unkept.is_some() && !keep_out.content.boxes.is_empty();
+    let name = if is_wrong { RichText::new(name).color(Palette::of(ui).bad) } else { RichText::new(name) };
     if ui.selectable_label(is_open, name).on_hover_text(what).clicked() {
         ui.data_mut(|data| data.insert_temp(open_key(), !is_open));
         set_drawing(ui, false);
@@ -91,11 +95,15 @@ fn buttons_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if ui.selectable_label(is_on, tr!(language, "Draw a box")).clicked() {
             set_drawing(ui, !is_on);
         }
+        if ui.button(tr!(language, "Add a box")).clicked() {
+            let in_front = with_drawn(&model.keep_out.content, [0.4, -0.1], [0.6, 0.1]);
+            outbox.send(Command::SetKeepOut(Box::new(in_front.expect("a rectangle"))));
+        }
         if ui.button(tr!(language, "Read…")).clicked() {
             outbox.send(Command::SetDialog(Some(Dialog::ImportKeepOut)));
         }
-        let any = model.keep_out.content != KeepOutFile::default();
-        if ui.add_enabled(any, Button::new(tr!(language, "Write…"))).clicked() {
+        let is_whole = model.keep_out.fault.is_none() && model.keep_out.content != KeepOutFile::default();
+        if ui.add_enabled(is_whole, Button::new(tr!(language, "Write…"))).clicked() {
             outbox.send(Command::SetDialog(Some(Dialog::ExportKeepOut)));
         }
     });
@@ -105,9 +113,10 @@ fn buttons_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         tr!(language, "Millimetres in the base. The arm keeps out of them from its next motion on.")
     };
     parts::hint_ui(ui, hint);
-    if let Some(fault) = &model.keep_out.fault {
+    let keep_out = &model.keep_out;
+    for why in [&keep_out.fault, &keep_out.unkept, &keep_out.unsaved].into_iter().flatten() {
         let colour = Palette::of(ui).bad;
-        ui.add(Label::new(RichText::new(fault.say(language)).color(colour)).wrap());
+        ui.add(Label::new(RichText::new(why.say(language)).color(colour)).wrap());
     }
 }
 
@@ -157,7 +166,17 @@ fn box_ui(ui: &mut Ui, entry: &mut KeepOutBox, number: usize, language: Language
             return;
         }
         let mut yaw_deg = entry.yaw_deg.unwrap_or(0.0);
-        let drag = ui.add(DragValue::new(&mut yaw_deg).range(-180.0..=180.0).speed(1.0).suffix("°").max_decimals(1));
+        let drag = ui.add(
+            // What a file has beyond the range stays as it is until somebody changes it.
+            DragValue::new(&mut yaw_deg)
+                .range(-180.0..=180.0)
+                .clamp_existing_to_range(false)
+                .speed(1.0)
+                .suffix("°")
+                .max_decimals(1),
+        );
+        let label = text!("Yaw of box {number}", number = number).say(language);
+        drag.widget_info(|| WidgetInfo { label: Some(label.clone()), ..WidgetInfo::drag_value(true, yaw_deg) });
         if drag.changed() {
             entry.yaw_deg = (yaw_deg != 0.0).then_some(yaw_deg);
         }
@@ -183,13 +202,17 @@ fn millimetres_ui(ui: &mut Ui, caption: &str, metres: &mut [f64; 3], least_mm: f
     caption_ui(ui, caption, |ui| {
         for (axis, value) in ["x", "y", "z"].into_iter().zip(metres) {
             let mut mm = *value * 1e3;
-            let drag = DragValue::new(&mut mm).range(least_mm..=FARTHEST_MM).speed(2.0).max_decimals(0);
+            let drag = DragValue::new(&mut mm)
+                .range(least_mm..=FARTHEST_MM)
+                .clamp_existing_to_range(false)
+                .speed(2.0)
+                .max_decimals(0);
             let drag = ui.add_sized([54.0, ui.spacing().interact_size.y], drag);
             let label = text!("{what} of box {number} along {axis}, mm", what = caption, number = number, axis = axis)
                 .say(language);
             drag.widget_info(|| WidgetInfo { label: Some(label.clone()), ..WidgetInfo::drag_value(true, mm) });
             let drag = drag.on_hover_text(&label);
-            // What the file has below a millimetre stays as it is until somebody changes it.
+            // What the file has below a millimetre, or beyond the range, stays as it is until somebody changes it.
             if drag.changed() {
                 *value = mm * 1e-3;
             }

@@ -18,12 +18,16 @@ const LEAST_DRAWN_M: f64 = 0.01;
 pub struct KeepOut {
     /// As they are edited.
     pub content: KeepOutFile,
-    /// What the arm keeps to: what the newest content that makes sense means.
+    /// What the arm keeps to: every entry of the content that makes sense.
     pub around: Arc<Surroundings>,
-    /// Why the content is not what the arm keeps to.
+    /// What of the content makes no sense.
     pub fault: Option<Text>,
+    /// Why the arm keeps out of none of them.
+    pub unkept: Option<Text>,
     /// Where they are kept; nowhere where that cannot be read or the system has no folder for it.
     pub file: Option<PathBuf>,
+    /// Why they are kept nowhere.
+    pub unsaved: Option<Text>,
     /// Since when \[s\] they are to be written.
     pub unwritten_since_s: Option<f64>,
     /// What the cell says stands around; `None` before it has said so.
@@ -31,16 +35,11 @@ pub struct KeepOut {
 }
 
 impl KeepOut {
-    /// Takes in other boxes. What makes no sense is shown and not kept to.
+    /// Takes in other boxes. An entry that makes no sense is shown and not kept to, all others are.
     pub fn set(&mut self, content: KeepOutFile) {
         let file = self.file.as_deref().unwrap_or_else(|| Path::new("keep-out boxes"));
-        match content.surroundings(file) {
-            Ok(around) => {
-                self.around = Arc::new(around);
-                self.fault = None;
-            }
-            Err(error) => self.fault = Some(Text::verbatim(error.to_string())),
-        }
+        self.fault = content.surroundings(file).err().map(|error| Text::verbatim(error.to_string()));
+        self.around = Arc::new(content.sensible());
         self.content = content;
     }
 }
@@ -76,18 +75,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_makes_no_sense_is_shown_and_the_arm_keeps_to_what_was_before() {
+    fn what_makes_no_sense_is_shown_and_the_arm_keeps_to_everything_else() {
         let mut keep_out = KeepOut::default();
         let one = with_drawn(&keep_out.content, [0.5, 0.3], [0.2, -0.1]).expect("a rectangle");
         keep_out.set(one.clone());
         assert_eq!((keep_out.around.obstacles.len(), keep_out.fault.is_some()), (1, false));
         let [size, centre] = [keep_out.content.boxes[0].size_m, keep_out.content.boxes[0].centre_m];
         assert_eq!((size, centre), ([0.3, 0.4, 0.2], [0.35, 0.1, 0.1]));
-        let mut flat = one.clone();
-        flat.boxes[0].size_m[1] = 0.0;
-        keep_out.set(flat.clone());
-        assert_eq!((keep_out.around.obstacles[0].size_m, keep_out.content.clone()), ([0.3, 0.4, 0.2], flat));
-        assert!(keep_out.fault.is_some());
+        // A name is being typed, and another box is drawn meanwhile.
+        let mut two = with_drawn(&one, [0.0, 0.5], [0.1, 0.7]).expect("a rectangle");
+        two.boxes[0].size_m[1] = 0.0;
+        two.boxes[1].name.clear();
+        keep_out.set(two.clone());
+        assert!(keep_out.fault.is_some() && keep_out.content == two);
+        assert_eq!(keep_out.around.obstacles.len(), 1, "the one without a name is a box all the same");
         keep_out.set(one);
         assert_eq!(keep_out.fault, None);
     }

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use handeye_core::plan::Surroundings;
 use handeye_core::plan::surroundings::{KeepOutFile, SurroundingsError};
 
 use super::state::KeepOut;
@@ -19,19 +20,23 @@ const WRITTEN_AFTER_S: f64 = 0.5;
 /// What a file says at the start; nothing where there is none. One that cannot be used is left as it is.
 pub(crate) fn opened(file: Option<PathBuf>) -> (KeepOut, Option<Text>) {
     let Some(file) = file else { return (KeepOut::default(), None) };
-    match KeepOutFile::read(&file).and_then(|content| content.surroundings(&file).map(|around| (content, around))) {
-        Ok((content, around)) => {
-            (KeepOut { content, around: Arc::new(around), file: Some(file), ..KeepOut::default() }, None)
+    match KeepOutFile::read(&file) {
+        Ok(content) => {
+            let mut keep_out = KeepOut { file: Some(file), ..KeepOut::default() };
+            keep_out.set(content);
+            let fault = keep_out.fault.clone();
+            (keep_out, fault)
         }
         Err(SurroundingsError::Unreadable { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
             (KeepOut { file: Some(file), ..KeepOut::default() }, None)
         }
         Err(error) => {
             let said = text!(
-                "The arm is not kept out of the boxes of this file, and it stays as it is: {error}",
+                "The arm is not kept out of the boxes of this file. It stays as it is, and boxes of now are not kept for the \
+                 next start: {error}",
                 error = error
             );
-            (KeepOut::default(), Some(said))
+            (KeepOut { unsaved: Some(said.clone()), ..KeepOut::default() }, Some(said))
         }
     }
 }
@@ -46,6 +51,25 @@ impl App {
     /// Has the arm keep to them.
     pub(crate) fn send_keep_out(&self) {
         self.workers.keep_out(Arc::clone(&self.model.keep_out.around));
+    }
+
+    /// Whether the arm keeps out of them, and of what else. That it does not is said once.
+    pub(crate) fn standing_found(&mut self, standing: Result<Arc<Surroundings>, Text>) {
+        let keep_out = &mut self.model.keep_out;
+        match standing {
+            Ok(standing) => {
+                keep_out.standing = Some(standing);
+                keep_out.unkept = None;
+            }
+            Err(why) => {
+                let said = text!("The arm is not kept out of the boxes: {why}", why = why);
+                let is_news = keep_out.unkept.as_ref() != Some(&said) && !keep_out.content.boxes.is_empty();
+                keep_out.unkept = Some(said.clone());
+                if is_news {
+                    self.say(Severity::Warning, said);
+                }
+            }
+        }
     }
 
     pub(crate) fn import_keep_out(&mut self, file: PathBuf) {
@@ -70,7 +94,7 @@ impl App {
     pub(crate) fn keep_keep_out(&mut self, at_once: bool) {
         let keep_out = &mut self.model.keep_out;
         let Some(since_s) = keep_out.unwritten_since_s else { return };
-        if keep_out.fault.is_some() || !at_once && self.model.now_s < since_s + WRITTEN_AFTER_S {
+        if !at_once && self.model.now_s < since_s + WRITTEN_AFTER_S {
             return;
         }
         keep_out.unwritten_since_s = None;
@@ -105,11 +129,20 @@ mod tests {
         let content = with_drawn(&none.content, [0.1, 0.1], [0.4, 0.3]).expect("a rectangle");
         write(&file, &content.to_toml()).expect("written");
         let (again, said) = opened(Some(file.clone()));
-        assert_eq!((again.content, again.around.obstacles.len(), said), (content, 1, None));
+        assert_eq!((&again.content, again.around.obstacles.len(), said), (&content, 1, None));
+
+        // One entry that makes no sense is shown, and takes no other one along.
+        let mut faulty = again.content.clone();
+        faulty.boxes.push(faulty.boxes[0].clone());
+        faulty.boxes[1].size_m[0] = -1.0;
+        write(&file, &faulty.to_toml()).expect("written");
+        let (with_fault, said) = opened(Some(file.clone()));
+        assert_eq!((with_fault.content, with_fault.around.obstacles.len()), (faulty, 1));
+        assert!(said.is_some() && with_fault.file.is_some());
 
         std::fs::write(&file, "[[box]]\nname = \"post\"\n").expect("written");
         let (broken, said) = opened(Some(file.clone()));
-        assert!(broken.file.is_none(), "nothing is written over it");
+        assert!(broken.file.is_none() && broken.unsaved.is_some(), "nothing is written over it");
         assert!(said.is_some_and(|said| said.say(crate::text::Language::English).contains("keep_out.toml")));
     }
 }

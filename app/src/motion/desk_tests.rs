@@ -163,3 +163,16 @@ fn every_motion_has_one_end_in_every_order_of_events() {
         assert_eq!(ends, expected, "order {order}");
     }
 }
+
+#[test]
+fn what_the_arm_keeps_out_of_is_told_once_for_each_change_and_each_connection() {
+    let queue = MotionQueue::new(Arc::new(|| {}));
+    assert!(queue.take_keep_out().is_none(), "there is nothing to keep out of and nobody to tell");
+    let keep_out = Arc::new(Surroundings::default());
+    queue.keep_out(Arc::clone(&keep_out));
+    assert!(queue.take_keep_out().is_some_and(|told| Arc::ptr_eq(&told, &keep_out)));
+    assert!(queue.take_keep_out().is_none());
+    queue.disconnected(0.0);
+    queue.connected();
+    assert!(queue.take_keep_out().is_some_and(|told| Arc::ptr_eq(&told, &keep_out)));
+}

@@ -208,7 +208,9 @@ impl MotionPort for LiveMotion {
 fn no_views(why: &PlanError) -> Text {
     match why {
         PlanError::StartBlocked => {
-            text!("Where the arm is now it touches the board, its table or itself: move it into free space first")
+            text!(
+                "Where the arm is now it touches the board, its table, a keep-out box or itself: move it into free space first"
+            )
         }
         PlanError::TooFewViews { candidates, not_in_view, unreachable, in_the_way, no_path, .. } => text!(
             "Of {tried} views that were tried, {not_in_view} would not show the whole board, {unreachable} are out of \

@@ -4,7 +4,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
-use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{FollowMoment, FollowWish as ArmWish};
@@ -159,21 +158,16 @@ impl Motions {
         ended
     }
 
-    /// Before anything moves.
+    /// Before anything moves, and after what moves was taken: what was wished before it holds for it.
     fn keep_out(&self, port: &mut dyn MotionPort, outlet: &Outlet) {
         let Some(keep_out) = self.desk.take_keep_out() else { return };
-        match port.keep_out(&keep_out) {
-            Ok(standing) => outlet.report(Event::Standing(Arc::new(standing))),
-            Err(_why) if *keep_out == Surroundings::default() => {}
-            Err(why) => {
-                outlet.notice(Severity::Warning, text!("The arm is not kept out of the boxes: {why}", why = why));
-            }
-        }
+        outlet.report(Event::Standing(port.keep_out(&keep_out).map(Arc::new)));
     }
 
     fn work(&self, port: &mut dyn MotionPort, outlet: &Outlet) -> Result<Duration, PortError> {
+        let work = self.desk.take(outlet.now_s());
         self.keep_out(port, outlet);
-        match self.desk.take(outlet.now_s()) {
+        match work {
             Work::Motion(task, cancel) => self.run(port, &task, &cancel, outlet)?,
             Work::Jog(request) => self.jog(port, &request, outlet)?,
             Work::Nothing => {

@@ -63,8 +63,9 @@ pub struct CellSetup {
     pub noise: Noise,
     /// Whether the lens is to be estimated.
     pub free_lens: bool,
-    /// Whether the first view is straight on, with the board close to the edge of the image.
-    pub straight: bool,
+    /// Focal length \[px\] of a first view that is straight on, with the board close to the edge of the image; `None` for that
+    /// of the other studies, and a first view that is tilted a little.
+    pub straight: Option<f64>,
     /// Seed of places and noise.
     pub seed: u64,
 }
@@ -134,11 +135,14 @@ impl GuidedCell {
             Vector3::new(about(0.03), about(0.03), distance_m).into(),
             tilt(about(0.2), about(0.2)) * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.5)),
         ) * Translation3::from(-BOARD.centre().coords);
-        let seen_first = if setup.straight {
-            // Some 40 px from the edge of the image of 640 px.
-            Isometry3::translation(0.31 * distance_m, 0.0, distance_m) * Translation3::from(-BOARD.centre().coords)
-        } else {
-            seen_first
+        let lens = setup.straight.map_or_else(camera, |focal_px| Intrinsics::pinhole(640, 480, focal_px));
+        let seen_first = match setup.straight {
+            // Some 40 px from the edge of the image of 640 px; BOARD is 135 mm wide.
+            Some(focal_px) => {
+                Isometry3::translation(280.0 * distance_m / focal_px - 0.0675, 0.0, distance_m)
+                    * Translation3::from(-BOARD.centre().coords)
+            }
+            None => seen_first,
         };
         let (mount_from_camera, anchor_from_target, first_tip) = match setup.mode {
             Mode::EyeInHand => {
@@ -187,12 +191,9 @@ impl GuidedCell {
         // Where the other of camera and board is the guide has to find out.
         around.obstacles.pop();
         // With all that is estimated of a lens by default, of which it has none.
-        let free = Intrinsics { distortion: DEFAULT_MODEL, ..camera() };
-        let (intrinsics, knowledge) = if setup.free_lens {
-            (free, CameraKnowledge::NOTHING)
-        } else {
-            (camera(), CameraKnowledge::Fixed(camera()))
-        };
+        let free = Intrinsics { distortion: DEFAULT_MODEL, ..lens };
+        let (intrinsics, knowledge) =
+            if setup.free_lens { (free, CameraKnowledge::NOTHING) } else { (lens, CameraKnowledge::Fixed(lens)) };
         Some(Self {
             setup,
             rng: ChaCha8Rng::seed_from_u64(setup.seed ^ 0x5eed),

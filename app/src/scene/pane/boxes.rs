@@ -43,7 +43,7 @@ pub fn boxes(canvas: &mut Canvas, keep_out: &KeepOut, language: Language, palett
     if let Some(volume) = &own.volume {
         edges(canvas, &corners(volume), Stroke::new(1.2, palette.bad.gamma_multiply(0.7)));
     }
-    if !own.obstacles.is_empty() || own.volume.is_some() {
+    if keep_out.unkept.is_none() && (!own.obstacles.is_empty() || own.volume.is_some()) {
         entries.push(Entry {
             sign: Sign::Line,
             colour: palette.bad,

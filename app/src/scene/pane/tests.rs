@@ -1,6 +1,6 @@
 use egui::{Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::plan::surroundings::KeepOutFile;
+use handeye_core::plan::surroundings::{KeepOutBox, KeepOutFile};
 
 use super::*;
 use crate::gui::testing::pane_harness::PaneHarness;
@@ -196,6 +196,25 @@ fn a_box_to_keep_out_of_is_drawn_on_the_ground_named_and_deleted() {
     assert_eq!(deleted, [Command::SetKeepOut(Box::default())]);
     let drags = drag(&mut pane, vec2(-30.0, 10.0), PointerButton::Secondary, Modifiers::NONE);
     assert!(matches!(drags[..], [Command::SetSceneView(_)]), "one box is one drag: {drags:?}");
+}
+
+/// A file may say more than a field shows.
+#[test]
+fn looking_at_the_boxes_of_a_file_changes_nothing_of_them() {
+    let mut model = sample::connected();
+    let odd = KeepOutBox {
+        name: "post".to_owned(),
+        centre_m: [0.123_456, 0.0, 0.0],
+        size_m: [0.000_4, 9.5, 0.1],
+        rotation_xyzw: None,
+        yaw_deg: Some(270.0),
+    };
+    model.keep_out.set(KeepOutFile { boxes: vec![odd], ..KeepOutFile::default() });
+    let mut pane = pane(model);
+    pane.click("Keep-out boxes: 1");
+    pane.steps();
+    assert_eq!(pane.commands(), []);
+    assert!(pane.harness.query_by_label("Yaw of box 1").is_some() && pane.sees("Add a box"));
 }
 
 #[test]

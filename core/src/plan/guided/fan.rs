@@ -16,6 +16,8 @@ const LARGEST_RAD: f64 = 14.0 * std::f64::consts::PI / 180.0;
 const LEAST_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// Part of the room in the image that a turn may use: the lever may use as much again.
 const PART: f64 = 0.45;
+/// By which the turns grow when it begins anew.
+const LARGER: f64 = 1.4;
 /// Axes of the tip in the order in which it is turned about them.
 const TURNS: [[f64; 3]; 8] = [
     [1.0, 0.0, 0.0],
@@ -38,11 +40,13 @@ pub fn free_turn_rad(corners_px: impl Iterator<Item = Vector2<f64>>, image_size:
     (PART * room_px.max(0.0) / focal_px).clamp(LEAST_RAD, LARGEST_RAD)
 }
 
-/// Pose `index` of the fan about a tip pose, and its turn \[rad\], with turns of `turn_rad`; after the last one it begins anew
-/// with turns half as large, in case the board left the image.
-pub fn pose(about: &Pose<Base, Tip>, index: usize, turn_rad: f64) -> (Pose<Base, Tip>, f64) {
+/// Pose `index` of the fan about a tip pose, and its turn \[rad\], with turns of `turn_rad` at first. After the last one it
+/// begins anew with larger turns, because the board was seen from all; with turns half as large for each two of `failed` poses
+/// that did not show it.
+pub fn pose(about: &Pose<Base, Tip>, index: usize, turn_rad: f64, failed: usize) -> (Pose<Base, Tip>, f64) {
     let axis = Unit::new_normalize(Vector3::from(TURNS[index % TURNS.len()]));
-    let turn_rad = turn_rad * 0.5_f64.powi((index / TURNS.len()) as i32);
+    let scale = LARGER.powi((index / TURNS.len()) as i32) * 0.5_f64.powi((failed / 2) as i32);
+    let turn_rad = (turn_rad * scale).min(LARGEST_RAD);
     let mut turned = *about.isometry();
     turned.rotation *= UnitQuaternion::from_axis_angle(&axis, turn_rad);
     (Pose::from_isometry(turned), turn_rad)
@@ -68,14 +72,15 @@ mod tests {
     fn the_tip_stays_where_it_is_and_turns_about_two_axes_first() {
         let about: Pose<Base, Tip> =
             Pose::from_isometry(crate::geometry::se3::exp(&nalgebra::Vector6::new(0.3, 0.1, 0.5, 0.2, 1.0, 0.4)));
-        let turn = |index| {
-            let (pose, stated_rad) = pose(&about, index, 0.2);
+        let turn = |index, failed| {
+            let (pose, stated_rad) = pose(&about, index, 0.1, failed);
             assert!((about.rotation().angle_to(&pose.rotation()) - stated_rad).abs() < 1e-12);
             assert!((pose.translation() - about.translation()).norm() < 1e-12);
             (about.rotation().inverse() * pose.rotation()).scaled_axis()
         };
-        assert!(turn(0).normalize().dot(&turn(1).normalize()).abs() < 0.1);
-        assert!((turn(0).norm() - 0.2).abs() < 1e-12 && (turn(6).norm() - 0.2).abs() < 1e-12);
-        assert!((turn(8).norm() - 0.1).abs() < 1e-12);
+        assert!(turn(0, 0).normalize().dot(&turn(1, 0).normalize()).abs() < 0.1);
+        assert!((turn(0, 0).norm() - 0.1).abs() < 1e-12 && (turn(6, 1).norm() - 0.1).abs() < 1e-12);
+        assert!((turn(8, 0).norm() - 0.14).abs() < 1e-12 && (turn(8, 4).norm() - 0.035).abs() < 1e-12);
+        assert!((turn(24, 0).norm() - LARGEST_RAD).abs() < 1e-12, "never a large move");
     }
 }

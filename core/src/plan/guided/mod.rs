@@ -369,7 +369,7 @@ impl Guide {
             Some((plan, modelled_m)) if plan.candidates > 0 => {
                 self.judged(plan, modelled_m, used.len(), is_sound(known.calibration))
             }
-            // So little is known that no view is surely in the image: more of the small turns.
+            // So little is known that no view is surely in the image: more of the first poses.
             Some(_) => self.first_poses(known, cancel),
         }
     }

@@ -126,7 +126,7 @@ impl Why {
                 turn = format!("{:.1}", turn_rad.to_degrees())
             ),
             Self::FirstTilts { turn_rad } => text!(
-                "Tilted by {turn}° from the first view: small turns do not determine the lens",
+                "Tilted by {turn}° from the first view: small turns do not determine an answer yet",
                 turn = format!("{:.0}", turn_rad.to_degrees())
             ),
             Self::Gain { from_m, to_m, rotation_part } => {

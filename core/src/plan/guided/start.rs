@@ -2,8 +2,11 @@
 //!
 //! The small turns ([`super::fan`]) need to know nothing. Where the board nearly fills the image, or lies near its edge, they are
 //! so small that they determine no lens. But with a lens that is guessed they give a rough answer, and by that the board can
-//! be tilted in the image without leaving it: whatever the focal length, the rough answer fits how the image moved by the
-//! turns, and by a shift the image moves as the pixels of the board say.
+//! be tilted in the image without leaving it. Turns of the tip by an angle `a` move the board in the image by
+//! `f a (1 + l / z)`, where `l` is the lever from tip to camera along the line of sight, and `z`, the distance of the board, is
+//! `f` times what its pixels say. So whatever `f` is guessed, `l + z`, the place of the board before the tip, comes out right, and
+//! a tilt turns the tip about that place. What comes out wrong is where the camera sits: it is not what is kept clear of things,
+//! the camera at the tip still is.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -11,6 +14,7 @@ use super::choose::{Plan, Proposal, Robot};
 use super::{
     CAREFUL_ROOM_M, Ending, Guide, Known, LARGEST_FAN_WAY_RAD, MOST_FAN, Next, ViewRange, Why, fan, with_board,
 };
+use crate::estimate::handeye::Mode;
 use crate::estimate::{CameraKnowledge, Method, Observations, calibrate};
 use crate::geometry::arm::JointValues;
 use crate::geometry::camera::{Distortion, Intrinsics};
@@ -67,7 +71,8 @@ impl Guide {
         let corners_px = first.corners.iter().map(|corner| corner.px);
         let turn_rad = fan::free_turn_rad(corners_px, observations.image_size, lens(observations).fx);
         while self.fan_tried < MOST_FAN {
-            let (base_from_tip, turn_rad) = fan::pose(&first.base_from_tip, self.fan_tried, turn_rad);
+            let (base_from_tip, turn_rad) =
+                fan::pose(&first.base_from_tip, self.fan_tried, turn_rad, self.failed.len());
             self.fan_tried += 1;
             if let Some(joints) = reached(known.robot, &base_from_tip) {
                 return go(base_from_tip, Pose::identity(), joints, Why::FirstTurns { turn_rad });
@@ -85,12 +90,17 @@ impl Guide {
         let (target, lens) = (&observations.target, lens(observations));
         let rough = Observations { camera: CameraKnowledge::Fixed(lens), ..observations.clone() };
         let hand_eye = calibrate(&rough, Method::Joint, cancel).ok()?.hand_eye?;
-        let robot = known.robot.map(|robot| with_board(robot, &hand_eye, observations, CAREFUL_ROOM_M));
+        let robot = known.robot.map(|robot| {
+            let mut around = with_board(robot, &hand_eye, observations, CAREFUL_ROOM_M);
+            if hand_eye.mode() == Mode::EyeInHand {
+                around.arm.carried.clone_from(&robot.arm.carried);
+            }
+            around
+        });
         let seen_first = hand_eye.camera_from_target(first);
         let middle = (seen_first.isometry() * target.centre()).coords;
         let range = ViewRange::about([middle.norm()].into_iter())?;
-        while let Some((axis, deg)) = TILTS.get(self.tilts_tried) {
-            self.tilts_tried += 1;
+        for (offset, (axis, deg)) in TILTS[self.tilts_tried..].iter().enumerate() {
             let turn_rad = deg.to_radians();
             let about = UnitQuaternion::from_scaled_axis(Vector3::from(*axis).normalize() * turn_rad);
             let tilted =
@@ -98,6 +108,7 @@ impl Guide {
             for camera_from_target in tilted.filter(|view| range.shows(&lens, target, view, None)) {
                 let base_from_tip = hand_eye.base_from_tip(&camera_from_target);
                 if let Some(joints) = reached(robot.as_ref(), &base_from_tip) {
+                    self.tilts_tried += offset + 1;
                     return Some(go(base_from_tip, camera_from_target, joints, Why::FirstTilts { turn_rad }));
                 }
             }

@@ -218,6 +218,21 @@ impl KeepOutFile {
     }
 }
 
+impl KeepOutFile {
+    /// What every entry means that makes sense by itself; a box without a name of its own is one all the same.
+    pub fn sensible(&self) -> Surroundings {
+        let named = |entry: &KeepOutBox| {
+            let name = if entry.name.trim().is_empty() { "box".to_owned() } else { entry.name.clone() };
+            KeepOutBox { name, ..entry.clone() }.obstacle().ok()
+        };
+        Surroundings {
+            obstacles: self.boxes.iter().filter_map(named).collect(),
+            volume: self.volume.and_then(|volume| volume.volume().ok()),
+            limits: self.limits.and_then(|limits| limits.limits().ok()).unwrap_or_default(),
+        }
+    }
+}
+
 impl KeepOutBox {
     /// What it means.
     ///

@@ -31,8 +31,14 @@ impl CellObjects {
     pub fn find(sim: &mut Sim, paths: &CellPaths) -> Result<Self, LinkError> {
         let tip = required(sim, paths, CellPart::Tip)?;
         let arm = optional(sim, &paths.arm)?;
+        let usual = CellPaths::default();
+        if arm.is_none() && !paths.arm.is_empty() && paths.arm != usual.arm {
+            return Err(missing(sim, &paths.arm, CellPart::Arm));
+        }
         let carriers = Carriers::of(sim, tip, arm)?;
-        let joints = if carriers.reach_base && !carriers.joints.is_empty() {
+        // The joints of that name may be those of another arm than the one whose tip was named.
+        let is_tip_alone_named = paths.tip != usual.tip && paths.joints == usual.joints;
+        let joints = if (carriers.reach_base || is_tip_alone_named) && !carriers.joints.is_empty() {
             carriers.joints
         } else {
             match named_joints(sim, paths) {
@@ -129,7 +135,11 @@ fn present(found: Result<ObjectHandle, LinkError>) -> Result<Option<ObjectHandle
 /// With the objects of that kind which the scene has, as far as the server lists them.
 fn missing(sim: &mut Sim, path: &str, part: CellPart) -> LinkError {
     let objects = sim.get_objects_in_tree(None, part.kind().0).unwrap_or_default();
+    let more = objects.len().saturating_sub(MOST_LISTED);
     let paths = objects.into_iter().take(MOST_LISTED).map(|object| sim.get_object_path(object));
-    let there = paths.collect::<Result<_, _>>().unwrap_or_default();
+    let mut there: Vec<String> = paths.collect::<Result<_, _>>().unwrap_or_default();
+    if more > 0 && !there.is_empty() {
+        there.push(format!("and {more} more"));
+    }
     LinkError::NoSuchObject { path: path.to_owned(), part, there }
 }

@@ -1,5 +1,7 @@
 //! Where the parts of a cell are in its scene.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -7,7 +9,7 @@ use crate::client::constants;
 
 /// Where the parts of the cell are in the scene: object paths as `sim.getObject` takes them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(try_from = "BTreeMap<String, String>")]
 pub struct CellPaths {
     /// The base of the arm; without it the kinematics of the arm is not known. All joints between it and the tip are
     /// driven, whatever they are called.
@@ -30,6 +32,17 @@ impl Default for CellPaths {
     /// The public UR5 hand-eye scene, which the built-in cell mimics.
     fn default() -> Self {
         Self::below("UR5")
+    }
+}
+
+/// Parts by their names; those that are not there are as in the public scene.
+impl TryFrom<BTreeMap<String, String>> for CellPaths {
+    type Error = BadCellPath;
+
+    fn try_from(parts: BTreeMap<String, String>) -> Result<Self, BadCellPath> {
+        let mut paths = Self::default();
+        parts.iter().try_for_each(|(key, path)| paths.assign(&format!("{key}={path}")))?;
+        Ok(paths)
     }
 }
 

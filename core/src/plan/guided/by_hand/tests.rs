@@ -9,7 +9,7 @@ fn options() -> GuidedOptions {
 }
 
 fn cell(mode: Mode, seed: u64, free_lens: bool) -> GuidedCell {
-    GuidedCell::new(CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens, straight: false, seed })
+    GuidedCell::new(CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens, straight: None, seed })
 }
 
 #[test]
