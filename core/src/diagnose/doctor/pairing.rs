@@ -180,8 +180,8 @@ mod tests {
         // The last views have poses of two rows further, which the step undoes.
         let mut shifted = session(&Setup::new(Mode::EyeInHand, 14, 71));
         let poses: Vec<_> = shifted.views.iter().map(|view| view.base_from_tip).collect();
-        for view in 7..12 {
-            shifted.views[view + 2].base_from_tip = poses[view];
+        for (view, pose) in shifted.views[9..14].iter_mut().zip(&poses[7..12]) {
+            view.base_from_tip = *pose;
         }
         let shifted = SessionViews::new(&shifted).expect("views");
         let step = Pairing::Stepped { from: 7, before: 0, after: 2 };
