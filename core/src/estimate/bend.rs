@@ -5,6 +5,9 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 /// Significance from which a bent target is taken into the model: by chance one flat target in a thousand.
 const LEVEL: f64 = 1e-3;
+/// Part of the least limit of the ratio that it has to have before the degrees of freedom are known: a step from a flat fit and
+/// the fit of a bend differ in the second order alone. Four flat targets in a thousand have as much by chance.
+const NEARLY: f64 = 0.8;
 /// And the deflection has to matter: a tenth of what the corners' noise is at the target, so that a fit of thousands of
 /// corners does not chase a micrometre.
 const MATTERS: f64 = 0.1;
@@ -21,6 +24,12 @@ pub(super) struct Deflection {
     pub degrees_of_freedom: f64,
     /// What the noise of a corner is at the target, metres.
     pub noise_m: f64,
+}
+
+/// Whether a bend may be shown by a ratio as that of [`Deflection::is_shown`], on however many degrees of freedom: the limit is
+/// least on infinitely many, where half of chi-square with two is exponential.
+pub(super) fn may_be_shown(ratio: f64) -> bool {
+    ratio > NEARLY * -LEVEL.ln()
 }
 
 impl Deflection {

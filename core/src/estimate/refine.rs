@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector2};
 
-use super::bend::Deflection;
+use super::bend::{Deflection, may_be_shown};
 use super::lens::Lens;
 use super::{CalibrateError, JointOffsets, MethodResult, Options};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
@@ -187,12 +187,25 @@ fn bent(
     let views = screened.kept_views();
     let free = Free { warp: true, ..screened.solution.free };
     let with_warp = JointProblem { free, views: &views, ..*problem };
-    let solution = match joint::estimate(&with_warp, &screened.solution.as_start(), work.cancel) {
-        Ok(solution) => solution,
-        Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-        // A target seen square on says nothing of its shape.
-        Err(_) => return Ok(None),
+    let one_step = joint::warp_ratio(&with_warp, &screened.solution, work.cancel)?;
+    if !one_step.is_some_and(may_be_shown) {
+        return Ok(None);
+    }
+    // A target seen square on says nothing of its shape.
+    let determined = |solution: Result<JointSolution, HandEyeError>| match solution {
+        Ok(solution) => Ok(Some(solution)),
+        Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
+        Err(_) => Ok(None),
     };
+    let start = screened.solution.as_start();
+    let Some(solution) = determined(joint::fit(&with_warp, &start, work.cancel))? else { return Ok(None) };
+    // What estimated noise levels and a curved cost do to the covariance makes it larger.
+    let fitted = joint::warp_ratio(&with_warp, &solution, work.cancel)?;
+    if !fitted.is_some_and(may_be_shown) {
+        return Ok(None);
+    }
+    let stated = joint::with_stated_error(&with_warp, solution, work.cancel);
+    let Some(solution) = determined(stated)? else { return Ok(None) };
     let Some(covariance) = solution.warp_covariance() else { return Ok(None) };
     let metres_per_px = solution.reference_point.coords.norm() / solution.intrinsics.fx;
     let deflection = Deflection {

@@ -43,6 +43,17 @@ pub fn outliers(squared: &[f64], limit: f64) -> Vec<usize> {
     outliers
 }
 
+/// Degrees of freedom of a variance that is a sum of parts, each proportional to an estimated variance: of every part its
+/// share of the sum, and the degrees of freedom of the estimate. At least one.
+///
+/// # Reference
+/// Satterthwaite 1946, "An approximate distribution of estimates of variance components", Biometrics Bulletin 2; for several
+/// numbers at once Fai & Cornelius 1996, J. Stat. Comput. Simul. 54.
+pub fn pooled_freedom(parts: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    let inverse: f64 = parts.into_iter().map(|(share, freedom)| share * share / freedom.max(f64::MIN_POSITIVE)).sum();
+    inverse.recip().max(1.0)
+}
+
 /// Numbers up to which the law of [`better_by_chance`] is counted out; for more it is normal to a part in a hundred of its tail.
 const COUNTED: usize = 60;
 
@@ -115,6 +126,18 @@ mod tests {
         let (counted, normal) = (better_by_chance(&mixed(60)), better_by_chance(&mixed(61)));
         assert!((counted / normal).ln().abs() < 0.4, "{counted} {normal}");
         assert_eq!((better_by_chance(&[]), better_by_chance(&[0.0])), (1.0, 1.0));
+    }
+
+    #[test]
+    fn the_freedom_of_a_sum_is_that_of_its_largest_part_and_more_where_parts_are_alike() {
+        let pooled = |parts: &[(f64, f64)]| pooled_freedom(parts.iter().copied());
+        assert_eq!(pooled(&[(1.0, 30.0), (0.0, 4.0)]), 30.0, "a part of nothing does not count");
+        assert!((pooled(&[(0.5, 8.0), (0.5, 8.0)]) - 16.0).abs() < 1e-12, "two estimates tell twice as much as one");
+        assert_eq!(pooled(&[(1.0, 0.0)]), 1.0);
+        // The variance of the estimate of `a + b` is `2 a² / 8 + 2 b² / 40`, that of a variance `v` on `n` degrees `2 v² / n`.
+        let (a, b) = (0.8, 0.2);
+        let by_moments = 2.0 / (2.0 * a * a / 8.0 + 2.0 * b * b / 40.0);
+        assert!((pooled(&[(a, 8.0), (b, 40.0)]) - by_moments).abs() < 1e-12);
     }
 
     #[test]

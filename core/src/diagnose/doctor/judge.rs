@@ -132,12 +132,13 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         Candidate::Views(views) => next.aside.extend(views),
     }
     let fit = model.fit(&next, before.levels)?;
-    let (wald, count, numbers, sigma, ln_alternatives);
+    let (wald, count, freedom, numbers, sigma, ln_alternatives);
     match &candidate {
         Candidate::Effect(effect) => {
             count = effect.numbers(lens);
             let at = fit.width() - count;
             wald = fit.wald(at, count)?;
+            freedom = fit.freedom(at, count);
             numbers = fit.theta.rows(at, count).iter().copied().collect();
             sigma = (at..at + count).map(|i| fit.covariance[(i, i)].max(0.0).sqrt()).collect();
             ln_alternatives = alternatives(model, *effect);
@@ -145,11 +146,11 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         Candidate::Views(views) => {
             count = 6 * views.len();
             wald = fit.wald_of_views(views)?;
+            freedom = least_freedom(&fit, views)?;
             (numbers, sigma) = (Vec::new(), Vec::new());
             ln_alternatives = ln_choose(model.sight.views.len(), views.len());
         }
     }
-    let freedom = fit.freedom();
     let gain = 0.5 * freedom * (wald / freedom).ln_1p();
     let held_out = match &candidate {
         Candidate::Effect(_) => predicted(model, &next, before).zip(predicted(model, &next, &fit)),
@@ -173,10 +174,29 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         candidate,
     };
     judged.matters = matters(model, &judged);
+    if let Candidate::Effect(effect @ (Effect::Scale | Effect::BoardMoved(_) | Effect::CameraMoved(_))) =
+        judged.candidate
+    {
+        judged.significant = judged.significant && is_more_than_a_field(model, &judged, effect);
+    }
     if let Candidate::Views(views) = &judged.candidate {
         judged.significant &= stand_apart(&judged, views);
     }
     Some(judged)
+}
+
+/// Whether an effect is significant beside errors of the arm in the axes of its base, too.
+fn is_more_than_a_field(model: &Model<'_>, judged: &Judged, effect: Effect) -> bool {
+    let Some(model) = model.with_field_in_base() else { return true };
+    let Some(fit) = model.fit(&judged.state, judged.fit.levels) else { return false };
+    let count = effect.numbers(model.sight.lens_count());
+    let at = fit.width() - count;
+    fit.wald(at, count).is_some_and(|wald| is_significant(wald, count, fit.freedom(at, count), judged.ln_alternatives))
+}
+
+/// Degrees of freedom of that view whose expectation rests on the fewest.
+fn least_freedom(fit: &Fit, views: &[usize]) -> Option<f64> {
+    views.iter().map(|view| fit.freedom_of_view(*view)).try_fold(f64::INFINITY, |least, of| Some(least.min(of?)))
 }
 
 /// Whether each of these views is an outlier among all of them, by a fit that is without.
@@ -188,7 +208,8 @@ fn stand_apart(judged: &Judged, views: &[usize]) -> bool {
     };
     let squared: Vec<f64> = (0..fit.residuals.len()).map(squared).collect();
     let level = 1.0 - ALPHA / squared.len() as f64;
-    let limit = FisherSnedecor::new(6.0, fit.freedom()).map_or(f64::INFINITY, |f| 6.0 * f.inverse_cdf(level));
+    let Some(freedom) = least_freedom(fit, views) else { return false };
+    let limit = FisherSnedecor::new(6.0, freedom).map_or(f64::INFINITY, |f| 6.0 * f.inverse_cdf(level));
     let outliers = outliers(&squared, limit);
     views.iter().all(|view| outliers.contains(view))
 }

@@ -21,9 +21,13 @@ use super::effect::Effect;
 use super::views::SessionViews;
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::chain::Chain;
-use crate::estimate::handeye::joint::field::{self, Places, SLOPES};
+use crate::estimate::handeye::joint::field::{self, HALF, Places, SLOPES};
 use crate::geometry::se3;
+use crate::geometry::statistics::pooled_freedom;
 
+/// Parts of the field, each with a level: errors of position and of orientation in the axes of the tip, and in those of the
+/// base.
+const PARTS: usize = 4;
 /// Smallest noise level of the robot, m and rad: below it nothing changes now.
 const LEAST: f64 = 1e-6;
 /// Largest change of a variance in one step, as a logarithm.
@@ -39,6 +43,7 @@ const LEAST_DETERMINED: f64 = 0.1;
 const NO_FIELD: f64 = 1e-3;
 
 /// One view in the linear model.
+#[derive(Clone)]
 pub(super) struct Row {
     pub error: Vector6<f64>,
     pub by_hand_eye: Matrix6<f64>,
@@ -54,6 +59,8 @@ pub(super) struct Model<'a> {
     pub rows: Vec<Row>,
     /// Where the errors of the robot that depend on where it stands are taken, where there are any.
     pub field: Option<Places>,
+    /// Whether the field has a part in the axes of the base.
+    in_base: bool,
 }
 
 /// Variances of the robot per axis, of position (m²) and of orientation (rad²).
@@ -61,14 +68,14 @@ pub(super) struct Model<'a> {
 pub(super) struct Levels {
     /// Of its noise, view by view.
     pub noise: [f64; 2],
-    /// Of what depends on where it stands, at a typical place.
-    pub field: [f64; 2],
+    /// Of what depends on where it stands, at a typical place: in the axes of the tip, then in those of the base.
+    pub field: [f64; PARTS],
 }
 
 impl Levels {
     /// With as much of the one as of the other.
     pub fn even(noise: [f64; 2]) -> Self {
-        Self { noise, field: noise }
+        Self { noise, field: [noise[0], noise[1], noise[0], noise[1]] }
     }
 }
 
@@ -95,6 +102,8 @@ pub(super) struct Fit {
     pub designs: Vec<DMatrix<f64>>,
     /// Views in the fit.
     pub views: usize,
+    /// Places of the field's slopes among the unknowns, in the order of their levels.
+    slopes: [Range<usize>; PARTS],
 }
 
 impl<'a> Model<'a> {
@@ -121,7 +130,18 @@ impl<'a> Model<'a> {
                 }
             })
             .collect();
-        Self { sight, solution, rows, field }
+        Self { sight, solution, rows, field, in_base: false }
+    }
+
+    /// The same with a field that has a part in the axes of the base, too; `None` where there is none to be had.
+    ///
+    /// What is wrong near the wrist turns with the tip. What is wrong near the base does not: links that are too long make the
+    /// arm move too far, which a field in the axes of the tip cannot follow where the tip turns, and looks like another
+    /// size of the target, or like a move. An effect beside both parts is more than that.
+    pub fn with_field_in_base(&self) -> Option<Self> {
+        let field = Places::for_field(self.sight.views.iter().map(|view| &view.base_from_tip))?;
+        let (sight, solution, rows) = (self.sight, self.solution, self.rows.clone());
+        Some(Self { sight, solution, rows, field: Some(field), in_base: true })
     }
 
     /// The same views at the solution that a fit found.
@@ -155,7 +175,11 @@ impl<'a> Model<'a> {
     }
 
     fn slopes(&self) -> usize {
-        if self.field.is_some() { SLOPES } else { 0 }
+        match (&self.field, self.in_base) {
+            (None, _) => 0,
+            (Some(_), false) => SLOPES,
+            (Some(_), true) => 2 * SLOPES,
+        }
     }
 
     fn design(&self, index: usize, state: &State, width: usize) -> DMatrix<f64> {
@@ -170,9 +194,17 @@ impl<'a> Model<'a> {
             at += lens;
         }
         if let Some(places) = &self.field {
-            let columns = field::columns(&places.at(&view.base_from_tip), &row.by_robot);
-            design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
-            at += columns.ncols();
+            let place = places.at(&view.base_from_tip);
+            let tip_from_base = view.base_from_tip.isometry().rotation.inverse().to_rotation_matrix();
+            let mut turned = Matrix6::zeros();
+            for part in [0, 3] {
+                turned.fixed_view_mut::<3, 3>(part, part).copy_from(tip_from_base.matrix());
+            }
+            for by_error in [row.by_robot, row.by_robot * turned].iter().take(if self.in_base { 2 } else { 1 }) {
+                let columns = field::columns(&place, by_error);
+                design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
+                at += columns.ncols();
+            }
         }
         for effect in &state.effects {
             let columns = effect.columns(self, index);
@@ -218,21 +250,19 @@ impl<'a> Model<'a> {
             return None;
         }
         let designs: Vec<DMatrix<f64>> = (0..self.rows.len()).map(|i| self.design(i, state, width)).collect();
-        let floor = |levels: [f64; 2]| levels.map(|v: f64| v.max(LEAST * LEAST));
-        let mut levels = Levels { noise: floor(start.noise), field: floor(start.field) };
+        let floor = |v: f64| v.max(LEAST * LEAST);
+        let mut levels = Levels { noise: start.noise.map(floor), field: start.field.map(floor) };
         for step in 0..=MAX_STEPS {
             let solved = self.solve(state, &inside, &designs, levels)?;
             if step == MAX_STEPS {
                 return Some(self.finished(solved, levels, designs, &inside));
             }
-            let changes =
-                [self.scoring(&inside, &designs, &solved, levels.noise), self.scoring_of_field(&solved, levels.field)];
+            let of_noise = self.scoring(&inside, &designs, &solved, levels.noise);
+            let of_field = self.scoring_of_field(&solved, levels.field);
             let mut settled = true;
-            for (level, change) in [&mut levels.noise, &mut levels.field].into_iter().zip(changes) {
-                for (v, c) in level.iter_mut().zip(change) {
-                    settled &= c.abs() < SETTLED || (c < 0.0 && *v <= LEAST * LEAST);
-                    *v = (*v * c.exp()).max(LEAST * LEAST);
-                }
+            for (v, c) in levels.noise.iter_mut().chain(&mut levels.field).zip(of_noise.into_iter().chain(of_field)) {
+                settled &= c.abs() < SETTLED || (c < 0.0 && *v <= LEAST * LEAST);
+                *v = floor(*v * c.exp());
             }
             if settled {
                 return Some(self.finished(solved, levels, designs, &inside));
@@ -266,24 +296,48 @@ impl<'a> Model<'a> {
         theta.iter().all(|v| v.is_finite()).then_some(Solution { weights, covariance, theta })
     }
 
-    /// Places of the field's slopes among the unknowns: those of position, those of orientation.
-    fn field_parts(&self) -> [Range<usize>; 2] {
-        let (at, half) = (self.field_at(), self.slopes() / 2);
-        [at..at + half, at + half..at + 2 * half]
+    /// Places of the field's slopes among the unknowns, in the order of their levels.
+    fn field_parts(&self) -> [Range<usize>; PARTS] {
+        let (first, end) = (self.field_at(), self.effects_at());
+        [0, 1, 2, 3].map(|k| {
+            let at = |k: usize| (first + k * HALF).min(end);
+            at(k)..at(k + 1)
+        })
     }
 
-    /// Logarithmic step of both variances of the field: Fisher scoring on the restricted likelihood, in which
+    /// Logarithmic step of the variances of the field: Fisher scoring on the restricted likelihood, in which
     /// `Zᵀ P Z = (1 - C / v) / v` for effects with the variance `v` and the covariance `C` after the fit.
-    fn scoring_of_field(&self, solved: &Solution, levels: [f64; 2]) -> [f64; 2] {
-        let [position, orientation] = self.field_parts();
-        [(position, levels[0]), (orientation, levels[1])].map(|(part, level)| {
-            let (at, count) = (part.start, part.len());
-            let known = DMatrix::identity(count, count) - solved.covariance.view((at, at), (count, count)) / level;
-            let gradient = 0.5 * (solved.theta.rows(at, count).norm_squared() / level - known.trace());
-            let information = 0.5 * known.norm_squared();
+    fn scoring_of_field(&self, solved: &Solution, levels: [f64; PARTS]) -> [f64; PARTS] {
+        let parts = self.field_parts();
+        let mut gradient = nalgebra::SVector::<f64, PARTS>::zeros();
+        let mut information = nalgebra::SMatrix::<f64, PARTS, PARTS>::zeros();
+        for (k, part) in parts.iter().enumerate() {
+            for (l, other) in parts.iter().enumerate() {
+                let mut known = DMatrix::zeros(part.len(), other.len());
+                if k == l {
+                    known.fill_with_identity();
+                }
+                let within = (levels[k] * levels[l]).sqrt();
+                known -= solved.covariance.view((part.start, other.start), known.shape()) / within;
+                if k == l {
+                    let squares = solved.theta.rows(part.start, part.len()).norm_squared();
+                    gradient[k] = 0.5 * (squares / levels[k] - known.trace());
+                }
+                information[(k, l)] = 0.5 * known.norm_squared();
+            }
+        }
+        for k in 0..PARTS {
             // What does not show beside the noise is none.
-            if information < NO_FIELD { 0.0 } else { (gradient / information).clamp(-LARGEST_STEP, LARGEST_STEP) }
-        })
+            if information[(k, k)] < NO_FIELD {
+                information.fill_row(k, 0.0);
+                information.fill_column(k, 0.0);
+                (gradient[k], information[(k, k)]) = (0.0, 1.0);
+            }
+            // Axes of tip and base are the same where the tip hardly turns: nothing then tells which it is.
+            information[(k, k)] *= 1.0 + 1e-3;
+        }
+        let step = information.try_inverse().map_or_else(|| gradient * 0.0, |inverse| inverse * gradient);
+        [0, 1, 2, 3].map(|k: usize| step[k].clamp(-LARGEST_STEP, LARGEST_STEP))
     }
 
     fn residual(&self, index: usize, design: &DMatrix<f64>, theta: &DVector<f64>) -> Vector6<f64> {
@@ -330,7 +384,8 @@ impl<'a> Model<'a> {
         let by_prior: f64 = parts.map(|(part, level)| part.map(|i| covariance[(i, i)] / level).sum::<f64>()).sum();
         let determined = theta.len() as f64 - by_prior;
         let residuals = designs.iter().enumerate().map(|(i, design)| self.residual(i, design, &theta)).collect();
-        Fit { theta, covariance, levels, determined, residuals, weights, designs, views: inside.len() }
+        let (views, slopes) = (inside.len(), self.field_parts());
+        Fit { theta, covariance, levels, determined, residuals, weights, designs, views, slopes }
     }
 }
 
@@ -377,8 +432,41 @@ impl Fit {
     }
 
     /// Degrees of freedom of the noise levels, taken with care: position and orientation share the numbers.
-    pub fn freedom(&self) -> f64 {
+    fn freedom_of_noise(&self) -> f64 {
         (0.5 * (6.0 * self.views as f64 - self.determined)).max(1.0)
+    }
+
+    /// Degrees of freedom of the variance of some unknowns. What of it is due to the slopes of the field is in proportion to
+    /// their variance, which is estimated from the slopes alone that the data determine: nine in each part at the most,
+    /// however many views there are. The rest is the noise's.
+    pub fn freedom(&self, at: usize, count: usize) -> f64 {
+        let covariance = self.covariance.view((at, at), (count, count)).into_owned();
+        let by_slopes = |part: &Range<usize>| self.covariance.view((at, part.start), (count, part.len())).into_owned();
+        self.pooled(&covariance, by_slopes)
+    }
+
+    /// The same of how far a view that is not in the fit is from what is expected of it.
+    pub fn freedom_of_view(&self, view: usize) -> Option<f64> {
+        let design = &self.designs[view];
+        let own = self.weights[view].try_inverse()?;
+        let shared = design * &self.covariance * design.transpose();
+        let by_slopes = |part: &Range<usize>| design * self.covariance.columns(part.start, part.len());
+        Some(self.pooled(&DMatrix::from_fn(6, 6, |i, j| own[(i, j)] + shared[(i, j)]), by_slopes))
+    }
+
+    /// By a covariance, and the covariance of its numbers with some of the slopes: by the log of the variance `v` of these
+    /// the covariance `C` changes by `C_s C_sᵀ / v`.
+    fn pooled(&self, covariance: &DMatrix<f64>, by_slopes: impl Fn(&Range<usize>) -> DMatrix<f64>) -> f64 {
+        let Some(inverse) = inverse(covariance) else { return self.freedom_of_noise() };
+        let of_field = self.slopes.iter().zip(self.levels.field).map(|(part, level)| {
+            let with = by_slopes(part);
+            let share = (&inverse * &with).dot(&with) / (level * covariance.nrows() as f64);
+            let known = part.len() as f64 - part.clone().map(|i| self.covariance[(i, i)]).sum::<f64>() / level;
+            (share, known)
+        });
+        let of_field: Vec<(f64, f64)> = of_field.collect();
+        let of_noise = 1.0 - of_field.iter().map(|(share, _)| share).sum::<f64>();
+        pooled_freedom(of_field.into_iter().chain([(of_noise, self.freedom_of_noise())]))
     }
 
     /// Wald's statistic of `count` unknowns from `at`.

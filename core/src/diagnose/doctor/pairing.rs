@@ -76,8 +76,10 @@ pub(super) fn wrong(
     (0..sight.views.len()).filter(|view| misfit(*view) >= wrong_m).collect()
 }
 
-/// Whether a step explains at least two in three of the views that are wrong without it. Those beside it do not count:
-/// where poses are missing, as many images there belong to none.
+/// Whether a step explains at least two in three of the views that are wrong without it, and its own solution puts at least
+/// two, and two in three, of the views that it pairs with another row right with that row and wrong with their own. Without
+/// the second a solution that gives up the views after the step, and therefore suits the others better, would count as an
+/// explanation. Views beside the step do not count: where poses are missing, as many images there belong to none.
 pub(super) fn explains(
     sight: &SessionViews,
     step: Pairing,
@@ -87,10 +89,19 @@ pub(super) fn explains(
 ) -> bool {
     let Pairing::Stepped { from, before, after } = step else { return false };
     let gap = (after - before).unsigned_abs();
-    let judged = |views: Vec<usize>| views.into_iter().filter(|view| view + gap < from || *view >= from + gap).count();
-    let without = judged(wrong(sight, Pairing::AsGiven, as_given, wrong_m));
-    let with = judged(wrong(sight, step, Some(stepped), wrong_m));
-    without >= 2 && 3 * with <= without
+    let judged = |mut views: Vec<usize>| {
+        views.retain(|view| view + gap < from || *view >= from + gap);
+        views
+    };
+    let without = judged(wrong(sight, Pairing::AsGiven, as_given, wrong_m)).len();
+    let still_wrong = judged(wrong(sight, step, Some(stepped), wrong_m));
+    let own_row_wrong = judged(wrong(sight, Pairing::AsGiven, Some(stepped), wrong_m));
+    let moved = |view: &usize| (if *view < from { before } else { after }) != 0;
+    let repaired = own_row_wrong.iter().filter(|view| moved(view) && !still_wrong.contains(view)).count();
+    // An image of which the table has no pose cannot be repaired.
+    let has_row = |view: &usize| step.pose_of(sight, *view).is_some();
+    let paired_anew = judged((0..sight.views.len()).collect()).iter().filter(|v| moved(v) && has_row(v)).count();
+    without >= 2 && 3 * still_wrong.len() <= without && repaired >= 2 && 3 * repaired >= 2 * paired_anew
 }
 
 /// The step that lets most views agree with the solution of one side of the session; `None` when the views are too few.
@@ -142,4 +153,38 @@ fn one_sided(sight: &SessionViews) -> Vec<(bool, ClosedFormSolution)> {
 fn misfit_m(sight: &SessionViews, solution: &ClosedFormSolution, view: usize, by: isize) -> f64 {
     let Some(pose) = Pairing::Shifted(by).pose_of(sight, view) else { return f64::INFINITY };
     agreement::misfit_of(sight, solution, &pose, &sight.views[view].camera_from_target)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector6;
+
+    use super::*;
+    use crate::estimate::handeye::Mode;
+    use crate::testing::faulty::{Setup, links, session};
+
+    /// A step explains what it repairs, not what the solution beside it happens to suit better.
+    #[test]
+    fn a_step_is_believed_by_the_views_that_it_pairs_anew() {
+        let healthy = SessionViews::new(&session(&Setup::new(Mode::EyeInHand, 14, 71))).expect("views");
+        let (mount_from_camera, anchor_from_target) = links(Mode::EyeInHand);
+        let right = ClosedFormSolution { mount_from_camera, anchor_from_target };
+        let off = Vector6::new(0.02, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let poor = ClosedFormSolution { mount_from_camera: mount_from_camera.perturbed(&off), anchor_from_target };
+        let wrong_m = 0.01 * healthy.distance_m;
+        let step = Pairing::Stepped { from: 11, before: 0, after: -2 };
+        assert_eq!(wrong(&healthy, Pairing::AsGiven, Some(&poor), wrong_m).len(), 14);
+        assert_eq!(wrong(&healthy, step, Some(&right), wrong_m), [11, 12, 13]);
+        assert!(!explains(&healthy, step, Some(&poor), &right, wrong_m), "all it does is give the last views up");
+
+        // The last views have poses of two rows further, which the step undoes.
+        let mut shifted = session(&Setup::new(Mode::EyeInHand, 14, 71));
+        let poses: Vec<_> = shifted.views.iter().map(|view| view.base_from_tip).collect();
+        for (view, pose) in shifted.views[9..14].iter_mut().zip(&poses[7..12]) {
+            view.base_from_tip = *pose;
+        }
+        let shifted = SessionViews::new(&shifted).expect("views");
+        let step = Pairing::Stepped { from: 7, before: 0, after: 2 };
+        assert!(explains(&shifted, step, Some(&poor), &right, wrong_m));
+    }
 }

@@ -106,7 +106,7 @@ fn drop_overtaken(model: &Model<'_>, state: &mut State, fit: &mut Fit, taken: &m
         let mut weak = None;
         for effect in &state.effects {
             let count = effect.numbers(lens);
-            if !is_significant(fit.wald(at, count)?, count, fit.freedom(), alternatives(model, *effect)) {
+            if !is_significant(fit.wald(at, count)?, count, fit.freedom(at, count), alternatives(model, *effect)) {
                 weak = Some(*effect);
             }
             at += count;

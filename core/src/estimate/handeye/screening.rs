@@ -161,8 +161,8 @@ fn fitted<E: Estimator>(
 impl<S> Fit<S> {
     /// The views that are outliers by their distances.
     fn wrong(&self) -> Vec<usize> {
-        let squared: Vec<f64> = self.judged.iter().map(|j| j.squared).collect();
-        outliers(&squared, self.judged.first().map_or(f64::INFINITY, |j| j.limit))
+        let of_limit: Vec<f64> = self.judged.iter().map(|j| j.squared / j.limit).collect();
+        outliers(&of_limit, 1.0)
     }
 
     fn median(&self) -> f64 {
@@ -201,10 +201,9 @@ fn without_farthest<E: Estimator>(
     estimator: &E,
     fit: &Fit<E::Solution>,
 ) -> Result<Option<Fit<E::Solution>>, HandEyeError> {
-    let squared = |i: usize| fit.judged[i].squared;
-    let farthest = fit.kept.iter().copied().max_by(|&a, &b| squared(a).total_cmp(&squared(b)));
-    let far = |i: usize| squared(i) > SUSPECT * fit.judged[i].limit;
-    let Some(farthest) = farthest.filter(|&i| fit.kept.len() > NEED && far(i)) else { return Ok(None) };
+    let of_limit = |i: usize| fit.judged[i].squared / fit.judged[i].limit;
+    let farthest = fit.kept.iter().copied().max_by(|&a, &b| of_limit(a).total_cmp(&of_limit(b)));
+    let Some(farthest) = farthest.filter(|&i| fit.kept.len() > NEED && of_limit(i) > SUSPECT) else { return Ok(None) };
     let rest = fit.kept.iter().copied().filter(|&i| i != farthest).collect();
     match fitted(estimator, rest, Some(&fit.solution)) {
         Ok(next) => Ok(next.wrong().contains(&farthest).then_some(next)),

@@ -34,11 +34,16 @@ pub(super) fn base_from_tip(arm: &Arm, joints: &[f64; 6]) -> Isometry3<f64> {
     *arm.forward(joints).expect("six joints").isometry()
 }
 
-/// Whether the arm stands as it does in a session that is moved through without turning over: in front of its base, the
-/// elbow up and the wrist to one side. The errors of its links are other ones on every branch.
+/// Whether the arm stands as it does in a session that is moved through without turning over: in front of its base, not
+/// bent backwards over its shoulder, the elbow up and the wrist to one side. The errors of its links are other ones on every
+/// branch.
 fn is_usual(joints: &[f64; 6]) -> bool {
-    let [base, shoulder, elbow, _, wrist, _] = joints.map(|angle| angle.sin().atan2(angle.cos()));
-    base.abs() < std::f64::consts::FRAC_PI_2 && shoulder < 0.0 && elbow > 0.0 && wrist < 0.0
+    let [_, upper, fore, _, hand, _] = ArmKind::Ur5.rows();
+    let [base, shoulder, elbow, wrist_1, wrist_2, _] = joints.map(|angle| angle.sin().atan2(angle.cos()));
+    let forwards_m = upper.a_m * shoulder.cos()
+        + fore.a_m * (shoulder + elbow).cos()
+        + hand.d_m * (shoulder + elbow + wrist_1).sin();
+    base.abs() < std::f64::consts::FRAC_PI_2 && forwards_m > 0.0 && elbow > 0.0 && wrist_2 < 0.0
 }
 
 /// Joint angles that reach a pose in the usual way; `None` when it is out of reach.

@@ -149,24 +149,30 @@ impl Optimum<'_> {
     /// where there is no optimum.
     fn rise(&self, along: &Vector6<f64>, wanted: f64) -> Result<Option<f64>, HandEyeError> {
         let start = self.state.mount_from_camera.isometry().inverse();
+        let bottom = self.system.cost(self.noise);
         let mut direction = DVector::zeros(self.covariance.nrows());
         direction.rows_mut(0, 6).copy_from(along);
         let mut state = self.state.clone();
+        let mut moved_on: Option<(System, Reduced)> = None;
         for _ in 0..STEPS {
-            let Some(system) = self.linearised(&state)? else { return Ok(None) };
-            let Ok(reduced) = system.reduce(self.noise) else { return Ok(None) };
+            let (system, reduced) =
+                moved_on.as_ref().map_or((self.system, self.reduced), |(system, reduced)| (system, reduced));
             let moved = along.dot(&se3::log(&(start * state.mount_from_camera.isometry())));
             let free = reduced.shared_step();
             let follows = reduced.solve(&direction);
             let left = wanted - moved - direction.dot(&free);
             let step = &free + &follows * (left / direction.dot(&follows));
-            state = state.stepped(self.problem, &step, &reduced.own_steps(&step));
             if reduced.length(&step) < SMALL {
-                break;
+                // So near, the cost is its parabola: least at the free step, and all corrections follow.
+                let least = system.cost(self.noise) - reduced.decrease();
+                return Ok(Some(least + reduced.length(&(&step - &free)).powi(2) - bottom));
             }
+            state = state.stepped(self.problem, &step, &reduced.own_steps(&step));
+            let Some(system) = self.linearised(&state)? else { return Ok(None) };
+            let Ok(reduced) = system.reduce(self.noise) else { return Ok(None) };
+            moved_on = Some((system, reduced));
         }
-        let bottom = self.system.cost(self.noise);
-        Ok(self.linearised(&state)?.map(|system| system.cost(self.noise) - bottom))
+        Ok(moved_on.map(|(system, _)| system.cost(self.noise) - bottom))
     }
 
     fn linearised(&self, state: &State) -> Result<Option<System>, HandEyeError> {

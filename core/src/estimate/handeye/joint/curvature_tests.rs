@@ -43,3 +43,48 @@ fn a_free_lens_is_stated_less_well_known_with_few_views() {
     let (plain, stated) = variances(36, true, 5);
     assert!(stated / plain < 1.15, "{}", stated / plain);
 }
+
+/// Few views and a free lens, where the cost is no parabola: the profile is followed to its optimum, not to where it starts.
+#[test]
+fn the_rise_along_a_direction_is_that_of_the_optimum_there() {
+    let lens = Intrinsics { distortion: Distortion::BrownConrady([-0.08, 0.05, 6e-4, -4e-4, -0.01]), ..camera() };
+    let t = trial(Mode::EyeInHand, 6, &NOISE, lens, 61);
+    let problem = t.problem(true, Some(NOISE));
+    let cancel = CancelToken::default();
+    let state = State::of(&fit(&problem, &t.start(), &cancel).expect("solves"));
+    let system = System::new(&problem, &state, &cancel).expect("solves");
+    let reduced = system.reduce(&NOISE).expect("determined");
+    let covariance = reduced.inverse();
+    let optimum = Optimum {
+        problem: &problem,
+        state: &state,
+        system: &system,
+        noise: &NOISE,
+        reduced: &reduced,
+        covariance: &covariance,
+    };
+    let along = Vector6::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
+    let sigma = covariance[(2, 2)].sqrt();
+    for times in [-1.96, 1.96] {
+        let rise = optimum.rise(&along, times * sigma).expect("not cancelled").expect("an optimum");
+        // All steps are taken, however small.
+        let mut held = state.clone();
+        let start = state.mount_from_camera.isometry().inverse();
+        let mut direction = DVector::zeros(covariance.nrows());
+        direction[2] = 1.0;
+        for _ in 0..12 {
+            let system = System::new(&problem, &held, &cancel).expect("solves");
+            let reduced = system.reduce(&NOISE).expect("determined");
+            let follows = reduced.solve(&direction);
+            let moved = se3::log(&(start * held.mount_from_camera.isometry()))[2];
+            let free = reduced.shared_step();
+            let step = &free + &follows * ((times * sigma - moved - free[2]) / follows[2]);
+            held = held.stepped(&problem, &step, &reduced.own_steps(&step));
+        }
+        let at_end = System::new(&problem, &held, &cancel).expect("solves").cost(&NOISE) - system.cost(&NOISE);
+        println!("{times}: {rise:.5}, by many steps {at_end:.5}, of a parabola {:.5}", times * times);
+        // A step of a hundredth that is not taken anew leaves a part in ten thousand of a unit, and its cube.
+        assert!((rise / at_end - 1.0).abs() < 1e-3, "{rise} {at_end}");
+        assert!((at_end / (times * times) - 1.0).abs() > 0.01, "{at_end}: a parabola would do");
+    }
+}

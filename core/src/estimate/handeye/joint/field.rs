@@ -99,6 +99,14 @@ impl RobotField {
         Self { places, slopes: [0.0; SLOPES] }
     }
 
+    /// The same slopes, affine as far as these poses go, too: where they are judged by what the field predicts and is uncertain
+    /// by, a field that ends at the edge of the views that it was found from would predict the wrong error there.
+    pub(crate) fn reaching<'a>(mut self, poses: impl Iterator<Item = &'a Pose<Base, Tip>>) -> Self {
+        let distances = poses.map(|pose| (pose.translation() - self.places.mean).norm());
+        self.places.reach_m = distances.fold(self.places.reach_m, f64::max);
+        self
+    }
+
     pub(crate) fn place(&self, base_from_tip: &Pose<Base, Tip>) -> Vector3<f64> {
         self.places.at(base_from_tip)
     }

@@ -38,6 +38,7 @@ mod problem;
 pub(crate) mod residual_distortion;
 pub(crate) mod shared_lens;
 mod shown_field;
+mod shown_warp;
 mod solution;
 pub(crate) mod state;
 mod variance;
@@ -48,6 +49,7 @@ use nalgebra::Point3;
 pub use problem::{Free, JointProblem, JointStart, LensPrior, Noise};
 pub use residual_distortion::ShownDistortion;
 pub use shown_field::with_shown_field;
+pub(crate) use shown_warp::warp_ratio;
 pub use solution::{JointSolution, ViewFit};
 
 use super::HandEye;

@@ -7,18 +7,21 @@
 //! A corner is left out as an outlier when its residual, its view's own pose being free, is several times what nine in ten corners
 //! have; so long tails of honest noise are kept.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, SMatrix, Vector6};
 
 use super::field;
 use super::normal::System;
 use super::view_block::{MAX_SHARED, prior_weight};
-use super::{JointProblem, JointSolution, JointStart, fit};
+use super::{JointProblem, JointSolution, JointStart, Noise, fit};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::screening::{Distance, Estimator, Judged, limit, screened};
 use crate::estimate::wrong_corners;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::se3;
+use crate::geometry::statistics::pooled_freedom;
 use crate::geometry::view_equations::{FreeParameters, PoseEquations};
 use crate::progress::{CancelToken, Work};
 use crate::targets::observation::{Corner, View};
@@ -130,20 +133,27 @@ fn distances(
 ) -> Result<Vec<Judged>, HandEyeError> {
     let chosen: Vec<View> = kept.iter().map(|&i| views[i].clone()).collect();
     let inside = JointProblem { views: &chosen, ..*problem };
-    let state = State::of(solution);
+    let mut state = State::of(solution);
+    state.field = state.field.map(|field| field.reaching(views.iter().map(|view| &view.base_from_tip)));
     let system = System::new(&inside, &state, cancel)?;
     let covariance = system.reduce(&solution.noise)?.inverse();
     let layout = system.layout;
     // What is known of an unknown beforehand takes no residuals to find.
     let determined = layout.count() as f64 - system.prior_trace(&solution.noise, &covariance);
     let freedom = 0.5 * (6.0 * kept.len() as f64 - determined);
-    let limit = limit(views.len(), freedom.max(4.0));
+    let of_noise = freedom.max(4.0);
+    let slopes = slopes(&system, &solution.noise, &covariance);
     let robot = prior_weight(&solution.noise).map(f64::recip);
     let in_pixels = solution.noise.corner_px.powi(2) + solution.noise.view_px.powi(2);
     let centre = centre(problem, &solution.as_start());
     let judged = views.iter().zip(own).enumerate().map(|(i, (view, own))| {
         let chain = state.chain(problem, view, &Vector6::zeros());
-        let gone = || Judged { squared: f64::INFINITY, limit, metres: f64::INFINITY, radians: f64::INFINITY };
+        let gone = || Judged {
+            squared: f64::INFINITY,
+            limit: limit(views.len(), of_noise),
+            metres: f64::INFINITY,
+            radians: f64::INFINITY,
+        };
         let Some((seen, equations)) = own_pose(problem, &state, view, own) else { return gone() };
         let Some(factor) = Cholesky::new(equations.pose) else { return gone() };
         let (metres, radians) = apart(&chain.camera_from_target, &seen, &centre);
@@ -170,10 +180,33 @@ fn distances(
         let expected = if kept.binary_search(&i).is_ok() { own - shared } else { own + shared };
         // A view that the others do not determine has nothing to disagree with.
         let expected = Cholesky::new(expected).or_else(|| Cholesky::new(own));
-        let squared = expected.map_or(f64::INFINITY, |v| error.dot(&v.solve(&error)));
-        Judged { squared, limit, metres, radians }
+        let squared = expected.as_ref().map_or(f64::INFINITY, |v| error.dot(&v.solve(&error)));
+        let freedom = expected.map_or(of_noise, |v| {
+            // By the log of their variance `v`, what is expected changes by `B C_s C_sᵀ Bᵀ / v` with the slopes.
+            let share = |(part, variance, _): &(Range<usize>, f64, f64)| {
+                let with = &by_shared * covariance.columns(part.start, part.len());
+                v.solve(&Matrix6::from_iterator((&with * with.transpose()).iter().copied())).trace() / (6.0 * variance)
+            };
+            let of_field: Vec<(f64, f64)> = slopes.iter().map(|part| (share(part), part.2)).collect();
+            let rest = 1.0 - of_field.iter().map(|(share, _)| share).sum::<f64>();
+            pooled_freedom(of_field.into_iter().chain([(rest, of_noise)]))
+        });
+        Judged { squared, limit: limit(views.len(), freedom), metres, radians }
     });
     Ok(judged.collect())
+}
+
+/// The slopes of the robot's field, position and orientation: where they are among the shared unknowns, their variance, and on
+/// how many of them, which the data determine, that rests.
+fn slopes(system: &System, noise: &Noise, covariance: &DMatrix<f64>) -> Vec<(Range<usize>, f64, f64)> {
+    let halves = [(0, noise.field_m), (field::HALF, noise.field_rad)];
+    let halves = halves.into_iter().filter(|(at, _)| *at < system.slopes.len()).map(|(at, sigma)| {
+        let first = system.layout.field_at() + at;
+        let part = first..first + field::HALF;
+        let unknown: f64 = part.clone().map(|i| covariance[(i, i)]).sum::<f64>() / sigma.powi(2);
+        (part, sigma.powi(2), field::HALF as f64 - unknown)
+    });
+    halves.collect()
 }
 
 /// The pose of a view by its corners alone with the lens and the target of the state, and the equations there; `None` when

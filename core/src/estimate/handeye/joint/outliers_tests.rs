@@ -136,3 +136,39 @@ fn noise_that_all_corners_of_a_view_share_is_found_and_stated() {
     // 99.9 % of 6 F(6, 20).
     assert!(squared < 36.0, "{squared}");
 }
+
+#[test]
+fn a_view_farther_out_than_the_others_is_judged_by_a_field_that_reaches_it() {
+    // A robot whose errors are affine in the place, and nothing wrong. The farthest view is judged by a fit without it, whose
+    // own views end before it.
+    let noise = Noise { field_m: 3e-3, field_rad: 5e-3, robot_m: 2e-5, robot_rad: 1e-4, ..REALISTIC };
+    let (mut farther, mut beyond) = (Vec::new(), 0);
+    for seed in 0..20 {
+        let t = trial(Mode::EyeInHand, 16, &noise, camera(), 950 + seed);
+        let from_middle = |views: &[usize]| {
+            let mean: nalgebra::Vector3<f64> =
+                views.iter().map(|&i| t.views[i].base_from_tip.translation()).sum::<nalgebra::Vector3<f64>>()
+                    / views.len() as f64;
+            t.views.iter().map(|view| (view.base_from_tip.translation() - mean).norm()).collect::<Vec<f64>>()
+        };
+        let all: Vec<usize> = (0..16).collect();
+        let far = from_middle(&all);
+        let farthest = all.iter().copied().max_by(|&a, &b| far[a].total_cmp(&far[b])).expect("views");
+        let kept: Vec<usize> = all.into_iter().filter(|&i| i != farthest).collect();
+        let far = from_middle(&kept);
+        farther.push(far[farthest] / kept.iter().map(|&i| far[i]).fold(0.0, f64::max));
+        let free = super::super::Free { field: true, ..Default::default() };
+        let problem = JointProblem { free, ..t.problem(false, None) };
+        let own = own(&t);
+        let cancel = CancelToken::default();
+        let of_views =
+            OfViews { problem: &problem, start: &t.start(), views: &t.views, own: &own, work: Work::from(&cancel) };
+        let solution = of_views.fit(&kept, None).expect("solves");
+        let judged = of_views.judge(&solution, &kept).expect("solves");
+        beyond += usize::from(judged[farthest].squared > judged[farthest].limit);
+    }
+    let farthest = farther.iter().copied().fold(0.0, f64::max);
+    assert!(farthest > 1.2, "none is far out: {farther:.2?}");
+    // One in a thousand sessions has a view beyond the limit.
+    assert_eq!(beyond, 0);
+}
