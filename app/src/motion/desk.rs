@@ -110,8 +110,8 @@ struct Inner {
     said: Vec<Event>,
     /// What a person keeps the arm out of.
     keep_out: Arc<Surroundings>,
-    /// The connection does not know of it yet.
-    owes_keep_out: bool,
+    /// The same while the connection does not know of it.
+    owed_keep_out: Option<Arc<Surroundings>>,
 }
 
 /// Shared by the application and the motion worker.
@@ -171,14 +171,13 @@ impl MotionQueue {
     /// What the arm is to keep out of, from its next motion on and over every connection.
     pub fn keep_out(&self, keep_out: Arc<Surroundings>) {
         let mut inner = self.inner();
+        inner.owed_keep_out = Some(Arc::clone(&keep_out));
         inner.keep_out = keep_out;
-        inner.owes_keep_out = true;
     }
 
     /// The same for the worker, once for each change and for each connection.
     pub fn take_keep_out(&self) -> Option<Arc<Surroundings>> {
-        let mut inner = self.inner();
-        std::mem::take(&mut inner.owes_keep_out).then(|| Arc::clone(&inner.keep_out))
+        self.inner().owed_keep_out.take()
     }
 
     /// Ends what moves, and forgets what was to move next.
@@ -213,7 +212,7 @@ impl MotionQueue {
     pub fn connected(&self) {
         let mut inner = self.inner();
         inner.connected = true;
-        inner.owes_keep_out = true;
+        inner.owed_keep_out = Some(Arc::clone(&inner.keep_out));
     }
 
     /// The worker has none now. What it had not begun is refused.

@@ -116,7 +116,7 @@ fn an_arm_of_another_name_is_calibrated_once_the_objects_of_its_scene_are_named(
     let (mm, deg, _) = errors(&result);
     println!("Panda called Franka: {mm:.4} mm, {deg:.4}°");
     let reached = result.findings.iter().find(|finding| finding.code == "goal_reached").expect("it is");
-    assert!(reached.message.contains("goal of 0.300 mm"), "{}", reached.message);
+    assert!(reached.text.contains("goal of 0.300 mm"), "{}", reached.text);
     let stated_mm = result.quality.tip_error_95_mm.expect("stated");
     assert!(mm < 3.0 * stated_mm, "{mm} mm, stated {stated_mm} mm");
 }
