@@ -1,30 +1,24 @@
 //! Where the scene has the parts of the cell.
 
-use egui::{CollapsingHeader, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
+use egui::{CollapsingHeader, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::cell::{BadCellPath, CellPart, CellPaths};
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::theme::Palette;
 use crate::gui::style::{form, parts};
-use crate::model::{LinkState, Model};
+use crate::model::Model;
 use crate::text::{Language, Text};
 use crate::{text, tr};
 
 /// The paths as they are typed; `None` while nothing was.
 pub(super) type Draft = Option<[String; CellPart::ALL.len()]>;
 
-/// A path for each part, folded while those of the public scene are in use; unfolded when a search fails.
+/// A path for each part, folded while those of the public scene are in use when the pane is first shown.
 pub(super) fn objects_ui(ui: &mut Ui, model: &Model, draft: &mut Draft, outbox: &mut Outbox) {
     let language = model.view.language;
-    let key = Id::new("objects were not found");
-    // A search that has failed once: nothing answers there, or something is missing.
-    let is_missed = matches!(model.control, LinkState::Searching { attempt: 2.., .. } | LinkState::Failed { .. });
-    let was_missed: bool = parts::remembered(ui, key);
-    parts::remember(ui, key, is_missed);
     CollapsingHeader::new(tr!(language, "Objects of the scene"))
         .id_salt("objects of the scene")
         .default_open(model.objects != CellPaths::default())
-        .open((is_missed && !was_missed).then_some(true))
         .show(ui, |ui| {
             let hint = tr!(language, "Paths as in the scene hierarchy of CoppeliaSim, such as /Panda/Tip");
             parts::hint_ui(ui, hint);
@@ -102,10 +96,10 @@ mod tests {
         assert!(!pane.sees("Tip (TCP)"), "the public scene needs nothing of it");
         pane.click("Objects of the scene");
         pane.steps();
-        pane.type_into("Path: Tip (TCP)", "Panda");
+        pane.retype("Path: Tip (TCP)", "Panda");
         assert!(pane.sees("is no path of an object"));
         assert_eq!(pane.click("Use these objects"), [], "what is no path is not sent");
-        pane.type_into("Path: Tip (TCP)", "/Panda/Tip");
+        pane.retype("Path: Tip (TCP)", "/Panda/Tip");
         let wanted = CellPaths { tip: "/Panda/Tip".to_owned(), ..CellPaths::default() };
         assert_eq!(pane.click("Use these objects"), [Command::SetObjects(wanted)]);
         assert!(pane.nothing_is_cut_off());

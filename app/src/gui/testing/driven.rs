@@ -81,10 +81,18 @@ impl Driven {
     }
 
     /// Puts a text into a field in place of what is in it.
-    pub fn type_into(&mut self, label: &str, text: &str) {
+    pub fn retype(&mut self, label: &str, text: &str) {
         self.harness.get_by_label(label).click();
         self.steps();
         self.harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
+        self.steps();
+        self.harness.get_by_label(label).type_text(text);
+        self.steps();
+    }
+
+    /// Puts a text into a field that is empty or selects all when it is entered.
+    pub fn type_into(&mut self, label: &str, text: &str) {
+        self.harness.get_by_label(label).click();
         self.steps();
         self.harness.get_by_label(label).type_text(text);
         self.steps();

@@ -117,6 +117,11 @@ impl World {
             "sim.getObject" => self.object(args),
             // The tip hangs on nothing, so its joints are found by their name.
             "sim.getObjectParent" => ret([Value::from(-1)]),
+            // What the scene has in place of what is missing.
+            "sim.getObjectsInTree" => ret([Value::Array((1..=25).map(Value::from).collect())]),
+            "sim.getObjectAlias" => {
+                ret([Value::from(format!("/object[{}]", args[0].as_integer().map_or(0, i128::from)))])
+            }
             "sim.getJointType" => ret([Value::from(constants::JOINT_REVOLUTE)]),
             "sim.getJointInterval" => ret([Value::from(false), wire::floats([-3.0, 6.5])]),
             "sim.getJointPosition" => ret([Value::Float(self.joints[id as usize])]),
@@ -324,8 +329,12 @@ fn a_scene_without_its_tip_is_named_with_the_path() {
     let world = world();
     edit(&world, |w| w.missing.push("/UR5/Tip"));
     let error = try_cell(&world).0.err().expect("no tip");
-    let LinkError::NoSuchObject { path, part, .. } = error else { panic!("{error}") };
+    let said = error.to_string();
+    let LinkError::NoSuchObject { path, part, there } = error else { panic!("{error}") };
     assert_eq!((path.as_str(), part), ("/UR5/Tip", CellPart::Tip));
+    // Not all of a scene with many of them.
+    assert_eq!((there.len(), there[19].as_str(), there[20].as_str()), (21, "/object[20]", "and 5 more"));
+    assert!(said.contains("its dummies are /object[1], /object[2]") && said.contains("object path \"tip\""), "{said}");
 }
 
 #[test]
