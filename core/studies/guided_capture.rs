@@ -5,13 +5,15 @@
 //! cargo run --release -p handeye_core --example guided_capture -- stop 1000
 //! cargo run --release -p handeye_core --example guided_capture -- speed 20
 //! cargo run --release -p handeye_core --example guided_capture -- hand 100
+//! cargo run --release -p handeye_core --example guided_capture -- straight 6
 //! ```
 //!
 //! `choice`: the expected error of the tip over the box about the board, by the true model and the poses that were taken, in
 //! sessions that begin with one view of the board. Farthest rotation and random views know from the beginning where camera
 //! and board are; guided capture does not. The optimum is the best set of so many views out of the same thousand, by
 //! exchange. `stop`: what is true when guided capture ends by itself. `speed`: how long the choice of a pose takes, on one
-//! thread, with a thousand candidates and six poses ahead. `hand`: a robot that a person moves.
+//! thread, with a thousand candidates and six poses ahead. `hand`: a robot that a person moves. `straight`: the first poses
+//! where small turns determine no lens.
 
 #![expect(clippy::expect_used, clippy::print_stdout, reason = "a study prints, and stops at what cannot be")]
 
@@ -51,7 +53,8 @@ fn main() {
         "stop" => stop(sessions),
         "speed" => speed(sessions),
         "hand" => by_hand(sessions),
-        other => println!("{other:?} is none of choice, stop, speed, hand"),
+        "straight" => straight(sessions),
+        other => println!("{other:?} is none of choice, stop, speed, hand, straight"),
     }
 }
 
@@ -89,6 +92,36 @@ fn by_hand(sessions: u64) {
             stated_mm / count,
             1e2 * f64::from(below) / count
         );
+    }
+}
+
+/// Whether the goal is reached from a board straight on and near the edge of the image, by a lens that is not known.
+fn straight(sessions: u64) {
+    println!("| focal length, px of 640 | camera | reached | moves that lost the board |");
+    println!("| --- | --- | --- | --- |");
+    for focal_px in [350.0, 581.0, 1100.0] {
+        for (mode, name) in [(Mode::EyeInHand, "on the arm"), (Mode::EyeToHand, "beside it")] {
+            let all = CellArm::ALL.into_iter().flat_map(|arm| (0..sessions).map(move |seed| (arm, seed)));
+            let runs: Vec<(bool, usize)> = all
+                .collect::<Vec<_>>()
+                .into_par_iter()
+                .map(|(arm, seed)| {
+                    let setup = CellSetup {
+                        arm,
+                        mode,
+                        noise: REALISTIC,
+                        free_lens: true,
+                        straight: Some(focal_px),
+                        seed: 21 + seed,
+                    };
+                    let run = GuidedCell::new(setup).run(GuidedOptions { goal_m: 1.5e-3, ..GuidedOptions::default() });
+                    (matches!(run.ending, Ending::GoalReached { .. }), run.failed)
+                })
+                .collect();
+            let reached = runs.iter().filter(|run| run.0).count();
+            let lost: usize = runs.iter().map(|run| run.1).sum();
+            println!("| {focal_px} | {name} | {reached} of {} | {lost} |", runs.len());
+        }
     }
 }
 
