@@ -29,7 +29,10 @@ struct Bench {
 
 fn bench(cell: &FakeCell) -> Bench {
     let cell = cell.clone();
-    let connect: Connect = Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Connector>);
+    bench_with(Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Connector>))
+}
+
+fn bench_with(connect: Connect) -> Bench {
     let clock: Clock = Arc::new(|| 3.0);
     let waker: Waker = Arc::new(|| {});
     let sessions = tempfile::tempdir().expect("a folder");
@@ -48,6 +51,34 @@ fn bench(cell: &FakeCell) -> Bench {
 
 fn said(app: &App) -> String {
     app.model().messages.newest().map_or_else(String::new, |message| message.text.say(Language::English))
+}
+
+/// A scene is read when a connection is made, so another scene takes another connection; the built-in cell has one scene, and
+/// a new connection would be a new cell.
+#[test]
+fn objects_of_another_scene_and_connect_again_make_a_new_connection_to_an_address_alone() {
+    let made: Arc<std::sync::Mutex<Vec<(CellSource, CellPaths)>>> = Arc::default();
+    let noted = Arc::clone(&made);
+    let cell = FakeCell::new(0);
+    let mut bench = bench_with(Arc::new(move |source, objects| {
+        noted.lock().expect("whole").push((source.clone(), objects.clone()));
+        Arc::new(cell.clone()) as Arc<dyn Connector>
+    }));
+    let connected = LinkState::Connected { server: "a cell".to_owned(), address: "tcp://127.0.0.1:9".to_owned() };
+    let panda = CellPaths::below("Panda");
+    bench.app.model.control = connected.clone();
+    bench.app.apply(Command::SetObjects(panda.clone()));
+    bench.app.apply(Command::Reconnect);
+    assert_eq!(made.lock().expect("whole").len(), 1, "the cell of the start goes on");
+
+    let address = CellSource::Address("tcp://127.0.0.1:9".to_owned());
+    bench.app.apply(Command::Connect(address.clone()));
+    let xarm = CellPaths::below("xArm");
+    bench.app.apply(Command::SetObjects(xarm.clone()));
+    bench.app.model.control = connected;
+    bench.app.apply(Command::Reconnect);
+    let made = made.lock().expect("whole")[1..].to_vec();
+    assert_eq!(made, [(address.clone(), panda), (address.clone(), xarm.clone()), (address, xarm)]);
 }
 
 #[test]

@@ -230,6 +230,36 @@ fn an_arm_of_another_name_is_found_by_its_object_paths_and_without_them_the_scen
     assert_eq!(here.info().joints.len(), 7);
 }
 
+/// The joints that carry the tip that was named are driven, not those of the arm that has the usual names.
+#[test]
+fn of_two_arms_the_one_with_the_named_tip_is_driven_and_a_named_base_that_is_not_there_is_an_error() {
+    let mut bench = Bench::start(Scene::reference().expect("valid"));
+    let start = bench.arm.joint_values().expect("a call");
+    let sim = bench.arm.sim();
+    // The wrist stands by itself: three joints of the usual names are left on /UR5.
+    let fourth = sim.get_object_index("/UR5/joint", 3).expect("a joint");
+    let args = vec![fourth.0.into(), (-1).into(), true.into()];
+    sim.connection().call("sim.setObjectParent", args).expect("a call");
+    let endpoint = bench.server.endpoint().parse().expect("an address");
+    let connect = |paths: &CellPaths| Arm::connect(&endpoint, &ConnectionOptions::default(), paths);
+    let of_wrist = CellPaths {
+        tip: "/Tip".to_owned(),
+        camera: "/3D_camera".to_owned(),
+        depth: String::new(),
+        target: String::new(),
+        ..CellPaths::default()
+    };
+    let mut wrist = connect(&of_wrist).expect("a tip and its camera");
+    let joints = wrist.joint_values().expect("a call");
+    assert_eq!(joints[..], start[3..], "those of the column are {:?}", &start[..3]);
+    match connect(&CellPaths { arm: "/UR10".to_owned(), ..of_wrist }).err() {
+        Some(LinkError::NoSuchObject { part: CellPart::Arm, there, .. }) => {
+            assert!(there.contains(&"/UR5".to_owned()), "{there:?}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn an_arm_that_cannot_be_driven_along_lines_says_why() {
     let mut loose = Bench::shipped("xarm6.toml");
