@@ -1,6 +1,7 @@
 //! How fast the arm moves when nobody says otherwise.
 
 use handeye_core::geometry::arm::JointKind;
+use handeye_core::plan::Pace;
 use handeye_core::project::taught_poses;
 use handeye_sim_link::client::MotionLimits;
 
@@ -22,12 +23,12 @@ pub fn of_joints(
     kinds: impl Iterator<Item = JointKind>,
 ) -> MotionLimits {
     let of_kind = |kind| match kind {
-        JointKind::Revolute => slower([limits.joint_velocity, limits.joint_acceleration, limits.joint_jerk], share),
-        JointKind::Prismatic => slower([limits.tip_velocity, limits.tip_acceleration, limits.tip_jerk], share),
+        JointKind::Revolute => pace(limits, share),
+        JointKind::Prismatic => pace_of_tip(limits, share),
     };
     let mut all = MotionLimits { velocity: Vec::new(), acceleration: Vec::new(), jerk: Vec::new() };
-    for [velocity, acceleration, jerk] in kinds.map(of_kind) {
-        all.velocity.push(velocity);
+    for Pace { speed, acceleration, jerk } in kinds.map(of_kind) {
+        all.velocity.push(speed);
         all.acceleration.push(acceleration);
         all.jerk.push(jerk);
     }
@@ -36,14 +37,19 @@ pub fn of_joints(
 
 /// For motions of the tip (x, y, z, angle), at a share of the speed.
 pub fn of_tip(limits: &taught_poses::MotionLimits, share: f64) -> MotionLimits {
-    let [velocity, acceleration, jerk] = slower([limits.tip_velocity, limits.tip_acceleration, limits.tip_jerk], share);
-    MotionLimits::uniform(4, velocity, acceleration, jerk)
+    let Pace { speed, acceleration, jerk } = pace_of_tip(limits, share);
+    MotionLimits::uniform(4, speed, acceleration, jerk)
 }
 
-/// The limits of the same motion in slower time: at half the speed it takes twice as long. The velocity alone would not
-/// do, because short motions end before they are as fast as they may be.
-fn slower([velocity, acceleration, jerk]: [f64; 3], share: f64) -> [f64; 3] {
-    [velocity * share, acceleration * share.powi(2), jerk * share.powi(3)]
+/// Of revolute joints at a share of the speed. The velocity alone would not do, because short motions end before they are as
+/// fast as they may be.
+pub fn pace(limits: &taught_poses::MotionLimits, share: f64) -> Pace {
+    Pace { speed: limits.joint_velocity, acceleration: limits.joint_acceleration, jerk: limits.joint_jerk }
+        .slower(share)
+}
+
+fn pace_of_tip(limits: &taught_poses::MotionLimits, share: f64) -> Pace {
+    Pace { speed: limits.tip_velocity, acceleration: limits.tip_acceleration, jerk: limits.tip_jerk }.slower(share)
 }
 
 #[cfg(test)]
@@ -67,6 +73,17 @@ mod tests {
         for angle_rad in [0.01, 0.4, 5.0] {
             let ratio = duration_s(0.25, angle_rad) / duration_s(1.0, angle_rad);
             assert!((ratio - 4.0).abs() < 1e-6, "{ratio} over {angle_rad} rad");
+        }
+    }
+
+    #[test]
+    fn a_motion_takes_as_long_as_guided_capture_reckons() {
+        for (share, angle_rad) in [(1.0, 0.01), (1.0, 0.4), (0.25, 1.0), (0.5, 5.0)] {
+            let (took_s, reckoned_s) = (duration_s(share, angle_rad), pace(&SEQUENCE, share).duration_s(angle_rad));
+            assert!(
+                (took_s - reckoned_s).abs() < 1e-6 * took_s,
+                "{reckoned_s} s instead of {took_s} s over {angle_rad} rad"
+            );
         }
     }
 }

@@ -30,7 +30,7 @@ use handeye_core::plan::guided::candidates::ViewRange;
 use handeye_core::plan::guided::design::{Design, weight_about};
 use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Step};
 use handeye_core::progress::CancelToken;
-use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
+use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
 use handeye_core::testing::hand;
 use handeye_core::testing::sessions::{BOARD, REALISTIC};
 use rand::SeedableRng as _;
@@ -68,8 +68,15 @@ fn by_hand(sessions: u64) {
         let (mut took_s, mut refused, mut skipped) = (Vec::new(), 0, 0);
         let (mut stated_mm, mut below, mut solved) = (0.0, 0, 0);
         for seed in 0..sessions {
-            let setup =
-                CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens: false, straight: None, seed };
+            let setup = CellSetup {
+                arm: CellArm::Ur5e,
+                mode,
+                noise: REALISTIC,
+                free_lens: false,
+                straight: None,
+                untold: Untold::NOTHING,
+                seed,
+            };
             let mut cell = GuidedCell::new(setup);
             let run = hand::session(&mut cell, GuidedOptions { goal_m: 1e-9, ..GuidedOptions::default() }, 10, seed);
             took_s.extend(run.took_s);
@@ -112,6 +119,7 @@ fn straight(sessions: u64) {
                         noise: REALISTIC,
                         free_lens: true,
                         straight: Some(focal_px),
+                        untold: Untold::NOTHING,
                         seed: 21 + seed,
                     };
                     let run = GuidedCell::new(setup).run(GuidedOptions { goal_m: 1.5e-3, ..GuidedOptions::default() });
@@ -325,7 +333,15 @@ fn choice(sessions: u64) {
         let all: Vec<([Way; 4], Vec<f64>)> = (0..sessions)
             .into_par_iter()
             .map(|seed| {
-                let setup = CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, seed };
+                let setup = CellSetup {
+                    arm,
+                    mode,
+                    noise: REALISTIC,
+                    free_lens: false,
+                    straight: None,
+                    untold: Untold::NOTHING,
+                    seed,
+                };
                 let bench = Bench::new(setup);
                 let cell = GuidedCell::new(setup);
                 let ways = [bench.guided(), bench.farthest(&cell), bench.random(&cell), bench.easy_handeye(&cell)];
@@ -375,8 +391,15 @@ fn speed(sessions: u64) {
         for free_lens in [false, true] {
             let mut times: Vec<f64> = (0..sessions)
                 .map(|seed| {
-                    let mut cell =
-                        GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens, straight: None, seed });
+                    let mut cell = GuidedCell::new(CellSetup {
+                        arm,
+                        mode,
+                        noise: REALISTIC,
+                        free_lens,
+                        straight: None,
+                        untold: Untold::NOTHING,
+                        seed,
+                    });
                     let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
                     let calibration = cell.calibrate();
                     let known = cell.known(calibration.as_ref(), 0.0);
@@ -400,8 +423,15 @@ fn speed(sessions: u64) {
 fn looks(arm: CellArm, mode: Mode, sessions: u64) {
     let mut times: Vec<f64> = Vec::new();
     for seed in 0..sessions {
-        let mut cell =
-            GuidedCell::new(CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, seed });
+        let mut cell = GuidedCell::new(CellSetup {
+            arm,
+            mode,
+            noise: REALISTIC,
+            free_lens: false,
+            straight: None,
+            untold: Untold::NOTHING,
+            seed,
+        });
         let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
         let calibration = cell.calibrate();
         let truth = cell.truth();
@@ -427,26 +457,41 @@ fn stop(sessions: u64) {
         "{:44}{:>8}{:>10}{:>10}{:>8}{:>8}{:>8}{:>9}",
         "", "reached", "< stated", "< goal", "views", "90 %", "failed", "promise"
     );
-    let rows: [(&str, f64, Noise, bool); 5] = [
-        ("goal 0.1 mm, 0.1 px, 0.1 mm, 0.02°", 1e-4, REALISTIC, false),
-        ("goal 0.2 mm", 2e-4, REALISTIC, false),
-        ("goal 0.4 mm", 4e-4, REALISTIC, false),
+    let as_said = Untold::NOTHING;
+    let field = Noise { field_m: 1.5e-3, ..REALISTIC };
+    let rows: [(&str, f64, Noise, bool, Untold); 9] = [
+        ("goal 0.1 mm, 0.1 px, 0.1 mm, 0.02°", 1e-4, REALISTIC, false, as_said),
+        ("goal 0.2 mm", 2e-4, REALISTIC, false, as_said),
+        ("goal 0.4 mm", 4e-4, REALISTIC, false, as_said),
         (
             "goal 0.6 mm, 0.3 px, 0.5 mm, 0.1°",
             6e-4,
             Noise { corner_px: 0.3, robot_m: 5e-4, robot_rad: 0.1_f64.to_radians(), ..Noise::EXACT },
             false,
+            as_said,
         ),
-        ("goal 0.5 mm, lens estimated", 5e-4, REALISTIC, true),
+        ("goal 0.5 mm, lens estimated", 5e-4, REALISTIC, true, as_said),
+        ("goal 0.4 mm, board bent by 1 mm", 4e-4, REALISTIC, false, Untold { bend_m: [1e-3, 0.6e-3], ..as_said }),
+        ("goal 0.5 mm, lens said to be 1 % longer", 5e-4, REALISTIC, false, Untold { focal: 0.99, ..as_said }),
+        ("goal 1 mm, robot off by 1.5 mm by place", 1e-3, field, false, as_said),
+        ("goal 2 mm, robot off by 1.5 mm by place", 2e-3, field, false, as_said),
     ];
-    for (name, goal_m, noise, free_lens) in rows {
+    for (name, goal_m, noise, free_lens, untold) in rows {
         for mode in [Mode::EyeInHand, Mode::EyeToHand] {
             let runs: Vec<_> = (0..sessions)
                 .into_par_iter()
                 .map(|seed| {
                     let arm = CellArm::ALL[seed as usize % 3];
-                    GuidedCell::new(CellSetup { arm, mode, noise, free_lens, straight: None, seed: 1000 + seed })
-                        .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
+                    GuidedCell::new(CellSetup {
+                        arm,
+                        mode,
+                        noise,
+                        free_lens,
+                        straight: None,
+                        untold,
+                        seed: 1000 + seed,
+                    })
+                    .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
                 })
                 .collect();
             let ended: Vec<_> = runs.iter().filter_map(|run| run.history.last().map(|last| (run, *last))).collect();

@@ -13,7 +13,7 @@ use std::env;
 
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::testing::clutter::{Tally, session};
-use handeye_core::testing::guided_cell::{CellArm, CellSetup};
+use handeye_core::testing::guided_cell::{CellArm, CellSetup, Untold};
 use handeye_core::testing::sessions::REALISTIC;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
@@ -48,5 +48,5 @@ fn row(name: &str, moves: usize, is_known: bool) {
 fn setup(seed: u64) -> CellSetup {
     let arm = CellArm::ALL[(seed % 3) as usize];
     let mode = if (seed / 3).is_multiple_of(2) { Mode::EyeInHand } else { Mode::EyeToHand };
-    CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, seed }
+    CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: Untold::NOTHING, seed }
 }

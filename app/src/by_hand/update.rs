@@ -75,7 +75,7 @@ impl App {
         if hand.checked >= CHECKS || hand.tried >= MOST_CHECK_VIEWS {
             return self.guiding_finished();
         }
-        let check = hand.ending.map(|_| (hand.tried, hand.tried.saturating_sub(hand.checked)));
+        let check = hand.ending.as_ref().map(|_| (hand.tried, hand.tried.saturating_sub(hand.checked)));
         let (guide, elapsed_s) = (hand.guide.clone(), self.model.now_s - hand.began_s);
         let solved = self.model.solve.solved.clone().filter(|_| self.model.solve.fresh);
         let document = Arc::clone(&self.model.session.document);
@@ -109,10 +109,11 @@ impl App {
                 hand.goes_on();
             }
             Some(HandNext::End(ending)) => {
+                let said = ending.text();
                 hand.ending = Some(ending);
                 hand.goes_on();
                 if !self.model.solve.fresh {
-                    self.guiding_ends(Severity::Warning, ending.text());
+                    self.guiding_ends(Severity::Warning, said);
                 }
             }
             None if hand.ending.is_some() => self.guiding_finished(),
@@ -155,7 +156,7 @@ impl App {
         let Some(hand) = self.model.by_hand.as_deref_mut().filter(|hand| hand.waits != HandWaits::Choice) else {
             return;
         };
-        match (role, hand.ending) {
+        match (role, &hand.ending) {
             (Some(Role::Verification), Some(_)) => hand.checked += 1,
             (Some(Role::Calibration), None) => hand.guide.captured(),
             // What somebody took besides answers no question of the guide.
@@ -179,11 +180,8 @@ impl App {
     }
 
     fn guiding_finished(&mut self) {
-        let Some((ending, checked)) = self.model.by_hand.as_ref().and_then(|hand| Some((hand.ending?, hand.checked)))
-        else {
-            return;
-        };
-        let (severity, said) = ended(ending, checked);
+        let said = self.model.by_hand.as_ref().and_then(|hand| Some(ended(hand.ending.as_ref()?, hand.checked)));
+        let Some((severity, said)) = said else { return };
         self.guiding_ends(severity, said);
     }
 

@@ -58,7 +58,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     if !model.sequence_runs {
         if let Some(message) = model.messages.standing_in(Pane::Poses) {
             parts::notice_ui(ui, Tone::Warning, &message.text.say(language), |_| ());
-        } else if let Some(ending) = guided.ending.filter(|_| model.solve.fresh) {
+        } else if let Some(ending) = guided.ending.as_ref().filter(|_| model.solve.fresh) {
             let tone = if ending.is_success() { Tone::Good } else { Tone::Warning };
             parts::notice_ui(ui, tone, &ending.text().say(language), |_| ());
         }
@@ -135,7 +135,7 @@ fn left(model: &Model, sequence: &PoseSequence, guided: &GuidedProgress) -> Opti
 /// What is done now.
 pub fn under_way(sequence: &PoseSequence, guided: &GuidedProgress) -> Text {
     let number = sequence.outcomes.len() + 1;
-    match (guided.waits, guided.ending) {
+    match (guided.waits, &guided.ending) {
         (Waits::Confirmation, Some(_)) => {
             text!("Check {n} of {of} waits for you", n = guided.checked + 1, of = CHECKS)
         }

@@ -79,6 +79,8 @@ pub struct GuideRequest {
     pub solved: Option<Arc<Solved>>,
     /// Since the beginning \[s\].
     pub elapsed_s: f64,
+    /// How fast the arm is driven, of its highest speed.
+    pub speed: f64,
     /// The number of the check, where a pose to check the answer at is asked for.
     pub check: Option<usize>,
 }
@@ -144,7 +146,7 @@ pub(crate) fn options(goal_m: f64, views: usize) -> GuidedOptions {
 }
 
 /// How it ended, after so many checks.
-pub(crate) fn ended(ending: Ending, checked: usize) -> (Severity, Text) {
+pub(crate) fn ended(ending: &Ending, checked: usize) -> (Severity, Text) {
     if checked < CHECKS {
         let said = text!(
             "{ending}. It was checked at {checked} of {of} poses only: see why in the log, and verify where you can",

@@ -112,8 +112,9 @@ impl App {
         let elapsed_s = self.model.now_s - sequence.began_s;
         let Some(guided) = sequence.guided.as_deref_mut() else { return };
         guided.waits = Waits::Choice;
-        let check = guided.ending.map(|_| guided.tried);
-        let request = GuideRequest { guide: guided.guide.clone(), observations, solved, elapsed_s, check };
+        let check = guided.ending.as_ref().map(|_| guided.tried);
+        let speed = self.model.view.jog.speed;
+        let request = GuideRequest { guide: guided.guide.clone(), observations, solved, elapsed_s, speed, check };
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         if self.workers.guide(self.numbers.motion, request).is_err() {
             self.break_off();
@@ -251,7 +252,7 @@ impl App {
             }
             return;
         }
-        let has_answer = self.model.solve.fresh;
+        let (has_answer, said) = (self.model.solve.fresh, ending.text());
         let Some(sequence) = self.model.sequence.as_mut() else { return };
         if let Some(guided) = sequence.guided.as_deref_mut() {
             guided.ending = Some(ending);
@@ -260,7 +261,7 @@ impl App {
             guided.waits = Waits::Answer;
         }
         if !has_answer {
-            return self.guided_ends(Severity::Warning, ending.text());
+            return self.guided_ends(Severity::Warning, said);
         }
         sequence.purpose = Some(CapturePurpose::Verify);
         self.guided_step();
@@ -276,11 +277,11 @@ impl App {
     }
 
     fn guided_finished(&mut self) {
-        let Some((ending, checked)) = self.guided_mut().and_then(|guided| Some((guided.ending?, guided.checked)))
+        let Some((severity, said)) =
+            self.guided_mut().and_then(|guided| Some(ended(guided.ending.as_ref()?, guided.checked)))
         else {
             return;
         };
-        let (severity, said) = ended(ending, checked);
         self.guided_ends(severity, said);
     }
 

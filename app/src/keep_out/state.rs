@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use handeye_core::plan::Surroundings;
-use handeye_core::plan::surroundings::{KeepOutBox, KeepOutFile};
+use handeye_core::plan::surroundings::{KeepOutBox, KeepOutFile, SurroundingsError};
 
 use crate::text::Text;
 
@@ -38,7 +38,10 @@ impl KeepOut {
     /// Takes in other boxes. An entry that makes no sense is shown and not kept to, all others are.
     pub fn set(&mut self, content: KeepOutFile) {
         let file = self.file.as_deref().unwrap_or_else(|| Path::new("keep-out boxes"));
-        self.fault = content.surroundings(file).err().map(|error| Text::verbatim(error.to_string()));
+        self.fault = content.surroundings(file).err().map(|error| match error {
+            SurroundingsError::Entry { entry, fault, .. } => entry.with_fault(&fault),
+            other => Text::verbatim(other.to_string()),
+        });
         self.around = Arc::new(content.sensible());
         self.content = content;
     }

@@ -4,8 +4,8 @@ use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::guided::choose::Robot;
 use handeye_core::plan::{Contact, PlanError, Surroundings};
 use handeye_sim_link::client::cell::{
-    Among, Arm, ArmJog, ArmKinematics, BoardInView, BoardReach, FollowEnd, FollowLimits, FollowMoment, FollowWish,
-    JogAxes, JogEnd, JogObstacle, MotionTolerance, SettleOptions, Standing, UnknownKinematics,
+    Among, Arm, ArmJog, ArmKinematics, BoardInView, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes, JogEnd,
+    JogObstacle, MotionTolerance, SettleOptions, Standing, UnknownKinematics,
 };
 use handeye_sim_link::client::{CancelToken, LinkError, SimulationState};
 use nalgebra::Vector3;
@@ -143,12 +143,10 @@ impl MotionPort for LiveMotion {
         // Following says what is wrong with an arm of unknown kinematics.
         let Ok(kinematics) = &self.kinematics else { return Ok(Room::Enough) };
         let joints = self.arm.joint_values().map_err(port_error)?;
-        let (limits, reach) = (FollowLimits::default(), BoardReach::default());
-        if kinematics.has_room_to_follow(&limits, board, &reach, &joints, self.among.as_ref()) {
-            return Ok(Room::Enough);
-        }
-        Ok(match kinematics.place_to_follow(&limits, board, &reach, &joints, &self.around, self.among.as_ref()) {
-            Ok(place) => Room::At(place.joints),
+        let limits = FollowLimits::default();
+        Ok(match kinematics.where_to_follow(&limits, board, &joints, &self.around, self.among.as_ref()) {
+            Ok(None) => Room::Enough,
+            Ok(Some(place)) => Room::At(place.joints),
             Err(none) => Room::Nowhere(text!(
                 "Of {tried} places that show the whole board none has room for the arm to go along with it: move the board \
                  away from the column of the arm, and not to the end of its reach",
@@ -169,14 +167,13 @@ impl MotionPort for LiveMotion {
         Ok(kinematics.views_unlike(board, taken, &start, &self.around, *count).map_err(|why| no_views(&why)))
     }
 
-    fn robot(&mut self) -> Result<Result<Robot, Text>, PortError> {
+    fn robot(&mut self, speed: f64) -> Result<Result<Robot, Text>, PortError> {
         let kinematics = match &self.kinematics {
             Ok(kinematics) => kinematics,
             Err(why) => return Ok(Err(text!("The kinematics of the arm is not known: {why}", why = why))),
         };
         let joints = self.arm.joint_values().map_err(port_error)?;
-        let limits = limits::SEQUENCE;
-        Ok(Ok(kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &self.around)))
+        Ok(Ok(kinematics.guided_robot(&joints, limits::pace(&limits::SEQUENCE, speed), &self.around)))
     }
 
     fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text> {
@@ -207,10 +204,8 @@ impl MotionPort for LiveMotion {
 /// Why no poses can be planned.
 fn no_views(why: &PlanError) -> Text {
     match why {
-        PlanError::StartBlocked => {
-            text!(
-                "Where the arm is now it touches the board, its table, a keep-out box or itself: move it into free space first"
-            )
+        PlanError::StartBlocked { by } => {
+            text!("Where it stands the arm is {there}: move it into free space first", there = by.here())
         }
         PlanError::TooFewViews { candidates, not_in_view, unreachable, in_the_way, no_path, .. } => text!(
             "Of {tried} views that were tried, {not_in_view} would not show the whole board, {unreachable} are out of \

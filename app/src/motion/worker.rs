@@ -91,7 +91,7 @@ impl Motions {
         cancel: &CancelToken,
         outlet: &Outlet,
     ) -> Result<(), PortError> {
-        let (outcome, ended) = match port.robot() {
+        let (outcome, ended) = match port.robot(request.speed) {
             Ok(robot) => (robot.and_then(|robot| chosen(request, &robot, cancel)), Ok(())),
             Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
         };

@@ -286,7 +286,7 @@ impl MotionPort for FakeCell {
         Ok(self.answer()?.views.clone())
     }
 
-    fn robot(&mut self) -> Result<Result<Robot, Text>, PortError> {
+    fn robot(&mut self, _speed: f64) -> Result<Result<Robot, Text>, PortError> {
         Ok(self.answer()?.robot.clone())
     }
 

@@ -177,11 +177,11 @@ pub trait MotionPort: Send {
     /// As [`Self::move_to`].
     fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError>;
 
-    /// The arm as guided capture drives it, where it stands; or why it cannot be. Nothing moves.
+    /// The arm as guided capture drives it at a share of its highest speed, where it stands; or why it cannot be. Nothing moves.
     ///
     /// # Errors
     /// As [`Self::move_to`].
-    fn robot(&mut self) -> Result<Result<Robot, Text>, PortError>;
+    fn robot(&mut self, speed: f64) -> Result<Result<Robot, Text>, PortError>;
 
     /// Has the arm keep out of these, too, from its next motion on. Gives what the cell says stands around; or why nothing can be
     /// kept out of.

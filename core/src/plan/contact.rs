@@ -6,6 +6,8 @@ use super::capsule::Capsule;
 use super::clearance::{Arm, Filled, SELF_CLEARANCE_M};
 use super::surroundings::{Obstacle, Surroundings};
 use super::travel;
+use crate::text;
+use crate::wording::Text;
 
 /// Between two configurations that a path is checked at nothing comes nearer than allowed by more than half of this, metres.
 const PATH_GAP_M: f64 = 0.01;
@@ -17,7 +19,7 @@ const SPEED_SAMPLES: usize = 320;
 const ROUNDING_M: f64 = 1e-9;
 
 /// What is too near.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Contact {
     /// Something that stands around.
@@ -35,6 +37,18 @@ pub enum Contact {
     /// Values that are not those of its joints.
     #[error("these are not values of the arm's joints")]
     NoConfiguration,
+}
+
+impl Contact {
+    /// What stands where the arm is, in the words of a person who is asked to move it away.
+    pub fn here(&self) -> Text {
+        match self {
+            Self::Box { name } => text!("too near to “{name}”", name = name),
+            Self::Itself => text!("too near to itself or to what it carries"),
+            Self::Volume => text!("outside of the work volume with its tip or camera"),
+            Self::NoConfiguration => text!("at values that are not those of its joints"),
+        }
+    }
 }
 
 /// How near the arm may come to each thing, metres.
@@ -154,7 +168,12 @@ impl Arm {
     /// Whether the arm, its tool and what it carries keep their distance from all that stands around and from the arm itself,
     /// in the work volume; values that are not those of its joints are nowhere free.
     pub fn is_free(&self, joints: &[f64], around: &Surroundings, clearance_m: f64) -> bool {
-        Guard::strict(self, around, clearance_m).contact(joints).is_none()
+        self.contact(joints, around, clearance_m).is_none()
+    }
+
+    /// What keeps [`Self::is_free`] from being true.
+    pub fn contact(&self, joints: &[f64], around: &Surroundings, clearance_m: f64) -> Option<Contact> {
+        Guard::strict(self, around, clearance_m).contact(joints)
     }
 
     /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.

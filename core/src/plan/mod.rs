@@ -7,6 +7,7 @@ mod clearance;
 mod contact;
 pub mod guided;
 pub mod links;
+mod pace;
 mod spread;
 pub mod surroundings;
 
@@ -14,6 +15,7 @@ pub use capsule::Capsule;
 pub use carried::Carried;
 pub use clearance::{Arm, ArmBody, travel};
 pub use contact::{Contact, Guard};
+pub use pace::Pace;
 pub use spread::{
     PlanError, PlannedView, ViewOptions, ViewSetup, order_by_travel, poses_looking_at, poses_unlike,
     random_poses_looking_at, views_of_board,

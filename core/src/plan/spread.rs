@@ -5,11 +5,13 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::clearance::{Arm, travel};
+use super::contact::Contact;
 use super::surroundings::Surroundings;
 use crate::geometry::arm::JointValues;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::targets::TargetSpec;
+use crate::wording::English;
 
 /// What the planner knows of a cell. Being a centimetre or a few degrees off costs nothing but margin, so estimates and
 /// drawings do.
@@ -80,7 +82,7 @@ pub struct PlannedView {
 }
 
 /// Why there are not enough views.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
     /// Fewer views than asked for fit the cell.
@@ -107,8 +109,11 @@ pub enum PlanError {
         no_path: usize,
     },
     /// Even the configuration to start from is not free.
-    #[error("the arm already touches something in the configuration to start from: move it into free space first")]
-    StartBlocked,
+    #[error("in the configuration to start from the arm is {}: move it into free space first", by.here().say(English))]
+    StartBlocked {
+        /// What it is too near to.
+        by: Contact,
+    },
 }
 
 /// Picks views of the board that differ as much as possible in rotation.
@@ -137,8 +142,8 @@ pub fn poses_unlike(
     options: &ViewOptions,
     taken: &[Pose<Base, Tip>],
 ) -> Result<Vec<PlannedView>, PlanError> {
-    if !setup.is_free(&setup.start_joints, options.clearance_m) {
-        return Err(PlanError::StartBlocked);
+    if let Some(by) = setup.arm.contact(&setup.start_joints, &setup.around, options.clearance_m) {
+        return Err(PlanError::StartBlocked { by });
     }
     let mut draws = Draws::new(setup, options);
     let views = draws.by_ref().flatten().collect();

@@ -128,7 +128,7 @@ pub fn session(setup: CellSetup, views: usize, is_known: bool) -> Tally {
 /// One move.
 fn judged(cell: &GuidedCell, body: &Body, solid: &[Obstacle], from: &JointValues, to: &JointValues) -> Tally {
     let robot = &cell.robot;
-    let rad_s = robot.arm.joint_speed(from, to, &robot.around, robot.speed_rad_s);
+    let rad_s = robot.arm.joint_speed(from, to, &robot.around, robot.pace.speed);
     let place_s = travel(from, to) / rad_s / PLACES as f64;
     let mut nearest_m = f64::INFINITY;
     let (mut inside_itself, mut is_out, mut is_fast) = (false, false, false);

@@ -1,12 +1,13 @@
 //! A cell that takes the poses that guided capture proposes: an arm, a camera and a board whose places are known.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::arms;
-use super::sessions::{BOARD, camera, reported, seen};
-use crate::estimate::handeye::joint::{Noise, ViewModel};
+use super::sessions::{BOARD, camera, noise_twist, reported, seen};
+use crate::estimate::handeye::joint::chain::correction_transform;
+use crate::estimate::handeye::joint::{Noise, RobotField, ViewModel};
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::estimate::{Calibration, CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView, calibrate};
 use crate::geometry::arm::{Arm, ArmKind, JointValues};
@@ -14,8 +15,9 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use crate::plan::guided::choose::Robot;
 use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Step};
-use crate::plan::{self, ArmBody, Carried, Obstacle, Surroundings};
+use crate::plan::{self, ArmBody, Carried, Obstacle, Pace, Surroundings};
 use crate::progress::CancelToken;
+use crate::targets::bent::{BoardPoints, BoardShape};
 
 /// Arms of the cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,9 +68,31 @@ pub struct CellSetup {
     /// Focal length \[px\] of a first view that is straight on, with the board close to the edge of the image; `None` for that
     /// of the other studies, and a first view that is tilted a little.
     pub straight: Option<f64>,
+    /// What is not as it is said to be.
+    pub untold: Untold,
     /// Seed of places and noise.
     pub seed: u64,
 }
+
+/// What a guide is not told, and what its estimate has to find out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Untold {
+    /// Deflection of the middle of the board against its edges along x and along y, metres.
+    pub bend_m: [f64; 2],
+    /// True focal length over that of the lens which is said to be known.
+    pub focal: f64,
+}
+
+impl Untold {
+    /// All is as it is said to be.
+    pub const NOTHING: Self = Self { bend_m: [0.0; 2], focal: 1.0 };
+}
+
+/// From the first pose to where errors of the robot that depend on the place have the size of the noise, metres: about
+/// the RMS spread of the tip in a guided session.
+const FIELD_SPREAD_M: f64 = 0.15;
+/// No pose is farther from the first one than this, metres.
+const FIELD_REACH_M: f64 = 2.0;
 
 /// The cell.
 pub struct GuidedCell {
@@ -83,7 +107,10 @@ pub struct GuidedCell {
     pub robot: Robot,
     /// What was seen so far.
     pub observations: Observations,
+    /// The board as it is.
     points: Vec<Point3<f64>>,
+    /// Errors of the robot that depend on where it stands.
+    field: Option<RobotField>,
 }
 
 /// What came of a guided session.
@@ -105,6 +132,8 @@ pub struct GuidedRun {
 
 /// Free space that the arm keeps, metres.
 const CLEARANCE_M: f64 = 0.02;
+/// How fast its joints are driven.
+const PACE: Pace = Pace { speed: 1.0, acceleration: 2.0, jerk: f64::INFINITY };
 /// Table on which the arm stands.
 const TABLE: [f64; 3] = [4.0, 4.0, 0.1];
 
@@ -115,7 +144,15 @@ impl GuidedCell {
     /// When there are no such places: a mistake in the setup.
     pub fn new(setup: CellSetup) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
-        (0..1000).find_map(|_| Self::drawn(setup, &mut rng)).expect("most places are good")
+        let mut cell = (0..1000).find_map(|_| Self::drawn(setup, &mut rng)).expect("most places are good");
+        let Noise { field_m, field_rad, .. } = setup.noise;
+        if field_m > 0.0 || field_rad > 0.0 {
+            let mut slopes = |size: f64| Matrix3::from_fn(|_, _| noise_twist(&mut rng, size, 0.0).x / FIELD_SPREAD_M);
+            let (position, orientation) = (slopes(field_m), slopes(field_rad));
+            let origin_m = cell.base_from_tip().translation();
+            cell.field = Some(RobotField::new(origin_m, FIELD_REACH_M, &position, &orientation));
+        }
+        cell
     }
 
     fn drawn(setup: CellSetup, rng: &mut ChaCha8Rng) -> Option<Self> {
@@ -192,15 +229,18 @@ impl GuidedCell {
         around.obstacles.pop();
         // With all that is estimated of a lens by default, of which it has none.
         let free = Intrinsics { distortion: DEFAULT_MODEL, ..lens };
+        let focal = setup.untold.focal;
+        let said = Intrinsics { fx: lens.fx / focal, fy: lens.fy / focal, ..lens };
+        let shape = BoardShape { warp_m: setup.untold.bend_m, ..BoardShape::FLAT };
         let (intrinsics, knowledge) =
-            if setup.free_lens { (free, CameraKnowledge::NOTHING) } else { (lens, CameraKnowledge::Fixed(lens)) };
+            if setup.free_lens { (free, CameraKnowledge::NOTHING) } else { (lens, CameraKnowledge::Fixed(said)) };
         Some(Self {
             setup,
             rng: ChaCha8Rng::seed_from_u64(setup.seed ^ 0x5eed),
             intrinsics,
             mount_from_camera: Pose::from_isometry(mount_from_camera),
             anchor_from_target: Pose::from_isometry(anchor_from_target),
-            robot: Robot { arm, around, clearance_m: CLEARANCE_M, joints, speed_rad_s: 1.0, acceleration_rad_s2: 2.0 },
+            robot: Robot { arm, around, clearance_m: CLEARANCE_M, joints, pace: PACE },
             observations: Observations {
                 mode: Some(setup.mode),
                 target: BOARD,
@@ -208,7 +248,8 @@ impl GuidedCell {
                 camera: knowledge,
                 views: Vec::new(),
             },
-            points: BOARD.points(),
+            points: BoardPoints::new(&BOARD.points()).points(&shape),
+            field: None,
         })
     }
 
@@ -237,7 +278,11 @@ impl GuidedCell {
     fn view(&mut self, base_from_tip: &Pose<Base, Tip>) -> Option<ObservedView> {
         // The error goes the other way round: where the tip truly is, of where it is said to be.
         let error = reported(&mut self.rng, &Pose::identity(), &self.setup.noise).inverse();
-        let true_tip = *base_from_tip * error.relabel();
+        let by_place = self
+            .field
+            .as_ref()
+            .map_or_else(Isometry3::identity, |field| correction_transform(&field.correction(base_from_tip)));
+        let true_tip = Pose::from_isometry(base_from_tip.isometry() * by_place * error.isometry());
         let camera_from_target = crate::estimate::handeye::joint::camera_from_target(
             self.setup.mode,
             &true_tip,

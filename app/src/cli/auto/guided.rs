@@ -16,6 +16,7 @@ use handeye_sim_link::client::cell::ArmKinematics;
 
 use super::super::Failure;
 use super::sequence::PoseSequence;
+use crate::limits;
 use crate::model::CapturePurpose;
 use crate::text::Language;
 
@@ -165,8 +166,8 @@ impl<'a, 's> GuidedSequence<'a, 's> {
 
     fn robot(&mut self) -> Result<Robot, Failure> {
         let joints = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
-        let limits = self.sequence.plan.limits;
-        Ok(self.kinematics.guided_robot(&joints, limits.joint_velocity, limits.joint_acceleration, &self.around))
+        let pace = limits::pace(&self.sequence.plan.limits, 1.0);
+        Ok(self.kinematics.guided_robot(&joints, pace, &self.around))
     }
 }
 

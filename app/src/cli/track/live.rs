@@ -12,8 +12,8 @@ use handeye_core::project::files::image_file::gray_from_rgb;
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_core::track::{Estimate, Image, Keep, Setup, State};
 use handeye_sim_link::client::cell::{
-    Arm, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment, FollowWish as ArmWish,
-    MotionTolerance, SettleOptions,
+    Among, Arm, ArmKinematics, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment,
+    FollowWish as ArmWish, MotionTolerance, SettleOptions, Standing,
 };
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError, Sim, SimulationState};
 use serde_json::{Value, json};
@@ -32,6 +32,9 @@ const LOOK: Duration = Duration::from_millis(2);
 
 /// A line of progress every so often \[s\].
 const PROGRESS_S: f64 = 2.0;
+
+/// The speed of the way to where there is room, as a share of [`limits::SEQUENCE`]: as in the window.
+const SHARE_OF_SPEED: f64 = 0.25;
 
 /// What the arm does about the board.
 #[derive(Debug, Clone, Copy)]
@@ -152,29 +155,16 @@ impl Live {
         let end = CancelToken::default();
         line.begin(wish);
         let kinematics = arm.kinematics().map_err(Failure::failed)?.map_err(Failure::failed)?;
-        let standing = arm.surroundings(&kinematics).map_err(Failure::failed)?;
-        arm.keep_clear(Some(kinematics.among(standing.around, None)));
-        let (end_of_arm, line_of_arm) = (end.clone(), Arc::clone(&line));
-        let arm_thread = Builder::new()
-            .name("follow".to_owned())
-            .spawn(move || {
-                // Nothing to follow before the board has been seen.
-                while !line_of_arm.is_seen() && !end_of_arm.is_cancelled() {
-                    std::thread::sleep(LOOK);
-                }
-                let mut wanted = |moment: &FollowMoment| {
-                    if end_of_arm.is_cancelled() { ArmWish::End } else { line_of_arm.wish(moment) }
-                };
-                arm.follow(&kinematics, &FollowLimits::default(), &mut wanted)
-            })
-            .map_err(Failure::failed)?;
+        let follower = Follower { arm, kinematics, wish, line: Arc::clone(&line), end: end.clone() };
+        let arm_thread =
+            Builder::new().name("follow".to_owned()).spawn(move || follower.run()).map_err(Failure::failed)?;
         let watched = Self::watch(feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), taken);
         end.cancel();
         let followed = arm_thread
             .join()
             .map_err(|_panic| Failure::failed(anyhow::anyhow!("the thread that moves the arm ended with a panic")))?;
         watched?;
-        let end = followed.map_err(Failure::failed)?;
+        let end = followed?;
         // What ends in the very moment in which it was followed enough has done what it was asked to.
         if cancel.is_cancelled() || job.frames.is_some_and(|frames| taken.summary.frames >= frames) {
             return Ok(());
@@ -308,6 +298,55 @@ impl Pause {
             tracing::info!("the simulation goes on");
         }
         *self = Self::default();
+    }
+}
+
+/// The arm that follows, on a thread of its own.
+struct Follower {
+    arm: Arm,
+    kinematics: ArmKinematics,
+    wish: FollowWish,
+    line: Arc<FollowLine>,
+    end: CancelToken,
+}
+
+impl Follower {
+    /// Follows until it is cancelled or following ends by itself; the arm is at rest then.
+    fn run(mut self) -> Result<FollowEnd, Failure> {
+        // Nothing to follow before the board has been seen.
+        while !self.line.is_seen() && !self.end.is_cancelled() {
+            std::thread::sleep(LOOK);
+        }
+        let standing = self.arm.surroundings(&self.kinematics).map_err(Failure::failed)?;
+        let among = self.kinematics.among(standing.around.clone(), None);
+        self.arm.keep_clear(Some(among.clone()));
+        if self.wish == FollowWish::KeepViewWithRoom && !self.end.is_cancelled() {
+            self.make_room(&standing, &among)?;
+        }
+        let Self { mut arm, kinematics, line, end, .. } = self;
+        let mut wanted = |moment: &FollowMoment| if end.is_cancelled() { ArmWish::End } else { line.wish(moment) };
+        arm.follow(&kinematics, &FollowLimits::default(), &mut wanted).map_err(Failure::failed)
+    }
+
+    /// Moves to the nearest place from which the arm can go along with the board, where it cannot from here.
+    fn make_room(&mut self, standing: &Standing, among: &Among) -> Result<(), Failure> {
+        let Some(board) = self.line.board_in_view() else { return Ok(()) };
+        let joints = self.arm.joint_values().map_err(Failure::failed)?;
+        let limits = FollowLimits::default();
+        let place = self.kinematics.where_to_follow(&limits, &board, &joints, &standing.all(), Some(among));
+        let Some(place) = place.map_err(Failure::failed)? else { return Ok(()) };
+        tracing::info!(
+            "here the arm has no room to go along with the board: it moves to the nearest place where it has, and keeps the \
+             view from there"
+        );
+        let limits = limits::of_joints(&limits::SEQUENCE, SHARE_OF_SPEED, self.arm.info().joint_kinds());
+        match self.arm.move_to_joints(&place.joints, &limits, &self.end) {
+            // Following ends at its first pass.
+            Err(LinkError::Cancelled { .. }) => {}
+            moved => moved.map_err(Failure::failed)?,
+        }
+        self.line.begin_elsewhere(self.wish);
+        Ok(())
     }
 }
 

@@ -34,6 +34,10 @@ pub struct TrackArgs {
     /// Have the arm keep the view of the board that it has at the beginning.
     #[arg(long)]
     follow: bool,
+    /// With --follow: where the arm has no room to go along with the board, move it to the nearest place where it has, as
+    /// soon as the board is seen, and keep the view from there.
+    #[arg(long, requires = "follow", conflicts_with = "corner")]
+    make_room: bool,
     /// With --follow: bring the tip to this corner of the board instead, counted from 0.
     #[arg(long, value_name = "INDEX", requires = "follow")]
     corner: Option<usize>,
@@ -117,6 +121,7 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
     let task = match (args.follow, args.corner, args.reach) {
         (_, _, Some(index)) => Task::Reach { index, stand_off_m },
         (true, Some(index), None) => Task::Follow(FollowWish::Corner { index, stand_off_m }),
+        (true, None, None) if args.make_room => Task::Follow(FollowWish::KeepViewWithRoom),
         (true, None, None) => Task::Follow(FollowWish::KeepView),
         (false, _, None) => Task::Watch,
     };

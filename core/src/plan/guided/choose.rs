@@ -10,6 +10,7 @@ use crate::estimate::handeye::joint::{ExpectedView, ViewModel};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::plan::clearance::{Arm, travel};
+use crate::plan::pace::Pace;
 use crate::plan::surroundings::Surroundings;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
@@ -37,10 +38,8 @@ pub struct Robot {
     pub clearance_m: f64,
     /// Where its joints are, radians; of a prismatic joint metres.
     pub joints: JointValues,
-    /// How fast they are driven, rad/s.
-    pub speed_rad_s: f64,
-    /// Acceleration, rad/s².
-    pub acceleration_rad_s2: f64,
+    /// How fast they are driven.
+    pub pace: Pace,
 }
 
 /// What is asked of a plan.
@@ -322,14 +321,8 @@ impl Robot {
     /// How long the arm takes from one configuration to another: up to speed, along, and down again, by the joint that has
     /// the longest way, within the limits of what stands around. Limits of jerk are not in it.
     pub fn travel_s(&self, from: &JointValues, to: &JointValues) -> f64 {
-        let way = travel(from, to);
-        let speed_rad_s = self.arm.joint_speed(from, to, &self.around, self.speed_rad_s);
-        let ramps = speed_rad_s.powi(2) / self.acceleration_rad_s2;
-        if way > ramps {
-            way / speed_rad_s + speed_rad_s / self.acceleration_rad_s2
-        } else {
-            2.0 * (way / self.acceleration_rad_s2).sqrt()
-        }
+        let speed = self.arm.joint_speed(from, to, &self.around, self.pace.speed);
+        Pace { speed, ..self.pace }.duration_s(travel(from, to))
     }
 }
 

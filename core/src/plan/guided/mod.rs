@@ -34,7 +34,7 @@ use crate::estimate::{Calibration, Observations, ViewStatus};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::point_error;
-use crate::plan::Carried;
+use crate::plan::{Carried, Contact};
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use candidates::ViewRange;
@@ -166,7 +166,7 @@ pub enum Why {
 }
 
 /// Why it ends.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Ending {
     /// The error is below the goal. Metres.
     GoalReached {
@@ -183,7 +183,10 @@ pub enum Ending {
     /// As much time as allowed.
     MostTime,
     /// The arm touches something where it stands, as far as is known: it cannot be driven away safely.
-    StartBlocked,
+    StartBlocked {
+        /// What it is too near to.
+        by: Contact,
+    },
     /// The board was not seen from any of the first turns, or they determine nothing.
     NoStart,
     /// So many poses in a row gave no view of the board.
@@ -334,7 +337,7 @@ impl Guide {
             return next;
         }
         match &next {
-            Next::End(ending) => self.ended = Some(*ending),
+            Next::End(ending) => self.ended = Some(ending.clone()),
             Next::Go { plan, why } => self.steps.extend(plan.proposals.first().map(|first| Step {
                 base_from_tip: first.base_from_tip,
                 joints: first.joints,
@@ -355,9 +358,9 @@ impl Guide {
         if self.failures >= MOST_FAILURES && self.range.is_some() {
             return Next::End(Ending::BoardLost { poses: self.failures });
         }
-        let is_blocked = |robot: &Robot| !robot.arm.is_free(&robot.joints, &robot.around, robot.clearance_m);
-        if used.len() <= 1 && known.robot.is_some_and(is_blocked) {
-            return Next::End(Ending::StartBlocked);
+        let contact = |robot: &Robot| robot.arm.contact(&robot.joints, &robot.around, robot.clearance_m);
+        if let (0..=1, Some(by)) = (used.len(), known.robot.and_then(contact)) {
+            return Next::End(Ending::StartBlocked { by });
         }
         let target = &known.observations.target;
         let model = known.calibration.and_then(|calibration| ViewModel::new(calibration, target));

@@ -96,8 +96,10 @@ impl Guide {
             }
             .to_owned(),
         });
-        let ending =
-            self.ended.map(|ending| EndingRecord { code: ending.code().to_owned(), text: ending.text().say(English) });
+        let ending = self
+            .ended
+            .as_ref()
+            .map(|ending| EndingRecord { code: ending.code().to_owned(), text: ending.text().say(English) });
         let box_mm = self.options.tool_box.map(|tool_box| tool_box.bounds().map(|corner| (corner * 1e3).into()));
         GuidedRecord {
             goal_mm: mm(self.options.goal_m),
@@ -157,7 +159,7 @@ impl Ending {
             Self::LittleToGain { .. } => "little_to_gain",
             Self::MostViews => "most_views",
             Self::MostTime => "most_time",
-            Self::StartBlocked => "start_blocked",
+            Self::StartBlocked { .. } => "start_blocked",
             Self::NoStart => "no_start",
             Self::BoardLost { .. } => "board_lost",
             Self::AnswerLost => "answer_lost",
@@ -168,7 +170,7 @@ impl Ending {
 
     /// What it means and, where it is no success, what to do.
     pub fn text(&self) -> Text {
-        match *self {
+        match self {
             Self::GoalReached { error_m } => {
                 text!("The goal is reached: the expected error is {error} mm", error = format!("{:.3}", error_m * 1e3))
             }
@@ -179,8 +181,9 @@ impl Ending {
             ),
             Self::MostViews => text!("As many poses as allowed are taken: allow more of them for a smaller error"),
             Self::MostTime => text!("The time that was allowed is over: allow more of it for a smaller error"),
-            Self::StartBlocked => text!(
-                "As far as is known the arm touches something where it stands: move it into free space and begin again"
+            Self::StartBlocked { by } => text!(
+                "Where it stands the arm is {there}: move it into free space, or correct the boxes, and begin again",
+                there = by.here()
             ),
             Self::NoStart => text!(
                 "No pose near the first one gave a view of the whole board that determines an answer: bring the board to the \

@@ -3,11 +3,11 @@ use nalgebra::Isometry3;
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::testing::clutter::{Tally, session};
-use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
+use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
 use crate::testing::sessions::REALISTIC;
 
 fn setup(arm: CellArm, mode: Mode, seed: u64) -> CellSetup {
-    CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, seed }
+    CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: Untold::NOTHING, seed }
 }
 
 fn options(goal_m: f64) -> GuidedOptions {
@@ -192,7 +192,8 @@ fn a_board_that_is_never_seen_again_and_an_arm_that_touches_something_end_with_t
     assert!((4..=MOST_FAN).contains(&moves), "{moves} moves");
     let on_tip = crate::plan::Obstacle::new("block", *cell.base_from_tip().isometry(), [0.1; 3]);
     cell.robot.around.obstacles.push(on_tip);
-    assert_eq!(next(&mut Guide::new(options(1e-3)), &cell), Next::End(Ending::StartBlocked));
+    let by = Contact::Box { name: "block".to_owned() };
+    assert_eq!(next(&mut Guide::new(options(1e-3)), &cell), Next::End(Ending::StartBlocked { by }));
 }
 
 /// What the arm is driven along, point by point: tip and camera of every move, by the chain and the true place of the camera.

@@ -1,12 +1,15 @@
 //! What stands around, in a file that a person writes; its keys are in `docs/surroundings.md`.
 
-use std::fs;
+use std::error::Error;
 use std::path::{Path, PathBuf};
+use std::{fmt, fs};
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{Obstacle, SpeedLimits, Surroundings, WorkVolume};
+use crate::text;
+use crate::wording::{English, Text};
 
 /// How far from 1 the length of a quaternion may be, as in dataset folders.
 const UNIT_TOLERANCE: f64 = 1e-3;
@@ -40,31 +43,28 @@ pub enum SurroundingsError {
     Entry {
         /// The file.
         file: PathBuf,
-        /// Which box by number and name, or which table.
-        entry: String,
+        /// Which one.
+        entry: EntryName,
         /// What is wrong.
         fault: EntryFault,
     },
 }
 
 /// What is wrong with an entry.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum EntryFault {
     /// A number that is none.
-    #[error("{key} is not finite")]
     NotFinite {
         /// The key.
         key: &'static str,
     },
     /// An edge that has no length.
-    #[error("size_m has the edge {value} m: give the whole length of each edge, above 0")]
     Size {
         /// The edge.
         value: f64,
     },
     /// Farther than any arm reaches.
-    #[error("{key} has {value} m: lengths are metres here; divide millimetres by 1000")]
     Millimetres {
         /// The key.
         key: &'static str,
@@ -72,22 +72,18 @@ pub enum EntryFault {
         value: f64,
     },
     /// A quaternion of another length.
-    #[error("rotation_xyzw has the length {norm}: give a unit quaternion, x y z w")]
     NotUnit {
         /// Its length.
         norm: f64,
     },
     /// Two rotations.
-    #[error("has both rotation_xyzw and yaw_deg: give one of them")]
     TwoRotations,
     /// A volume without room.
-    #[error("min_m is not below max_m along {axis}: min_m is the corner with the smallest coordinates")]
     InsideOut {
         /// The axis.
         axis: char,
     },
     /// A speed that is none.
-    #[error("{key} is {value}: give a speed above 0")]
     Speed {
         /// The key.
         key: &'static str,
@@ -95,17 +91,91 @@ pub enum EntryFault {
         value: f64,
     },
     /// A tip faster than any arm.
-    #[error("tip_speed_m_s is {value}: speeds of the tip are metres per second here; divide millimetres by 1000")]
     MillimetresPerSecond {
         /// The value.
         value: f64,
     },
     /// Nothing to call it by.
-    #[error("name is empty: it says in messages what is in the way")]
     NoName,
     /// Two boxes of one name.
-    #[error("an earlier box has the same name: names tell boxes apart in messages")]
     SameName,
+}
+
+impl EntryFault {
+    /// It in a sentence without its subject, with what to do.
+    pub fn text(&self) -> Text {
+        match self {
+            Self::NotFinite { key } => text!("{key} is not finite", key = key),
+            Self::Size { value } => {
+                text!("size_m has the edge {value} m: give the whole length of each edge, above 0", value = value)
+            }
+            Self::Millimetres { key, value } => {
+                text!(
+                    "{key} has {value} m: lengths are metres here; divide millimetres by 1000",
+                    key = key,
+                    value = value
+                )
+            }
+            Self::NotUnit { norm } => {
+                text!("rotation_xyzw has the length {norm}: give a unit quaternion, x y z w", norm = norm)
+            }
+            Self::TwoRotations => text!("has both rotation_xyzw and yaw_deg: give one of them"),
+            Self::InsideOut { axis } => text!(
+                "min_m is not below max_m along {axis}: min_m is the corner with the smallest coordinates",
+                axis = axis
+            ),
+            Self::Speed { key, value } => text!("{key} is {value}: give a speed above 0", key = key, value = value),
+            Self::MillimetresPerSecond { value } => text!(
+                "tip_speed_m_s is {value}: speeds of the tip are metres per second here; divide millimetres by 1000",
+                value = value
+            ),
+            Self::NoName => text!("name is empty: it says in messages what is in the way"),
+            Self::SameName => text!("an earlier box has the same name: names tell boxes apart in messages"),
+        }
+    }
+}
+
+impl fmt::Display for EntryFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text().say(English))
+    }
+}
+
+impl Error for EntryFault {}
+
+/// An entry of a file, as messages name it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum EntryName {
+    /// A box.
+    Box {
+        /// Counted from 1.
+        number: usize,
+        /// What it is called.
+        name: String,
+    },
+    /// A table.
+    Table(&'static str),
+}
+
+impl fmt::Display for EntryName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Box { number, name } => write!(f, "box {number} {name:?}"),
+            Self::Table(table) => f.write_str(table),
+        }
+    }
+}
+
+impl EntryName {
+    /// The entry and what is wrong with it, without the file.
+    pub fn with_fault(&self, fault: &EntryFault) -> Text {
+        match self {
+            Self::Box { number, name } => {
+                text!("Box {number} “{name}”: {fault}", number = number, name = name, fault = fault.text())
+            }
+            Self::Table(table) => text!("{table}: {fault}", table = table, fault = fault.text()),
+        }
+    }
 }
 
 /// What a file of surroundings says, in its own units; [`Self::surroundings`] is what it means.
@@ -205,15 +275,16 @@ impl KeepOutFile {
     /// # Errors
     /// [`SurroundingsError::Entry`] for the first entry that makes no sense.
     pub fn surroundings(&self, file: &Path) -> Result<Surroundings, SurroundingsError> {
-        let at = |entry: String| move |fault| SurroundingsError::Entry { file: file.to_owned(), entry, fault };
+        let at = |entry: EntryName| move |fault| SurroundingsError::Entry { file: file.to_owned(), entry, fault };
         let mut obstacles: Vec<Obstacle> = Vec::with_capacity(self.boxes.len());
         for (index, entry) in self.boxes.iter().enumerate() {
             let is_known = obstacles.iter().any(|earlier| earlier.name == entry.name);
             let read = if is_known { Err(EntryFault::SameName) } else { entry.obstacle() };
-            obstacles.push(read.map_err(at(format!("box {} {:?}", index + 1, entry.name)))?);
+            let name = EntryName::Box { number: index + 1, name: entry.name.clone() };
+            obstacles.push(read.map_err(at(name))?);
         }
-        let volume = self.volume.map(|volume| volume.volume().map_err(at("[volume]".to_owned()))).transpose()?;
-        let limits = self.limits.map(|limits| limits.limits().map_err(at("[limits]".to_owned()))).transpose()?;
+        let volume = self.volume.map(|volume| volume.volume().map_err(at(EntryName::Table("[volume]")))).transpose()?;
+        let limits = self.limits.map(|limits| limits.limits().map_err(at(EntryName::Table("[limits]")))).transpose()?;
         Ok(Surroundings { obstacles, volume, limits: limits.unwrap_or_default() })
     }
 }

@@ -2,7 +2,7 @@
 
 mod file;
 
-pub use file::{EntryFault, KeepBelow, KeepInVolume, KeepOutBox, KeepOutFile, SurroundingsError};
+pub use file::{EntryFault, EntryName, KeepBelow, KeepInVolume, KeepOutBox, KeepOutFile, SurroundingsError};
 
 use nalgebra::{Isometry3, Point3, Vector3};
 

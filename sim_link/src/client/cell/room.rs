@@ -104,6 +104,26 @@ pub struct NoPlace {
 }
 
 impl ArmKinematics {
+    /// Where the arm follows a board from: `None` where it has room from these joints ([`Self::has_room_to_follow`]), else
+    /// [`Self::place_to_follow`].
+    ///
+    /// # Errors
+    /// [`NoPlace`].
+    pub fn where_to_follow(
+        &self,
+        limits: &FollowLimits,
+        board: &BoardInView,
+        from: &JointValues,
+        around: &Surroundings,
+        among: Option<&Among>,
+    ) -> Result<Option<FollowPlace>, NoPlace> {
+        let reach = BoardReach::default();
+        if self.has_room_to_follow(limits, board, &reach, from, among) {
+            return Ok(None);
+        }
+        self.place_to_follow(limits, board, &reach, from, around, among).map(Some)
+    }
+
     /// Whether the tip can follow the board at a usual speed from these joints, wherever it goes within `reach` while its
     /// view is kept, and touches nothing of what it is kept clear of.
     pub fn has_room_to_follow(

@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 
 use super::reach::ArmKinematics;
 use handeye_core::plan::guided::choose::Robot;
-use handeye_core::plan::{self as planning, Obstacle, PlanError, Surroundings, ViewOptions, ViewSetup};
+use handeye_core::plan::{self as planning, Obstacle, Pace, PlanError, Surroundings, ViewOptions, ViewSetup};
 
 /// How far below its frame the arm is mounted \[m\]. What it stands on is taken for a table.
 const TABLE_BELOW_ARM_M: f64 = 0.0147;
@@ -90,22 +90,15 @@ impl ArmKinematics {
         }
     }
 
-    /// The arm as guided capture drives it from `joints`, at these speeds, among what stands around. Where the camera sits is
+    /// The arm as guided capture drives it from `joints`, at this pace, among what stands around. Where the camera sits is
     /// not known before there is an estimate.
-    pub fn guided_robot(
-        &self,
-        joints: &JointValues,
-        speed_rad_s: f64,
-        acceleration_rad_s2: f64,
-        around: &Surroundings,
-    ) -> Robot {
+    pub fn guided_robot(&self, joints: &JointValues, pace: Pace, around: &Surroundings) -> Robot {
         Robot {
             arm: self.as_planned(Isometry3::identity()),
             around: around.clone(),
             clearance_m: ViewOptions::default().clearance_m,
             joints: *joints,
-            speed_rad_s,
-            acceleration_rad_s2,
+            pace,
         }
     }
 

@@ -1,6 +1,6 @@
 use super::*;
 use crate::estimate::handeye::Mode;
-use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
+use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
 use crate::testing::hand;
 use crate::testing::sessions::REALISTIC;
 
@@ -9,7 +9,15 @@ fn options() -> GuidedOptions {
 }
 
 fn cell(mode: Mode, seed: u64, free_lens: bool) -> GuidedCell {
-    GuidedCell::new(CellSetup { arm: CellArm::Ur5e, mode, noise: REALISTIC, free_lens, straight: None, seed })
+    GuidedCell::new(CellSetup {
+        arm: CellArm::Ur5e,
+        mode,
+        noise: REALISTIC,
+        free_lens,
+        straight: None,
+        untold: Untold::NOTHING,
+        seed,
+    })
 }
 
 #[test]
