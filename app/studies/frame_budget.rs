@@ -74,7 +74,7 @@ fn main() -> anyhow::Result<()> {
 
     measure("a move of 30 s", CellSource::Address(cell.endpoint()), duration.max(Duration::from_secs(35)), |app| {
         let mut view = app.model().view.jog;
-        view.speed = 0.005;
+        view.speed = Some(0.005);
         app.apply(Command::SetJog(view));
         let goal = MotionGoal::Joints([0.4, 0.3, -0.6, 0.2, 1.2, 0.3].into());
         app.apply(Command::Move { goal, what: Text::verbatim("a far place") });

@@ -11,7 +11,7 @@
 //! `choice`: the expected error of the tip over the box about the board, by the true model and the poses that were taken, in
 //! sessions that begin with one view of the board. Farthest rotation and random views know from the beginning where camera
 //! and board are; guided capture does not. The optimum is the best set of so many views out of the same thousand, by
-//! exchange. `stop`: what is true when guided capture ends by itself. `speed`: how long the choice of a pose takes, on one
+//! exchange. `stop`: what is true when guided capture ends by itself; a word behind the number picks rows. `speed`: how long the choice of a pose takes, on one
 //! thread, with a thousand candidates and six poses ahead. `hand`: a robot that a person moves. `straight`: the first poses
 //! where small turns determine no lens.
 
@@ -30,7 +30,7 @@ use handeye_core::plan::guided::candidates::ViewRange;
 use handeye_core::plan::guided::design::{Design, weight_about};
 use handeye_core::plan::guided::{Ending, Guide, GuidedOptions, Step};
 use handeye_core::progress::CancelToken;
-use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
+use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, GuidedRun, Untold};
 use handeye_core::testing::hand;
 use handeye_core::testing::sessions::{BOARD, REALISTIC};
 use rand::SeedableRng as _;
@@ -50,7 +50,7 @@ fn main() {
     let sessions: u64 = args.next().map_or(200, |n| n.parse().expect("a number of sessions"));
     match what.as_str() {
         "choice" => choice(sessions),
-        "stop" => stop(sessions),
+        "stop" => stop(sessions, &args.next().unwrap_or_default()),
         "speed" => speed(sessions),
         "hand" => by_hand(sessions),
         "straight" => straight(sessions),
@@ -451,7 +451,7 @@ fn looks(arm: CellArm, mode: Mode, sessions: u64) {
     }
 }
 
-fn stop(sessions: u64) {
+fn stop(sessions: u64, only: &str) {
     println!("at the end of guided sessions, {sessions} for each row and set-up:");
     println!(
         "{:44}{:>8}{:>10}{:>10}{:>8}{:>8}{:>8}{:>9}",
@@ -476,7 +476,7 @@ fn stop(sessions: u64) {
         ("goal 1 mm, robot off by 1.5 mm by place", 1e-3, field, false, as_said),
         ("goal 2 mm, robot off by 1.5 mm by place", 2e-3, field, false, as_said),
     ];
-    for (name, goal_m, noise, free_lens, untold) in rows {
+    for (name, goal_m, noise, free_lens, untold) in rows.into_iter().filter(|row| row.0.contains(only)) {
         for mode in [Mode::EyeInHand, Mode::EyeToHand] {
             let runs: Vec<_> = (0..sessions)
                 .into_par_iter()
@@ -494,7 +494,9 @@ fn stop(sessions: u64) {
                     .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
                 })
                 .collect();
-            let ended: Vec<_> = runs.iter().filter_map(|run| run.history.last().map(|last| (run, *last))).collect();
+            // Of those whose last answer states an error.
+            let last = |run: &GuidedRun| run.history.last().copied().filter(|last| last.0 == run.times_s.len());
+            let ended: Vec<_> = runs.iter().filter_map(|run| last(run).map(|last| (run, last))).collect();
             let share = |of: &dyn Fn(&(usize, f64, f64)) -> bool, among: &dyn Fn(&Ending) -> bool| {
                 let among: Vec<_> = ended.iter().filter(|(run, _)| among(&run.ending)).collect();
                 100.0 * among.iter().filter(|(_, last)| of(last)).count() as f64 / among.len().max(1) as f64

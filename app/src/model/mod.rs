@@ -462,6 +462,13 @@ impl Model {
         self.view.confirm_moves.unwrap_or(self.source != CellSource::BuiltIn)
     }
 
+    /// Share of its fastest speed at which the arm moves: as the user wants it, or else a quarter, and half in the built-in
+    /// cell, because behind an address there may be a real arm.
+    pub fn speed(&self) -> f64 {
+        let usual = if self.source == CellSource::BuiltIn { 0.5 } else { 0.25 };
+        self.view.jog.speed.unwrap_or(usual)
+    }
+
     /// Whether the simulation is known not to run, while the connection works.
     pub fn resting_simulation(&self) -> Option<Simulation> {
         let robot = self.robot.as_ref().filter(|_| self.control.is_connected())?;

@@ -219,13 +219,14 @@ pub struct JogSettings {
     pub frame: JogFrame,
     /// How far.
     pub step: JogStep,
-    /// Share of the fastest speed, over 0 and up to 1.
-    pub speed: f64,
+    /// Share of the fastest speed, over 0 and up to 1; `None` as [`Model::speed`](crate::model::Model::speed) has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed: Option<f64>,
 }
 
 impl Default for JogSettings {
     fn default() -> Self {
-        Self { frame: JogFrame::Base, step: JogStep::Hold, speed: 0.25 }
+        Self { frame: JogFrame::Base, step: JogStep::Hold, speed: None }
     }
 }
 

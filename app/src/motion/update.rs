@@ -14,7 +14,7 @@ impl App {
     pub(crate) fn start_motion(&mut self, goal: MotionGoal, what: Text) {
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         let id = self.numbers.motion;
-        let request = MotionRequest { id, goal, speed: self.model.view.jog.speed };
+        let request = MotionRequest { id, goal, speed: self.model.speed() };
         self.model.messages.is_over_in(Pane::Jog);
         match self.workers.move_to(request) {
             Ok(()) => {
@@ -84,7 +84,7 @@ impl App {
             JogStep::Step { metres, radians } => {
                 self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
                 let id = self.numbers.motion;
-                let speed = self.model.view.jog.speed;
+                let speed = self.model.speed();
                 let length = if jog.is_length(|joint| self.model.joint_kind(joint)) { metres } else { radians };
                 match self.workers.jog_step(id, jog, length, speed, self.camera_on_tip()) {
                     Ok(()) => {
@@ -102,7 +102,7 @@ impl App {
         if self.model.view.jog.step != JogStep::Hold {
             return;
         }
-        self.workers.hold_jog(jog, self.model.view.jog.speed, self.camera_on_tip());
+        self.workers.hold_jog(jog, self.model.speed(), self.camera_on_tip());
     }
 
     pub(crate) fn release_jog(&mut self) {

@@ -89,7 +89,7 @@ impl App {
         }
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         let id = self.numbers.motion;
-        match self.workers.follow(id, wish, self.model.view.jog.speed) {
+        match self.workers.follow(id, wish, self.model.speed()) {
             Ok(()) => {
                 self.numbers.follow = Some(id);
                 self.model.track.follow = FollowStatus::Off;

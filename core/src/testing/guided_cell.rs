@@ -6,6 +6,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::arms;
 use super::sessions::{BOARD, camera, noise_twist, reported, seen};
+use crate::diagnose::doctor;
+use crate::diagnose::findings::FindingOptions;
 use crate::estimate::handeye::joint::chain::correction_transform;
 use crate::estimate::handeye::joint::{Noise, RobotField, ViewModel};
 use crate::estimate::handeye::{HandEye, Mode};
@@ -14,7 +16,7 @@ use crate::geometry::arm::{Arm, ArmKind, JointValues};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use crate::plan::guided::choose::Robot;
-use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Step};
+use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, LEAST_VIEWS, Next, Step};
 use crate::plan::{self, ArmBody, Carried, Obstacle, Pace, Surroundings};
 use crate::progress::CancelToken;
 use crate::targets::bent::{BoardPoints, BoardShape};
@@ -307,8 +309,21 @@ impl GuidedCell {
     pub fn true_error_m(&self, calibration: &Calibration) -> Option<f64> {
         let estimated = calibration.hand_eye?.mount_from_camera();
         let point = calibration.joint.as_ref()?.reference_point;
-        let off = self.mount_from_camera.inverse() * estimated;
+        let off = (self.mount_from_tip() * self.mount_from_camera).inverse() * estimated;
         Some((off.isometry() * point - point).norm())
+    }
+
+    /// What errors of the robot that depend on the place are in the middle of the session's places: a camera on the tip
+    /// cannot be told from one that is off by as much, and measures with the same arm.
+    fn mount_from_tip(&self) -> Pose<Mount, Mount> {
+        let tips = self.observations.views.iter().filter_map(|view| view.base_from_tip);
+        let count = self.observations.views.len() as f64;
+        let middle = tips.map(|tip| tip.translation()).sum::<Vector3<f64>>() / count;
+        let at_middle = Pose::from_isometry(Translation3::from(middle).into());
+        match (&self.field, self.setup.mode) {
+            (Some(field), Mode::EyeInHand) => Pose::from_isometry(correction_transform(&field.correction(&at_middle))),
+            _ => Pose::identity(),
+        }
     }
 
     /// The model of what is true.
@@ -321,6 +336,17 @@ impl GuidedCell {
     /// What a guide is told, with an answer from the views so far.
     pub fn known<'a>(&'a self, calibration: Option<&'a Calibration>, elapsed_s: f64) -> Known<'a> {
         Known { observations: &self.observations, calibration, robot: Some(&self.robot), elapsed_s }
+    }
+
+    /// The same as a user gets it: from the first pose on at which guided capture may end it is examined, too, which decides
+    /// what error may be stated.
+    fn solve(&self) -> Option<Calibration> {
+        let mut calibration = self.calibrate()?;
+        if self.observations.views.len() >= LEAST_VIEWS {
+            let (options, cancel) = (FindingOptions::default(), CancelToken::default());
+            doctor::diagnose(&self.observations, Some(&mut calibration), &options, &cancel);
+        }
+        Some(calibration)
     }
 
     /// The calibration from the views so far.
@@ -351,7 +377,7 @@ impl GuidedCell {
             if self.capture(&joints) {
                 times_s.push(time_s);
                 guide.captured();
-                calibration = self.calibrate();
+                calibration = self.solve();
                 if let Some(solved) = &calibration
                     && let (Some(stated), Some(truth)) = (solved.tip_error_95_m(), self.true_error_m(solved))
                 {

@@ -19,7 +19,7 @@ pub fn settings_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let settings = model.view.jog;
     frame_ui(ui, settings, language, outbox);
     step_ui(ui, settings, language, outbox);
-    speed_ui(ui, settings, language, outbox);
+    speed_ui(ui, model, outbox);
 }
 
 /// A frame in words.
@@ -70,15 +70,16 @@ fn step_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut 
     });
 }
 
-fn speed_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut Outbox) {
+fn speed_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let (language, settings) = (model.view.language, model.view.jog);
     parts::row_ui(ui, tr!(language, "Speed"), |ui| {
-        let mut percent = settings.speed * 100.0;
+        let mut percent = model.speed() * 100.0;
         ui.spacing_mut().slider_width = 90.0;
         let slider = Slider::new(&mut percent, 1.0..=100.0).step_by(1.0).show_value(false);
         let response = ui.add(slider);
         response.widget_info(|| WidgetInfo::slider(true, percent, tr!(language, "Speed in percent")));
         if response.changed() {
-            outbox.send(Command::SetJog(JogSettings { speed: percent / 100.0, ..settings }));
+            outbox.send(Command::SetJog(JogSettings { speed: Some(percent / 100.0), ..settings }));
         }
         let share = percent / 100.0;
         let text = format!("{percent:.0} % · {:.0} mm/s", JOG_LINE_SPEED_M_S * 1e3 * share);

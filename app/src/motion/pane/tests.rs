@@ -10,7 +10,8 @@ use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    Axis, Home, Jog, JogFrame, JogStep, JointFacts, LinkState, Motion, MotionGoal, MotionId, Pane, Severity, Simulation,
+    Axis, CellSource, Home, Jog, JogFrame, JogStep, JointFacts, LinkState, Motion, MotionGoal, MotionId, Pane,
+    Severity, Simulation,
 };
 use crate::text::Text;
 
@@ -144,7 +145,13 @@ fn frame_step_and_speed_are_chosen() {
     let sent = pane.click("Step 10 mm, 10°");
     let [Command::SetJog(jog)] = sent[..] else { panic!("{sent:?}") };
     assert_eq!(jog.step, JogStep::Step { metres: 0.01, radians: 10.0_f64.to_radians() });
-    assert!(pane.sees("25 % · 62 mm/s"));
+    assert!(pane.sees("50 % · 125 mm/s"), "no arm can be hurt in the built-in cell");
+    pane.model().source = CellSource::Address("tcp://127.0.0.1:23000".to_owned());
+    pane.steps();
+    assert!(pane.sees("25 % · 62 mm/s"), "there may be a real arm behind an address");
+    pane.model().view.jog.speed = Some(0.8);
+    pane.steps();
+    assert!(pane.sees("80 % · 200 mm/s"));
 }
 
 #[test]

@@ -89,7 +89,7 @@ fn connected(folder: &Path) -> (Workbench, CellServer) {
     bench.click(Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("the board", |model| model.board_seen_s.is_some());
-    bench.click(Command::SetJog(JogSettings { speed: 1.0, ..JogSettings::default() }));
+    bench.click(Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
     // Behind an address there may be a real arm, and each move waits for a person.
     bench.click(Command::SetConfirmMoves(false));
     (bench, cell)

@@ -28,7 +28,7 @@ fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {
     bench.click(Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("a solution", |model| model.solve.current().is_some());
-    bench.click(Command::SetJog(JogSettings { speed: 1.0, ..JogSettings::default() }));
+    bench.click(Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
     (bench, cell)
 }
 
