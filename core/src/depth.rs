@@ -75,6 +75,19 @@ pub enum DepthSample {
     Invalid,
 }
 
+impl DepthSample {
+    /// What a depth \[m\] says; `far_m` is the sensor's far plane, infinity when it has none.
+    pub fn of(depth_m: f32, far_m: f32) -> Self {
+        if depth_m.is_nan() || depth_m <= 0.0 {
+            Self::Invalid
+        } else if depth_m >= far_m * (1.0 - FAR_TOLERANCE) {
+            Self::Far
+        } else {
+            Self::Metres(depth_m)
+        }
+    }
+}
+
 impl DepthImage {
     /// Checks the number of samples.
     ///
@@ -95,7 +108,7 @@ impl DepthImage {
             return DepthSample::Invalid;
         }
         let index = row as usize * self.width as usize + column as usize;
-        self.metres.get(index).map_or(DepthSample::Invalid, |&depth| classify(depth, far_m))
+        self.metres.get(index).map_or(DepthSample::Invalid, |&depth| DepthSample::of(depth, far_m))
     }
 
     /// The point that a pixel sees: where its ray has the pixel's depth along the optical axis. `None` for a pixel
@@ -135,7 +148,7 @@ impl DepthImage {
             return Err(DepthError::BadRange { what: "the colour range", low: near_m.into(), high: far_m.into() });
         }
         let table: Vec<[u8; 3]> = (0..=255).map(|i| map.colour(f64::from(i) / 255.0)).collect();
-        self.image(|depth| match classify(depth, far_plane_m) {
+        self.image(|depth| match DepthSample::of(depth, far_plane_m) {
             DepthSample::Metres(m) => {
                 // In 0 ..= 255 by the clamp.
                 table[(((m - near_m) / (far_m - near_m)).clamp(0.0, 1.0) * 255.0).round() as usize]
@@ -156,16 +169,6 @@ impl DepthImage {
             *pixel = Rgb(colour(depth));
         }
         Ok(out)
-    }
-}
-
-fn classify(depth_m: f32, far_m: f32) -> DepthSample {
-    if depth_m.is_nan() || depth_m <= 0.0 {
-        DepthSample::Invalid
-    } else if depth_m >= far_m * (1.0 - FAR_TOLERANCE) {
-        DepthSample::Far
-    } else {
-        DepthSample::Metres(depth_m)
     }
 }
 

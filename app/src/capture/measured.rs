@@ -27,11 +27,11 @@ pub struct Measured {
     pub target: TargetSpec,
     /// Mean of the images.
     pub rgb: Arc<RgbImage>,
-    /// Mean of the depths \[m\].
-    pub depth: DepthImage,
+    /// Mean of the depths \[m\], from a camera that measures them.
+    pub depth: Option<DepthImage>,
     /// The tip as the controller reported it with the last of the images.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The joints at the same instant \[rad\].
+    /// The joints at the same instant \[rad\]; none where the robot does not report them.
     pub joints_rad: JointValues,
     /// Simulated time of the last image \[s\].
     pub sim_time_s: f64,
@@ -72,9 +72,9 @@ impl Measured {
     pub fn record(&self, session: &mut Store) -> Result<CaptureId, SessionError> {
         session.add_capture(&Capture {
             image: &self.rgb,
-            depth_m: Some(&self.depth),
+            depth_m: self.depth.as_ref(),
             base_from_tip: self.base_from_tip,
-            joints_rad: Some(&self.joints_rad),
+            joints_rad: Some(&*self.joints_rad).filter(|joints| !joints.is_empty()),
             sim_time_s: Some(self.sim_time_s),
             role: match self.purpose {
                 CapturePurpose::Calibrate => Role::Calibration,

@@ -1,6 +1,6 @@
 //! Why there is no capture: what is wrong and what to do, in words.
 
-use handeye_core::capture::{EdgeBlur, NO_IMAGES_S, Refusal};
+use handeye_core::capture::{EdgeBlur, NO_IMAGES_S, Refusal, RobotRate};
 use handeye_core::detect::VisionError;
 use handeye_core::targets::TargetSpec;
 
@@ -14,13 +14,23 @@ pub type Why = (RefusalKind, Text);
 /// Why no images came together.
 pub fn of_machine(refusal: &Refusal) -> Why {
     match refusal {
-        Refusal::RobotMoves { after_s, rate_rad_s } => {
-            let (seconds, rate) = (format!("{after_s:.0}"), format!("{:.2}", rate_rad_s.to_degrees()));
-            let why = text!(
-                "The robot still moves after {seconds} s: a joint turns at {rate}°/s. Let it come to rest and capture again",
-                seconds = seconds,
-                rate = rate
-            );
+        Refusal::RobotMoves { after_s, rate } => {
+            let seconds = format!("{after_s:.0}");
+            let degrees = |rad_s: f64| format!("{:.2}", rad_s.to_degrees());
+            let why = match *rate {
+                RobotRate::Joint(rad_s) => text!(
+                    "The robot still moves after {seconds} s: a joint turns at {rate}°/s. Let it come to rest and capture again",
+                    seconds = seconds,
+                    rate = degrees(rad_s)
+                ),
+                RobotRate::Tip { m_s, rad_s } => text!(
+                    "The robot still moves after {seconds} s: the tip moves at {speed} mm/s and turns at {rate}°/s. Let it come \
+                     to rest and capture again",
+                    seconds = seconds,
+                    speed = format!("{:.2}", m_s * 1e3),
+                    rate = degrees(rad_s)
+                ),
+            };
             (RefusalKind::NotSettled, why)
         }
         Refusal::ImageChanges { after_s } => {

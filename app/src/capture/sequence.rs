@@ -44,16 +44,17 @@ impl Sequence {
             number: info.number,
             sim_time_s: info.sim_time_s,
             received_s: info.received_s,
+            base_from_tip: info.base_from_tip,
             joints_rad: &info.joints_rad,
             rgb: &images.rgb,
             grey,
-            depth: &images.depth,
+            depth: images.depth.as_ref().map(|depth| &depth.metres),
             far_plane_m: info.far_plane_m,
         };
         if !self.is_complete() {
             self.last = Some(info.clone());
         }
-        self.machine.see(&info.base_from_tip, &shot);
+        self.machine.see(&shot);
         self.is_complete()
     }
 

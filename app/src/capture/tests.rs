@@ -11,7 +11,7 @@ use handeye_core::targets::TargetSpec;
 
 use super::drawn::{BOARD, board, brighter_board};
 use super::{CaptureEnd, CaptureRequest, Images, take};
-use crate::model::{CaptureOptions, CapturePurpose, FrameImages, FrameInfo, LiveFrame, RefusalKind};
+use crate::model::{CaptureOptions, CapturePurpose, ColouredDepth, FrameImages, FrameInfo, LiveFrame, RefusalKind};
 use crate::text::Language;
 
 /// One image after the other, a pass apart.
@@ -50,9 +50,9 @@ impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Images for Reel<F> {
             joints_rad: [0.0; 6].into(),
             base_from_target_true: None,
         };
-        let depth = DepthImage { width: 1, height: 1, metres: vec![0.5] };
         let rgb = (self.rgb)(self.number)?;
-        let images = FrameImages { rgb, depth, depth_coloured: RgbImage::default() };
+        let depth = DepthImage { width: 1, height: 1, metres: vec![0.5] };
+        let images = FrameImages { rgb, depth: Some(ColouredDepth { metres: depth, colours: RgbImage::default() }) };
         Ok(LiveFrame { info, images: Arc::new(images) })
     }
 }

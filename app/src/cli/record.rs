@@ -7,7 +7,7 @@ use handeye_core::project::session::Store;
 use handeye_sim_link::client::LinkError;
 use handeye_sim_link::client::cell::{Arm, CellInfo, Frame, GroundTruth};
 
-use crate::model::{CellFacts, FrameImages, FrameInfo, LiveFrame};
+use crate::model::{CellFacts, ColouredDepth, FrameImages, FrameInfo, LiveFrame};
 use crate::rerun_log::{Entry, Recorder};
 
 /// The cell and what it publishes of itself.
@@ -56,7 +56,8 @@ pub fn live_frame(info: &CellInfo, number: u64, received_s: f64, frame: Frame) -
         joints_rad: joints,
         base_from_target_true,
     };
-    LiveFrame { info, images: Arc::new(FrameImages { rgb, depth, depth_coloured: RgbImage::default() }) }
+    let depth = Some(ColouredDepth { metres: depth, colours: RgbImage::default() });
+    LiveFrame { info, images: Arc::new(FrameImages { rgb, depth }) }
 }
 
 /// The session as it is now.

@@ -32,7 +32,7 @@ pub struct FrameInfo {
     pub far_plane_m: f32,
     /// The tip as the controller reported it at the instant of the images.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The joints at the same instant \[rad\].
+    /// The joints at the same instant \[rad\]; none where the robot does not report them.
     pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it; only ever compared with.
     pub base_from_target_true: Option<Pose<Base, Target>>,
@@ -43,17 +43,24 @@ pub struct FrameInfo {
 pub struct FrameImages {
     /// Colour, row 0 on top.
     pub rgb: RgbImage,
+    /// Depth, from a camera that measures it.
+    pub depth: Option<ColouredDepth>,
+}
+
+/// A depth image and how it is shown.
+#[derive(Clone, PartialEq)]
+pub struct ColouredDepth {
     /// Depth in metres, row 0 on top.
-    pub depth: DepthImage,
-    /// Depth as the window shows it, same size as `depth`.
-    pub depth_coloured: RgbImage,
+    pub metres: DepthImage,
+    /// As the window shows it, of the same size.
+    pub colours: RgbImage,
 }
 
 /// Sizes only: a million pixels say nothing in a log.
 impl fmt::Debug for FrameImages {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { rgb, depth, depth_coloured: _ } = self;
-        let depth = (depth.width, depth.height);
+        let Self { rgb, depth } = self;
+        let depth = depth.as_ref().map(|depth| (depth.metres.width, depth.metres.height));
         f.debug_struct("FrameImages").field("rgb", &rgb.dimensions()).field("depth", &depth).finish()
     }
 }
@@ -66,14 +73,15 @@ impl FrameImages {
 
     /// Depth at a pixel of the colour image; the depth image may have another size.
     pub fn depth_at(&self, point: ImagePoint, far_plane_m: f32) -> DepthSample {
+        let Some(ColouredDepth { metres: depth, .. }) = &self.depth else { return DepthSample::Invalid };
         let (width, height) = self.rgb.dimensions();
         if point.column >= width || point.row >= height {
             return DepthSample::Invalid;
         }
         let scaled = |at: u32, of: u32, to: u32| (u64::from(at) * u64::from(to) / u64::from(of)) as u32;
-        let column = scaled(point.column, width, self.depth.width);
-        let row = scaled(point.row, height, self.depth.height);
-        self.depth.sample(column, row, far_plane_m)
+        let column = scaled(point.column, width, depth.width);
+        let row = scaled(point.row, height, depth.height);
+        depth.sample(column, row, far_plane_m)
     }
 }
 

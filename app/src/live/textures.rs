@@ -43,10 +43,13 @@ impl LiveTextures {
             return;
         }
         upload(ctx, &mut self.rgb, "rgb", &images.rgb, crisp);
-        upload(ctx, &mut self.depth, "depth", &images.depth_coloured, crisp);
+        match &images.depth {
+            Some(depth) => upload(ctx, &mut self.depth, "depth", &depth.colours, crisp),
+            None => self.depth = None,
+        }
         self.review_range_m = model.review.as_ref().and_then(|_| {
             let far_plane_m = model.frame.as_ref().map_or(f32::INFINITY, |frame| frame.info.far_plane_m);
-            depth::range_of(&images.depth, far_plane_m, None)
+            depth::range_of(&images.depth.as_ref()?.metres, far_plane_m, None)
         });
         tracing::trace!("image shown");
         self.shown = Some((images.clone(), crisp));

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use handeye_core::depth::ColourMap;
+use handeye_core::depth::{ColourMap, DepthImage};
 use handeye_sim_link::client::CancelToken;
 
 use crate::live::depth;
-use crate::model::{DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};
+use crate::model::{ColouredDepth, DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};
 use crate::text;
 use crate::worker::link::{Duty, Outlet};
 use crate::worker::port::{CameraPort, Connected, Connector, PortError, RawFrame};
@@ -56,16 +56,19 @@ impl Camera {
     /// Prepares the newest images for the window.
     fn prepare(&mut self, raw: RawFrame, limits_m: [f32; 2], received_s: f64) -> Result<LiveFrame, PortError> {
         let [_, far_plane_m] = limits_m;
-        self.auto_range_m = depth::range_of(&raw.depth, far_plane_m, self.auto_range_m);
+        if let Some(depth) = &raw.depth {
+            self.auto_range_m = depth::range_of(depth, far_plane_m, self.auto_range_m);
+        }
         let depth_range_m = match self.scale {
             DepthScale::Full => limits_m,
             DepthScale::Auto => self.auto_range_m.unwrap_or(limits_m),
         };
         let [near_m, far_m] = depth_range_m;
-        let depth_coloured = raw
-            .depth
-            .colours(self.colours, near_m, far_m, far_plane_m)
-            .map_err(|error| PortError::Refused(text!("The depth image cannot be shown: {why}", why = error)))?;
+        let coloured = |metres: DepthImage| match metres.colours(self.colours, near_m, far_m, far_plane_m) {
+            Ok(colours) => Ok(ColouredDepth { metres, colours }),
+            Err(error) => Err(PortError::Refused(text!("The depth image cannot be shown: {why}", why = error))),
+        };
+        let depth = raw.depth.map(coloured).transpose()?;
         self.number += 1;
         let info = FrameInfo {
             number: self.number,
@@ -79,7 +82,7 @@ impl Camera {
             joints_rad: raw.joints_rad,
             base_from_target_true: raw.base_from_target_true,
         };
-        Ok(LiveFrame { info, images: Arc::new(FrameImages { rgb: raw.rgb, depth: raw.depth, depth_coloured }) })
+        Ok(LiveFrame { info, images: Arc::new(FrameImages { rgb: raw.rgb, depth }) })
     }
 }
 

@@ -27,7 +27,8 @@ pub use crate::capture::state::{
 };
 pub use crate::export::state::{ExportState, Preview, PreviewFile, Written};
 pub use crate::live::state::{
-    FrameImages, FrameInfo, ImagePoint, LiveFrame, Overlays, PickedPoint, SceneView, Viewport, exports_of,
+    ColouredDepth, FrameImages, FrameInfo, ImagePoint, LiveFrame, Overlays, PickedPoint, SceneView, Viewport,
+    exports_of,
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{

@@ -5,7 +5,7 @@ use handeye_core::geometry::frames::Pose;
 use handeye_core::image::RgbImage;
 
 use super::*;
-use crate::model::{FrameImages, FrameInfo, Severity};
+use crate::model::{ColouredDepth, FrameImages, FrameInfo, Severity};
 
 const SOON: Duration = Duration::from_secs(20);
 const AT_ONCE: Duration = Duration::from_millis(1);
@@ -32,7 +32,10 @@ fn image(number: u64) -> Entry {
         base_from_target_true: None,
     };
     let depth = DepthImage::new(1, 1, vec![1.0]).expect("an image");
-    let images = FrameImages { rgb: RgbImage::new(1, 1), depth, depth_coloured: RgbImage::new(1, 1) };
+    let images = FrameImages {
+        rgb: RgbImage::new(1, 1),
+        depth: Some(ColouredDepth { metres: depth, colours: RgbImage::new(1, 1) }),
+    };
     Entry::Image { info: Box::new(info), images: Arc::new(images) }
 }
 

@@ -320,7 +320,7 @@ impl CameraPort for FakeCell {
         let metres = (0..width * height).map(|i| 0.4 + 0.4 * (i % width) as f32 / width as f32).collect();
         Ok(RawFrame {
             rgb: Self::rgb(script.frames),
-            depth: DepthImage { width, height, metres },
+            depth: Some(DepthImage { width, height, metres }),
             sim_time_s: script.frames as f64 * 0.05,
             image_age_s: 0.0,
             base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),

@@ -17,7 +17,9 @@ use super::link::Outlet;
 use crate::command::Event;
 use crate::keep_out;
 use crate::live::depth;
-use crate::model::{FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written};
+use crate::model::{
+    ColouredDepth, FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written,
+};
 use crate::settings::SettingsWrite;
 use crate::text;
 
@@ -152,14 +154,14 @@ fn images(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<
     let session = Session::open(folder).map_err(|error| error.to_string())?;
     let rgb = session.load_rgb(capture).map_err(|error| error.to_string())?;
     let depth = session.load_depth_m(capture).map_err(|error| error.to_string())?;
-    let (width, height) = rgb.dimensions();
-    let depth =
-        depth.unwrap_or_else(|| DepthImage { width, height, metres: vec![f32::NAN; width as usize * height as usize] });
-    // A recorded depth has its far plane in it: nothing lies behind.
-    let far_plane_m = depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
-    let [near_m, far_m] = depth::range_of(&depth, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
-    let depth_coloured = depth.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
-    Ok(FrameImages { rgb, depth, depth_coloured })
+    let coloured = |metres: DepthImage| {
+        // A recorded depth has its far plane in it: nothing lies behind.
+        let far_plane_m = metres.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
+        let [near_m, far_m] = depth::range_of(&metres, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
+        let colours = metres.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
+        Ok::<_, String>(ColouredDepth { metres, colours })
+    };
+    Ok(FrameImages { rgb, depth: depth.map(coloured).transpose()? })
 }
 
 /// Has a program show a folder, until the program ends; says where the folder is when there is none.

@@ -182,7 +182,7 @@ impl CameraPort for LiveCamera {
         let frame = self.feed.grab().map_err(port_error)?;
         Ok(RawFrame {
             rgb: frame.rgb,
-            depth: frame.depth,
+            depth: Some(frame.depth),
             sim_time_s: frame.sim_time_s,
             image_age_s: frame.image_age_s,
             base_from_tip: frame.base_from_tip,

@@ -203,15 +203,15 @@ pub trait MotionPort: Send {
 pub struct RawFrame {
     /// Colour, row 0 on top.
     pub rgb: RgbImage,
-    /// Depth in metres, row 0 on top.
-    pub depth: DepthImage,
+    /// Depth in metres, row 0 on top, from a camera that measures it.
+    pub depth: Option<DepthImage>,
     /// Simulated time \[s\].
     pub sim_time_s: f64,
     /// How much older than pose and joints the images may be \[s\] of simulated time.
     pub image_age_s: f64,
     /// The tip as the controller reports it at that instant.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The joints at that instant \[rad\].
+    /// The joints at that instant \[rad\]; none where the robot does not report them.
     pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it.
     pub base_from_target_true: Option<Pose<Base, Target>>,

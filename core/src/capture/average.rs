@@ -14,7 +14,8 @@ pub struct Average {
     frames: u32,
     size: (u32, u32),
     colours: Vec<u32>,
-    depth_size: (u32, u32),
+    /// `None` without depths.
+    depth_size: Option<(u32, u32)>,
     depths: Vec<DepthSum>,
 }
 
@@ -28,16 +29,15 @@ struct DepthSum {
 }
 
 impl Average {
-    /// Begins with a pair of images; `far_plane_m` as in [`DepthImage::sample`].
-    pub fn begin(rgb: &RgbImage, depth: &DepthImage, far_plane_m: f32) -> Self {
-        let depth_size = (depth.width, depth.height);
+    /// Begins with an image, and a depth where there is one; `far_plane_m` as in [`DepthImage::sample`].
+    pub fn begin(rgb: &RgbImage, depth: Option<&DepthImage>, far_plane_m: f32) -> Self {
         let none = DepthSum { metres: 0.0, count: 0, hole: f32::NAN, hole_is_far: false };
         let mut average = Self {
             frames: 0,
             size: rgb.dimensions(),
             colours: vec![0; rgb.as_raw().len()],
-            depth_size,
-            depths: vec![none; depth.metres.len()],
+            depth_size: depth.map(|depth| (depth.width, depth.height)),
+            depths: vec![none; depth.map_or(0, |depth| depth.metres.len())],
         };
         average.add(rgb, depth, far_plane_m);
         average
@@ -48,18 +48,18 @@ impl Average {
         self.frames
     }
 
-    /// Adds a pair of images; `false`, and nothing happens, when their sizes are others.
-    pub fn add(&mut self, rgb: &RgbImage, depth: &DepthImage, far_plane_m: f32) -> bool {
-        let sizes = (rgb.dimensions(), (depth.width, depth.height), depth.metres.len());
-        if sizes != (self.size, self.depth_size, self.depths.len()) {
+    /// Adds an image with its depth; `false`, and nothing happens, when their sizes are others or only some have a depth.
+    pub fn add(&mut self, rgb: &RgbImage, depth: Option<&DepthImage>, far_plane_m: f32) -> bool {
+        let depth_size = depth.map(|depth| (depth.width, depth.height));
+        let samples = depth.map_or(&[][..], |depth| &depth.metres);
+        if (rgb.dimensions(), depth_size, samples.len()) != (self.size, self.depth_size, self.depths.len()) {
             return false;
         }
         for (sum, &level) in self.colours.iter_mut().zip(rgb.as_raw()) {
             *sum = sum.saturating_add(u32::from(level));
         }
-        let width = depth.width.max(1) as usize;
-        for (i, (sum, &metres)) in self.depths.iter_mut().zip(&depth.metres).enumerate() {
-            match depth.sample((i % width) as u32, (i / width) as u32, far_plane_m) {
+        for (sum, &metres) in self.depths.iter_mut().zip(samples) {
+            match DepthSample::of(metres, far_plane_m) {
                 DepthSample::Metres(metres) => {
                     sum.metres += f64::from(metres);
                     sum.count += 1;
@@ -74,7 +74,7 @@ impl Average {
     }
 
     /// The mean.
-    pub fn finish(&self) -> (RgbImage, DepthImage) {
+    pub fn finish(&self) -> (RgbImage, Option<DepthImage>) {
         let frames = self.frames.max(1);
         let levels = self.colours.iter().map(|sum| (sum.saturating_add(frames / 2) / frames) as u8).collect();
         // The length is that of an image of this size; an empty image stands for none.
@@ -82,7 +82,7 @@ impl Average {
         let mean = |sum: &DepthSum| {
             if sum.count > 0 { (sum.metres / f64::from(sum.count)) as f32 } else { sum.hole }
         };
-        let (width, height) = self.depth_size;
-        (rgb, DepthImage { width, height, metres: self.depths.iter().map(mean).collect() })
+        let metres = || self.depths.iter().map(mean).collect();
+        (rgb, self.depth_size.map(|(width, height)| DepthImage { width, height, metres: metres() }))
     }
 }

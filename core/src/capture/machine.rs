@@ -4,7 +4,7 @@ use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
 use super::watch::Reference;
-use super::{Average, Rest, Scatter, Shot, Similar, Watch, nearest_similar};
+use super::{Average, Rest, RobotRate, Scatter, Shot, Similar, Watch, nearest_similar};
 use crate::depth::DepthImage;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::targets::observation::Corner;
@@ -36,7 +36,7 @@ pub struct Plan {
 pub enum Wait {
     /// Images from after the request.
     ForImage,
-    /// The joints to come to rest.
+    /// The robot to come to rest.
     RobotMoves,
     /// The image to come to rest.
     ImageChanges,
@@ -52,14 +52,14 @@ pub enum Wait {
 /// Why there are no images to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refusal {
-    /// The joints did not come to rest.
+    /// The robot did not come to rest.
     RobotMoves {
         /// How long was waited \[s\], simulated.
         after_s: f64,
-        /// How fast the fastest joint still moves [rad/s].
-        rate_rad_s: f64,
+        /// How fast it still moves.
+        rate: RobotRate,
     },
-    /// The joints are at rest and the image is not.
+    /// The robot is at rest and the image is not.
     ImageChanges {
         /// How long was waited \[s\], simulated.
         after_s: f64,
@@ -88,8 +88,8 @@ pub enum Progress {
 pub struct Taken {
     /// Colour, see [`Average`].
     pub rgb: RgbImage,
-    /// Depth.
-    pub depth: DepthImage,
+    /// Depth, where every image had one.
+    pub depth: Option<DepthImage>,
     /// Images in the average.
     pub frames: u32,
     /// Simulated time \[s\] from the first image until everything was at rest.
@@ -151,7 +151,7 @@ impl Machine {
     }
 
     /// Takes in an image.
-    pub fn see(&mut self, base_from_tip: &Pose<Base, Tip>, shot: &Shot<'_>) -> Progress {
+    pub fn see(&mut self, shot: &Shot<'_>) -> Progress {
         if self.ended.is_some() || self.is_complete() || shot.received_s < self.requested_s {
             return self.progress();
         }
@@ -165,7 +165,7 @@ impl Machine {
         self.advanced_s = shot.received_s;
         self.sim_time_s = Some(shot.sim_time_s);
         if !self.collect(shot) {
-            self.settle(base_from_tip, shot, passed_s.map_or(0.0, |s| s.max(0.0)));
+            self.settle(shot, passed_s.map_or(0.0, |s| s.max(0.0)));
         }
         self.progress()
     }
@@ -190,14 +190,14 @@ impl Machine {
         added
     }
 
-    fn settle(&mut self, base_from_tip: &Pose<Base, Tip>, shot: &Shot<'_>, passed_s: f64) {
+    fn settle(&mut self, shot: &Shot<'_>, passed_s: f64) {
         self.settling_s += passed_s;
         self.settling_images = self.settling_images.saturating_add(1);
         let rest = self.watch.see(shot);
         self.waits_for(rest);
         if let Rest::Still { noise } = rest {
             let Plan { others, least_distance_m, least_angle_rad, .. } = &self.plan;
-            if let Some(similar) = nearest_similar(base_from_tip, others, *least_distance_m, *least_angle_rad) {
+            if let Some(similar) = nearest_similar(&shot.base_from_tip, others, *least_distance_m, *least_angle_rad) {
                 self.ended = Some(Refusal::TooSimilar(similar));
                 return;
             }
@@ -214,7 +214,7 @@ impl Machine {
         if self.settling_s > self.plan.settle_limit_s && self.settling_images >= FAIR_IMAGES {
             let after_s = self.settling_s;
             self.ended = match rest {
-                Rest::RobotMoves { rate_rad_s } => Some(Refusal::RobotMoves { after_s, rate_rad_s }),
+                Rest::RobotMoves(rate) => Some(Refusal::RobotMoves { after_s, rate }),
                 Rest::ImageChanges => Some(Refusal::ImageChanges { after_s }),
                 // Nothing moved last; an image or two more tell.
                 Rest::Unknown | Rest::Still { .. } => None,
@@ -225,7 +225,7 @@ impl Machine {
     /// What moved last is waited for until everything is known to be still.
     fn waits_for(&mut self, rest: Rest) {
         match rest {
-            Rest::RobotMoves { .. } => self.wait = Wait::RobotMoves,
+            Rest::RobotMoves(_) => self.wait = Wait::RobotMoves,
             Rest::ImageChanges => self.wait = Wait::ImageChanges,
             Rest::Unknown | Rest::Still { .. } => {}
         }

@@ -1,6 +1,6 @@
 use nalgebra::{Isometry3, Vector2, Vector3};
 
-use super::{Machine, Plan, Progress, Refusal, Wait};
+use super::{Machine, Plan, Progress, Refusal, RobotRate, Wait};
 use crate::geometry::frames::Pose;
 use crate::targets::observation::Corner;
 use crate::testing::flat_board::{Board, Instant, image};
@@ -23,7 +23,7 @@ fn plan(frames: u32) -> Plan {
 fn run(machine: &mut Machine, instants: impl Iterator<Item = Instant>) -> Vec<Progress> {
     let mut all = Vec::new();
     for instant in instants {
-        let progress = machine.see(&Pose::identity(), &instant.shot());
+        let progress = machine.see(&instant.shot());
         all.push(progress);
         if !matches!(progress, Progress::Waits(_)) {
             break;
@@ -80,7 +80,8 @@ fn nothing_is_captured_while_a_joint_moves() {
     };
     assert_eq!(feed(&at(0.9e-3, 1000)).last(), Some(&Progress::Complete));
     let refused = feed(&at(1.1e-3, 1000));
-    let Some(Progress::Refused(Refusal::RobotMoves { after_s, rate_rad_s })) = refused.last() else {
+    let Some(Progress::Refused(Refusal::RobotMoves { after_s, rate: RobotRate::Joint(rate_rad_s) })) = refused.last()
+    else {
         panic!("{refused:?}")
     };
     assert!((3.0..3.1).contains(after_s) && (rate_rad_s - 1.1e-3).abs() < 1e-9, "{refused:?}");
@@ -183,7 +184,7 @@ fn a_simulation_that_rests_is_told_from_a_camera_that_is_gone() {
     // Images come, all of the same instant.
     let mut machine = Machine::new(plan(1), REQUESTED_S);
     for instant in still().map(|instant| Instant { sim_time_s: 7.0, ..instant }).take(60) {
-        machine.see(&Pose::identity(), &instant.shot());
+        machine.see(&instant.shot());
         machine.pass_time(instant.received_s, None);
     }
     assert_eq!(machine.progress(), Progress::Refused(Refusal::Paused));
@@ -248,7 +249,7 @@ fn the_average_has_its_images_and_their_scatter_and_no_others() {
     let corner = |number: u64| Corner::new(0, Vector2::new(if number.is_multiple_of(2) { 1.0 } else { -1.0 }, 5.0));
     let mut sum = 0.0;
     for instant in images(3.0, |_| 0.0) {
-        let progress = machine.see(&Pose::identity(), &instant.shot());
+        let progress = machine.see(&instant.shot());
         machine.saw_board(instant.number, &[corner(instant.number)]);
         // A second look at an image that is not in the average does not count.
         machine.saw_board(instant.number + 1, &[corner(7), Corner::new(0, Vector2::new(900.0, 0.0))]);
@@ -265,6 +266,33 @@ fn the_average_has_its_images_and_their_scatter_and_no_others() {
     assert!((mean - sum / 16.0).abs() <= 0.5, "{mean}, {sum}");
     // ±1 in u with 15 degrees of freedom, nothing in v: σ² = 16 / 30.
     assert!((taken.corner_noise_px.expect("16 images") - (16.0_f64 / 30.0).sqrt()).abs() < 1e-12);
-    assert_eq!(taken.depth.metres[0], 0.5);
-    assert!(taken.depth.metres[1].is_nan(), "a hole stays one");
+    let depth = taken.depth.expect("every image had one");
+    assert_eq!(depth.metres[0], 0.5);
+    assert!(depth.metres[1].is_nan(), "a hole stays one");
+}
+
+#[test]
+fn a_robot_that_reports_no_joints_is_watched_by_its_tip_and_a_camera_without_depth_is_averaged() {
+    // At the limit of what rests, and a tenth above, along the tip's x and about it.
+    let feed = |m_s: f64, rad_s: f64| {
+        let mut machine = Machine::new(plan(2), REQUESTED_S);
+        let instants = images(1.0, |_| 0.0).map(|instant| {
+            let passed_s = 0.05 * instant.number as f64;
+            let moved = Isometry3::new(Vector3::x() * m_s * passed_s, Vector3::x() * rad_s * passed_s);
+            Instant { joints_rad: Vec::new(), base_from_tip: Pose::new(moved), depth: None, ..instant }
+        });
+        let progress = run(&mut machine, instants);
+        (progress.last().copied(), machine.finish())
+    };
+    let (progress, taken) = feed(0.99e-3 / 2.0, 0.99e-3 / 2.0);
+    assert_eq!(progress, Some(Progress::Complete));
+    assert_eq!(taken.map(|taken| (taken.frames, taken.depth)), Some((2, None)));
+    for (m_s, rad_s) in [(1.1e-3, 0.0), (0.0, 1.1e-3)] {
+        let (Some(Progress::Refused(Refusal::RobotMoves { rate: RobotRate::Tip { m_s: m, rad_s: rad }, .. })), _) =
+            feed(m_s, rad_s)
+        else {
+            panic!("it moves");
+        };
+        assert!((m - m_s).abs() < 1e-9 && (rad - rad_s).abs() < 1e-9, "{m} m/s, {rad} rad/s");
+    }
 }

@@ -3,7 +3,7 @@
 //!
 //! | part | decides |
 //! | --- | --- |
-//! | [`Watch`] | whether joints and image are at rest |
+//! | [`Watch`] | whether robot and image are at rest |
 //! | [`Average`] | the mean of images and depths |
 //! | [`Scatter`] | how much corners differ from image to image |
 //! | [`EdgeBlur`] | how blurred the board's edges are |
@@ -28,11 +28,12 @@ pub use machine::{Machine, NO_IMAGES_S, Plan, Progress, Refusal, Taken, Wait};
 pub use observe::{Sighting, observe_gray, observe_image};
 pub use scatter::Scatter;
 pub use similar::{Similar, nearest_similar};
-pub use watch::{Rest, STILL_RATE_RAD_S, Watch};
+pub use watch::{Rest, RobotRate, STILL_RATE_RAD_S, Watch};
 
 use image::{GrayImage, RgbImage};
 
 use crate::depth::DepthImage;
+use crate::geometry::frames::{Base, Pose, Tip};
 
 /// A pair of images with what is known of its instant.
 #[derive(Debug, Clone, Copy)]
@@ -43,14 +44,16 @@ pub struct Shot<'a> {
     pub sim_time_s: f64,
     /// When it arrived, on the clock of whoever asks \[s\].
     pub received_s: f64,
-    /// Positions of the joints \[rad\].
+    /// The tip as the controller reports it.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// Positions of the joints \[rad\]; none where the robot does not report them.
     pub joints_rad: &'a [f64],
     /// Colour.
     pub rgb: &'a RgbImage,
     /// The same in grey, see [`crate::project::files::image_file::gray_from_rgb`].
     pub grey: &'a GrayImage,
-    /// Depth.
-    pub depth: &'a DepthImage,
+    /// Depth, from a camera that measures it.
+    pub depth: Option<&'a DepthImage>,
     /// The depth sensor's far plane \[m\]: depths there are no surface.
     pub far_plane_m: f32,
 }

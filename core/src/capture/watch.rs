@@ -2,12 +2,18 @@
 
 use std::collections::VecDeque;
 
+use serde::{Deserialize, Serialize};
+
 use super::Shot;
 use super::cells::Cells;
+use crate::geometry::frames::{Base, Pose, Tip};
 
 /// Fastest joint [rad/s] that counts as at rest: an arm of 1 m reach then moves by 0.05 mm in a pass of 50 ms, less than
 /// a tenth of a pixel at 0.4 m. The same as where motions wait for the arm.
 pub const STILL_RATE_RAD_S: f64 = 1e-3;
+
+/// Reach of an arm [m], for the tip of a robot that reports no joints.
+const REACH_M: f64 = 1.0;
 
 /// Over longer intervals \[s\] a joint may not travel further than in this one: what moved and stopped between two
 /// images has moved.
@@ -38,12 +44,9 @@ const NO_DIFFERENCE: f64 = 0.005;
 pub enum Rest {
     /// Too few images to tell, and nothing moved in those.
     Unknown,
-    /// A joint moves, the fastest so fast [rad/s].
-    RobotMoves {
-        /// Its rate.
-        rate_rad_s: f64,
-    },
-    /// The joints are at rest, the image is not yet.
+    /// The robot moves.
+    RobotMoves(RobotRate),
+    /// The robot is at rest, the image is not yet.
     ImageChanges,
     /// Nothing moves.
     Still {
@@ -52,10 +55,25 @@ pub enum Rest {
     },
 }
 
+/// How fast a robot moves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum RobotRate {
+    /// The fastest joint [rad/s].
+    Joint(f64),
+    /// The tip, where joints are not reported.
+    Tip {
+        /// Its speed [m/s].
+        m_s: f64,
+        /// Its rate of turn [rad/s].
+        rad_s: f64,
+    },
+}
+
 /// Watches the last few images.
 ///
-/// # Joints
-/// They are at rest when from image to image none turns faster than [`STILL_RATE_RAD_S`].
+/// # Robot
+/// It is at rest when from image to image no joint turns faster than [`STILL_RATE_RAD_S`]; of a robot that does not report
+/// its joints, when the tip does not turn faster than that nor move faster than it would at the end of an arm of 1 m.
 ///
 /// # Image
 /// Differences (mean absolute, of cells of about 1/80 of the width, apart from brightness) are taken between all pairs
@@ -75,7 +93,7 @@ pub struct Watch {
 #[derive(Debug, Clone)]
 struct Sample {
     sim_time_s: f64,
-    joints_rad: Vec<f64>,
+    robot: Configuration,
     cells: Cells,
 }
 
@@ -86,8 +104,7 @@ impl Watch {
         if !shot.sim_time_s.is_finite() {
             return self.rest.unwrap_or(Rest::Unknown);
         }
-        let seen =
-            Sample { sim_time_s: shot.sim_time_s, joints_rad: shot.joints_rad.to_vec(), cells: Cells::of(shot.grey) };
+        let seen = Sample { sim_time_s: shot.sim_time_s, robot: Configuration::of(shot), cells: Cells::of(shot.grey) };
         if let Some(last) = self.seen.back() {
             let interval_s = seen.sim_time_s - last.sim_time_s;
             if interval_s < 0.0 || !seen.cells.fits(&last.cells) {
@@ -97,7 +114,7 @@ impl Watch {
             }
         }
         let rest = self.judge(&seen);
-        if matches!(rest, Rest::RobotMoves { .. }) {
+        if matches!(rest, Rest::RobotMoves(_)) {
             self.seen.clear();
         }
         if self.seen.len() == IMAGES {
@@ -111,9 +128,9 @@ impl Watch {
     fn judge(&self, new: &Sample) -> Rest {
         let Some(last) = self.seen.back() else { return Rest::Unknown };
         let interval_s = new.sim_time_s - last.sim_time_s;
-        let travel_rad = travel_rad(&last.joints_rad, &new.joints_rad);
-        if !at_rest(travel_rad, interval_s) {
-            return Rest::RobotMoves { rate_rad_s: travel_rad / interval_s };
+        let travel = new.robot.travel_from(&last.robot);
+        if !travel.is_rest(interval_s) {
+            return Rest::RobotMoves(travel.rate(interval_s));
         }
         let mut images: Vec<&Cells> = self.seen.iter().rev().take(IMAGES - 1).map(|seen| &seen.cells).collect();
         if images.len() + 1 < IMAGES {
@@ -134,9 +151,52 @@ fn limit(noise: f64, cells: usize) -> f64 {
     noise * (1.0 + UNEVEN_NOISE + chance) + NO_DIFFERENCE
 }
 
-/// Whether a joint that turned so far in an interval is at rest; not for what is no number.
-fn at_rest(travel_rad: f64, interval_s: f64) -> bool {
-    travel_rad <= STILL_RATE_RAD_S * interval_s.min(LONGEST_INTERVAL_S)
+/// Where the robot is: by its joints, or by its tip where those are not known.
+#[derive(Debug, Clone)]
+struct Configuration {
+    joints_rad: Vec<f64>,
+    base_from_tip: Pose<Base, Tip>,
+}
+
+/// How far a robot has moved.
+#[derive(Debug, Clone, Copy)]
+enum Travel {
+    /// The joint that turned furthest \[rad\].
+    Joint(f64),
+    /// The tip \[m, rad\].
+    Tip { m: f64, rad: f64 },
+}
+
+impl Configuration {
+    fn of(shot: &Shot<'_>) -> Self {
+        Self { joints_rad: shot.joints_rad.to_vec(), base_from_tip: shot.base_from_tip }
+    }
+
+    fn travel_from(&self, before: &Self) -> Travel {
+        if self.joints_rad.is_empty() && before.joints_rad.is_empty() {
+            let moved = before.base_from_tip.inverse() * self.base_from_tip;
+            return Travel::Tip { m: moved.translation().norm(), rad: moved.rotation().angle() };
+        }
+        Travel::Joint(travel_rad(&before.joints_rad, &self.joints_rad))
+    }
+}
+
+impl Travel {
+    /// Whether a robot that moved so far in an interval is at rest; not for what is no number.
+    fn is_rest(self, interval_s: f64) -> bool {
+        let limit = STILL_RATE_RAD_S * interval_s.min(LONGEST_INTERVAL_S);
+        match self {
+            Self::Joint(rad) => rad <= limit,
+            Self::Tip { m, rad } => m <= limit * REACH_M && rad <= limit,
+        }
+    }
+
+    fn rate(self, interval_s: f64) -> RobotRate {
+        match self {
+            Self::Joint(rad) => RobotRate::Joint(rad / interval_s),
+            Self::Tip { m, rad } => RobotRate::Tip { m_s: m / interval_s, rad_s: rad / interval_s },
+        }
+    }
 }
 
 /// Largest turn of a joint \[rad\], by the shorter way round; not a number when a joint is none.
@@ -149,10 +209,10 @@ fn travel_rad(from: &[f64], to: &[f64]) -> f64 {
     from.iter().zip(to).map(turn).fold(0.0, |most, turn| if turn > most || turn.is_nan() { turn } else { most })
 }
 
-/// What images of an average are held against: joints and image as they were when everything was at rest.
+/// What images of an average are held against: robot and image as they were when everything was at rest.
 #[derive(Debug, Clone)]
 pub(super) struct Reference {
-    joints_rad: Vec<f64>,
+    robot: Configuration,
     cells: Cells,
     noise: f64,
 }
@@ -160,15 +220,15 @@ pub(super) struct Reference {
 impl Reference {
     /// Of the image after which [`Watch`] found everything still, with the noise it found.
     pub fn new(shot: &Shot<'_>, noise: f64) -> Self {
-        Self { joints_rad: shot.joints_rad.to_vec(), cells: Cells::of(shot.grey), noise }
+        Self { robot: Configuration::of(shot), cells: Cells::of(shot.grey), noise }
     }
 
-    /// How a later image differs from it. The joints may have turned by as much as in one interval at rest, however
+    /// How a later image differs from it. The robot may have moved by as much as in one interval at rest, however
     /// long ago it was.
     pub fn compare(&self, shot: &Shot<'_>, interval_s: f64) -> Rest {
-        let travel_rad = travel_rad(&self.joints_rad, shot.joints_rad);
-        if !at_rest(travel_rad, LONGEST_INTERVAL_S) {
-            return Rest::RobotMoves { rate_rad_s: travel_rad / interval_s };
+        let travel = Configuration::of(shot).travel_from(&self.robot);
+        if !travel.is_rest(LONGEST_INTERVAL_S) {
+            return Rest::RobotMoves(travel.rate(interval_s));
         }
         let cells = Cells::of(shot.grey);
         let same = cells.fits(&self.cells) && {

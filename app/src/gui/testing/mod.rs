@@ -16,7 +16,8 @@ use super::window::Window;
 use crate::app::{App, Connect, Start};
 use crate::command::{Command, Event};
 use crate::model::{
-    CellSource, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation, ViewSettings,
+    CellSource, ColouredDepth, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation,
+    ViewSettings,
 };
 use crate::rerun_log::RerunChoice;
 use crate::settings::SettingsFile;
@@ -203,7 +204,8 @@ pub fn frame(number: u64) -> Event {
     let rgb = RgbImage::from_fn(width, height, |column, row| Rgb([column as u8, row as u8, 200]));
     let mut metres: Vec<f32> = (0..width * height).map(|i| 0.5 + 0.01 * (i % width) as f32).collect();
     metres[0] = 3.5;
-    let images = FrameImages { depth_coloured: rgb.clone(), depth: DepthImage { width, height, metres }, rgb };
+    let depth = ColouredDepth { metres: DepthImage { width, height, metres }, colours: rgb.clone() };
+    let images = FrameImages { rgb, depth: Some(depth) };
     let info = FrameInfo {
         number,
         sim_time_s: 12.3,

@@ -22,9 +22,9 @@ use handeye_sim_link::client::cell::{ArmKinematics, Support};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
-    BoardMotion, BoardPath, CellFacts, CellSource, FollowStatus, FollowWish, FrameImages, FrameInfo, JobId, LinkState,
-    LiveDetection, LiveFrame, Model, Observed, PreviewFile, RobotState, SessionState, Simulation, Solved, TrackError,
-    TrackPoint, TrackState, Tracked, Truth, ViewSettings,
+    BoardMotion, BoardPath, CellFacts, CellSource, ColouredDepth, FollowStatus, FollowWish, FrameImages, FrameInfo,
+    JobId, LinkState, LiveDetection, LiveFrame, Model, Observed, PreviewFile, RobotState, SessionState, Simulation,
+    Solved, TrackError, TrackPoint, TrackState, Tracked, Truth, ViewSettings,
 };
 use crate::session::start::{self, BOARD};
 use crate::truth;
@@ -106,9 +106,9 @@ pub fn images() -> FrameImages {
     let (width, height) = (640, 480);
     let rgb = RgbImage::from_fn(width, height, |column, row| Rgb([(column / 4) as u8, (row / 4) as u8, 120]));
     let metres = (0..width * height).map(|i| 0.3 + 0.2 * (i % width) as f32 / width as f32).collect();
-    let depth = DepthImage { width, height, metres };
-    let depth_coloured = depth.colours(ColourMap::Turbo, 0.3, 0.5, 3.5).expect("an image");
-    FrameImages { rgb, depth, depth_coloured }
+    let metres = DepthImage { width, height, metres };
+    let colours = metres.colours(ColourMap::Turbo, 0.3, 0.5, 3.5).expect("an image");
+    FrameImages { rgb, depth: Some(ColouredDepth { metres, colours }) }
 }
 
 /// Connected, with a live image in which the board is seen, and nothing captured.

@@ -43,7 +43,7 @@ impl<'a> Shown<'a> {
             capture: None,
             base_from_tip: Some(frame.info.base_from_tip),
             far_plane_m,
-            depth_range_m: Some(frame.info.depth_range_m),
+            depth_range_m: frame.images.depth.is_some().then_some(frame.info.depth_range_m),
         })
     }
 

@@ -256,8 +256,16 @@ impl SceneWriter {
         // A negative age is a simulation that was started again.
         if age_s.is_none_or(|age| !(0.0..DEPTH_EVERY_S).contains(&age)) {
             self.depth_at_s = Some(self.clock.sim_time_s);
-            let images = (&images.depth, &images.rgb);
-            faults.tolerate(camera::write_depth(pen, &self.known, &info.base_from_tip, images, self.far_plane_m))?;
+            if let Some(depth) = &images.depth {
+                let images = (&depth.metres, &images.rgb);
+                faults.tolerate(camera::write_depth(
+                    pen,
+                    &self.known,
+                    &info.base_from_tip,
+                    images,
+                    self.far_plane_m,
+                ))?;
+            }
         }
         faults.finish()
     }

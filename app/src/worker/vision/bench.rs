@@ -20,8 +20,8 @@ use crate::capture::drawn::BOARD;
 use crate::capture::{CaptureRequest, Measured};
 use crate::command::Event;
 use crate::model::{
-    CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellSource, DepthScale, FrameImages, FrameInfo,
-    LiveDetection, LiveFrame, ViewSettings,
+    CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellSource, ColouredDepth, DepthScale, FrameImages,
+    FrameInfo, LiveDetection, LiveFrame, ViewSettings,
 };
 
 /// A healthy cell answers within milliseconds; this is for a machine that does something else.
@@ -105,8 +105,9 @@ impl Table {
             joints_rad: [0.0; 6].into(),
             base_from_target_true: None,
         };
-        let depth = DepthImage { width: 1, height: 1, metres: vec![0.5] };
-        let images = FrameImages { rgb: rgb.clone(), depth, depth_coloured: RgbImage::new(1, 1) };
+        let metres = DepthImage { width: 1, height: 1, metres: vec![0.5] };
+        let depth = ColouredDepth { metres, colours: RgbImage::new(1, 1) };
+        let images = FrameImages { rgb: rgb.clone(), depth: Some(depth) };
         self.tap.heard(*now_s);
         self.tap.put(LiveFrame { info, images: Arc::new(images) });
     }

@@ -206,7 +206,7 @@ impl Vision {
             image: Image {
                 time_s: info.sim_time_s,
                 grey,
-                depth: Some(&frame.images.depth),
+                depth: frame.images.depth.as_ref().map(|depth| &depth.metres),
                 far_plane_m: info.far_plane_m,
                 base_from_tip: info.base_from_tip,
             },
