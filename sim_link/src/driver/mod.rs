@@ -7,6 +7,7 @@
 //! | [`message`] | what is said, and what is wrong with a message |
 //! | [`wire`] | lines and the bytes that follow them, with limits |
 //! | [`Driver`] | one program: state, images, motions, log, how it ended |
+//! | [`conformance`] | whether a program keeps to the protocol |
 //! | [`DriverCell`] | a robot and a camera, in one program or two: images with the pose at their instant |
 //!
 //! ```no_run
@@ -27,6 +28,7 @@ mod cell;
 mod chain;
 mod client;
 pub mod clock;
+pub mod conformance;
 mod error;
 mod images;
 mod link;
