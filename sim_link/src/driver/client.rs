@@ -248,7 +248,7 @@ impl Driver {
             else {
                 continue;
             };
-            return self.decoded(image, bytes, frame.depth).map(Some);
+            return self.decoded(&image, bytes, frame.depth).map(Some);
         }
     }
 
@@ -270,7 +270,7 @@ impl Driver {
 
     fn decoded(
         &self,
-        image: ImageMessage,
+        image: &ImageMessage,
         bytes: Vec<u8>,
         depth: Option<(DepthMessage, Vec<u8>)>,
     ) -> Result<DriverImage, DriverError> {
@@ -281,7 +281,7 @@ impl Driver {
             self.owner.shared.finish(why.clone());
             self.owner.shared.gone(why)
         };
-        let rgb = images::image(&image, bytes).map_err(broken)?;
+        let rgb = images::image(image, bytes).map_err(broken)?;
         let depth = depth.map(|(depth, bytes)| images::depth(&depth, &bytes)).transpose().map_err(broken)?;
         let lens = image.intrinsics.or(self.hello().camera.and_then(|camera| camera.intrinsics));
         Ok(DriverImage {
@@ -370,13 +370,12 @@ impl Driver {
             return Err(self.no_answer("`move` with accepted or refused", shared.options.answer));
         }
         let ended = shared.wait(shared.options.motion, Some(cancel), |inner| inner.finished(id))?;
-        let ended = match ended {
-            Some(ended) => ended,
-            None => {
-                self.stop()?;
-                let ended = shared.wait(shared.options.answer, None, |inner| inner.finished(id))?;
-                ended.ok_or_else(|| self.end(Ending::DoesNotStop))?
-            }
+        let ended = if let Some(ended) = ended {
+            ended
+        } else {
+            self.stop()?;
+            let ended = shared.wait(shared.options.answer, None, |inner| inner.finished(id))?;
+            ended.ok_or_else(|| self.end(Ending::DoesNotStop))?
         };
         Ok(match ended {
             Progress::Refused(why) => MoveEnd::Refused(why),

@@ -93,6 +93,24 @@ impl FrameRequest {
     }
 }
 
+/// What has been read to its end.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ReadUp {
+    /// What the driver sends.
+    pub output: bool,
+    /// Standard error.
+    pub errors: bool,
+}
+
+/// What a conformance run does otherwise than the workbench, to see what the driver does about that.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Trial {
+    /// No pings are sent.
+    pub is_quiet: bool,
+    /// The connection is closed without `bye`.
+    pub leaves_without_bye: bool,
+}
+
 /// The state of a connection.
 #[derive(Debug, Default)]
 pub struct Inner {
@@ -100,10 +118,7 @@ pub struct Inner {
     pub arm: Option<Arc<Arm>>,
     /// Why it is over.
     pub ending: Option<Ending>,
-    /// Nothing more will be read.
-    pub output_ended: bool,
-    /// Standard error is read to its end.
-    pub errors_ended: bool,
+    pub read_up: ReadUp,
     pub clock: ClockOffset,
     /// Pings under way, with when they left.
     pub pings: VecDeque<(u64, f64)>,
@@ -122,10 +137,7 @@ pub struct Inner {
     pub is_armed: bool,
     pub is_moving: bool,
     pub log: LogLines,
-    /// No pings are sent, to see what the driver does about that.
-    pub is_quiet: bool,
-    /// The connection is closed without `bye`, to see the same.
-    pub leaves_without_bye: bool,
+    pub trial: Trial,
     /// How the driver ended once the connection was over.
     pub burial: Option<Burial>,
     unknown: BTreeSet<String>,
@@ -207,8 +219,8 @@ impl Shared {
 
     /// Waits until nothing more is read, at most so long; whether that is so.
     pub fn wait_for_output(&self, patience: Duration) -> bool {
-        let waited = self.changed.wait_timeout_while(self.lock(), patience, |inner| !inner.output_ended);
-        waited.unwrap_or_else(PoisonError::into_inner).0.output_ended
+        let waited = self.changed.wait_timeout_while(self.lock(), patience, |inner| !inner.read_up.output);
+        waited.unwrap_or_else(PoisonError::into_inner).0.read_up.output
     }
 
     pub fn gone(&self, why: Ending) -> DriverError {

@@ -82,7 +82,7 @@ pub enum WireProblem {
 pub struct Excerpt(String);
 
 impl Excerpt {
-    /// Of the bytes of a line. What is no text becomes `\x…`.
+    /// Of the bytes of a line. What is no text becomes �.
     pub fn of(line: &[u8]) -> Self {
         let mut shown = String::new();
         for chunk in line.trim_ascii().utf8_chunks() {
@@ -92,8 +92,8 @@ impl Excerpt {
                 }
                 if character.is_control() { shown.extend(character.escape_default()) } else { shown.push(character) }
             }
-            for byte in chunk.invalid() {
-                shown += &format!("\\x{byte:02x}");
+            if !chunk.invalid().is_empty() {
+                shown.push(char::REPLACEMENT_CHARACTER);
             }
         }
         Self(shown)

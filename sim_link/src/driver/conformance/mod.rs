@@ -32,8 +32,8 @@ pub struct ConformanceOptions {
     pub driver: DriverOptions,
 }
 
-/// A check that did not pass, and what it is.
-type Failure = Box<Check>;
+/// A check, or how it failed.
+type Checked = fn(&Run<'_>) -> Result<Check, Check>;
 
 /// Runs all checks that the driver's abilities call for.
 ///
@@ -73,7 +73,7 @@ struct Run<'a> {
 
 impl Run<'_> {
     fn all(&self, report: &mut Report) -> Result<(), ()> {
-        let checks: [(&'static str, fn(&Self) -> Result<Check, Failure>); 7] = [
+        let checks: [(&'static str, Checked); 7] = [
             ("hello", Self::hello),
             ("clock", Self::clock),
             ("states", Self::states),
@@ -88,7 +88,7 @@ impl Run<'_> {
                 report.add(skipped(name, "not tried"));
                 continue;
             }
-            let found = check(self).unwrap_or_else(|failure| *failure);
+            let found = check(self).unwrap_or_else(|failure| failure);
             report.add(found);
             // A connection that is over may have ended unnoticed by the check.
             if let Err(gone) = self.driver.check() {
@@ -105,7 +105,7 @@ impl Run<'_> {
         self.driver.hello().can(ability)
     }
 
-    fn hello(&self) -> Result<Check, Failure> {
+    fn hello(&self) -> Result<Check, Check> {
         let hello = self.driver.hello();
         let can: Vec<String> = hello.can.iter().filter(|a| **a != Ability::Unknown).map(Ability::to_string).collect();
         if !self.can(Ability::State) && !self.can(Ability::Image) {
@@ -126,21 +126,17 @@ impl Run<'_> {
     }
 
     /// Waits, and says if the driver is gone meanwhile.
-    fn wait(&self, name: &'static str, patience: Duration) -> Result<(), Failure> {
+    fn wait(&self, name: &'static str, patience: Duration) -> Result<(), Check> {
         let nothing = |_: &mut Inner| None::<()>;
-        self.gone(name, self.driver.shared().wait(patience, Some(self.cancel), nothing)).map(|_| ())
-    }
-
-    fn gone<T>(&self, name: &'static str, result: Result<T, DriverError>) -> Result<T, Failure> {
-        result.map_err(|error| Box::new(failed(name, &error)))
+        gone(name, self.driver.shared().wait(patience, Some(self.cancel), nothing)).map(|_| ())
     }
 
     /// Sends what only a later version would, and looks whether the driver is still there.
-    fn later_versions(&self) -> Result<Check, Failure> {
+    fn later_versions(&self) -> Result<Check, Check> {
         const NAME: &str = "later versions";
         let shared = self.driver.shared();
         let line = "{\"type\":\"of_a_later_version\",\"with\":[1,{\"a\":null}],\"id\":0}\n".to_owned();
-        self.gone(NAME, shared.send_line(line))?;
+        gone(NAME, shared.send_line(line))?;
         let before = shared.lock().pongs;
         let heard = shared.wait(self.options.driver.silence, Some(self.cancel), |inner| {
             (inner.pongs > before + 1).then_some(())
@@ -150,27 +146,27 @@ impl Run<'_> {
             Ok(None) => Err(wrong(NAME, "after a message of an unknown type no ping is answered: ignore what is not known")),
             Err(error) => {
                 let found = failed(NAME, &error);
-                Err(Box::new(Check { text: format!("after a message of an unknown type, {}", found.text), ..found }))
+                Err(Check { text: format!("after a message of an unknown type, {}", found.text), ..found })
             }
         }
     }
 
     /// Asks for a motion to where the arm stands, which must be refused.
-    fn read_only(&self) -> Result<Check, Failure> {
+    fn read_only(&self) -> Result<Check, Check> {
         const NAME: &str = "read-only";
         if !self.driver.hello().can_move() {
             return Ok(skipped(NAME, "it says of itself that it moves nothing"));
         }
         let patience = self.options.driver.answer;
-        let here = self.gone(NAME, self.driver.first_state(patience, self.cancel))?;
+        let here = gone(NAME, self.driver.first_state(patience, self.cancel))?;
         let shared = self.driver.shared();
         let goal = self.goal_here(&here.reading);
-        let id = self.gone(NAME, shared.request(|id| move_message(id, &goal, 0.01)))?;
+        let id = gone(NAME, shared.request(|id| move_message(id, &goal, 0.01)))?;
         let answered = |inner: &mut Inner| match inner.requests.get(&id) {
             Some(Progress::Sent) => None,
             other => Some(other.cloned()),
         };
-        match self.gone(NAME, shared.wait(patience, Some(self.cancel), answered))? {
+        match gone(NAME, shared.wait(patience, Some(self.cancel), answered))? {
             Some(Some(Progress::Refused(why))) if why.is_empty() => {
                 Ok(warning(NAME, "`move` is refused before `arm`, without a `why` that the user could read"))
             }
@@ -184,11 +180,16 @@ impl Run<'_> {
     }
 }
 
+/// A check that fails where the connection does.
+fn gone<T>(name: &'static str, result: Result<T, DriverError>) -> Result<T, Check> {
+    result.map_err(|error| failed(name, &error))
+}
+
 /// Closes the input of a process, or the connection, without `bye`.
 fn closed_without_farewell(driver: Driver, options: &DriverOptions) -> Check {
     const NAME: &str = "end of input";
     let shared = driver.shared().clone();
-    shared.update(|inner| inner.leaves_without_bye = true);
+    shared.update(|inner| inner.trial.leaves_without_bye = true);
     let began = Instant::now();
     drop(driver);
     let took_s = began.elapsed().as_secs_f64();
@@ -203,7 +204,7 @@ fn closed_without_farewell(driver: Driver, options: &DriverOptions) -> Check {
             "it does not close its end of a connection that was closed: it must brake and wait for the next".to_owned()
         }
     };
-    *wrong(NAME, text)
+    wrong(NAME, text)
 }
 
 /// Starts it again and says `bye`.
@@ -225,7 +226,7 @@ fn said_farewell(spec: &DriverSpec, options: &DriverOptions, cancel: &CancelToke
         Some(Burial::Ended { .. }) => passed(NAME, "it starts again and ends after `bye`"),
         Some(Burial::Closed) => passed(NAME, "it is there for the next connection and closes it after `bye`"),
         Some(Burial::Killed | Burial::LeftOpen) | None => {
-            *wrong(NAME, format!("it does not end within {} s after `bye`", options.farewell.as_secs_f64()))
+            wrong(NAME, format!("it does not end within {} s after `bye`", options.farewell.as_secs_f64()))
         }
     }
 }
@@ -242,13 +243,13 @@ fn skipped(name: &'static str, text: impl Into<String>) -> Check {
     Check { outcome: Outcome::Skipped, ..passed(name, text) }
 }
 
-fn wrong(name: &'static str, text: impl Into<String>) -> Failure {
-    Box::new(Check { outcome: Outcome::Failed, ..passed(name, text) })
+fn wrong(name: &'static str, text: impl Into<String>) -> Check {
+    Check { outcome: Outcome::Failed, ..passed(name, text) }
 }
 
 /// The error of a connection, with the line where it has one.
 fn failed(name: &'static str, error: &DriverError) -> Check {
-    let check = |text: String| *wrong(name, text);
+    let check = |text: String| wrong(name, text);
     match error {
         DriverError::Gone { why: Ending::Broken(broken), .. } => Check {
             message: Some(broken.number),

@@ -4,13 +4,13 @@ use std::time::Duration;
 
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::nalgebra::{Isometry3, Vector3};
+use handeye_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::super::client::{Goal, MoveEnd, move_message};
 use super::super::message::Ability;
 use super::super::shared::{Inner, Progress};
 use super::super::states::Reading;
-use super::{Check, Failure, Run, passed, skipped, wrong};
+use super::{Check, Run, gone, passed, skipped, warning, wrong};
 
 /// How far a joint is moved \[rad, m of a prismatic one\].
 const TURN_RAD: f64 = 0.2;
@@ -35,7 +35,7 @@ enum Brake {
 }
 
 impl Run<'_> {
-    pub(super) fn motion(&self) -> Result<Check, Failure> {
+    pub(super) fn motion(&self) -> Result<Check, Check> {
         const NAME: &str = "motion";
         if !self.driver.hello().can_move() {
             return Ok(skipped(NAME, "it says of itself that it moves nothing"));
@@ -44,7 +44,7 @@ impl Run<'_> {
             return Ok(skipped(NAME, "not allowed: --allow-motion has it move by up to 0.2 rad or 2 cm"));
         }
         let start = self.here(NAME)?;
-        self.gone(NAME, self.driver.arm(true))?;
+        gone(NAME, self.driver.arm(true))?;
         let away = self.goal_away(&start);
         self.reaches(NAME, &away)?;
         let mut ended_early = Vec::new();
@@ -57,21 +57,21 @@ impl Run<'_> {
             if !self.is_ended_by(NAME, goal, brake, what)? {
                 ended_early.push(what);
             }
-            self.gone(NAME, self.driver.arm(true))?;
+            gone(NAME, self.driver.arm(true))?;
         }
         self.reaches(NAME, &self.goal_here(&start))?;
-        self.gone(NAME, self.driver.arm(false))?;
+        gone(NAME, self.driver.arm(false))?;
         let text = "reaches its goals, and is ended by `stop`, `arm` with on false, and a second of silence";
         if ended_early.is_empty() {
             return Ok(passed(NAME, text));
         }
         let why = format!("{}: not tried, the arm was there before it could be ended", ended_early.join(", "));
-        Ok(super::warning(NAME, why))
+        Ok(warning(NAME, why))
     }
 
-    fn here(&self, name: &'static str) -> Result<Reading, Failure> {
+    fn here(&self, name: &'static str) -> Result<Reading, Check> {
         let patience = self.options.driver.answer;
-        Ok(self.gone(name, self.driver.first_state(patience, self.cancel))?.reading)
+        Ok(gone(name, self.driver.first_state(patience, self.cancel))?.reading)
     }
 
     /// Where the arm stands, in the terms in which it is moved.
@@ -93,14 +93,14 @@ impl Run<'_> {
                 Goal::Joints(JointValues::from_fn(joints.len(), |i| if i == last { to } else { joints[i] }))
             }
             Goal::Tip(pose) => {
-                let up = Isometry3::from_parts(Vector3::new(0.0, 0.0, SHIFT_M).into(), Default::default());
+                let up = Isometry3::from_parts(Vector3::new(0.0, 0.0, SHIFT_M).into(), UnitQuaternion::identity());
                 Goal::Tip(Pose::<Base, Tip>::from_isometry(up * pose.isometry()))
             }
         }
     }
 
-    fn reaches(&self, name: &'static str, goal: &Goal) -> Result<(), Failure> {
-        match self.gone(name, self.driver.move_to(goal, SPEED, self.cancel))? {
+    fn reaches(&self, name: &'static str, goal: &Goal) -> Result<(), Check> {
+        match gone(name, self.driver.move_to(goal, SPEED, self.cancel))? {
             MoveEnd::Arrived => {}
             MoveEnd::Stopped(why) => return Err(wrong(name, format!("a motion was stopped that nobody ended: {why}"))),
             MoveEnd::Refused(why) => return Err(wrong(name, format!("a motion of 0.2 rad or 2 cm was refused: {why}"))),
@@ -120,11 +120,11 @@ impl Run<'_> {
     }
 
     /// Begins a motion, ends it, and looks whether the arm stands. False when it was there before.
-    fn is_ended_by(&self, name: &'static str, goal: &Goal, brake: Brake, what: &str) -> Result<bool, Failure> {
+    fn is_ended_by(&self, name: &'static str, goal: &Goal, brake: Brake, what: &str) -> Result<bool, Check> {
         let (shared, patience) = (self.driver.shared(), self.options.driver.answer);
-        let id = self.gone(name, shared.request(|id| move_message(id, goal, SPEED)))?;
+        let id = gone(name, shared.request(|id| move_message(id, goal, SPEED)))?;
         let begun = |inner: &mut Inner| (inner.requests.get(&id) != Some(&Progress::Sent)).then_some(());
-        if self.gone(name, shared.wait(patience, Some(self.cancel), begun))?.is_none() {
+        if gone(name, shared.wait(patience, Some(self.cancel), begun))?.is_none() {
             return Err(wrong(name, "`move` is answered with neither `accepted` nor `refused`"));
         }
         self.wait(name, UNDER_WAY)?;
@@ -135,8 +135,8 @@ impl Run<'_> {
             Some(_) => return Ok(false),
         }
         if brake == Brake::Stop {
-            let second = self.gone(name, shared.request(|id| move_message(id, goal, SPEED)))?;
-            let answered = self.gone(name, shared.wait(patience, Some(self.cancel), |inner| inner.finished(second)))?;
+            let second = gone(name, shared.request(|id| move_message(id, goal, SPEED)))?;
+            let answered = gone(name, shared.wait(patience, Some(self.cancel), |inner| inner.finished(second)))?;
             let is_refused = matches!(answered, Some(Progress::Refused(_)));
             let is_over = shared.update(|inner| inner.finished(id).is_some());
             if !is_refused && !is_over {
@@ -148,20 +148,20 @@ impl Run<'_> {
         }
         let patience = match brake {
             Brake::Stop => {
-                self.gone(name, self.driver.stop())?;
+                gone(name, self.driver.stop())?;
                 patience
             }
             Brake::Disarm => {
-                self.gone(name, self.driver.arm(false))?;
+                gone(name, self.driver.arm(false))?;
                 patience
             }
             Brake::Quiet => {
-                shared.update(|inner| inner.is_quiet = true);
+                shared.update(|inner| inner.trial.is_quiet = true);
                 QUIET
             }
         };
-        let ended = self.gone(name, shared.wait(patience, Some(self.cancel), |inner| inner.finished(id)))?;
-        shared.update(|inner| inner.is_quiet = false);
+        let ended = gone(name, shared.wait(patience, Some(self.cancel), |inner| inner.finished(id)))?;
+        shared.update(|inner| inner.trial.is_quiet = false);
         match ended {
             None => {
                 let _gone_too = self.driver.stop().is_err();

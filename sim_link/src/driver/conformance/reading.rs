@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::super::message::Ability;
 use super::super::shared::Inner;
 use super::super::states::Reading;
-use super::{Check, Failure, Run, passed, skipped, warning, wrong};
+use super::{Check, Run, gone, passed, skipped, warning, wrong};
 
 /// How long clock and states are watched.
 const WATCHED: Duration = Duration::from_millis(1500);
@@ -22,12 +22,12 @@ const FEWEST_HZ: f64 = 8.0;
 const MOST_HZ: f64 = 600.0;
 
 impl Run<'_> {
-    pub(super) fn clock(&self) -> Result<Check, Failure> {
+    pub(super) fn clock(&self) -> Result<Check, Check> {
         const NAME: &str = "clock";
         let shared = self.driver.shared();
         let heard = |inner: &mut Inner| inner.last_pong;
         let no_pong = || wrong(NAME, "no `ping` is answered");
-        let (first_s, first) = self.gone(NAME, shared.wait(WATCHED, Some(self.cancel), heard))?.ok_or_else(no_pong)?;
+        let (first_s, first) = gone(NAME, shared.wait(WATCHED, Some(self.cancel), heard))?.ok_or_else(no_pong)?;
         self.wait(NAME, WATCHED)?;
         let Some((last_s, last)) = shared.lock().last_pong.filter(|(last_s, _)| *last_s > first_s) else {
             return Err(wrong(NAME, "only the first `ping` is answered: each has to be, five times a second"));
@@ -52,13 +52,13 @@ impl Run<'_> {
         Ok(passed(NAME, text))
     }
 
-    pub(super) fn states(&self) -> Result<Check, Failure> {
+    pub(super) fn states(&self) -> Result<Check, Check> {
         const NAME: &str = "states";
         if !self.can(Ability::State) {
             return Ok(skipped(NAME, "it sends none: poses have to be given by hand"));
         }
         let patience = self.options.driver.answer;
-        let first = self.gone(NAME, self.driver.first_state(patience, self.cancel))?;
+        let first = gone(NAME, self.driver.first_state(patience, self.cancel))?;
         self.in_range(NAME, &first.reading)?;
         let count = |inner: &mut Inner| (inner.state_count, inner.states.newest().map_or(0.0, |newest| newest.stamp_s));
         let (before, before_s) = self.driver.shared().update(count);
@@ -71,7 +71,7 @@ impl Run<'_> {
         if after_s <= before_s {
             return Err(wrong(NAME, format!("all have the stamp {after_s}: each has the time at which it was measured")));
         }
-        let now = self.gone(NAME, self.driver.state())?;
+        let now = gone(NAME, self.driver.state())?;
         let Some(newest) = now else { return Err(wrong(NAME, "none has come")) };
         self.in_range(NAME, &newest.reading)?;
         self.of_this_clock(NAME, newest.reading.stamp_s)?;
@@ -83,7 +83,7 @@ impl Run<'_> {
     }
 
     /// Joint values within what `hello` says; degrees are the usual reason for others.
-    fn in_range(&self, name: &'static str, reading: &Reading) -> Result<(), Failure> {
+    fn in_range(&self, name: &'static str, reading: &Reading) -> Result<(), Check> {
         let Some(values) = &reading.joints else { return Ok(()) };
         for (joint, value) in self.driver.hello().joints.iter().zip(values) {
             let (min, max) = (joint.min.unwrap_or(f64::NEG_INFINITY), joint.max.unwrap_or(f64::INFINITY));
@@ -97,7 +97,7 @@ impl Run<'_> {
     }
 
     /// A stamp is near the present on the clock of the pongs.
-    fn of_this_clock(&self, name: &'static str, stamp_s: f64) -> Result<f64, Failure> {
+    fn of_this_clock(&self, name: &'static str, stamp_s: f64) -> Result<f64, Check> {
         let Some(offset) = self.driver.clock() else { return Err(wrong(name, "no pong has related the clocks")) };
         let age_s = self.driver.timebase().now_s() - offset.offset_s - stamp_s;
         if (-FUTURE_S..=OLDEST_S).contains(&age_s) {
@@ -113,7 +113,7 @@ impl Run<'_> {
         ))
     }
 
-    pub(super) fn images(&self) -> Result<Check, Failure> {
+    pub(super) fn images(&self) -> Result<Check, Check> {
         const NAME: &str = "images";
         if !self.can(Ability::Image) {
             return Ok(skipped(NAME, "it has none"));
@@ -121,7 +121,7 @@ impl Run<'_> {
         let mut after = None;
         let mut ages_s = Vec::new();
         for _ in 0..3 {
-            let image = self.gone(NAME, self.driver.image(after, IMAGE_PATIENCE, self.cancel))?;
+            let image = gone(NAME, self.driver.image(after, IMAGE_PATIENCE, self.cancel))?;
             let Some(image) = image else {
                 let why = match after {
                     None => "`next_image` with after null is not answered within 5 s".to_owned(),

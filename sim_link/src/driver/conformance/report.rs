@@ -60,7 +60,7 @@ impl Report {
 
     /// For people: a line for each check, and what failed with the line of the driver.
     pub fn text(&self) -> String {
-        let mut text = String::new();
+        let mut lines = Vec::new();
         for Check { name, outcome, text: found, message, line } in &self.checks {
             let mark = match outcome {
                 Outcome::Passed => "ok     ",
@@ -68,20 +68,18 @@ impl Report {
                 Outcome::Failed => "FAILED ",
                 Outcome::Skipped => "skipped",
             };
-            text += &format!("{mark}  {name}: {found}\n");
+            lines.push(format!("{mark}  {name}: {found}"));
             if let (Some(message), Some(line)) = (message, line) {
-                text += &format!("         message {message}: {line}\n");
+                lines.push(format!("         message {message}: {line}"));
             }
         }
-        for line in &self.log {
-            text += &format!("log      {line}\n");
-        }
+        lines.extend(self.log.iter().map(|line| format!("log      {line}")));
         let failed = self.checks.iter().filter(|check| check.outcome == Outcome::Failed).count();
-        text += &match failed {
-            0 => format!("{} passes\n", self.driver),
-            1 => format!("{} does not pass: 1 check failed\n", self.driver),
-            _ => format!("{} does not pass: {failed} checks failed\n", self.driver),
-        };
-        text
+        lines.push(match failed {
+            0 => format!("{} passes", self.driver),
+            1 => format!("{} does not pass: 1 check failed", self.driver),
+            _ => format!("{} does not pass: {failed} checks failed", self.driver),
+        });
+        lines.join("\n") + "\n"
     }
 }
