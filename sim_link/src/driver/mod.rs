@@ -8,6 +8,7 @@
 //! | [`wire`] | lines and the bytes that follow them, with limits |
 //! | [`Driver`] | one program: state, images, motions, log, how it ended |
 //! | [`conformance`] | whether a program keeps to the protocol |
+//! | [`fake`] | a driver with the built-in cell behind it |
 //! | [`DriverCell`] | a robot and a camera, in one program or two: images with the pose at their instant |
 //!
 //! ```no_run
@@ -30,6 +31,7 @@ mod client;
 pub mod clock;
 pub mod conformance;
 mod error;
+pub mod fake;
 mod images;
 mod link;
 mod log;
