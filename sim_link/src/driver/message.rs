@@ -666,3 +666,8 @@ impl BadMessage {
         Self::Value { field, why: why.to_string() }
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[path = "message_tests.rs"]
+mod tests;

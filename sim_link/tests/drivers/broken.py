@@ -136,7 +136,7 @@ def work():
 def hello():
     global greeted
     can = ["state", "joints", "image", "move_joints"]
-    message = {"type": "hello", "protocol": 1, "name": "broken", "version": "1", "clock": "test", "can": can,
+    message = {"type": "hello", "protocol": 1, "name": f"broken {os.getpid()}", "version": "1", "clock": "test", "can": can,
                "joints": [JOINT], "camera": {"width": WIDTH, "height": HEIGHT}}
     if fault == "protocol 2":
         message["protocol"] = 2

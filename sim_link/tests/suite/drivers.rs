@@ -1,12 +1,19 @@
 //! Drivers as programs of their own: the template, ones with something wrong, and ones that die.
 
+use std::io::BufReader;
+use std::net::{Shutdown, TcpListener};
 use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::testing::python;
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::driver::conformance::{self, ConformanceOptions, Report};
+use handeye_sim_link::driver::fake::{Fake, FakeOptions, FakePart};
 use handeye_sim_link::driver::{
     Driver, DriverCell, DriverCellSpec, DriverError, DriverOptions, DriverSpec, Ending, Goal, MoveEnd,
 };
@@ -120,6 +127,13 @@ fn a_driver_that_dies_says_why_and_another_takes_its_place() {
     let again = start(&broken(&python, "none")).unwrap();
     assert!(again.image(None, PATIENCE, &CancelToken::default()).unwrap().is_some());
 
+    let id = again.hello().name.rsplit(' ').next().unwrap().to_owned();
+    assert!(Command::new("kill").args(["-s", "KILL", &id]).status().unwrap().success());
+    let Ending::Exited { status, .. } = ending(&again) else { panic!("it was killed") };
+    assert!(status.contains("signal: 9"), "{status}");
+    drop(again);
+    start(&broken(&python, "none")).unwrap().first_state(PATIENCE, &CancelToken::default()).unwrap();
+
     let early = start(&broken(&python, "early exit")).unwrap_err().to_string();
     assert!(early.contains("No module named 'robot'"), "{early}");
     let nothing = start(&DriverSpec::Command(vec!["/there/is/no/such/program".to_owned()]));
@@ -165,6 +179,104 @@ fn what_is_no_message_ends_the_connection_with_the_line() {
     let driver = start(&broken(&python, "nan")).unwrap();
     let Ending::Broken(error) = ending(&driver) else { panic!("NaN is no JSON") };
     assert!(error.to_string().contains("JSON has no NaN"), "{error}");
+}
+
+#[test]
+fn images_of_one_driver_get_the_pose_of_another_whose_clock_is_elsewhere() {
+    let Some(python) = python() else { return };
+    let cancel = CancelToken::default();
+    let part = |part, ahead| command(&python, "tests/drivers/clock.py", &[part, ahead]);
+    let spec = DriverCellSpec { robot: part("robot", "0.08"), camera: Some(part("camera", "-1000")) };
+    let cell = DriverCell::start(&spec, &options(), &cancel).unwrap();
+    assert!(cell.is_two() && cell.camera().is_some());
+    cell.robot().first_state(PATIENCE, &cancel).unwrap();
+    let until = Instant::now() + PATIENCE;
+    let clocks = loop {
+        match cell.clock_difference() {
+            Some(clocks) => break clocks,
+            None => assert!(Instant::now() < until, "no pong has come"),
+        }
+        std::thread::yield_now();
+    };
+    let off_s = (clocks.robot_from_camera_s - 1000.08).abs();
+    assert!(off_s <= clocks.uncertainty_s, "off by {off_s} s, stated {} s", clocks.uncertainty_s);
+
+    let height_m = |time_s: f64| 0.5 + 0.2 * (std::f64::consts::PI * time_s).sin();
+    // The fastest that the tip goes, and what a straight line between states up to 0.25 s apart leaves of the curve.
+    let (fastest_m_s, curve_m_s2) = (0.2 * std::f64::consts::PI, 0.2 * std::f64::consts::PI.powi(2));
+    let (mut after, mut compared, mut worst_m) = (None, 0, 0.0_f64);
+    while compared < 40 {
+        let frame = cell.frame(after, PATIENCE, &cancel).unwrap().unwrap();
+        after = Some(frame.stamp_s);
+        let bytes: Vec<u8> = frame.rgb.pixels().map(|pixel| pixel[0]).collect();
+        let time_s = f64::from_le_bytes(bytes.try_into().unwrap());
+        let Ok(robot) = frame.robot else { continue };
+        let off_m = (robot.base_from_tip.translation().z - height_m(time_s)).abs();
+        let gap_s = 0.25;
+        let allowed_m = fastest_m_s * frame.time_uncertainty_s + curve_m_s2 * gap_s * gap_s / 8.0;
+        assert!(off_m <= allowed_m, "off by {off_m} m, stated {allowed_m} m");
+        worst_m = worst_m.max(off_m);
+        compared += 1;
+    }
+    // Taken for one clock, 80 ms would be 50 mm.
+    assert!(worst_m < 0.02, "{worst_m}");
+}
+
+/// A fake driver that listens, for so many workbenches one after the other; and where.
+fn listening_fake(options: FakeOptions, workbenches: usize) -> (DriverSpec, JoinHandle<()>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let spec = DriverSpec::Tcp(listener.local_addr().unwrap().to_string());
+    let fake = Fake::start(options).unwrap();
+    let thread = std::thread::spawn(move || {
+        for _ in 0..workbenches {
+            let (stream, _) = listener.accept().unwrap();
+            let input = BufReader::new(stream.try_clone().unwrap());
+            fake.converse(input, &stream).unwrap();
+            stream.shutdown(Shutdown::Both).unwrap_or_default();
+        }
+    });
+    (spec, thread)
+}
+
+#[test]
+fn a_fake_cell_over_tcp_sees_its_board_and_goes_where_it_is_told_with_robot_and_camera_as_two_drivers() {
+    let scene = Scene::reference().unwrap();
+    let server = CellServer::start(CellConfig::new(scene.clone())).unwrap();
+    let connect = Some(server.endpoint().parse().unwrap());
+    let part = |part, clock_s| FakeOptions { connect: connect.clone(), part, clock_s, ..FakeOptions::new(scene.clone()) };
+    let (robot, robot_thread) = listening_fake(part(FakePart::Robot, 0.0), 1);
+    let (camera, camera_thread) = listening_fake(part(FakePart::Camera, 500.0), 1);
+    let cancel = CancelToken::default();
+    let cell = DriverCell::start(&DriverCellSpec { robot, camera: Some(camera) }, &options(), &cancel).unwrap();
+    let chain = cell.robot().chain().unwrap();
+    assert_eq!((chain.joint_count(), cell.robot().hello().joints.len()), (6, 6));
+
+    let start = cell.robot().first_state(PATIENCE, &cancel).unwrap().reading.joints.unwrap();
+    cell.robot().arm(true).unwrap();
+    let goal = JointValues::from_fn(6, |i| start[i] + if i == 5 { 0.3 } else { 0.05 });
+    assert_eq!(cell.robot().move_to(&Goal::Joints(goal), 1.0, &cancel).unwrap(), MoveEnd::Arrived);
+    let mut after = None;
+    let robot = loop {
+        let frame = cell.frame(after, PATIENCE, &cancel).unwrap().unwrap();
+        after = Some(frame.stamp_s);
+        assert_eq!((frame.rgb.width(), frame.depth.as_ref().map(|depth| depth.width)), (640, Some(640)));
+        assert!(frame.intrinsics.is_some_and(|lens| lens.validate().is_ok()));
+        // Until the images are of the arm where it stands now.
+        match frame.robot {
+            Ok(robot) if robot.moving == Some(false) && robot.speed_m_s < 1e-9 => break robot,
+            _ => {}
+        }
+    };
+    let joints = robot.joints.unwrap();
+    assert!(goal.iter().zip(&joints).all(|(a, b)| (a - b).abs() < 1e-3), "{joints:?} and not {goal:?}");
+    let (off_m, off_rad) = chain.forward(&joints).unwrap().distance_to(&robot.base_from_tip);
+    assert!(off_m.is_finite() && off_rad.is_finite());
+
+    let out_of_range = Goal::Joints(JointValues::from_fn(6, |_| 100.0));
+    assert!(matches!(cell.robot().move_to(&out_of_range, 1.0, &cancel), Ok(MoveEnd::Refused(_))));
+    drop(cell);
+    robot_thread.join().unwrap();
+    camera_thread.join().unwrap();
 }
 
 /// A fault of `broken.py`, and what a report says of it.
@@ -255,6 +367,14 @@ mod slow {
         let report = report(&command(&python, "../assets/drivers/template.py", &[]), true);
         assert!(report.passed, "{}", report.text());
         assert!(!report.text().contains("warning"), "{}", report.text());
+    }
+
+    #[test]
+    fn the_fake_driver_passes_the_conformance_test_over_tcp() {
+        let (spec, thread) = listening_fake(FakeOptions::new(Scene::reference().unwrap()), 2);
+        let report = report(&spec, true);
+        assert!(report.passed, "{}", report.text());
+        thread.join().unwrap();
     }
 
     #[test]
