@@ -1,6 +1,6 @@
 //! Checks that move the arm, by little.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
@@ -17,9 +17,13 @@ const TURN_RAD: f64 = 0.2;
 const SHIFT_M: f64 = 0.02;
 /// At which share of the highest speed: slow enough that a motion can be ended on its way.
 const SPEED: f64 = 0.05;
+/// That of a motion which is to last for longer than the silence that ends it.
+const SLOW: f64 = 0.02;
 /// How long a motion is left alone before it is ended.
 const UNDER_WAY: Duration = Duration::from_millis(150);
-/// A driver that hears nothing brakes within a second; with what braking takes.
+/// A driver that hears nothing for so long brakes; a motion that was over before tells nothing.
+const SILENCE: Duration = Duration::from_secs(1);
+/// With what braking takes.
 const QUIET: Duration = Duration::from_millis(2500);
 /// How far from its goal a joint, or the tip, may say that it stands.
 const REACHED: f64 = 2e-3;
@@ -122,7 +126,8 @@ impl Run<'_> {
     /// Begins a motion, ends it, and looks whether the arm stands. False when it was there before.
     fn is_ended_by(&self, name: &'static str, goal: &Goal, brake: Brake, what: &str) -> Result<bool, Check> {
         let (shared, patience) = (self.driver.shared(), self.options.driver.answer);
-        let id = gone(name, shared.request(|id| move_message(id, goal, SPEED)))?;
+        let speed = if brake == Brake::Quiet { SLOW } else { SPEED };
+        let id = gone(name, shared.request(|id| move_message(id, goal, speed)))?;
         let begun = |inner: &mut Inner| (inner.requests.get(&id) != Some(&Progress::Sent)).then_some(());
         if gone(name, shared.wait(patience, Some(self.cancel), begun))?.is_none() {
             return Err(wrong(name, "`move` is answered with neither `accepted` nor `refused`"));
@@ -160,14 +165,16 @@ impl Run<'_> {
                 QUIET
             }
         };
+        let since = Instant::now();
         let ended = gone(name, shared.wait(patience, Some(self.cancel), |inner| inner.finished(id)))?;
+        let is_early = brake != Brake::Quiet || since.elapsed() < SILENCE;
         shared.update(|inner| inner.trial.is_quiet = false);
         match ended {
             None => {
                 let _gone_too = self.driver.stop().is_err();
                 return Err(wrong(name, format!("{what} does not end a motion: it must be answered with `stopped`")));
             }
-            Some(Progress::Done) if brake != Brake::Quiet => return Ok(false),
+            Some(Progress::Done) if is_early => return Ok(false),
             Some(Progress::Done) => {
                 return Err(wrong(name, format!("{what} does not end a motion: the arm went on to its goal")));
             }
