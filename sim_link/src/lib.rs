@@ -1,6 +1,8 @@
-//! CoppeliaSim's ZeroMQ remote API: the wire, a client, and a built-in simulated cell that serves it.
+//! What the workbench drives: CoppeliaSim's ZeroMQ remote API (wire, client, and a built-in simulated cell that serves it), and
+//! drivers, programs that speak JSON lines.
 
 pub mod axes;
 pub mod cell;
 pub mod client;
+pub mod driver;
 pub mod wire;
