@@ -72,6 +72,10 @@ pub enum Command {
     SetCaptureOptions(CaptureOptions),
     /// Work with another cell.
     Connect(CellSource),
+    /// Let a robot behind a driver be moved from here, or no longer.
+    Arm(bool),
+    /// The pose that the robot's pendant shows, where nothing reports it.
+    TypePose(Pose<Base, Tip>),
     /// Say where the scene has the parts of the cell, and connect again.
     SetObjects(CellPaths),
     /// The boxes that the arm keeps out of are these.
@@ -264,6 +268,13 @@ pub enum Event {
     Stopped,
     /// A cell was connected.
     Cell(Box<CellFacts>),
+    /// A driver said something for people.
+    Heard {
+        /// How much it matters.
+        severity: Severity,
+        /// Its name and its words.
+        words: String,
+    },
     /// A motion has ended.
     Moved {
         /// Which one.

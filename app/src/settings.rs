@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, ValueDeserializer};
 
 use crate::command::Event;
-use crate::model::{CellSource, DepthScale, RotationFormat, Severity, ThemeChoice, ViewSettings};
+use crate::model::{CellSource, DepthScale, Drivers, RotationFormat, Severity, ThemeChoice, ViewSettings};
 use crate::text;
 use crate::text::{Language, Text};
 
@@ -39,6 +39,8 @@ pub struct Settings {
     sessions: String,
     /// Addresses that were connected to, newest first.
     pub addresses: Vec<String>,
+    /// Drivers that were connected to, newest first.
+    pub drivers: Vec<Drivers>,
     /// Where a scene other than the built-in one has the parts of the cell.
     pub objects: CellPaths,
 }
@@ -65,6 +67,7 @@ impl Settings {
         table.insert(key.to_owned(), value);
         *self = table.try_into()?;
         self.addresses.truncate(ADDRESSES);
+        self.drivers.truncate(ADDRESSES);
         Ok(())
     }
 
@@ -184,9 +187,19 @@ impl SettingsFile {
     }
 
     /// What is to be written when the user has changed how the window looks or where the scene has its objects, or an
-    /// address is new; a worker does it.
-    pub fn keep(&mut self, view: ViewSettings, addresses: &[String], objects: &CellPaths) -> Option<SettingsWrite> {
-        if view == self.last_view && *addresses == self.in_file.addresses && *objects == self.last_objects {
+    /// address or a driver is new; a worker does it.
+    pub fn keep(
+        &mut self,
+        view: ViewSettings,
+        addresses: &[String],
+        drivers: &[Drivers],
+        objects: &CellPaths,
+    ) -> Option<SettingsWrite> {
+        if view == self.last_view
+            && *addresses == self.in_file.addresses
+            && *drivers == self.in_file.drivers
+            && *objects == self.last_objects
+        {
             return None;
         }
         let before_text = self.in_file.written();
@@ -200,6 +213,7 @@ impl SettingsFile {
         keep(&mut kept.depth_colours, before.depth_colours, depth_colours);
         self.last_view = view;
         self.in_file.addresses = addresses.to_vec();
+        self.in_file.drivers = drivers.to_vec();
         if self.last_objects != *objects {
             self.last_objects = objects.clone();
             self.in_file.objects = objects.clone();

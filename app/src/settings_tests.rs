@@ -85,7 +85,7 @@ fn the_environment_goes_before_the_file_and_does_not_get_into_it() {
     let (mut file, settings, warnings) = SettingsFile::open(Some(path.clone()), variable);
     assert_eq!(warnings, []);
     assert_eq!((settings.theme, settings.language), (ThemeChoice::Light, Language::Chinese));
-    write(file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view() }, &[], &CellPaths::default()))
+    write(file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view() }, &[], &[], &CellPaths::default()))
         .expect("it can be written");
     let (_, again, _) = SettingsFile::open(Some(path), nothing);
     assert_eq!((again.theme, again.language), (ThemeChoice::Dark, Language::English));
@@ -96,7 +96,7 @@ fn nothing_is_written_before_something_is_changed() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("settings.toml");
     let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
-    assert_eq!(file.keep(settings.view(), &[], &CellPaths::default()), None, "there is nothing to do");
+    assert_eq!(file.keep(settings.view(), &[], &[], &CellPaths::default()), None, "there is nothing to do");
     assert!(!path.exists());
 }
 
@@ -106,7 +106,7 @@ fn earlier_addresses_are_in_the_file() {
     let path = folder.path().join("settings.toml");
     let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
     let addresses = vec!["tcp://a:1".to_owned(), "tcp://b:1".to_owned()];
-    write(file.keep(settings.view(), &addresses, &CellPaths::default())).expect("it can be written");
+    write(file.keep(settings.view(), &addresses, &[], &CellPaths::default())).expect("it can be written");
     assert_eq!(SettingsFile::open(Some(path), nothing).1.addresses, addresses);
 }
 
@@ -117,9 +117,9 @@ fn objects_of_the_scene_are_in_the_file_once_they_are_changed_and_not_those_of_o
     let (file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
     let of_this_run = CellPaths::below("xArm");
     let mut file = file.with_objects(&of_this_run);
-    assert_eq!(file.keep(settings.view(), &[], &of_this_run), None, "given for this run");
+    assert_eq!(file.keep(settings.view(), &[], &[], &of_this_run), None, "given for this run");
     let chosen = CellPaths { depth: String::new(), ..CellPaths::below("Panda") };
-    write(file.keep(settings.view(), &[], &chosen)).expect("it can be written");
+    write(file.keep(settings.view(), &[], &[], &chosen)).expect("it can be written");
     assert_eq!(SettingsFile::open(Some(path), nothing).1.objects, chosen);
     let mut read = Settings::default();
     for (line, why) in [("flange = \"/Panda\"", "flange"), ("tip = \"Panda\"", "begins with /")] {
@@ -135,7 +135,7 @@ fn a_file_that_cannot_be_written_is_told() {
     std::fs::write(&blocked, "").expect("written");
     let (mut file, settings, _) = SettingsFile::open(Some(blocked.join("settings.toml")), nothing);
     let view = ViewSettings { theme: settings.theme.other(), ..settings.view() };
-    let Err(Warning(text)) = write(file.keep(view, &[], &CellPaths::default())) else { panic!("it went well") };
+    let Err(Warning(text)) = write(file.keep(view, &[], &[], &CellPaths::default())) else { panic!("it went well") };
     assert!(text.say(Language::English).contains("settings.toml"));
 }
 

@@ -13,7 +13,7 @@ use std::time::Instant;
 use handeye_sim_link::client::cell::CellPaths;
 
 use crate::command::{Command, Event, Outbox};
-use crate::model::{CellSource, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
+use crate::model::{CellSource, Drivers, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
 use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice};
 use crate::settings::SettingsWrite;
 use crate::text;
@@ -30,6 +30,8 @@ pub struct Start {
     pub view: ViewSettings,
     /// Addresses that were connected to before, newest first.
     pub addresses: Vec<String>,
+    /// Drivers that were connected to before, newest first.
+    pub drivers: Vec<Drivers>,
     /// Where a scene other than the built-in one has the parts of the cell.
     pub objects: CellPaths,
     /// Where the boxes that the arm keeps out of are kept; nowhere if not given.
@@ -80,7 +82,7 @@ impl App {
     /// # Errors
     /// When the system has no more threads, or the file of the recording cannot be made.
     pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
-        let Start { source, view, addresses, objects, keep_out, sessions, open, rerun } = start;
+        let Start { source, view, addresses, drivers, objects, keep_out, sessions, open, rerun } = start;
         let recorder = Recorder::start(RecorderOptions {
             choice: rerun,
             pace: Pace::Live,
@@ -90,7 +92,8 @@ impl App {
         })?;
         let desk = SessionThreads::start(sessions, &clock, &waker)?;
         let workers = Workers::start(&source, &view, &connect(&source, &objects), desk.captures(), &clock, &waker)?;
-        let model = Model { addresses, objects, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
+        let model =
+            Model { addresses, drivers, objects, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
         let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
         let model = Model { keep_out, ..model };
         let numbers = Numbers::default();
@@ -159,6 +162,8 @@ impl App {
             Command::StartSimulation => self.start_simulation(),
             Command::Reconnect => self.reconnect(),
             Command::Connect(source) => self.connect(source),
+            Command::Arm(on) => self.arm(on),
+            Command::TypePose(pose) => self.type_pose(Some(pose)),
             Command::SetObjects(objects) => self.set_objects(objects),
             Command::SetKeepOut(content) => self.set_keep_out(*content),
             Command::ImportKeepOut(file) => self.import_keep_out(file),
@@ -264,6 +269,7 @@ impl App {
                 self.model.robot = Some(robot);
             }
             Event::Cell(facts) => self.cell_found(*facts),
+            Event::Heard { severity, words } => self.heard(severity, words),
             Event::Stopped => self.stopped(),
             Event::Frame { info, dropped, images } => {
                 self.model.dropped_frames = dropped;
@@ -286,7 +292,10 @@ impl App {
             Event::JogEnded { why } => self.jog_ended(why),
             Event::CaptureWaits { number, wait } => self.capture_waits(number, wait),
             Event::CaptureRefused { number, refused } => self.capture_refused(number, refused),
-            Event::Captured { number, id } => self.captured(number, id),
+            Event::Captured { number, id } => {
+                self.captured(number, id);
+                self.forget_typed_pose();
+            }
             Event::Document(state) => self.document_changed(*state),
             Event::SessionOpened { exported } => self.session_opened(exported),
             Event::SessionFailed { why } => self.session_failed(why),

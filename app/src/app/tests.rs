@@ -40,6 +40,7 @@ fn bench_with(connect: Connect) -> Bench {
         source: CellSource::BuiltIn,
         view: ViewSettings::default(),
         addresses: Vec::new(),
+        drivers: Vec::new(),
         objects: CellPaths::default(),
         keep_out: None,
         sessions: sessions.path().to_path_buf(),

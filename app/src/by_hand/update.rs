@@ -129,9 +129,8 @@ impl App {
         }
         let Some(hand) = self.model.by_hand.as_deref_mut().filter(|hand| hand.waits == HandWaits::View) else { return };
         let (Some(wanted), Some(detection)) = (&hand.wanted, &self.model.detection) else { return };
-        let seen = detection.corners.as_ref();
-        hand.judged = seen.map(|corners| wanted.judge(corners, &detection.base_from_tip));
-        let tip = detection.base_from_tip;
+        let (seen, Some(tip)) = (detection.corners.as_ref(), detection.base_from_tip) else { return };
+        hand.judged = seen.map(|corners| wanted.judge(corners, &tip));
         if hand.refused_at.is_some_and(|at| !has_left(at.distance_to(&tip))) {
             hand.rests = None;
             return;
@@ -171,7 +170,7 @@ impl App {
         hand.rests = None;
         if hand.wanted.is_some() {
             hand.waits = HandWaits::View;
-            hand.refused_at = self.model.detection.as_ref().map(|detection| detection.base_from_tip);
+            hand.refused_at = self.model.detection.as_ref().and_then(|detection| detection.base_from_tip);
         } else {
             let said =
                 text!("The board was not captured: bring the whole board into the image, hold still and begin again");

@@ -80,6 +80,15 @@ pub fn no_board(target: &TargetSpec) -> Why {
     (RefusalKind::NoBoard, why)
 }
 
+/// Images come, and the robot is not known where it was.
+pub fn no_pose() -> Why {
+    let why = text!(
+        "Where the robot was in the image is not known: type the pose that its pendant shows, or look into the messages for \
+         what its driver says, and capture again"
+    );
+    (RefusalKind::NoImages, why)
+}
+
 /// The image could not be searched at all.
 pub fn not_searched(error: &VisionError) -> Why {
     (RefusalKind::NoBoard, text!("The board cannot be looked for: {why}", why = error))

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use handeye_core::capture::{self, Machine, Plan, Progress, Shot, Sighting, Taken, Wait};
+use handeye_core::capture::{self, Machine, Plan, Progress, Refusal, Shot, Sighting, Taken, Wait};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::image::GrayImage;
 use handeye_core::progress::CancelToken;
 use handeye_core::targets::TargetSpec;
@@ -20,7 +21,9 @@ pub struct Sequence {
     target: TargetSpec,
     machine: Machine,
     /// What belongs to the last image that was taken in.
-    last: Option<FrameInfo>,
+    last: Option<(Pose<Base, Tip>, FrameInfo)>,
+    /// The newest image came without a pose of the robot.
+    lacks_pose: bool,
 }
 
 impl Sequence {
@@ -29,7 +32,7 @@ impl Sequence {
         let CaptureOptions { frames, least_distance_m, least_angle_rad, settle_limit_s } = request.options;
         let others = request.others.clone();
         let plan = Plan { frames, settle_limit_s, least_distance_m, least_angle_rad, others };
-        Self { request, target, machine: Machine::new(plan, now_s), last: None }
+        Self { request, target, machine: Machine::new(plan, now_s), last: None, lacks_pose: false }
     }
 
     /// The number of the request.
@@ -40,11 +43,13 @@ impl Sequence {
     /// Takes in an image; whether it was the last that is needed.
     pub fn see(&mut self, frame: &LiveFrame, grey: &GrayImage) -> bool {
         let LiveFrame { info, images } = frame;
+        self.lacks_pose = info.base_from_tip.is_none();
+        let Some(base_from_tip) = info.base_from_tip else { return self.is_complete() };
         let shot = Shot {
             number: info.number,
             sim_time_s: info.sim_time_s,
             received_s: info.received_s,
-            base_from_tip: info.base_from_tip,
+            base_from_tip,
             joints_rad: &info.joints_rad,
             rgb: &images.rgb,
             grey,
@@ -52,7 +57,7 @@ impl Sequence {
             far_plane_m: info.far_plane_m,
         };
         if !self.is_complete() {
-            self.last = Some(info.clone());
+            self.last = Some((base_from_tip, info.clone()));
         }
         self.machine.see(&shot);
         self.is_complete()
@@ -85,6 +90,7 @@ impl Sequence {
         match self.machine.progress() {
             Progress::Waits(wait) => Ok(CaptureWait::Images(wait)),
             Progress::Complete => Ok(CaptureWait::Measuring),
+            Progress::Refused(Refusal::NoImages | Refusal::Paused) if self.lacks_pose => Err(refusal::no_pose()),
             Progress::Refused(why) => Err(refusal::of_machine(&why)),
         }
     }
@@ -101,7 +107,12 @@ impl Sequence {
         })
     }
 
-    fn measured(&self, taken: Taken, corners: Vec<Corner>, last: &FrameInfo) -> Measured {
+    fn measured(
+        &self,
+        taken: Taken,
+        corners: Vec<Corner>,
+        (base_from_tip, last): &(Pose<Base, Tip>, FrameInfo),
+    ) -> Measured {
         let Taken { rgb, depth, frames, settled_s, corner_noise_px } = taken;
         Measured {
             number: self.request.number,
@@ -110,7 +121,7 @@ impl Sequence {
             thumbnail: thumbnail(&rgb),
             rgb: Arc::new(rgb),
             depth,
-            base_from_tip: last.base_from_tip,
+            base_from_tip: *base_from_tip,
             joints_rad: last.joints_rad,
             sim_time_s: last.sim_time_s,
             frames,

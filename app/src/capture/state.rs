@@ -17,8 +17,8 @@ pub struct LiveDetection {
     pub corners: Option<Vec<Corner>>,
     /// The board's pose with the intrinsics at hand.
     pub camera_from_target: Option<Pose<Camera, Target>>,
-    /// Where the tip was.
-    pub base_from_tip: Pose<Base, Tip>,
+    /// Where the tip was, where that is known.
+    pub base_from_tip: Option<Pose<Base, Tip>>,
     /// How long the search took \[s\].
     pub took_s: f64,
     /// Why the image could not be searched at all, which is another thing than a board that is not in it.

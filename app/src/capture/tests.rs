@@ -46,9 +46,10 @@ impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Images for Reel<F> {
             rate_hz: 0.0,
             depth_range_m: [0.1, 3.5],
             far_plane_m: 3.5,
-            base_from_tip: Pose::identity(),
+            base_from_tip: Some(Pose::identity()),
             joints_rad: [0.0; 6].into(),
             base_from_target_true: None,
+            clocks: None,
         };
         let rgb = (self.rgb)(self.number)?;
         let depth = DepthImage { width: 1, height: 1, metres: vec![0.5] };

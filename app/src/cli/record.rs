@@ -36,7 +36,9 @@ pub fn image(recorder: &Recorder, info: &CellInfo, number: u64, frame: Frame) {
 
 fn note(recorder: &Recorder, LiveFrame { info, images }: LiveFrame) {
     let FrameInfo { sim_time_s, base_from_tip, joints_rad, .. } = info;
-    recorder.note(Entry::Robot { sim_time_s, base_from_tip, joints_rad });
+    if let Some(base_from_tip) = base_from_tip {
+        recorder.note(Entry::Robot { sim_time_s, base_from_tip, joints_rad });
+    }
     recorder.note(Entry::Image { info: Box::new(info), images });
 }
 
@@ -52,9 +54,10 @@ pub fn live_frame(info: &CellInfo, number: u64, received_s: f64, frame: Frame) -
         rate_hz: 0.0,
         depth_range_m,
         far_plane_m: depth_range_m[1],
-        base_from_tip,
+        base_from_tip: Some(base_from_tip),
         joints_rad: joints,
         base_from_target_true,
+        clocks: None,
     };
     let depth = Some(ColouredDepth { metres: depth, colours: RgbImage::default() });
     LiveFrame { info, images: Arc::new(FrameImages { rgb, depth }) }

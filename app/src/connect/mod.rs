@@ -1,6 +1,7 @@
 //! The connection to a cell: choosing it, its state, starting and stopping its simulation.
 
 pub(crate) mod dialog;
+pub(crate) mod drivers;
 mod objects;
 pub(crate) mod pane;
 pub(crate) mod update;
@@ -14,6 +15,6 @@ use crate::text::Text;
 pub(crate) fn server_name(source: &CellSource, server: &str) -> Text {
     match source {
         CellSource::BuiltIn => text!("built-in cell"),
-        CellSource::Address(_) => Text::verbatim(server),
+        CellSource::Address(_) | CellSource::Drivers(_) => Text::verbatim(server),
     }
 }

@@ -4,7 +4,7 @@ use egui::text::LayoutJob;
 use egui::{Align, Button, ComboBox, FontSelection, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::{BadEndpoint, Endpoint};
 
-use super::objects;
+use super::{drivers, objects};
 use crate::command::{Command, Outbox};
 use crate::connect::server_name;
 use crate::gui::status;
@@ -17,12 +17,34 @@ use crate::{text, tr};
 /// What the user is about to connect to; it belongs to nothing but the window.
 #[derive(Debug, Clone, Default)]
 struct Draft {
-    /// Whether an address is wanted; `None` while the user has chosen nothing.
-    remote: Option<bool>,
+    /// Which kind of cell is wanted; `None` while the user has chosen nothing.
+    kind: Option<Kind>,
     /// The address; `None` while nothing was typed.
     address: Option<String>,
     /// Where the scene there has the parts of the cell.
     objects: objects::Draft,
+    /// The drivers of a robot that is driven, and of one that a person moves.
+    drivers: [drivers::pane::Draft; 2],
+}
+
+/// Kinds of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    BuiltIn,
+    Address,
+    Driver,
+    Freehand,
+}
+
+impl Kind {
+    fn of(source: &CellSource) -> Self {
+        match source {
+            CellSource::BuiltIn => Self::BuiltIn,
+            CellSource::Address(_) => Self::Address,
+            CellSource::Drivers(drivers) if drivers.robot.is_none() => Self::Freehand,
+            CellSource::Drivers(_) => Self::Driver,
+        }
+    }
 }
 
 /// The pane.
@@ -32,17 +54,32 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let mut draft: Draft = ui.data(|data| data.get_temp(id)).unwrap_or_default();
     form::body_ui(ui, |ui| {
         form::heading_ui(ui, tr!(language, "Cell"));
-        let remote = draft.remote.unwrap_or(matches!(model.source, CellSource::Address(_)));
+        let kind = draft.kind.unwrap_or_else(|| Kind::of(&model.source));
         let choices = [
-            (false, tr!(language, "Built-in"), tr!(language, "A simulated UR5 cell inside this program")),
-            (true, tr!(language, "Address"), tr!(language, "A CoppeliaSim or a cell that is running")),
+            (Kind::BuiltIn, tr!(language, "Built-in"), tr!(language, "A simulated UR5 cell inside this program")),
+            (Kind::Address, tr!(language, "CoppeliaSim"), tr!(language, "A CoppeliaSim or a cell that is running")),
+            (
+                Kind::Driver,
+                tr!(language, "Driver"),
+                tr!(language, "Any robot and camera, through programs that speak the driver protocol"),
+            ),
+            (Kind::Freehand, tr!(language, "Freehand"), tr!(language, "A camera, and a robot whose pose you type")),
         ];
-        if let Some(choice) = form::choice_ui(ui, remote, &choices) {
-            draft.remote = Some(choice);
+        if let Some(choice) = form::choice_ui(ui, kind, &choices) {
+            draft.kind = Some(choice);
         }
+        let named = match kind {
+            Kind::BuiltIn | Kind::Address => None,
+            Kind::Driver => drivers::pane::drivers_ui(ui, model, false, &mut draft.drivers[0]),
+            Kind::Freehand => drivers::pane::drivers_ui(ui, model, true, &mut draft.drivers[1]),
+        };
         let wanted = ui.horizontal(|ui| {
-            let wanted = if remote { address_ui(ui, model, &mut draft) } else { Ok(CellSource::BuiltIn) };
-            if connect_button_ui(ui, model, wanted.as_ref().ok(), outbox) {
+            let wanted = match kind {
+                Kind::BuiltIn => Ok(Some(CellSource::BuiltIn)),
+                Kind::Address => address_ui(ui, model, &mut draft).map(Some),
+                Kind::Driver | Kind::Freehand => Ok(named),
+            };
+            if connect_button_ui(ui, model, wanted.as_ref().ok().and_then(Option::as_ref), outbox) {
                 draft = Draft::default();
             }
             wanted
@@ -51,11 +88,12 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             let colour = Palette::of(ui).bad;
             ui.add(Label::new(RichText::new(error.to_string()).color(colour)).wrap());
         }
-        if remote {
+        if kind == Kind::Address {
             objects::objects_ui(ui, model, &mut draft.objects, outbox);
         }
         ui.add_space(4.0);
         state_ui(ui, model);
+        clocks_ui(ui, model);
         session_ui(ui, model, outbox);
     });
     ui.data_mut(|data| data.insert_temp(id, draft));
@@ -81,6 +119,19 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
         parts::copy_ui(ui, language, tr!(language, "the path of the folder"), || folder.display().to_string());
     });
+}
+
+/// How the clocks of a robot and a camera that are two drivers relate.
+fn clocks_ui(ui: &mut Ui, model: &Model) {
+    let Some([robot_from_camera_s, uncertainty_s]) = model.frame.as_ref().and_then(|frame| frame.info.clocks) else {
+        return;
+    };
+    let said = text!(
+        "Clocks: {ms} ± {uncertainty} ms are added to a time stamp of the camera to have one of the robot",
+        ms = format!("{:.1}", robot_from_camera_s * 1e3),
+        uncertainty = format!("{:.1}", uncertainty_s * 1e3)
+    );
+    parts::hint_ui(ui, &said.say(model.view.language));
 }
 
 /// How each connection is doing.
@@ -151,8 +202,8 @@ fn connect_button_ui(ui: &mut Ui, model: &Model, wanted: Option<&CellSource>, ou
 fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Result<CellSource, BadEndpoint> {
     let language = model.view.language;
     let mut address = draft.address.clone().unwrap_or_else(|| match (&model.source, model.addresses.first()) {
-        (CellSource::Address(address), _) | (CellSource::BuiltIn, Some(address)) => address.clone(),
-        (CellSource::BuiltIn, None) => Endpoint::default().to_string(),
+        (CellSource::Address(address), _) | (_, Some(address)) => address.clone(),
+        (_, None) => Endpoint::default().to_string(),
     });
     let before = address.clone();
     let name = tr!(language, "Address of the cell");

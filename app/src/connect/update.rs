@@ -2,11 +2,13 @@
 
 use std::thread::Builder;
 
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::cell::CellPaths;
 
 use crate::app::App;
 use crate::connect::server_name;
-use crate::model::{BoardMotion, CellFacts, CellSource, Link, LinkState, Motion, Severity, Trail};
+use crate::model::{BoardMotion, CellFacts, CellSource, Home, Link, LinkState, Motion, Severity, Trail};
+use crate::text::Text;
 use crate::worker::{CameraTask, ControlTask, Request, Workers};
 use crate::{shortfall, text};
 
@@ -46,7 +48,7 @@ impl App {
 
     /// Tries now what is being tried. A connection that works is made anew, because the scene may be another one.
     pub(crate) fn reconnect(&mut self) {
-        if self.model.control.is_connected() && matches!(self.model.source, CellSource::Address(_)) {
+        if self.model.control.is_connected() && self.model.source != CellSource::BuiltIn {
             return self.connect(self.model.source.clone());
         }
         let asked = self.workers.reconnect();
@@ -55,11 +57,10 @@ impl App {
 
     /// Works with another cell. What is open stays open: a session belongs to its captures, not to a connection.
     pub(crate) fn connect(&mut self, source: CellSource) {
-        if let CellSource::Address(address) = &source {
-            let addresses = &mut self.model.addresses;
-            addresses.retain(|other| other != address);
-            addresses.insert(0, address.clone());
-            addresses.truncate(ADDRESSES);
+        match &source {
+            CellSource::BuiltIn => {}
+            CellSource::Address(address) => put_first(&mut self.model.addresses, address),
+            CellSource::Drivers(drivers) => put_first(&mut self.model.drivers, drivers),
         }
         self.model.robot = None;
         self.model.frame = None;
@@ -159,6 +160,34 @@ impl App {
         }
     }
 
+    /// Lets a robot behind a driver be moved, or no longer.
+    pub(crate) fn arm(&mut self, on: bool) {
+        let asked = self.workers.ask_control(Request::Do(ControlTask::Arm(on)));
+        self.expect(text!("Nothing has changed about who moves the robot"), asked);
+    }
+
+    /// Takes the pose that the pendant shows; `None` once the robot is moved on.
+    pub(crate) fn type_pose(&mut self, pose: Option<Pose<Base, Tip>>) {
+        let asked = self.workers.ask_control(Request::Do(ControlTask::TypePose(pose)));
+        self.expect(text!("The pose was not taken"), asked);
+        if pose.is_none() {
+            self.model.robot = None;
+        }
+    }
+
+    /// A pose that was typed is that of one capture: the next one is from another place, and the old pose would be wrong.
+    pub(crate) fn forget_typed_pose(&mut self) {
+        if self.model.cell.as_ref().is_some_and(|cell| cell.poses_are_typed) {
+            self.type_pose(None);
+        }
+    }
+
+    /// A driver said something for people.
+    pub(crate) fn heard(&mut self, severity: Severity, words: String) {
+        let home = if severity == Severity::Error { Home::Toast } else { Home::Log };
+        self.model.messages.say_at(home, severity, Text::verbatim(words), self.model.now_s);
+    }
+
     /// Has a worker of the camera do something.
     pub(crate) fn ask_camera(&mut self, task: CameraTask, failure: text::Text) -> bool {
         let asked = self.workers.ask_camera(Request::Do(task));
@@ -166,4 +195,11 @@ impl App {
         self.expect(failure, asked);
         taken
     }
+}
+
+/// Puts it before the others, once.
+fn put_first<T: PartialEq + Clone>(earlier: &mut Vec<T>, newest: &T) {
+    earlier.retain(|other| other != newest);
+    earlier.insert(0, newest.clone());
+    earlier.truncate(ADDRESSES);
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
 use crate::command::Event;
@@ -58,6 +59,10 @@ pub enum ControlTask {
     MoveBoard(BoardMotion),
     /// Hide it, or show it again.
     HideBoard(bool),
+    /// Let a robot behind a driver be moved, or no longer.
+    Arm(bool),
+    /// The pose that a person reads off the pendant.
+    TypePose(Option<Pose<Base, Tip>>),
 }
 
 /// The duty of the control worker.
@@ -106,7 +111,8 @@ impl Duty for Control {
     ) -> Result<Connected<Self::Port>, PortError> {
         let mut connected = connector.connect_control(shutdown)?;
         self.owes_facts = true;
-        if self.start_by_itself && connected.port.state()?.simulation == Simulation::Stopped {
+        if self.start_by_itself && connected.port.state()?.is_some_and(|state| state.simulation == Simulation::Stopped)
+        {
             connected.port.start_simulation()?;
         }
         Ok(connected)
@@ -117,8 +123,13 @@ impl Duty for Control {
         if std::mem::take(&mut self.owes_facts) {
             outlet.report(Event::Cell(Box::new(port.facts()?)));
         }
-        self.robot.put(port.state()?);
-        (outlet.waker)();
+        for (severity, words) in port.heard() {
+            outlet.report(Event::Heard { severity, words });
+        }
+        if let Some(state) = port.state()? {
+            self.robot.put(state);
+            (outlet.waker)();
+        }
         Ok(PERIOD)
     }
 
@@ -145,6 +156,20 @@ impl Duty for Control {
             },
             ControlTask::MoveBoard(motion) => board_answer(port.move_board(&motion), outlet),
             ControlTask::HideBoard(hidden) => board_answer(port.hide_board(hidden), outlet),
+            ControlTask::Arm(on) => match port.arm(on) {
+                Err(PortError::Refused(why)) => {
+                    outlet.notice(Severity::Error, text!("The robot cannot be moved from here: {why}", why = why));
+                    Ok(())
+                }
+                answer => answer,
+            },
+            ControlTask::TypePose(pose) => match port.type_pose(pose) {
+                Err(PortError::Refused(why)) => {
+                    outlet.notice(Severity::Warning, why);
+                    Ok(())
+                }
+                answer => answer,
+            },
         }
     }
 }

@@ -10,6 +10,12 @@ pub struct GuiArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
     #[arg(long, value_name = "ADDR")]
     pub connect: Option<String>,
+    /// Driver of the robot, or of robot and camera: a command, or tcp://HOST:PORT.
+    #[arg(long, value_name = "DRIVER", conflicts_with = "connect")]
+    pub driver: Option<String>,
+    /// Driver of the camera, where it is another program; alone where you type the robot's poses.
+    #[arg(long, value_name = "DRIVER", conflicts_with = "connect")]
+    pub camera_driver: Option<String>,
     /// Where its scene has the parts of the cell; as in the settings if not given.
     #[command(flatten)]
     pub objects: ObjectArgs,

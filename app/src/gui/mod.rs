@@ -32,8 +32,9 @@ use handeye_core::plan::Surroundings;
 
 use crate::app::{App, Connect, Start};
 use crate::command::Event;
+use crate::connect::drivers::DriverConnector;
 pub use crate::gui::shell::layout::Layout;
-use crate::model::CellSource;
+use crate::model::{CellSource, Drivers};
 use crate::rerun_log::RerunChoice;
 use crate::settings::{self, SettingsFile};
 use crate::worker::{Clock, LiveConnector, Waker};
@@ -54,7 +55,12 @@ const KEEP_OUT_FILE: &str = "keep_out.toml";
 pub fn run(args: GuiArgs) -> anyhow::Result<()> {
     let variable = |name: &str| std::env::var(name).ok();
     let (file, settings, warnings) = SettingsFile::open(settings::default_path(), variable);
-    let source = args.connect.map_or_else(|| settings.source(), CellSource::Address);
+    let drivers = Drivers { robot: args.driver, camera: args.camera_driver };
+    let source = match args.connect {
+        Some(address) => CellSource::Address(address),
+        None if drivers != Drivers::default() => CellSource::Drivers(drivers),
+        None => settings.source(),
+    };
     let objects = args.objects.paths(settings.objects.clone());
     let file = file.with_objects(&objects);
     if let Some(file) = &args.keep_out {
@@ -78,13 +84,16 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let waker: Waker = Arc::new(move || ctx.request_repaint_after(GATHER));
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
-        let connect: Connect =
-            Arc::new(|source, objects| Arc::new(LiveConnector::new(source.clone(), objects.clone())));
+        let connect: Connect = Arc::new(|source, objects| match source {
+            CellSource::Drivers(drivers) => Arc::new(DriverConnector::new(drivers.clone())),
+            source => Arc::new(LiveConnector::new(source.clone(), objects.clone())),
+        });
         let remembered = Remembered::stored(creation.storage);
         let start = Start {
             source,
             view: remembered.view(settings.view()),
             addresses: settings.addresses.clone(),
+            drivers: settings.drivers.clone(),
             objects,
             keep_out: args.keep_out.or_else(|| settings::default_path().map(|path| path.with_file_name(KEEP_OUT_FILE))),
             sessions: settings.sessions_folder(),

@@ -108,6 +108,9 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
         }
         LinkState::Searching { address, attempt, why } => {
             let detail = match why {
+                None if matches!(model.source, CellSource::Drivers(_)) => {
+                    text!("The driver is started, or connected to, and has to say what it is.")
+                }
                 None => text!("Asking whether a CoppeliaSim or a cell answers there."),
                 Some(why) => text!("Try {attempt}. {why}", attempt = attempt, why = sentence(why)),
             };
@@ -117,7 +120,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
         LinkState::Connected { address, server } => {
             let title = match model.source {
                 CellSource::BuiltIn => text!("Connected to the built-in cell"),
-                CellSource::Address(_) => text!("Connected to {server}", server = server),
+                CellSource::Address(_) | CellSource::Drivers(_) => text!("Connected to {server}", server = server),
             };
             status(Tone::Good, title, Text::verbatim(address.clone()), None)
         }
@@ -137,6 +140,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
             let title = match &model.source {
                 CellSource::BuiltIn => text!("The built-in cell did not start"),
                 CellSource::Address(address) => text!("Cannot connect to {address}", address = address),
+                CellSource::Drivers(drivers) => text!("Cannot connect to {address}", address = drivers),
             };
             status(Tone::Bad, title, sentence(why), Some(Action::Reconnect))
         }

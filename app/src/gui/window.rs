@@ -193,7 +193,7 @@ impl Window {
             self.apply(command);
         }
         let model = self.app.model();
-        if let Some(settings) = self.settings.keep(model.view, &model.addresses, &model.objects) {
+        if let Some(settings) = self.settings.keep(model.view, &model.addresses, &model.drivers, &model.objects) {
             self.app.write_settings(settings);
         }
     }

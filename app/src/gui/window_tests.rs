@@ -211,7 +211,7 @@ fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
     assert!(silent.app().model().stop_pending);
 
     silent.absorb(Event::Stopped);
-    silent.click("Address");
+    silent.click("CoppeliaSim");
     silent.harness.get_by_label("Address of the cell").focus();
     silent.steps();
     assert!(silent.harness.ctx.text_edit_focused());
@@ -229,7 +229,7 @@ fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
 #[test]
 fn keys_rest_while_text_is_typed() {
     let mut silent = Silent::live();
-    silent.click("Address");
+    silent.click("CoppeliaSim");
     silent.harness.get_by_label("Address of the cell").focus();
     silent.steps();
     silent.press(egui::Modifiers::NONE, egui::Key::Num2);
@@ -283,7 +283,7 @@ fn an_error_stays_on_the_screen_until_it_is_put_aside_and_then_in_the_log() {
 #[test]
 fn an_address_is_checked_before_it_is_used() {
     let mut silent = Silent::live();
-    silent.click("Address");
+    silent.click("CoppeliaSim");
     let button = |silent: &Silent| silent.harness.get_by_label("Connect now").accesskit_node().is_disabled();
     assert!(!button(&silent), "the usual port on this machine is offered");
     silent.harness.get_by_label("Address of the cell").focus();

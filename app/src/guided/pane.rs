@@ -8,13 +8,17 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::marks::Marks;
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
-use crate::model::{Model, Motion, Pane, PoseSequence};
+use crate::model::{Model, Motion, Moves, Pane, PoseSequence};
 use crate::taught::pane::immovable;
 use crate::text::Text;
 use crate::{text, tr};
 
 /// The button, where nothing is under way.
 pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, height: f32, outbox: &mut Outbox) {
+    if model.moves() != Moves::Freely {
+        // Behind a driver nobody knows where the chain of the arm stands.
+        return;
+    }
     let language = model.view.language;
     let words = RichText::new(tr!(language, "Calibrate for me")).strong().color(Marks::of(ui).on_accent);
     let button = Button::new(words).fill(Palette::of(ui).accent).min_size(Vec2::new(0.0, height));

@@ -18,9 +18,9 @@ use crate::text::Text;
 pub struct FrameInfo {
     /// Counts the frames since the start of the program; grows with every frame that the camera worker takes.
     pub number: u64,
-    /// Simulated time of the images \[s\].
+    /// Simulated time of the images \[s\]; of images from a driver, time of the workbench.
     pub sim_time_s: f64,
-    /// How much older than pose and joints they may be \[s\] of simulated time: nothing where all is of one instant.
+    /// How far they and pose and joints may be apart \[s\]: nothing where all is of one instant.
     pub image_age_s: f64,
     /// When they arrived.
     pub received_s: f64,
@@ -30,12 +30,16 @@ pub struct FrameInfo {
     pub depth_range_m: [f32; 2],
     /// The sensor's far plane \[m\]: depths there are no surface.
     pub far_plane_m: f32,
-    /// The tip as the controller reported it at the instant of the images.
-    pub base_from_tip: Pose<Base, Tip>,
+    /// The tip as the controller reported it at the instant of the images; not known where the states of a robot leave a
+    /// gap, or nobody has typed it.
+    pub base_from_tip: Option<Pose<Base, Tip>>,
     /// The joints at the same instant \[rad\]; none where the robot does not report them.
     pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it; only ever compared with.
     pub base_from_target_true: Option<Pose<Base, Target>>,
+    /// Of a robot and a camera that are two drivers: what is added to a stamp of the camera to have one of the robot, and how well
+    /// that is known \[s\].
+    pub clocks: Option<[f64; 2]>,
 }
 
 /// The pixels of a frame.

@@ -57,9 +57,10 @@ impl App {
         };
         let words = |error: VerifyError| Text::verbatim(error.to_string());
         let from_depth = match frame.images.depth_at(pixel, frame.info.far_plane_m) {
-            DepthSample::Metres(depth_m) => {
-                calibrated.point_at_depth(&frame.info.base_from_tip, &px, f64::from(depth_m)).map_err(words)
-            }
+            DepthSample::Metres(depth_m) => match &frame.info.base_from_tip {
+                Some(base_from_tip) => calibrated.point_at_depth(base_from_tip, &px, f64::from(depth_m)).map_err(words),
+                None => Err(text!("where the robot is is not known")),
+            },
             DepthSample::Far | DepthSample::Invalid => Err(text!("there is no depth at this pixel")),
         };
         // The board and the tip of the same image: the newest frame may be a later one. The board is as large and as
@@ -67,7 +68,7 @@ impl App {
         let seen = self.model.detection.as_ref().and_then(|it| {
             let board = BoardPoints::new(&self.model.document().meta.target.points());
             let seen = calibrated.seen(&board, it.corners.as_ref()?, &it.camera_from_target?)?;
-            Some((seen, it.base_from_tip))
+            Some((seen, it.base_from_tip?))
         });
         let from_board = match seen {
             Some((camera_from_target, base_from_tip)) => {

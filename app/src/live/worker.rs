@@ -81,6 +81,7 @@ impl Camera {
             base_from_tip: raw.base_from_tip,
             joints_rad: raw.joints_rad,
             base_from_target_true: raw.base_from_target_true,
+            clocks: raw.clocks,
         };
         Ok(LiveFrame { info, images: Arc::new(FrameImages { rgb: raw.rgb, depth }) })
     }
@@ -102,12 +103,9 @@ impl Duty for Camera {
     }
 
     fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
-        let sim_time_s = port.sim_time_s()?;
+        let newest = port.newest(self.seen_sim_time_s)?;
         self.for_vision.heard(outlet.now_s());
-        if self.seen_sim_time_s == Some(sim_time_s) {
-            return Ok(PERIOD);
-        }
-        let raw = port.grab()?;
+        let Some(raw) = newest else { return Ok(PERIOD) };
         let received_s = outlet.now_s();
         self.seen_sim_time_s = Some(raw.sim_time_s);
         self.rate.arrived(received_s);

@@ -24,6 +24,8 @@ pub enum Severity {
 /// Where a message stands. The log has all of them; besides that each stands in one place, so that nothing is said twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Home {
+    /// The log alone: it is said for those who look for it.
+    Log,
     /// The line at the bottom: it went as asked.
     StatusLine,
     /// Below the steps, for a while or until it is put aside.

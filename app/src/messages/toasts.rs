@@ -41,7 +41,7 @@ fn up<'a>(model: &'a Model, layout: &Layout) -> Vec<&'a Message> {
         let has_no_other_place = match message.home {
             Home::Toast => true,
             Home::Pane(pane) => !layout.is_in_front(pane),
-            Home::StatusLine | Home::Connection => false,
+            Home::Log | Home::StatusLine | Home::Connection => false,
         };
         has_no_other_place
             && !message.dismissed

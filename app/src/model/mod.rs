@@ -6,6 +6,7 @@
 pub(crate) mod workflow;
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ pub use crate::live::state::{
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{
     Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal, MotionId, MotionOutcome,
-    MotionRequest, Truth,
+    MotionRequest, Moves, Truth,
 };
 pub use crate::rerun_log::state::{RerunState, ViewerState};
 pub use crate::session::state::{
@@ -60,6 +61,26 @@ pub enum CellSource {
     BuiltIn,
     /// A server that runs already.
     Address(String),
+    /// Programs that speak the driver protocol.
+    Drivers(Drivers),
+}
+
+/// Commands or addresses of drivers. Without one for the robot a person types its poses.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Drivers {
+    /// The robot's, which may have the images, too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
+    /// The camera's, where it is another program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+}
+
+impl fmt::Display for Drivers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named: Vec<&str> = self.robot.iter().chain(&self.camera).map(String::as_str).collect();
+        f.write_str(&named.join(" + "))
+    }
 }
 
 /// The connections to the cell.
@@ -145,12 +166,14 @@ pub enum Simulation {
 pub struct RobotState {
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints from the base up \[rad, or m of a prismatic joint\].
+    /// Positions of the joints from the base up \[rad, or m of a prismatic joint\]; none where they are not reported.
     pub joints_rad: JointValues,
-    /// Simulated time \[s\].
+    /// Simulated time \[s\]; of a robot behind a driver, time of the workbench.
     pub sim_time_s: f64,
     /// Whether it advances.
     pub simulation: Simulation,
+    /// Whether a robot behind a driver may be moved.
+    pub is_armed: bool,
 }
 
 /// Which depths the colour map covers.
@@ -268,6 +291,8 @@ pub struct Model {
     pub messages: Messages,
     /// Addresses that were connected to before, newest first.
     pub addresses: Vec<String>,
+    /// Drivers that were connected to before, newest first.
+    pub drivers: Vec<Drivers>,
     /// Where a scene other than the built-in one has the parts of the cell.
     pub objects: CellPaths,
     /// What the arm keeps out of.
@@ -368,6 +393,7 @@ impl Model {
             view,
             messages: Messages::default(),
             addresses: Vec::new(),
+            drivers: Vec::new(),
             objects: CellPaths::default(),
             keep_out: KeepOut::default(),
             detection: None,
@@ -435,7 +461,7 @@ impl Model {
     /// The camera: as calibrated, or else as its settings say.
     pub fn intrinsics(&self) -> Option<Intrinsics> {
         let calibrated = self.solve.solved.as_ref().and_then(|solved| solved.calibration.intrinsics());
-        calibrated.or_else(|| Some(self.cell.as_ref()?.nominal_intrinsics))
+        calibrated.or_else(|| self.cell.as_ref()?.nominal_intrinsics)
     }
 
     /// The camera on the tip, by the newest calibration; `None` without one, or for a camera beside the robot.
@@ -470,6 +496,24 @@ impl Model {
         self.view.jog.speed.unwrap_or(usual)
     }
 
+    /// How the arm may be moved; freely as long as that is not known.
+    pub fn moves(&self) -> Moves {
+        self.cell.as_ref().map_or(Moves::Freely, |cell| cell.moves)
+    }
+
+    /// Whether the arm may be moved, as far as a person has to allow it.
+    pub fn is_armed(&self) -> bool {
+        !matches!(self.moves(), Moves::OnceArmed { .. }) || self.robot.as_ref().is_some_and(|robot| robot.is_armed)
+    }
+
+    /// How far one press of a jog button goes: a robot that moves in steps only has none that is held.
+    pub fn jog_step(&self) -> JogStep {
+        match (self.view.jog.step, self.moves()) {
+            (JogStep::Hold, Moves::OnceArmed { .. }) => JogStep::Step { metres: 1e-3, radians: 1_f64.to_radians() },
+            (step, _) => step,
+        }
+    }
+
     /// Whether the simulation is known not to run, while the connection works.
     pub fn resting_simulation(&self) -> Option<Simulation> {
         let robot = self.robot.as_ref().filter(|_| self.control.is_connected())?;
@@ -483,6 +527,7 @@ impl LinkState {
         match source {
             CellSource::BuiltIn => Self::StartingCell { why: None },
             CellSource::Address(address) => Self::Searching { address: address.clone(), attempt: 1, why: None },
+            CellSource::Drivers(drivers) => Self::Searching { address: drivers.to_string(), attempt: 1, why: None },
         }
     }
 }

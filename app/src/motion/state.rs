@@ -13,8 +13,9 @@ use crate::text::Text;
 pub struct CellFacts {
     /// The joints from the base up.
     pub joints: Vec<JointFacts>,
-    /// What the camera's settings say, without its lens: good enough to draw with before there is a calibration.
-    pub nominal_intrinsics: Intrinsics,
+    /// What the camera's settings say, without its lens, or a driver knows: good enough to draw with before there is a
+    /// calibration.
+    pub nominal_intrinsics: Option<Intrinsics>,
     /// The arm as it was measured. Where that is not known, goals are not checked before anything moves, and it is not
     /// drawn.
     pub arm: Option<ArmKinematics>,
@@ -22,6 +23,28 @@ pub struct CellFacts {
     pub support: Support,
     /// What a simulated cell publishes for comparison; never read by a solver.
     pub truth: Option<Truth>,
+    /// Whether the camera measures depth.
+    pub has_depth: bool,
+    /// How the arm may be moved from here.
+    pub moves: Moves,
+    /// Whether a person types the pose of the robot, because nothing reports it.
+    pub poses_are_typed: bool,
+}
+
+/// How an arm may be moved from the workbench.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Moves {
+    /// In every way: a simulation.
+    Freely,
+    /// To goals and in steps, once a person allows it: a robot behind a driver.
+    OnceArmed {
+        /// To values of the joints.
+        joints: bool,
+        /// To poses of the tip.
+        tip: bool,
+    },
+    /// Not at all.
+    Never,
 }
 
 impl CellFacts {
@@ -29,10 +52,13 @@ impl CellFacts {
     pub fn new(info: &CellInfo, arm: Option<&ArmKinematics>, truth: Option<&GroundTruth>) -> Self {
         Self {
             joints: info.joints.iter().map(JointFacts::from).collect(),
-            nominal_intrinsics: info.camera_intrinsics_nominal(),
+            nominal_intrinsics: Some(info.camera_intrinsics_nominal()),
             arm: arm.cloned(),
             support: info.support(),
             truth: truth.map(Truth::from),
+            has_depth: true,
+            moves: Moves::Freely,
+            poses_are_typed: false,
         }
     }
 }

@@ -76,7 +76,7 @@ impl App {
     /// A press of a jog button: one step, or the beginning of holding it.
     pub(crate) fn jog(&mut self, jog: Jog) {
         self.model.messages.is_over_in(Pane::Jog);
-        match self.model.view.jog.step {
+        match self.model.jog_step() {
             JogStep::Hold => {
                 self.hold_jog(jog);
                 self.model.motion = Motion::Jogging(jog);
@@ -99,7 +99,7 @@ impl App {
 
     /// The button is still held. A jog that has ended by itself does not begin anew before the next press.
     pub(crate) fn hold_jog(&mut self, jog: Jog) {
-        if self.model.view.jog.step != JogStep::Hold {
+        if self.model.jog_step() != JogStep::Hold {
             return;
         }
         self.workers.hold_jog(jog, self.model.speed(), self.camera_on_tip());

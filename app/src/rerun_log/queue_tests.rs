@@ -27,9 +27,10 @@ fn image(number: u64) -> Entry {
         rate_hz: 0.0,
         depth_range_m: [0.0, 1.0],
         far_plane_m: 1.0,
-        base_from_tip: Pose::identity(),
+        base_from_tip: Some(Pose::identity()),
         joints_rad: [0.0; 6].into(),
         base_from_target_true: None,
+        clocks: None,
     };
     let depth = DepthImage::new(1, 1, vec![1.0]).expect("an image");
     let images = FrameImages {

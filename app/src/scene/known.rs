@@ -106,7 +106,7 @@ impl Known {
     pub fn intrinsics(&self) -> Option<Intrinsics> {
         let calibrated = self.solved.as_ref().and_then(|solved| solved.calibration.intrinsics());
         calibrated
-            .or_else(|| Some(self.cell.as_ref()?.nominal_intrinsics))
+            .or_else(|| self.cell.as_ref()?.nominal_intrinsics)
             .or_else(|| self.document_truth.as_ref()?.intrinsics)
     }
 

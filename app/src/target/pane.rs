@@ -309,8 +309,8 @@ fn lens_ui(ui: &mut Ui, camera: &mut Intrinsics, language: Language) {
 
 /// Where entering intrinsics starts: what the cell says of its camera, or else a lens of 57° for the picture at hand.
 fn start(model: &Model) -> Intrinsics {
-    if let Some(cell) = &model.cell {
-        return cell.nominal_intrinsics;
+    if let Some(nominal) = model.cell.as_ref().and_then(|cell| cell.nominal_intrinsics) {
+        return nominal;
     }
     let (width, height) = model.frame.as_ref().map_or((640, 480), |frame| frame.images.rgb.dimensions());
     Intrinsics::from_view_angle(width, height, 57.0_f64.to_radians())

@@ -17,7 +17,7 @@ use nalgebra::Isometry3;
 use super::port::{
     CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
 };
-use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, RobotState, Simulation};
+use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, Moves, RobotState, Simulation};
 use crate::text;
 use crate::text::Text;
 
@@ -175,22 +175,26 @@ impl ControlPort for FakeCell {
                 };
                 6
             ],
-            nominal_intrinsics: Intrinsics::pinhole(width, height, 60.0),
+            nominal_intrinsics: Some(Intrinsics::pinhole(width, height, 60.0)),
             arm: ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges())
                 .ok(),
             support: Support::Whole,
             truth: None,
+            has_depth: true,
+            moves: Moves::Freely,
+            poses_are_typed: false,
         })
     }
 
-    fn state(&mut self) -> Result<RobotState, PortError> {
+    fn state(&mut self) -> Result<Option<RobotState>, PortError> {
         let script = self.answer()?;
-        Ok(RobotState {
+        Ok(Some(RobotState {
             base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
             joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
             sim_time_s: script.frames as f64 * 0.05,
             simulation: script.simulation,
-        })
+            is_armed: true,
+        }))
     }
 
     fn start_simulation(&mut self) -> Result<(), PortError> {
@@ -296,7 +300,7 @@ impl MotionPort for FakeCell {
     }
 
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
-        let RobotState { base_from_tip, joints_rad, .. } = self.state()?;
+        let RobotState { base_from_tip, joints_rad, .. } = self.state()?.expect("it has one");
         let sim_time_s = || self.script().frames as f64 * 0.05;
         let moment = |sim_time_s| FollowMoment { sim_time_s, joints: joints_rad, base_from_tip };
         self.end_of_motion(|_| {}, || wish(&moment(sim_time_s())) != FollowWish::End)
@@ -304,29 +308,28 @@ impl MotionPort for FakeCell {
 }
 
 impl CameraPort for FakeCell {
-    fn sim_time_s(&mut self) -> Result<f64, PortError> {
-        let script = self.answer()?;
-        let next = script.frames + u64::from(script.frames_left > 0);
-        Ok(next as f64 * 0.05)
-    }
-
-    fn grab(&mut self) -> Result<RawFrame, PortError> {
+    fn newest(&mut self, seen_s: Option<f64>) -> Result<Option<RawFrame>, PortError> {
         let mut script = self.answer()?;
+        let next = script.frames + u64::from(script.frames_left > 0);
+        if seen_s == Some(next as f64 * 0.05) {
+            return Ok(None);
+        }
         if script.frames_left > 0 {
             script.frames_left -= 1;
             script.frames += 1;
         }
         let (width, height) = SIZE;
         let metres = (0..width * height).map(|i| 0.4 + 0.4 * (i % width) as f32 / width as f32).collect();
-        Ok(RawFrame {
+        Ok(Some(RawFrame {
             rgb: Self::rgb(script.frames),
             depth: Some(DepthImage { width, height, metres }),
             sim_time_s: script.frames as f64 * 0.05,
             image_age_s: 0.0,
-            base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
+            base_from_tip: Some(Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0])),
             joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
             base_from_target_true: None,
-        })
+            clocks: None,
+        }))
     }
 
     fn depth_limits_m(&self) -> [f32; 2] {

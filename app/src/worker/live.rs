@@ -28,8 +28,8 @@ impl LiveConnector {
     /// Nothing is started or connected yet. `objects` is where another scene than the built-in one has its parts.
     pub fn new(source: CellSource, objects: CellPaths) -> Self {
         let paths = match source {
-            CellSource::BuiltIn => CellPaths::default(),
             CellSource::Address(_) => objects,
+            CellSource::BuiltIn | CellSource::Drivers(_) => CellPaths::default(),
         };
         Self { source, paths, server: Mutex::new(None) }
     }
@@ -38,7 +38,8 @@ impl LiveConnector {
     fn endpoint(&self) -> Result<Endpoint, PortError> {
         let address = match &self.source {
             CellSource::Address(address) => address.clone(),
-            CellSource::BuiltIn => {
+            // Drivers have a connector of their own.
+            CellSource::BuiltIn | CellSource::Drivers(_) => {
                 let mut server = self.server.lock().unwrap_or_else(PoisonError::into_inner);
                 match server.as_ref() {
                     Some(server) => server.endpoint(),
@@ -133,7 +134,7 @@ impl ControlPort for LiveControl {
         Ok(CellFacts::new(self.arm.info(), kinematics.ok().as_ref(), truth.as_ref()))
     }
 
-    fn state(&mut self) -> Result<RobotState, PortError> {
+    fn state(&mut self) -> Result<Option<RobotState>, PortError> {
         check_arm(&mut self.arm)?;
         let read = |arm: &mut Arm| {
             Ok(RobotState {
@@ -145,9 +146,10 @@ impl ControlPort for LiveControl {
                     SimulationState::Paused => Simulation::Paused,
                     SimulationState::Running => Simulation::Running,
                 },
+                is_armed: true,
             })
         };
-        read(&mut self.arm).map_err(port_error)
+        read(&mut self.arm).map(Some).map_err(port_error)
     }
 
     fn start_simulation(&mut self) -> Result<(), PortError> {
@@ -173,22 +175,23 @@ struct LiveCamera {
 }
 
 impl CameraPort for LiveCamera {
-    fn sim_time_s(&mut self) -> Result<f64, PortError> {
+    fn newest(&mut self, seen_s: Option<f64>) -> Result<Option<RawFrame>, PortError> {
         check(self.feed.sim().connection().is_connected())?;
-        self.feed.sim().get_simulation_time().map_err(port_error)
-    }
-
-    fn grab(&mut self) -> Result<RawFrame, PortError> {
+        // Cheap to ask for, and images of a time that has been seen are not fetched again.
+        if seen_s == Some(self.feed.sim().get_simulation_time().map_err(port_error)?) {
+            return Ok(None);
+        }
         let frame = self.feed.grab().map_err(port_error)?;
-        Ok(RawFrame {
+        Ok(Some(RawFrame {
             rgb: frame.rgb,
             depth: Some(frame.depth),
             sim_time_s: frame.sim_time_s,
             image_age_s: frame.image_age_s,
-            base_from_tip: frame.base_from_tip,
+            base_from_tip: Some(frame.base_from_tip),
             joints_rad: frame.joints,
             base_from_target_true: frame.base_from_target_true,
-        })
+            clocks: None,
+        }))
     }
 
     fn depth_limits_m(&self) -> [f32; 2] {

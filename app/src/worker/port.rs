@@ -9,7 +9,8 @@ use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish};
 
-use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
+use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState, Severity};
+use crate::text;
 use crate::text::Text;
 
 /// Why a port has no answer.
@@ -72,11 +73,11 @@ pub trait ControlPort: Send {
     /// [`PortError`].
     fn facts(&mut self) -> Result<CellFacts, PortError>;
 
-    /// Reads the robot.
+    /// Reads the robot; `None` while nothing is known of it.
     ///
     /// # Errors
     /// [`PortError`].
-    fn state(&mut self) -> Result<RobotState, PortError>;
+    fn state(&mut self) -> Result<Option<RobotState>, PortError>;
 
     /// Lets simulated time advance.
     ///
@@ -101,6 +102,27 @@ pub trait ControlPort: Send {
     /// # Errors
     /// As [`Self::move_board`].
     fn hide_board(&mut self, hidden: bool) -> Result<(), PortError>;
+
+    /// Lets a robot behind a driver be moved, or no longer.
+    ///
+    /// # Errors
+    /// [`PortError`], [`PortError::Refused`] by a driver that does not allow it.
+    fn arm(&mut self, _on: bool) -> Result<(), PortError> {
+        Ok(())
+    }
+
+    /// Takes the pose that a person reads off the pendant; `None` once the robot has been moved on.
+    ///
+    /// # Errors
+    /// [`PortError::Refused`] by a cell that reports its pose.
+    fn type_pose(&mut self, _pose: Option<Pose<Base, Tip>>) -> Result<(), PortError> {
+        Err(PortError::Refused(text!("The robot reports its pose by itself")))
+    }
+
+    /// What the cell has said for people since the last call.
+    fn heard(&mut self) -> Vec<(Severity, String)> {
+        Vec::new()
+    }
 }
 
 /// A jog that is asked for: for as long as a button is held, or by a step.
@@ -209,27 +231,24 @@ pub struct RawFrame {
     pub sim_time_s: f64,
     /// How much older than pose and joints the images may be \[s\] of simulated time.
     pub image_age_s: f64,
-    /// The tip as the controller reports it at that instant.
-    pub base_from_tip: Pose<Base, Tip>,
+    /// The tip as the controller reports it at that instant, where that is known.
+    pub base_from_tip: Option<Pose<Base, Tip>>,
     /// The joints at that instant \[rad\]; none where the robot does not report them.
     pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it.
     pub base_from_target_true: Option<Pose<Base, Target>>,
+    /// See [`FrameInfo::clocks`](crate::model::FrameInfo::clocks).
+    pub clocks: Option<[f64; 2]>,
 }
 
 /// The camera.
 pub trait CameraPort: Send {
-    /// Simulated time \[s\]: cheap to ask for, and images of a time that has been seen are not fetched again.
+    /// The newest images; `None` while there are none of another instant than the last ones, whose time was `seen_s`. Waits
+    /// no longer than a tenth of a second for them.
     ///
     /// # Errors
     /// [`PortError`].
-    fn sim_time_s(&mut self) -> Result<f64, PortError>;
-
-    /// Fetches the images of the present instant.
-    ///
-    /// # Errors
-    /// [`PortError`].
-    fn grab(&mut self) -> Result<RawFrame, PortError>;
+    fn newest(&mut self, seen_s: Option<f64>) -> Result<Option<RawFrame>, PortError>;
 
     /// Depths \[m\] that the sensor can measure; it reports the far one where nothing reflects.
     fn depth_limits_m(&self) -> [f32; 2];

@@ -75,6 +75,9 @@ impl Reconnect {
             CellSource::Address(address) => {
                 LinkState::Searching { address: address.clone(), attempt: self.attempt, why: self.why.clone() }
             }
+            CellSource::Drivers(drivers) => {
+                LinkState::Searching { address: drivers.to_string(), attempt: self.attempt, why: self.why.clone() }
+            }
         }
     }
 

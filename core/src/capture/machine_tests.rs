@@ -279,7 +279,7 @@ fn a_robot_that_reports_no_joints_is_watched_by_its_tip_and_a_camera_without_dep
         let instants = images(1.0, |_| 0.0).map(|instant| {
             let passed_s = 0.05 * instant.number as f64;
             let moved = Isometry3::new(Vector3::x() * m_s * passed_s, Vector3::x() * rad_s * passed_s);
-            Instant { joints_rad: Vec::new(), base_from_tip: Pose::new(moved), depth: None, ..instant }
+            Instant { joints_rad: Vec::new(), base_from_tip: Pose::from_isometry(moved), depth: None, ..instant }
         });
         let progress = run(&mut machine, instants);
         (progress.last().copied(), machine.finish())

@@ -18,18 +18,20 @@ fn colours_are_averaged_and_rounded_and_depths_leave_holes_out() {
     let nan = f32::NAN;
     // A surface that is measured twice of three times, one pixel far away twice, one never measured, one always.
     let (rgb, depth) = frame(10, [0.5, 3.5, 0.0, 1.0]);
-    let mut average = Average::begin(&rgb, &depth, 3.5);
+    let mut average = Average::begin(&rgb, Some(&depth), 3.5);
     for (rgb, depth) in [frame(11, [nan, 3.5, nan, 2.0]), frame(11, [0.7, nan, 0.0, 3.0])] {
-        assert!(average.add(&rgb, &depth, 3.5));
+        assert!(average.add(&rgb, Some(&depth), 3.5));
     }
     let (rgb, depth) = average.finish();
+    let depth = depth.expect("every image had one");
     assert_eq!(rgb.get_pixel(1, 1).0, [11, 255, 0], "10.67 is rounded up");
     assert!((depth.metres[0] - 0.6).abs() < 1e-6);
     assert_eq!(depth.metres[1], 3.5, "far, not a surface at the mean of far and nothing");
     assert_eq!(depth.metres[2], 0.0);
     assert_eq!(depth.metres[3], 2.0);
     let other = RgbImage::new(3, 2);
-    assert!(!average.add(&other, &depth, 3.5), "another size");
+    assert!(!average.add(&other, Some(&depth), 3.5), "another size");
+    assert!(!average.add(&rgb, None, 3.5), "no depth");
     assert_eq!(average.frames(), 3);
 }
 

@@ -6,3 +6,4 @@ pub mod files;
 pub mod result;
 pub mod session;
 pub mod taught_poses;
+pub mod typed_pose;

@@ -121,9 +121,8 @@ impl Driver {
         spawned("driver-errors", Box::new(move || threads::collect_errors(&listening, errors)))?;
 
         shared.send(&ToDriver::Hello { protocol: PROTOCOL, workbench: env!("CARGO_PKG_VERSION").to_owned() })?;
-        let greeted = shared.wait(options.hello, Some(cancel), |inner| {
-            inner.hello.clone().map(|hello| (hello, inner.arm.clone()))
-        })?;
+        let greeted = shared
+            .wait(options.hello, Some(cancel), |inner| inner.hello.clone().map(|hello| (hello, inner.arm.clone())))?;
         let Some((hello, arm)) = greeted else {
             let last_line = shared.lock().log.last_printed();
             let why = if cancel.is_cancelled() {
@@ -236,9 +235,7 @@ impl Driver {
         loop {
             self.ask_for_image(after)?;
             let left = until.saturating_duration_since(Instant::now());
-            let answered = |inner: &mut Inner| {
-                inner.frame.take_if(|frame| frame.is_answered())
-            };
+            let answered = |inner: &mut Inner| inner.frame.take_if(|frame| frame.is_answered());
             let Some(frame) = shared.wait(left, Some(cancel), answered)? else { return Ok(None) };
             if let Some(why) = frame.refused {
                 return Err(DriverError::Refused { driver: self.name().to_owned(), what: "an image", why });

@@ -41,8 +41,11 @@ fn every_message_of_the_page_is_one() {
 fn the_page_names_every_type_every_ability_and_every_limit() {
     let names = ["hello", "ping", "next_image", "arm", "move", "stop", "bye"];
     let names = names.into_iter().chain(["pong", "state", "image", "depth", "accepted", "done", "stopped", "refused"]);
-    let names = names.chain(["log", "error", "joints", "move_joints", "move_tip", "rgb8", "bgr8", "mono8", "jpeg", "png"]);
-    for name in names.chain(["u16_mm", "f32_m", "base_from_flange", "flange_from_tcp", "base_from_tip", "depth_limits_m"]) {
+    let names =
+        names.chain(["log", "error", "joints", "move_joints", "move_tip", "rgb8", "bgr8", "mono8", "jpeg", "png"]);
+    for name in
+        names.chain(["u16_mm", "f32_m", "base_from_flange", "flange_from_tcp", "base_from_tip", "depth_limits_m"])
+    {
         assert!(PAGE.contains(&format!("`{name}`")), "{name}");
     }
     for limit in ["65 536 bytes", "67 108 864", "10 to 500 times a second"] {

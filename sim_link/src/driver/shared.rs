@@ -156,13 +156,7 @@ pub struct Shared {
 
 impl Shared {
     pub fn new(driver: String, options: DriverOptions, queue: SyncSender<Out>) -> Self {
-        Self {
-            driver,
-            options,
-            inner: Mutex::default(),
-            changed: Condvar::new(),
-            queue: Mutex::new(Some(queue)),
-        }
+        Self { driver, options, inner: Mutex::default(), changed: Condvar::new(), queue: Mutex::new(Some(queue)) }
     }
 
     pub fn now_s(&self) -> f64 {
@@ -260,8 +254,7 @@ impl Shared {
         match self.enqueue(Out::Line(line)) {
             Ok(()) => Ok(()),
             Err(error) => {
-                let why =
-                    if matches!(error, TrySendError::Full(_)) { Ending::NotReading } else { Ending::ClosedHere };
+                let why = if matches!(error, TrySendError::Full(_)) { Ending::NotReading } else { Ending::ClosedHere };
                 self.finish(why.clone());
                 Err(self.gone(why))
             }

@@ -18,7 +18,7 @@ use crate::guided::pane::{begin_ui, is_wanted, progress_ui};
 use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
 use crate::live::textures::Thumbnails;
-use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, PoseSequence};
+use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, Moves, PoseSequence};
 use crate::scene::Standing;
 use crate::taught::pane::sequence;
 use crate::text::Language;
@@ -124,7 +124,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
     }
     let count = model.document().taught.len();
     // With captures in the table the sequence is in the pane of the taught poses.
-    if count == 0 || !model.document().captures.is_empty() {
+    if count == 0 || !model.document().captures.is_empty() || model.moves() == Moves::Never {
         return;
     }
     let name = text!("Run the {count} taught {count|pose|poses}", count = count).say(language);

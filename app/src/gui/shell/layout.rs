@@ -3,7 +3,7 @@
 use egui_tiles::{Container, Linear, LinearDir, Tile, TileId, Tiles, Tree};
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Pane, Step};
+use crate::model::{Model, Moves, Pane, Step};
 
 /// Key of the layout in eframe's storage.
 pub const STORAGE_KEY: &str = "layout";
@@ -84,6 +84,11 @@ impl Layout {
     /// A layout that was remembered, without the panes that are no longer there and with those that are new.
     #[must_use]
     pub fn brought_up_to_date(mut self) -> Self {
+        // What the cell before did not have may be there now.
+        let all: Vec<TileId> = self.tree.tiles.tile_ids().collect();
+        for id in all {
+            self.tree.tiles.set_visible(id, true);
+        }
         let mut seen = Vec::new();
         let mut superfluous = Vec::new();
         let mut tiles: Vec<_> = self.tree.tiles.iter().collect();
@@ -138,6 +143,18 @@ impl Layout {
             }
         }
         false
+    }
+
+    /// Leaves out what the cell does not have, and brings it back where another one has it.
+    pub fn leave_out(&mut self, model: &Model) {
+        let has_depth = model.cell.as_ref().is_none_or(|cell| cell.has_depth) || model.review.is_some();
+        for (pane, is_there) in [(Pane::Depth, has_depth), (Pane::Taught, model.moves() != Moves::Never)] {
+            if let Some(tile) = self.tree.tiles.find_pane(&Slot::from(pane))
+                && self.tree.tiles.is_visible(tile) != is_there
+            {
+                self.tree.tiles.set_visible(tile, is_there);
+            }
+        }
     }
 
     /// Brings a pane to the front.

@@ -15,13 +15,14 @@ use crate::live::pane::colour_ui;
 use crate::live::pane::depth_ui;
 use crate::live::textures::Textures;
 use crate::messages::pane::log_ui;
-use crate::model::{ImagePoint, Model, Pane};
+use crate::model::{ImagePoint, Model, Moves, Pane};
 use crate::motion::pane::jog_ui;
 use crate::scene::pane::scene_ui;
 use crate::solve::charts;
 use crate::solve::pane::result_ui;
 use crate::target::pane::target_ui;
 use crate::taught::pane::taught_ui;
+use crate::tr;
 use crate::track::pane::track_ui;
 use crate::verify::pane::verify_ui;
 
@@ -37,6 +38,7 @@ pub fn tiles_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mu
     let palette = Palette::of(ui);
     // Behind the tiles, whose places are known only after they were drawn.
     let behind = ui.painter().add(Shape::Noop);
+    layout.leave_out(model);
     let mut panes = Panes { model, textures, outbox, pointed: None };
     layout.tree.ui(&mut panes, ui);
     let pointed = panes.pointed;
@@ -97,7 +99,13 @@ impl Behavior<Slot> for Panes<'_> {
     }
 
     fn tab_title_for_pane(&mut self, slot: &Slot) -> WidgetText {
-        slot.pane().map_or("", |pane| super::title(pane, self.model.view.language)).into()
+        let language = self.model.view.language;
+        match slot.pane() {
+            // A robot that is only read is not jogged.
+            Some(Pane::Jog) if self.model.moves() == Moves::Never => tr!(language, "Robot"),
+            pane => pane.map_or("", |pane| super::title(pane, language)),
+        }
+        .into()
     }
 
     fn tab_ui(&mut self, tiles: &mut Tiles<Slot>, ui: &mut Ui, id: Id, tile: TileId, state: &TabState) -> Response {

@@ -62,6 +62,7 @@ impl Silent {
             source,
             view: ViewSettings::default(),
             addresses: Vec::new(),
+            drivers: Vec::new(),
             objects: CellPaths::default(),
             keep_out: None,
             sessions: folder.path().to_path_buf(),
@@ -195,6 +196,7 @@ pub fn robot(simulation: Simulation) -> RobotState {
         joints_rad: [0.0, std::f64::consts::FRAC_PI_4, -1.0, 0.0, 0.0, 0.0].into(),
         sim_time_s: 12.35,
         simulation,
+        is_armed: true,
     }
 }
 
@@ -214,9 +216,10 @@ pub fn frame(number: u64) -> Event {
         rate_hz: 20.0,
         depth_range_m: [0.4, 1.2],
         far_plane_m: 3.5,
-        base_from_tip: Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0]),
+        base_from_tip: Some(Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0])),
         joints_rad: [0.0; 6].into(),
         base_from_target_true: None,
+        clocks: None,
     };
     Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) }
 }

@@ -23,8 +23,8 @@ use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector
 
 use crate::model::{
     BoardMotion, BoardPath, CellFacts, CellSource, ColouredDepth, FollowStatus, FollowWish, FrameImages, FrameInfo,
-    JobId, LinkState, LiveDetection, LiveFrame, Model, Observed, PreviewFile, RobotState, SessionState, Simulation,
-    Solved, TrackError, TrackPoint, TrackState, Tracked, Truth, ViewSettings,
+    JobId, LinkState, LiveDetection, LiveFrame, Model, Moves, Observed, PreviewFile, RobotState, SessionState,
+    Simulation, Solved, TrackError, TrackPoint, TrackState, Tracked, Truth, ViewSettings,
 };
 use crate::session::start::{self, BOARD};
 use crate::truth;
@@ -125,6 +125,7 @@ pub fn connected() -> Model {
         joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
         sim_time_s: 12.35,
         simulation: Simulation::Running,
+        is_armed: true,
     });
     model.cell = Some(CellFacts {
         joints: vec![
@@ -134,7 +135,7 @@ pub fn connected() -> Model {
             };
             6
         ],
-        nominal_intrinsics: intrinsics(),
+        nominal_intrinsics: Some(intrinsics()),
         arm: Some(arm()),
         support: Support::Whole,
         truth: Some(Truth {
@@ -142,6 +143,9 @@ pub fn connected() -> Model {
             base_from_target: Some(base_from_target()),
             intrinsics: intrinsics(),
         }),
+        has_depth: true,
+        moves: Moves::Freely,
+        poses_are_typed: false,
     });
     let info = FrameInfo {
         number: 1,
@@ -151,9 +155,10 @@ pub fn connected() -> Model {
         rate_hz: 20.0,
         depth_range_m: [0.3, 0.5],
         far_plane_m: 3.5,
-        base_from_tip: base_from_tip(1),
+        base_from_tip: Some(base_from_tip(1)),
         joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
         base_from_target_true: Some(base_from_target()),
+        clocks: None,
     };
     model.frame = Some(LiveFrame { info, images: Arc::new(images()) });
     model.board_seen_s = Some(model.now_s);
@@ -161,7 +166,7 @@ pub fn connected() -> Model {
         frame: 1,
         corners: Some(corners(1)),
         camera_from_target: Some(camera_from_target(1)),
-        base_from_tip: base_from_tip(1),
+        base_from_tip: Some(base_from_tip(1)),
         took_s: 0.006,
         problem: None,
         dropped: 0,

@@ -229,7 +229,7 @@ pub fn live_chain(model: &Model) -> Option<Pose<Camera, Target>> {
     if model.track.on {
         detection.camera_from_target
     } else {
-        Some(calibrated.camera_from_target(&detection.base_from_tip))
+        Some(calibrated.camera_from_target(detection.base_from_tip.as_ref()?))
     }
 }
 

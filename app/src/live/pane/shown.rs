@@ -41,7 +41,7 @@ impl<'a> Shown<'a> {
         Some(Self {
             images: &frame.images,
             capture: None,
-            base_from_tip: Some(frame.info.base_from_tip),
+            base_from_tip: frame.info.base_from_tip,
             far_plane_m,
             depth_range_m: frame.images.depth.is_some().then_some(frame.info.depth_range_m),
         })

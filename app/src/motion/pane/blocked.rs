@@ -5,7 +5,7 @@ use egui::Ui;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Tone;
-use crate::model::{Model, Simulation};
+use crate::model::{Model, Moves, Simulation};
 use crate::tr;
 
 /// Reasons in the language of the window.
@@ -33,10 +33,16 @@ impl Blocked {
             Some(tr!(language, "Waiting until the robot has been read"))
         } else if model.sequence_runs {
             Some(tr!(language, "A sequence is under way: stop it to move the arm yourself"))
+        } else if matches!(model.moves(), Moves::OnceArmed { .. }) && !model.is_armed() {
+            Some(tr!(language, "The robot is only read until you let the workbench move it, in Jog"))
         } else {
             None
         };
-        let knows_kinematics = model.cell.as_ref().is_none_or(|cell| cell.arm.is_some());
+        let knows_kinematics = match model.moves() {
+            // The controller has its own.
+            Moves::OnceArmed { tip, .. } => tip,
+            Moves::Freely | Moves::Never => model.cell.as_ref().is_none_or(|cell| cell.arm.is_some()),
+        };
         let tip = arm.or_else(|| {
             (!knows_kinematics)
                 .then(|| tr!(language, "This arm's kinematics is not known, so only its joints can be moved"))
@@ -46,7 +52,8 @@ impl Blocked {
 
     /// The reason for everything, and what helps.
     pub fn arm_ui(&self, ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
-        let Some(reason) = self.arm else { return };
+        // Where a person has to allow it, the question stands below.
+        let Some(reason) = self.arm.filter(|_| model.is_armed() || !model.control.is_connected()) else { return };
         parts::notice_ui(ui, Tone::Warning, reason, |ui| {
             if self.can_start && ui.button(tr!(model.view.language, "Run the simulation")).clicked() {
                 outbox.send(Command::StartSimulation);

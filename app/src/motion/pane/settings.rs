@@ -6,7 +6,7 @@ use handeye_sim_link::client::cell::{JOG_JOINT_SPEED_RAD_S, JOG_LINE_SPEED_M_S, 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
-use crate::model::{JogFrame, JogSettings, JogStep, Model};
+use crate::model::{JogFrame, JogSettings, JogStep, Model, Moves};
 use crate::text::Language;
 use crate::{text, tr};
 
@@ -18,7 +18,7 @@ pub fn settings_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let settings = model.view.jog;
     frame_ui(ui, settings, language, outbox);
-    step_ui(ui, settings, language, outbox);
+    step_ui(ui, model, outbox);
     speed_ui(ui, model, outbox);
 }
 
@@ -48,7 +48,9 @@ fn frame_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut
     });
 }
 
-fn step_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut Outbox) {
+fn step_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let (settings, language) = (model.view.jog, model.view.language);
+    let can_be_held = model.moves() == Moves::Freely;
     parts::row_ui(ui, tr!(language, "Step [mm, °]"), |ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 7.0;
@@ -58,8 +60,8 @@ fn step_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut 
             let step = JogStep::Step { metres: mm * 1e-3, radians: deg.to_radians() };
             (step, format!("{mm}"), text!("Step {mm} mm, {deg}°", mm = mm, deg = deg).say(language))
         });
-        for (step, name, what) in std::iter::once(hold).chain(steps) {
-            let chosen = settings.step == step;
+        for (step, name, what) in Some(hold).filter(|_| can_be_held).into_iter().chain(steps) {
+            let chosen = model.jog_step() == step;
             let response = ui.selectable_label(chosen, &name);
             let label = if step == JogStep::Hold { &name } else { &what };
             response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, chosen, label));

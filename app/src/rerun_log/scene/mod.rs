@@ -244,27 +244,24 @@ impl SceneWriter {
         self.newest_image = Some((info.number, self.clock.sim_time_s));
         self.far_plane_m = Some(info.far_plane_m);
         pen.at(self.clock.live());
-        self.tip(pen, &info.base_from_tip, Some(&info.joints_rad))?;
+        if let Some(base_from_tip) = &info.base_from_tip {
+            self.tip(pen, base_from_tip, Some(&info.joints_rad))?;
+        }
         if info.base_from_target_true.is_some() {
             self.known.base_from_target_true = info.base_from_target_true;
             write_board(pen, &self.known, self.known.true_board())?;
         }
         let mut faults = Faults::default();
         faults.tolerate(camera::write_image(pen, &self.known, &images.rgb))?;
-        camera::write_prediction(pen, &self.known, &info.base_from_tip)?;
+        let Some(base_from_tip) = &info.base_from_tip else { return faults.finish() };
+        camera::write_prediction(pen, &self.known, base_from_tip)?;
         let age_s = self.depth_at_s.map(|at| self.clock.sim_time_s - at);
         // A negative age is a simulation that was started again.
         if age_s.is_none_or(|age| !(0.0..DEPTH_EVERY_S).contains(&age)) {
             self.depth_at_s = Some(self.clock.sim_time_s);
             if let Some(depth) = &images.depth {
                 let images = (&depth.metres, &images.rgb);
-                faults.tolerate(camera::write_depth(
-                    pen,
-                    &self.known,
-                    &info.base_from_tip,
-                    images,
-                    self.far_plane_m,
-                ))?;
+                faults.tolerate(camera::write_depth(pen, &self.known, base_from_tip, images, self.far_plane_m))?;
             }
         }
         faults.finish()

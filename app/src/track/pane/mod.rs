@@ -12,7 +12,7 @@ use egui::{Ui, Vec2};
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Tone;
-use crate::model::Model;
+use crate::model::{Model, Moves};
 use crate::tr;
 use blocked::Blocked;
 
@@ -52,8 +52,10 @@ pub fn track_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 pose::pose_ui(ui, model);
             });
             column(ui, right, &mut |ui| {
-                follow::follow_ui(ui, model, &blocked, outbox);
-                cell_board::board_ui(ui, model, &blocked, outbox);
+                if model.moves() == Moves::Freely {
+                    follow::follow_ui(ui, model, &blocked, outbox);
+                    cell_board::board_ui(ui, model, &blocked, outbox);
+                }
                 plots::plots_ui(ui, model);
             });
         });

@@ -6,7 +6,7 @@ use handeye_core::estimate::handeye::Mode;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
-use crate::model::{CapturePurpose, Model, Motion, Pane, PoseSequence, StopOutcome};
+use crate::model::{CapturePurpose, Model, Motion, Moves, Pane, PoseSequence, StopOutcome};
 use crate::taught::pane::immovable;
 use crate::taught::pane::sequence;
 use crate::{text, tr};
@@ -14,6 +14,9 @@ use crate::{text, tr};
 /// The button that begins, or how far it is; and how it went.
 pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
+    if model.moves() != Moves::Freely {
+        return;
+    }
     let verifies = |sequence: &&PoseSequence| sequence.purpose == Some(CapturePurpose::Verify);
     match model.sequence.as_ref().filter(verifies) {
         Some(sequence) if model.sequence_runs => {

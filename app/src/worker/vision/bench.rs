@@ -101,9 +101,10 @@ impl Table {
             rate_hz: 20.0,
             depth_range_m: [0.1, 3.5],
             far_plane_m: 3.5,
-            base_from_tip: Pose::identity(),
+            base_from_tip: Some(Pose::identity()),
             joints_rad: [0.0; 6].into(),
             base_from_target_true: None,
+            clocks: None,
         };
         let metres = DepthImage { width: 1, height: 1, metres: vec![0.5] };
         let depth = ColouredDepth { metres, colours: RgbImage::new(1, 1) };

@@ -199,6 +199,8 @@ impl Vision {
     fn track_in(&mut self, frame: &LiveFrame, grey: &GrayImage, dropped: u64) {
         let Some(tracking) = &mut self.tracking else { return };
         let info = &frame.info;
+        // A board without a pose of the robot has no place in the base.
+        let Some(base_from_tip) = info.base_from_tip else { return };
         let began_s = self.outlet.now_s();
         let sight = TrackedImage {
             number: info.number,
@@ -208,7 +210,7 @@ impl Vision {
                 grey,
                 depth: frame.images.depth.as_ref().map(|depth| &depth.metres),
                 far_plane_m: info.far_plane_m,
-                base_from_tip: info.base_from_tip,
+                base_from_tip,
             },
             base_from_target_true: info.base_from_target_true,
         };

@@ -138,12 +138,13 @@ impl Run<'_> {
         let line = "{\"type\":\"of_a_later_version\",\"with\":[1,{\"a\":null}],\"id\":0}\n".to_owned();
         gone(NAME, shared.send_line(line))?;
         let before = shared.lock().pongs;
-        let heard = shared.wait(self.options.driver.silence, Some(self.cancel), |inner| {
-            (inner.pongs > before + 1).then_some(())
-        });
+        let heard = shared
+            .wait(self.options.driver.silence, Some(self.cancel), |inner| (inner.pongs > before + 1).then_some(()));
         match heard {
             Ok(Some(())) => Ok(passed(NAME, "a message of an unknown type is ignored")),
-            Ok(None) => Err(wrong(NAME, "after a message of an unknown type no ping is answered: ignore what is not known")),
+            Ok(None) => {
+                Err(wrong(NAME, "after a message of an unknown type no ping is answered: ignore what is not known"))
+            }
             Err(error) => {
                 let found = failed(NAME, &error);
                 Err(Check { text: format!("after a message of an unknown type, {}", found.text), ..found })

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::super::client::Goal;
 use super::super::message::{
-    Ability, AnswerMessage, DepthEncoding, DepthMessage, ImageEncoding, ImageMessage, JointMessage, LogLevel, LogMessage, PongMessage,
-    PoseMessage, StateMessage, ToDriver,
+    Ability, AnswerMessage, DepthEncoding, DepthMessage, ImageEncoding, ImageMessage, JointMessage, LogLevel,
+    LogMessage, PongMessage, PoseMessage, StateMessage, ToDriver,
 };
 use super::super::wire::MAX_LINE;
 use super::{Fake, FakeError};
@@ -180,7 +180,9 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
                 let stamp = self.stamps().now_s();
                 self.send("pong", &PongMessage { id, stamp }, &[])
             }
-            ToDriver::NextImage { id, .. } if !self.can(Ability::Image) => self.answer("refused", id, "there is no camera"),
+            ToDriver::NextImage { id, .. } if !self.can(Ability::Image) => {
+                self.answer("refused", id, "there is no camera")
+            }
             ToDriver::NextImage { id, after, depth } => {
                 self.lock().wanted = Some(Wanted { id, after, depth });
                 self.changed.notify_all();

@@ -1,0 +1,126 @@
+//! A robot and a camera behind [drivers](handeye_sim_link::driver), as the workers use them.
+
+mod camera;
+mod control;
+mod motion;
+pub(crate) mod pane;
+#[cfg(test)]
+mod tests;
+pub(crate) mod typed_pose;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_sim_link::client::CancelToken;
+use handeye_sim_link::driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverOptions};
+
+use crate::model::Drivers;
+use crate::text::Text;
+use crate::worker::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError};
+use camera::DriverCamera;
+use control::DriverControl;
+use motion::DriverMotion;
+
+/// Starts the drivers, or connects to them, once for all workers; and again when they have ended.
+pub struct DriverConnector {
+    drivers: Drivers,
+    cell: Mutex<Option<DriverCell>>,
+    typed: TypedPose,
+}
+
+impl DriverConnector {
+    /// Nothing is started yet.
+    pub fn new(drivers: Drivers) -> Self {
+        Self { drivers, cell: Mutex::new(None), typed: TypedPose::default() }
+    }
+
+    /// The drivers that run. The other workers wait for the first.
+    fn cell(&self, shutdown: &CancelToken) -> Result<DriverCell, PortError> {
+        let mut cell = self.cell.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cell) = cell.as_ref().filter(|cell| cell.check().is_ok()) {
+            return Ok(cell.clone());
+        }
+        // The one that has ended is buried first: it may hold what the next one needs.
+        *cell = None;
+        let spec = spec(&self.drivers).map_err(|why| PortError::Hopeless(Text::verbatim(why.to_string())))?;
+        let started = DriverCell::start(&spec, &DriverOptions::default(), shutdown).map_err(port_error)?;
+        Ok(cell.insert(started).clone())
+    }
+
+    fn is_freehand(&self) -> bool {
+        self.drivers.robot.is_none()
+    }
+
+    fn connected<Port>(&self, port: Port, cell: &DriverCell) -> Connected<Port> {
+        let named = |driver: &handeye_sim_link::driver::Driver| {
+            let hello = driver.hello();
+            hello.version.as_ref().map_or_else(|| hello.name.clone(), |version| format!("{} {version}", hello.name))
+        };
+        let robot = named(cell.robot());
+        let server = match cell.camera().filter(|_| cell.is_two()) {
+            Some(camera) => format!("{robot}, {}", named(camera)),
+            None => robot,
+        };
+        Connected { port, address: self.drivers.to_string(), server }
+    }
+}
+
+impl Connector for DriverConnector {
+    fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
+        let cell = self.cell(shutdown)?;
+        let port = DriverControl::new(cell.clone(), self.is_freehand().then(|| self.typed.clone()));
+        Ok(self.connected(Box::new(port), &cell))
+    }
+
+    fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
+        let cell = self.cell(shutdown)?;
+        if cell.camera().is_none() {
+            let said = crate::text!(
+                "The driver has no images: name a driver for the camera under Connect, beside that of the robot"
+            );
+            return Err(PortError::Hopeless(said));
+        }
+        let port = DriverCamera::new(cell.clone(), self.is_freehand().then(|| self.typed.clone()), shutdown.clone());
+        Ok(self.connected(Box::new(port), &cell))
+    }
+
+    fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
+        let cell = self.cell(shutdown)?;
+        Ok(self.connected(Box::new(DriverMotion::new(cell.clone())), &cell))
+    }
+}
+
+/// The pose that a person reads off the pendant, where no driver reports it. All clones are the same.
+#[derive(Debug, Clone, Default)]
+struct TypedPose(Arc<Mutex<Option<Pose<Base, Tip>>>>);
+
+impl TypedPose {
+    fn set(&self, pose: Option<Pose<Base, Tip>>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = pose;
+    }
+
+    fn get(&self) -> Option<Pose<Base, Tip>> {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The camera's driver stands in for the robot's where a person types the poses.
+fn spec(drivers: &Drivers) -> Result<DriverCellSpec, BadSpec> {
+    let robot = drivers.robot.as_deref().map(str::parse).transpose()?;
+    let camera = drivers.camera.as_deref().map(str::parse).transpose()?;
+    match (robot, camera) {
+        (Some(robot), camera) => Ok(DriverCellSpec { robot, camera }),
+        (None, Some(camera)) => Ok(DriverCellSpec { robot: camera, camera: None }),
+        (None, None) => Err(BadSpec::Empty),
+    }
+}
+
+/// What an error of a driver means for a connection.
+fn port_error(error: DriverError) -> PortError {
+    let text = Text::verbatim(error.to_string());
+    match error {
+        DriverError::Gone { .. } | DriverError::Connect { .. } | DriverError::NoAnswer { .. } => PortError::Lost(text),
+        DriverError::Start { .. } | DriverError::Cannot { .. } => PortError::Hopeless(text),
+        _ => PortError::Refused(text),
+    }
+}

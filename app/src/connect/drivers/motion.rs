@@ -1,0 +1,227 @@
+//! Motions through a driver: goals and steps, by the controller's own planning.
+
+use handeye_core::geometry::arm::JointValues;
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::plan::Surroundings;
+use handeye_core::plan::guided::choose::Robot;
+use handeye_sim_link::client::CancelToken;
+use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish};
+use handeye_sim_link::driver::message::Ability;
+use handeye_sim_link::driver::{Driver, DriverCell, DriverError, Goal, MoveEnd, Reading};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use super::port_error;
+use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
+use crate::text;
+use crate::text::Text;
+use crate::worker::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
+
+pub(super) struct DriverMotion {
+    cell: DriverCell,
+}
+
+impl DriverMotion {
+    pub fn new(cell: DriverCell) -> Self {
+        Self { cell }
+    }
+
+    fn robot(&self) -> &Driver {
+        self.cell.robot()
+    }
+
+    fn now(&self) -> Result<Result<Reading, Text>, PortError> {
+        if !self.robot().hello().can(Ability::State) {
+            return Ok(Err(text!("This cell has no robot that could be moved")));
+        }
+        let now = self.robot().state().map_err(port_error)?;
+        Ok(now.map(|now| now.reading).ok_or_else(|| text!("Waiting until the robot has been read")))
+    }
+
+    fn drive(&self, goal: &Goal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
+        match self.robot().move_to(goal, speed, cancel) {
+            Ok(MoveEnd::Arrived) => Ok(MotionOutcome::Arrived),
+            Ok(MoveEnd::Stopped(_)) if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
+            // STOP comes over another connection.
+            Ok(MoveEnd::Stopped(why)) if why.is_empty() => Ok(MotionOutcome::Stopped),
+            Ok(MoveEnd::Stopped(why)) => Ok(MotionOutcome::Failed(text!("The robot stopped: {why}", why = why))),
+            Ok(MoveEnd::Refused(why)) => Ok(MotionOutcome::Refused(text!("The robot refuses: {why}", why = why))),
+            Err(DriverError::NotArmed { .. }) => Ok(MotionOutcome::Refused(read_only())),
+            Err(error @ (DriverError::Cannot { .. } | DriverError::Busy { .. } | DriverError::Refused { .. })) => {
+                Ok(MotionOutcome::Refused(Text::verbatim(error.to_string())))
+            }
+            Err(error) => Err(port_error(error)),
+        }
+    }
+}
+
+impl MotionPort for DriverMotion {
+    fn check(&mut self) -> Result<(), PortError> {
+        self.cell.check().map_err(port_error)
+    }
+
+    fn move_to(&mut self, goal: &MotionGoal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
+        let goal = match *goal {
+            MotionGoal::Joints(joints) => Goal::Joints(joints),
+            MotionGoal::Tip(pose) => Goal::Tip(pose),
+        };
+        self.drive(&goal, speed, cancel)
+    }
+
+    fn jog_step(
+        &mut self,
+        request: &JogRequest,
+        length: f64,
+        cancel: &CancelToken,
+    ) -> Result<MotionOutcome, PortError> {
+        let reading = match self.now()? {
+            Ok(reading) => reading,
+            Err(why) => return Ok(MotionOutcome::Refused(why)),
+        };
+        match step(request, length, &reading) {
+            Ok(goal) => self.drive(&goal, request.speed, cancel),
+            Err(why) => Ok(MotionOutcome::Refused(why)),
+        }
+    }
+
+    fn jog(
+        &mut self,
+        _request: &JogRequest,
+        _held: &mut dyn FnMut() -> Option<f64>,
+    ) -> Result<Option<Text>, PortError> {
+        Ok(Some(text!("A robot behind a driver moves in steps: choose a step in Jog")))
+    }
+
+    fn room(&mut self, _board: &BoardInView) -> Result<Room, PortError> {
+        Ok(Room::Nowhere(cannot_follow()))
+    }
+
+    fn views(&mut self, _request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
+        Ok(Err(no_chain()))
+    }
+
+    fn robot(&mut self, _speed: f64) -> Result<Result<Robot, Text>, PortError> {
+        Ok(Err(no_chain()))
+    }
+
+    fn keep_out(&mut self, _keep_out: &Surroundings) -> Result<Surroundings, Text> {
+        Err(text!(
+            "A robot behind a driver goes the ways of its own controller: set its safety planes there, boxes of the workbench do \
+             not hold for it"
+        ))
+    }
+
+    fn follow(&mut self, _wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
+        Ok(MotionOutcome::Refused(cannot_follow()))
+    }
+}
+
+/// Where a step leads to.
+fn step(request: &JogRequest, length: f64, reading: &Reading) -> Result<Goal, Text> {
+    let (frame, axis, forward) = match request.jog {
+        Jog::Joint { index, forward } => {
+            let mut joints = reading.joints.ok_or_else(|| text!("The robot does not report its joints"))?;
+            let joint = joints.get_mut(index).ok_or_else(|| text!("The robot has no such joint"))?;
+            *joint += if forward { length } else { -length };
+            return Ok(Goal::Joints(joints));
+        }
+        Jog::Translate { frame, axis, forward } | Jog::Rotate { frame, axis, forward } => (frame, axis, forward),
+    };
+    let along = match axis {
+        Axis::X => Vector3::x(),
+        Axis::Y => Vector3::y(),
+        Axis::Z => Vector3::z(),
+    } * if forward { length } else { -length };
+    let moved = match request.jog {
+        Jog::Rotate { .. } => Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_scaled_axis(along)),
+        Jog::Translate { .. } | Jog::Joint { .. } => Isometry3::from_parts(along.into(), UnitQuaternion::identity()),
+    };
+    let now = *reading.base_from_tip.isometry();
+    let goal = match frame {
+        JogFrame::Base => {
+            // Turns are about the tip, along the axes of the base.
+            let rotation = moved.rotation * now.rotation;
+            Isometry3::from_parts((moved.translation.vector + now.translation.vector).into(), rotation)
+        }
+        JogFrame::Tip => now * moved,
+        JogFrame::Camera => {
+            let tip_from_camera = request.tip_from_camera.ok_or_else(|| {
+                text!("Where the camera is on the tip is not known yet: calibrate first, or jog along other axes")
+            })?;
+            let tip_from_camera = tip_from_camera.isometry();
+            now * tip_from_camera * moved * tip_from_camera.inverse()
+        }
+    };
+    Ok(Goal::Tip(Pose::<Base, Tip>::from_isometry(goal)))
+}
+
+fn read_only() -> Text {
+    text!("The robot is only read: press “Let the workbench move it” in Jog first")
+}
+
+fn no_chain() -> Text {
+    text!("Poses are not planned for a robot behind a driver: use “Guide me”, or taught poses")
+}
+
+fn cannot_follow() -> Text {
+    text!("A robot behind a driver cannot follow the board")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reading() -> Reading {
+        let turned = UnitQuaternion::from_euler_angles(0.3, -0.4, 2.0);
+        Reading {
+            stamp_s: 0.0,
+            base_from_tip: Pose::from_isometry(Isometry3::from_parts(Vector3::new(0.4, -0.1, 0.3).into(), turned)),
+            joints: Some([0.1, 0.2, 0.3].into()),
+            moving: None,
+        }
+    }
+
+    fn assert_near(is: Vector3<f64>, wanted: Vector3<f64>) {
+        assert!((is - wanted).norm() < 1e-12, "{is} instead of {wanted}");
+    }
+
+    fn tip(jog: Jog, tip_from_camera: Option<Isometry3<f64>>) -> Isometry3<f64> {
+        let request = JogRequest { jog, tip_from_camera: tip_from_camera.map(Pose::from_isometry), speed: 0.2 };
+        match step(&request, 0.05, &reading()) {
+            Ok(Goal::Tip(goal)) => *goal.isometry(),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_step_goes_along_or_about_the_axes_that_were_chosen() {
+        let now = *reading().base_from_tip.isometry();
+        let (axis, forward) = (Axis::Y, false);
+        let moved = tip(Jog::Translate { frame: JogFrame::Base, axis, forward }, None);
+        assert_near(moved.translation.vector - now.translation.vector, Vector3::new(0.0, -0.05, 0.0));
+        assert!(moved.rotation.angle_to(&now.rotation) < 1e-7);
+        let moved = tip(Jog::Translate { frame: JogFrame::Tip, axis, forward }, None);
+        assert_near((now.inverse() * moved).translation.vector, Vector3::new(0.0, -0.05, 0.0));
+        let turned = tip(Jog::Rotate { frame: JogFrame::Base, axis, forward }, None);
+        assert_near(turned.translation.vector, now.translation.vector);
+        let about = (turned.rotation * now.rotation.inverse()).scaled_axis();
+        assert_near(about, Vector3::new(0.0, -0.05, 0.0));
+    }
+
+    #[test]
+    fn a_turn_about_the_camera_leaves_the_camera_where_it_is() {
+        let tip_from_camera = Isometry3::new(Vector3::new(0.05, 0.0, 0.1), Vector3::new(0.0, 0.2, 1.0));
+        let turned = tip(Jog::Rotate { frame: JogFrame::Camera, axis: Axis::X, forward: true }, Some(tip_from_camera));
+        let now = *reading().base_from_tip.isometry();
+        let (before, after) = (now * tip_from_camera, turned * tip_from_camera);
+        assert_near(before.translation.vector, after.translation.vector);
+        assert_near((before.inverse() * after).rotation.scaled_axis(), Vector3::new(0.05, 0.0, 0.0));
+    }
+
+    #[test]
+    fn a_joint_that_is_not_there_is_not_stepped() {
+        let request =
+            |index| JogRequest { jog: Jog::Joint { index, forward: true }, tip_from_camera: None, speed: 0.2 };
+        assert_eq!(step(&request(1), 0.5, &reading()), Ok(Goal::Joints([0.1, 0.7, 0.3].into())));
+        assert!(step(&request(3), 0.5, &reading()).is_err());
+    }
+}

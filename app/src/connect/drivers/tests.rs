@@ -1,0 +1,120 @@
+//! The workers over a driver that serves the built-in cell on a socket.
+
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::thread;
+
+use handeye_core::geometry::frames::Pose;
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::client::CancelToken;
+use handeye_sim_link::driver::fake::{Fake, FakeOptions, FakePart};
+
+use super::*;
+use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome, Moves, RobotState};
+use crate::worker::{JogRequest, RawFrame};
+
+/// Serves one part of a cell to everybody who connects; the address.
+fn served(part: FakePart) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = format!("tcp://{}", listener.local_addr().expect("bound"));
+    let scene = Scene::reference().expect("the reference scene");
+    let fake = Arc::new(Fake::start(FakeOptions { part, ..FakeOptions::new(scene) }).expect("a cell"));
+    thread::spawn(move || {
+        for stream in listener.incoming().map_while(Result::ok) {
+            let fake = Arc::clone(&fake);
+            thread::spawn(move || {
+                let input = std::io::BufReader::new(stream.try_clone().expect("a socket"));
+                let _ended = fake.converse(input, stream);
+            });
+        }
+    });
+    address
+}
+
+fn connector(robot: Option<String>, camera: Option<String>) -> DriverConnector {
+    DriverConnector::new(Drivers { robot, camera })
+}
+
+fn first_state(control: &mut dyn ControlPort) -> RobotState {
+    loop {
+        if let Some(state) = control.state().expect("connected") {
+            return state;
+        }
+        thread::yield_now();
+    }
+}
+
+fn image(camera: &mut dyn CameraPort, seen_s: Option<f64>) -> RawFrame {
+    loop {
+        if let Some(frame) = camera.newest(seen_s).expect("connected") {
+            return frame;
+        }
+    }
+}
+
+#[test]
+fn a_cell_behind_a_driver_is_seen_read_and_moved_once_somebody_allows_it() {
+    let connector = connector(Some(served(FakePart::Both)), None);
+    let shutdown = CancelToken::default();
+    let mut control = connector.connect_control(&shutdown).expect("connected").port;
+    let facts = control.facts().expect("connected");
+    assert_eq!((facts.joints.len(), facts.moves), (6, Moves::OnceArmed { joints: true, tip: true }));
+    assert!(!facts.poses_are_typed && facts.truth.is_none());
+    let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
+    // The first images may come before the clocks are related.
+    let mut frame = image(camera.as_mut(), None);
+    while frame.base_from_tip.is_none() {
+        frame = image(camera.as_mut(), Some(frame.sim_time_s));
+    }
+    assert_eq!((frame.rgb.dimensions(), frame.depth.is_some()), ((640, 480), facts.has_depth));
+    let later = image(camera.as_mut(), Some(frame.sim_time_s));
+    assert!(later.sim_time_s > frame.sim_time_s);
+
+    let mut motion = connector.connect_motion(&shutdown).expect("connected").port;
+    let before = first_state(control.as_mut());
+    assert!(!before.is_armed);
+    let jog = Jog::Translate { frame: JogFrame::Base, axis: Axis::Z, forward: true };
+    let request = JogRequest { jog, tip_from_camera: None, speed: 0.5 };
+    let refused = motion.jog_step(&request, 0.02, &shutdown).expect("connected");
+    assert!(matches!(refused, MotionOutcome::Refused(_)), "{refused:?}");
+    control.arm(true).expect("allowed");
+    assert_eq!(motion.jog_step(&request, 0.02, &shutdown), Ok(MotionOutcome::Arrived));
+    let moved = (first_state(control.as_mut()).base_from_tip.translation() - before.base_from_tip.translation()) * 1e3;
+    assert!((moved - nalgebra::Vector3::new(0.0, 0.0, 20.0)).norm() < 0.2, "moved by {moved} mm");
+    let back = MotionGoal::Joints(before.joints_rad);
+    assert_eq!(motion.move_to(&back, 0.5, &shutdown), Ok(MotionOutcome::Arrived));
+    control.arm(false).expect("taken back");
+    assert!(matches!(motion.move_to(&back, 0.5, &shutdown), Ok(MotionOutcome::Refused(_))));
+    control.stop().expect("a stop is always heard");
+}
+
+#[test]
+fn freehand_a_person_types_where_the_robot_is() {
+    let connector = connector(None, Some(served(FakePart::Camera)));
+    let shutdown = CancelToken::default();
+    let mut control = connector.connect_control(&shutdown).expect("connected").port;
+    let facts = control.facts().expect("connected");
+    assert!(facts.poses_are_typed && facts.joints.is_empty() && facts.moves == Moves::Never);
+    assert_eq!(control.state(), Ok(None));
+    let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
+    let frame = image(camera.as_mut(), None);
+    assert_eq!(frame.base_from_tip, None, "nobody has said where the robot is");
+    let pose = Pose::from_translation_xyzw([0.4, -0.1, 0.3], [0.0, 1.0, 0.0, 0.0]);
+    control.type_pose(Some(pose)).expect("taken");
+    assert_eq!(control.state().expect("connected").map(|state| state.base_from_tip), Some(pose));
+    assert_eq!(image(camera.as_mut(), Some(frame.sim_time_s)).base_from_tip, Some(pose));
+    control.type_pose(None).expect("taken");
+    assert_eq!(control.state(), Ok(None), "the robot was moved on");
+}
+
+#[test]
+fn a_driver_without_images_says_what_is_missing_and_one_that_is_not_there_is_tried_again() {
+    let shutdown = CancelToken::default();
+    let robot_alone = connector(Some(served(FakePart::Robot)), None);
+    assert!(matches!(robot_alone.connect_camera(&shutdown), Err(PortError::Hopeless(_))));
+    let free = TcpListener::bind("127.0.0.1:0").expect("a free port").local_addr().expect("bound");
+    let nobody = connector(Some(format!("tcp://{free}")), None);
+    assert!(matches!(nobody.connect_control(&shutdown), Err(PortError::Lost(_))));
+    let no_program = connector(Some("no-such-program-anywhere --x".to_owned()), None);
+    assert!(matches!(no_program.connect_control(&shutdown), Err(PortError::Hopeless(_))));
+}
