@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 
 use handeye_core::progress::CancelToken;
 
-use super::client::{Driver, move_message};
+use super::client::Driver;
 use super::error::{DriverError, Ending};
 use super::message::Ability;
+use super::motion::move_message;
 use super::options::DriverOptions;
 use super::shared::{Burial, Inner, Progress};
 use super::spec::DriverSpec;
@@ -33,7 +34,7 @@ pub struct ConformanceOptions {
 }
 
 /// A check, or how it failed.
-type Checked = fn(&Run<'_>) -> Result<Check, Check>;
+type Checked<'a> = fn(&Run<'a>) -> Result<Check, Check>;
 
 /// Runs all checks that the driver's abilities call for.
 ///
@@ -71,9 +72,9 @@ struct Run<'a> {
     cancel: &'a CancelToken,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
     fn all(&self, report: &mut Report) -> Result<(), ()> {
-        let checks: [(&'static str, Checked); 7] = [
+        let checks: [(&'static str, Checked<'a>); 7] = [
             ("hello", Self::hello),
             ("clock", Self::clock),
             ("states", Self::states),

@@ -6,8 +6,8 @@ use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::super::client::{Goal, MoveEnd, move_message};
 use super::super::message::Ability;
+use super::super::motion::{Goal, MoveEnd, move_message};
 use super::super::shared::{Inner, Progress};
 use super::super::states::Reading;
 use super::{Check, Run, gone, passed, skipped, warning, wrong};
