@@ -8,6 +8,7 @@ use std::sync::Arc;
 use handeye_core::depth::ColourMap;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::geometry::arm::JointValues;
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::plan::Surroundings;
 use handeye_core::plan::surroundings::KeepOutFile;
 use handeye_core::progress::Stage;

@@ -24,7 +24,7 @@ use handeye_app::rerun_log::RerunChoice;
 use handeye_app::session::start::{self, BOARD};
 use handeye_app::settings::SettingsFile;
 use handeye_app::text::Text;
-use handeye_app::worker::{Clock, LiveConnector, Waker};
+use handeye_app::worker::{Clock, Waker};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
@@ -135,11 +135,12 @@ fn recorded(
     let began = Instant::now();
     let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
     let waker: Waker = Arc::new(|| {});
-    let connect: Connect = Arc::new(|source, objects| Arc::new(LiveConnector::new(source.clone(), objects.clone())));
+    let connect: Connect = Arc::new(handeye_app::connect::connector);
     let start = Start {
         source,
         view: ViewSettings::default(),
         addresses: Vec::new(),
+        drivers: Vec::new(),
         objects: CellPaths::default(),
         keep_out: None,
         // A session, so that there is a file to record into.

@@ -9,7 +9,7 @@ use handeye_app::command::Command;
 use handeye_app::model::{CellSource, Model, ViewSettings};
 use handeye_app::rerun_log::RerunChoice;
 use handeye_app::text::Language;
-use handeye_app::worker::{Clock, LiveConnector, Waker};
+use handeye_app::worker::{Clock, Waker};
 use handeye_sim_link::client::cell::CellPaths;
 
 /// Longer than anything that a test waits for takes on a busy machine.
@@ -42,12 +42,12 @@ impl Workbench {
         });
         let began = Instant::now();
         let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
-        let connect: Connect =
-            Arc::new(|source, objects| Arc::new(LiveConnector::new(source.clone(), objects.clone())));
+        let connect: Connect = Arc::new(handeye_app::connect::connector);
         let start = Start {
             source,
             view: ViewSettings::default(),
             addresses: Vec::new(),
+            drivers: Vec::new(),
             objects: CellPaths::default(),
             keep_out: None,
             sessions: sessions.to_path_buf(),

@@ -400,8 +400,9 @@ fn where_a_capture_by_hand_was_refused_it_is_not_tried_again() {
     let refused = CaptureRefused { kind: RefusalKind::TooSimilar, why, at_s: 3.0 };
     app.absorb(Event::CaptureRefused { number, refused });
     assert!(!stand(app, &seen), "the same place");
-    let moved = Pose::from_isometry(*seen.base_from_tip.isometry() * nalgebra::Translation3::new(0.0, 0.0, 0.05));
-    assert!(stand(app, &LiveDetection { base_from_tip: moved, ..seen }), "another place");
+    let at = seen.base_from_tip.expect("the robot is known");
+    let moved = Pose::from_isometry(*at.isometry() * nalgebra::Translation3::new(0.0, 0.0, 0.05));
+    assert!(stand(app, &LiveDetection { base_from_tip: Some(moved), ..seen }), "another place");
 }
 
 #[test]

@@ -7,9 +7,23 @@ pub(crate) mod pane;
 pub(crate) mod update;
 pub(crate) mod worker;
 
+use std::sync::Arc;
+
+use handeye_sim_link::client::cell::CellPaths;
+
 use crate::model::CellSource;
 use crate::text;
 use crate::text::Text;
+use crate::worker::{Connector, LiveConnector};
+use drivers::DriverConnector;
+
+/// What connects to a cell; `objects` is where another scene than the built-in one has its parts.
+pub fn connector(source: &CellSource, objects: &CellPaths) -> Arc<dyn Connector> {
+    match source {
+        CellSource::Drivers(drivers) => Arc::new(DriverConnector::new(drivers.clone())),
+        source => Arc::new(LiveConnector::new(source.clone(), objects.clone())),
+    }
+}
 
 /// What is connected, in the user's language where it is part of this program.
 pub(crate) fn server_name(source: &CellSource, server: &str) -> Text {

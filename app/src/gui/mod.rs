@@ -32,12 +32,11 @@ use handeye_core::plan::Surroundings;
 
 use crate::app::{App, Connect, Start};
 use crate::command::Event;
-use crate::connect::drivers::DriverConnector;
 pub use crate::gui::shell::layout::Layout;
 use crate::model::{CellSource, Drivers};
 use crate::rerun_log::RerunChoice;
 use crate::settings::{self, SettingsFile};
-use crate::worker::{Clock, LiveConnector, Waker};
+use crate::worker::{Clock, Waker};
 use signals::Signals;
 use window::Remembered;
 pub use window::Window;
@@ -84,10 +83,7 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
         let waker: Waker = Arc::new(move || ctx.request_repaint_after(GATHER));
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
-        let connect: Connect = Arc::new(|source, objects| match source {
-            CellSource::Drivers(drivers) => Arc::new(DriverConnector::new(drivers.clone())),
-            source => Arc::new(LiveConnector::new(source.clone(), objects.clone())),
-        });
+        let connect: Connect = Arc::new(crate::connect::connector);
         let remembered = Remembered::stored(creation.storage);
         let start = Start {
             source,

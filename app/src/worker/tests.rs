@@ -71,7 +71,7 @@ fn both_connections_are_made_and_images_and_robot_arrive() {
         panic!("not an image")
     };
     assert_eq!(info.received_s, 7.0);
-    assert_eq!(images.depth_coloured.dimensions(), images.rgb.dimensions());
+    assert_eq!(images.depth.as_ref().expect("it measures depth").colours.dimensions(), images.rgb.dimensions());
     assert!(info.depth_range_m[0] <= 0.4 && info.depth_range_m[1] >= 0.79, "{:?}", info.depth_range_m);
     bench.until("the robot", |event| matches!(event, Event::Robot(_)));
 }

@@ -54,7 +54,7 @@ impl DriverConnector {
     fn connected<Port>(&self, port: Port, cell: &DriverCell) -> Connected<Port> {
         let named = |driver: &handeye_sim_link::driver::Driver| {
             let hello = driver.hello();
-            hello.version.as_ref().map_or_else(|| hello.name.clone(), |version| format!("{} {version}", hello.name))
+            format!("{} {}", hello.name, hello.version).trim_end().to_owned()
         };
         let robot = named(cell.robot());
         let server = match cell.camera().filter(|_| cell.is_two()) {

@@ -216,7 +216,7 @@ fn the_readout_names_the_point_in_camera_and_in_base() {
     assert!((px - Vector2::new(200.0, 300.0)).norm() < 1e-6);
     let frame = model.frame.as_ref().expect("live");
     let in_base =
-        model.calibrated().expect("calibrated").base_from_camera(&frame.info.base_from_tip).isometry() * in_camera;
+        model.calibrated().expect("calibrated").base_from_camera(&frame.info.base_from_tip.expect("the robot is known")).isometry() * in_camera;
     let words = |at: &Point3<f64>| at.coords.map(|metres| crate::gui::style::numbers::fixed(metres * 1e3, 1, 0));
     let words = |at: &Point3<f64>| words(at).as_slice().join(" ");
     let pane = colour(model);
@@ -310,7 +310,7 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
     let place = Place::new(room, vec2(640.0, 480.0), Viewport::default());
     let projector = project::Projector {
         intrinsics: &calibrated.intrinsics,
-        camera_from_target: calibrated.camera_from_target(&frame.info.base_from_tip),
+        camera_from_target: calibrated.camera_from_target(&frame.info.base_from_tip.expect("the robot is known")),
         place: &place,
     };
     let target = model.document().meta.target;
@@ -364,7 +364,7 @@ fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_
     let calibrated = model.calibrated().expect("calibrated").clone();
     let textures = LiveTextures::default();
     let at = |model: &Model| overlays::expected(model, &Shown::of(model, &textures).expect("live"));
-    let of_calibration = calibrated.camera_from_target(&frame.info.base_from_tip);
+    let of_calibration = calibrated.camera_from_target(&frame.info.base_from_tip.expect("the robot is known"));
     assert!(apart_px(&model, &of_calibration) > 20.0, "the calibrated board is elsewhere");
     // Estimate and image are off by 0.2 mm and 0.07 px.
     assert!(apart_px(&model, &at(&model).expect("tracked")) < 1.0);
