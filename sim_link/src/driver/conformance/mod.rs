@@ -89,7 +89,7 @@ impl<'a> Run<'a> {
                 report.add(skipped(name, "not tried"));
                 continue;
             }
-            let found = check(self).unwrap_or_else(|failure| failure);
+            let (Ok(found) | Err(found)) = check(self);
             report.add(found);
             // A connection that is over may have ended unnoticed by the check.
             if let Err(gone) = self.driver.check() {
