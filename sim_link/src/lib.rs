@@ -1,4 +1,5 @@
-//! CoppeliaSim's ZeroMQ remote API: the wire, a client, and a built-in simulated cell that serves it.
+//! What the workbench drives: CoppeliaSim's ZeroMQ remote API (wire, client, and a built-in simulated cell that serves it), and
+//! drivers, programs that speak JSON lines.
 
 pub mod axes;
 pub mod cell;

@@ -1,0 +1,155 @@
+//! Why a driver does not do what it is asked for.
+
+use std::fmt;
+use std::time::Duration;
+
+use super::message::Ability;
+use super::spec::BadSpec;
+use super::wire::WireError;
+
+/// Why a driver does not do what it is asked for. Each names the driver.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DriverError {
+    /// The text names none.
+    #[error(transparent)]
+    Spec(#[from] BadSpec),
+    /// The program cannot be started.
+    #[error("the driver `{command}` cannot be started: {why}")]
+    Start {
+        /// Its command.
+        command: String,
+        /// What the system said.
+        why: String,
+    },
+    /// Nobody answers at the address.
+    #[error("no driver listens at tcp://{address}: {why}")]
+    Connect {
+        /// HOST:PORT.
+        address: String,
+        /// What the system said.
+        why: String,
+    },
+    /// It worked and is gone, or it never became ready. Starting it again is worth a try.
+    #[error("the driver `{driver}` {why}")]
+    Gone {
+        /// Its command or address.
+        driver: String,
+        /// How it ended.
+        why: Ending,
+    },
+    /// It does not say that it can.
+    #[error("the driver `{driver}` cannot do this: it has no `{ability}` in `can`")]
+    Cannot {
+        /// Its command or address.
+        driver: String,
+        /// What it would need.
+        ability: Ability,
+    },
+    /// What `hello` says of the arm is not usable.
+    #[error("the driver `{driver}`: arm: {why}")]
+    Arm {
+        /// Its command or address.
+        driver: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// Motion is not allowed.
+    #[error("the driver `{driver}` is read-only: allow it to move the arm first")]
+    NotArmed {
+        /// Its command or address.
+        driver: String,
+    },
+    /// A motion is under way.
+    #[error("the driver `{driver}` moves the arm already")]
+    Busy {
+        /// Its command or address.
+        driver: String,
+    },
+    /// The driver says no.
+    #[error("the driver `{driver}` refuses {what}: {why}")]
+    Refused {
+        /// Its command or address.
+        driver: String,
+        /// What was asked for.
+        what: &'static str,
+        /// What it says.
+        why: String,
+    },
+    /// A request was not answered in time. The connection is closed where the arm might move.
+    #[error("the driver `{driver}` has not answered {what} within {} s", after.as_secs_f64())]
+    NoAnswer {
+        /// Its command or address.
+        driver: String,
+        /// What was asked for.
+        what: &'static str,
+        /// How long was waited.
+        after: Duration,
+    },
+}
+
+impl DriverError {
+    /// Whether the connection is over, so that only starting it again can help.
+    pub fn is_gone(&self) -> bool {
+        matches!(self, Self::Gone { .. } | Self::Start { .. } | Self::Connect { .. })
+    }
+}
+
+/// How a connection to a driver ended.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Ending {
+    /// The process ended by itself.
+    Exited {
+        /// Its exit status, in the words of the system.
+        status: String,
+        /// The last line that it printed to standard error.
+        last_line: Option<String>,
+    },
+    /// It closed its output, or the connection.
+    Closed {
+        /// The last line that it printed to standard error.
+        last_line: Option<String>,
+    },
+    /// It sent something that breaks the protocol.
+    Broken(WireError),
+    /// It said that it cannot go on.
+    Said(String),
+    /// No answer to `hello`.
+    NoHello {
+        /// How long was waited.
+        after: Duration,
+        /// The last line that it printed to standard error.
+        last_line: Option<String>,
+    },
+    /// No answer to pings.
+    Silent {
+        /// For how long.
+        after: Duration,
+    },
+    /// It does not read what it is sent.
+    NotReading,
+    /// It did not stop a motion when it was told to.
+    DoesNotStop,
+    /// This program closed it.
+    ClosedHere,
+}
+
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let last = |line: &Option<String>| line.as_ref().map(|line| format!(": {line}")).unwrap_or_default();
+        match self {
+            Self::Exited { status, last_line } => write!(f, "ended ({status}){}", last(last_line)),
+            Self::Closed { last_line } => write!(f, "closed the connection{}", last(last_line)),
+            Self::Broken(error) => write!(f, "broke the protocol: {error}"),
+            Self::Said(text) => write!(f, "gave up: {text}"),
+            Self::NoHello { after, last_line } => {
+                write!(f, "has not answered `hello` within {} s{}", after.as_secs_f64(), last(last_line))
+            }
+            Self::Silent { after } => write!(f, "has not answered a `ping` for {} s", after.as_secs_f64()),
+            Self::NotReading => f.write_str("does not read what it is sent"),
+            Self::DoesNotStop => f.write_str("did not come to rest after `stop`; the connection was closed"),
+            Self::ClosedHere => f.write_str("was closed"),
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The two ends of a driver: its pipes as a process, or a TCP connection.
+
+use std::io::{Read, Write};
+use std::net::{Shutdown, TcpStream, ToSocketAddrs};
+use std::os::unix::process::CommandExt as _;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::Pid;
+
+use super::error::DriverError;
+use super::spec::DriverSpec;
+
+/// Longest wait for a TCP connection, and for a driver that does not take what is sent to it.
+const TCP_PATIENCE: Duration = Duration::from_secs(3);
+/// How often an end is looked for.
+const POLL: Duration = Duration::from_millis(5);
+
+/// A driver that is reached.
+pub struct Link {
+    /// What it sends.
+    pub output: Box<dyn Read + Send>,
+    /// What it is sent. Dropping it is the end of its standard input.
+    pub input: Box<dyn Write + Send>,
+    /// What it prints for people; over TCP there is none.
+    pub errors: Option<Box<dyn Read + Send>>,
+    /// How it is ended.
+    pub end: LinkEnd,
+}
+
+/// Ends a driver.
+#[derive(Debug)]
+pub enum LinkEnd {
+    /// A process, the first of its group.
+    Process(Child),
+    /// A connection.
+    Tcp(TcpStream),
+}
+
+impl Link {
+    /// Starts the program, or connects.
+    ///
+    /// # Errors
+    /// [`DriverError::Start`], [`DriverError::Connect`].
+    pub fn open(spec: &DriverSpec) -> Result<Self, DriverError> {
+        match spec {
+            DriverSpec::Command(words) => Self::start(words),
+            DriverSpec::Tcp(address) => Self::connect(address),
+        }
+    }
+
+    fn start(words: &[String]) -> Result<Self, DriverError> {
+        let failed = |why: String| DriverError::Start { command: words.join(" "), why };
+        let (program, arguments) = words.split_first().ok_or_else(|| failed("no program is named".to_owned()))?;
+        // A group of its own: killing it ends what the driver has started too, and Ctrl-C in a terminal is for the
+        // workbench, which brakes the arm before it ends the driver.
+        let mut child = Command::new(program)
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .process_group(0)
+            .spawn()
+            .map_err(|error| failed(error.to_string()))?;
+        let (input, output, errors) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let (Some(input), Some(output)) = (input, output) else {
+            return Err(failed("it has no pipes".to_owned()));
+        };
+        Ok(Self {
+            output: Box::new(output),
+            input: Box::new(input),
+            errors: errors.map(|errors| Box::new(errors) as Box<dyn Read + Send>),
+            end: LinkEnd::Process(child),
+        })
+    }
+
+    fn connect(address: &str) -> Result<Self, DriverError> {
+        let failed = |why: String| DriverError::Connect { address: address.to_owned(), why };
+        let addresses = address.to_socket_addrs().map_err(|error| failed(error.to_string()))?;
+        let mut why = "the name has no address".to_owned();
+        for address in addresses {
+            let connected = TcpStream::connect_timeout(&address, TCP_PATIENCE).and_then(|stream| {
+                stream.set_nodelay(true)?;
+                stream.set_write_timeout(Some(TCP_PATIENCE))?;
+                Ok((stream.try_clone()?, stream.try_clone()?, stream))
+            });
+            match connected {
+                Ok((output, input, end)) => {
+                    let (output, input) = (Box::new(output), Box::new(input));
+                    return Ok(Self { output, input, errors: None, end: LinkEnd::Tcp(end) });
+                }
+                Err(error) => why = error.to_string(),
+            }
+        }
+        Err(failed(why))
+    }
+}
+
+impl LinkEnd {
+    /// How the process ended, if it has within this time; never over TCP.
+    pub fn ended_within(&mut self, patience: Duration) -> Option<ExitStatus> {
+        let Self::Process(child) = self else { return None };
+        let until = Instant::now() + patience;
+        loop {
+            match child.try_wait() {
+                Ok(Some(status)) => return Some(status),
+                Ok(None) if Instant::now() < until => std::thread::sleep(POLL),
+                Ok(None) | Err(_) => return None,
+            }
+        }
+    }
+
+    /// Ends it now, with all that it has started.
+    pub fn kill(&mut self) {
+        match self {
+            Self::Process(child) => {
+                if let Ok(id) = i32::try_from(child.id()) {
+                    // Nobody is left in the group: that is what was wanted.
+                    let _gone_already = killpg(Pid::from_raw(id), Signal::SIGKILL).is_err();
+                }
+                let _reaped = child.wait().is_ok();
+            }
+            Self::Tcp(stream) => {
+                let _closed_already = stream.shutdown(Shutdown::Both).is_err();
+            }
+        }
+    }
+}

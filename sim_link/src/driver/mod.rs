@@ -1,0 +1,49 @@
+//! Robots and cameras through programs that speak JSON lines, on standard input and output or over TCP.
+//!
+//! The protocol is on one page, `docs/drivers.md`.
+//!
+//! | module | what it knows |
+//! | --- | --- |
+//! | [`message`] | what is said, and what is wrong with a message |
+//! | [`wire`] | lines and the bytes that follow them, with limits |
+//! | [`Driver`] | one program: state, images, motions, log, how it ended |
+//! | [`DriverCell`] | a robot and a camera, in one program or two: images with the pose at their instant |
+//!
+//! ```no_run
+//! use std::time::Duration;
+//! use handeye_sim_link::client::CancelToken;
+//! use handeye_sim_link::driver::{DriverCell, DriverCellSpec, DriverOptions};
+//!
+//! let spec = DriverCellSpec { robot: "python3 my_driver.py".parse()?, camera: None };
+//! let cancel = CancelToken::default();
+//! let cell = DriverCell::start(&spec, &DriverOptions::default(), &cancel)?;
+//! if let Some(frame) = cell.frame(None, Duration::from_secs(1), &cancel)? {
+//!     println!("{:?}", frame.robot);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod cell;
+mod chain;
+mod client;
+pub mod clock;
+mod error;
+mod images;
+mod link;
+mod log;
+pub mod message;
+mod options;
+mod shared;
+mod spec;
+mod states;
+mod threads;
+pub mod wire;
+
+pub use cell::{ClockDifference, DriverCell, DriverCellSpec, DriverFrame};
+pub use client::{Driver, DriverImage, Goal, MoveEnd, RobotNow};
+pub use error::{DriverError, Ending};
+pub use log::LogLine;
+pub use message::LogLevel;
+pub use options::DriverOptions;
+pub use spec::{BadSpec, DriverSpec};
+pub use states::{NoPose, Reading, RobotAt};

@@ -1,0 +1,404 @@
+//! What the threads of one driver's connection share, and what each message does to it.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::mpsc::{SyncSender, TrySendError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use handeye_core::geometry::arm::Arm;
+use handeye_core::progress::CancelToken;
+
+use super::chain;
+use super::clock::ClockOffset;
+use super::error::{DriverError, Ending};
+use super::log::LogLines;
+use super::message::{
+    Ability, AnswerMessage, DepthMessage, FromDriver, Hello, ImageMessage, LogLevel, LogMessage, PongMessage,
+    StateMessage, ToDriver,
+};
+use super::options::DriverOptions;
+use super::states::{Reading, States};
+use super::wire::{Excerpt, Incoming, WireError, WireProblem};
+
+/// Lines that may wait for a driver which reads slowly.
+pub const QUEUE: usize = 64;
+/// Requests that may be open at a time; the workbench makes a handful.
+const MOST_REQUESTS: usize = 64;
+/// Unknown types of messages that are named in the log.
+const MOST_UNKNOWN: usize = 32;
+/// How often a cancel token is looked at.
+const POLL: Duration = Duration::from_millis(20);
+
+/// What the thread that writes is given.
+#[derive(Debug)]
+pub enum Out {
+    /// A message.
+    Line(String),
+    /// A ping with this number, whose time is taken when it leaves.
+    Ping(u64),
+    /// The last message.
+    Bye,
+}
+
+/// How far a request is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Progress {
+    /// On its way.
+    Sent,
+    /// Nobody waits for it any longer.
+    Abandoned,
+    /// The motion has begun.
+    Accepted,
+    /// It is done.
+    Done,
+    /// The motion ended elsewhere, and why.
+    Stopped(String),
+    /// It is not begun, and why.
+    Refused(String),
+}
+
+/// An image that is asked for, and what has come of it.
+#[derive(Debug)]
+pub struct FrameRequest {
+    pub id: u64,
+    pub after: Option<f64>,
+    pub depth_wanted: bool,
+    pub image: Option<(ImageMessage, Vec<u8>)>,
+    pub depth: Option<(DepthMessage, Vec<u8>)>,
+    pub refused: Option<String>,
+}
+
+impl FrameRequest {
+    /// Whether there is nothing more to wait for.
+    pub fn is_answered(&self) -> bool {
+        self.refused.is_some() || (self.image.is_some() && (self.depth.is_some() || !self.depth_wanted))
+    }
+}
+
+/// The state of a connection.
+#[derive(Debug, Default)]
+pub struct Inner {
+    pub hello: Option<Arc<Hello>>,
+    pub arm: Option<Arc<Arm>>,
+    /// Why it is over.
+    pub ending: Option<Ending>,
+    /// Nothing more will be read.
+    pub output_ended: bool,
+    /// Standard error is read to its end.
+    pub errors_ended: bool,
+    pub clock: ClockOffset,
+    /// Pings under way, with when they left.
+    pub pings: VecDeque<(u64, f64)>,
+    /// When the last pong came, or the hello.
+    pub last_heard_s: f64,
+    pub states: States,
+    pub frame: Option<FrameRequest>,
+    pub requests: BTreeMap<u64, Progress>,
+    pub last_id: u64,
+    pub is_armed: bool,
+    pub is_moving: bool,
+    pub log: LogLines,
+    unknown: BTreeSet<String>,
+}
+
+/// A connection to one driver, as its threads and its users have it.
+#[derive(Debug)]
+pub struct Shared {
+    /// Command or address, for messages.
+    pub driver: String,
+    pub options: DriverOptions,
+    inner: Mutex<Inner>,
+    changed: Condvar,
+    queue: Mutex<Option<SyncSender<Out>>>,
+}
+
+impl Shared {
+    pub fn new(driver: String, options: DriverOptions, queue: SyncSender<Out>) -> Self {
+        Self {
+            driver,
+            options,
+            inner: Mutex::default(),
+            changed: Condvar::new(),
+            queue: Mutex::new(Some(queue)),
+        }
+    }
+
+    pub fn now_s(&self) -> f64 {
+        self.options.timebase.now_s()
+    }
+
+    /// The state, for a moment.
+    pub fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes the state and wakes who waits for it.
+    pub fn update<T>(&self, change: impl FnOnce(&mut Inner) -> T) -> T {
+        let changed = change(&mut self.lock());
+        self.changed.notify_all();
+        changed
+    }
+
+    /// Ends the connection, unless it is over already.
+    pub fn finish(&self, why: Ending) {
+        self.update(|inner| {
+            inner.ending.get_or_insert(why);
+            inner.is_armed = false;
+        });
+    }
+
+    /// Waits until `ready` gives something, at most so long; `None` when the time is over or `cancel` was raised.
+    ///
+    /// # Errors
+    /// [`DriverError::Gone`] once the connection is over.
+    pub fn wait<T>(
+        &self,
+        patience: Duration,
+        cancel: Option<&CancelToken>,
+        mut ready: impl FnMut(&mut Inner) -> Option<T>,
+    ) -> Result<Option<T>, DriverError> {
+        let until = Instant::now() + patience;
+        let mut inner = self.lock();
+        loop {
+            if let Some(found) = ready(&mut inner) {
+                return Ok(Some(found));
+            }
+            if let Some(why) = &inner.ending {
+                return Err(self.gone(why.clone()));
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() || cancel.is_some_and(CancelToken::is_cancelled) {
+                return Ok(None);
+            }
+            let pause = if cancel.is_some() { left.min(POLL) } else { left };
+            inner = self.changed.wait_timeout(inner, pause).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Waits until nothing more is read, at most so long.
+    pub fn wait_for_output(&self, patience: Duration) {
+        let waited = self.changed.wait_timeout_while(self.lock(), patience, |inner| !inner.output_ended);
+        drop(waited.unwrap_or_else(PoisonError::into_inner));
+    }
+
+    pub fn gone(&self, why: Ending) -> DriverError {
+        DriverError::Gone { driver: self.driver.clone(), why }
+    }
+
+    /// Puts something into the queue of the thread that writes; false when it is full or closed.
+    pub fn enqueue(&self, out: Out) -> Result<(), TrySendError<Out>> {
+        let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
+        match queue.as_ref() {
+            Some(queue) => queue.try_send(out),
+            None => Err(TrySendError::Disconnected(out)),
+        }
+    }
+
+    /// Nothing is sent any longer; the thread that writes closes the driver's input once it has sent what waits.
+    pub fn close_queue(&self) {
+        *self.queue.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Sends a message.
+    ///
+    /// # Errors
+    /// [`DriverError::Gone`], also when the driver reads nothing.
+    pub fn send(&self, message: &ToDriver) -> Result<(), DriverError> {
+        if let Some(why) = &self.lock().ending {
+            return Err(self.gone(why.clone()));
+        }
+        match self.enqueue(Out::Line(message.line())) {
+            Ok(()) => Ok(()),
+            Err(error) => {
+                let why =
+                    if matches!(error, TrySendError::Full(_)) { Ending::NotReading } else { Ending::ClosedHere };
+                self.finish(why.clone());
+                Err(self.gone(why))
+            }
+        }
+    }
+
+    /// Makes a request and gives its number.
+    ///
+    /// # Errors
+    /// As [`Self::send`].
+    pub fn request(&self, message: impl FnOnce(u64) -> ToDriver) -> Result<u64, DriverError> {
+        let id = {
+            let mut inner = self.lock();
+            // What nobody waits for any longer makes room; a driver that answers nothing holds no more than this.
+            while inner.requests.len() >= MOST_REQUESTS {
+                inner.requests.pop_first();
+            }
+            inner.last_id += 1;
+            let id = inner.last_id;
+            inner.requests.insert(id, Progress::Sent);
+            id
+        };
+        self.send(&message(id))?;
+        Ok(id)
+    }
+
+    /// Takes in a message.
+    ///
+    /// # Errors
+    /// [`WireError`] for one that does not belong where it stands.
+    pub fn take(&self, incoming: Incoming, arrived_s: f64) -> Result<(), WireError> {
+        let Incoming { number, line, message, bytes } = incoming;
+        let taken = self.update(|inner| inner.take(message, bytes, arrived_s));
+        taken.map_err(|problem| WireError { number, excerpt: Excerpt::of(line.as_bytes()), problem })
+    }
+}
+
+fn misplaced(why: impl Into<String>) -> WireProblem {
+    WireProblem::Conversation(why.into())
+}
+
+impl Inner {
+    fn take(&mut self, message: FromDriver, bytes: Vec<u8>, arrived_s: f64) -> Result<(), WireProblem> {
+        let is_early = self.hello.is_none();
+        match message {
+            FromDriver::Hello(hello) => self.take_hello(*hello, arrived_s),
+            FromDriver::Log(LogMessage { level, text }) => {
+                self.log.add(level, false, &text);
+                Ok(())
+            }
+            FromDriver::Error(LogMessage { text, .. }) => {
+                self.log.add(LogLevel::Error, false, &text);
+                self.ending.get_or_insert(Ending::Said(text));
+                Ok(())
+            }
+            FromDriver::Unknown(kind) => {
+                if self.unknown.len() < MOST_UNKNOWN && !self.unknown.contains(&kind) {
+                    self.log.add(LogLevel::Debug, false, &format!("messages of type {kind} are not known and ignored"));
+                    self.unknown.insert(kind);
+                }
+                Ok(())
+            }
+            _ if is_early => Err(misplaced("only hello, log and error come before hello")),
+            FromDriver::Pong(pong) => self.take_pong(pong, arrived_s),
+            FromDriver::State(state) => self.take_state(&state),
+            FromDriver::Image(image) => self.take_image(image, bytes),
+            FromDriver::Depth(depth) => self.take_depth(depth, bytes),
+            FromDriver::Accepted(answer) => self.take_answer(answer, |_| Progress::Accepted),
+            FromDriver::Done(answer) => self.take_answer(answer, |_| Progress::Done),
+            FromDriver::Stopped(answer) => self.take_answer(answer, Progress::Stopped),
+            FromDriver::Refused(answer) => match &mut self.frame {
+                Some(frame) if frame.id == answer.id => {
+                    frame.refused = Some(answer.why);
+                    Ok(())
+                }
+                _ => self.take_answer(answer, Progress::Refused),
+            },
+        }
+    }
+
+    fn take_hello(&mut self, hello: Hello, arrived_s: f64) -> Result<(), WireProblem> {
+        if self.hello.is_some() {
+            return Err(misplaced("a second hello"));
+        }
+        self.arm = chain::arm_of(&hello).map_err(|why| misplaced(format!("arm: {why}")))?.map(Arc::new);
+        self.hello = Some(Arc::new(hello));
+        self.last_heard_s = arrived_s;
+        Ok(())
+    }
+
+    fn take_pong(&mut self, pong: PongMessage, arrived_s: f64) -> Result<(), WireProblem> {
+        let sent = self.pings.iter().position(|(id, _)| *id == pong.id);
+        let Some(position) = sent else {
+            return Err(misplaced(format!("id {} is of no ping that waits for an answer", pong.id)));
+        };
+        let (_, left_s) = self.pings[position];
+        // Those before it are answered late or never; their answers are then of no ping.
+        self.pings.drain(..=position);
+        self.clock.add(left_s, arrived_s, pong.stamp);
+        self.last_heard_s = arrived_s;
+        Ok(())
+    }
+
+    fn take_state(&mut self, state: &StateMessage) -> Result<(), WireProblem> {
+        let joints = self.can(Ability::Joints).map_or(0, |hello| hello.joints.len());
+        if self.can(Ability::State).is_none() {
+            return Err(misplaced("a state without `state` in `can`"));
+        }
+        let reading = Reading::of(state, joints, self.arm.as_deref())?;
+        self.states.add(reading)?;
+        Ok(())
+    }
+
+    fn can(&self, ability: Ability) -> Option<&Hello> {
+        self.hello.as_deref().filter(|hello| hello.can(ability))
+    }
+
+    fn take_image(&mut self, image: ImageMessage, bytes: Vec<u8>) -> Result<(), WireProblem> {
+        self.check_size(image.width, image.height)?;
+        let frame = self.frame.as_mut().filter(|frame| frame.id == image.id && frame.image.is_none());
+        let Some(frame) = frame else { return Err(misplaced(format!("id {} asks for no image", image.id))) };
+        if frame.after.is_some_and(|after| image.stamp <= after) {
+            return Err(misplaced(format!("stamp {} is not after {}", image.stamp, frame.after.unwrap_or_default())));
+        }
+        frame.image = Some((image, bytes));
+        Ok(())
+    }
+
+    fn take_depth(&mut self, depth: DepthMessage, bytes: Vec<u8>) -> Result<(), WireProblem> {
+        self.check_size(depth.width, depth.height)?;
+        let frame = self.frame.as_mut();
+        let frame = frame.filter(|frame| frame.id == depth.id && frame.depth_wanted && frame.depth.is_none());
+        let Some(frame) = frame else { return Err(misplaced(format!("id {} asks for no depth", depth.id))) };
+        frame.depth = Some((depth, bytes));
+        Ok(())
+    }
+
+    fn check_size(&self, width: u32, height: u32) -> Result<(), WireProblem> {
+        match self.hello.as_ref().and_then(|hello| hello.camera) {
+            Some(camera) if (camera.width, camera.height) == (width, height) => Ok(()),
+            Some(camera) => {
+                let said = format!("{}×{}", camera.width, camera.height);
+                Err(misplaced(format!("it is {width}×{height} and the camera of hello {said}")))
+            }
+            None => Err(misplaced("an image without `camera` in hello")),
+        }
+    }
+
+    fn take_answer(
+        &mut self,
+        AnswerMessage { id, why }: AnswerMessage,
+        progress: impl FnOnce(String) -> Progress,
+    ) -> Result<(), WireProblem> {
+        match self.requests.get_mut(&id) {
+            None => Err(misplaced(format!("id {id} is of no request that waits for an answer"))),
+            Some(Progress::Abandoned) => {
+                let progress = progress(why);
+                if progress != Progress::Accepted {
+                    self.requests.remove(&id);
+                }
+                Ok(())
+            }
+            Some(slot) => {
+                *slot = progress(why);
+                Ok(())
+            }
+        }
+    }
+
+    /// When the driver was last heard; `None` before its hello.
+    pub fn heard_s(&self) -> Option<f64> {
+        self.hello.as_ref().map(|_| self.last_heard_s)
+    }
+
+    /// Takes a finished request out; `None` while it is under way.
+    pub fn finished(&mut self, id: u64) -> Option<Progress> {
+        match self.requests.get(&id) {
+            None => Some(Progress::Abandoned),
+            Some(Progress::Done | Progress::Stopped(_) | Progress::Refused(_)) => self.requests.remove(&id),
+            Some(Progress::Sent | Progress::Accepted | Progress::Abandoned) => None,
+        }
+    }
+
+    /// Nobody waits for this one any longer.
+    pub fn abandon(&mut self, id: u64) {
+        if let Some(slot) = self.requests.get_mut(&id) {
+            *slot = Progress::Abandoned;
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! The states that a driver has sent, and the robot at an instant between two of them.
+
+use std::collections::VecDeque;
+
+use handeye_core::geometry::arm::{Arm, JointValues};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::geometry::se3;
+
+use super::message::{BadMessage, PoseMessage, StateMessage};
+
+/// Two states farther apart than this \[s\] say too little of what was between them; the protocol asks for ten a second.
+const MOST_APART_S: f64 = 0.25;
+/// For how long states are kept \[s\]: longer than an image takes from its exposure to here.
+const MEMORY_S: f64 = 10.0;
+/// Most states that are kept: those of 8 s at the highest rate of the protocol.
+const MOST: usize = 4096;
+
+/// The robot as a state says it, on the driver's clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// The driver's stamp \[s\].
+    pub stamp_s: f64,
+    /// Where the tip is.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// A value for each joint, rad or m.
+    pub joints: Option<JointValues>,
+    /// Whether the controller moves the arm, where it says so.
+    pub moving: Option<bool>,
+}
+
+/// The robot at an instant between two states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobotAt {
+    /// Where the tip was.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// A value for each joint, rad or m.
+    pub joints: Option<JointValues>,
+    /// Whether either state says that the arm moved; `None` where the driver does not say.
+    pub moving: Option<bool>,
+    /// Speed of the tip between the two states \[m/s\].
+    pub speed_m_s: f64,
+    /// How fast it turned \[rad/s\].
+    pub turn_rad_s: f64,
+}
+
+/// Why an image has no pose.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoPose {
+    /// There is no robot.
+    #[error("the driver sends no states: the pose of each image has to be given")]
+    NoRobot,
+    /// No state has come.
+    #[error("the robot's driver has not sent a state yet")]
+    NoState,
+    /// The clocks of robot and camera are not related yet.
+    #[error("the clocks of robot and camera are not related yet: no pong has come")]
+    NoClock,
+    /// The image is older than every state.
+    #[error("the image is {by_s:.3} s older than the oldest state: stamps of robot and camera do not belong together")]
+    TooOld {
+        /// By how much \[s\].
+        by_s: f64,
+    },
+    /// No state has come after the image.
+    #[error("there is no state after the image, the newest is {by_s:.3} s older: the robot's driver is late")]
+    TooNew {
+        /// By how much \[s\].
+        by_s: f64,
+    },
+    /// The states around it are too far apart.
+    #[error("the states before and after the image are {gap_s:.3} s apart, at most {MOST_APART_S} s")]
+    Gap {
+        /// How far apart \[s\].
+        gap_s: f64,
+    },
+}
+
+impl Reading {
+    /// Reads a state: `base_from_tip`, or the flange with its tool, or the joints of a chain that is known.
+    ///
+    /// # Errors
+    /// [`BadMessage`] for a pose that is none, a number of joints other than `joints`, and where nothing says where the
+    /// tip is.
+    pub fn of(state: &StateMessage, joints: usize, arm: Option<&Arm>) -> Result<Self, BadMessage> {
+        if let Some(values) = &state.joints_rad
+            && values.len() != joints
+        {
+            let why = format!("{} values, where hello has {joints} joints", values.len());
+            return Err(BadMessage::value("joints_rad", why));
+        }
+        if joints > 0 && state.joints_rad.is_none() {
+            return Err(BadMessage::value("joints_rad", "missing, where hello has joints"));
+        }
+        let tool = state.flange_from_tcp.map(|pose| pose.pose::<Tip, Tip>("flange_from_tcp")).transpose()?;
+        let with_tool = |flange: Pose<Base, Tip>| tool.map_or(flange, |tool| flange * tool);
+        let read = |pose: PoseMessage, field| pose.pose::<Base, Tip>(field);
+        let base_from_tip = match (state.base_from_tip, state.base_from_flange, arm, &state.joints_rad) {
+            (Some(tip), ..) => read(tip, "base_from_tip")?,
+            (None, Some(flange), ..) => with_tool(read(flange, "base_from_flange")?),
+            (None, None, Some(arm), Some(values)) => {
+                with_tool(arm.forward(values).map_err(|error| BadMessage::value("joints_rad", error))?)
+            }
+            _ => return Err(BadMessage::value("state", "base_from_tip is missing, and nothing else says where the tip is")),
+        };
+        Ok(Self { stamp_s: state.stamp, base_from_tip, joints: state.joints_rad, moving: state.moving })
+    }
+
+    fn between(&self, next: &Self, stamp_s: f64) -> RobotAt {
+        let gap_s = next.stamp_s - self.stamp_s;
+        let part = if gap_s > 0.0 { ((stamp_s - self.stamp_s) / gap_s).clamp(0.0, 1.0) } else { 1.0 };
+        let motion = se3::log((self.base_from_tip.inverse() * next.base_from_tip).isometry());
+        let per_s = if gap_s > 0.0 { 1.0 / gap_s } else { 0.0 };
+        let joints = match (&self.joints, &next.joints) {
+            (Some(a), Some(b)) if a.len() == b.len() => {
+                Some(JointValues::from_fn(a.len(), |i| a[i] + part * (b[i] - a[i])))
+            }
+            _ => None,
+        };
+        RobotAt {
+            base_from_tip: self.base_from_tip.perturbed(&(part * motion)),
+            joints,
+            moving: match (self.moving, next.moving) {
+                (None, None) => None,
+                (a, b) => Some(a.unwrap_or(false) || b.unwrap_or(false)),
+            },
+            speed_m_s: motion.fixed_rows::<3>(0).norm() * per_s,
+            turn_rad_s: motion.fixed_rows::<3>(3).norm() * per_s,
+        }
+    }
+}
+
+/// The newest states in the order of their stamps.
+#[derive(Debug, Clone, Default)]
+pub struct States {
+    readings: VecDeque<Reading>,
+}
+
+impl States {
+    /// Adds the newest.
+    ///
+    /// # Errors
+    /// [`BadMessage::Value`] for a stamp before that of the one before it.
+    pub fn add(&mut self, reading: Reading) -> Result<(), BadMessage> {
+        if let Some(last) = self.readings.back()
+            && reading.stamp_s < last.stamp_s
+        {
+            let why = format!("{} after {}: stamps never go back", reading.stamp_s, last.stamp_s);
+            return Err(BadMessage::value("stamp", why));
+        }
+        while self.readings.len() >= MOST
+            || self.readings.front().is_some_and(|first| reading.stamp_s - first.stamp_s > MEMORY_S)
+        {
+            self.readings.pop_front();
+        }
+        self.readings.push_back(reading);
+        Ok(())
+    }
+
+    /// The newest.
+    pub fn newest(&self) -> Option<&Reading> {
+        self.readings.back()
+    }
+
+    /// The robot at an instant of the driver's clock, by the screw motion between the two states around it.
+    ///
+    /// # Errors
+    /// [`NoPose`] where these are missing or too far apart.
+    pub fn at(&self, stamp_s: f64) -> Result<RobotAt, NoPose> {
+        let (Some(first), Some(last)) = (self.readings.front(), self.readings.back()) else {
+            return Err(NoPose::NoState);
+        };
+        let next = self.readings.partition_point(|reading| reading.stamp_s < stamp_s);
+        if next == self.readings.len() {
+            return Err(NoPose::TooNew { by_s: stamp_s - last.stamp_s });
+        }
+        let after = &self.readings[next];
+        if after.stamp_s == stamp_s && next == 0 {
+            return Ok(after.between(after, stamp_s));
+        }
+        let Some(before) = next.checked_sub(1).map(|i| &self.readings[i]) else {
+            return Err(NoPose::TooOld { by_s: first.stamp_s - stamp_s });
+        };
+        let gap_s = after.stamp_s - before.stamp_s;
+        if gap_s > MOST_APART_S {
+            return Err(NoPose::Gap { gap_s });
+        }
+        Ok(before.between(after, stamp_s))
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[path = "states_tests.rs"]
+mod tests;

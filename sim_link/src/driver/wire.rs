@@ -1,0 +1,178 @@
+//! Framing: lines and the bytes that follow them, with limits. What is held is bounded whatever a driver sends.
+
+use std::fmt;
+use std::io::{BufRead, Read};
+
+use super::message::{BadMessage, FromDriver};
+
+/// Longest line in bytes, its end included.
+pub const MAX_LINE: usize = 65_536;
+/// Most bytes that follow a line: an image of 22 million pixels in colour.
+pub const MAX_BYTES: u64 = 67_108_864;
+/// Bytes are taken in pieces of this size, so that what is promised and does not come takes no memory.
+const PIECE: u64 = 1 << 20;
+/// How much of a line is shown.
+const SHOWN: usize = 160;
+
+/// A message as it came.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Incoming {
+    /// Which line of the conversation it was, counted from 1.
+    pub number: u64,
+    /// The line, for messages about it.
+    pub line: String,
+    /// What it says.
+    pub message: FromDriver,
+    /// What followed it; nothing after a message of an unknown type, where bytes are passed over.
+    pub bytes: Vec<u8>,
+}
+
+/// A message that breaks the protocol, with the line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("message {number}: {problem}: {excerpt}")]
+pub struct WireError {
+    /// Which line of the conversation it was, counted from 1.
+    pub number: u64,
+    /// How the line begins.
+    pub excerpt: Excerpt,
+    /// What is wrong.
+    pub problem: WireProblem,
+}
+
+/// What is wrong with a message.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WireProblem {
+    /// No end of line within [`MAX_LINE`].
+    #[error("longer than {MAX_LINE} bytes: data such as images follow a line as bytes")]
+    TooLong,
+    /// The output ended within a line.
+    #[error("the output ended before the end of the line")]
+    CutLine,
+    /// The output ended within the bytes that follow a line.
+    #[error("the output ended after {got} of {need} bytes")]
+    CutBytes {
+        /// What came.
+        got: u64,
+        /// What was promised.
+        need: u64,
+    },
+    /// Not text.
+    #[error("not UTF-8: the number of bytes before it may have been wrong")]
+    NotText,
+    /// More bytes than [`MAX_BYTES`].
+    #[error("{got} bytes are to follow, at most {MAX_BYTES}")]
+    TooManyBytes {
+        /// What was promised.
+        got: u64,
+    },
+    /// The message itself.
+    #[error(transparent)]
+    Message(#[from] BadMessage),
+    /// It does not belong where it stands in the conversation, or its bytes are no image.
+    #[error("{0}")]
+    Conversation(String),
+    /// The system cannot read.
+    #[error("it cannot be read: {0}")]
+    Unreadable(String),
+}
+
+/// The beginning of a line, safe to show.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Excerpt(String);
+
+impl Excerpt {
+    /// Of the bytes of a line. What is no text becomes `\x…`.
+    pub fn of(line: &[u8]) -> Self {
+        let mut shown = String::new();
+        for chunk in line.trim_ascii().utf8_chunks() {
+            for character in chunk.valid().chars() {
+                if shown.len() >= SHOWN {
+                    return Self(shown + "…");
+                }
+                if character.is_control() { shown.extend(character.escape_default()) } else { shown.push(character) }
+            }
+            for byte in chunk.invalid() {
+                shown += &format!("\\x{byte:02x}");
+            }
+        }
+        Self(shown)
+    }
+}
+
+impl fmt::Display for Excerpt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// Reads the messages of a driver. After an error there is no way to tell where the next message begins.
+#[derive(Debug)]
+pub struct MessageReader<R> {
+    source: R,
+    number: u64,
+    line: Vec<u8>,
+}
+
+impl<R: BufRead> MessageReader<R> {
+    /// From the beginning of a conversation.
+    pub fn new(source: R) -> Self {
+        Self { source, number: 0, line: Vec::new() }
+    }
+
+    /// The next message; `None` once the output has ended where a message could begin. Blocks until then.
+    ///
+    /// # Errors
+    /// [`WireError`] with the line that is wrong.
+    pub fn read(&mut self) -> Result<Option<Incoming>, WireError> {
+        self.number += 1;
+        self.line.clear();
+        let limit = MAX_LINE as u64;
+        let taken = self.source.by_ref().take(limit).read_until(b'\n', &mut self.line);
+        taken.map_err(|error| self.error(WireProblem::Unreadable(error.to_string())))?;
+        if self.line.is_empty() {
+            return Ok(None);
+        }
+        if self.line.last() != Some(&b'\n') {
+            let is_long = self.line.len() >= MAX_LINE;
+            return Err(self.error(if is_long { WireProblem::TooLong } else { WireProblem::CutLine }));
+        }
+        let Ok(line) = std::str::from_utf8(&self.line) else { return Err(self.error(WireProblem::NotText)) };
+        let line = line.trim_ascii_end().to_owned();
+        let (message, count) = FromDriver::parse(&line).map_err(|bad| self.error(bad.into()))?;
+        if count > MAX_BYTES {
+            return Err(self.error(WireProblem::TooManyBytes { got: count }));
+        }
+        let is_kept = !matches!(message, FromDriver::Unknown(_));
+        let bytes = self.bytes(count, is_kept)?;
+        Ok(Some(Incoming { number: self.number, line, message, bytes }))
+    }
+
+    fn bytes(&mut self, count: u64, is_kept: bool) -> Result<Vec<u8>, WireError> {
+        let mut bytes = Vec::new();
+        let mut got = 0;
+        while got < count {
+            let mut piece = self.source.by_ref().take(PIECE.min(count - got));
+            let taken = if is_kept {
+                piece.read_to_end(&mut bytes).map(|taken| taken as u64)
+            } else {
+                std::io::copy(&mut piece, &mut std::io::sink())
+            };
+            match taken {
+                Ok(0) => return Err(self.error(WireProblem::CutBytes { got, need: count })),
+                Ok(taken) => got += taken,
+                Err(error) => return Err(self.error(WireProblem::Unreadable(error.to_string()))),
+            }
+        }
+        Ok(bytes)
+    }
+
+    fn error(&self, problem: WireProblem) -> WireError {
+        WireError { number: self.number, excerpt: Excerpt::of(&self.line), problem }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[path = "wire_tests.rs"]
+mod tests;
