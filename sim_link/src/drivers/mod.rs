@@ -5,8 +5,11 @@
 //! [`serve`] answers the workbench meanwhile. All of them only read: a request to move is refused.
 
 mod clock;
+pub mod folder;
+mod interpolate;
 mod outlet;
 mod serve;
+pub mod rosbridge;
 pub mod ur_rtde;
 
 pub use outlet::{DepthFrame, Frame, Outlet};

@@ -106,7 +106,7 @@ impl Outlet {
     }
 
     /// What the device's clock shows.
-    pub(super) fn device_time(&self) -> f64 {
+    pub fn device_time(&self) -> f64 {
         locked(&self.clock).at(self.own_time())
     }
 

@@ -6,6 +6,7 @@ mod any_joints;
 mod arm;
 mod board;
 mod client_faults;
+mod drivers;
 mod joint_offsets;
 mod other_arms;
 mod surroundings;
