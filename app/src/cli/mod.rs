@@ -9,6 +9,7 @@ mod box_arg;
 mod calibrate;
 mod cell;
 mod doctor;
+mod driver;
 mod export;
 mod failure;
 mod gate;
@@ -69,6 +70,9 @@ enum Command {
     /// Track the board live with a calibration, and have the arm follow it.
     #[command(after_help = "Example:\n  handeye track --calibration session/result.json --follow --frames 600")]
     Track(track::TrackArgs),
+    /// Try a driver, or be one: a program between the workbench and any robot or camera (docs/drivers.md).
+    #[command(after_help = driver::EXAMPLES)]
+    Driver(driver::DriverArgs),
     /// Write calibration files from a solved session or a result JSON.
     #[command(after_help = "Example:\n  handeye export session --format ros_camera_info easy_handeye2 --out files")]
     Export(export::ExportArgs),
@@ -99,6 +103,7 @@ pub fn main() -> ExitCode {
         Command::Doctor(args) => doctor::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Track(args) => track::run(&args),
+        Command::Driver(args) => driver::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Target(args) => target::run(&args),
     };

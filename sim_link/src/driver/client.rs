@@ -20,7 +20,7 @@ use super::link::Link;
 use super::log::LogLine;
 use super::message::{Ability, DepthMessage, Hello, ImageMessage, PROTOCOL, PoseMessage, ToDriver};
 use super::options::DriverOptions;
-use super::shared::{FrameRequest, Progress, QUEUE, Shared};
+use super::shared::{FrameRequest, Inner, Progress, QUEUE, Shared};
 use super::spec::DriverSpec;
 use super::states::{NoPose, Reading, RobotAt};
 use super::threads;
@@ -236,7 +236,7 @@ impl Driver {
         loop {
             self.ask_for_image(after)?;
             let left = until.saturating_duration_since(Instant::now());
-            let answered = |inner: &mut super::shared::Inner| {
+            let answered = |inner: &mut Inner| {
                 inner.frame.take_if(|frame| frame.is_answered())
             };
             let Some(frame) = shared.wait(left, Some(cancel), answered)? else { return Ok(None) };
@@ -248,7 +248,7 @@ impl Driver {
             else {
                 continue;
             };
-            return self.decoded(image, bytes, frame.depth).map(Some);
+            return self.decoded(&image, bytes, frame.depth).map(Some);
         }
     }
 
@@ -270,7 +270,7 @@ impl Driver {
 
     fn decoded(
         &self,
-        image: ImageMessage,
+        image: &ImageMessage,
         bytes: Vec<u8>,
         depth: Option<(DepthMessage, Vec<u8>)>,
     ) -> Result<DriverImage, DriverError> {
@@ -281,7 +281,7 @@ impl Driver {
             self.owner.shared.finish(why.clone());
             self.owner.shared.gone(why)
         };
-        let rgb = images::image(&image, bytes).map_err(broken)?;
+        let rgb = images::image(image, bytes).map_err(broken)?;
         let depth = depth.map(|(depth, bytes)| images::depth(&depth, &bytes)).transpose().map_err(broken)?;
         let lens = image.intrinsics.or(self.hello().camera.and_then(|camera| camera.intrinsics));
         Ok(DriverImage {
@@ -361,12 +361,8 @@ impl Driver {
     fn moved(&self, goal: &Goal, speed: f64, cancel: &CancelToken) -> Result<MoveEnd, DriverError> {
         let shared = &self.owner.shared;
         let speed = speed.clamp(0.001, 1.0);
-        let (joints_rad, base_from_tip) = match goal {
-            Goal::Joints(joints) => (Some(*joints), None),
-            Goal::Tip(pose) => (None, Some(PoseMessage::of(pose))),
-        };
-        let id = shared.request(|id| ToDriver::Move { id, joints_rad, base_from_tip, speed })?;
-        let begun = |inner: &mut super::shared::Inner| (inner.requests.get(&id) != Some(&Progress::Sent)).then_some(());
+        let id = shared.request(|id| move_message(id, goal, speed))?;
+        let begun = |inner: &mut Inner| (inner.requests.get(&id) != Some(&Progress::Sent)).then_some(());
         if shared.wait(shared.options.answer, None, begun)?.is_none() {
             // It may begin yet.
             self.stop()?;
@@ -374,13 +370,12 @@ impl Driver {
             return Err(self.no_answer("`move` with accepted or refused", shared.options.answer));
         }
         let ended = shared.wait(shared.options.motion, Some(cancel), |inner| inner.finished(id))?;
-        let ended = match ended {
-            Some(ended) => ended,
-            None => {
-                self.stop()?;
-                let ended = shared.wait(shared.options.answer, None, |inner| inner.finished(id))?;
-                ended.ok_or_else(|| self.end(Ending::DoesNotStop))?
-            }
+        let ended = if let Some(ended) = ended {
+            ended
+        } else {
+            self.stop()?;
+            let ended = shared.wait(shared.options.answer, None, |inner| inner.finished(id))?;
+            ended.ok_or_else(|| self.end(Ending::DoesNotStop))?
         };
         Ok(match ended {
             Progress::Refused(why) => MoveEnd::Refused(why),
@@ -411,6 +406,10 @@ impl Driver {
         self.owner.shared.lock().log.take()
     }
 
+    pub(super) fn shared(&self) -> &Arc<Shared> {
+        &self.owner.shared
+    }
+
     fn require(&self, ability: Ability) -> Result<(), DriverError> {
         if self.hello().can(ability) {
             return Ok(());
@@ -437,6 +436,15 @@ impl Drop for Owner {
             tracing::error!(driver = %self.shared.driver, "the thread that watches the driver had failed");
         }
     }
+}
+
+/// The request for a motion.
+pub(super) fn move_message(id: u64, goal: &Goal, speed: f64) -> ToDriver {
+    let (joints_rad, base_from_tip) = match goal {
+        Goal::Joints(joints) => (Some(*joints), None),
+        Goal::Tip(pose) => (None, Some(PoseMessage::of(pose))),
+    };
+    ToDriver::Move { id, joints_rad, base_from_tip, speed }
 }
 
 /// Stands where none has come yet.

@@ -51,9 +51,11 @@ pub struct Offset {
 
 #[derive(Debug, Clone, Copy)]
 struct Pong {
-    at_s: f64,
-    low_s: f64,
-    high_s: f64,
+    /// When it arrived \[s\].
+    arrived: f64,
+    /// Least and greatest offset that it allows \[s\].
+    least: f64,
+    greatest: f64,
 }
 
 /// Estimates the offset from pongs.
@@ -67,14 +69,14 @@ impl ClockOffset {
     /// A pong: when its ping left and when it arrived on our clock, and the driver's stamp, all in seconds. One that
     /// contradicts those before says that a clock was set: they are forgotten.
     pub fn add(&mut self, left_s: f64, arrived_s: f64, stamp_s: f64) {
-        let pong = Pong { at_s: arrived_s, low_s: left_s - stamp_s, high_s: arrived_s - stamp_s };
+        let pong = Pong { arrived: arrived_s, least: left_s - stamp_s, greatest: arrived_s - stamp_s };
         if let Some((low_s, high_s)) = self.interval(arrived_s)
-            && (pong.low_s > high_s || pong.high_s < low_s)
+            && (pong.least > high_s || pong.greatest < low_s)
         {
             self.pongs.clear();
             self.jumps += 1;
         }
-        self.pongs.retain(|old| arrived_s - old.at_s <= MEMORY_S);
+        self.pongs.retain(|old| arrived_s - old.arrived <= MEMORY_S);
         if self.pongs.len() >= MOST {
             self.pongs.pop_front();
         }
@@ -89,9 +91,9 @@ impl ClockOffset {
     }
 
     fn interval(&self, now_s: f64) -> Option<(f64, f64)> {
-        let wider = |pong: &Pong| DRIFT * (now_s - pong.at_s).abs();
-        let low_s = self.pongs.iter().map(|pong| pong.low_s - wider(pong)).reduce(f64::max)?;
-        let high_s = self.pongs.iter().map(|pong| pong.high_s + wider(pong)).reduce(f64::min)?;
+        let wider = |pong: &Pong| DRIFT * (now_s - pong.arrived).abs();
+        let low_s = self.pongs.iter().map(|pong| pong.least - wider(pong)).reduce(f64::max)?;
+        let high_s = self.pongs.iter().map(|pong| pong.greatest + wider(pong)).reduce(f64::min)?;
         Some((low_s, high_s))
     }
 }

@@ -503,6 +503,10 @@ impl FromDriver {
     /// # Errors
     /// [`BadMessage`] says what is wrong with it.
     pub fn parse(line: &str) -> Result<(Self, u64), BadMessage> {
+        // An array can be read as a struct too, and is none here.
+        if !line.trim_start().starts_with('{') {
+            return Err(if line.trim().is_empty() { BadMessage::Empty } else { BadMessage::Chatter });
+        }
         let header: Header = serde_json::from_str(line).map_err(|error| not_a_message(line, &error))?;
         let kind = header.kind.as_str();
         let message = match kind {
@@ -567,22 +571,14 @@ fn body<'a, T: Deserialize<'a>>(kind: &str, line: &'a str) -> Result<T, BadMessa
 }
 
 fn not_a_message(line: &str, error: &serde_json::Error) -> BadMessage {
-    if line.trim().is_empty() {
-        BadMessage::Empty
-    } else if error.is_data() {
+    if error.is_data() {
         BadMessage::Field { kind: "message".to_owned(), why: error.to_string() }
-    } else if has_nan(line) {
+    } else if line.contains("NaN") || line.contains("Infinity") {
+        // What Python writes for numbers that are none.
         BadMessage::NotJson { why: format!("{error}: JSON has no NaN and no Infinity, leave the field out") }
-    } else if line.trim_start().starts_with('{') {
-        BadMessage::NotJson { why: error.to_string() }
     } else {
-        BadMessage::Chatter
+        BadMessage::NotJson { why: error.to_string() }
     }
-}
-
-/// Python writes these for numbers that are none.
-fn has_nan(line: &str) -> bool {
-    line.trim_start().starts_with('{') && (line.contains("NaN") || line.contains("Infinity"))
 }
 
 fn check_size(width: u32, height: u32) -> Result<(), BadMessage> {
@@ -666,3 +662,8 @@ impl BadMessage {
         Self::Value { field, why: why.to_string() }
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[path = "message_tests.rs"]
+mod tests;

@@ -7,6 +7,9 @@
 //! | [`message`] | what is said, and what is wrong with a message |
 //! | [`wire`] | lines and the bytes that follow them, with limits |
 //! | [`Driver`] | one program: state, images, motions, log, how it ended |
+//! | [`DriverHost`] | the same cell for several threads, started again when it is gone |
+//! | [`conformance`] | whether a program keeps to the protocol |
+//! | [`fake`] | a driver with the built-in cell behind it |
 //! | [`DriverCell`] | a robot and a camera, in one program or two: images with the pose at their instant |
 //!
 //! ```no_run
@@ -27,7 +30,10 @@ mod cell;
 mod chain;
 mod client;
 pub mod clock;
+pub mod conformance;
 mod error;
+pub mod fake;
+mod host;
 mod images;
 mod link;
 mod log;
@@ -42,6 +48,7 @@ pub mod wire;
 pub use cell::{ClockDifference, DriverCell, DriverCellSpec, DriverFrame};
 pub use client::{Driver, DriverImage, Goal, MoveEnd, RobotNow};
 pub use error::{DriverError, Ending};
+pub use host::DriverHost;
 pub use log::LogLine;
 pub use message::LogLevel;
 pub use options::DriverOptions;

@@ -57,6 +57,24 @@ pub enum Progress {
     Refused(String),
 }
 
+/// How a driver ended once it was told to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Burial {
+    /// The process ended by itself.
+    Ended {
+        /// In the words of the system.
+        status: String,
+        /// Whether its exit status is 0.
+        is_success: bool,
+    },
+    /// The process had to be killed.
+    Killed,
+    /// It closed its end of the connection.
+    Closed,
+    /// It did not close its end.
+    LeftOpen,
+}
+
 /// An image that is asked for, and what has come of it.
 #[derive(Debug)]
 pub struct FrameRequest {
@@ -75,6 +93,24 @@ impl FrameRequest {
     }
 }
 
+/// What has been read to its end.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ReadUp {
+    /// What the driver sends.
+    pub output: bool,
+    /// Standard error.
+    pub errors: bool,
+}
+
+/// What a conformance run does otherwise than the workbench, to see what the driver does about that.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Trial {
+    /// No pings are sent.
+    pub is_quiet: bool,
+    /// The connection is closed without `bye`.
+    pub leaves_without_bye: bool,
+}
+
 /// The state of a connection.
 #[derive(Debug, Default)]
 pub struct Inner {
@@ -82,13 +118,16 @@ pub struct Inner {
     pub arm: Option<Arc<Arm>>,
     /// Why it is over.
     pub ending: Option<Ending>,
-    /// Nothing more will be read.
-    pub output_ended: bool,
-    /// Standard error is read to its end.
-    pub errors_ended: bool,
+    pub read_up: ReadUp,
     pub clock: ClockOffset,
     /// Pings under way, with when they left.
     pub pings: VecDeque<(u64, f64)>,
+    /// When the newest pong came, and its stamp.
+    pub last_pong: Option<(f64, f64)>,
+    /// How many pongs have come.
+    pub pongs: u64,
+    /// How many states have come.
+    pub state_count: u64,
     /// When the last pong came, or the hello.
     pub last_heard_s: f64,
     pub states: States,
@@ -98,6 +137,9 @@ pub struct Inner {
     pub is_armed: bool,
     pub is_moving: bool,
     pub log: LogLines,
+    pub trial: Trial,
+    /// How the driver ended once the connection was over.
+    pub burial: Option<Burial>,
     unknown: BTreeSet<String>,
 }
 
@@ -175,10 +217,10 @@ impl Shared {
         }
     }
 
-    /// Waits until nothing more is read, at most so long.
-    pub fn wait_for_output(&self, patience: Duration) {
-        let waited = self.changed.wait_timeout_while(self.lock(), patience, |inner| !inner.output_ended);
-        drop(waited.unwrap_or_else(PoisonError::into_inner));
+    /// Waits until nothing more is read, at most so long; whether that is so.
+    pub fn wait_for_output(&self, patience: Duration) -> bool {
+        let waited = self.changed.wait_timeout_while(self.lock(), patience, |inner| !inner.read_up.output);
+        waited.unwrap_or_else(PoisonError::into_inner).0.read_up.output
     }
 
     pub fn gone(&self, why: Ending) -> DriverError {
@@ -204,10 +246,18 @@ impl Shared {
     /// # Errors
     /// [`DriverError::Gone`], also when the driver reads nothing.
     pub fn send(&self, message: &ToDriver) -> Result<(), DriverError> {
+        self.send_line(message.line())
+    }
+
+    /// Sends a line, with its end.
+    ///
+    /// # Errors
+    /// As [`Self::send`].
+    pub fn send_line(&self, line: String) -> Result<(), DriverError> {
         if let Some(why) = &self.lock().ending {
             return Err(self.gone(why.clone()));
         }
-        match self.enqueue(Out::Line(message.line())) {
+        match self.enqueue(Out::Line(line)) {
             Ok(()) => Ok(()),
             Err(error) => {
                 let why =
@@ -311,6 +361,8 @@ impl Inner {
         // Those before it are answered late or never; their answers are then of no ping.
         self.pings.drain(..=position);
         self.clock.add(left_s, arrived_s, pong.stamp);
+        self.last_pong = Some((arrived_s, pong.stamp));
+        self.pongs += 1;
         self.last_heard_s = arrived_s;
         Ok(())
     }
@@ -322,6 +374,7 @@ impl Inner {
         }
         let reading = Reading::of(state, joints, self.arm.as_deref())?;
         self.states.add(reading)?;
+        self.state_count += 1;
         Ok(())
     }
 

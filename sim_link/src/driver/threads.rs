@@ -2,15 +2,16 @@
 //! driver. Nothing that a driver does, or does not do, blocks anybody else.
 
 use std::io::{BufReader, Read, Write};
+use std::net::Shutdown;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use super::error::Ending;
+use super::error::{DriverError, Ending};
 use super::link::LinkEnd;
 use super::log::LONGEST;
 use super::message::{LogLevel, ToDriver};
-use super::shared::{Out, Shared};
+use super::shared::{Burial, Inner, Out, Shared};
 use super::wire::MessageReader;
 
 /// How long the rest of what a driver that has ended said may take to be read.
@@ -40,7 +41,7 @@ pub fn read(shared: &Shared, output: Box<dyn Read + Send>) {
         }
     }
     let _unreadable = std::io::copy(&mut output, &mut std::io::sink()).is_err();
-    shared.update(|inner| inner.output_ended = true);
+    shared.update(|inner| inner.read_up.output = true);
 }
 
 /// Writes what is queued until the queue is closed; then the driver's input ends.
@@ -85,20 +86,25 @@ pub fn collect_errors(shared: &Shared, mut errors: Box<dyn Read + Send>) {
         if !line.is_empty() {
             inner.log.add(LogLevel::Info, true, &String::from_utf8_lossy(&line));
         }
-        inner.errors_ended = true;
+        inner.read_up.errors = true;
     });
 }
 
 /// Sends pings, notices that the driver is gone, and ends it.
 pub fn watch(shared: &Arc<Shared>, mut end: LinkEnd) {
     let mut id = 0;
-    while let Some(why) = shared.wait(shared.options.ping_every, None, |inner| inner.output_ended.then_some(())).ok() {
-        let is_over = why.is_some() || end.ended_within(Duration::ZERO).is_some();
+    let over = |inner: &mut Inner| inner.read_up.output.then_some(());
+    while let Ok(over) = shared.wait(shared.options.ping_every, None, over) {
+        let is_over = over.is_some() || end.ended_within(Duration::ZERO).is_some();
         if is_over {
             shared.finish(how_ended(shared, &mut end));
             break;
         }
         let Some(heard_s) = shared.lock().heard_s() else { continue };
+        if shared.lock().trial.is_quiet {
+            shared.lock().last_heard_s = shared.now_s();
+            continue;
+        }
         if shared.now_s() - heard_s > shared.options.silence.as_secs_f64() {
             shared.finish(Ending::Silent { after: shared.options.silence });
             break;
@@ -114,9 +120,9 @@ pub fn watch(shared: &Arc<Shared>, mut end: LinkEnd) {
 fn how_ended(shared: &Shared, end: &mut LinkEnd) -> Ending {
     let status = end.ended_within(LAST_WORDS);
     // What it said last is often why.
-    let read_up = |inner: &mut super::shared::Inner| (inner.errors_ended && inner.output_ended).then_some(());
+    let read_up = |inner: &mut Inner| (inner.read_up.errors && inner.read_up.output).then_some(());
     if status.is_some()
-        && let Err(super::error::DriverError::Gone { why, .. }) = shared.wait(LAST_WORDS, None, read_up)
+        && let Err(DriverError::Gone { why, .. }) = shared.wait(LAST_WORDS, None, read_up)
     {
         return why;
     }
@@ -129,12 +135,23 @@ fn how_ended(shared: &Shared, end: &mut LinkEnd) -> Ending {
 
 /// Tells the driver to brake and end, closes its input, and kills it when it does not end by itself.
 fn bury(shared: &Shared, end: &mut LinkEnd) {
-    let _full_or_closed = shared.enqueue(Out::Bye).is_err();
-    shared.close_queue();
-    if matches!(end, LinkEnd::Tcp(_)) {
-        shared.wait_for_output(shared.options.farewell);
-    } else {
-        end.ended_within(shared.options.farewell);
+    if !shared.lock().trial.leaves_without_bye {
+        let _full_or_closed = shared.enqueue(Out::Bye).is_err();
     }
+    shared.close_queue();
+    let patience = shared.options.farewell;
+    let burial = match end {
+        LinkEnd::Tcp(stream) => {
+            if shared.lock().trial.leaves_without_bye {
+                let _closed_already = stream.shutdown(Shutdown::Write).is_err();
+            }
+            if shared.wait_for_output(patience) { Burial::Closed } else { Burial::LeftOpen }
+        }
+        LinkEnd::Process(_) => match end.ended_within(patience) {
+            Some(status) => Burial::Ended { status: status.to_string(), is_success: status.success() },
+            None => Burial::Killed,
+        },
+    };
     end.kill();
+    shared.update(|inner| inner.burial = Some(burial));
 }

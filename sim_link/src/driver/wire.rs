@@ -58,8 +58,16 @@ pub enum WireProblem {
         need: u64,
     },
     /// Not text.
-    #[error("not UTF-8: the number of bytes before it may have been wrong")]
+    #[error("not UTF-8")]
     NotText,
+    /// No message where one has to be, behind the bytes of another.
+    #[error("{what}: it follows the {bytes} bytes of the message before, of which there may be more or fewer")]
+    AfterBytes {
+        /// How many bytes were taken.
+        bytes: u64,
+        /// What is wrong with what follows.
+        what: Box<WireProblem>,
+    },
     /// More bytes than [`MAX_BYTES`].
     #[error("{got} bytes are to follow, at most {MAX_BYTES}")]
     TooManyBytes {
@@ -82,7 +90,7 @@ pub enum WireProblem {
 pub struct Excerpt(String);
 
 impl Excerpt {
-    /// Of the bytes of a line. What is no text becomes `\x…`.
+    /// Of the bytes of a line. What is no text becomes �.
     pub fn of(line: &[u8]) -> Self {
         let mut shown = String::new();
         for chunk in line.trim_ascii().utf8_chunks() {
@@ -92,8 +100,8 @@ impl Excerpt {
                 }
                 if character.is_control() { shown.extend(character.escape_default()) } else { shown.push(character) }
             }
-            for byte in chunk.invalid() {
-                shown += &format!("\\x{byte:02x}");
+            if !chunk.invalid().is_empty() {
+                shown.push(char::REPLACEMENT_CHARACTER);
             }
         }
         Self(shown)
@@ -112,12 +120,14 @@ pub struct MessageReader<R> {
     source: R,
     number: u64,
     line: Vec<u8>,
+    /// How many bytes followed the line before.
+    bytes_before: u64,
 }
 
 impl<R: BufRead> MessageReader<R> {
     /// From the beginning of a conversation.
     pub fn new(source: R) -> Self {
-        Self { source, number: 0, line: Vec::new() }
+        Self { source, number: 0, line: Vec::new(), bytes_before: 0 }
     }
 
     /// The next message; `None` once the output has ended where a message could begin. Blocks until then.
@@ -125,6 +135,20 @@ impl<R: BufRead> MessageReader<R> {
     /// # Errors
     /// [`WireError`] with the line that is wrong.
     pub fn read(&mut self) -> Result<Option<Incoming>, WireError> {
+        let bytes = std::mem::take(&mut self.bytes_before);
+        self.read_next().map_err(|error| match error.problem {
+            what @ (WireProblem::NotText
+            | WireProblem::TooLong
+            | WireProblem::Message(BadMessage::Empty | BadMessage::Chatter | BadMessage::NotJson { .. }))
+                if bytes > 0 =>
+            {
+                WireError { problem: WireProblem::AfterBytes { bytes, what: Box::new(what) }, ..error }
+            }
+            _ => error,
+        })
+    }
+
+    fn read_next(&mut self) -> Result<Option<Incoming>, WireError> {
         self.number += 1;
         self.line.clear();
         let limit = MAX_LINE as u64;
@@ -145,6 +169,7 @@ impl<R: BufRead> MessageReader<R> {
         }
         let is_kept = !matches!(message, FromDriver::Unknown(_));
         let bytes = self.bytes(count, is_kept)?;
+        self.bytes_before = count;
         Ok(Some(Incoming { number: self.number, line, message, bytes }))
     }
 

@@ -6,9 +6,11 @@ mod any_joints;
 mod arm;
 mod board;
 mod client_faults;
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod drivers;
 mod joint_offsets;
 mod other_arms;
+mod robots;
 mod surroundings;
 mod vendor;
 

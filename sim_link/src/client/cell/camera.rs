@@ -152,7 +152,8 @@ impl CameraFeed {
         })
     }
 
-    fn shown(&mut self) -> Result<Option<ShownMoment>, LinkError> {
+    /// The robot and the time that the newest images show, from a cell that says so; `None` where they show nothing yet.
+    pub(crate) fn shown(&mut self) -> Result<Option<ShownMoment>, LinkError> {
         if !self.tells_moment {
             return Ok(None);
         }

@@ -85,7 +85,7 @@ impl PublishedTruth {
 
 /// The pass that the images of a cell show.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct ShownMoment {
+pub(crate) struct ShownMoment {
     pub sim_time_s: f64,
     pub joints: JointValues,
     pub base_from_tip: Pose<Base, Tip>,
