@@ -47,7 +47,7 @@ pub(super) struct Scene {
     pub tree: Tree,
     pub joints: Joints,
     info: Option<CameraInfo>,
-    /// Size of the last image.
+    /// Size of the images.
     pub size: Option<(u32, u32)>,
     pictures: VecDeque<Picture>,
     depths: VecDeque<DepthFrame>,
@@ -128,7 +128,12 @@ impl Scene {
             let image: AnyImage = parse(topic, text, "sensor_msgs/Image or sensor_msgs/CompressedImage")?;
             let picture = images::picture(image).map_err(|why| RosbridgeError::topic(topic, why))?;
             stamped(topic, picture.stamp_s)?;
-            self.size = Some((picture.width, picture.height));
+            let size = (picture.width, picture.height);
+            let first = *self.size.get_or_insert(size);
+            if size != first {
+                let why = format!("images were {}×{} and are {}×{} now", first.0, first.1, size.0, size.1);
+                return Err(RosbridgeError::topic(topic, why));
+            }
             keep(&mut self.pictures, picture);
             return Ok(self.frame());
         }

@@ -1,5 +1,7 @@
 //! The drivers that come with the workbench, through the protocol, in front of servers that other clients read too.
 
+mod folder;
+mod rosbridge;
 mod ur_rtde;
 
 use std::io::{BufRead as _, BufReader, PipeReader, PipeWriter, Read as _, Write as _};
