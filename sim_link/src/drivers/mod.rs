@@ -8,8 +8,8 @@ mod clock;
 pub mod folder;
 mod interpolate;
 mod outlet;
-mod serve;
 pub mod rosbridge;
+mod serve;
 pub mod ur_rtde;
 
 pub use outlet::{DepthFrame, Frame, Outlet};

@@ -86,12 +86,7 @@ struct Message<'a, T: Serialize> {
 impl Outlet {
     pub(super) fn new(output: impl Write + Send + 'static) -> Self {
         let line = Line { output: Box::new(output), greeted: false, wanted: None, newest: None };
-        Self {
-            line: Arc::new(Mutex::new(line)),
-            clock: Arc::default(),
-            ended: Arc::default(),
-            start: Instant::now(),
-        }
+        Self { line: Arc::new(Mutex::new(line)), clock: Arc::default(), ended: Arc::default(), start: Instant::now() }
     }
 
     /// Seconds of a steady clock of this process.
@@ -173,8 +168,7 @@ impl Outlet {
         let Frame { stamp, stamp_uncertainty_s, width, height, encoding, bytes, intrinsics, depth } = frame;
         let id = wanted.id;
         let length = bytes.len() as u64;
-        let image =
-            ImageMessage { id, stamp, stamp_uncertainty_s, width, height, encoding, bytes: length, intrinsics };
+        let image = ImageMessage { id, stamp, stamp_uncertainty_s, width, height, encoding, bytes: length, intrinsics };
         self.write(line, "image", image, &bytes);
         if let Some(depth) = depth.filter(|_| wanted.depth) {
             let DepthFrame { stamp, encoding, bytes } = depth;

@@ -38,7 +38,7 @@ pub fn serve(
     let (events, received) = mpsc::sync_channel(16);
     let lines = events.clone();
     spawn("driver-input", move || read_lines(input, &lines))?;
-    let mut serving = Serving { outlet: outlet.clone(), device: Some(device), events, can_image: true };
+    let mut serving = Serving { outlet: outlet.clone(), device: Some(device), events };
     let result = loop {
         match received.recv_timeout(LOOK) {
             Ok(Event::Line(line)) => match serving.line(&line) {
@@ -91,7 +91,6 @@ struct Serving<D> {
     /// Until `hello` has come.
     device: Option<D>,
     events: mpsc::SyncSender<Event>,
-    can_image: bool,
 }
 
 impl<D: Device> Serving<D> {
@@ -118,7 +117,9 @@ impl<D: Device> Serving<D> {
 
     fn hello(&mut self, protocol: u32) -> Result<(), Fault> {
         if protocol != PROTOCOL {
-            return Err(Fault(format!("the workbench speaks version {protocol} of the protocol, this driver {PROTOCOL}")));
+            return Err(Fault(format!(
+                "the workbench speaks version {protocol} of the protocol, this driver {PROTOCOL}"
+            )));
         }
         let Some(mut device) = self.device.take() else { return Ok(()) };
         let (outlet, events) = (self.outlet.clone(), self.events.clone());

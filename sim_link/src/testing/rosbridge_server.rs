@@ -121,7 +121,12 @@ struct Subscription {
 
 type Subscriptions = BTreeMap<String, Subscription>;
 
-fn serve(stream: TcpStream, topics: &Topics, ended: &AtomicBool, start: Instant) -> Result<(), Box<tungstenite::Error>> {
+fn serve(
+    stream: TcpStream,
+    topics: &Topics,
+    ended: &AtomicBool,
+    start: Instant,
+) -> Result<(), Box<tungstenite::Error>> {
     stream.set_nodelay(true).map_err(boxed)?;
     let Ok(mut socket) = tungstenite::accept(stream) else { return Ok(()) };
     socket.get_ref().set_read_timeout(Some(Duration::from_millis(2))).map_err(boxed)?;
@@ -131,7 +136,8 @@ fn serve(stream: TcpStream, topics: &Topics, ended: &AtomicBool, start: Instant)
             Ok(Message::Text(text)) => answer(&mut socket, topics, &mut subscriptions, &text)?,
             Ok(Message::Close(_)) => return Ok(()),
             Ok(_) => {}
-            Err(tungstenite::Error::Io(error)) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(tungstenite::Error::Io(error))
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
             Err(error) => return Err(Box::new(error)),
         }
         let topics = topics.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -215,7 +221,11 @@ fn answer(
             };
             let service = &message["service"];
             let id = &message["id"];
-            send(socket, &json!({"op": "service_response", "id": id, "service": service, "values": values, "result": true}), None)
+            send(
+                socket,
+                &json!({"op": "service_response", "id": id, "service": service, "values": values, "result": true}),
+                None,
+            )
         }
         _ => Ok(()),
     }

@@ -114,7 +114,8 @@ impl RtdeRobot {
     pub fn start_on_its_own_port(script: RtdeScript) -> std::io::Result<Self> {
         let mut last = None;
         for host in 2..=254 {
-            match Self::start_at((Ipv4Addr::new(127, 0, 0, host), crate::drivers::ur_rtde::PORT).into(), script.clone()) {
+            match Self::start_at((Ipv4Addr::new(127, 0, 0, host), crate::drivers::ur_rtde::PORT).into(), script.clone())
+            {
                 Ok(robot) => return Ok(robot),
                 Err(error) => last = Some(error),
             }

@@ -43,8 +43,10 @@ enum DriverCommand {
     #[command(after_help = ROSBRIDGE_EXAMPLES)]
     Rosbridge(rosbridge::RosbridgeArgs),
     /// Be a driver that shows each image that comes into a folder, with its pose.
-    #[command(after_help = "Example:\n  handeye driver folder captures --length-unit mm --rotation rpy --angle-unit deg \
-                            --pose base_from_tip")]
+    #[command(
+        after_help = "Example:\n  handeye driver folder captures --length-unit mm --rotation rpy --angle-unit deg \
+                            --pose base_from_tip"
+    )]
     Folder(folder::FolderArgs),
 }
 

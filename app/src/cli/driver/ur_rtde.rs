@@ -31,10 +31,7 @@ pub fn run(args: &UrRtdeArgs) -> Result<(), Failure> {
         let names = known.join(", ");
         return Err(Failure::unusable(anyhow::anyhow!("--arm {arm} is none of {names}: leave it out for another arm")));
     }
-    let rtde = RtdeOptions {
-        port: args.port,
-        frequency_hz: f64::from(args.frequency),
-        ..RtdeOptions::new(args.host.clone())
-    };
+    let rtde =
+        RtdeOptions { port: args.port, frequency_hz: f64::from(args.frequency), ..RtdeOptions::new(args.host.clone()) };
     serve(UrRtde::new(UrRtdeOptions { rtde, arm: args.arm.clone().map(ArmMessage::Name) }))
 }

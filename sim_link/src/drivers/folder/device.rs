@@ -97,7 +97,8 @@ impl Device for Folder {
         if count > 0 {
             can.push(Ability::Joints);
         }
-        let joint = |number| JointMessage { name: format!("q{number}"), kind: JointKind::Revolute, min: None, max: None };
+        let joint =
+            |number| JointMessage { name: format!("q{number}"), kind: JointKind::Revolute, min: None, max: None };
         let hello = Hello {
             protocol: PROTOCOL,
             name: format!("folder {}", folder.display()),
@@ -114,7 +115,9 @@ impl Device for Folder {
     }
 
     fn run(&mut self, outlet: &Outlet) -> Result<(), Fault> {
-        let Some((mut watch, mut current)) = self.open.take() else { return Err(Fault("the folder was not opened".into())) };
+        let Some((mut watch, mut current)) = self.open.take() else {
+            return Err(Fault("the folder was not opened".into()));
+        };
         let mut size = current.as_ref().map(|capture| capture.size).or(self.options.size);
         let mut next = VecDeque::new();
         let (mut looked_s, mut shown_s, mut changed_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY);

@@ -54,7 +54,8 @@ fn of_json(text: &str, columns: &[&str]) -> Result<Vec<String>, String> {
         }
         _ => return Err("neither a list of numbers nor an object".into()),
     };
-    let number = |cell: &Value| cell.as_f64().map(|number| number.to_string()).ok_or_else(|| format!("{cell} is no number"));
+    let number =
+        |cell: &Value| cell.as_f64().map(|number| number.to_string()).ok_or_else(|| format!("{cell} is no number"));
     cells.into_iter().map(number).collect()
 }
 
@@ -83,7 +84,8 @@ mod tests {
     use super::*;
 
     fn format() -> PoseFormat {
-        let keys = "poses = \"poses.csv\"\nlength_unit = \"m\"\nrotation = \"quaternion_xyzw\"\npose = \"base_from_tip\"";
+        let keys =
+            "poses = \"poses.csv\"\nlength_unit = \"m\"\nrotation = \"quaternion_xyzw\"\npose = \"base_from_tip\"";
         PoseFormat::parse(Path::new("options"), keys).expect("a format")
     }
 

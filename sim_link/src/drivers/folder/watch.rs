@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 use std::time::SystemTime;
 
-use handeye_core::image::{GenericImageView as _, RgbImage};
+use handeye_core::image::RgbImage;
 use handeye_core::natural_order;
 use handeye_core::project::dataset::{PoseFormat, PoseOfImage};
 use handeye_core::project::files::image_file;
@@ -166,7 +166,9 @@ impl Watch {
             (waiting.is_checked, waiting.is_whole) = (true, read.is_ok());
         }
         match read {
-            Ok((size, encoding, bytes)) => Some(Capture { name: name.to_owned(), size, encoding, bytes, pose, modified }),
+            Ok((size, encoding, bytes)) => {
+                Some(Capture { name: name.to_owned(), size, encoding, bytes, pose, modified })
+            }
             Err(why) => {
                 self.remark(format!("{}: {}", path.display(), why.text));
                 None

@@ -127,7 +127,11 @@ impl Rosbridge {
             }
             let waited = start.elapsed();
             if lists && waited > LISTING || waited > FIRST {
-                return Err(if lists { list_frames(scene) } else { self.absent(&missing, &topics, &complaints) });
+                return Err(if lists {
+                    list_frames(scene)
+                } else {
+                    Self::absent(missing.as_deref(), &topics, &complaints)
+                });
             }
             if asked.elapsed() > AGAIN {
                 asked = Instant::now();
@@ -142,7 +146,7 @@ impl Rosbridge {
             }
             match link.receive(Instant::now() + TICK).map_err(Fault::of)? {
                 Some(Incoming::Publish { topic, text }) => {
-                    pass_on(&scene.take(&topic, &text).map_err(Fault::of)?, outlet);
+                    pass_on(scene.take(&topic, &text).map_err(Fault::of)?, outlet);
                 }
                 Some(Incoming::Status { text, .. }) if complaints.len() < 10 && !complaints.contains(&text) => {
                     complaints.push(text);
@@ -168,7 +172,9 @@ impl Rosbridge {
             return Some(if seen.is_empty() {
                 format!("nothing comes on {topic}")
             } else if scene.joints.names().is_empty() {
-                format!("which joints of {topic} are the arm's, from the base up? It has {seen}: give --joint-names, or --urdf")
+                format!(
+                    "which joints of {topic} are the arm's, from the base up? It has {seen}: give --joint-names, or --urdf"
+                )
             } else {
                 format!("{topic} has the joints {seen}, and not all of {}", scene.joints.names().join(","))
             });
@@ -181,20 +187,18 @@ impl Rosbridge {
         None
     }
 
-    fn absent(&self, missing: &Option<String>, topics: &[(String, String)], complaints: &[String]) -> Fault {
-        let mut text = format!("after {} s: {}", FIRST.as_secs(), missing.as_deref().unwrap_or("nothing is missing"));
-        let of_use = |kind: &str| ["Image", "CompressedImage", "CameraInfo", "JointState", "TFMessage"].iter().any(|end| kind.ends_with(end));
-        let useful: Vec<_> = topics.iter().filter(|(_, kind)| of_use(kind)).collect();
-        if !useful.is_empty() {
-            text.push_str("\nTopics that can be read:");
-            for (topic, kind) in useful.iter().take(50) {
-                text.push_str(&format!("\n  {topic} ({kind})"));
-            }
+    fn absent(missing: Option<&str>, topics: &[(String, String)], complaints: &[String]) -> Fault {
+        const READ: [&str; 5] = ["/Image", "/CompressedImage", "/CameraInfo", "/JointState", "/TFMessage"];
+        const MOST: usize = 50;
+        let mut lines = vec![format!("after {} s: {}", FIRST.as_secs(), missing.unwrap_or("nothing is missing"))];
+        let is_read = |(_, kind): &&(String, String)| READ.iter().any(|end| kind.ends_with(end));
+        let mut of_use = topics.iter().filter(is_read).take(MOST).peekable();
+        if of_use.peek().is_some() {
+            lines.push("Topics that can be read:".into());
+            lines.extend(of_use.map(|(topic, kind)| format!("  {topic} ({kind})")));
         }
-        for complaint in complaints {
-            text.push_str(&format!("\nrosbridge says: {complaint}"));
-        }
-        Fault(text)
+        lines.extend(complaints.iter().map(|complaint| format!("rosbridge says: {complaint}")));
+        Fault(lines.join("\n"))
     }
 
     fn hello(&self, scene: &Scene) -> Result<Hello, Fault> {
@@ -252,7 +256,7 @@ impl Device for Rosbridge {
         while !outlet.has_ended() {
             match link.receive(Instant::now() + TICK).map_err(Fault::of)? {
                 Some(Incoming::Publish { topic, text }) => {
-                    pass_on(&scene.take(&topic, &text).map_err(Fault::of)?, outlet);
+                    pass_on(scene.take(&topic, &text).map_err(Fault::of)?, outlet);
                 }
                 Some(Incoming::Status { level, text }) => {
                     let level = if level == "error" { LogLevel::Error } else { LogLevel::Info };
@@ -270,13 +274,13 @@ impl Device for Rosbridge {
 }
 
 /// Frames go to the outlet, stamps to its clock.
-fn pass_on(news: &News, outlet: &Outlet) {
+fn pass_on(news: News, outlet: &Outlet) {
     match news {
         News::None => {}
-        News::Moved(stamp_s) => outlet.heard(*stamp_s),
+        News::Moved(stamp_s) => outlet.heard(stamp_s),
         News::Frame(frame) => {
             outlet.heard(frame.stamp);
-            outlet.frame((**frame).clone());
+            outlet.frame(*frame);
         }
     }
 }
@@ -313,7 +317,10 @@ impl<'a> Arm<'a> {
         if stamp - self.last_s < CLOSEST_S {
             if !self.is_stale && self.said.elapsed() > STALE {
                 self.is_stale = true;
-                outlet.log(LogLevel::Warn, format!("tf has said nothing new of {tip} in {base} for {} s", STALE.as_secs()));
+                outlet.log(
+                    LogLevel::Warn,
+                    format!("tf has said nothing new of {tip} in {base} for {} s", STALE.as_secs()),
+                );
             }
             return Ok(());
         }
@@ -359,4 +366,3 @@ fn pairs(values: &Value) -> Vec<(String, String)> {
     };
     texts("topics").into_iter().zip(texts("types")).collect()
 }
-

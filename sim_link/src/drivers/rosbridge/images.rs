@@ -121,7 +121,9 @@ mod tests {
     }
 
     fn from_json(mut fields: Value) -> AnyImage {
-        for (key, value) in [("width", json!(2)), ("height", json!(2)), ("header", json!({"stamp": {"sec": 7, "nanosec": 0}}))] {
+        for (key, value) in
+            [("width", json!(2)), ("height", json!(2)), ("header", json!({"stamp": {"sec": 7, "nanosec": 0}}))]
+        {
             fields[key] = value;
         }
         serde_json::from_value(fields).expect("an image")
@@ -144,7 +146,8 @@ mod tests {
         let (millimetres, size) = depth(image("16UC1", 4, &[1, 0, 2, 0, 3, 0, 4, 1])).expect("depth");
         assert_eq!((size, millimetres.encoding), ((2, 2), DepthEncoding::U16Mm));
         assert_eq!(millimetres.bytes, [1, 0, 2, 0, 3, 0, 4, 1]);
-        let big = from_json(json!({"encoding": "16UC1", "is_bigendian": true, "step": 4, "data": [0, 1, 0, 2, 0, 3, 1, 4]}));
+        let big =
+            from_json(json!({"encoding": "16UC1", "is_bigendian": true, "step": 4, "data": [0, 1, 0, 2, 0, 3, 1, 4]}));
         assert_eq!(depth(big).expect("depth").0.bytes, millimetres.bytes);
         let floats: Vec<u8> = [0.5_f32, 1.0, f32::NAN, 2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(depth(image("32FC1", 8, &floats)).expect("depth").0.encoding, DepthEncoding::F32M);

@@ -51,9 +51,8 @@ impl Joints {
 
     /// At an instant among the messages.
     pub fn at(&self, at_s: f64) -> Option<JointValues> {
-        self.samples.at(at_s, |left, right, share| {
-            JointValues::from_fn(left.len(), |i| left[i] + share * (right[i] - left[i]))
-        })
+        self.samples
+            .at(at_s, |left, right, share| JointValues::from_fn(left.len(), |i| left[i] + share * (right[i] - left[i])))
     }
 }
 

@@ -99,12 +99,14 @@ impl Link {
         stream.set_nodelay(true).map_err(text)?;
         stream.set_read_timeout(Some(PATIENCE)).map_err(text)?;
         stream.set_write_timeout(Some(PATIENCE)).map_err(text)?;
-        let config =
-            WebSocketConfig::default().max_message_size(Some(MAX_MESSAGE)).max_frame_size(Some(MAX_MESSAGE));
-        let (socket, _) = tungstenite::client::client_with_config(uri, stream, Some(config)).map_err(|error| match error {
-            HandshakeError::Interrupted(_) => format!("it accepts connections and does not answer for {PATIENCE:?}"),
-            HandshakeError::Failure(error) => format!("what answers there is no rosbridge ({error})"),
-        })?;
+        let config = WebSocketConfig::default().max_message_size(Some(MAX_MESSAGE)).max_frame_size(Some(MAX_MESSAGE));
+        let (socket, _) =
+            tungstenite::client::client_with_config(uri, stream, Some(config)).map_err(|error| match error {
+                HandshakeError::Interrupted(_) => {
+                    format!("it accepts connections and does not answer for {PATIENCE:?}")
+                }
+                HandshakeError::Failure(error) => format!("what answers there is no rosbridge ({error})"),
+            })?;
         let now = Instant::now();
         Ok(Self { socket, fragments: Fragments::default(), fragment_size, heard: now, pinged: now })
     }
@@ -170,21 +172,20 @@ impl Link {
 
     /// A piece of a piece is nothing.
     fn read(&mut self, text: String, may_be_piece: bool) -> Result<Option<Incoming>, RosbridgeError> {
-        let malformed = |error: serde_json::Error| RosbridgeError::malformed(error);
-        let operation: Operation = serde_json::from_str(&text).map_err(malformed)?;
+        let operation: Operation = serde_json::from_str(&text).map_err(RosbridgeError::malformed)?;
         match operation.op.as_str() {
             "publish" => Ok(Some(Incoming::Publish { topic: operation.topic, text })),
             "fragment" if may_be_piece => {
-                let fragment: Fragment = serde_json::from_str(&text).map_err(malformed)?;
+                let fragment: Fragment = serde_json::from_str(&text).map_err(RosbridgeError::malformed)?;
                 self.fragments.push(fragment)?.map_or(Ok(None), |whole| self.read(whole, false))
             }
             "status" => {
-                let value: Value = serde_json::from_str(&text).map_err(malformed)?;
+                let value: Value = serde_json::from_str(&text).map_err(RosbridgeError::malformed)?;
                 let text = value["msg"].as_str().map_or_else(|| value["msg"].to_string(), str::to_owned);
                 Ok(Some(Incoming::Status { level: operation.level, text }))
             }
             "service_response" => {
-                let mut value: Value = serde_json::from_str(&text).map_err(malformed)?;
+                let mut value: Value = serde_json::from_str(&text).map_err(RosbridgeError::malformed)?;
                 let id = value["id"].as_str().unwrap_or_default().to_owned();
                 Ok(Some(Incoming::Response { id, values: value["values"].take() }))
             }

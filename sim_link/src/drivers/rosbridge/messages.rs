@@ -72,9 +72,8 @@ impl TransformStamped {
         const UNIT_TOLERANCE: f64 = 1e-3;
         let Transform { translation: t, rotation: q } = &self.transform;
         let rotation = Quaternion::new(q.w, q.x, q.y, q.z);
-        ((rotation.norm() - 1.0).abs() < UNIT_TOLERANCE).then(|| {
-            Isometry3::from_parts(Translation3::new(t.x, t.y, t.z), UnitQuaternion::from_quaternion(rotation))
-        })
+        ((rotation.norm() - 1.0).abs() < UNIT_TOLERANCE)
+            .then(|| Isometry3::from_parts(Translation3::new(t.x, t.y, t.z), UnitQuaternion::from_quaternion(rotation)))
     }
 }
 

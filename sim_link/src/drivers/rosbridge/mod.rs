@@ -35,8 +35,10 @@ pub enum RosbridgeError {
         why: String,
     },
     /// No connection.
-    #[error("no rosbridge answers at {url}: {why}. Start it with `ros2 launch rosbridge_server rosbridge_websocket_launch.xml` \
-             (ROS 1: `roslaunch rosbridge_server rosbridge_websocket.launch`)")]
+    #[error(
+        "no rosbridge answers at {url}: {why}. Start it with `ros2 launch rosbridge_server rosbridge_websocket_launch.xml` \
+             (ROS 1: `roslaunch rosbridge_server rosbridge_websocket.launch`)"
+    )]
     Unreachable {
         /// Its address.
         url: String,

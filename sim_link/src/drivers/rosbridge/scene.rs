@@ -156,7 +156,7 @@ impl Scene {
     }
 
     fn take_tf(&mut self, message: &TfMessage, is_static: bool) -> News {
-        let mut newest = None;
+        let mut newest = f64::NEG_INFINITY;
         for transform in &message.transforms {
             let stamp_s = transform.header.stamp.seconds();
             let (parent, child) = (transform.header.frame_id.as_str(), transform.child_frame_id.as_str());
@@ -167,12 +167,9 @@ impl Scene {
             if !self.tree.insert(parent, child, stamp_s, pose, is_static) {
                 self.remark("tf has more than 2000 frames; those that came last are not used".into());
             }
-            newest = newest.max(Some(stamp_s));
+            newest = newest.max(stamp_s);
         }
-        match newest {
-            Some(stamp_s) if !is_static => News::Moved(stamp_s),
-            _ => News::None,
-        }
+        if newest.is_finite() && !is_static { News::Moved(newest) } else { News::None }
     }
 
     fn remark(&mut self, text: String) {

@@ -90,7 +90,7 @@ impl Tree {
             lines.push(format!("{}{frame}", "  ".repeat(depth)));
             if depth < LONGEST_CHAIN {
                 for child in children.get(frame).into_iter().flatten().rev() {
-                    rest.push_front((child, depth + 1));
+                    rest.push_front((*child, depth + 1));
                 }
             }
         }
@@ -119,7 +119,8 @@ impl Tree {
         let ancestor = of_base[shared];
         let up = &of_base[..shared];
         let down: Vec<_> = of_tip.iter().copied().take_while(|frame| *frame != ancestor).collect();
-        let moving = || up.iter().chain(&down).filter_map(|frame| self.links.get(*frame)).filter(|link| !link.is_static);
+        let moving =
+            || up.iter().chain(&down).filter_map(|frame| self.links.get(*frame)).filter(|link| !link.is_static);
         let latest = moving().filter_map(|link| link.parent_from_child.last_s()).reduce(f64::min);
         let instant = latest.map(|latest| latest.min(limit_s));
         let product = |frames: &[&str]| {

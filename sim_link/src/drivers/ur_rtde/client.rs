@@ -60,7 +60,8 @@ impl RtdeClient {
             has_tcp_offset: false,
             messages: Vec::new(),
         };
-        let accepted = client.ask(wire::REQUEST_PROTOCOL_VERSION, &2_u16.to_be_bytes(), "the version of the protocol")?;
+        let accepted =
+            client.ask(wire::REQUEST_PROTOCOL_VERSION, &2_u16.to_be_bytes(), "the version of the protocol")?;
         if accepted.first() != Some(&1) {
             return Err(RtdeError::ProtocolRefused);
         }
@@ -189,7 +190,8 @@ impl RtdeClient {
 fn connect(options: &RtdeOptions) -> Result<TcpStream, RtdeError> {
     let address = format!("{}:{}", options.host, options.port);
     let unreachable = |why: String| RtdeError::Unreachable { address: address.clone(), why };
-    let found = (options.host.as_str(), options.port).to_socket_addrs().map_err(|error| unreachable(error.to_string()))?;
+    let found =
+        (options.host.as_str(), options.port).to_socket_addrs().map_err(|error| unreachable(error.to_string()))?;
     let mut why = "the name has no address".to_owned();
     for socket in found {
         match TcpStream::connect_timeout(&socket, options.patience) {

@@ -40,7 +40,9 @@ pub enum RtdeError {
     )]
     ProtocolRefused,
     /// Variables that every controller has are missing.
-    #[error("the controller has no output {names}: is it a robot of Universal Robots with software 3.10, 5.4 or newer?")]
+    #[error(
+        "the controller has no output {names}: is it a robot of Universal Robots with software 3.10, 5.4 or newer?"
+    )]
     NotFound {
         /// Their names.
         names: String,
@@ -75,7 +77,7 @@ pub enum RtdeError {
     #[error("the controller closed the connection: was it switched off, or is another program using the same outputs?")]
     Closed,
     /// Nothing comes.
-    #[error("the controller has sent nothing for {:.1} s: {during}", waited.as_secs_f64())]
+    #[error("the controller has sent nothing for {:.1} s: {during}", .waited.as_secs_f64())]
     Silent {
         /// How long.
         waited: Duration,

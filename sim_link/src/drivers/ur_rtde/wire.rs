@@ -61,7 +61,9 @@ impl Unpacker {
         let Some((header, _)) = rest.split_first_chunk::<HEADER>() else { return Ok(None) };
         let size = usize::from(u16::from_be_bytes([header[0], header[1]]));
         if size < HEADER {
-            return Err(RtdeError::malformed(format!("a package says that it has {size} bytes, the least is {HEADER}")));
+            return Err(RtdeError::malformed(format!(
+                "a package says that it has {size} bytes, the least is {HEADER}"
+            )));
         }
         let Some(body) = rest.get(HEADER..size) else { return Ok(None) };
         let package = (header[2], body.to_vec());

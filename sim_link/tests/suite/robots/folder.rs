@@ -86,7 +86,10 @@ fn images_that_come_together_are_shown_in_natural_order_each_with_its_own_pose()
         std::fs::write(folder.path().join(&name), image(number, ImageFormat::Jpeg)).expect("written");
     }
     append(&folder.path().join("poses.csv"), HEADER);
-    append(&folder.path().join("poses.csv"), "view_9.jpg,9,0,0,0,0,0\nview_10.jpg,10,0,0,0,0,0\nview_2.jpg,2,0,0,0,0,0\n");
+    append(
+        &folder.path().join("poses.csv"),
+        "view_9.jpg,9,0,0,0,0,0\nview_10.jpg,10,0,0,0,0,0\nview_2.jpg,2,0,0,0,0,0\n",
+    );
     for x_mm in [2.0, 9.0, 10.0] {
         wait_for_x(&mut talk, x_mm);
     }

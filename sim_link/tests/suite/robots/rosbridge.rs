@@ -166,9 +166,11 @@ fn images_that_change_their_size_or_have_no_stamp_end_the_driver_with_the_reason
     server.set("/camera/image_raw", large.topics()["/camera/image_raw"].clone());
     let text = talk.error();
     assert!(text.contains("32×12") && text.contains("16×12"), "{text}");
-    let unstamped = Topic::every("sensor_msgs/msg/Image", Duration::from_millis(20), move |_| {
-        json!({"header": small.header(0.0, "camera"), "height": 1, "width": 1, "encoding": "mono8", "step": 1, "data": "AA=="})
-    });
+    let unstamped = Topic::every(
+        "sensor_msgs/msg/Image",
+        Duration::from_millis(20),
+        move |_| json!({"header": small.header(0.0, "camera"), "height": 1, "width": 1, "encoding": "mono8", "step": 1, "data": "AA=="}),
+    );
     server.set("/camera/image_raw", unstamped);
     let text = Talk::start(Rosbridge::new(options)).error();
     assert!(text.contains("no stamp"), "{text}");

@@ -119,7 +119,9 @@ fn nothing_moves_the_arm() {
     let mut talk = Talk::start(device(&robot));
     talk.hello();
     let joints_rad = Some([0.0; 6].into());
-    for message in [ToDriver::Arm { id: 1, on: true }, ToDriver::Move { id: 1, joints_rad, base_from_tip: None, speed: 1.0 }] {
+    for message in
+        [ToDriver::Arm { id: 1, on: true }, ToDriver::Move { id: 1, joints_rad, base_from_tip: None, speed: 1.0 }]
+    {
         talk.say(&message);
         let why = talk.wait(|message, _| match message {
             FromDriver::Refused(answer) if answer.id == 1 => Some(answer.why),
