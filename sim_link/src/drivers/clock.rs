@@ -6,6 +6,11 @@ use std::collections::VecDeque;
 const WINDOW_S: f64 = 30.0;
 /// One value is kept for so long.
 const BUCKET_S: f64 = 1.0;
+/// How fast what is shown follows what is known, seconds a second: half of what the workbench takes for the drift of two
+/// clocks. Faster, it would take it for a clock that was set.
+const SLEW: f64 = 5e-5;
+/// What is farther off is shown at once: the clock was set, or the first messages were very late.
+const STEP_S: f64 = 0.05;
 
 /// The clock that a device stamps with, as messages tell it. A message arrives some time after it was stamped, so the one
 /// that was the fastest of late is nearest to the truth.
@@ -13,6 +18,8 @@ const BUCKET_S: f64 = 1.0;
 pub(super) struct DeviceClock {
     /// Begin of the bucket and the least of `arrival − stamp` in it, oldest first.
     buckets: VecDeque<(f64, f64)>,
+    /// When it was last asked, and by how much the own clock was shown to lead.
+    shown: Option<(f64, f64)>,
 }
 
 impl DeviceClock {
@@ -29,9 +36,17 @@ impl DeviceClock {
     }
 
     /// What it shows at this time of the own clock: that itself as long as nothing was heard.
-    pub fn at(&self, own_s: f64) -> f64 {
-        let least = self.buckets.iter().map(|(_, least)| *least).reduce(f64::min);
-        own_s - least.unwrap_or(0.0)
+    pub fn at(&mut self, own_s: f64) -> f64 {
+        let Some(known) = self.buckets.iter().map(|(_, least)| *least).reduce(f64::min) else { return own_s };
+        let lead = match self.shown {
+            Some((last_s, shown)) if (known - shown).abs() < STEP_S => {
+                let most = SLEW * (own_s - last_s).max(0.0);
+                shown + (known - shown).clamp(-most, most)
+            }
+            _ => known,
+        };
+        self.shown = Some((own_s, lead));
+        own_s - lead
     }
 }
 
@@ -50,9 +65,21 @@ mod tests {
             clock.heard(own + delay, own + 1000.0);
         }
         assert!((clock.at(20.0) - 1019.999).abs() < 1e-9);
-        // After a break of a minute, slower ones are all that is known.
-        clock.heard(100.02, 1100.0);
-        assert!((clock.at(101.0) - 1100.98).abs() < 1e-9);
+        // After a break of a minute, messages of a clock that was set by 5 s are all that is known.
+        clock.heard(100.0, 1105.0);
+        assert!((clock.at(101.0) - 1106.0).abs() < 1e-9);
         assert!(clock.buckets.len() <= 31);
+    }
+
+    #[test]
+    fn a_faster_message_does_not_make_the_time_jump() {
+        let mut clock = DeviceClock::default();
+        clock.heard(0.010, 0.0);
+        let before = clock.at(1.0);
+        clock.heard(1.001, 1.0);
+        let after = clock.at(2.0);
+        assert!((after - before - 1.0).abs() < 1e-4, "{before} {after}");
+        // It is there in the end.
+        assert!((clock.at(1000.0) - 999.999).abs() < 1e-9);
     }
 }

@@ -239,7 +239,12 @@ impl Client {
                 let (frequency, names) = body.split_first_chunk::<8>().ok_or(ErrorKind::InvalidData)?;
                 let frequency = f64::from_be_bytes(*frequency);
                 self.period = Duration::from_secs_f64(1.0 / frequency.clamp(1.0, 500.0));
-                self.recipe = String::from_utf8_lossy(names).split(',').map(str::to_owned).collect();
+                // Other clients end the list with a comma.
+                self.recipe = String::from_utf8_lossy(names)
+                    .split(',')
+                    .filter(|name| !name.is_empty())
+                    .map(str::to_owned)
+                    .collect();
                 let types: Vec<_> = self.recipe.iter().map(|name| type_of(&script, name)).collect();
                 let recipe = if types.contains(&"NOT_FOUND") { 0 } else { RECIPE };
                 self.send(kind, &[&[recipe][..], types.join(",").as_bytes()].concat())
