@@ -74,7 +74,7 @@ pub mod detect;
 pub mod diagnose;
 pub mod estimate;
 pub mod geometry;
-pub(crate) mod natural_order;
+pub mod natural_order;
 pub mod plan;
 pub mod progress;
 pub mod project;

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 /// Compares runs of digits by their value and everything else letter by letter. A total order: names of equal value
 /// (`a1`, `a01`) are told apart letter by letter.
-pub(crate) fn compare(a: &str, b: &str) -> Ordering {
+pub fn compare(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);
     loop {
         let (run_a, rest_a) = first_run(left);

@@ -5,4 +5,7 @@ pub mod axes;
 pub mod cell;
 pub mod client;
 pub mod driver;
+pub mod drivers;
+#[cfg(feature = "testing")]
+pub mod testing;
 pub mod wire;

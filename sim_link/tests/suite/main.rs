@@ -10,6 +10,7 @@ mod client_faults;
 mod drivers;
 mod joint_offsets;
 mod other_arms;
+mod robots;
 mod surroundings;
 mod vendor;
 

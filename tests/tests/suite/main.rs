@@ -31,6 +31,7 @@ mod slow {
     mod official_client;
     mod rerun_recording;
     mod rerun_viewers;
+    mod robots;
     mod tracking;
     mod verifying;
     mod web_page;

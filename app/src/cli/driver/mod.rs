@@ -1,9 +1,13 @@
 //! `handeye driver`: a conformance run of a driver, and the drivers that come with the workbench.
 
 mod fake;
+mod folder;
+mod rosbridge;
 mod test;
+mod ur_rtde;
 
 use clap::{Args, Subcommand};
+use handeye_sim_link::drivers::{self, Device};
 
 use super::Failure;
 
@@ -11,6 +15,11 @@ pub const EXAMPLES: &str = "Examples:
   handeye driver test \"python3 assets/drivers/template.py\" --allow-motion
   handeye driver test tcp://192.168.0.7:7000
   handeye driver fake --listen 127.0.0.1:7000";
+
+const ROSBRIDGE_EXAMPLES: &str = "Examples:
+  handeye driver rosbridge --url ws://192.168.0.7:9090         # lists the frames of tf and ends
+  handeye driver rosbridge --url ws://192.168.0.7:9090 --base-frame base_link --tip-frame tool0 \\
+      --image /camera/image_raw --camera-info /camera/camera_info";
 
 /// Options of `handeye driver`.
 #[derive(Debug, Args)]
@@ -27,11 +36,31 @@ enum DriverCommand {
     /// Be a driver with the built-in cell behind it, on standard input and output or over TCP.
     #[command(after_help = "Example:\n  handeye driver test \"handeye driver fake\" --allow-motion")]
     Fake(fake::FakeArgs),
+    /// Be a driver that reads a controller of Universal Robots through RTDE.
+    #[command(after_help = "Example:\n  handeye driver test \"handeye driver ur-rtde --host 192.168.0.10 --arm ur5e\"")]
+    UrRtde(ur_rtde::UrRtdeArgs),
+    /// Be a driver that reads ROS 1 or ROS 2 through a rosbridge.
+    #[command(after_help = ROSBRIDGE_EXAMPLES)]
+    Rosbridge(rosbridge::RosbridgeArgs),
+    /// Be a driver that shows each image that comes into a folder, with its pose.
+    #[command(
+        after_help = "Example:\n  handeye driver folder captures --length-unit mm --rotation rpy --angle-unit deg \
+                            --pose base_from_tip"
+    )]
+    Folder(folder::FolderArgs),
 }
 
 pub fn run(args: &DriverArgs) -> Result<(), Failure> {
     match &args.command {
         DriverCommand::Test(args) => test::run(args),
         DriverCommand::Fake(args) => fake::run(args),
+        DriverCommand::UrRtde(args) => ur_rtde::run(args),
+        DriverCommand::Rosbridge(args) => rosbridge::run(args),
+        DriverCommand::Folder(args) => folder::run(args),
     }
+}
+
+/// Speaks for a device on standard input and output until the workbench leaves.
+fn serve(device: impl Device) -> Result<(), Failure> {
+    drivers::serve(device, std::io::stdin(), std::io::stdout()).map_err(Failure::failed)
 }

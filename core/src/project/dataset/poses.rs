@@ -63,7 +63,7 @@ pub(super) fn read_poses(
     Ok(poses)
 }
 
-fn headers(rotation: RotationConvention) -> Vec<Vec<&'static str>> {
+pub(super) fn headers(rotation: RotationConvention) -> Vec<Vec<&'static str>> {
     let rotations: &[&[&'static str]] = match rotation {
         RotationConvention::QuaternionXyzw => &[&["qx", "qy", "qz", "qw"]],
         RotationConvention::QuaternionWxyz => &[&["qw", "qx", "qy", "qz"]],
