@@ -56,6 +56,7 @@ pub use error::{DatasetError, DatasetProblem};
 pub use joints::DatasetArm;
 use outside::Outside;
 use poses::PoseRow;
+pub use poses::rotation_of_matrix;
 use target_table::TargetPoseDirection;
 use text::TextFile;
 
