@@ -49,7 +49,7 @@ pub fn run<T: Send>(
             let heard = match said {
                 Ok(Said::Done(result)) => return interrupted.map_or(result, |error: PyErr| Err(error.into())),
                 Ok(Said::Progress(now)) => {
-                    told.map_or(Ok(()), |told| told.call1((now.stage.label(), now.fraction())).map(|_| ()))
+                    told.map_or(Ok(()), |told| told.call1((now.stage.label(), now.fraction())).map(drop))
                 }
                 Err(RecvTimeoutError::Timeout) => py.check_signals(),
                 Err(RecvTimeoutError::Disconnected) => {

@@ -28,6 +28,7 @@ mod slow {
     mod interrupted;
     mod leaving;
     mod official_client;
+    mod python_module;
     mod rerun_recording;
     mod rerun_viewers;
     mod tracking;

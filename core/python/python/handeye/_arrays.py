@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._errors import InputError
 
+Array = NDArray[Any]
 Corners = Tuple[Optional[bytes], bytes]
 
 
-def floats(what: str, value: Any) -> np.ndarray:
+def floats(what: str, value: Any) -> Array:
     """`value` as an array of doubles."""
     try:
         array = np.asarray(value, dtype=np.float64)
@@ -20,7 +22,7 @@ def floats(what: str, value: Any) -> np.ndarray:
     return array
 
 
-def poses(what: str, value: Any) -> np.ndarray:
+def poses(what: str, value: Any) -> Array:
     """A stack of transforms, (N, 4, 4)."""
     if isinstance(value, (list, tuple)):
         for index, one in enumerate(value):
@@ -32,12 +34,12 @@ def poses(what: str, value: Any) -> np.ndarray:
     return array
 
 
-def packed(array: np.ndarray) -> bytes:
+def packed(array: Array) -> bytes:
     """Its bytes as the compiled part takes them."""
     return np.ascontiguousarray(array).tobytes()
 
 
-def matrices(data: bytes) -> np.ndarray:
+def matrices(data: bytes) -> Array:
     """(N, 4, 4) of bytes; read-only."""
     return np.frombuffer(data, dtype=np.float64).reshape(-1, 4, 4)
 
@@ -67,7 +69,7 @@ def corners_of_views(corners: Sequence[Any], ids: Optional[Sequence[Any]]) -> Li
     return out
 
 
-def transform(link: dict) -> np.ndarray:
+def transform(link: Mapping[str, Any]) -> Array:
     """4 × 4 of a link in a result document."""
     x, y, z, w = link["rotation_xyzw"]
     out = np.eye(4)
@@ -80,6 +82,6 @@ def transform(link: dict) -> np.ndarray:
     return out
 
 
-def covariance(link: dict) -> Optional[np.ndarray]:
+def covariance(link: Mapping[str, Any]) -> Optional[Array]:
     """6 × 6 of a link in a result document."""
     return None if link["covariance"] is None else np.array(link["covariance"])

@@ -10,7 +10,7 @@ from typing import Any, List, Optional, Tuple, Union
 import numpy as np
 
 from . import _handeye
-from ._arrays import matrices
+from ._arrays import Array, matrices
 from ._errors import InputError
 from ._types import Intrinsics, Target
 
@@ -34,15 +34,15 @@ class Dataset:
     """Of the views, as the pose table has them."""
     image_paths: List[Optional[str]]
     """Where the images are; None where only corners or target poses were kept."""
-    base_from_tip: Optional[np.ndarray]
+    base_from_tip: Optional[Array]
     """(N, 4, 4), metres; None without a robot."""
-    camera_from_target: Optional[np.ndarray]
+    camera_from_target: Optional[Array]
     """(N, 4, 4), metres, from a table of target poses; not finite in a view without a row; None without a table."""
-    corners: Optional[List[Optional[np.ndarray]]]
+    corners: Optional[List[Optional[Array]]]
     """(M, 2) pixels of each view from a corner table, None where the target was not found; None without a table."""
-    corner_ids: Optional[List[Optional[np.ndarray]]]
+    corner_ids: Optional[List[Optional[Array]]]
     """(M,) which points of the target they are."""
-    joints: Optional[List[Optional[np.ndarray]]]
+    joints: Optional[List[Optional[Array]]]
     """Joint values of each view, radians or metres; None when the pose table has none."""
     notes: List[str]
     """What the tables name outside of the folder."""
@@ -73,16 +73,17 @@ def load_dataset(path: Union[str, "os.PathLike[str]"]) -> Dataset:
     observations, text, arrays = _handeye.read_folder(os.fspath(path))
     said = json.loads(text)
 
-    def stack(name: str) -> Optional[np.ndarray]:
+    def stack(name: str) -> Optional[Array]:
         return matrices(arrays[name]) if name in arrays else None
 
-    corners = corner_ids = None
+    corners: Optional[List[Optional[Array]]] = None
+    corner_ids: Optional[List[Optional[Array]]] = None
     if "corners" in arrays:
         seen = arrays["corners"]
         corners = [None if c is None else np.frombuffer(c[1], dtype=np.float64).reshape(-1, 2) for c in seen]
         corner_ids = [None if c is None else np.frombuffer(c[0], dtype=np.int64) for c in seen]
     target = said["target"]
-    joints = None
+    joints: Optional[List[Optional[Array]]] = None
     if any(values is not None for values in said["joints_rad"]):
         joints = [None if values is None else np.array(values) for values in said["joints_rad"]]
     return Dataset(

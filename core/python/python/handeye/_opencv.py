@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, Dict, List, Sequence, Tuple, Union
+from typing import Any, List, Sequence, Tuple, Union
 
 import numpy as np
 
 from . import _handeye
-from ._arrays import floats, matrices, packed
+from ._arrays import Array, floats, matrices, packed
 from ._calibrate import calibrate
 from ._errors import CalibrationWarning, InputError
 
@@ -26,7 +26,7 @@ def calibrate_hand_eye(
     R_target2cam: Sequence[Any],
     t_target2cam: Sequence[Any],
     method: Union[str, int] = "pose_pairs",
-) -> Tuple[np.ndarray, np.ndarray]:
+) -> Tuple[Array, Array]:
     """The camera on the gripper from N pose pairs, as OpenCV 4's calibrateHandEye answers it.
 
     Parameters
@@ -72,7 +72,7 @@ def calibrate_robot_world_hand_eye(
     R_base2gripper: Sequence[Any],
     t_base2gripper: Sequence[Any],
     method: Union[str, int] = "pose_pairs",
-) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> Tuple[Array, Array, Array, Array]:
     """Both links from N pose pairs, as OpenCV 4's calibrateRobotWorldHandEye answers it.
 
     Parameters
@@ -102,8 +102,8 @@ def calibrate_robot_world_hand_eye(
 
 
 def _solve(
-    robot: np.ndarray, target: np.ndarray, method: Union[str, int], constants: Tuple[str, ...]
-) -> Tuple[np.ndarray, np.ndarray]:
+    robot: Array, target: Array, method: Union[str, int], constants: Tuple[str, ...]
+) -> Tuple[Array, Array]:
     if len(robot) != len(target):
         raise InputError(f"{len(robot)} poses of the robot and {len(target)} of the target: one of each for every view")
     name = _method(method, constants)
@@ -135,11 +135,11 @@ def _method(method: Union[str, int], constants: Tuple[str, ...]) -> str:
     raise InputError(f"no method {method!r}: 'pose_pairs', {', '.join(map(repr, ALL))}, or OpenCV's constant")
 
 
-def _poses(what: str, rotations: Sequence[Any], translations: Sequence[Any]) -> np.ndarray:
+def _poses(what: str, rotations: Sequence[Any], translations: Sequence[Any]) -> Array:
     """(N, 4, 4) of OpenCV's lists."""
     if len(rotations) != len(translations):
         raise InputError(f"R_{what} has {len(rotations)} views and t_{what} {len(translations)}")
-    out: List[np.ndarray] = []
+    out: List[Array] = []
     for index, (rotation, translation) in enumerate(zip(rotations, translations)):
         r, t = floats(f"R_{what}[{index}]", rotation), floats(f"t_{what}[{index}]", translation)
         if r.shape != (3, 3) and r.size != 3:
@@ -153,17 +153,18 @@ def _poses(what: str, rotations: Sequence[Any], translations: Sequence[Any]) -> 
     return np.array(out).reshape(-1, 4, 4)
 
 
-def _rodrigues(vector: np.ndarray) -> np.ndarray:
+def _rodrigues(vector: Array) -> Array:
     angle = float(np.linalg.norm(vector))
     x, y, z = vector
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     # Both quotients are exact to the last digit where the angle is too small to square.
     first = np.sin(angle) / angle if angle > 1e-8 else 1.0
     second = (1.0 - np.cos(angle)) / angle**2 if angle > 1e-4 else 0.5
-    return np.eye(3) + first * skew + second * (skew @ skew)
+    out: Array = np.eye(3) + first * skew + second * (skew @ skew)
+    return out
 
 
-def _inverse(poses: np.ndarray) -> np.ndarray:
+def _inverse(poses: Array) -> Array:
     out = np.tile(np.eye(4), (len(poses), 1, 1))
     turned = np.swapaxes(poses[:, :3, :3], 1, 2)
     out[:, :3, :3] = turned

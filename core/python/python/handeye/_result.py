@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 
-from ._arrays import covariance, transform
+from ._arrays import Array, covariance, transform
 from ._types import Finding, Intrinsics, findings_of
 
 
@@ -42,17 +42,17 @@ class Calibration:
 
     mode: Optional[str]
     """eye_in_hand or eye_to_hand; None when there was no robot and only the camera was calibrated."""
-    tip_from_camera: Optional[np.ndarray]
+    tip_from_camera: Optional[Array]
     """Eye in hand: the camera on the robot's tip, (4, 4)."""
-    base_from_target: Optional[np.ndarray]
+    base_from_target: Optional[Array]
     """Eye in hand: the target in the robot's base, (4, 4)."""
-    base_from_camera: Optional[np.ndarray]
+    base_from_camera: Optional[Array]
     """Eye to hand: the camera in the robot's base, (4, 4)."""
-    tip_from_target: Optional[np.ndarray]
+    tip_from_target: Optional[Array]
     """Eye to hand: the target on the robot's tip, (4, 4)."""
-    hand_eye_covariance: Optional[np.ndarray]
+    hand_eye_covariance: Optional[Array]
     """Of tip_from_camera or base_from_camera, (6, 6); None for a closed form."""
-    target_covariance: Optional[np.ndarray]
+    target_covariance: Optional[Array]
     """Of base_from_target or tip_from_target, (6, 6); None for a closed form."""
     tip_error_95_mm: Optional[float]
     """Expected error of a point that is measured where the camera saw the target: 95 % of errors are below, millimetres.
@@ -79,14 +79,14 @@ class Calibration:
     """One for each view, in the order given."""
     findings: List[Finding]
     """What is weak or wrong, the most severe first."""
-    methods: Dict[str, Optional[np.ndarray]]
+    methods: Dict[str, Optional[Array]]
     """What the closed forms say, by name: the hand-eye transform (4, 4), None where one failed."""
     document: Mapping[str, Any] = field(repr=False)
     """All of it, in the layout of handeye-calibration-1.schema.json."""
     _json: str = field(repr=False)
 
     @property
-    def hand_eye(self) -> Optional[np.ndarray]:
+    def hand_eye(self) -> Optional[Array]:
         """tip_from_camera or base_from_camera, whichever the mode has."""
         return self.tip_from_camera if self.mode == "eye_in_hand" else self.base_from_camera
 
@@ -102,7 +102,7 @@ class Calibration:
     @classmethod
     def _of(cls, text: str, sigmas: Optional[Tuple[float, float]]) -> Calibration:
         document = json.loads(text)
-        links: Dict[str, np.ndarray] = {}
+        links: Dict[str, Array] = {}
         covariances = {}
         for key in ("hand_eye", "target"):
             link = document[key]

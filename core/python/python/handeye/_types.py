@@ -9,7 +9,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from . import _handeye
-from ._arrays import floats
+from ._arrays import Array, floats
 from ._errors import InputError
 
 
@@ -36,7 +36,7 @@ class Target:
         return {"kind": self.kind, **self.keys}
 
     @property
-    def points(self) -> np.ndarray:
+    def points(self) -> Array:
         """All points, (N, 3), metres in the target frame."""
         return np.frombuffer(_handeye.target_points(self._json()), dtype=np.float64).reshape(-1, 3)
 
@@ -148,12 +148,12 @@ class Intrinsics:
         )
 
     @property
-    def camera_matrix(self) -> np.ndarray:
+    def camera_matrix(self) -> Array:
         """(3, 3), as OpenCV has it."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
     @property
-    def dist_coeffs(self) -> np.ndarray:
+    def dist_coeffs(self) -> Array:
         """As OpenCV has them."""
         return np.array(self.distortion)
 
@@ -167,13 +167,18 @@ class Intrinsics:
     def _of(cls, document: Optional[Mapping[str, Any]]) -> Optional[Intrinsics]:
         if document is None:
             return None
-        names = ("fx", "fy", "cx", "cy")
         sigma = document.get("sigma") or {}
-        known = all(sigma.get(name) is not None for name in names)
+        sigmas: Any = (sigma.get("fx"), sigma.get("fy"), sigma.get("cx"), sigma.get("cy"))
         return cls(
-            document["width"], document["height"], *(document[name] for name in names),
-            model=document["model"], distortion=tuple(document["distortion"]),
-            sigma=tuple(sigma[name] for name in names) if known else None,  # type: ignore[arg-type]
+            width=document["width"],
+            height=document["height"],
+            fx=document["fx"],
+            fy=document["fy"],
+            cx=document["cx"],
+            cy=document["cy"],
+            model=document["model"],
+            distortion=tuple(document["distortion"]),
+            sigma=None if None in sigmas else sigmas,
         )
 
 
