@@ -1,12 +1,11 @@
 """Ours beside the methods that KinHEC ships, on every track of one of its tiers.
 
-    pip install kinhec
-    cargo build --release -p handeye_app
-    python tests/bench/kinhec_tracks.py --ours target/release/handeye --data target/kinhec_smoke
+    pip install kinhec ./core/python
+    python tests/bench/kinhec_tracks.py --data target/kinhec_smoke
 
 KinHEC is a synthetic benchmark: streams of robot poses and of target poses with known truth. A tier that is not in --data is
 generated there by its own command, in about a minute for `smoke`. Every method gets what KinHEC's protocol gives to its
-own: the measured poses of the same keyframes. Ours goes through the command line, as a dataset folder with two pose tables.
+own: the measured poses of the same keyframes. Ours is the Python module, which answers as the command line does.
 Where the target poses come from corners, the recipe of the sequence is run again to have those corners, and ours gets them
 and the camera too, which the other methods have no use for.
 
@@ -23,6 +22,7 @@ import sys
 import tempfile
 import warnings
 
+import handeye
 import numpy as np
 from scipy import stats
 
@@ -83,39 +83,31 @@ def corners_of(sequence):
     return pixels
 
 
-def write_poses(path, names, poses):
-    with open(path, 'w') as file:
-        print('image,x,y,z,' + ','.join(f'r{row}{column}' for row in '123' for column in '123'), file=file)
-        for name, pose in zip(names, poses):
-            numbers = [*pose[:3, 3], *pose[:3, :3].ravel()]
-            print(name + ',' + ','.join(repr(float(n)) for n in numbers), file=file)
+def board_of(sequence):
+    board = TARGETS[sequence.manifest['target']]
+    return board, handeye.Target.chessboard(board.cols, board.rows, board.spacing_m)
 
 
-def write_folder(folder, sequence, frames, robot, target, pixels):
-    os.makedirs(folder)
-    names = [f'{frame:05}.png' for frame in frames]
-    board, camera = TARGETS[sequence.manifest['target']], CAMERAS[sequence.manifest['camera']]
-    write_poses(os.path.join(folder, 'poses.csv'), names, robot)
-    if pixels is None:
-        source = 'poses = "target_poses.csv"'
-        write_poses(os.path.join(folder, 'target_poses.csv'), names, target)
-        lens = ''
-    else:
-        source = 'corners = "corners.csv"'
-        lens = (f'[camera]\nfixed = true\nwidth = {camera.width}\nheight = {camera.height}\nfx = {camera.fx}\n'
-                f'fy = {camera.fy}\ncx = {camera.cx}\ncy = {camera.cy}\nmodel = "none"\ndistortion = []\n')
-        with open(os.path.join(folder, 'corners.csv'), 'w') as file:
-            print('image,column,row,u,v', file=file)
-            for name, frame in zip(names, frames):
-                for i, (u, v) in enumerate(pixels[int(frame)]):
-                    if 0 <= u <= camera.width - 1 and 0 <= v <= camera.height - 1:
-                        print(f'{name},{i % board.cols},{board.rows - 1 - i // board.cols},{u!r},{v!r}'
-                              .replace('np.float64(', '').replace(')', ''), file=file)
+def views_of(sequence, frames, robot):
+    """What ours is told in either way."""
     mode = 'eye_in_hand' if sequence.eye_in_hand else 'eye_to_hand'
-    with open(os.path.join(folder, 'dataset.toml'), 'w') as file:
-        file.write(f'mode = "{mode}"\n[target]\nkind = "chessboard"\ncolumns = {board.cols}\nrows = {board.rows}\n'
-                   f'square_m = {board.spacing_m}\n{source}\n[robot]\nposes = "poses.csv"\nlength_unit = "m"\n'
-                   f'rotation = "matrix"\npose = "base_from_tip"\n{lens}')
+    names = [f'{frame:05}.png' for frame in frames]
+    return {'base_from_tip': robot, 'mode': mode, 'names': names, 'target': board_of(sequence)[1]}
+
+
+def seen_in(sequence, frames, pixels):
+    """Corners in the images, with the camera; our rows run against theirs."""
+    board, camera = TARGETS[sequence.manifest['target']], CAMERAS[sequence.manifest['camera']]
+    row, column = np.divmod(np.arange(board.cols * board.rows), board.cols)
+    ours = (board.rows - 1 - row) * board.cols + column
+    corners, ids = [], []
+    for frame in frames:
+        px = pixels[int(frame)]
+        inside = ((px >= 0) & (px <= [camera.width - 1, camera.height - 1])).all(axis=1)
+        corners.append(px[inside])
+        ids.append(ours[inside])
+    lens = handeye.Intrinsics(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
+    return {'corners': corners, 'corner_ids': ids, 'intrinsics': lens}
 
 
 def transform(link):
@@ -139,15 +131,12 @@ def inside(link, estimate, true):
     return bool(delta @ np.linalg.solve(np.array(link['covariance']) * scale, delta) <= limit)
 
 
-def calibrate(ours, folder, *options):
-    """Its result, or why there is none."""
-    path = os.path.join(folder, 'result.json')
-    command = [ours, 'calibrate', folder, '--quiet', '--json', path, *options]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode == 0:
-        with open(path) as file:
-            return json.load(file), None
-    return None, (done.stderr.strip().splitlines() or [f'exit code {done.returncode}'])[-1]
+def calibrate(**arguments):
+    """Its result document, or why there is none."""
+    try:
+        return handeye.calibrate(**arguments).document, None
+    except handeye.HandeyeError as error:
+        return None, f'error: {error}'
 
 
 def compared(sequence, result, from_corners):
@@ -170,20 +159,19 @@ def compared(sequence, result, from_corners):
                        else inside(result[name], None, true) for name, true in zip(('hand_eye', 'target'), links)]}
 
 
-def ours_on(ours, sequence, offset, folder):
+def ours_on(sequence, offset):
     """By name: errors, or a sentence."""
     frames, robot, target = keyframes(sequence, offset)
-    write_folder(os.path.join(folder, 'poses'), sequence, frames, robot, target, None)
-    result, why = calibrate(ours, os.path.join(folder, 'poses'))
+    views = views_of(sequence, frames, robot)
+    result, why = calibrate(camera_from_target=target, **views)
     if result is None:
         return {POSES: why}
     out = {POSES: compared(sequence, result, False)}
-    result, why = calibrate(ours, os.path.join(folder, 'poses'), '--free-scale')
+    result, why = calibrate(camera_from_target=target, free_scale=True, **views)
     out[SCALED] = why if result is None else compared(sequence, result, False)
     # Outliers of KinHEC are put into the target poses, not into the corners.
     if sequence.manifest['camera_noise_model'] == 'pnp' and sequence.manifest['outlier_fraction'] == 0:
-        write_folder(os.path.join(folder, 'corners'), sequence, frames, robot, target, corners_of(sequence))
-        result, why = calibrate(ours, os.path.join(folder, 'corners'))
+        result, why = calibrate(**views, **seen_in(sequence, frames, corners_of(sequence)))
         out[CORNERS] = why if result is None else compared(sequence, result, True)
     return out
 
@@ -247,7 +235,6 @@ def print_track(title, results):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--ours', required=True, help='the built handeye')
     parser.add_argument('--data', required=True, help='folder of the tier; generated when it is not there')
     parser.add_argument('--tier', default='smoke', help='smoke, small, medium, full')
     parser.add_argument('--tracks', nargs='*', help='all when left out')
@@ -266,8 +253,7 @@ def main():
                 if mode == 'estimated':
                     offset, _ = benchmark.solvers.estimate_time_offset(
                         sequence.robot.t, sequence.robot.T_base_ee_meas, sequence.camera.t, sequence.camera.T_cam_target_meas)
-                with tempfile.TemporaryDirectory() as folder:
-                    found = {**theirs_on(sequence, mode), **ours_on(arguments.ours, sequence, offset, folder)}
+                found = {**theirs_on(sequence, mode), **ours_on(sequence, offset)}
                 key = mode if not sequence.synchronous else ''
                 by_sync.setdefault(key, {})[name] = found
                 if arguments.each:

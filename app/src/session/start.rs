@@ -1,9 +1,6 @@
 //! What a new session begins with.
 
-use std::collections::BTreeMap;
-
 use handeye_core::estimate::handeye::{HandEye, Mode};
-use handeye_core::estimate::{Method, Options};
 use handeye_core::geometry::arm::{ArmKind, ArmModel, JointKind};
 use handeye_core::project::session::{GroundTruth, SessionMeta};
 use handeye_core::targets::{Grid, TargetSpec};
@@ -19,21 +16,6 @@ const BUILT_IN_ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
 
 /// The ten reference poses, so that they are there wherever the binary is.
 pub const REFERENCE_POSES: &str = include_str!("../../../assets/poses/seed10.toml");
-
-/// Where a result says which board it was made with, among the options that it depends on.
-pub const TARGET_OPTION: &str = "target";
-
-/// What a result depends on besides its data.
-pub fn solve_options(method: Method, options: Options, target: &TargetSpec) -> BTreeMap<String, serde_json::Value> {
-    let target = serde_json::to_value(target).unwrap_or_default();
-    BTreeMap::from([
-        ("method".to_owned(), method.name().into()),
-        ("keep_outliers".to_owned(), options.keep_outliers.into()),
-        ("free_scale".to_owned(), options.free_scale.into()),
-        ("joint_offsets".to_owned(), options.joint_offsets.into()),
-        (TARGET_OPTION.to_owned(), target),
-    ])
-}
 
 /// The arm whose joint values the estimate of joint offsets may use: of any other the values are kept and not used.
 pub fn arm(kinematics: Option<&ArmKinematics>) -> Option<ArmModel> {

@@ -9,14 +9,13 @@ use handeye_core::diagnose::findings::{Finding, FindingOptions};
 use handeye_core::estimate::handeye::HandEyeError;
 use handeye_core::estimate::{self, CalibrateError, Calibration, Method, Observations, Options};
 use handeye_core::progress::{CancelToken, Progress, Work};
-use handeye_core::project::result::VerificationSummary;
+use handeye_core::project::result::{VerificationSummary, solve_options};
 use handeye_core::project::session::CaptureId;
 use handeye_core::targets::observation::View;
 use handeye_core::verify::{self, CheckCapture, Predictor, Verification, VerifyError};
 
 use crate::command::{Event, SolveOutcome};
 use crate::model::{JobId, Solved, Truth};
-use crate::session::start;
 use crate::text;
 use crate::text::Text;
 use crate::truth;
@@ -89,7 +88,7 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
 pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) -> Result<Solved, CalibrateError> {
     let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3));
     let findings = doctor::diagnose(&job.observations, Some(&mut calibration), &goal, work.cancel).findings;
-    let options = start::solve_options(job.method, job.options, &job.observations.target);
+    let options = solve_options(job.method, job.options, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);

@@ -29,6 +29,7 @@ mod slow {
     mod interrupted;
     mod leaving;
     mod official_client;
+    mod python_module;
     mod rerun_recording;
     mod rerun_viewers;
     mod robots;

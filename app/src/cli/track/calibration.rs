@@ -4,14 +4,13 @@ use std::path::Path;
 
 use handeye_core::estimate::handeye::joint::SmallSample;
 use handeye_core::estimate::handeye::{HandEye, Mode};
-use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::result::{CalibrationResult, TARGET_OPTION};
 use handeye_core::project::session::{RESULT, Session};
 use handeye_core::targets::bent::BoardShape;
 use handeye_core::targets::{Grid, TargetSpec};
 use handeye_core::verify::Predictor;
 
 use crate::cli::Failure;
-use crate::session::start::TARGET_OPTION;
 
 /// Reads a result, or that of a session; with the board it was made with, where that is known.
 pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {

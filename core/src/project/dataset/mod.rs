@@ -58,6 +58,7 @@ pub use joints::DatasetArm;
 use outside::Outside;
 pub use pose_format::{PoseFormat, PoseOfImage};
 use poses::PoseRow;
+pub use poses::rotation_of_matrix;
 use target_table::TargetPoseDirection;
 use text::TextFile;
 

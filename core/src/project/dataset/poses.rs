@@ -102,7 +102,7 @@ fn read_pose(table: &Table<'_>, row: &Row, conventions: &RobotConfig) -> Result<
         }
         RotationConvention::Matrix => {
             let elements: [f64; 9] = table.numbers(row, FIRST_OF_ROTATION)?;
-            rotation_matrix(&Matrix3::from_row_slice(&elements)).map_err(|p| table.fail(row, p))?
+            rotation_of_matrix(&Matrix3::from_row_slice(&elements)).map_err(|p| table.fail(row, p))?
         }
     };
     Ok(Isometry3::from_parts(Translation3::from(translation), rotation))
@@ -144,7 +144,11 @@ fn unit_quaternion(q: Quaternion<f64>) -> Result<UnitQuaternion<f64>, DatasetPro
     Ok(if is_exact { UnitQuaternion::new_unchecked(q) } else { UnitQuaternion::from_quaternion(q) })
 }
 
-fn rotation_matrix(m: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, DatasetProblem> {
+/// The rotation of a matrix that is orthonormal to 2·10⁻³; it is made exact.
+///
+/// # Errors
+/// [`DatasetProblem::NotARotation`] for one that is further off, or that mirrors.
+pub fn rotation_of_matrix(m: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, DatasetProblem> {
     // Elements first: products of huge ones are not numbers, and compare as nothing.
     let deviation = (m.transpose() * m - Matrix3::identity()).amax();
     if m.amax() > 1.0 + ORTHONORMAL_TOLERANCE || deviation > ORTHONORMAL_TOLERANCE {

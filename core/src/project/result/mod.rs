@@ -26,6 +26,7 @@ pub use estimate::{
     WideningRecord,
 };
 pub use file::{ResultError, ResultProblem};
+pub use of_calibration::{TARGET_OPTION, solve_options};
 
 /// What `format` says.
 pub const FORMAT: &str = "handeye-calibration";

@@ -11,7 +11,25 @@ use super::{
 use crate::estimate::claim::Claim;
 use crate::estimate::handeye::joint::{RobotField, ShownDistortion};
 use crate::estimate::uncertainty::widening::Evidence;
-use crate::estimate::{Calibration, CameraFit, JointFit, MethodResult, ShapeEstimate, ViewResult, ViewStatus};
+use crate::estimate::{
+    Calibration, CameraFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
+};
+use crate::targets::TargetSpec;
+
+/// Where a result says which board it was made with, among the options that it depends on.
+pub const TARGET_OPTION: &str = "target";
+
+/// What a result depends on besides its data.
+pub fn solve_options(method: Method, options: Options, target: &TargetSpec) -> BTreeMap<String, serde_json::Value> {
+    let target = serde_json::to_value(target).unwrap_or_default();
+    BTreeMap::from([
+        ("method".to_owned(), method.name().into()),
+        ("keep_outliers".to_owned(), options.keep_outliers.into()),
+        ("free_scale".to_owned(), options.free_scale.into()),
+        ("joint_offsets".to_owned(), options.joint_offsets.into()),
+        (TARGET_OPTION.to_owned(), target),
+    ])
+}
 
 impl Calibration {
     /// The result document. `options` are what the answer depends on besides the input.

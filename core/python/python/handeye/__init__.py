@@ -1,0 +1,35 @@
+"""Hand-eye calibration that says how accurate it is.
+
+`calibrate` takes corners or pose pairs as numpy arrays, `calibrate_hand_eye` the arguments of OpenCV's calibrateHandEye,
+`doctor` says what is wrong with the data, `load_dataset` reads a dataset folder. Transforms are 4 × 4 arrays named
+`dst_from_src`, lengths metres, angles radians and pixels OpenCV's, unless a name says otherwise.
+"""
+
+from ._calibrate import calibrate, doctor
+from ._dataset import Dataset, load_dataset
+from ._errors import CalibrationError, CalibrationWarning, HandeyeError, InputError
+from ._handeye import __version__
+from ._opencv import calibrate_hand_eye, calibrate_robot_world_hand_eye
+from ._result import Calibration, Diagnosis, Hypothesis, View
+from ._types import Finding, Intrinsics, Target
+
+__all__ = [
+    "Calibration",
+    "CalibrationError",
+    "CalibrationWarning",
+    "Dataset",
+    "Diagnosis",
+    "Finding",
+    "HandeyeError",
+    "Hypothesis",
+    "InputError",
+    "Intrinsics",
+    "Target",
+    "View",
+    "__version__",
+    "calibrate",
+    "calibrate_hand_eye",
+    "calibrate_robot_world_hand_eye",
+    "doctor",
+    "load_dataset",
+]

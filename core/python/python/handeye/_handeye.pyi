@@ -1,0 +1,33 @@
+"""The compiled part: arrays are bytes of doubles in the order of C, small things JSON."""
+
+from os import PathLike
+from typing import Any, Callable, Dict, List, Optional, Tuple, Union
+
+__version__: str
+
+class Observations:
+    def __new__(
+        cls,
+        description: str,
+        base_from_tip: Optional[bytes],
+        corners: Optional[List[Optional[Tuple[Optional[bytes], bytes]]]],
+        camera_from_target: Optional[bytes],
+    ) -> Observations: ...
+
+def calibrate(
+    observations: Observations,
+    method: str,
+    keep_outliers: bool,
+    free_scale: bool,
+    joint_offsets: bool,
+    goal_mm: Optional[float],
+    progress: Optional[Callable[[str, float], Any]],
+) -> Tuple[str, Optional[Tuple[float, float]]]: ...
+def diagnose(
+    observations: Observations, goal_mm: Optional[float], progress: Optional[Callable[[str, float], Any]]
+) -> Tuple[str, str, bool]: ...
+def closed_form(
+    method: str, anchor_from_mount: bytes, camera_from_target: bytes, names: List[str]
+) -> Tuple[bytes, bytes]: ...
+def read_folder(folder: Union[str, "PathLike[str]"]) -> Tuple[Observations, str, Dict[str, Any]]: ...
+def target_points(target: str) -> bytes: ...

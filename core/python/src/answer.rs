@@ -1,0 +1,95 @@
+//! Calibrations and diagnoses, as the documents that the command line writes.
+
+use handeye_core::diagnose::doctor::{self, Diagnosis};
+use handeye_core::diagnose::findings::{Finding, FindingOptions};
+use handeye_core::estimate::handeye::HandEyeError;
+use handeye_core::estimate::{CalibrateError, Calibration, Method, Options, calibrate_with};
+use handeye_core::project::result::{CalibrationResult, TARGET_OPTION, solve_options};
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::background::run;
+use crate::error::Failure;
+use crate::input::Observations;
+
+/// What the result contract has no place for: the disagreement of pose pairs per axis, metres and radians.
+type PairSigmas = Option<(f64, f64)>;
+
+/// The result document as JSON, and the disagreement of pose pairs.
+#[pyfunction]
+#[pyo3(signature = (observations, method, keep_outliers, free_scale, joint_offsets, goal_mm, progress))]
+#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "the wrapper in Python has names for them")]
+pub fn calibrate(
+    py: Python<'_>,
+    observations: &Bound<'_, Observations>,
+    method: &str,
+    keep_outliers: bool,
+    free_scale: bool,
+    joint_offsets: bool,
+    goal_mm: Option<f64>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> Result<(String, PairSigmas), Failure> {
+    let method = method_by_name(method)?;
+    let options = Options { keep_outliers, free_scale, joint_offsets };
+    let observations = observations.get();
+    run(py, progress, |work| {
+        let observed = &observations.observed;
+        let mut calibration = calibrate_with(observed, method, options, work)?;
+        let goal = FindingOptions::with_goal_mm(goal_mm);
+        let findings = doctor::diagnose(observed, Some(&mut calibration), &goal, work.cancel).findings;
+        if work.is_cancelled() {
+            return Err(HandEyeError::Cancelled.into());
+        }
+        let result = document(observations, &calibration, &findings, method, options)?;
+        let sigmas = calibration.pose_fit.map(|fit| (fit.sigma_m, fit.sigma_rad));
+        Ok((result.to_json().map_err(|error| Failure::NoAnswer(error.to_string()))?, sigmas))
+    })
+}
+
+/// What is wrong with the data: JSON, the page of text, and whether nothing is.
+#[pyfunction]
+pub fn diagnose(
+    py: Python<'_>,
+    observations: &Bound<'_, Observations>,
+    goal_mm: Option<f64>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> Result<(String, String, bool), Failure> {
+    let observations = observations.get();
+    run(py, progress, |work| {
+        let observed = &observations.observed;
+        // Why there is no calibration is what the diagnosis is about.
+        let mut calibration = match calibrate_with(observed, Method::Joint, Options::default(), work) {
+            Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(HandEyeError::Cancelled.into()),
+            other => other.ok(),
+        };
+        let goal = FindingOptions::with_goal_mm(goal_mm);
+        let diagnosis: Diagnosis = doctor::diagnose(observed, calibration.as_mut(), &goal, work.cancel);
+        if work.is_cancelled() {
+            return Err(HandEyeError::Cancelled.into());
+        }
+        let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| Failure::NoAnswer(error.to_string()))?;
+        Ok((json, diagnosis.report(), diagnosis.is_healthy()))
+    })
+}
+
+fn method_by_name(name: &str) -> Result<Method, Failure> {
+    Method::by_name(name)
+        .ok_or_else(|| Failure::Input(format!("no method {name:?}: choose from {}", Method::names().join(", "))))
+}
+
+fn document(
+    observations: &Observations,
+    calibration: &Calibration,
+    findings: &[Finding],
+    method: Method,
+    options: Options,
+) -> Result<CalibrationResult, Failure> {
+    let sha256 = observations.dataset.as_ref().map(|dataset| dataset.input_sha256().map_err(Failure::input));
+    let mut said = solve_options(method, options, &observations.observed.target);
+    if !observations.target_is_known {
+        said.insert(TARGET_OPTION.to_owned(), Value::Null);
+    }
+    let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), sha256.transpose()?, said);
+    result.findings = findings.iter().map(Finding::to_record).collect();
+    Ok(result)
+}

@@ -1,0 +1,67 @@
+//! Work on a thread of its own while Python goes on: its other threads run, Ctrl-C ends the work, progress is told.
+
+use std::thread;
+use std::time::Duration;
+
+use crossbeam_channel::{RecvTimeoutError, unbounded};
+use handeye_core::progress::{CancelToken, Progress, Work};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use crate::error::Failure;
+
+/// How often signals are looked at: soon enough for a person who pressed Ctrl-C.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// What the working thread says.
+enum Said<T> {
+    Progress(Progress),
+    Done(Result<T, Failure>),
+}
+
+/// Does the work without holding Python's lock. `told` is called with the stage in words and the part of it that is done.
+///
+/// # Errors
+/// That of the work; `KeyboardInterrupt`, or what `told` raised, after which the work was cancelled.
+pub fn run<T: Send>(
+    py: Python<'_>,
+    told: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(Work<'_>) -> Result<T, Failure> + Send,
+) -> Result<T, Failure> {
+    let cancel = CancelToken::default();
+    let wants_progress = told.is_some();
+    thread::scope(|scope| {
+        let (sender, receiver) = unbounded();
+        let token = cancel.clone();
+        let worker = scope.spawn(move || {
+            // Nobody listens any more only when nobody waits any more.
+            let say = |said| drop(sender.send(said));
+            let progress = |now: Progress| {
+                if wants_progress {
+                    say(Said::Progress(now));
+                }
+            };
+            say(Said::Done(work(Work { cancel: &token, progress: &progress })));
+        });
+        let mut interrupted = None;
+        loop {
+            let said = py.detach(|| receiver.recv_timeout(LOOK));
+            let heard = match said {
+                Ok(Said::Done(result)) => return interrupted.map_or(result, |error: PyErr| Err(error.into())),
+                Ok(Said::Progress(now)) => {
+                    told.map_or(Ok(()), |told| told.call1((now.stage.label(), now.fraction())).map(drop))
+                }
+                Err(RecvTimeoutError::Timeout) => py.check_signals(),
+                Err(RecvTimeoutError::Disconnected) => {
+                    let _panic = worker.join();
+                    let message = "the solver broke down on this set: please report it with the data";
+                    return Err(PyRuntimeError::new_err(message).into());
+                }
+            };
+            if let (Err(error), None) = (heard, &interrupted) {
+                cancel.cancel();
+                interrupted = Some(error);
+            }
+        }
+    })
+}

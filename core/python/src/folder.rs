@@ -1,0 +1,62 @@
+//! Dataset folders as arrays.
+
+use std::path::PathBuf;
+
+use handeye_core::project::dataset::{Dataset, Entry};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use serde_json::json;
+
+use crate::error::Failure;
+use crate::input::{Lens, Observations};
+use crate::numbers::{bytes_of, of_pose};
+
+/// Numbers (int64) and pixels of the corners of a view.
+type CornerBytes<'py> = (Bound<'py, PyBytes>, Bound<'py, PyBytes>);
+
+/// A dataset folder: what a calibration is made from, what is small as JSON, and arrays by their names. An array that no
+/// view has is left out; a pose that one view lacks is not finite.
+#[pyfunction]
+pub fn read_folder(py: Python<'_>, folder: PathBuf) -> Result<(Observations, String, Bound<'_, PyDict>), Failure> {
+    let dataset = py.detach(|| Dataset::read(&folder)).map_err(Failure::input)?;
+    let entries = &dataset.entries;
+    let arrays = PyDict::new(py);
+    if entries.iter().any(|entry| entry.base_from_tip.is_some()) {
+        let numbers = entries.iter().flat_map(|entry| matrix(entry.base_from_tip.as_ref().map(of_pose)));
+        arrays.set_item("base_from_tip", bytes_of(py, numbers))?;
+    }
+    if entries.iter().any(|entry| entry.camera_from_target.is_some()) {
+        let numbers = entries.iter().flat_map(|entry| matrix(entry.camera_from_target.as_ref().map(of_pose)));
+        arrays.set_item("camera_from_target", bytes_of(py, numbers))?;
+    }
+    if entries.iter().any(|entry| entry.corners.is_some()) {
+        let corners: Vec<_> = entries.iter().map(|entry| corners(py, entry)).collect();
+        arrays.set_item("corners", corners)?;
+    }
+    let lens = dataset.camera.as_ref().and_then(|camera| camera.intrinsics.as_ref()).map(Lens::from);
+    let described = json!({
+        "mode": dataset.mode,
+        "target": dataset.target,
+        "image_size": dataset.image_size,
+        "intrinsics": lens,
+        "intrinsics_are_known": dataset.camera.is_some_and(|camera| camera.fixed),
+        "lens_model": dataset.camera.map(|camera| camera.model.name()),
+        "names": entries.iter().map(|entry| &entry.name).collect::<Vec<_>>(),
+        "image_paths": entries.iter().map(|entry| &entry.image_path).collect::<Vec<_>>(),
+        "joints_rad": entries.iter().map(|entry| &entry.joints_rad).collect::<Vec<_>>(),
+        "notes": dataset.outside,
+    });
+    let observed = dataset.observations(|_image| None);
+    Ok((Observations { observed, dataset: Some(dataset), target_is_known: true }, described.to_string(), arrays))
+}
+
+fn matrix(pose: Option<Vec<f64>>) -> Vec<f64> {
+    pose.unwrap_or_else(|| vec![f64::NAN; 16])
+}
+
+fn corners<'py>(py: Python<'py>, entry: &Entry) -> Option<CornerBytes<'py>> {
+    let corners = entry.corners.as_ref().filter(|corners| !corners.is_empty())?;
+    let numbers: Vec<u8> = corners.iter().flat_map(|corner| (corner.index as i64).to_ne_bytes()).collect();
+    let pixels = corners.iter().flat_map(|corner| [corner.px.x, corner.px.y]);
+    Some((PyBytes::new(py, &numbers), bytes_of(py, pixels)))
+}

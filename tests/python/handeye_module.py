@@ -1,0 +1,438 @@
+"""The Python module against OpenCV 4, the command line and simulated truth.
+
+    python handeye_module.py HANDEYE SCHEMA FOLDER
+
+HANDEYE is the binary, FOLDER an empty one. Prints a line for every check.
+"""
+
+import inspect
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+import warnings
+
+import cv2
+import numpy as np
+
+import handeye
+import simulated
+from simulated import BASE_FROM_TARGET, MATRIX, POINTS, SIZE, TIP_FROM_CAMERA, inverse, pose, session
+
+BOARD = handeye.Target.chessboard(simulated.COLUMNS, simulated.ROWS, simulated.SQUARE_M)
+LENS = handeye.Intrinsics.from_opencv(MATRIX, None, SIZE)
+CHECKS = []
+
+
+def check(function):
+    CHECKS.append(function)
+    return function
+
+
+def near(a, b, tolerance):
+    assert np.abs(np.asarray(a) - np.asarray(b)).max() <= tolerance, f"{a}\nis not\n{b}"
+
+
+def raises(kind, words, call, *arguments, **named):
+    """The exception, whose message has all the words."""
+    try:
+        call(*arguments, **named)
+    except kind as error:
+        missing = [word for word in words if word not in str(error)]
+        assert not missing, f"{missing} not in: {error}"
+        return error
+    raise AssertionError(f"no {kind.__name__} about {words}")
+
+
+def in_opencv_order(s, camera_from_target=None):
+    seen = s.camera_from_target if camera_from_target is None else camera_from_target
+    split = lambda poses: ([p[:3, :3] for p in poses], [p[:3, 3:] for p in poses])
+    return *split(s.base_from_tip), *split(seen)
+
+
+def noisy_pairs(rng, views, robot_mm=0.3, robot_deg=0.05):
+    """A session with the poses that OpenCV finds from its corners."""
+    s = session(rng, views, 0.2, robot_mm, robot_deg)
+    seen = []
+    for corners in s.corners:
+        _, turn, shift = cv2.solvePnP(POINTS, corners, MATRIX, None)
+        seen.append(pose(turn[:, 0], shift[:, 0]))
+    return s, np.array(seen)
+
+
+@check
+def exact_pairs_give_the_truth_and_what_opencv_gives(rng):
+    s = session(rng, 12)
+    pairs = in_opencv_order(s)
+    for method in ("pose_pairs", "tsai", "park", "horaud", "andreff", "daniilidis", "shah", "li"):
+        turn, shift = handeye.calibrate_hand_eye(*pairs, method=method)
+        assert turn.shape == (3, 3) and shift.shape == (3, 1)
+        near(np.hstack([turn, shift]), TIP_FROM_CAMERA[:3], 1e-9)
+    for constant in range(5):
+        near(np.hstack(handeye.calibrate_hand_eye(*pairs, method=constant)),
+             np.hstack(cv2.calibrateHandEye(*pairs, method=constant)), 1e-9)
+
+
+@check
+def noisy_pairs_give_the_numbers_of_opencv(rng):
+    # The same formulas: what is left is arithmetic, and OpenCV's Rodrigues, which takes turns below 1e-5 rad for none.
+    for views in (5, 12, 30):
+        s, seen = noisy_pairs(rng, views)
+        pairs = in_opencv_order(s, seen)
+        for constant in range(5):
+            theirs = np.hstack(cv2.calibrateHandEye(*pairs, method=constant))
+            near(np.hstack(handeye.calibrate_hand_eye(*pairs, method=constant)), theirs, 1e-9)
+            # By position too, where OpenCV has an output.
+            near(np.hstack(handeye.calibrate_hand_eye(*pairs, constant)), theirs, 1e-9)
+        world = [inverse(p) for p in s.base_from_tip]
+        pairs = [p[:3, :3] for p in seen], [p[:3, 3:] for p in seen], [p[:3, :3] for p in world], [p[:3, 3:] for p in world]
+        for constant in range(2):
+            theirs = cv2.calibrateRobotWorldHandEye(*pairs, method=constant)
+            ours = handeye.calibrate_robot_world_hand_eye(*pairs, method=constant)
+            for mine, other in zip(ours, theirs):
+                assert mine.shape == other.shape
+                near(mine, other, 1e-9)
+
+
+@check
+def rotation_vectors_and_flat_translations_are_taken_as_opencv_takes_them(rng):
+    s = session(rng, 8)
+    turns, shifts, seen, distances = in_opencv_order(s)
+    vectors = [cv2.Rodrigues(r)[0] for r in turns]
+    flat = handeye.calibrate_hand_eye(vectors, [t[:, 0] for t in shifts], seen, np.array(distances).reshape(-1, 3))
+    near(np.hstack(flat), TIP_FROM_CAMERA[:3], 1e-9)
+
+
+@check
+def a_standing_camera_is_found_by_either_function(rng):
+    s = session(rng, 15, 0.1, 0.1, 0.02)
+    # The same chain with the roles of base and tip exchanged.
+    reported = np.array([inverse(p) for p in s.base_from_tip])
+    result = handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=reported, intrinsics=LENS, mode="eye_to_hand")
+    assert result.tip_from_camera is None and result.base_from_target is None
+    assert simulated.error(result.base_from_camera)[0] < 1.0
+    near(result.tip_from_target[:3, 3], BASE_FROM_TARGET[:3, 3], 1e-3)
+    assert result.hand_eye is result.base_from_camera
+
+
+@check
+def corners_give_the_answer_with_its_uncertainty(rng):
+    s = session(rng, 15, 0.1, 0.1, 0.02)
+    told = []
+    result = handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, image_size=SIZE,
+                               mode="eye_in_hand", progress=lambda stage, part: told.append((stage, part)))
+    millimetres, degrees = simulated.error(result.tip_from_camera)
+    assert millimetres < 1.0 and degrees < 0.1, (millimetres, degrees)
+    assert 0.02 < result.tip_error_95_mm < 2.0, result.tip_error_95_mm
+    for covariance in (result.hand_eye_covariance, result.target_covariance):
+        assert covariance.shape == (6, 6)
+        near(covariance, covariance.T, 1e-15)
+        assert np.linalg.eigvalsh(covariance).min() > 0
+    near(result.intrinsics.camera_matrix[:2], MATRIX[:2], 5.0)
+    assert not result.intrinsics_are_known and min(result.intrinsics.sigma) > 0
+    assert 0.05 < result.corner_sigma_px < 0.2 and result.robot_sigma_mm > 0 and result.robot_sigma_deg > 0
+    assert [view.status for view in result.views] == ["used"] * 15
+    assert all(0 < view.rms_px < 1 for view in result.views)
+    assert {stage for stage, _ in told} >= {"calibrating the camera", "estimating jointly"}
+    assert all(0 <= part <= 1 for _, part in told)
+    assert set(result.methods) >= {"tsai_lenz", "park_martin", "shah"}
+    # The points of calibrateCamera say the same as the kind of target.
+    same = handeye.calibrate(corners=[c[:, None] for c in s.corners], target=POINTS, base_from_tip=s.base_from_tip,
+                             image_size=SIZE, mode="eye_in_hand")
+    near(same.tip_from_camera, result.tip_from_camera, 0)
+
+
+@check
+def a_board_seen_in_part_says_which_corners_it_shows(rng):
+    s = session(rng, 12, 0.05, 0.05, 0.01)
+    ids = [np.sort(rng.choice(70, 40, replace=False)) for _ in s.corners]
+    corners = [c[i] for c, i in zip(s.corners, ids)]
+    corners[3] = None
+    result = handeye.calibrate(corners=corners, corner_ids=ids, target=BOARD, base_from_tip=s.base_from_tip,
+                               intrinsics=LENS, mode="eye_in_hand")
+    assert simulated.error(result.tip_from_camera)[0] < 1.0
+    assert result.views[3].status == "no_target" and result.intrinsics_are_known
+
+
+@check
+def pairs_state_their_disagreement_and_leave_outliers_out(rng):
+    s, seen = noisy_pairs(rng, 14)
+    seen[5] = seen[5] @ pose([0.2, 0.1, 0.0], [0.03, 0.0, 0.0])
+    names = [f"photo {i}" for i in range(14)]
+    result = handeye.calibrate(base_from_tip=s.base_from_tip, camera_from_target=seen, mode="eye_in_hand", names=names)
+    assert [view.name for view in result.views if view.status == "outlier"] == ["photo 5"]
+    assert any(f.code == "outlier_view" and f.views == ("photo 5",) for f in result.findings), result.findings
+    assert 0.05 < result.pair_sigma_mm < 5 and 0.01 < result.pair_sigma_deg < 1 and result.tip_error_95_mm is None
+    assert np.linalg.eigvalsh(result.hand_eye_covariance).min() > 0 and result.intrinsics is None
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        handeye.calibrate_hand_eye(*in_opencv_order(s, seen))
+    assert [w.category for w in said] == [handeye.CalibrationWarning] and "view 5" in str(said[0].message)
+    assert said[0].filename == __file__
+
+
+@check
+def the_doctor_accuses_an_injected_fault(rng):
+    s = session(rng, 12, 0.1, 0.1, 0.02)
+    good = dict(corners=s.corners, target=BOARD, intrinsics=LENS, mode="eye_in_hand")
+    healthy = handeye.doctor(base_from_tip=s.base_from_tip, **good)
+    assert healthy.is_healthy and healthy.untested is None, healthy.report
+    inverted = np.array([inverse(p) for p in s.base_from_tip])
+    millimetres = s.base_from_tip.copy()
+    millimetres[:, :3, 3] *= 1e3
+    for poses, code in ((inverted, "inverted_poses"), (millimetres, "wrong_length_unit"),
+                        (np.roll(s.base_from_tip, 1, axis=0), "shifted_poses")):
+        diagnosis = handeye.doctor(base_from_tip=poses, **good)
+        assert code in [f.code for f in diagnosis.findings], diagnosis.report
+        assert not diagnosis.is_healthy and any(h.accepted and h.code == code for h in diagnosis.hypotheses)
+        assert diagnosis.report.strip() and json.loads(diagnosis.to_json())["findings"]
+        # And the calibration is not to be used.
+        try:
+            result = handeye.calibrate(base_from_tip=poses, **good)
+        except handeye.CalibrationError:
+            continue
+        assert result.problem is not None and result.tip_error_95_mm is None, code
+
+
+@check
+def bad_input_is_an_exception_that_says_what_to_do(rng):
+    s = session(rng, 8, 0.1, 0.1, 0.02)
+    good = dict(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, image_size=SIZE, mode="eye_in_hand")
+    bad = lambda words, **change: raises(handeye.InputError, words, handeye.calibrate, **{**good, **change})
+    spoilt = s.base_from_tip.copy()
+    spoilt[2, 0, 3] = np.nan
+    bad(["base_from_tip", "view 2", "not finite", "leave this view out"], base_from_tip=spoilt)
+    spoilt = s.base_from_tip.copy()
+    spoilt[4, :3, :3] = spoilt[4, :3, :3] * [1, 1, -1]
+    bad(["view 4", "mirrors"], base_from_tip=spoilt)
+    spoilt = s.base_from_tip.copy()
+    spoilt[1, :3, :3] *= 1.1
+    bad(["view 1", "orthonormal"], base_from_tip=spoilt)
+    bad(["last row", "transposed"], base_from_tip=np.swapaxes(s.base_from_tip, 1, 2))
+    bad(["shape (8, 3, 4)", "(N, 4, 4)"], base_from_tip=s.base_from_tip[:, :3])
+    bad(["shape (4,)", "4 × 4"], base_from_tip=[p[0] for p in s.base_from_tip])
+    bad(["not an array of numbers"], base_from_tip="poses.csv")
+    bad(["8 in corners", "7 in base_from_tip"], base_from_tip=s.base_from_tip[:7])
+    corners = list(s.corners)
+    corners[6] = corners[6][:50]
+    bad(["view 6", "50", "70 points", "corner_ids"], corners=corners)
+    bad(["corners[0] has shape (70, 3)"], corners=[np.zeros((70, 3))] * 8)
+    corners[6] = s.corners[6].copy()
+    corners[6][9, 1] = np.inf
+    bad(["view 6", "corner 9", "not finite"], corners=corners)
+    corners[6][9, 1] = 481.0
+    bad(["view 6", "corner 9", "outside of the image"], corners=corners)
+    ids = [np.arange(70)] * 8
+    bad(["view 0", "corner 70 is not on the target"], corner_ids=[np.arange(1, 71), *ids[1:]])
+    bad(["view 0", "twice"], corner_ids=[np.zeros(70, dtype=int), *ids[1:]])
+    bad(["mode is missing", "eye_to_hand"], mode=None)
+    bad(["'eye-in-hand'", "'eye_in_hand'"], mode="eye-in-hand")
+    bad(["image_size is missing"], image_size=None)
+    bad(["target is missing"], target=None)
+    bad(["base_from_tip is missing"], base_from_tip=None)
+    bad(["keep corners"], camera_from_target=s.camera_from_target)
+    bad(["same name"], names=["a"] * 8)
+    bad(["no method 'tsai'", "tsai_lenz"], method="tsai")
+    bad(["grid"], target=rng.normal(size=(70, 3)))
+    bad(["leave that option out"], corners=None, target=None, image_size=None, camera_from_target=s.camera_from_target,
+        joint_offsets=True)
+    raises(handeye.InputError, ["give corners, or camera_from_target"], handeye.calibrate, base_from_tip=s.base_from_tip,
+           mode="eye_in_hand")
+    raises(handeye.InputError, ["square_m", "positive"], handeye.Target.chessboard, 10, 7, 0.0)
+    raises(handeye.InputError, ["columns"], handeye.Target.chessboard, 2, 7, 0.01)
+    raises(handeye.InputError, ["6 dist_coeffs"], handeye.Intrinsics.from_opencv, MATRIX, np.zeros(6), SIZE)
+    assert issubclass(handeye.InputError, ValueError) and issubclass(handeye.CalibrationError, RuntimeError)
+
+    pairs = in_opencv_order(s)
+    opencv = lambda words, *arguments, **named: raises(
+        handeye.InputError, words, handeye.calibrate_hand_eye, *arguments, **named)
+    opencv(["no method 7", "0 tsai_lenz"], *pairs, method=7)
+    opencv(["no method 'best'", "'pose_pairs'"], *pairs, "best")
+    opencv(["no method None"], *pairs, None)
+    opencv(["8 poses", "7 of the target"], *pairs[:2], pairs[2][:7], pairs[3][:7])
+    opencv(["t_target2cam[0] has shape (2,)"], *pairs[:3], [np.zeros(2)] * 8)
+    opencv(["R_gripper2base has 8 views and t_gripper2base 7"], pairs[0], pairs[1][:7], *pairs[2:])
+
+
+@check
+def data_without_an_answer_say_what_to_capture(rng):
+    s = session(rng, 12, 0.1, 0.1, 0.02)
+    few = dict(base_from_tip=s.base_from_tip[:2], camera_from_target=s.camera_from_target[:2], mode="eye_in_hand")
+    raises(handeye.CalibrationError, ["2 views", "at least 3", "capture more poses"], handeye.calibrate, **few)
+    one_axis = np.array([pose([0, 0, 0.3 * i], [0.02 * i, 0.01, 0.5]) for i in range(8)])
+    s = session(rng, 8, 0.1, camera_from_target=one_axis)
+    for method in ("pose_pairs", "park", "shah"):
+        raises(handeye.CalibrationError, ["about the same axis", "add views turned"], handeye.calibrate_hand_eye,
+               *in_opencv_order(s), method=method)
+    raises(handeye.CalibrationError, ["about the same axis", "30°"], handeye.calibrate, corners=s.corners, target=BOARD,
+           base_from_tip=s.base_from_tip, intrinsics=LENS, mode="eye_in_hand")
+    still = session(rng, 8, 0.1, camera_from_target=np.array([pose([0.1, 0, 0], [0.01 * i, 0, 0.5]) for i in range(8)]))
+    raises(handeye.CalibrationError, ["turn the tip by 30°"], handeye.calibrate_hand_eye, *in_opencv_order(still))
+    diagnosis = handeye.doctor(base_from_tip=still.base_from_tip, camera_from_target=still.camera_from_target,
+                               mode="eye_in_hand")
+    assert diagnosis.untested and not diagnosis.is_healthy
+
+
+def write_folder(folder, s, corners=True, images=()):
+    os.makedirs(folder)
+    names = [f"images/{i:03}.png" for i in range(len(s.base_from_tip))]
+    rows = lambda poses: "".join(
+        f"{name}," + ",".join(repr(float(v)) for v in [*p[:3, 3], *p[:3, :3].ravel()]) + "\n" for name, p in zip(names, poses))
+    header = "image,x,y,z," + ",".join(f"r{r}{c}" for r in "123" for c in "123") + "\n"
+    files = {"poses.csv": header + rows(s.base_from_tip)}
+    if corners:
+        source = 'corners = "corners.csv"'
+        lines = [f"{name},{i % 10},{i // 10},{float(u)!r},{float(v)!r}\n"
+                 for name, seen in zip(names, s.corners) for i, (u, v) in enumerate(seen)]
+        files["corners.csv"] = "image,column,row,u,v\n" + "".join(lines)
+    elif not images:
+        source = 'poses = "target_poses.csv"'
+        files["target_poses.csv"] = header + rows(s.camera_from_target)
+    else:
+        source = ""
+    files["dataset.toml"] = (
+        f'mode = "eye_in_hand"\n[target]\nkind = "chessboard"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\n{source}\n'
+        '[robot]\nposes = "poses.csv"\nlength_unit = "m"\nrotation = "matrix"\npose = "base_from_tip"\n')
+    if corners:
+        files["dataset.toml"] += "[camera]\nfixed = false\nwidth = 640\nheight = 480\n"
+    for name, text in files.items():
+        with open(os.path.join(folder, name), "w") as file:
+            file.write(text)
+    for name in names if images else ():
+        os.makedirs(os.path.join(folder, "images"), exist_ok=True)
+        cv2.imwrite(os.path.join(folder, name), np.zeros((48, 64), np.uint8))
+
+
+@check
+def a_folder_reads_to_the_numbers_in_it_and_solves_as_on_the_command_line(rng):
+    binary, folder = sys.argv[1], sys.argv[3]
+    s = session(rng, 12, 0.1, 0.1, 0.02)
+    for kind in ("corners", "pairs"):
+        path = os.path.join(folder, kind)
+        write_folder(path, s, corners=kind == "corners")
+        data = handeye.load_dataset(path)
+        # A rotation goes through a quaternion.
+        near(data.base_from_tip, s.base_from_tip, 1e-14)
+        assert data.mode == "eye_in_hand" and data.target == BOARD and len(data.names) == 12
+        if kind == "corners":
+            near(data.corners, s.corners, 0)
+            near(data.corner_ids, [np.arange(70)] * 12, 0)
+            assert data.image_size == SIZE and data.camera_from_target is None
+        else:
+            near(data.camera_from_target, s.camera_from_target, 1e-14)
+            assert data.corners is None and data.image_paths == [None] * 12
+        # 0.5 mm is the goal of the command line.
+        result = handeye.calibrate(data, goal_mm=0.5)
+        output = os.path.join(folder, kind + ".json")
+        subprocess.run([binary, "calibrate", path, "--quiet", "--json", output], check=True, stdout=subprocess.DEVNULL)
+        with open(output) as file:
+            assert json.load(file) == json.loads(result.to_json())
+        diagnosis = subprocess.run([binary, "doctor", path, "--quiet", "--json", "-"], check=True, stdout=subprocess.PIPE)
+        assert json.loads(diagnosis.stdout) == json.loads(handeye.doctor(data).to_json())
+        # The arrays of a data set give its answer, and with something changed another.
+        if kind == "corners":
+            arrays = dict(corners=data.corners, corner_ids=data.corner_ids, target=data.target, mode=data.mode,
+                          base_from_tip=data.base_from_tip, image_size=data.image_size, names=data.names)
+        else:
+            arrays = dict(camera_from_target=data.camera_from_target, target=data.target, mode=data.mode,
+                          base_from_tip=data.base_from_tip, names=data.names)
+        near(handeye.calibrate(**arrays).tip_from_camera, result.tip_from_camera, 1e-12)
+        raises(handeye.InputError, ["a data set and mode"], handeye.calibrate, data, mode="eye_in_hand")
+    path = os.path.join(folder, "images")
+    write_folder(path, s, corners=False, images=True)
+    data = handeye.load_dataset(path)
+    assert data.image_size == (64, 48) and all(os.path.exists(p) for p in data.image_paths)
+    for call in (handeye.calibrate, handeye.doctor):
+        raises(handeye.InputError, ["12 images", "OpenCV", "handeye calibrate"], call, data)
+    missing = os.path.join(folder, "nowhere")
+    raises(handeye.InputError, [missing], handeye.load_dataset, missing)
+    with open(os.path.join(path, "poses.csv"), "a") as file:
+        file.write("images/099.png,1\n")
+    raises(handeye.InputError, ["poses.csv", "14"], handeye.load_dataset, path)
+
+
+@check
+def the_document_is_what_the_schema_says(rng):
+    import jsonschema
+
+    with open(sys.argv[2]) as file:
+        schema = json.load(file)
+    s = session(rng, 10, 0.1, 0.1, 0.02)
+    results = [
+        handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, image_size=SIZE,
+                          mode="eye_in_hand", goal_mm=0.3),
+        handeye.calibrate(base_from_tip=s.base_from_tip, camera_from_target=s.camera_from_target, mode="eye_in_hand"),
+        handeye.calibrate(corners=s.corners, target=BOARD, image_size=SIZE),
+        handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, intrinsics=LENS,
+                          mode="eye_in_hand", method="daniilidis"),
+    ]
+    for result in results:
+        jsonschema.validate(json.loads(result.to_json()), schema)
+        assert result.document == json.loads(result.to_json())
+    camera = results[2]
+    assert camera.mode is None and camera.hand_eye is None and camera.intrinsics.fx > 0
+    assert results[1].document["provenance"]["options"]["target"] is None
+
+
+@check
+def other_threads_run_while_it_computes_and_ctrl_c_ends_it(rng):
+    s = session(rng, 120, 0.1, 0.1, 0.02)
+    arguments = dict(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, image_size=SIZE, mode="eye_in_hand")
+    began = time.monotonic()
+    handeye.calibrate(**arguments)
+    whole = time.monotonic() - began
+    turns, running = [0], threading.Event()
+
+    def count():
+        while not running.is_set():
+            turns[0] += 1
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    before = turns[0]
+    handeye.calibrate(**arguments)
+    counted = turns[0] - before
+    running.set()
+    thread.join()
+    assert counted > 1000, counted
+
+    # As Ctrl-C: Python's own handlers run in the middle of the work.
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, whole / 5)
+    began = time.monotonic()
+    raises(KeyboardInterrupt, [], handeye.calibrate, **arguments)
+    assert time.monotonic() - began < whole, "the work went on"
+
+    def stop(stage, part):
+        raise ZeroDivisionError("enough")
+
+    raises(ZeroDivisionError, ["enough"], handeye.calibrate, progress=stop, **arguments)
+
+
+@check
+def everything_public_is_documented_and_opencv_is_not_inside(rng):
+    for name in handeye.__all__:
+        value = getattr(handeye, name)
+        if inspect.isclass(value) or inspect.isfunction(value):
+            assert inspect.getdoc(value), name
+    folder = os.path.dirname(handeye.__file__)
+    assert os.path.exists(os.path.join(folder, "py.typed")) and os.path.exists(os.path.join(folder, "_handeye.pyi"))
+    library, = [name for name in os.listdir(folder) if name.startswith("_handeye") and name.endswith((".so", ".pyd"))]
+    assert ".abi3." in library, library
+    with open(os.path.join(folder, library), "rb") as file:
+        assert b"libopencv" not in file.read()
+    assert re.fullmatch(r"\d+\.\d+\.\d+", handeye.__version__)
+
+
+def main():
+    for index, function in enumerate(CHECKS):
+        function(np.random.default_rng(index))
+        print(function.__name__)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""Sessions of which the truth is known: a camera on a robot's tip, a chessboard, corners with noise and reported poses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+COLUMNS, ROWS, SQUARE_M = 10, 7, 0.015
+SIZE = (640, 480)
+MATRIX = np.array([[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]])
+ROW, COLUMN = np.divmod(np.arange(COLUMNS * ROWS), COLUMNS)
+POINTS = np.stack([COLUMN * SQUARE_M, ROW * SQUARE_M, np.zeros(COLUMNS * ROWS)], axis=1)
+
+
+def rotation(vector):
+    """(3, 3) of a rotation vector."""
+    angle = np.linalg.norm(vector)
+    x, y, z = vector / angle if angle > 0 else vector
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
+
+
+def pose(vector, translation):
+    out = np.eye(4)
+    out[:3, :3] = rotation(np.asarray(vector, dtype=float))
+    out[:3, 3] = translation
+    return out
+
+
+def inverse(transform):
+    out = np.eye(4)
+    out[:3, :3] = transform[:3, :3].T
+    out[:3, 3] = -transform[:3, :3].T @ transform[:3, 3]
+    return out
+
+
+def angle_deg(a, b):
+    """Between two rotations; good for small angles too."""
+    return np.degrees(2 * np.arcsin(min(np.linalg.norm(a[:3, :3] - b[:3, :3]) / np.sqrt(8), 1)))
+
+
+TIP_FROM_CAMERA = pose([0.2, -0.1, 1.5], [0.05, -0.03, 0.08])
+BASE_FROM_TARGET = pose([3.0, 0.2, 0.1], [0.5, 0.1, 0.02])
+
+
+@dataclass
+class Session:
+    """Transforms are (N, 4, 4)."""
+
+    base_from_tip: np.ndarray
+    """As reported."""
+    camera_from_target: np.ndarray
+    """The true ones."""
+    corners: list
+    """(70, 2) each."""
+
+
+def looks(rng, views):
+    """camera_from_target: tilted by up to 35°, turned by up to 60°, from 0.4 to 0.6 m."""
+    out = []
+    for _ in range(views):
+        tilt, azimuth = np.radians(35) * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi)
+        turn = rotation(np.array([tilt * np.cos(azimuth), tilt * np.sin(azimuth), 0.0]))
+        turn = turn @ rotation(np.array([0.0, 0.0, np.radians(rng.uniform(-60, 60))]))
+        middle = np.array([*rng.uniform(-0.03, 0.03, 2), rng.uniform(0.4, 0.6)])
+        look = np.eye(4)
+        look[:3, :3], look[:3, 3] = turn, middle - turn @ POINTS.mean(axis=0)
+        out.append(look)
+    return np.array(out)
+
+
+def session(rng, views, corner_px=0.0, robot_mm=0.0, robot_deg=0.0, camera_from_target=None):
+    """Noise per axis."""
+    seen = looks(rng, views) if camera_from_target is None else camera_from_target
+    reported, corners = [], []
+    for look in seen:
+        error = pose(rng.normal(size=3) * np.radians(robot_deg), rng.normal(size=3) * robot_mm * 1e-3)
+        reported.append(BASE_FROM_TARGET @ inverse(look) @ inverse(TIP_FROM_CAMERA) @ error)
+        points = POINTS @ look[:3, :3].T + look[:3, 3]
+        pixels = points[:, :2] / points[:, 2:] * MATRIX[0, 0] + MATRIX[:2, 2]
+        corners.append(pixels + rng.normal(size=pixels.shape) * corner_px)
+    return Session(np.array(reported), seen, corners)
+
+
+def error(tip_from_camera, truth=TIP_FROM_CAMERA):
+    """Of a hand-eye transform: millimetres, degrees."""
+    return 1e3 * np.linalg.norm(tip_from_camera[:3, 3] - truth[:3, 3]), angle_deg(tip_from_camera, truth)
