@@ -1,5 +1,7 @@
 //! What a new session begins with.
 
+use std::collections::BTreeMap;
+
 use handeye_core::estimate::handeye::{HandEye, Mode};
 use handeye_core::geometry::arm::{ArmKind, ArmModel, JointKind};
 use handeye_core::project::session::{GroundTruth, SessionMeta};

@@ -21,6 +21,7 @@ mod slow {
     mod asleep;
     mod auto;
     mod coppeliasim_only;
+    mod driven_cells;
     mod drivers;
     mod first_user;
     mod following;

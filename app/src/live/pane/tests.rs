@@ -215,8 +215,12 @@ fn the_readout_names_the_point_in_camera_and_in_base() {
     let px = intrinsics.project(&in_camera).expect("in front");
     assert!((px - Vector2::new(200.0, 300.0)).norm() < 1e-6);
     let frame = model.frame.as_ref().expect("live");
-    let in_base =
-        model.calibrated().expect("calibrated").base_from_camera(&frame.info.base_from_tip.expect("the robot is known")).isometry() * in_camera;
+    let in_base = model
+        .calibrated()
+        .expect("calibrated")
+        .base_from_camera(&frame.info.base_from_tip.expect("the robot is known"))
+        .isometry()
+        * in_camera;
     let words = |at: &Point3<f64>| at.coords.map(|metres| crate::gui::style::numbers::fixed(metres * 1e3, 1, 0));
     let words = |at: &Point3<f64>| words(at).as_slice().join(" ");
     let pane = colour(model);

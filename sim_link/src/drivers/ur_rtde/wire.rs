@@ -5,6 +5,7 @@ use super::RtdeError;
 /// Bytes before the body.
 const HEADER: usize = 3;
 /// Longest body of a package.
+#[cfg(test)]
 const MAX_BODY: usize = u16::MAX as usize - HEADER;
 
 /// Asks for a version of the protocol; answered by whether it is accepted.

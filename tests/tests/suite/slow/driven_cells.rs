@@ -1,0 +1,129 @@
+//! The window over drivers: programs of their own, two clocks, a driver that is killed, a robot whose poses are typed.
+
+use std::path::Path;
+use std::process::Command as Program;
+
+use handeye_app::command::Command;
+use handeye_app::limits;
+use handeye_app::model::{CapturePurpose, CellSource, Drivers, Model, Motion, SolveStatus};
+use handeye_core::geometry::frames::{Camera, Pose, Tip};
+use handeye_core::project::taught_poses::Goal;
+use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_sim_link::client::cell::{Arm, CellPaths, SettleOptions};
+use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint};
+use handeye_tests::handeye_binary;
+use handeye_tests::workbench::Workbench;
+
+/// A cell that keeps pace with real time, as drivers of hardware do.
+fn cell() -> (CellServer, Endpoint) {
+    let scene = Scene::reference().expect("the scene");
+    let cell = CellServer::start(CellConfig { real_time: Some(true), ..CellConfig::new(scene) }).expect("a cell");
+    let endpoint = cell.endpoint().parse().expect("an address");
+    (cell, endpoint)
+}
+
+/// The command of a driver of one part of that cell, with its clock so far ahead.
+fn driver(cell: &Endpoint, part: &str, clock_s: f64) -> String {
+    format!("'{}' driver fake --connect {cell} --only {part} --clock {clock_s}", handeye_binary().display())
+}
+
+fn arm(cell: &Endpoint) -> Arm {
+    Arm::connect(cell, &ConnectionOptions::default(), &CellPaths::default()).expect("the cell")
+}
+
+fn is_connected(model: &Model) -> bool {
+    model.control.is_connected() && model.camera.is_connected() && model.frame.is_some() && model.cell.is_some()
+}
+
+fn is_solved(model: &Model) -> bool {
+    model.solve.status == SolveStatus::Idle && model.solve.fresh
+}
+
+/// How far the answer is from the truth \[mm\], which no driver reports.
+fn error_mm(bench: &Workbench, truth: &Pose<Tip, Camera>) -> f64 {
+    let solved = bench.model().solve.current().expect("solved");
+    let found = solved.result.hand_eye.expect("a robot").translation_m;
+    distance(found, truth.translation().into()) * 1e3
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+fn bench(robot: Option<String>, camera: Option<String>, sessions: &Path) -> Workbench {
+    let mut bench = Workbench::start(CellSource::Drivers(Drivers { robot, camera }), sessions, None);
+    bench.until("a cell", is_connected);
+    bench
+}
+
+#[test]
+fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed() {
+    let (_cell, endpoint) = cell();
+    let folder = tempfile::tempdir().expect("a folder");
+    let robot = driver(&endpoint, "robot", 500.0);
+    let mut bench = bench(Some(robot.clone()), Some(driver(&endpoint, "camera", 500.08)), folder.path());
+    bench.until("related clocks", |model| {
+        model.frame.as_ref().is_some_and(|frame| frame.info.clocks.is_some() && frame.info.base_from_tip.is_some())
+    });
+    bench.until("the robot", |model| model.robot.is_some());
+
+    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.until("the refusal", |model| !model.sequence_runs);
+    assert!(bench.said().contains("only read"), "nothing moves before somebody allows it: {}", bench.said());
+    bench.click(Command::Arm(true));
+    bench.until("the permission", Model::is_armed);
+    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.until("five captures", |model| model.document().captures.len() >= 5);
+
+    // Its process alone: the camera's goes on.
+    let robots = format!("driver fake --connect {endpoint} --only robot");
+    let killed = Program::new("pkill").args(["-KILL", "-f", "--", &robots]).status();
+    assert!(killed.expect("pkill runs").success());
+    bench.until("the end of the sequence", |model| !model.sequence_runs && model.capture.is_none());
+    bench.until("the robot again", |model| is_connected(model) && model.mover.is_connected() && model.robot.is_some());
+    assert!(!bench.model().is_armed(), "a new connection begins read-only");
+    bench.click(Command::Arm(true));
+    bench.until("the permission", Model::is_armed);
+    bench.click(Command::ContinueSequence);
+    bench.until("the rest of the sequence", |model| !model.sequence_runs && model.motion == Motion::Idle);
+    bench.until("a solution", is_solved);
+    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
+    let truth = arm(&endpoint).ground_truth().expect("a cell of this project").tip_from_camera;
+    let mm = error_mm(&bench, &truth);
+    assert!(mm < 0.5, "{mm} mm: a clock off by 80 ms, or an image of another pose, would show here");
+
+    bench.click(Command::Export);
+    bench.until("the exports", |model| model.export.written.is_some());
+}
+
+#[test]
+fn a_robot_that_is_moved_by_hand_is_calibrated_with_poses_that_are_typed() {
+    let (_cell, endpoint) = cell();
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut bench = bench(None, Some(driver(&endpoint, "camera", 0.0)), folder.path());
+    assert!(bench.model().robot.is_none());
+    let taught = bench.model().document().taught.clone();
+    let mut hand = arm(&endpoint);
+    let cancel = CancelToken::default();
+    for (number, pose) in taught.iter().enumerate().take(8) {
+        let Goal::Joints(joints) = &pose.goal else { panic!("the reference poses are joints") };
+        let limits = limits::of_joints(&limits::SEQUENCE, 1.0, hand.info().joint_kinds());
+        hand.move_to_joints(joints, &limits, &cancel).expect("it is moved");
+        hand.settle(&SettleOptions::default(), &cancel).expect("it stands");
+        bench.click(Command::TypePose(hand.base_from_tip().expect("the pendant shows it")));
+        bench.until("the typed pose", |model| model.robot.is_some());
+        bench.click(Command::Capture(CapturePurpose::Calibrate));
+        bench.until("the capture", |model| model.document().captures.len() == number + 1);
+        bench.until("the question for the next pose", |model| model.robot.is_none());
+    }
+    bench.until("a solution", is_solved);
+    let truth = hand.ground_truth().expect("a cell of this project").tip_from_camera;
+    let mm = error_mm(&bench, &truth);
+    assert!(mm < 0.5, "{mm} mm");
+
+    // The pose of the last capture is not that of the next one.
+    bench.click(Command::Capture(CapturePurpose::Calibrate));
+    bench.until("the refusal", |model| model.refused.is_some());
+    assert!(bench.said().contains("type the pose that its pendant shows"), "{}", bench.said());
+}
