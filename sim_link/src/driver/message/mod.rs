@@ -18,6 +18,8 @@ pub use robot::{PoseMessage, StateMessage};
 
 /// The version of the protocol that is spoken here.
 pub const PROTOCOL: u32 = 1;
+/// Longest text of the parser that is shown, in characters.
+const LONGEST_SAID: usize = 300;
 
 /// What the workbench sends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -215,17 +217,23 @@ impl FromDriver {
 }
 
 fn body<'a, T: Deserialize<'a>>(kind: &str, line: &'a str) -> Result<T, BadMessage> {
-    serde_json::from_str(line).map_err(|error| BadMessage::Field { kind: kind.to_owned(), why: error.to_string() })
+    serde_json::from_str(line).map_err(|error| BadMessage::Field { kind: kind.to_owned(), why: said(&error) })
+}
+
+/// What the parser says, which may repeat what a driver has sent: on one line, and in its beginning.
+fn said(error: &serde_json::Error) -> String {
+    let one_line = |c: char| if c.is_control() { ' ' } else { c };
+    error.to_string().chars().map(one_line).take(LONGEST_SAID).collect()
 }
 
 fn not_a_message(line: &str, error: &serde_json::Error) -> BadMessage {
     if error.is_data() {
-        BadMessage::Field { kind: "message".to_owned(), why: error.to_string() }
+        BadMessage::Field { kind: "message".to_owned(), why: said(error) }
     } else if line.contains("NaN") || line.contains("Infinity") {
         // What Python writes for numbers that are none.
-        BadMessage::NotJson { why: format!("{error}: JSON has no NaN and no Infinity, leave the field out") }
+        BadMessage::NotJson { why: format!("{}: JSON has no NaN and no Infinity, leave the field out", said(error)) }
     } else {
-        BadMessage::NotJson { why: error.to_string() }
+        BadMessage::NotJson { why: said(error) }
     }
 }
 

@@ -48,6 +48,7 @@ impl PoseMessage {
         Ok(Pose::from_translation_xyzw(self.translation_m, self.rotation_xyzw))
     }
 }
+
 /// The robot at one instant, as the driver says it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StateMessage {
