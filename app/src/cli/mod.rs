@@ -12,6 +12,7 @@ mod doctor;
 mod export;
 mod failure;
 mod gate;
+mod import;
 mod object_arg;
 mod out;
 mod output;
@@ -69,6 +70,9 @@ enum Command {
     /// Track the board live with a calibration, and have the arm follow it.
     #[command(after_help = "Example:\n  handeye track --calibration session/result.json --follow --frames 600")]
     Track(track::TrackArgs),
+    /// Turn somebody's recording into a dataset folder: images with a table, a file to a pose, what other tools write.
+    #[command(after_help = import::after_help())]
+    Import(import::ImportArgs),
     /// Write calibration files from a solved session or a result JSON.
     #[command(after_help = "Example:\n  handeye export session --format ros_camera_info easy_handeye2 --out files")]
     Export(export::ExportArgs),
@@ -100,6 +104,7 @@ pub fn main() -> ExitCode {
         Command::Plan(args) => plan::run(&args),
         Command::Track(args) => track::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Target(args) => target::run(&args),
     };
     ended(result)

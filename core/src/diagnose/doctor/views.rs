@@ -41,7 +41,7 @@ pub(super) struct TableRow {
 }
 
 /// One view with a robot pose and a pose of the target.
-pub(super) struct SessionView {
+pub(crate) struct SessionView {
     pub name: String,
     /// Its row in the table of those in the fit.
     pub row: usize,
@@ -60,7 +60,7 @@ pub(super) struct SessionView {
 }
 
 /// All views as the camera saw them.
-pub(super) struct SessionViews {
+pub(crate) struct SessionViews {
     pub mode: Mode,
     pub views: Vec<SessionView>,
     /// Every row of the table that is in the fit.
