@@ -174,7 +174,7 @@ fn import(
         Source::Stream(i) => cameras.get(i).cloned().flatten(),
         Source::Track(_) => None,
     };
-    let known = write::Known { recording, judgement: &judgement, settings, target, camera, is_taken };
+    let known = write::Context { recording, judgement: &judgement, settings, target, camera, is_taken };
     if args.link {
         // Names are relative to the folder, which has to be there to be a place.
         std::fs::create_dir_all(folder).map_err(|e| Failure::unusable(anyhow!("{}: {e}", folder.display())))?;
@@ -185,7 +185,7 @@ fn import(
             tracing::info!("{done} of {of} images copied");
         }
     };
-    write::write(&plan, folder, args.link, progress).map_err(Failure::failed)?;
+    write::write(&plan, folder, progress).map_err(Failure::failed)?;
     for line in &plan.left_out {
         told.note(format_args!("not written: {line}"));
     }

@@ -32,7 +32,7 @@ const ROUNDS: usize = 6;
 const NOISY: f64 = 2.0;
 
 /// A row of the pose table, whether the target was seen in its image or not.
-pub(super) struct TableRow {
+pub(crate) struct TableRow {
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Place of its image when the images are sorted by number (1, 2, 10).
     pub rank_by_number: usize,

@@ -37,7 +37,10 @@ pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>), ImportError> 
         // Beside a file that was named only what it may refer to counts: images, the description of a camera.
         let is_series =
             |f: &Path| ["csv", "txt", "tsv", "json", "samples", "npz", "npy", "mcap", "db3"].contains(&&*ending(f));
-        files.retain(|file| *file == only || !is_series(file));
+        files.retain(|file| {
+            let is_others = ending(file) == "calib" && file.file_stem() != only.file_stem();
+            *file == only || !(is_series(file) || is_others)
+        });
     }
     files.sort_by(|a, b| natural_order::compare(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok((root, files))

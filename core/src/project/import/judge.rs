@@ -271,7 +271,7 @@ fn sources(recording: &Recording, sights: &Sights, settings: &Settings) -> Resul
         }
     };
     let with_images = settings.target_poses.is_none() && sights.streams.iter().any(Option::is_some);
-    for (robot, track) in recording.tracks.iter().enumerate().filter(|(_, track)| robots(track)) {
+    for robot in (0..recording.tracks.len()).filter(|i| robots(&recording.tracks[*i])) {
         if with_images {
             for (i, stream) in recording.streams.iter().enumerate() {
                 if sights.streams.get(i).is_some_and(Option::is_some) && is_wanted(&stream.name, &settings.images) {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::error::ImportError;
 use super::folder;
 use super::formats::tree::{self, LEAST_POSES};
-use super::formats::{easy_handeye, industrial_calibration, intrinsics, moveit, npz, table, visp};
+use super::formats::{easy_handeye, industrial_calibration, intrinsics, moveit, npz, rosbag2, table, visp};
 use super::recording::{Recording, Sample, Stated, Track};
 use super::value::{self, Value};
 use crate::project::files::own_folder::{DESCRIPTION, is_session};
@@ -114,6 +114,16 @@ impl Reader<'_> {
             "json" | "yaml" | "yml" | "samples" | "calib" => self.documents(members),
             "csv" | "txt" | "tsv" | "dat" | "" | "log" => self.tables(members),
             "npz" | "npy" => self.arrays(members),
+            "mcap" => {
+                for (file, _) in members {
+                    let name = file.display().to_string();
+                    let read = rosbag2::bytes(&self.root.join(file))
+                        .and_then(|bytes| rosbag2::read(&name, &bytes, &mut self.recording));
+                    if let Err(why) = read {
+                        self.warn(file, format_args!("is not used: {why}"));
+                    }
+                }
+            }
             "xml" => self.each(members, |reader, file, text| {
                 let camera = visp::camera(text, &file.display().to_string());
                 reader.recording.cameras.extend(camera);
@@ -147,7 +157,7 @@ impl Reader<'_> {
         let mut read: Vec<(&Path, Option<u64>, Value)> = Vec::new();
         for (file, number) in members {
             if let Some(value) = self.document(file) {
-                read.push((file, *number, value));
+                read.push((file.as_path(), *number, value));
             }
         }
         if members.len() >= LEAST_POSES && self.one_to_a_file(&read) {

@@ -1,8 +1,10 @@
 //! What was found: images and series of poses, as the files have them.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use nalgebra::Matrix4;
+use tempfile::TempDir;
 
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use crate::estimate::handeye::Mode;
@@ -28,6 +30,8 @@ pub struct Recording {
     pub mode: Option<Known<Mode>>,
     /// What a person should know of the files: doubled ones, some that cannot be read.
     pub warnings: Vec<String>,
+    /// Where images lie that were unpacked; it goes with the recording.
+    pub scratch: Option<Arc<TempDir>>,
 }
 
 /// Images of one naming in one folder.
@@ -46,7 +50,7 @@ pub struct Stream {
 /// An image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageFile {
-    /// Where it is, below the folder of the recording.
+    /// Where it is, below the folder of the recording; of one that was unpacked as a whole.
     pub path: PathBuf,
     /// The number in its name that differs from image to image.
     pub number: Option<u64>,

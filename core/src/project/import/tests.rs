@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use image::{GrayImage, Luma};
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::Isometry3;
 use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -15,6 +15,7 @@ use tempfile::TempDir;
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::estimate::{CameraKnowledge, Observations};
+use crate::geometry::frames::Pose;
 use crate::geometry::se3;
 use crate::progress::CancelToken;
 use crate::project::dataset::Dataset;
@@ -149,8 +150,6 @@ fn written_pairs(recording: &Recording, h: &Hypothesis, session: &Observations) 
         .collect()
 }
 
-use crate::geometry::frames::Pose;
-
 #[test]
 fn every_way_to_write_a_pose_is_found_by_the_data_once_the_place_of_the_camera_is_known() {
     for (seed, mode) in [(1, Mode::EyeInHand), (2, Mode::EyeToHand)] {
@@ -191,7 +190,7 @@ fn a_written_import_is_a_data_set_with_the_same_poses_to_nine_digits() {
     let (recording, judgement) = judged(folder.path(), &session, &in_hand());
     let settings = in_hand();
     let target = Some((session.target, "given with --target".to_owned()));
-    let known = write::Known {
+    let known = write::Context {
         recording: &recording,
         judgement: &judgement,
         settings: &settings,
@@ -204,7 +203,7 @@ fn a_written_import_is_a_data_set_with_the_same_poses_to_nine_digits() {
         let out = home.path().join("set");
         fs::create_dir(&out).expect("made");
         let plan = plan(&judgement.hypotheses[0], &known, link.then_some(out.as_path()));
-        write::write(&plan, &out, link, |_, _| ()).expect("written");
+        write::write(&plan, &out, |_, _| ()).expect("written");
         let dataset = Dataset::read(&out).expect("a data set");
         assert_eq!(dataset.entries.len(), 12);
         for entry in &dataset.entries {
@@ -217,7 +216,7 @@ fn a_written_import_is_a_data_set_with_the_same_poses_to_nine_digits() {
         for said in ["mode = eye_in_hand", "given with --set", "rotation = euler_zyx_123", "by the data: it leaves"] {
             assert!(text.contains(said), "{said:?} in\n{text}");
         }
-        let again = write::write(&plan, &out, link, |_, _| ()).expect_err("there is something");
+        let again = write::write(&plan, &out, |_, _| ()).expect_err("there is something");
         assert!(matches!(again, ImportError::OutNotEmpty(_)), "{again}");
     }
 }
@@ -442,7 +441,6 @@ fn the_angle_of_a_view_is_that_of_its_rotation() {
     let (_, judgement) = judged(folder.path(), &session, &in_hand());
     let fit = judgement.hypotheses[0].fit.as_ref().expect("a fit");
     assert!(fit.median_rad < 0.2f64.to_radians() && fit.median_m < 1e-3, "{fit:?}");
-    let _ = UnitQuaternion::<f64>::identity();
 }
 
 /// Files of many formats, to be broken.

@@ -27,11 +27,6 @@ impl Value {
         entries.iter().find(|(name, _)| name.eq_ignore_ascii_case(key)).map(|(_, value)| value)
     }
 
-    /// A value by keys, one inside of the other.
-    pub fn at(&self, path: &[&str]) -> Option<&Value> {
-        path.iter().try_fold(self, |value, key| value.get(key))
-    }
-
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Number(number) => Some(*number),

@@ -34,7 +34,7 @@ pub struct Plan {
     pub poses: String,
     /// The text of `target_poses.csv`, where there are no images.
     pub target_poses: Option<String>,
-    /// Images, and their names in the data set.
+    /// Images to copy, and their names in the data set.
     pub images: Vec<(PathBuf, String)>,
     /// Views that are written.
     pub views: usize,
@@ -43,7 +43,7 @@ pub struct Plan {
 }
 
 /// What goes into a plan beside the hypothesis.
-pub struct Known<'a> {
+pub struct Context<'a> {
     /// The recording.
     pub recording: &'a Recording,
     /// All that was tried.
@@ -59,7 +59,7 @@ pub struct Known<'a> {
 }
 
 /// Plans the folder of a hypothesis. With `link_to` images stay where they are and are named relative to that folder.
-pub fn plan(h: &Hypothesis, known: &Known<'_>, link_to: Option<&Path>) -> Plan {
+pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan {
     let recording = known.recording;
     let track = &recording.tracks[h.robot];
     let disagreeing: BTreeSet<usize> = h.fit.iter().flat_map(|fit| fit.disagreeing.iter().map(|(s, _)| *s)).collect();
@@ -91,9 +91,13 @@ pub fn plan(h: &Hypothesis, known: &Known<'_>, link_to: Option<&Path>) -> Plan {
         let name = match h.source {
             Source::Stream(i) => {
                 let path = &recording.streams[i].images[image].path;
-                let name = names.of(path, images.len());
-                images.push((recording.root.join(path), name.clone()));
-                name
+                if let Some(linked) = names.linked(path) {
+                    linked
+                } else {
+                    let name = names.of(path, images.len());
+                    images.push((recording.root.join(path), name.clone()));
+                    name
+                }
             }
             Source::Track(i) => {
                 let name = format!("view_{:04}", rows.len() + 1);
@@ -175,13 +179,13 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
+    /// Where it is as seen from the data set, if it stays there. What was unpacked does not.
+    fn linked(&self, path: &Path) -> Option<String> {
+        self.link_to.filter(|_| path.is_relative()).and_then(|folder| relative(&self.root.join(path), folder))
+    }
+
     fn of(&mut self, path: &Path, index: usize) -> String {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
-        if let Some(folder) = self.link_to
-            && let Some(relative) = relative(&self.root.join(path), folder)
-        {
-            return relative;
-        }
         let file = path.file_name().and_then(|name| name.to_str());
         let whole = path.to_str().map(|path| path.replace(['/', '\\'], "_"));
         // Of two folders the files may have the same names, and a name may be no text.
@@ -212,7 +216,7 @@ fn comment(text: &mut String, line: impl std::fmt::Display) {
     let _ok = writeln!(text, "# {line}").is_ok();
 }
 
-fn comments(h: &Hypothesis, known: &Known<'_>, left_out: &[String]) -> String {
+fn comments(h: &Hypothesis, known: &Context<'_>, left_out: &[String]) -> String {
     let mut text = String::new();
     comment(&mut text, "Imported by handeye. Poses are written anew in metres and quaternions; where they come from:");
     for belief in &known.recording.beliefs {
@@ -260,7 +264,7 @@ fn comments(h: &Hypothesis, known: &Known<'_>, left_out: &[String]) -> String {
 }
 
 /// Why a convention is as it is.
-pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Known<'_>) -> String {
+pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -> String {
     let settings = known.settings;
     let is_set = match key {
         "mode" => settings.mode.is_some(),
@@ -342,7 +346,7 @@ fn is_robots(track: &Track) -> bool {
 ///
 /// # Errors
 /// [`ImportError::OutNotEmpty`], [`ImportError::Unwritable`], [`ImportError::Unreadable`] for an image.
-pub fn write(plan: &Plan, out: &Path, link: bool, mut progress: impl FnMut(usize, usize)) -> Result<(), ImportError> {
+pub fn write(plan: &Plan, out: &Path, mut progress: impl FnMut(usize, usize)) -> Result<(), ImportError> {
     check_out(out)?;
     let unwritable =
         |file: &Path, e: &std::io::Error| ImportError::Unwritable { file: file.to_path_buf(), why: one_line(e) };
@@ -351,7 +355,7 @@ pub fn write(plan: &Plan, out: &Path, link: bool, mut progress: impl FnMut(usize
         let file = out.join(name);
         atomic_file::write(&file, bytes).map_err(|e| unwritable(&file, &e))
     };
-    if !link && !plan.images.is_empty() {
+    if !plan.images.is_empty() {
         let folder = out.join(IMAGES);
         fs::create_dir(&folder).map_err(|e| unwritable(&folder, &e))?;
         for (i, (from, name)) in plan.images.iter().enumerate() {
