@@ -120,6 +120,11 @@ pub(super) struct Naming {
 }
 
 impl Naming {
+    /// The name without its numbers and without its folder.
+    pub fn template(&self) -> &str {
+        &self.template
+    }
+
     /// As a person reads it: `#` stands for a number.
     pub fn shown(&self) -> String {
         self.folder.join(&self.template).display().to_string()

@@ -47,6 +47,8 @@ pub struct Hypothesis {
 pub struct Fit {
     /// Median distance between where the poses put the target's outer points and where they were seen, metres.
     pub median_m: f64,
+    /// It over the target's distance from the camera, which is the same in every unit.
+    pub relative: f64,
     /// Median angle between both, radians.
     pub median_rad: f64,
     /// Views with a pose and the target in sight.
@@ -126,9 +128,8 @@ impl Hypothesis {
     }
 
     /// Whether most views agree with it, well enough for their distance from the camera, and none says that it is wrong.
-    pub fn explains(&self, distance_m: f64) -> bool {
-        self.contradictions.is_empty()
-            && self.fit.as_ref().is_some_and(|fit| fit.median_m < super::judge::EXPLAINED * distance_m)
+    pub fn explains(&self) -> bool {
+        self.contradictions.is_empty() && self.fit.as_ref().is_some_and(|fit| fit.relative < super::judge::EXPLAINED)
     }
 }
 

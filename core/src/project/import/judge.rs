@@ -33,6 +33,8 @@ pub const NEED: usize = 4;
 /// A view disagrees beyond so many times the median, and beyond this part of the distance.
 const DISAGREES: f64 = 5.0;
 const DISAGREES_OF_DISTANCE: f64 = 3e-3;
+/// A hypothesis that leaves less than this part of the target's distance needs no second look at the others.
+const CLEAR: f64 = 0.01;
 /// Views that are looked at to sort hypotheses.
 const MOST_QUICK: usize = 20;
 /// And to judge the best of them.
@@ -41,6 +43,9 @@ const MOST_VIEWS: usize = 400;
 const MOST_JUDGED: usize = 40;
 /// Hypotheses that are kept for the list.
 const MOST_LISTED: usize = 24;
+/// Targets are not seen from nearer or farther than this, metres.
+const NEAREST_M: f64 = 0.03;
+const FARTHEST_M: f64 = 20.0;
 /// Within this factor two hypotheses explain the same, and the commoner one comes first.
 const TIE: f64 = 1.05;
 
@@ -124,12 +129,12 @@ pub fn judge(
             if cancel.is_cancelled() {
                 break;
             }
-            let fit = judge.solve(case, MOST_QUICK, robust).map_or(f64::INFINITY, |(_, median_m)| median_m);
-            quick.push((fit, i));
+            let fit = judge.solve(case, MOST_QUICK, robust).map(|(_, median_m)| median_m / judge.distance_of(case));
+            quick.push((fit.unwrap_or(f64::INFINITY), i));
         }
         quick.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = quick.first().map_or(f64::INFINITY, |(fit, _)| *fit);
-        if quick.first().is_none_or(|(_, i)| best < 0.2 * EXPLAINED * judge.distance_of(&cases[*i])) {
+        if best < CLEAR {
             break;
         }
     }
@@ -150,25 +155,22 @@ pub fn judge(
     sort(recording, &mut hypotheses);
     hypotheses.truncate(MOST_LISTED);
     let distance_m = hypotheses.first().map_or(0.0, |h| judge.sight_distance(h));
-    let verdict = verdict(&mut hypotheses, |h| judge.sight_distance(h));
+    let verdict = verdict(&mut hypotheses);
     Ok(Judgement { hypotheses, tried, distance_m, verdict })
 }
 
-fn verdict(hypotheses: &mut [Hypothesis], distance: impl Fn(&Hypothesis) -> f64) -> Verdict {
+fn verdict(hypotheses: &mut [Hypothesis]) -> Verdict {
     // Those that explain come first, also before a better fit that is contradicted.
-    hypotheses.sort_by_key(|h| !h.explains(distance(h)));
+    hypotheses.sort_by_key(|h| !h.explains());
     let alone = hypotheses.len() == 1;
-    let Some(best) = hypotheses.first() else { return Verdict::Unexplained };
-    let Some(fit) = best.fit.as_ref().filter(|_| best.explains(distance(best))) else { return Verdict::Unexplained };
-    let (limit, views) = (TIMES * fit.median_m.max(1e-4 * distance(best)), fit.views);
-    let near = hypotheses.iter().take_while(|h| {
-        h.explains(distance(h)) && h.fit.as_ref().is_some_and(|fit| fit.median_m <= limit || fit.views < NEED)
-    });
-    let near = near.count();
+    let Some(best) = hypotheses.first().filter(|best| best.explains()) else { return Verdict::Unexplained };
+    let (limit, views) = best.fit.as_ref().map_or((0.0, 0), |fit| (TIMES * fit.relative.max(1e-4), fit.views));
+    let is_near =
+        |h: &&Hypothesis| h.explains() && h.fit.as_ref().is_some_and(|fit| fit.relative <= limit || fit.views < NEED);
+    let near = hypotheses.iter().take_while(is_near).count();
     // With too few views to tell hypotheses apart, all of them are open. What was paired by what the images show rests on
     // the answer itself.
-    if (near == 1 && !best.pairing.is_by_content && (views >= NEED || alone)) || (alone && !best.pairing.is_by_content)
-    {
+    if near == 1 && !best.pairing.is_by_content && (views >= NEED || alone) {
         Verdict::Decided
     } else {
         Verdict::Ambiguous(near)
@@ -194,14 +196,14 @@ fn rarity(recording: &Recording, h: &Hypothesis) -> (usize, usize, usize, usize,
 }
 
 fn sort(recording: &Recording, hypotheses: &mut [Hypothesis]) {
-    let median_of = |h: &Hypothesis| h.fit.as_ref().map_or(f64::INFINITY, |fit| fit.median_m);
+    let median_of = |h: &Hypothesis| h.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative);
     hypotheses.sort_by(|a, b| {
         median_of(a).total_cmp(&median_of(b)).then_with(|| rarity(recording, a).cmp(&rarity(recording, b)))
     });
     // Runs of equals, each measured by its first.
     let mut start = 0;
     while start < hypotheses.len() {
-        let limit = TIE * median_of(&hypotheses[start]) + 1e-9;
+        let limit = TIE * median_of(&hypotheses[start]) + 1e-7;
         let end = start + hypotheses[start..].iter().take_while(|h| median_of(h) <= limit).count().max(1);
         hypotheses[start..end].sort_by(|a, b| {
             let views = |h: &Hypothesis| h.fit.as_ref().map_or(0, |fit| fit.views);
@@ -383,7 +385,10 @@ fn cases(recording: &Recording, paired: &[Paired], settings: &Settings) -> Vec<C
     let mut out = Vec::new();
     for (number, pair) in paired.iter().enumerate() {
         let track = &recording.tracks[pair.robot];
-        let robot_readings = readings(track, settings.length, settings.angle, settings.rotation);
+        let mut robot_readings = readings(track, settings.length, settings.angle, settings.rotation);
+        if matches!(pair.source, Source::Track(_)) {
+            robot_readings = without_centimetres(robot_readings);
+        }
         let target_readings: Vec<Option<(Reading, Direction)>> = match pair.source {
             Source::Stream(_) => vec![None],
             Source::Track(i) => target_readings(&recording.tracks[i], settings).into_iter().map(Some).collect(),
@@ -411,8 +416,21 @@ fn cases(recording: &Recording, paired: &[Paired], settings: &Settings) -> Vec<C
     out
 }
 
+/// When both sides are in one unit no data tell which it is, and nobody has recorded both in centimetres: only where it is
+/// the one that is left.
+fn without_centimetres(readings: Vec<Reading>) -> Vec<Reading> {
+    let is_other = |reading: &Reading| reading.length != LengthUnit::Centimetre;
+    if readings.iter().any(is_other) { readings.into_iter().filter(is_other).collect() } else { readings }
+}
+
 fn target_readings(track: &Track, settings: &Settings) -> Vec<(Reading, Direction)> {
-    let mut readings = readings(track, settings.target_length, None, settings.target_rotation);
+    let readings = readings(track, settings.target_length, None, settings.target_rotation);
+    let mut readings = without_centimetres(readings);
+    readings.retain(|reading| {
+        let distances = track.samples.iter().filter_map(|s| reading.transform(&s.numbers));
+        let distance_m = median(distances.map(|pose| pose.translation.vector.norm()));
+        distance_m.is_some_and(|distance_m| (NEAREST_M..FARTHEST_M).contains(&distance_m))
+    });
     // Poses of a target are written by programs, which have vectors, quaternions and matrices, and seldom angles.
     if readings.len() > 12 {
         use super::conventions::Euler;
@@ -580,6 +598,7 @@ impl Judge<'_> {
         }
         let fit = Fit {
             median_m,
+            relative: median_m / sight.distance_m,
             median_rad,
             views: views.len(),
             disagreeing,
@@ -623,7 +642,7 @@ impl Judge<'_> {
         let wants = |h: &&Hypothesis| {
             !h.contradictions.is_empty()
                 && self.settings.pairing.as_deref().is_none_or(|rule| rule == "aligned")
-                && h.fit.as_ref().is_some_and(|fit| fit.median_m < EXPLAINED * self.sight_distance(h))
+                && h.fit.as_ref().is_some_and(|fit| fit.relative < EXPLAINED)
         };
         for h in hypotheses.iter().filter(wants).take(4) {
             let Some(sight) = self.sight_of(h.source, h.target_reading.as_ref()) else { continue };

@@ -23,6 +23,8 @@ mod sight;
 mod value;
 pub mod write;
 
+#[cfg(all(test, feature = "opencv"))]
+mod golden_tests;
 #[cfg(test)]
 mod tests;
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::folder;
 use super::recording::{ImageFile, Sample};
 use crate::natural_order;
 
@@ -94,11 +95,18 @@ fn by_name(samples: &[Sample], images: &[ImageFile]) -> Vec<Pairing> {
     let by_path = keyed(images, |image| Some(lower(&image.path.to_string_lossy())));
     let by_file = keyed(images, |image| name(&image.path));
     let by_stem = keyed(images, |image| stem(&image.path));
+    // Numbers may have been filled up with zeros since.
+    let counted = |path: &Path| {
+        let (naming, numbers) = folder::naming(path, false);
+        (!numbers.is_empty()).then(|| (lower(naming.template()), numbers))
+    };
+    let by_counting = keyed(images, |image| counted(&image.path));
     let find = |text: &str| -> Option<usize> {
         let path = lower(text);
         let found = by_path.get(&path).or_else(|| by_file.get(&name(Path::new(&path))?));
         // A name with another ending may have been converted since; one without an ending is a stem.
-        found.or_else(|| by_stem.get(&stem(Path::new(&path))?)).or_else(|| by_stem.get(&path)).copied().flatten()
+        let found = found.or_else(|| by_stem.get(&stem(Path::new(&path))?)).or_else(|| by_stem.get(&path));
+        found.or_else(|| by_counting.get(&counted(Path::new(&path))?)).copied().flatten()
     };
     let mut out = Vec::new();
     if samples.iter().any(|sample| sample.image.is_some()) {

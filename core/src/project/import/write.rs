@@ -287,23 +287,22 @@ pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -
     if let Some(why) = stated(key, h, known.recording) {
         return why;
     }
-    let own = h.fit.as_ref().map_or(f64::INFINITY, |fit| fit.median_m);
+    // What each leaves over the target's distance, and in words.
+    let left = |h: &Hypothesis| h.fit.as_ref().map(|fit| (fit.relative, format!("{:.2} mm", fit.median_m * 1e3)));
+    let (own, own_said) = left(h).unwrap_or((f64::INFINITY, "nothing".into()));
     let other = known.judgement.hypotheses.iter().filter_map(|other| {
         let convention = other.conventions(known.recording).into_iter().find(|c| c.key == key)?;
-        (convention.value != value).then_some((
-            other.fit.as_ref()?.median_m,
-            convention.value,
-            !other.contradictions.is_empty(),
-        ))
+        let (relative, said) = left(other)?;
+        (convention.value != value).then_some((relative, said, convention.value, !other.contradictions.is_empty()))
     });
     match other.min_by(|a, b| a.0.total_cmp(&b.0)) {
         None => "nothing else is possible with these files, or explains the views nearly as well".into(),
-        Some((median_m, value, _)) if median_m > TIMES * own => {
-            format!("by the data: it leaves {:.2} mm, {value} leaves {:.2} mm", own * 1e3, median_m * 1e3)
+        Some((relative, said, value, _)) if relative > TIMES * own => {
+            format!("by the data: it leaves {own_said}, {value} leaves {said}")
         }
-        Some((_, value, true)) => format!("by the data: images contradict {value}"),
-        Some((median_m, value, false)) => {
-            format!("not decided by the data: it leaves {:.2} mm, {value} leaves {:.2} mm", own * 1e3, median_m * 1e3)
+        Some((.., value, true)) => format!("by the data: images contradict {value}"),
+        Some((_, said, value, false)) => {
+            format!("not decided by the data: it leaves {own_said}, {value} leaves {said}")
         }
     }
 }

@@ -233,7 +233,7 @@ mod tests {
         }
         assert_eq!(ost_in_tar(&tar).as_deref(), Some("image_width: 3\n"));
         for cut in 0..tar.len() {
-            let _ = ost_in_tar(&tar[..cut]);
+            let _cut = ost_in_tar(&tar[..cut]);
         }
     }
 }

@@ -122,9 +122,9 @@ fn one_image_is_taken_of_every_rest_with_the_pose_of_the_tip_there() {
 fn a_broken_bag_is_no_danger() {
     let whole = bag(&poses()[..2]);
     for cut in (0..whole.len()).step_by(whole.len() / 200) {
-        let _ = read("a.mcap", &whole[..cut], &mut Recording::default());
+        let _read = read("a.mcap", &whole[..cut], &mut Recording::default());
         let mut bent = whole.clone();
         bent[cut] ^= 0x55;
-        let _ = read("a.mcap", &bent, &mut Recording::default());
+        let _read = read("a.mcap", &bent, &mut Recording::default());
     }
 }
