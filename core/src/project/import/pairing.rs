@@ -36,15 +36,17 @@ impl Pairing {
     }
 }
 
-/// Every pairing that names, numbers and order allow and that gives at least `need` pairs, the most explicit first; what is
-/// the same under two rules is listed once, with both in words.
+/// Every pairing that names, numbers and order allow and that gives at least `need` pairs and half of those that the most
+/// give, the most explicit first; what is the same under two rules is listed once, with both in words.
 pub(super) fn pairings(samples: &[Sample], images: &[ImageFile], need: usize) -> Vec<Pairing> {
     let mut all = Vec::new();
     all.extend(by_name(samples, images));
     all.extend(by_number(samples, images));
     all.extend(by_order(samples, images));
     let mut out: Vec<Pairing> = Vec::new();
-    for pairing in all.into_iter().filter(|pairing| pairing.count() >= need) {
+    // A rule that pairs few of those that another one pairs fits by its few.
+    let most = all.iter().map(Pairing::count).max().unwrap_or(0);
+    for pairing in all.into_iter().filter(|pairing| pairing.count() >= need && 2 * pairing.count() >= most) {
         match out.iter_mut().find(|known| known.image_of == pairing.image_of) {
             Some(known) => known.text = format!("{} = {}", known.text, pairing.text),
             None => out.push(pairing),
