@@ -38,14 +38,12 @@ fn samples() -> Vec<Sample> {
         dictionary: "6x6_250".parse().expect("known"),
         layout: None,
     };
-    let decided = |files, target, settings, first, limit_mm| Sample {
-        files,
-        target,
-        settings,
-        first,
-        limit_mm,
-        verdict: Verdict::Decided,
-    };
+    let decided =
+        |files: &'static [&'static str],
+         target: Option<TargetSpec>,
+         settings: &'static [&'static str],
+         first: &'static [(&'static str, &'static str)],
+         limit_mm: f64| Sample { files, target, settings, first, limit_mm, verdict: Verdict::Decided };
     vec![
         decided(
             &["importers/table_eye_in_hand"],
