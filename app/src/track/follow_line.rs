@@ -112,7 +112,7 @@ impl FollowLine {
         }
         match inner.goal(moment) {
             Ok(goal) => {
-                inner.status = Some(distance(&goal.base_from_tip, &moment.base_from_tip));
+                inner.status = Some(following(&goal.base_from_tip, moment));
                 ArmWish::Towards(FollowGoal {
                     base_from_tip: goal.base_from_tip,
                     velocity_m_s: goal.velocity_m_s,
@@ -177,9 +177,13 @@ fn fixed(wish: FollowWish, now: &Estimate, setup: &Setup, base_from_tip: &Pose<B
     }
 }
 
-fn distance(goal: &Pose<Base, Tip>, tip: &Pose<Base, Tip>) -> FollowStatus {
-    let apart = tip.inverse() * *goal;
-    FollowStatus::Following { distance_m: apart.translation().norm(), angle_rad: apart.rotation().angle() }
+fn following(goal: &Pose<Base, Tip>, moment: &FollowMoment) -> FollowStatus {
+    let apart = moment.base_from_tip.inverse() * *goal;
+    FollowStatus::Following {
+        distance_m: apart.translation().norm(),
+        angle_rad: apart.rotation().angle(),
+        is_kept_off: moment.is_kept_off,
+    }
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ fn line() -> (FollowLine, Update, Pose<Base, Tip>) {
 }
 
 fn moment(sim_time_s: f64, base_from_tip: Pose<Base, Tip>) -> FollowMoment {
-    FollowMoment { sim_time_s, joints: [0.0; 6].into(), base_from_tip }
+    FollowMoment { sim_time_s, joints: [0.0; 6].into(), base_from_tip, is_kept_off: false }
 }
 
 #[test]

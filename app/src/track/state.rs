@@ -86,6 +86,8 @@ pub enum FollowStatus {
         distance_m: f64,
         /// Angle between tip and goal \[rad\].
         angle_rad: f64,
+        /// Whether the arm does not go as its goal asks, because it would come too near to something.
+        is_kept_off: bool,
     },
     /// It came to rest by itself, and this is why.
     Ended(Text),

@@ -493,35 +493,71 @@ proptest! {
     }
 }
 
+/// A box of 2 × 30 × 30 cm about a point.
+fn wall(at: Vector3<f64>) -> planning::Surroundings {
+    planning::Surroundings::of(vec![planning::Obstacle::new("wall", Isometry3::from(at), [0.02, 0.3, 0.3])])
+}
+
 #[test]
-fn a_goal_behind_a_box_is_followed_until_the_box_and_the_end_names_it() {
+fn before_a_box_the_arm_stands_and_goes_on_when_the_goal_comes_back() {
     let arm = arm();
     let start = arm.tip(&START);
-    let at = start.translation() + Vector3::new(0.25, 0.0, 0.0);
-    let wall = planning::Obstacle::new("wall", Isometry3::from(at), [0.02, 0.3, 0.3]);
-    let among = arm.among(planning::Surroundings::of(vec![wall]), None);
+    let among = arm.among(wall(start.translation() + Vector3::new(0.25, 0.0, 0.0)), None);
     let limits = open();
     let mut run = Run::among(&arm, &limits, &among);
-    let goal = shifted(&start, Vector3::new(0.5, 0.0, 0.0));
+    let behind = shifted(&start, Vector3::new(0.25, 0.0, 0.0));
     for _ in 0..400 {
-        run.pass(Some(&goal));
-        if run.plan.obstacle().is_some() && run.plan.is_at_rest() {
-            break;
-        }
+        run.pass(Some(&behind));
     }
-    assert_eq!(run.plan.obstacle(), Some(FollowEnd::Contact(Contact::Box { name: "wall".to_owned() })));
-    for joints in &run.points {
-        assert_eq!(among.guard(&START).contact(joints), None, "{joints:?}");
-    }
-    let went_m = run.arm.tip(run.plan.joints()).distance_to(&start).0;
-    assert!((0.05..0.25).contains(&went_m), "{went_m} m");
-
-    // The other way nothing keeps it.
-    let mut run = Run::among(&arm, &limits, &among);
+    assert!(run.plan.is_kept_off());
     let away = shifted(&start, Vector3::new(-0.1, 0.0, 0.0));
     for _ in 0..200 {
         run.pass(Some(&away));
     }
-    assert_eq!(run.plan.obstacle(), None);
+    assert!(!run.plan.is_kept_off());
     assert!(run.arm.tip(run.plan.joints()).distance_to(&away.base_from_tip).0 < 1e-3);
+    assert_eq!(run.plan.obstacle(), None);
+    for joints in &run.points {
+        assert_eq!(among.guard(&START).contact(joints), None, "{joints:?}");
+    }
+    let went_m = run.points.iter().map(|joints| run.arm.tip(joints).translation().x - start.translation().x);
+    let went_m = went_m.fold(0.0, f64::max);
+    assert!((0.05..0.25).contains(&went_m), "{went_m} m");
+    run.rest();
+    assert_eq!(run.broken_limit(&limits), None);
+}
+
+/// A goal that takes the tool along a box, closer to it than allowed for a part of the way.
+#[test]
+fn past_a_box_that_is_too_near_to_its_way_the_arm_comes_to_its_goal() {
+    let arm = arm();
+    let start = arm.tip(&START);
+    let limits = open();
+    let free = {
+        let none = arm.among(planning::Surroundings::default(), None);
+        let mut run = Run::among(&arm, &limits, &none);
+        run_past(&mut run, &start)
+    };
+    assert!(free < 1e-3, "{free} m without a box");
+    // With its edge 5 mm farther in than the clearance of 1 cm about the camera, a capsule of 3 cm radius, allows.
+    let among = arm.among(wall(start.translation() + Vector3::new(0.0, 0.15, 0.185)), None);
+    let mut run = Run::among(&arm, &limits, &among);
+    let apart_m = run_past(&mut run, &start);
+    assert!(run.points.iter().all(|joints| among.guard(&START).contact(joints).is_none()));
+    assert!(apart_m < 1e-3, "{apart_m} m from its goal in the end, {:?}", run.plan.obstacle());
+    run.rest();
+    assert_eq!(run.broken_limit(&limits), None);
+}
+
+/// The goal goes by 0.3 m along y and stands; how far the tip is from it in the end, metres.
+fn run_past(run: &mut Run<'_>, start: &Pose<Base, Tip>) -> f64 {
+    let velocity_m_s = Vector3::new(0.0, 0.05, 0.0);
+    for pass in 0..400 {
+        let time_s = (f64::from(pass) * DT_S).min(6.0);
+        let velocity_m_s = if time_s < 6.0 { velocity_m_s } else { Vector3::zeros() };
+        let at = shifted(start, Vector3::new(0.0, 0.05 * time_s, 0.0));
+        run.pass(Some(&FollowGoal { velocity_m_s, ..at }));
+    }
+    let end = shifted(start, Vector3::new(0.0, 0.3, 0.0));
+    run.arm.tip(run.plan.joints()).distance_to(&end.base_from_tip).0
 }
