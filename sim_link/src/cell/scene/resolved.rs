@@ -12,8 +12,8 @@ use super::board_motion::BoardMotionSpec;
 use super::check::si;
 use super::errors_of_robot::{RobotErrors, gaussian};
 use super::spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo,
-    SimulationSpec, SlipSpec, SolidSpec,
+    CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo, SimulationSpec,
+    SlipSpec, SolidSpec,
 };
 use handeye_core::geometry::arm::{Arm, ArmError, JointValues};
 use handeye_core::geometry::se3;

@@ -2,8 +2,9 @@
 //!
 //! A camera that keeps its view goes wherever the board goes, and about it when the board turns. Where the arm is close to
 //! its column, nearly stretched, or has two axes in line, some direction needs joints faster than they are, and following
-//! ends there; it ends as well before the arm touches something. So a place is judged by the worst of all poses of the board
-//! within a reach: by the share of its limits that the tip can have there in every direction at once, if nothing is touched.
+//! ends there; and the arm stays behind where it would touch something. So a place is judged by the worst of all poses of the
+//! board within a reach: by the share of its limits that the tip can have there in every direction at once, if nothing is touched,
+//! and by whether the whole board is still in the image there before the arm has moved.
 
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
@@ -15,6 +16,7 @@ use super::joints::in_rad;
 use super::reach::ArmKinematics;
 use super::surroundings::Among;
 use super::views::BoardInView;
+use handeye_core::plan::guided::candidates::ViewRange;
 use handeye_core::plan::{self as planning, Guard, PlannedView, Surroundings, ViewOptions};
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
@@ -33,6 +35,8 @@ const WIDER: f64 = 1.5;
 const DISTANCES: [f64; 2] = [0.8, 1.3];
 /// Free pixels about the board: an arm that starts after it lags behind for a moment.
 const MARGIN_PX: f64 = 30.0;
+/// Free pixels about a board that has gone to the end of its reach before the arm has: enough to be found.
+const LEAST_MARGIN_PX: f64 = 5.0;
 /// Random places that are tried: enough for one within a few degrees of any.
 const CANDIDATES: usize = 3000;
 
@@ -103,6 +107,21 @@ pub struct NoPlace {
     pub tried: usize,
 }
 
+impl BoardInView {
+    /// Whether the whole board is in the image from this pose of the tip, wherever it goes within the reach at once.
+    fn is_seen_over(&self, reach: &BoardReach, base_from_tip: &Pose<Base, Tip>) -> bool {
+        let camera_from_base = (*base_from_tip * self.tip_from_camera).inverse();
+        let centre = self.target.centre();
+        let Some(range) = ViewRange::about(std::iter::once(self.distance_m(base_from_tip))) else { return false };
+        let range = ViewRange { margin_px: LEAST_MARGIN_PX, ..range };
+        reach.ends().all(|(shift, turn)| {
+            let base_from_target = self.base_from_target.isometry() * moved_about(&centre, &shift, &turn);
+            let camera_from_target = Pose::from_isometry(camera_from_base.isometry() * base_from_target);
+            range.shows(&self.intrinsics, &self.target, &camera_from_target, None)
+        })
+    }
+}
+
 impl ArmKinematics {
     /// Where the arm follows a board from: `None` where it has room from these joints ([`Self::has_room_to_follow`]), else
     /// [`Self::place_to_follow`].
@@ -125,7 +144,7 @@ impl ArmKinematics {
     }
 
     /// Whether the tip can follow the board at a usual speed from these joints, wherever it goes within `reach` while its
-    /// view is kept, and touches nothing of what it is kept clear of.
+    /// view is kept, touches nothing of what it is kept clear of, and sees the whole board also when that is there at once.
     pub fn has_room_to_follow(
         &self,
         limits: &FollowLimits,
@@ -135,12 +154,14 @@ impl ArmKinematics {
         among: Option<&Among>,
     ) -> bool {
         let guard = among.map(Among::strict);
-        self.room_over(limits, board, reach, joints, ENOUGH, guard.as_ref()) >= ENOUGH
+        board.is_seen_over(reach, &self.tip(joints))
+            && self.room_over(limits, board, reach, joints, ENOUGH, guard.as_ref()) >= ENOUGH
     }
 
-    /// The nearest place from which the whole board is seen and the arm has room to go along with it over half as much again
-    /// as `reach`; where there is none, over `reach`, and where none has enough the one with most. Following keeps clear of what
-    /// it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around.
+    /// The nearest place from which the whole board is seen, also when it is elsewhere within `reach` at once, and the arm has
+    /// room to go along with it over half as much again as `reach`; where there is none, over `reach`; where there is none either,
+    /// one from which the board is seen where it is now, and where none has enough room the one with most. Following keeps clear of
+    /// what it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around.
     ///
     /// # Errors
     /// [`NoPlace`].
@@ -168,8 +189,9 @@ impl ArmKinematics {
         let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
         let place =
             |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
-        for reach in [&reach.wider(), reach] {
-            for view in &views {
+        let is_seen: Vec<bool> = views.iter().map(|view| board.is_seen_over(reach, &view.base_from_tip)).collect();
+        for (reach, keeps_seen) in [(&reach.wider(), true), (reach, true), (&reach.wider(), false), (reach, false)] {
+            for (view, _) in views.iter().zip(&is_seen).filter(|(_, is_seen)| **is_seen == keeps_seen) {
                 let room = self.room_over(limits, board, reach, &view.joints, ENOUGH, guard.as_ref());
                 if room >= ENOUGH && is_free(&view.joints) {
                     return Ok(place(view, room));
