@@ -89,6 +89,8 @@ pub enum FollowStatus {
         /// Whether the arm does not go as its goal asks, because it would come too near to something.
         is_kept_off: bool,
     },
+    /// It stands until the board is seen again.
+    Waiting,
     /// It came to rest by itself, and this is why.
     Ended(Text),
 }

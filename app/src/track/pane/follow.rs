@@ -153,6 +153,9 @@ fn status_ui(ui: &mut Ui, model: &Model, follows: bool) {
         (FollowStatus::MakingRoom, _) => {
             (palette.busy, tr!(language, "Moving to where the arm has room to follow…").to_owned())
         }
+        (FollowStatus::Waiting, _) => {
+            (palette.busy, tr!(language, "The arm stands until the board is seen again").to_owned())
+        }
         (FollowStatus::Off, true) => (palette.busy, tr!(language, "Starting to follow…").to_owned()),
         (FollowStatus::Off | FollowStatus::Ended(_), _) => return,
     };

@@ -37,6 +37,8 @@ const DISTANCES: [f64; 2] = [0.8, 1.3];
 const MARGIN_PX: f64 = 30.0;
 /// Free pixels about a board that has gone to the end of its reach before the arm has: enough to be found.
 const LEAST_MARGIN_PX: f64 = 5.0;
+/// Directions in which it goes; between two of them it goes no farther out of the image than by 8 % of the way.
+const DIRECTIONS: u32 = 8;
 /// Random places that are tried: enough for one within a few degrees of any.
 const CANDIDATES: usize = 3000;
 
@@ -108,14 +110,15 @@ pub struct NoPlace {
 }
 
 impl BoardInView {
-    /// Whether the whole board is in the image from this pose of the tip, wherever it goes within the reach at once.
+    /// Whether the whole board is in the image from this pose of the tip when it goes along its plane at once, as far as the reach.
     fn is_seen_over(&self, reach: &BoardReach, base_from_tip: &Pose<Base, Tip>) -> bool {
         let camera_from_base = (*base_from_tip * self.tip_from_camera).inverse();
-        let centre = self.target.centre();
         let Some(range) = ViewRange::about(std::iter::once(self.distance_m(base_from_tip))) else { return false };
         let range = ViewRange { margin_px: LEAST_MARGIN_PX, ..range };
-        reach.ends().all(|(shift, turn)| {
-            let base_from_target = self.base_from_target.isometry() * moved_about(&centre, &shift, &turn);
+        (0..DIRECTIONS).all(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS);
+            let shift = Translation3::new(reach.in_plane_m * angle.cos(), reach.in_plane_m * angle.sin(), 0.0);
+            let base_from_target = self.base_from_target.isometry() * shift;
             let camera_from_target = Pose::from_isometry(camera_from_base.isometry() * base_from_target);
             range.shows(&self.intrinsics, &self.target, &camera_from_target, None)
         })
