@@ -50,7 +50,7 @@ fn an_arm_that_loses_the_board_stands_and_goes_on_when_it_is_seen_again_in_time(
     // The images stop: the newest one grows old.
     assert_eq!(line.wish(&moment(30.2 + LONGEST_GUESS_S, tip)), ArmWish::Rest);
     assert_eq!(line.wish(&moment(30.1 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::Rest);
-    assert_eq!(line.wish(&moment(30.2 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::End);
+    assert_eq!(line.wish(&moment(30.3 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::End);
     assert!(line.take_ended().is_some());
 }
 

@@ -16,7 +16,6 @@ use super::joints::in_rad;
 use super::reach::ArmKinematics;
 use super::surroundings::Among;
 use super::views::BoardInView;
-use handeye_core::plan::guided::candidates::ViewRange;
 use handeye_core::plan::{self as planning, Guard, PlannedView, Surroundings, ViewOptions};
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
@@ -35,10 +34,6 @@ const WIDER: f64 = 1.5;
 const DISTANCES: [f64; 2] = [0.8, 1.3];
 /// Free pixels about the board: an arm that starts after it lags behind for a moment.
 const MARGIN_PX: f64 = 30.0;
-/// Free pixels about a board that has gone to the end of its reach before the arm has: enough to be found.
-const LEAST_MARGIN_PX: f64 = 5.0;
-/// Directions in which it goes; between two of them it goes no farther out of the image than by 8 % of the way.
-const DIRECTIONS: u32 = 8;
 /// Random places that are tried: enough for one within a few degrees of any.
 const CANDIDATES: usize = 3000;
 
@@ -112,16 +107,8 @@ pub struct NoPlace {
 impl BoardInView {
     /// Whether the whole board is in the image from this pose of the tip when it goes along its plane at once, as far as the reach.
     fn is_seen_over(&self, reach: &BoardReach, base_from_tip: &Pose<Base, Tip>) -> bool {
-        let camera_from_base = (*base_from_tip * self.tip_from_camera).inverse();
-        let Some(range) = ViewRange::about(std::iter::once(self.distance_m(base_from_tip))) else { return false };
-        let range = ViewRange { margin_px: LEAST_MARGIN_PX, ..range };
-        (0..DIRECTIONS).all(|k| {
-            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS);
-            let shift = Translation3::new(reach.in_plane_m * angle.cos(), reach.in_plane_m * angle.sin(), 0.0);
-            let base_from_target = self.base_from_target.isometry() * shift;
-            let camera_from_target = Pose::from_isometry(camera_from_base.isometry() * base_from_target);
-            range.shows(&self.intrinsics, &self.target, &camera_from_target, None)
-        })
+        let camera_from_target = (*base_from_tip * self.tip_from_camera).inverse() * self.base_from_target;
+        planning::shows_within(&self.intrinsics, &self.target, &camera_from_target, reach.in_plane_m)
     }
 }
 
@@ -180,36 +167,47 @@ impl ArmKinematics {
         let setup = self.view_setup(board, from, around);
         let guard = among.map(Among::strict);
         let distance_m = board.distance_m(&self.tip(from));
-        let options = ViewOptions {
-            distance_m: DISTANCES.map(|times| distance_m * times),
-            margin_px: MARGIN_PX,
-            candidates: CANDIDATES,
-            ..ViewOptions::default()
-        };
-        let mut views = planning::views_of_board(&setup, &options);
         let travel = |view: &PlannedView| planning::travel(from, &view.joints);
-        views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
-        let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
-        let place =
-            |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
-        let is_seen: Vec<bool> = views.iter().map(|view| board.is_seen_over(reach, &view.base_from_tip)).collect();
-        for (reach, keeps_seen) in [(&reach.wider(), true), (reach, true), (&reach.wider(), false), (reach, false)] {
-            for (view, _) in views.iter().zip(&is_seen).filter(|(_, is_seen)| **is_seen == keeps_seen) {
-                let room = self.room_over(limits, board, reach, &view.joints, ENOUGH, guard.as_ref());
-                if room >= ENOUGH && is_free(&view.joints) {
-                    return Ok(place(view, room));
+        let mut tried = 0;
+        // Views that keep a board which jumps in the image are few, and looked at first.
+        for leeway_m in [reach.in_plane_m, 0.0] {
+            let options = ViewOptions {
+                distance_m: DISTANCES.map(|times| distance_m * times),
+                margin_px: MARGIN_PX,
+                leeway_m,
+                candidates: CANDIDATES,
+                ..ViewOptions::default()
+            };
+            let mut views = planning::views_of_board(&setup, &options);
+            views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
+            tried = views.len();
+            let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
+            let place =
+                |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
+            for reach in [&reach.wider(), reach] {
+                for view in &views {
+                    let room = self.room_over(limits, board, reach, &view.joints, ENOUGH, guard.as_ref());
+                    if room >= ENOUGH && is_free(&view.joints) {
+                        return Ok(place(view, room));
+                    }
                 }
             }
-        }
-        let mut best: Option<FollowPlace> = None;
-        for view in &views {
-            let wanted = best.map_or(LEAST, |best| best.room);
-            let room = self.room_over(limits, board, reach, &view.joints, wanted, guard.as_ref());
-            if room > wanted && is_free(&view.joints) {
-                best = Some(place(view, room));
+            if leeway_m > 0.0 {
+                continue;
+            }
+            let mut best: Option<FollowPlace> = None;
+            for view in &views {
+                let wanted = best.map_or(LEAST, |best| best.room);
+                let room = self.room_over(limits, board, reach, &view.joints, wanted, guard.as_ref());
+                if room > wanted && is_free(&view.joints) {
+                    best = Some(place(view, room));
+                }
+            }
+            if let Some(best) = best {
+                return Ok(best);
             }
         }
-        best.ok_or(NoPlace { tried: views.len() })
+        Err(NoPlace { tried })
     }
 
     /// The least share of its limits that the tip can have in every direction from these joints, wherever the board goes
