@@ -17,7 +17,7 @@ use crate::guided::state::{Choice, ChosenStep, Waits};
 use crate::model::{
     ByHand, CapturePurpose, CaptureRefused, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState,
     LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind, SolveStatus, StopOutcome,
-    ThemeChoice,
+    ThemeChoice, WorkBox,
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
@@ -302,6 +302,25 @@ fn a_chosen_pose_waits_for_a_person_wherever_there_may_be_a_real_arm() {
     assert!(!app.model().sequence_runs);
     app.apply(Command::ConfirmMove);
     assert!(!app.model().sequence_runs, "nothing begins after a stop");
+}
+
+/// The box stays in its place in the base, so it is elsewhere in the camera with every answer.
+#[test]
+fn the_goal_is_judged_over_the_box_that_was_chosen_for_the_expected_error() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(sample::solved());
+    let judged_over = |app: &App| {
+        let guided = app.model().sequence.as_ref().and_then(|it| it.guided.as_deref()).expect("a guided sequence");
+        guided.guide.options().tool_box
+    };
+    app.apply(Command::CalibrateForMe);
+    assert_eq!((waits(app), judged_over(app)), (Some(Waits::Choice), None));
+    app.apply(Command::Stop);
+    app.apply(Command::SetTipBox(Some(WorkBox { from_m: [0.3, 0.0, 0.0], to_m: [0.5, 0.2, 0.1] })));
+    app.apply(Command::CalibrateForMe);
+    let [low, high] = judged_over(app).expect("a box").bounds();
+    assert_eq!((low.coords.as_slice(), high.coords.as_slice()), (&[0.3, 0.0, 0.0][..], &[0.5, 0.2, 0.1][..]));
 }
 
 /// The way was checked from where the arm was.

@@ -76,7 +76,8 @@ impl App {
             return self.guiding_finished();
         }
         let check = hand.ending.as_ref().map(|_| (hand.tried, hand.tried.saturating_sub(hand.checked)));
-        let (guide, elapsed_s) = (hand.guide.clone(), self.model.now_s - hand.began_s);
+        let (mut guide, elapsed_s) = (hand.guide.clone(), self.model.now_s - hand.began_s);
+        guide.work_in(self.chosen_box());
         let solved = self.model.solve.solved.clone().filter(|_| self.model.solve.fresh);
         let document = Arc::clone(&self.model.session.document);
         let observations = self.seen(&document).observations;

@@ -156,13 +156,20 @@ pub fn under_way(sequence: &PoseSequence, guided: &GuidedProgress) -> Text {
 /// The error beside the goal, and what is left; nothing before there is an error.
 pub fn error_ui(ui: &mut Ui, model: &Model, guide: &Guide, left: Option<Text>) {
     let language = model.view.language;
-    let error_mm = model.solve.solved.as_ref().and_then(|solved| solved.result.quality.tip_error_95_mm);
-    let Some(error_mm) = error_mm else { return };
-    let error = text!(
-        "Expected error {error} mm (95 %), goal {goal} mm",
-        error = format!("{error_mm:.3}"),
-        goal = format!("{:.3}", guide.options().goal_m * 1e3)
-    );
+    let goal = format!("{:.3}", guide.options().goal_m * 1e3);
+    let at_board_mm = model.solve.solved.as_ref().and_then(|solved| solved.result.quality.tip_error_95_mm);
+    let over_box = model.tip_box.judged.filter(|_| model.tip_box.chosen.is_some());
+    let error = match (over_box, at_board_mm) {
+        (Some((_, over)), _) => text!(
+            "Expected error over the box {error} mm (95 %), goal {goal} mm",
+            error = format!("{:.3}", over.worst_m * 1e3),
+            goal = goal
+        ),
+        (None, Some(error_mm)) => {
+            text!("Expected error {error} mm (95 %), goal {goal} mm", error = format!("{error_mm:.3}"), goal = goal)
+        }
+        (None, None) => return,
+    };
     let said = std::iter::once(error).chain(left).map(|text| text.say(language));
     ui.label(said.collect::<Vec<_>>().join(" · "));
 }

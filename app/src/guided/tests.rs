@@ -5,7 +5,9 @@ use super::state::{GuidedProgress, Waits};
 use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
-use crate::model::{CapturePurpose, CellSource, Jog, Model, Motion, PoseSequence, StopOutcome};
+use crate::model::{
+    self, BoxState, CapturePurpose, CellSource, Jog, Model, Motion, PoseSequence, StopOutcome, WorkBox,
+};
 use crate::text::Language;
 
 const BUTTON: &str = "Calibrate for me";
@@ -75,6 +77,20 @@ fn what_is_under_way_and_why_stands_in_the_pane() {
     assert!(self::pane(under_way(Waits::Choice, None)).sees("Choosing pose 2"));
     let checking = under_way(Waits::Nothing, Some(Ending::GoalReached { error_m: 3e-4 }));
     assert!(self::pane(checking).sees("Check 1 of 3"));
+}
+
+/// The goal is judged over the box that was chosen for the expected error, so that is what stands beside it.
+#[test]
+fn the_error_over_a_box_that_was_chosen_stands_beside_the_goal() {
+    let mut model = under_way(Waits::Nothing, None);
+    let chosen = Some(WorkBox { from_m: [0.3, 0.0, 0.0], to_m: [0.5, 0.2, 0.1] });
+    let judged = model::judge_box(chosen, model.solve.current().expect("solved"), model.document());
+    model.tip_box = BoxState { chosen, judged };
+    let worst_mm = judged.expect("judged").1.worst_m * 1e3;
+    let said = format!("Expected error over the box {worst_mm:.3} mm (95 %), goal 0.300 mm");
+    assert!(pane(model.clone()).sees(&said));
+    model.tip_box.chosen = None;
+    assert!(!pane(model).sees("over the box"));
 }
 
 #[test]

@@ -108,11 +108,12 @@ impl App {
         let solved = self.model.solve.solved.clone().filter(|_| self.model.solve.fresh);
         let document = Arc::clone(&self.model.session.document);
         let observations = self.seen(&document).observations;
-        let speed = self.model.speed();
+        let (speed, tool_box) = (self.model.speed(), self.chosen_box());
         let Some(sequence) = self.model.sequence.as_mut() else { return };
         let elapsed_s = self.model.now_s - sequence.began_s;
         let Some(guided) = sequence.guided.as_deref_mut() else { return };
         guided.waits = Waits::Choice;
+        guided.guide.work_in(tool_box);
         let check = guided.ending.as_ref().map(|_| guided.tried);
         let request = GuideRequest { guide: guided.guide.clone(), observations, solved, elapsed_s, speed, check };
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);

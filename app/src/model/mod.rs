@@ -42,7 +42,7 @@ pub use crate::session::state::{
 };
 pub use crate::solve::estimated::{EstimatedValue, estimated};
 pub use crate::solve::state::{JobId, SolveState, SolveStatus, Solved};
-pub use crate::solve::tip_box::{BoxState, WorkBox, judge_box};
+pub use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
 pub use crate::track::state::{
     BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
 };

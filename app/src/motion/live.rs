@@ -16,6 +16,9 @@ use crate::worker::cell_error::{check_arm, port_error};
 use crate::worker::port::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
 use crate::{limits, text};
 
+/// Seed of the views that are compared for a plan: the same question gets the same plan.
+const VIEWS_SEED: u64 = 1;
+
 /// A connection that moves the arm.
 pub(crate) struct LiveMotion {
     arm: Arm,
@@ -164,7 +167,9 @@ impl MotionPort for LiveMotion {
             }
         };
         let start = self.arm.joint_values().map_err(port_error)?;
-        Ok(kinematics.views_unlike(board, taken, &start, &self.around, *count).map_err(|why| no_views(&why)))
+        Ok(kinematics
+            .views_unlike(board, taken, &start, &self.around, *count, VIEWS_SEED)
+            .map_err(|why| no_views(&why)))
     }
 
     fn robot(&mut self, speed: f64) -> Result<Result<Robot, Text>, PortError> {
@@ -241,7 +246,6 @@ pub fn end_of_following(end: FollowEnd) -> Text {
                  Jog it to where it has more room and start again"
             )
         }
-        FollowEnd::Contact(contact) => contact_text(&contact),
         FollowEnd::NotFollowing { joint } => not_following(joint),
         FollowEnd::OtherTip => other_tip(),
     }

@@ -34,29 +34,33 @@ pub struct BoxState {
 
 /// The expected error (95 %) over a box; without one over that about where the target was seen. `None` where the
 /// calibration states no uncertainty.
+pub fn judge_box(chosen: Option<WorkBox>, solved: &Solved, document: &Document) -> Option<(WorkBox, BoxError)> {
+    let calibration = &solved.calibration;
+    // Stated everywhere or nowhere.
+    calibration.tip_error_95_m()?;
+    let work_box = match chosen {
+        Some(chosen) => chosen,
+        None => about_target(&calibration.hand_eye?, solved, document)?,
+    };
+    let error_95_m = |point: &Point3<f64>| calibration.error_95_m(point).unwrap_or(f64::INFINITY);
+    let error = quality::tip_error_95_over(error_95_m, &in_camera(&work_box, solved, document)?);
+    Some((work_box, error))
+}
+
+/// Where the camera sees a box. `None` where the calibration has no covariance.
 ///
 /// A camera on the tip sees the box from many places, and the error of a point depends on where it is in the camera. That
 /// place of a capture counts from which the middle of the box is known worst.
-pub fn judge_box(chosen: Option<WorkBox>, solved: &Solved, document: &Document) -> Option<(WorkBox, BoxError)> {
-    let calibration = &solved.calibration;
-    let covariance = *calibration.hand_eye_covariance()?;
-    // Stated everywhere or nowhere.
-    calibration.tip_error_95_m()?;
-    let hand_eye = calibration.hand_eye?;
-    let work_box = match chosen {
-        Some(chosen) => chosen,
-        None => about_target(&hand_eye, solved, document)?,
-    };
+pub fn in_camera(work_box: &WorkBox, solved: &Solved, document: &Document) -> Option<TipBox> {
+    let covariance = *solved.calibration.hand_eye_covariance()?;
     let (from, to) = (Point3::from(work_box.from_m), Point3::from(work_box.to_m));
     let middle = nalgebra::center(&from, &to);
     let variance = |camera_from_base: &Pose<Camera, Base>| {
         point_error::covariance(&covariance, &(camera_from_base.isometry() * middle)).trace()
     };
-    let worst =
-        views_of_base(&hand_eye, solved, document).into_iter().max_by(|a, b| variance(a).total_cmp(&variance(b)))?;
-    let error_95_m = |point: &Point3<f64>| calibration.error_95_m(point).unwrap_or(f64::INFINITY);
-    let error = quality::tip_error_95_over(error_95_m, &TipBox::in_base(from, to, &worst));
-    Some((work_box, error))
+    let places = views_of_base(&solved.calibration.hand_eye?, solved, document);
+    let worst = places.into_iter().max_by(|a, b| variance(a).total_cmp(&variance(b)))?;
+    Some(TipBox::in_base(from, to, &worst))
 }
 
 /// From where the base was seen by the captures of the fit; once for a camera that stands still.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use handeye_core::estimate::handeye::motion::MIN_VIEWS;
+use handeye_core::estimate::uncertainty::quality::TipBox;
 use handeye_core::estimate::{Method, Options};
 use handeye_core::progress::Stage;
 use handeye_core::project::session::{CaptureId, Document, SessionObservations};
@@ -11,7 +12,7 @@ use handeye_core::targets::observation::Corner;
 use super::question::Question;
 use crate::app::App;
 use crate::command::SolveOutcome;
-use crate::model::{BoxState, Goal, JobId, Severity, SolveState, SolveStatus, WorkBox, judge_box};
+use crate::model::{BoxState, Goal, JobId, Severity, SolveState, SolveStatus, WorkBox, box_in_camera, judge_box};
 use crate::text;
 use crate::text::Text;
 use crate::worker::{ArchiveTask, SolveJob};
@@ -147,6 +148,12 @@ impl App {
             self.model.tip_box.chosen = chosen;
             self.judge_tip_box();
         }
+    }
+
+    /// The box that was chosen, where the camera sees it by the newest answer: guided capture judges its goal over it.
+    pub(crate) fn chosen_box(&self) -> Option<TipBox> {
+        let (chosen, solved) = (self.model.tip_box.chosen?, self.model.solve.solved.as_deref()?);
+        box_in_camera(&chosen, solved, self.model.document())
     }
 
     /// Some milliseconds, so only when box or answer are others.

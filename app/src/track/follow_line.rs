@@ -16,8 +16,8 @@ use crate::text::Text;
 /// does not end everything, and less than what an arm at its speed limit makes of a wrong guess.
 const LONGEST_GUESS_S: f64 = 0.4;
 
-/// How long \[s\] an arm that was moved to another place waits there for the board to be seen again: the whole image is
-/// searched within a few images.
+/// How long \[s\] an arm stands and waits for the board to be seen: after it was moved to another place, and where the board is lost
+/// or images are late on the way. The whole image is searched within a few images, and who covered the board by mistake uncovers it.
 const PATIENCE_S: f64 = 3.0;
 
 /// What the arm is to do about the board.
@@ -35,8 +35,18 @@ struct Inner {
     patience_s: f64,
     /// Until then, once there was a pass.
     waits_until_s: Option<f64>,
+    /// Since when there has been no goal on the way \[s\].
+    without_goal_since_s: Option<f64>,
     ended: Option<Text>,
     status: Option<FollowStatus>,
+}
+
+/// Why there is no goal.
+enum NoGoal {
+    /// It may come back.
+    Now(Text),
+    /// There will be none.
+    Ever(Text),
 }
 
 enum Aim {
@@ -84,7 +94,7 @@ impl FollowLine {
     pub fn begin(&self, wish: FollowWish) {
         let mut inner = self.inner();
         inner.aim = Some(Aim::Wished(wish));
-        (inner.patience_s, inner.waits_until_s) = (0.0, None);
+        (inner.patience_s, inner.waits_until_s, inner.without_goal_since_s) = (0.0, None, None);
         inner.ended = None;
     }
 
@@ -112,14 +122,19 @@ impl FollowLine {
         }
         match inner.goal(moment) {
             Ok(goal) => {
-                inner.status = Some(distance(&goal.base_from_tip, &moment.base_from_tip));
+                inner.without_goal_since_s = None;
+                inner.status = Some(following(&goal.base_from_tip, moment));
                 ArmWish::Towards(FollowGoal {
                     base_from_tip: goal.base_from_tip,
                     velocity_m_s: goal.velocity_m_s,
                     angular_velocity_rad_s: goal.angular_velocity_rad_s,
                 })
             }
-            Err(why) => {
+            Err(NoGoal::Now(_)) if inner.has_patience(moment) => {
+                inner.status = Some(FollowStatus::Waiting);
+                ArmWish::Rest
+            }
+            Err(NoGoal::Now(why) | NoGoal::Ever(why)) => {
                 inner.ended.get_or_insert(why);
                 ArmWish::End
             }
@@ -137,30 +152,38 @@ impl Inner {
         matches!(self.aim, Some(Aim::Wished(_))) && !is_fresh && moment.sim_time_s < until_s
     }
 
-    fn goal(&mut self, moment: &FollowMoment) -> Result<TipGoal, Text> {
-        let setup = self.setup.as_ref().ok_or_else(|| text!("The board is not tracked: start tracking first"))?;
-        let newest = self.newest.as_ref().ok_or_else(|| text!("The board has not been seen yet"))?;
+    /// Whether an arm that was following stands a little longer.
+    fn has_patience(&mut self, moment: &FollowMoment) -> bool {
+        let since_s = *self.without_goal_since_s.get_or_insert(moment.sim_time_s);
+        matches!(self.aim, Some(Aim::Fixed(_))) && (0.0..PATIENCE_S).contains(&(moment.sim_time_s - since_s))
+    }
+
+    fn goal(&mut self, moment: &FollowMoment) -> Result<TipGoal, NoGoal> {
+        let ever = |why| NoGoal::Ever(why);
+        let setup = self.setup.as_ref().ok_or_else(|| ever(text!("The board is not tracked: start tracking first")))?;
+        let newest = self.newest.as_ref().ok_or_else(|| ever(text!("The board has not been seen yet")))?;
         let (Some(estimate), State::Tracking { .. } | State::Coasting { .. }) = (&newest.estimate, newest.state) else {
-            return Err(text!("The board was lost: bring it into view and start again"));
+            return Err(NoGoal::Now(text!("The board was lost: bring it into view and start again")));
         };
         let ahead_s = moment.sim_time_s - estimate.time_s;
-        // The clock of a simulation that is started anew goes back.
         if !(-LONGEST_GUESS_S..=LONGEST_GUESS_S).contains(&ahead_s) {
-            return Err(text!(
+            let why = text!(
                 "The newest image is {age} s of simulation old: the camera fell silent, or the simulation runs faster than \
                  images are taken and has to keep real time",
                 age = format!("{ahead_s:.1}")
-            ));
+            );
+            // The clock of a simulation that is started anew goes back.
+            return Err(if ahead_s > 0.0 { NoGoal::Now(why) } else { NoGoal::Ever(why) });
         }
         let now = estimate.carried_to(moment.sim_time_s);
         let keep = match self.aim.take() {
             Some(Aim::Fixed(keep)) => keep,
             Some(Aim::Wished(wish)) => fixed(wish, &now, setup, &moment.base_from_tip),
-            None => return Err(text!("The arm was not asked to follow")),
+            None => return Err(ever(text!("The arm was not asked to follow"))),
         };
         let goal = keep.tip_goal(&now, &setup.calibrated, &setup.target);
         self.aim = Some(Aim::Fixed(keep));
-        goal.ok_or_else(|| text!("Only a camera on the tip can follow: this one stands beside the robot"))
+        goal.ok_or_else(|| ever(text!("Only a camera on the tip can follow: this one stands beside the robot")))
     }
 }
 
@@ -177,9 +200,13 @@ fn fixed(wish: FollowWish, now: &Estimate, setup: &Setup, base_from_tip: &Pose<B
     }
 }
 
-fn distance(goal: &Pose<Base, Tip>, tip: &Pose<Base, Tip>) -> FollowStatus {
-    let apart = tip.inverse() * *goal;
-    FollowStatus::Following { distance_m: apart.translation().norm(), angle_rad: apart.rotation().angle() }
+fn following(goal: &Pose<Base, Tip>, moment: &FollowMoment) -> FollowStatus {
+    let apart = moment.base_from_tip.inverse() * *goal;
+    FollowStatus::Following {
+        distance_m: apart.translation().norm(),
+        angle_rad: apart.rotation().angle(),
+        is_kept_off: moment.is_kept_off,
+    }
 }
 
 #[cfg(test)]

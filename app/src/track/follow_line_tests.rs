@@ -18,7 +18,7 @@ fn line() -> (FollowLine, Update, Pose<Base, Tip>) {
 }
 
 fn moment(sim_time_s: f64, base_from_tip: Pose<Base, Tip>) -> FollowMoment {
-    FollowMoment { sim_time_s, joints: [0.0; 6].into(), base_from_tip }
+    FollowMoment { sim_time_s, joints: [0.0; 6].into(), base_from_tip, is_kept_off: false }
 }
 
 #[test]
@@ -32,8 +32,25 @@ fn an_arm_that_was_moved_waits_for_the_board_and_then_keeps_the_view_that_it_has
     let ArmWish::Towards(goal) = line.wish(&moment(30.05, tip)) else { panic!("it follows") };
     // The board is at 6 mm/s: after two passes the goal is still where the tip is.
     assert!(goal.base_from_tip.distance_to(&tip).0 < 1e-3);
+}
+
+#[test]
+fn an_arm_that_loses_the_board_stands_and_goes_on_when_it_is_seen_again_in_time() {
+    let (line, seen, tip) = line();
+    let lost = Update { state: State::Lost { since_s: 29.0 }, estimate: None, seen: None, ..seen.clone() };
+    line.see(&seen);
+    line.begin(FollowWish::KeepView);
+    let is_followed = |at_s: f64| matches!(line.wish(&moment(at_s, tip)), ArmWish::Towards(_));
+    assert!(is_followed(30.05));
     line.see(&lost);
-    assert_eq!(line.wish(&moment(30.1, tip)), ArmWish::End, "it waits only for the first goal");
+    assert_eq!(line.wish(&moment(30.1, tip)), ArmWish::Rest);
+    assert_eq!(line.take_status(), Some(FollowStatus::Waiting));
+    line.see(&seen);
+    assert!(is_followed(30.2));
+    // The images stop: the newest one grows old.
+    assert_eq!(line.wish(&moment(30.2 + LONGEST_GUESS_S, tip)), ArmWish::Rest);
+    assert_eq!(line.wish(&moment(30.1 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::Rest);
+    assert_eq!(line.wish(&moment(30.3 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::End);
     assert!(line.take_ended().is_some());
 }
 

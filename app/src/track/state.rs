@@ -86,7 +86,11 @@ pub enum FollowStatus {
         distance_m: f64,
         /// Angle between tip and goal \[rad\].
         angle_rad: f64,
+        /// Whether the arm does not go as its goal asks, because it would come too near to something.
+        is_kept_off: bool,
     },
+    /// It stands until the board is seen again.
+    Waiting,
     /// It came to rest by itself, and this is why.
     Ended(Text),
 }

@@ -302,7 +302,7 @@ impl MotionPort for FakeCell {
     fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
         let RobotState { base_from_tip, joints_rad, .. } = self.state()?.expect("it has one");
         let sim_time_s = || self.script().frames as f64 * 0.05;
-        let moment = |sim_time_s| FollowMoment { sim_time_s, joints: joints_rad, base_from_tip };
+        let moment = |sim_time_s| FollowMoment { sim_time_s, joints: joints_rad, base_from_tip, is_kept_off: false };
         self.end_of_motion(|_| {}, || wish(&moment(sim_time_s())) != FollowWish::End)
     }
 }

@@ -123,27 +123,49 @@ impl<'a> Guard<'a> {
         None
     }
 
+    /// What is next to the arm with these joint values, and how much nearer it may come to that, metres: less than 0 where it is
+    /// too near. Only what is nearer than allowed by less than `within_m` is looked for; `None` where nothing is.
+    pub fn nearest(&self, joints: &[f64], within_m: f64) -> Option<(f64, Contact)> {
+        let Some(filled) = self.arm.filled(joints) else { return Some((f64::NEG_INFINITY, Contact::NoConfiguration)) };
+        let mut least_m = within_m;
+        let mut next = None;
+        let mut look = |room_m: f64, at: Nearby| {
+            if room_m < least_m {
+                (least_m, next) = (room_m, Some(at));
+            }
+            least_m
+        };
+        look(filled.itself_m - self.allowed.itself, Nearby::Itself);
+        let mut room_m = look(filled.depth_m(self.around) - self.allowed.volume, Nearby::Volume);
+        for (index, (obstacle, allowed_m)) in self.around.obstacles.iter().zip(&self.allowed.boxes).enumerate() {
+            let distance_m = filled.distance_m(obstacle, allowed_m + room_m.max(0.0));
+            room_m = look(distance_m - allowed_m, Nearby::Box(index));
+        }
+        let contact = match next? {
+            Nearby::Itself => Contact::Itself,
+            Nearby::Volume => Contact::Volume,
+            Nearby::Box(index) => Contact::Box { name: self.around.obstacles[index].name.clone() },
+        };
+        Some((least_m, contact))
+    }
+
     /// How much nearer the arm may come to whatever is next, metres, as far as that is less than `up_to_m`; or what is too near.
     fn room(&self, joints: &[f64], up_to_m: f64) -> Result<f64, Contact> {
-        let filled = self.arm.filled(joints).ok_or(Contact::NoConfiguration)?;
-        let itself_m = filled.itself_m - self.allowed.itself;
-        if itself_m < -ROUNDING_M {
-            return Err(Contact::Itself);
+        match self.nearest(joints, up_to_m) {
+            Some((room_m, contact)) if room_m < -ROUNDING_M => Err(contact),
+            Some((room_m, _)) => Ok(room_m),
+            None => Ok(up_to_m),
         }
-        let volume_m = filled.depth_m(self.around) - self.allowed.volume;
-        if volume_m < -ROUNDING_M {
-            return Err(Contact::Volume);
-        }
-        let mut room_m = up_to_m.min(itself_m).min(volume_m);
-        for (obstacle, allowed_m) in self.around.obstacles.iter().zip(&self.allowed.boxes) {
-            let distance_m = filled.distance_m(obstacle, allowed_m + room_m.max(0.0)) - allowed_m;
-            if distance_m < -ROUNDING_M {
-                return Err(Contact::Box { name: obstacle.name.clone() });
-            }
-            room_m = room_m.min(distance_m);
-        }
-        Ok(room_m)
     }
+}
+
+/// What is looked at for the nearest.
+#[derive(Clone, Copy)]
+enum Nearby {
+    Itself,
+    Volume,
+    /// By its place among the obstacles.
+    Box(usize),
 }
 
 impl Filled {

@@ -18,7 +18,7 @@ pub use contact::{Contact, Guard};
 pub use pace::Pace;
 pub use spread::{
     PlanError, PlannedView, ViewOptions, ViewSetup, order_by_travel, poses_looking_at, poses_unlike,
-    random_poses_looking_at, views_of_board,
+    random_poses_looking_at, shows_within, views_of_board,
 };
 pub use surroundings::{Obstacle, SpeedLimits, Surroundings, WorkVolume};
 

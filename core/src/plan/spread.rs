@@ -13,6 +13,10 @@ use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::targets::TargetSpec;
 use crate::wording::English;
 
+/// Directions in which a board goes that may be elsewhere at once; between two of them it goes no farther out of the image than by
+/// 8 % of the way.
+const DIRECTIONS: u32 = 8;
+
 /// What the planner knows of a cell. Being a centimetre or a few degrees off costs nothing but margin, so estimates and
 /// drawings do.
 #[derive(Debug, Clone)]
@@ -50,6 +54,8 @@ pub struct ViewOptions {
     pub aim_m: f64,
     /// Free pixels between the printed squares and the edge of the image.
     pub margin_px: f64,
+    /// How far the board may go in its plane at once and still be wholly in the image, with no free pixels; 0 for one that stands.
+    pub leeway_m: f64,
     /// Free space around the arm and its tool.
     pub clearance_m: f64,
     /// How many random views are tried.
@@ -66,6 +72,7 @@ impl Default for ViewOptions {
             roll_rad: std::f64::consts::PI,
             aim_m: 0.03,
             margin_px: 12.0,
+            leeway_m: 0.0,
             clearance_m: 0.02,
             candidates: 3000,
         }
@@ -278,17 +285,44 @@ fn draw(setup: &ViewSetup, options: &ViewOptions, rng: &mut ChaCha8Rng) -> Pose<
 }
 
 fn shows_whole_board(setup: &ViewSetup, options: &ViewOptions, target_from_camera: &Pose<Target, Camera>) -> bool {
-    let grid = setup.target.grid();
     let camera_from_target = target_from_camera.inverse();
-    let (width, height) = (f64::from(setup.intrinsics.width), f64::from(setup.intrinsics.height));
-    let margin = options.margin_px - 0.5;
+    shows_outline(&setup.intrinsics, &setup.target, &camera_from_target, options.margin_px)
+        && shows_within(&setup.intrinsics, &setup.target, &camera_from_target, options.leeway_m)
+}
+
+/// Whether the whole board stays in the image when it goes along its plane by this much, metres.
+pub fn shows_within(
+    intrinsics: &Intrinsics,
+    target: &TargetSpec,
+    camera_from_target: &Pose<Camera, Target>,
+    leeway_m: f64,
+) -> bool {
+    leeway_m <= 0.0
+        || (0..DIRECTIONS).all(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS);
+            let shift = Translation3::new(leeway_m * angle.cos(), leeway_m * angle.sin(), 0.0);
+            let shifted = Pose::from_isometry(camera_from_target.isometry() * shift);
+            shows_outline(intrinsics, target, &shifted, 0.0)
+        })
+}
+
+/// Whether the printed pattern is in the image with so many free pixels.
+fn shows_outline(
+    intrinsics: &Intrinsics,
+    target: &TargetSpec,
+    camera_from_target: &Pose<Camera, Target>,
+    margin_px: f64,
+) -> bool {
+    let grid = target.grid();
+    let (width, height) = (f64::from(intrinsics.width), f64::from(intrinsics.height));
+    let margin = margin_px - 0.5;
     // The printed pattern goes one square beyond its outermost points; its border bounds it in any lens.
     let (last_column, last_row) = (grid.columns as i64, grid.rows as i64);
     (-1..=last_row).all(|row| {
         (-1..=last_column).filter(|&column| row == -1 || row == last_row || column == -1 || column == last_column).all(
             |column| {
                 let point = Point3::new(column as f64 * grid.square_m, row as f64 * grid.square_m, 0.0);
-                setup.intrinsics.project(&(camera_from_target.isometry() * point)).is_ok_and(|px| {
+                intrinsics.project(&(camera_from_target.isometry() * point)).is_ok_and(|px| {
                     px.x >= margin && px.y >= margin && px.x <= width - 1.0 - margin && px.y <= height - 1.0 - margin
                 })
             },

@@ -169,8 +169,9 @@ fn views_of_a_board_are_planned_for_an_xarm() {
         intrinsics: truth.intrinsics,
         tip_from_camera: truth.tip_from_camera,
     };
-    let views =
-        kinematics.views_unlike(&board, &[], &start, &kinematics.plane(), 5).unwrap_or_else(|error| panic!("{error}"));
+    let views = kinematics
+        .views_unlike(&board, &[], &start, &kinematics.plane(), 5, 1)
+        .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(views.len(), 5);
     for joints in views {
         let camera_from_target = truth.camera_from_target(&truth.reported_tip(&joints).expect("six joints"));

@@ -29,7 +29,7 @@ use crate::shortfall;
 use crate::text::Language;
 use crate::worker::{timestamp, timestamp_rfc3339};
 use guided::GuidedSequence;
-use poses::{GUIDED, Plan, REFERENCE};
+use poses::{GUIDED, PLANNED, Plan, REFERENCE};
 use solve::Solution;
 
 /// Options of `handeye auto`.
@@ -143,8 +143,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         return Err(Failure::unusable(anyhow::anyhow!("{option} goes with --poses guided")));
     }
     let scene = args.scene.load()?;
-    let plan = match args.connect {
-        Some(_) if is_guided => Plan::from_here(),
+    let plans_here = args.connect.is_some() && poses == PLANNED;
+    let mut plan = match args.connect {
+        Some(_) if is_guided || plans_here => Plan::from_here(),
         _ => Plan::find(poses, &scene, args.seed)?,
     };
     // Read before anything moves.
@@ -194,7 +195,10 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
             Some(arm_arg::checked(named, &read, &here)?)
         }
     };
-    let around = surroundings(cell.arm(), kinematics.as_ref(), is_guided, keep_out)?;
+    let around = surroundings(cell.arm(), kinematics.as_ref(), is_guided || plans_here, keep_out)?;
+    if plans_here {
+        plan = Plan::planned_here(cell.arm(), kinematics.as_ref(), &truth, &around, seed)?;
+    }
     if let Some(shortfall) = shortfall::of(cell.info().support(), kinematics.is_some()) {
         tracing::warn!("{}", shortfall.say(Language::English));
     }
@@ -264,16 +268,16 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
 }
 
 /// What stands around: in the scene, and in the file where one is given. With a file every motion is checked, and kept within
-/// its limits; without one only guided capture, which chooses its poses so, asks for it.
+/// its limits; without one only who chooses poses so asks for it.
 fn surroundings(
     arm: &mut Arm,
     kinematics: Option<&ArmKinematics>,
-    is_guided: bool,
+    is_asked: bool,
     keep_out: Option<Surroundings>,
 ) -> Result<Surroundings, Failure> {
     let kinematics = match (kinematics, &keep_out) {
         (Some(kinematics), Some(_)) => kinematics,
-        (Some(kinematics), None) if is_guided => kinematics,
+        (Some(kinematics), None) if is_asked => kinematics,
         (_, None) => return Ok(Surroundings::default()),
         (None, Some(_)) => {
             return Err(Failure::failed(anyhow::anyhow!(

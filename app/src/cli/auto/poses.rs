@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
-use handeye_core::plan::{ViewOptions, ViewSetup, poses_looking_at};
+use handeye_core::geometry::arm::JointValues;
+use handeye_core::plan::{Surroundings, ViewOptions, ViewSetup, poses_looking_at};
 use handeye_core::project::taught_poses::{Goal, MotionLimits, TaughtPoses};
 use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
+use handeye_sim_link::client::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 
 use super::super::Failure;
 use crate::limits;
-use crate::session::start::REFERENCE_POSES;
+use crate::session::start::{BOARD, REFERENCE_POSES};
 
 /// How much the board is tilted at most where guided capture begins.
 const FIRST_TILT_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -19,6 +21,8 @@ const PLANNED_VIEWS: usize = 20;
 pub const REFERENCE: &str = "seed10";
 /// Poses that are chosen on the way.
 pub const GUIDED: &str = "guided";
+/// Views of the board that are planned beforehand.
+pub const PLANNED: &str = "auto";
 
 /// A sequence of poses.
 pub struct Plan {
@@ -38,7 +42,7 @@ impl Plan {
                 let poses = TaughtPoses::parse(Path::new(REFERENCE), REFERENCE_POSES).map_err(Failure::failed)?;
                 Ok(Self::taught(&poses))
             }
-            "auto" => Self::planned(scene, seed),
+            PLANNED => Self::planned(scene, seed),
             GUIDED => Self::begun(scene, seed),
             file => Ok(Self::taught(&TaughtPoses::read(Path::new(file)).map_err(Failure::unusable)?)),
         }
@@ -76,6 +80,37 @@ impl Plan {
         Ok(Self { start_joints, goals: Vec::new(), limits: limits::SEQUENCE })
     }
 
+    /// Views of the board of a cell that is running, from where its arm stands: by its truth where it publishes that, and else by
+    /// where its scene has board and camera.
+    pub fn planned_here(
+        arm: &mut Arm,
+        kinematics: Option<&ArmKinematics>,
+        truth: &GroundTruth,
+        around: &Surroundings,
+        seed: u64,
+    ) -> Result<Self, Failure> {
+        let kinematics = kinematics.ok_or_else(|| {
+            Failure::failed(anyhow::anyhow!(
+                "planned views take an arm whose chain is known (docs/arms.md): give the poses by a file, --poses FILE"
+            ))
+        })?;
+        let base_from_target = match truth.base_from_target {
+            Some(published) => published,
+            None => arm.base_from_board(&BOARD).map_err(Failure::failed)?.ok_or_else(|| {
+                Failure::failed(anyhow::anyhow!(
+                    "where the board is nobody says here, so that no views of it can be planned: name it by --object \
+                     board=PATH, or bring it into the image and use --poses guided"
+                ))
+            })?,
+        };
+        let GroundTruth { tip_from_camera, intrinsics, .. } = *truth;
+        let board = BoardInView { base_from_target, target: BOARD, intrinsics, tip_from_camera };
+        let here = arm.joint_values().map_err(Failure::failed)?;
+        let views =
+            kinematics.views_unlike(&board, &[], &here, around, PLANNED_VIEWS, seed).map_err(Failure::failed)?;
+        Ok(Self { start_joints: None, goals: named(views.iter()), limits: limits::SEQUENCE })
+    }
+
     /// None at all: the arm begins where it stands.
     pub fn from_here() -> Self {
         Self { start_joints: None, goals: Vec::new(), limits: limits::SEQUENCE }
@@ -89,14 +124,14 @@ impl Plan {
         let views = poses_looking_at(&ViewSetup::from(&resolved), &options).map_err(Failure::failed)?;
         Ok(Self {
             start_joints: Some(resolved.start_joints.to_vec()),
-            goals: views
-                .iter()
-                .enumerate()
-                .map(|(i, view)| (format!("planned {}", i + 1), Goal::Joints(view.joints.to_vec())))
-                .collect(),
+            goals: named(views.iter().map(|view| &view.joints)),
             limits: limits::SEQUENCE,
         })
     }
+}
+
+fn named<'a>(views: impl Iterator<Item = &'a JointValues>) -> Vec<(String, Goal)> {
+    views.enumerate().map(|(i, joints)| (format!("planned {}", i + 1), Goal::Joints(joints.to_vec()))).collect()
 }
 
 /// The scene with board and camera where they are meant to be.

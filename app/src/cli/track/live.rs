@@ -94,6 +94,8 @@ pub struct Summary {
     rotation: Squares,
     follow_distance: Squares,
     follow_angle: Squares,
+    /// Images in which the arm did not go as its goal asked, because something was too near.
+    kept_off: u64,
     follow_ended: Option<String>,
 }
 
@@ -402,9 +404,10 @@ impl Summary {
             self.position.add(error.position_m);
             self.rotation.add(error.rotation_rad);
         }
-        if let Some(&FollowStatus::Following { distance_m, angle_rad }) = follow {
+        if let Some(&FollowStatus::Following { distance_m, angle_rad, is_kept_off }) = follow {
             self.follow_distance.add(distance_m);
             self.follow_angle.add(angle_rad);
+            self.kept_off += u64::from(is_kept_off);
         }
     }
 
@@ -433,6 +436,7 @@ impl Summary {
             "rotation_rms_deg": self.rotation.rms().map(f64::to_degrees),
             "follow_distance_rms_mm": self.follow_distance.rms().map(|m| m * 1e3),
             "follow_angle_rms_deg": self.follow_angle.rms().map(f64::to_degrees),
+            "follow_kept_off": self.kept_off,
             "follow_ended": self.follow_ended,
         })
     }
@@ -457,6 +461,9 @@ impl Summary {
             let deg = rad.to_degrees();
             let mm = m * 1e3;
             lines.push(format!("the tip from its goal: {mm:.2} mm and {deg:.3}° RMS, the way there included"));
+            if self.kept_off > 0 {
+                lines.push(format!("of it, in {} images the arm kept off what was too near", self.kept_off));
+            }
         }
         lines.join("\n") + "\n"
     }

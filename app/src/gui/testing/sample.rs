@@ -339,7 +339,7 @@ pub fn tracking() -> Model {
     model.track = TrackState {
         on: true,
         wish: Some(FollowWish::KeepView),
-        follow: FollowStatus::Following { distance_m: 1.2e-3, angle_rad: 4e-3 },
+        follow: FollowStatus::Following { distance_m: 1.2e-3, angle_rad: 4e-3, is_kept_off: false },
         newest: Some(Arc::new(Tracked {
             frame: 1,
             update: Update {

@@ -64,7 +64,7 @@ fn follow(model: &Model) -> Option<&'static str> {
 pub fn is_following(model: &Model) -> bool {
     let track = &model.track;
     match track.follow {
-        FollowStatus::Following { .. } | FollowStatus::MakingRoom => true,
+        FollowStatus::Following { .. } | FollowStatus::MakingRoom | FollowStatus::Waiting => true,
         FollowStatus::Off => track.wish.is_some(),
         FollowStatus::Ended(_) => false,
     }

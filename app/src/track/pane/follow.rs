@@ -146,11 +146,15 @@ fn status_ui(ui: &mut Ui, model: &Model, follows: bool) {
     let language = model.view.language;
     let palette = Palette::of(ui);
     let (colour, words) = match (&model.track.follow, follows) {
-        (FollowStatus::Following { distance_m, angle_rad }, _) => {
-            (palette.good, following(*distance_m, *angle_rad, language))
+        (FollowStatus::Following { distance_m, angle_rad, is_kept_off }, _) => {
+            let colour = if *is_kept_off { palette.busy } else { palette.good };
+            (colour, following(*distance_m, *angle_rad, *is_kept_off, language))
         }
         (FollowStatus::MakingRoom, _) => {
             (palette.busy, tr!(language, "Moving to where the arm has room to follow…").to_owned())
+        }
+        (FollowStatus::Waiting, _) => {
+            (palette.busy, tr!(language, "The arm stands until the board is seen again").to_owned())
         }
         (FollowStatus::Off, true) => (palette.busy, tr!(language, "Starting to follow…").to_owned()),
         (FollowStatus::Off | FollowStatus::Ended(_), _) => return,
@@ -163,7 +167,12 @@ fn status_ui(ui: &mut Ui, model: &Model, follows: bool) {
     });
 }
 
-fn following(distance_m: f64, angle_rad: f64, language: Language) -> String {
+fn following(distance_m: f64, angle_rad: f64, is_kept_off: bool, language: Language) -> String {
     let (distance, angle) = (format!("{:.1}", distance_m * 1e3), format!("{:.2}", angle_rad.to_degrees()));
-    text!("Following: {distance} mm and {angle}° from the goal", distance = distance, angle = angle).say(language)
+    let said = if is_kept_off {
+        text!("Keeping off what is near: {distance} mm and {angle}° from the goal", distance = distance, angle = angle)
+    } else {
+        text!("Following: {distance} mm and {angle}° from the goal", distance = distance, angle = angle)
+    };
+    said.say(language)
 }

@@ -151,7 +151,7 @@ fn the_arm_keeps_its_view_or_goes_to_a_corner_and_is_stopped() {
     pane.model().track.follow = FollowStatus::MakingRoom;
     pane.steps();
     assert!(pane.sees("Moving to where the arm has room to follow") && pane.sees("Stop following"));
-    pane.model().track.follow = FollowStatus::Following { distance_m: 0.0012, angle_rad: 0.01 };
+    pane.model().track.follow = FollowStatus::Following { distance_m: 0.0012, angle_rad: 0.01, is_kept_off: false };
     pane.steps();
     assert!(pane.sees("Following: 1.2 mm and 0.57° from the goal"));
     assert!(!pane.is_enabled("Keep this view"), "it is chosen before");

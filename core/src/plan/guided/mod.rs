@@ -286,6 +286,12 @@ impl Guide {
         &self.options
     }
 
+    /// Where the tool works from now on, see [`GuidedOptions::tool_box`]: what stays in its place in the base is elsewhere in the
+    /// camera with every answer.
+    pub fn work_in(&mut self, tool_box: Option<TipBox>) {
+        self.options.tool_box = tool_box;
+    }
+
     /// Every pose that was proposed, and what came of it.
     pub fn steps(&self) -> &[Step] {
         &self.steps

@@ -1,10 +1,10 @@
 //! The truth of one run of the cell.
 
-use crate::axes::sensor_from_camera;
+use crate::axes::{sensor_from_camera, sheet_from_target};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 use handeye_core::targets::{Grid, TargetSpec};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::Isometry3;
 
 use super::Scene;
 use super::arm::ArmSpec;
@@ -12,8 +12,8 @@ use super::board_motion::BoardMotionSpec;
 use super::check::si;
 use super::errors_of_robot::{RobotErrors, gaussian};
 use super::spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo,
-    SimulationSpec, SlipSpec, SolidSpec,
+    CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo, SimulationSpec,
+    SlipSpec, SolidSpec,
 };
 use handeye_core::geometry::arm::{Arm, ArmError, JointValues};
 use handeye_core::geometry::se3;
@@ -140,7 +140,7 @@ pub(super) fn resolve(scene: &Scene, arm: Arm, seed: u64) -> ResolvedScene {
         connection_from_tip: robot.tip.isometry(),
         tip_from_camera,
         tip_from_sensor: tip_from_camera * sensor_from_camera().inverse(),
-        base_from_target: Pose::from_isometry(world_from_plane * plane_from_target(board)),
+        base_from_target: Pose::from_isometry(world_from_plane * sheet_from_target(&target)),
         world_from_plane,
         board_motion: board.motion,
         board_slip: board.slip,
@@ -163,13 +163,6 @@ fn camera_on_tip(camera: &CameraSpec, seed: u64) -> Pose<Tip, Camera> {
     let nominal = Pose::<Tip, Sensor>::from_isometry(camera.sensor.isometry()) * sensor_from_camera();
     let (sigma_m, sigma_rad) = (camera.random_offset_mm * 1e-3, camera.random_offset_deg.to_radians());
     nominal.perturbed(&gaussian(seed, CAMERA_STREAM, sigma_m, sigma_rad))
-}
-
-/// The sheet's z points at the viewer and its y up; the target's z points into the sheet and its y down the rows.
-fn plane_from_target(board: &BoardSpec) -> Isometry3<f64> {
-    let half = |corners: usize| (corners as f64 - 1.0) / 2.0 * board.square_m;
-    let half_turn_about_x = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
-    Isometry3::from_parts(Translation3::new(-half(board.columns), half(board.rows), 0.0), half_turn_about_x)
 }
 
 /// The lens of a camera whose numbers may still be out of range.

@@ -1,9 +1,13 @@
-//! Moving and hiding the board of the built-in cell.
+//! The board: where a scene has it; moving and hiding that of the built-in cell.
 
 use ciborium::Value;
+use handeye_core::geometry::frames::{Base, Pose, Target};
+use handeye_core::targets::TargetSpec;
 
 use super::Arm;
+use crate::axes::sheet_from_target;
 use crate::client::error::LinkError;
+use crate::client::sim::ObjectHandle;
 use crate::wire;
 
 pub use crate::cell::scene::{BoardPath, UnknownPath};
@@ -66,6 +70,17 @@ impl Arm {
     /// [`LinkError::Unsupported`] on a server that is no built-in cell.
     pub fn show_board(&mut self, is_shown: bool) -> Result<(), LinkError> {
         self.call_board(SHOW_FUNCTION, Value::from(is_shown))
+    }
+
+    /// Where the scene has the board, taken to lie on its sheet as that of the public scene does. `None` where the scene has
+    /// none of the name that it is known by.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of the call.
+    pub fn base_from_board(&mut self, target: &TargetSpec) -> Result<Option<Pose<Base, Target>>, LinkError> {
+        let Some(board) = self.objects.board else { return Ok(None) };
+        let sheet: Pose<Base, Target> = self.sim.get_object_pose(board, ObjectHandle::WORLD)?;
+        Ok(Some(Pose::from_isometry(sheet.isometry() * sheet_from_target(target))))
     }
 
     fn call_board(&mut self, function: &str, argument: Value) -> Result<(), LinkError> {

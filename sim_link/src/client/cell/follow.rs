@@ -44,6 +44,8 @@ pub struct FollowMoment {
     pub joints: JointValues,
     /// The tip by these joints.
     pub base_from_tip: Pose<Base, Tip>,
+    /// Whether the arm does not go as its goal asks, because it would come too near to something.
+    pub is_kept_off: bool,
 }
 
 impl Arm {
@@ -103,7 +105,12 @@ impl Arm {
             }
             let sim_time_s = now_s + dt_s;
             let base_from_tip = plan.base_from_tip();
-            let goal = match wish(&FollowMoment { sim_time_s, joints: *plan.joints(), base_from_tip }) {
+            let goal = match wish(&FollowMoment {
+                sim_time_s,
+                joints: *plan.joints(),
+                base_from_tip,
+                is_kept_off: plan.is_kept_off(),
+            }) {
                 _ if ending.is_some() => None,
                 FollowWish::Towards(goal) if goal.is_finite() => Some(goal),
                 FollowWish::Towards(_) => {

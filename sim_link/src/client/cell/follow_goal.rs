@@ -1,7 +1,7 @@
 //! Where an arm that follows is sent, within which limits, and how it ends.
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::plan::{Contact, SpeedLimits};
+use handeye_core::plan::SpeedLimits;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::client::error::LinkError;
@@ -155,8 +155,6 @@ pub enum FollowEnd {
     },
     /// The arm is nearly stretched or folded so that some direction needs joints faster than they are.
     Singular,
-    /// The arm would come nearer to something than it may.
-    Contact(Contact),
     /// Something else moves this joint, counted from 1 at the base, or holds it.
     NotFollowing {
         /// Which joint.

@@ -4,16 +4,19 @@
 //! keeps its direction. A step is taken only if that way to rest, from where the step leads, keeps all limits, the
 //! ranges of the joints and the workspace, and touches nothing; otherwise less of the step is taken, in the worst case
 //! none, and the arm brakes. So whatever goals come, the limits hold from the first pass to the last, and the arm can always be stopped.
+//!
+//! What the arm must not touch does not end it: it goes by, as near to its goal as it can, or stands and goes on when the goal does.
 
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3::rotation_vector;
-use handeye_core::plan::{Contact, Guard};
+use handeye_core::plan::Guard;
 use nalgebra::{Isometry3, Vector3};
 
 use super::follow_goal::{FollowEnd, FollowGoal, FollowLimits, moved};
 use super::jog_plan::{JogObstacle, nearest};
 use super::joints::{in_rad, largest_change, of_rad};
+use super::keep_off::{self, Room};
 use super::reach::ArmKinematics;
 
 /// Share of the tip's acceleration that slows it down; the rest is for the curve that it takes when all joints brake.
@@ -89,6 +92,7 @@ pub(super) struct FollowPlan<'a> {
     dt_s: f64,
     now: Moving,
     obstacle: Option<FollowEnd>,
+    is_kept_off: bool,
 }
 
 impl<'a> FollowPlan<'a> {
@@ -110,7 +114,7 @@ impl<'a> FollowPlan<'a> {
         if !limits.workspace.contains(&now.base_from_tip.translation.vector) {
             return Err(FollowEnd::Workspace);
         }
-        Ok(Self { kinematics, guard, limits: *limits, dt_s, now, obstacle: None })
+        Ok(Self { kinematics, guard, limits: *limits, dt_s, now, obstacle: None, is_kept_off: false })
     }
 
     /// The joints as they were last sent \[rad\].
@@ -128,6 +132,11 @@ impl<'a> FollowPlan<'a> {
         self.obstacle.clone()
     }
 
+    /// Whether in the last pass the arm did not go as its goal asked, because it would have come too near to something.
+    pub fn is_kept_off(&self) -> bool {
+        self.is_kept_off
+    }
+
     /// Whether it stands.
     pub fn is_at_rest(&self) -> bool {
         self.now.is_at_rest()
@@ -141,13 +150,18 @@ impl<'a> FollowPlan<'a> {
     /// The joints for the next pass [rad]: towards the goal for the time of this point, or to rest with `None`.
     pub fn advance(&mut self, goal: Option<&FollowGoal>) -> JointValues {
         let braked = self.braked(&self.now);
+        self.is_kept_off = false;
         self.now = match goal.filter(|_| self.obstacle.is_none()).map(|goal| self.rates_towards(goal)) {
             None => braked,
             Some(Err(obstacle)) => {
                 self.obstacle = Some(obstacle);
                 braked
             }
-            Some(Ok(rates)) => self.most_of(&rates, &braked),
+            Some(Ok(rates)) => {
+                let kept_off = self.kept_off(&rates);
+                self.is_kept_off = kept_off.is_some();
+                self.most_of(&kept_off.unwrap_or(rates), &braked)
+            }
         };
         self.now.joints
     }
@@ -185,17 +199,14 @@ impl<'a> FollowPlan<'a> {
                 Ok(joints) => {
                     let (_, by_rad) = largest_change(self.kinematics.kinds(), &self.now.joints, &joints);
                     if by_rad <= largest_step {
-                        if let Some(contact) = self.contact(&joints) {
-                            return Err(FollowEnd::Contact(contact));
-                        }
                         let rate = |i: usize| (joints[i] - self.now.joints[i]) / self.dt_s;
                         return Ok(JointValues::from_fn(joints.len(), rate));
                     }
                     (largest_step / by_rad).min(LEAST_SLOWING)
                 }
                 Err(JogObstacle::JointRange { joint, .. }) => return Err(FollowEnd::JointLimit { joint }),
-                Err(JogObstacle::Contact(contact)) => return Err(FollowEnd::Contact(contact)),
-                Err(JogObstacle::Reach(_) | JogObstacle::Singular { .. }) => 0.5,
+                // What is touched is looked at afterwards.
+                Err(JogObstacle::Reach(_) | JogObstacle::Singular { .. } | JogObstacle::Contact(_)) => 0.5,
             };
             if share * share_of_limits < CRAWL {
                 break;
@@ -220,6 +231,18 @@ impl<'a> FollowPlan<'a> {
             within(&now.velocity_m_s, &(velocity_m_s + approach(&shift, linear, rate)), linear, dt_s),
             within(&now.turn_rad_s, &(turn_rad_s + approach(&turn, angular, rate)), angular, dt_s),
         )
+    }
+
+    /// Rates as near to these as keep the arm off what it must not touch; `None` where they do that already.
+    fn kept_off(&self, rates: &JointValues) -> Option<JointValues> {
+        let guard = self.guard.as_ref()?;
+        let FollowLimits { speed_m_s, acceleration_m_s2, turn_rad_s, .. } = self.limits;
+        let rate = APPROACH_RATE.min(APPROACH_PER_PASS / self.dt_s);
+        let room = Room::at(guard, &self.now.joints, nearing_distance(speed_m_s, acceleration_m_s2, rate))?;
+        let fastest = nearing_speed(room.left_m, acceleration_m_s2, rate);
+        let jacobian = self.kinematics.jacobian(&self.now.joints)?;
+        // As much of a turn as of a shift: what both take at their limits.
+        keep_off::deflected(rates, &room, -fastest, &jacobian, speed_m_s / turn_rad_s)
     }
 
     /// As much of a step as can be taken; what is left of it is braking.
@@ -286,12 +309,7 @@ impl<'a> FollowPlan<'a> {
             && is_within((to.turn_rad_s - from.turn_rad_s).norm(), limits.turn_acceleration_rad_s2 * self.dt_s)
             && limits.workspace.contains(&to.base_from_tip.translation.vector)
             && self.kinematics.arm().first_violation(&to.joints).is_none()
-            && self.contact(&to.joints).is_none()
-    }
-
-    /// What the arm would come too near to.
-    fn contact(&self, joints: &JointValues) -> Option<Contact> {
-        self.guard.as_ref().and_then(|guard| guard.contact(joints))
+            && self.guard.as_ref().is_none_or(|guard| guard.contact(&to.joints).is_none())
     }
 }
 
@@ -302,14 +320,25 @@ fn approach(left: &Vector3<f64>, (fastest, acceleration): (f64, f64), rate: f64)
     if distance == 0.0 {
         return Vector3::zeros();
     }
+    left * (nearing_speed(distance, acceleration, rate).min(fastest) / distance)
+}
+
+/// The speed at which a distance may shrink: in proportion to it, or at a steady deceleration.
+fn nearing_speed(distance: f64, acceleration: f64, rate: f64) -> f64 {
     let deceleration = APPROACH_SHARE * acceleration;
     let proportional = deceleration / (rate * rate);
-    let speed = if distance <= proportional {
+    if distance <= proportional {
         rate * distance
     } else {
         (2.0 * deceleration * (distance - proportional / 2.0)).sqrt()
-    };
-    left * (speed.min(fastest) / distance)
+    }
+}
+
+/// Farther away nothing is neared too fast at this speed.
+fn nearing_distance(speed: f64, acceleration: f64, rate: f64) -> f64 {
+    // Where `nearing_speed` is as much; more than that where it is still proportional.
+    let deceleration = APPROACH_SHARE * acceleration;
+    speed * speed / (2.0 * deceleration) + deceleration / (2.0 * rate * rate)
 }
 
 /// The wanted speed, as far as the limits of speed and acceleration allow.

@@ -22,6 +22,7 @@ mod jog;
 mod jog_plan;
 mod joint_elsewhere;
 mod joints;
+mod keep_off;
 mod motion;
 mod objects;
 mod paths;

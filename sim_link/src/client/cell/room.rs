@@ -2,8 +2,9 @@
 //!
 //! A camera that keeps its view goes wherever the board goes, and about it when the board turns. Where the arm is close to
 //! its column, nearly stretched, or has two axes in line, some direction needs joints faster than they are, and following
-//! ends there; it ends as well before the arm touches something. So a place is judged by the worst of all poses of the board
-//! within a reach: by the share of its limits that the tip can have there in every direction at once, if nothing is touched.
+//! ends there; and the arm stays behind where it would touch something. So a place is judged by the worst of all poses of the
+//! board within a reach: by the share of its limits that the tip can have there in every direction at once, if nothing is touched,
+//! and by whether the whole board is still in the image there before the arm has moved.
 
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
@@ -103,6 +104,14 @@ pub struct NoPlace {
     pub tried: usize,
 }
 
+impl BoardInView {
+    /// Whether the whole board is in the image from this pose of the tip when it goes along its plane at once, as far as the reach.
+    fn is_seen_over(&self, reach: &BoardReach, base_from_tip: &Pose<Base, Tip>) -> bool {
+        let camera_from_target = (*base_from_tip * self.tip_from_camera).inverse() * self.base_from_target;
+        planning::shows_within(&self.intrinsics, &self.target, &camera_from_target, reach.in_plane_m)
+    }
+}
+
 impl ArmKinematics {
     /// Where the arm follows a board from: `None` where it has room from these joints ([`Self::has_room_to_follow`]), else
     /// [`Self::place_to_follow`].
@@ -125,7 +134,7 @@ impl ArmKinematics {
     }
 
     /// Whether the tip can follow the board at a usual speed from these joints, wherever it goes within `reach` while its
-    /// view is kept, and touches nothing of what it is kept clear of.
+    /// view is kept, touches nothing of what it is kept clear of, and sees the whole board also when that is there at once.
     pub fn has_room_to_follow(
         &self,
         limits: &FollowLimits,
@@ -135,12 +144,14 @@ impl ArmKinematics {
         among: Option<&Among>,
     ) -> bool {
         let guard = among.map(Among::strict);
-        self.room_over(limits, board, reach, joints, ENOUGH, guard.as_ref()) >= ENOUGH
+        board.is_seen_over(reach, &self.tip(joints))
+            && self.room_over(limits, board, reach, joints, ENOUGH, guard.as_ref()) >= ENOUGH
     }
 
-    /// The nearest place from which the whole board is seen and the arm has room to go along with it over half as much again
-    /// as `reach`; where there is none, over `reach`, and where none has enough the one with most. Following keeps clear of what
-    /// it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around.
+    /// The nearest place from which the whole board is seen, also when it is elsewhere within `reach` at once, and the arm has
+    /// room to go along with it over half as much again as `reach`; where there is none, over `reach`; where there is none either,
+    /// one from which the board is seen where it is now, and where none has enough room the one with most. Following keeps clear of
+    /// what it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around.
     ///
     /// # Errors
     /// [`NoPlace`].
@@ -156,35 +167,47 @@ impl ArmKinematics {
         let setup = self.view_setup(board, from, around);
         let guard = among.map(Among::strict);
         let distance_m = board.distance_m(&self.tip(from));
-        let options = ViewOptions {
-            distance_m: DISTANCES.map(|times| distance_m * times),
-            margin_px: MARGIN_PX,
-            candidates: CANDIDATES,
-            ..ViewOptions::default()
-        };
-        let mut views = planning::views_of_board(&setup, &options);
         let travel = |view: &PlannedView| planning::travel(from, &view.joints);
-        views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
-        let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
-        let place =
-            |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
-        for reach in [&reach.wider(), reach] {
-            for view in &views {
-                let room = self.room_over(limits, board, reach, &view.joints, ENOUGH, guard.as_ref());
-                if room >= ENOUGH && is_free(&view.joints) {
-                    return Ok(place(view, room));
+        let mut tried = 0;
+        // Views that keep a board which jumps in the image are few, and looked at first.
+        for leeway_m in [reach.in_plane_m, 0.0] {
+            let options = ViewOptions {
+                distance_m: DISTANCES.map(|times| distance_m * times),
+                margin_px: MARGIN_PX,
+                leeway_m,
+                candidates: CANDIDATES,
+                ..ViewOptions::default()
+            };
+            let mut views = planning::views_of_board(&setup, &options);
+            views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
+            tried = views.len();
+            let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
+            let place =
+                |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
+            for reach in [&reach.wider(), reach] {
+                for view in &views {
+                    let room = self.room_over(limits, board, reach, &view.joints, ENOUGH, guard.as_ref());
+                    if room >= ENOUGH && is_free(&view.joints) {
+                        return Ok(place(view, room));
+                    }
                 }
             }
-        }
-        let mut best: Option<FollowPlace> = None;
-        for view in &views {
-            let wanted = best.map_or(LEAST, |best| best.room);
-            let room = self.room_over(limits, board, reach, &view.joints, wanted, guard.as_ref());
-            if room > wanted && is_free(&view.joints) {
-                best = Some(place(view, room));
+            if leeway_m > 0.0 {
+                continue;
+            }
+            let mut best: Option<FollowPlace> = None;
+            for view in &views {
+                let wanted = best.map_or(LEAST, |best| best.room);
+                let room = self.room_over(limits, board, reach, &view.joints, wanted, guard.as_ref());
+                if room > wanted && is_free(&view.joints) {
+                    best = Some(place(view, room));
+                }
+            }
+            if let Some(best) = best {
+                return Ok(best);
             }
         }
-        best.ok_or(NoPlace { tried: views.len() })
+        Err(NoPlace { tried })
     }
 
     /// The least share of its limits that the tip can have in every direction from these joints, wherever the board goes

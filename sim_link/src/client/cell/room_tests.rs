@@ -42,10 +42,19 @@ fn board_at(scene: &ResolvedScene, course: &Course, seconds: f64) -> Pose<Base, 
     Pose::from_isometry(scene.world_from_plane * course.offset(seconds) * plane_from_target)
 }
 
+/// The fastest that the middle of the board goes in some time [m/s].
+fn fastest_m_s(scene: &ResolvedScene, motion: &BoardMotionSpec, seconds: f64) -> f64 {
+    let course = Course::new(motion, scene.seed);
+    let middle = |at_s: f64| board_at(scene, &course, at_s).isometry() * scene.target.centre();
+    let speed = |pass: u32| (middle(f64::from(pass + 1) * DT_S) - middle(f64::from(pass) * DT_S)).norm() / DT_S;
+    (0..(seconds / DT_S) as u32).map(speed).fold(0.0, f64::max)
+}
+
 /// Follows the board on its way from some time on with the view kept: the worst distance of the tip from where the view
 /// wants it after the first seconds \[m\]; or after how many seconds it ended.
 fn followed(
     (scene, arm): (&ResolvedScene, &ArmKinematics),
+    among: Option<&Among>,
     joints: JointValues,
     motion: &BoardMotionSpec,
     from_s: f64,
@@ -53,7 +62,8 @@ fn followed(
 ) -> Result<f64, f64> {
     let course = Course::new(motion, scene.seed);
     let limits = FollowLimits::default();
-    let mut plan = FollowPlan::new(arm, &limits, None, joints, DT_S).expect("nothing forbids to move");
+    let mut plan = FollowPlan::new(arm, &limits, among.map(|among| among.guard(&joints)), joints, DT_S)
+        .expect("nothing forbids to move");
     let kept = board_at(scene, &course, from_s).inverse() * arm.tip(&joints);
     let mut worst_m: f64 = 0.0;
     for pass in 1..=(seconds / DT_S) as u32 {
@@ -92,7 +102,7 @@ fn from_where_the_reference_sequence_ends_a_board_on_a_circle_cannot_be_followed
     let last = *sequence.last().expect("ten poses");
     let limits = FollowLimits::default();
     assert!(!arm.has_room_to_follow(&limits, &board, &BoardReach::default(), &last, None));
-    let ended = followed((&scene, &arm), last, &moving(BoardPath::Circle, 0.05), 0.0, 60.0);
+    let ended = followed((&scene, &arm), None, last, &moving(BoardPath::Circle, 0.05), 0.0, 60.0);
     println!("the circle from the tenth pose: {ended:?}");
     assert!(ended.is_err_and(|after_s| after_s < 30.0), "{ended:?}");
 }
@@ -110,18 +120,52 @@ fn from_the_place_that_is_found_every_path_of_the_board_is_followed_for_minutes(
         let seconds = if index + 1 == sequence.len() { 300.0 } else { 20.0 };
         for path in paths() {
             for speed_m_s in [0.05, 0.1] {
-                let worst = followed((&scene, &arm), place.joints, &moving(path, speed_m_s), 0.0, seconds);
+                let worst = followed((&scene, &arm), None, place.joints, &moving(path, speed_m_s), 0.0, seconds);
                 let what = format!("{path} at {speed_m_s} m/s after pose {}", index + 1);
                 let worst_m = worst.unwrap_or_else(|after_s| panic!("{what} ended after {after_s} s"));
                 // A board that jumps by up to 80 mm is caught up with at 0.25 m/s. At twice the speed that there has to be
-                // room for the arm may lag for a moment, by what the board goes in a fifth of a second.
+                // room for the arm may lag for a moment, by what the board goes at its fastest in a fifth of a second.
                 let most_m = match path {
                     BoardPath::Step => 0.1,
-                    _ if speed_m_s > 0.05 => 0.02,
+                    _ if speed_m_s > 0.05 => 0.2 * fastest_m_s(&scene, &moving(path, speed_m_s), seconds),
                     _ => 2e-3,
                 };
                 assert!(worst_m < most_m, "{what}: {worst_m} m");
             }
+        }
+    }
+}
+
+/// A scene that is shipped, its arm up to the tip, and its board.
+fn shipped(name: &str) -> (ResolvedScene, ArmKinematics, BoardInView) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes").join(name);
+    let scene = Scene::load(&file).expect("the scene").resolve(1).expect("valid");
+    let chain = scene.arm.clone();
+    let (base_from_first, flange_from_tip) = (chain.base_from_first, chain.flange_from_tip * scene.connection_from_tip);
+    let arm = ArmKinematics::new(chain.mounted(base_from_first, flange_from_tip), scene.world_from_arm);
+    let board = BoardInView {
+        base_from_target: scene.base_from_target,
+        target: scene.target,
+        intrinsics: scene.intrinsics,
+        tip_from_camera: scene.tip_from_camera,
+    };
+    (scene, arm, board)
+}
+
+#[test]
+fn arms_of_other_makers_follow_every_path_for_minutes_and_touch_nothing() {
+    for name in ["panda.toml", "xarm6.toml"] {
+        let (scene, arm, board) = shipped(name);
+        let among = arm.among(arm.plane(), None);
+        let place =
+            arm.where_to_follow(&FollowLimits::default(), &board, &scene.start_joints, &arm.plane(), Some(&among));
+        let joints = place.expect("there is room").map_or(scene.start_joints, |place| place.joints);
+        for path in paths() {
+            let worst = followed((&scene, &arm), Some(&among), joints, &moving(path, 0.05), 0.0, 300.0);
+            println!("{name}, {path}: {worst:?}");
+            let worst_m = worst.unwrap_or_else(|after_s| panic!("{name}, {path} ended after {after_s} s"));
+            // A board that jumps by up to 80 mm is caught up with at 0.25 m/s.
+            assert!(worst_m < if path == BoardPath::Step { 0.1 } else { 5e-3 }, "{name}, {path}: {worst_m} m");
         }
     }
 }
@@ -139,7 +183,7 @@ fn a_place_that_is_found_amid_the_path_of_the_board_has_room_for_all_of_the_path
             let place = arm
                 .place_to_follow(&limits, &board, &BoardReach::default(), &from, &arm.plane(), None)
                 .expect("there is room");
-            let worst = followed((&scene, &arm), place.joints, &motion, from_s, 60.0);
+            let worst = followed((&scene, &arm), None, place.joints, &motion, from_s, 60.0);
             assert!(worst.is_ok(), "{path} from {from_s} s on ended after {worst:?} s");
         }
     }
@@ -158,11 +202,19 @@ fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
             None,
         )
         .expect("there is room");
-    let camera_from_target = (place.base_from_tip * board.tip_from_camera).inverse() * board.base_from_target;
-    for point in board.target.points() {
-        let px = board.intrinsics.project(&(camera_from_target.isometry() * point)).expect("in front");
-        let inside = |at: f64, size: u32| at > MARGIN_PX && at < f64::from(size) - MARGIN_PX;
-        assert!(inside(px.x, board.intrinsics.width) && inside(px.y, board.intrinsics.height), "{px}");
+    let camera_from_base = (place.base_from_tip * board.tip_from_camera).inverse();
+    let is_seen = |shift: Vector3<f64>, margin_px: f64| {
+        let shifted = board.base_from_target.isometry() * Translation3::from(shift);
+        board.target.points().iter().all(|point| {
+            let px = board.intrinsics.project(&(camera_from_base.isometry() * shifted * point)).expect("in front");
+            let inside = |at: f64, size: u32| at > margin_px && at < f64::from(size) - margin_px;
+            inside(px.x, board.intrinsics.width) && inside(px.y, board.intrinsics.height)
+        })
+    };
+    assert!(is_seen(Vector3::zeros(), MARGIN_PX));
+    // A board that jumps is not lost.
+    for (x, y) in [(-0.08, 0.0), (0.0, 0.08), (0.08, 0.0), (0.0, -0.08)] {
+        assert!(is_seen(Vector3::new(x, y, 0.0), 0.0), "{x} {y}");
     }
     // By the planner's own knowledge of the scene, which has a floor and a plate as well.
     let setup = planning::ViewSetup::from(&scene);
@@ -170,19 +222,13 @@ fn a_place_shows_the_whole_board_and_the_way_there_touches_nothing() {
 }
 
 #[test]
-fn where_there_is_room_the_nearest_place_is_near() {
+fn an_arm_that_has_room_stays_where_it_is() {
     let (_, arm, board, sequence) = after_the_sequence();
     let (limits, reach) = (FollowLimits::default(), BoardReach::default());
-    let first = arm
-        .place_to_follow(&limits, &board, &reach, sequence.last().expect("ten poses"), &arm.plane(), None)
-        .expect("there is room");
-    assert!(
-        arm.has_room_to_follow(&limits, &board, &reach, &first.joints, None),
-        "following begins there without a move"
-    );
-    let again = arm.place_to_follow(&limits, &board, &reach, &first.joints, &arm.plane(), None).expect("there is room");
-    let travel_deg = planning::travel(&first.joints, &again.joints).to_degrees();
-    assert!(travel_deg < 20.0, "{travel_deg}°");
+    let last = sequence.last().expect("ten poses");
+    let first = arm.place_to_follow(&limits, &board, &reach, last, &arm.plane(), None).expect("there is room");
+    let again = arm.where_to_follow(&limits, &board, &first.joints, &arm.plane(), None);
+    assert_eq!(again, Ok(None), "following begins there without a move");
 }
 
 #[test]
@@ -198,7 +244,9 @@ fn where_something_stands_in_the_way_of_the_board_there_is_no_room_and_another_p
     let among = arm.among(around.clone(), None);
     assert!(!arm.has_room_to_follow(&limits, &board, &reach, &free.joints, Some(&among)));
     let other = arm.place_to_follow(&limits, &board, &reach, from, &around, Some(&among)).expect("room elsewhere");
-    assert!(arm.has_room_to_follow(&limits, &board, &reach, &other.joints, Some(&among)));
+    let strict = among.strict();
+    let room = arm.room_over(&limits, &board, &reach, &other.joints, ENOUGH, Some(&strict));
+    assert!(room >= ENOUGH, "{room}");
 }
 
 #[test]

@@ -45,7 +45,7 @@ impl ArmKinematics {
     /// other: up to `count` of them, at least two, in an order with short ways. Nothing that is known is touched on the
     /// way from `start` to the first and from each to the next.
     ///
-    /// What is known is the arm itself, the board, and what stands around.
+    /// What is known is the arm itself, the board, and what stands around. `seed` is that of the views that are compared.
     ///
     /// # Errors
     /// [`PlanError`] says what was in the way.
@@ -56,9 +56,10 @@ impl ArmKinematics {
         start: &JointValues,
         around: &Surroundings,
         count: usize,
+        seed: u64,
     ) -> Result<Vec<JointValues>, PlanError> {
         let setup = self.view_setup(board, start, around);
-        let mut options = ViewOptions { count, ..ViewOptions::default() };
+        let mut options = ViewOptions { count, seed, ..ViewOptions::default() };
         let distances = taken.iter().map(|pose| board.distance_m(pose));
         if let Some([nearest, farthest]) = distances.fold(None, |range: Option<[f64; 2]>, distance_m| {
             let [nearest, farthest] = range.unwrap_or([distance_m; 2]);

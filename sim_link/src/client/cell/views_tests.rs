@@ -20,9 +20,9 @@ fn views_to_verify_at_show_the_whole_board_and_differ_from_those_of_the_fit_and_
     for scene in [Scene::reference().expect("the scene"), Scene::realistic().expect("the scene")] {
         let (arm, board, start) = arm_and_board(&scene);
         // A fit from views that the same planner chose, so that the best ones are taken already.
-        let fitted = arm.views_unlike(&board, &[], &start, &arm.plane(), 10).expect("views");
+        let fitted = arm.views_unlike(&board, &[], &start, &arm.plane(), 10, 1).expect("views");
         let taken: Vec<_> = fitted.iter().map(|joints| arm.tip(joints)).collect();
-        let views = arm.views_unlike(&board, &taken, &start, &arm.plane(), 5).expect("views");
+        let views = arm.views_unlike(&board, &taken, &start, &arm.plane(), 5, 1).expect("views");
         assert_eq!(views.len(), 5);
         for (index, joints) in views.iter().enumerate() {
             let tip = arm.tip(joints);
@@ -43,12 +43,12 @@ fn views_to_verify_at_show_the_whole_board_and_differ_from_those_of_the_fit_and_
 #[test]
 fn views_are_taken_from_distances_like_those_of_the_fit() {
     let (arm, board, start) = arm_and_board(&Scene::reference().expect("the scene"));
-    let fitted = arm.views_unlike(&board, &[], &start, &arm.plane(), 6).expect("views");
+    let fitted = arm.views_unlike(&board, &[], &start, &arm.plane(), 6, 1).expect("views");
     let taken: Vec<_> = fitted.iter().map(|joints| arm.tip(joints)).collect();
     let distances =
         |poses: &[Pose<Base, Tip>]| -> Vec<f64> { poses.iter().map(|pose| board.distance_m(pose)).collect() };
     let [least, most] = [f64::min, f64::max].map(|choose| distances(&taken).into_iter().reduce(choose).expect("some"));
-    let views = arm.views_unlike(&board, &taken, &start, &arm.plane(), 5).expect("views");
+    let views = arm.views_unlike(&board, &taken, &start, &arm.plane(), 5, 1).expect("views");
     let planned: Vec<_> = views.iter().map(|joints| arm.tip(joints)).collect();
     for distance_m in distances(&planned) {
         // The line of sight meets the board up to 4 cm beside its middle.
@@ -60,6 +60,6 @@ fn views_are_taken_from_distances_like_those_of_the_fit() {
 fn an_arm_that_touches_its_table_is_not_sent_anywhere() {
     let (arm, board, _) = arm_and_board(&Scene::reference().expect("the scene"));
     let lying = [0.0, 100.0_f64.to_radians(), 0.0, 0.0, 0.0, 0.0];
-    let blocked = arm.views_unlike(&board, &[], &lying.into(), &arm.plane(), 5);
+    let blocked = arm.views_unlike(&board, &[], &lying.into(), &arm.plane(), 5, 1);
     assert!(matches!(blocked, Err(PlanError::StartBlocked { .. })), "{blocked:?}");
 }

@@ -121,6 +121,19 @@ fn an_arm_of_another_name_is_calibrated_once_the_objects_of_its_scene_are_named(
     assert!(mm < 3.0 * stated_mm, "{mm} mm, stated {stated_mm} mm");
 }
 
+/// Over a connection nobody has given a scene: the views are of the board of the cell that is there, by its arm.
+#[test]
+fn views_are_planned_for_the_arm_and_the_board_of_a_cell_that_is_connected_to() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = workspace_root().join("assets/scenes/panda.toml");
+    for only in [&[][..], &["--coppeliasim-only"]] {
+        let cell = CellProcess::start(&[&["--fast", "--scene", scene.to_str().expect("UTF-8")], only].concat());
+        let address = format!("tcp://127.0.0.1:{}", cell.port());
+        let result = auto(folder.path(), &["--poses", "auto", "--connect", &address]);
+        assert!(result.views.iter().filter(|view| view.status == "used").count() >= 15, "{:?}", result.views);
+    }
+}
+
 #[test]
 fn the_ten_reference_poses_calibrate_the_exact_cell() {
     let folder = tempfile::tempdir().expect("a folder");

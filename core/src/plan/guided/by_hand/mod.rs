@@ -18,6 +18,7 @@ pub use deviation::Deviation;
 use super::design::Design;
 use super::{Ending, Guide, GuidedOptions, Known, LEAST_NOISE, Next, Why, at_least, used_views};
 use crate::estimate::handeye::joint::ViewModel;
+use crate::estimate::uncertainty::quality::TipBox;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::geometry::planar_pose;
@@ -92,6 +93,11 @@ impl HandGuide {
     /// Every view that was proposed from an answer, and what came of it.
     pub fn guide(&self) -> &Guide {
         &self.guide
+    }
+
+    /// See [`Guide::work_in`].
+    pub fn work_in(&mut self, tool_box: Option<TipBox>) {
+        self.guide.work_in(tool_box);
     }
 
     /// There is a view of what was proposed last.
