@@ -43,7 +43,7 @@ fn is_solved(model: &Model) -> bool {
 /// How far the answer is from the truth \[mm\], which no driver reports.
 fn error_mm(bench: &Workbench, truth: &Pose<Tip, Camera>) -> f64 {
     let solved = bench.model().solve.current().expect("solved");
-    let found = solved.result.hand_eye.expect("a robot").translation_m;
+    let found = solved.result.hand_eye.as_ref().expect("a robot").translation_m;
     distance(found, truth.translation().into()) * 1e3
 }
 

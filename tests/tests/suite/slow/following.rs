@@ -120,7 +120,7 @@ fn true_view(model: &Model) -> Pose<Camera, Target> {
     let truth = model.cell.as_ref().and_then(|cell| cell.truth.as_ref()).expect("the cell's truth");
     let frame = &model.frame.as_ref().expect("an image").info;
     let base_from_target = frame.base_from_target_true.expect("where the board is");
-    (frame.base_from_tip * truth.tip_from_camera).inverse() * base_from_target
+    (frame.base_from_tip.expect("a cell reports it") * truth.tip_from_camera).inverse() * base_from_target
 }
 
 /// What tracking makes of the newest image, on a cell that says nothing of where its board is.
@@ -268,7 +268,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
         cell.paced(false);
         bench.until("the end of following", |model| matches!(model.track.follow, FollowStatus::Ended(_)));
         assert!(fastest_rad_s <= limits.joint_speed_rad_s * 1.001, "trial {trial}: {fastest_rad_s} rad/s");
-        assert!(limits.workspace.contains(&before.base_from_tip.translation()), "trial {trial}: outside its box");
+        assert!(limits.workspace.contains(&before.base_from_tip.expect("a cell reports it").translation()), "trial {trial}: outside its box");
         bench.click(Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: 0.1 }));
         bench.click(Command::HideBoard(false));
         bench.click(Command::GoToCapture(FIRST));
