@@ -108,6 +108,14 @@ impl DriverCell {
         self.camera.as_ref().map_or(Ok(()), Driver::check)
     }
 
+    /// Ends both, whoever has them yet.
+    pub fn close(&self) {
+        self.robot.close();
+        if let Some(camera) = &self.camera {
+            camera.close();
+        }
+    }
+
     /// How the clocks of the two relate; `None` for one driver, and before both have answered a ping.
     pub fn clock_difference(&self) -> Option<ClockDifference> {
         let (robot, camera) = (self.robot.clock()?, self.camera.as_ref()?.clock()?);

@@ -7,9 +7,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use handeye_core::depth::DepthImage;
-use handeye_core::geometry::arm::{Arm, JointValues};
+use handeye_core::geometry::arm::Arm;
 use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::image::RgbImage;
 use handeye_core::progress::CancelToken;
 
@@ -18,9 +17,9 @@ use super::error::{DriverError, Ending};
 use super::images;
 use super::link::Link;
 use super::log::LogLine;
-use super::message::{Ability, DepthMessage, Hello, ImageMessage, PROTOCOL, PoseMessage, ToDriver};
+use super::message::{Ability, DepthMessage, Hello, ImageMessage, PROTOCOL, ToDriver};
 use super::options::DriverOptions;
-use super::shared::{FrameRequest, Inner, Progress, QUEUE, Shared};
+use super::shared::{FrameRequest, Inner, QUEUE, Shared};
 use super::spec::DriverSpec;
 use super::states::{NoPose, Reading, RobotAt};
 use super::threads;
@@ -43,26 +42,6 @@ struct Owner {
     /// One at a time asks for an image.
     camera_turn: Mutex<()>,
     watch: Option<JoinHandle<()>>,
-}
-
-/// Where the arm is to go.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Goal {
-    /// To a value for each joint, rad or m.
-    Joints(JointValues),
-    /// To a pose of the tip.
-    Tip(Pose<Base, Tip>),
-}
-
-/// How a motion ended. The arm is at rest.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum MoveEnd {
-    /// It is there.
-    Arrived,
-    /// It was stopped on its way, and why.
-    Stopped(String),
-    /// It was not begun, and why.
-    Refused(String),
 }
 
 /// The newest state.
@@ -121,9 +100,8 @@ impl Driver {
         spawned("driver-errors", Box::new(move || threads::collect_errors(&listening, errors)))?;
 
         shared.send(&ToDriver::Hello { protocol: PROTOCOL, workbench: env!("CARGO_PKG_VERSION").to_owned() })?;
-        let greeted = shared.wait(options.hello, Some(cancel), |inner| {
-            inner.hello.clone().map(|hello| (hello, inner.arm.clone()))
-        })?;
+        let greeted = shared
+            .wait(options.hello, Some(cancel), |inner| inner.hello.clone().map(|hello| (hello, inner.arm.clone())))?;
         let Some((hello, arm)) = greeted else {
             let last_line = shared.lock().log.last_printed();
             let why = if cancel.is_cancelled() {
@@ -236,9 +214,7 @@ impl Driver {
         loop {
             self.ask_for_image(after)?;
             let left = until.saturating_duration_since(Instant::now());
-            let answered = |inner: &mut Inner| {
-                inner.frame.take_if(|frame| frame.is_answered())
-            };
+            let answered = |inner: &mut Inner| inner.frame.take_if(|frame| frame.is_answered());
             let Some(frame) = shared.wait(left, Some(cancel), answered)? else { return Ok(None) };
             if let Some(why) = frame.refused {
                 return Err(DriverError::Refused { driver: self.name().to_owned(), what: "an image", why });
@@ -294,111 +270,12 @@ impl Driver {
         })
     }
 
-    /// Allows the driver to move the arm, or forbids it. A new connection begins read-only.
-    ///
-    /// # Errors
-    /// [`DriverError::Refused`], [`DriverError::NoAnswer`], [`DriverError::Gone`], [`DriverError::Cannot`].
-    pub fn arm(&self, on: bool) -> Result<(), DriverError> {
-        if !self.hello().can_move() {
-            self.require(Ability::MoveJoints)?;
-        }
+    /// Ends it, whoever has it yet, and waits until it has ended.
+    pub fn close(&self) {
         let shared = &self.owner.shared;
-        if !on {
-            shared.lock().is_armed = false;
-        }
-        let id = shared.request(|id| ToDriver::Arm { id, on })?;
-        let what = if on { "`arm` with on" } else { "`arm` with off" };
-        match shared.wait(shared.options.answer, None, |inner| inner.finished(id))? {
-            Some(Progress::Refused(why)) => {
-                Err(DriverError::Refused { driver: self.name().to_owned(), what: "to be armed", why })
-            }
-            Some(_) => {
-                shared.lock().is_armed = on;
-                Ok(())
-            }
-            None if on => {
-                shared.lock().abandon(id);
-                Err(self.no_answer(what, shared.options.answer))
-            }
-            // A driver that may still move is none to stay connected with.
-            None => Err(self.end(Ending::DoesNotStop)),
-        }
-    }
-
-    /// Whether it may move the arm.
-    pub fn is_armed(&self) -> bool {
-        self.owner.shared.lock().is_armed
-    }
-
-    /// Moves the arm at a share of its highest speed, over 0 and up to 1, and returns when it is at rest: at the goal, or
-    /// where `cancel` or a stop brought it to rest.
-    ///
-    /// # Errors
-    /// [`DriverError::NotArmed`], [`DriverError::Busy`], [`DriverError::Cannot`]: nothing was sent.
-    /// [`DriverError::NoAnswer`], [`DriverError::Gone`].
-    pub fn move_to(&self, goal: &Goal, speed: f64, cancel: &CancelToken) -> Result<MoveEnd, DriverError> {
-        self.require(match goal {
-            Goal::Joints(_) => Ability::MoveJoints,
-            Goal::Tip(_) => Ability::MoveTip,
-        })?;
-        let shared = &self.owner.shared;
-        self.check()?;
-        {
-            let mut inner = shared.lock();
-            if !inner.is_armed {
-                return Err(DriverError::NotArmed { driver: self.name().to_owned() });
-            }
-            if inner.is_moving {
-                return Err(DriverError::Busy { driver: self.name().to_owned() });
-            }
-            inner.is_moving = true;
-        }
-        let ended = self.moved(goal, speed, cancel);
-        shared.lock().is_moving = false;
-        ended
-    }
-
-    fn moved(&self, goal: &Goal, speed: f64, cancel: &CancelToken) -> Result<MoveEnd, DriverError> {
-        let shared = &self.owner.shared;
-        let speed = speed.clamp(0.001, 1.0);
-        let id = shared.request(|id| move_message(id, goal, speed))?;
-        let begun = |inner: &mut Inner| (inner.requests.get(&id) != Some(&Progress::Sent)).then_some(());
-        if shared.wait(shared.options.answer, None, begun)?.is_none() {
-            // It may begin yet.
-            self.stop()?;
-            shared.lock().abandon(id);
-            return Err(self.no_answer("`move` with accepted or refused", shared.options.answer));
-        }
-        let ended = shared.wait(shared.options.motion, Some(cancel), |inner| inner.finished(id))?;
-        let ended = if let Some(ended) = ended {
-            ended
-        } else {
-            self.stop()?;
-            let ended = shared.wait(shared.options.answer, None, |inner| inner.finished(id))?;
-            ended.ok_or_else(|| self.end(Ending::DoesNotStop))?
-        };
-        Ok(match ended {
-            Progress::Refused(why) => MoveEnd::Refused(why),
-            Progress::Stopped(why) => MoveEnd::Stopped(why),
-            _ => MoveEnd::Arrived,
-        })
-    }
-
-    /// Brings the arm to rest and waits until it is. A driver that does not answer in time loses its connection, which it
-    /// must take as a stop too.
-    ///
-    /// # Errors
-    /// [`DriverError::Gone`]; the arm may then still move.
-    pub fn stop(&self) -> Result<(), DriverError> {
-        if !self.hello().can_move() {
-            return Ok(());
-        }
-        let shared = &self.owner.shared;
-        let id = shared.request(|id| ToDriver::Stop { id })?;
-        match shared.wait(shared.options.answer, None, |inner| inner.finished(id))? {
-            Some(Progress::Refused(_)) | None => Err(self.end(Ending::DoesNotStop)),
-            Some(_) => Ok(()),
-        }
+        shared.finish(Ending::ClosedHere);
+        // It is killed after the farewell; the second is for the system.
+        shared.wait_for_burial(shared.options.farewell + Duration::from_secs(1));
     }
 
     /// What it has said for people since the last call.
@@ -410,18 +287,18 @@ impl Driver {
         &self.owner.shared
     }
 
-    fn require(&self, ability: Ability) -> Result<(), DriverError> {
+    pub(super) fn require(&self, ability: Ability) -> Result<(), DriverError> {
         if self.hello().can(ability) {
             return Ok(());
         }
         Err(DriverError::Cannot { driver: self.name().to_owned(), ability })
     }
 
-    fn no_answer(&self, what: &'static str, after: Duration) -> DriverError {
+    pub(super) fn no_answer(&self, what: &'static str, after: Duration) -> DriverError {
         DriverError::NoAnswer { driver: self.name().to_owned(), what, after }
     }
 
-    fn end(&self, why: Ending) -> DriverError {
+    pub(super) fn end(&self, why: Ending) -> DriverError {
         self.owner.shared.finish(why.clone());
         self.owner.shared.gone(why)
     }
@@ -436,15 +313,6 @@ impl Drop for Owner {
             tracing::error!(driver = %self.shared.driver, "the thread that watches the driver had failed");
         }
     }
-}
-
-/// The request for a motion.
-pub(super) fn move_message(id: u64, goal: &Goal, speed: f64) -> ToDriver {
-    let (joints_rad, base_from_tip) = match goal {
-        Goal::Joints(joints) => (Some(*joints), None),
-        Goal::Tip(pose) => (None, Some(PoseMessage::of(pose))),
-    };
-    ToDriver::Move { id, joints_rad, base_from_tip, speed }
 }
 
 /// Stands where none has come yet.

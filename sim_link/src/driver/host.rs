@@ -37,14 +37,18 @@ impl DriverHost {
         if let Some(cell) = kept.as_ref().filter(|cell| cell.check().is_ok()) {
             return Ok(cell.clone());
         }
-        // The old one first: a robot takes one program at a time.
-        *kept = None;
+        // The old one first, both halves of it, whoever has them yet: a device takes one program at a time.
+        if let Some(old) = kept.take() {
+            old.close();
+        }
         let cell = DriverCell::start(&self.spec, &self.options, cancel)?;
         Ok(kept.insert(cell).clone())
     }
 
-    /// Lets go of the cell: it ends once no thread has it any longer.
-    pub fn release(&self) {
-        *self.cell.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    /// Ends the cell, whoever has it yet.
+    pub fn close(&self) {
+        if let Some(cell) = self.cell.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            cell.close();
+        }
     }
 }

@@ -1,31 +1,21 @@
-//! What the threads of one driver's connection share, and what each message does to it.
+//! What the threads of one driver's connection share.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::mpsc::{SyncSender, TrySendError};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use handeye_core::geometry::arm::Arm;
 use handeye_core::progress::CancelToken;
 
-use super::chain;
-use super::clock::ClockOffset;
 use super::error::{DriverError, Ending};
-use super::log::LogLines;
-use super::message::{
-    Ability, AnswerMessage, DepthMessage, FromDriver, Hello, ImageMessage, LogLevel, LogMessage, PongMessage,
-    StateMessage, ToDriver,
-};
+pub use super::inner::{Burial, FrameRequest, Inner, Progress};
+use super::message::ToDriver;
 use super::options::DriverOptions;
-use super::states::{Reading, States};
-use super::wire::{Excerpt, Incoming, WireError, WireProblem};
+use super::wire::{Excerpt, Incoming, WireError};
 
 /// Lines that may wait for a driver which reads slowly.
 pub const QUEUE: usize = 64;
 /// Requests that may be open at a time; the workbench makes a handful.
 const MOST_REQUESTS: usize = 64;
-/// Unknown types of messages that are named in the log.
-const MOST_UNKNOWN: usize = 32;
 /// How often a cancel token is looked at.
 const POLL: Duration = Duration::from_millis(20);
 
@@ -38,109 +28,6 @@ pub enum Out {
     Ping(u64),
     /// The last message.
     Bye,
-}
-
-/// How far a request is.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Progress {
-    /// On its way.
-    Sent,
-    /// Nobody waits for it any longer.
-    Abandoned,
-    /// The motion has begun.
-    Accepted,
-    /// It is done.
-    Done,
-    /// The motion ended elsewhere, and why.
-    Stopped(String),
-    /// It is not begun, and why.
-    Refused(String),
-}
-
-/// How a driver ended once it was told to.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Burial {
-    /// The process ended by itself.
-    Ended {
-        /// In the words of the system.
-        status: String,
-        /// Whether its exit status is 0.
-        is_success: bool,
-    },
-    /// The process had to be killed.
-    Killed,
-    /// It closed its end of the connection.
-    Closed,
-    /// It did not close its end.
-    LeftOpen,
-}
-
-/// An image that is asked for, and what has come of it.
-#[derive(Debug)]
-pub struct FrameRequest {
-    pub id: u64,
-    pub after: Option<f64>,
-    pub depth_wanted: bool,
-    pub image: Option<(ImageMessage, Vec<u8>)>,
-    pub depth: Option<(DepthMessage, Vec<u8>)>,
-    pub refused: Option<String>,
-}
-
-impl FrameRequest {
-    /// Whether there is nothing more to wait for.
-    pub fn is_answered(&self) -> bool {
-        self.refused.is_some() || (self.image.is_some() && (self.depth.is_some() || !self.depth_wanted))
-    }
-}
-
-/// What has been read to its end.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct ReadUp {
-    /// What the driver sends.
-    pub output: bool,
-    /// Standard error.
-    pub errors: bool,
-}
-
-/// What a conformance run does otherwise than the workbench, to see what the driver does about that.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Trial {
-    /// No pings are sent.
-    pub is_quiet: bool,
-    /// The connection is closed without `bye`.
-    pub leaves_without_bye: bool,
-}
-
-/// The state of a connection.
-#[derive(Debug, Default)]
-pub struct Inner {
-    pub hello: Option<Arc<Hello>>,
-    pub arm: Option<Arc<Arm>>,
-    /// Why it is over.
-    pub ending: Option<Ending>,
-    pub read_up: ReadUp,
-    pub clock: ClockOffset,
-    /// Pings under way, with when they left.
-    pub pings: VecDeque<(u64, f64)>,
-    /// When the newest pong came, and its stamp.
-    pub last_pong: Option<(f64, f64)>,
-    /// How many pongs have come.
-    pub pongs: u64,
-    /// How many states have come.
-    pub state_count: u64,
-    /// When the last pong came, or the hello.
-    pub last_heard_s: f64,
-    pub states: States,
-    pub frame: Option<FrameRequest>,
-    pub requests: BTreeMap<u64, Progress>,
-    pub last_id: u64,
-    pub is_armed: bool,
-    pub is_moving: bool,
-    pub log: LogLines,
-    pub trial: Trial,
-    /// How the driver ended once the connection was over.
-    pub burial: Option<Burial>,
-    unknown: BTreeSet<String>,
 }
 
 /// A connection to one driver, as its threads and its users have it.
@@ -156,13 +43,7 @@ pub struct Shared {
 
 impl Shared {
     pub fn new(driver: String, options: DriverOptions, queue: SyncSender<Out>) -> Self {
-        Self {
-            driver,
-            options,
-            inner: Mutex::default(),
-            changed: Condvar::new(),
-            queue: Mutex::new(Some(queue)),
-        }
+        Self { driver, options, inner: Mutex::default(), changed: Condvar::new(), queue: Mutex::new(Some(queue)) }
     }
 
     pub fn now_s(&self) -> f64 {
@@ -223,6 +104,12 @@ impl Shared {
         waited.unwrap_or_else(PoisonError::into_inner).0.read_up.output
     }
 
+    /// Waits until the driver has ended, at most so long.
+    pub fn wait_for_burial(&self, patience: Duration) {
+        let waited = self.changed.wait_timeout_while(self.lock(), patience, |inner| inner.burial.is_none());
+        drop(waited.unwrap_or_else(PoisonError::into_inner));
+    }
+
     pub fn gone(&self, why: Ending) -> DriverError {
         DriverError::Gone { driver: self.driver.clone(), why }
     }
@@ -260,8 +147,7 @@ impl Shared {
         match self.enqueue(Out::Line(line)) {
             Ok(()) => Ok(()),
             Err(error) => {
-                let why =
-                    if matches!(error, TrySendError::Full(_)) { Ending::NotReading } else { Ending::ClosedHere };
+                let why = if matches!(error, TrySendError::Full(_)) { Ending::NotReading } else { Ending::ClosedHere };
                 self.finish(why.clone());
                 Err(self.gone(why))
             }
@@ -296,162 +182,5 @@ impl Shared {
         let Incoming { number, line, message, bytes } = incoming;
         let taken = self.update(|inner| inner.take(message, bytes, arrived_s));
         taken.map_err(|problem| WireError { number, excerpt: Excerpt::of(line.as_bytes()), problem })
-    }
-}
-
-fn misplaced(why: impl Into<String>) -> WireProblem {
-    WireProblem::Conversation(why.into())
-}
-
-impl Inner {
-    fn take(&mut self, message: FromDriver, bytes: Vec<u8>, arrived_s: f64) -> Result<(), WireProblem> {
-        let is_early = self.hello.is_none();
-        match message {
-            FromDriver::Hello(hello) => self.take_hello(*hello, arrived_s),
-            FromDriver::Log(LogMessage { level, text }) => {
-                self.log.add(level, false, &text);
-                Ok(())
-            }
-            FromDriver::Error(LogMessage { text, .. }) => {
-                self.log.add(LogLevel::Error, false, &text);
-                self.ending.get_or_insert(Ending::Said(text));
-                Ok(())
-            }
-            FromDriver::Unknown(kind) => {
-                if self.unknown.len() < MOST_UNKNOWN && !self.unknown.contains(&kind) {
-                    self.log.add(LogLevel::Debug, false, &format!("messages of type {kind} are not known and ignored"));
-                    self.unknown.insert(kind);
-                }
-                Ok(())
-            }
-            _ if is_early => Err(misplaced("only hello, log and error come before hello")),
-            FromDriver::Pong(pong) => self.take_pong(pong, arrived_s),
-            FromDriver::State(state) => self.take_state(&state),
-            FromDriver::Image(image) => self.take_image(image, bytes),
-            FromDriver::Depth(depth) => self.take_depth(depth, bytes),
-            FromDriver::Accepted(answer) => self.take_answer(answer, |_| Progress::Accepted),
-            FromDriver::Done(answer) => self.take_answer(answer, |_| Progress::Done),
-            FromDriver::Stopped(answer) => self.take_answer(answer, Progress::Stopped),
-            FromDriver::Refused(answer) => match &mut self.frame {
-                Some(frame) if frame.id == answer.id => {
-                    frame.refused = Some(answer.why);
-                    Ok(())
-                }
-                _ => self.take_answer(answer, Progress::Refused),
-            },
-        }
-    }
-
-    fn take_hello(&mut self, hello: Hello, arrived_s: f64) -> Result<(), WireProblem> {
-        if self.hello.is_some() {
-            return Err(misplaced("a second hello"));
-        }
-        self.arm = chain::arm_of(&hello).map_err(|why| misplaced(format!("arm: {why}")))?.map(Arc::new);
-        self.hello = Some(Arc::new(hello));
-        self.last_heard_s = arrived_s;
-        Ok(())
-    }
-
-    fn take_pong(&mut self, pong: PongMessage, arrived_s: f64) -> Result<(), WireProblem> {
-        let sent = self.pings.iter().position(|(id, _)| *id == pong.id);
-        let Some(position) = sent else {
-            return Err(misplaced(format!("id {} is of no ping that waits for an answer", pong.id)));
-        };
-        let (_, left_s) = self.pings[position];
-        // Those before it are answered late or never; their answers are then of no ping.
-        self.pings.drain(..=position);
-        self.clock.add(left_s, arrived_s, pong.stamp);
-        self.last_pong = Some((arrived_s, pong.stamp));
-        self.pongs += 1;
-        self.last_heard_s = arrived_s;
-        Ok(())
-    }
-
-    fn take_state(&mut self, state: &StateMessage) -> Result<(), WireProblem> {
-        let joints = self.can(Ability::Joints).map_or(0, |hello| hello.joints.len());
-        if self.can(Ability::State).is_none() {
-            return Err(misplaced("a state without `state` in `can`"));
-        }
-        let reading = Reading::of(state, joints, self.arm.as_deref())?;
-        self.states.add(reading)?;
-        self.state_count += 1;
-        Ok(())
-    }
-
-    fn can(&self, ability: Ability) -> Option<&Hello> {
-        self.hello.as_deref().filter(|hello| hello.can(ability))
-    }
-
-    fn take_image(&mut self, image: ImageMessage, bytes: Vec<u8>) -> Result<(), WireProblem> {
-        self.check_size(image.width, image.height)?;
-        let frame = self.frame.as_mut().filter(|frame| frame.id == image.id && frame.image.is_none());
-        let Some(frame) = frame else { return Err(misplaced(format!("id {} asks for no image", image.id))) };
-        if frame.after.is_some_and(|after| image.stamp <= after) {
-            return Err(misplaced(format!("stamp {} is not after {}", image.stamp, frame.after.unwrap_or_default())));
-        }
-        frame.image = Some((image, bytes));
-        Ok(())
-    }
-
-    fn take_depth(&mut self, depth: DepthMessage, bytes: Vec<u8>) -> Result<(), WireProblem> {
-        self.check_size(depth.width, depth.height)?;
-        let frame = self.frame.as_mut();
-        let frame = frame.filter(|frame| frame.id == depth.id && frame.depth_wanted && frame.depth.is_none());
-        let Some(frame) = frame else { return Err(misplaced(format!("id {} asks for no depth", depth.id))) };
-        frame.depth = Some((depth, bytes));
-        Ok(())
-    }
-
-    fn check_size(&self, width: u32, height: u32) -> Result<(), WireProblem> {
-        match self.hello.as_ref().and_then(|hello| hello.camera) {
-            Some(camera) if (camera.width, camera.height) == (width, height) => Ok(()),
-            Some(camera) => {
-                let said = format!("{}×{}", camera.width, camera.height);
-                Err(misplaced(format!("it is {width}×{height} and the camera of hello {said}")))
-            }
-            None => Err(misplaced("an image without `camera` in hello")),
-        }
-    }
-
-    fn take_answer(
-        &mut self,
-        AnswerMessage { id, why }: AnswerMessage,
-        progress: impl FnOnce(String) -> Progress,
-    ) -> Result<(), WireProblem> {
-        match self.requests.get_mut(&id) {
-            None => Err(misplaced(format!("id {id} is of no request that waits for an answer"))),
-            Some(Progress::Abandoned) => {
-                let progress = progress(why);
-                if progress != Progress::Accepted {
-                    self.requests.remove(&id);
-                }
-                Ok(())
-            }
-            Some(slot) => {
-                *slot = progress(why);
-                Ok(())
-            }
-        }
-    }
-
-    /// When the driver was last heard; `None` before its hello.
-    pub fn heard_s(&self) -> Option<f64> {
-        self.hello.as_ref().map(|_| self.last_heard_s)
-    }
-
-    /// Takes a finished request out; `None` while it is under way.
-    pub fn finished(&mut self, id: u64) -> Option<Progress> {
-        match self.requests.get(&id) {
-            None => Some(Progress::Abandoned),
-            Some(Progress::Done | Progress::Stopped(_) | Progress::Refused(_)) => self.requests.remove(&id),
-            Some(Progress::Sent | Progress::Accepted | Progress::Abandoned) => None,
-        }
-    }
-
-    /// Nobody waits for this one any longer.
-    pub fn abandon(&mut self, id: u64) {
-        if let Some(slot) = self.requests.get_mut(&id) {
-            *slot = Progress::Abandoned;
-        }
     }
 }

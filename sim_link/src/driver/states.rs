@@ -101,7 +101,12 @@ impl Reading {
             (None, None, Some(arm), Some(values)) => {
                 with_tool(arm.forward(values).map_err(|error| BadMessage::value("joints_rad", error))?)
             }
-            _ => return Err(BadMessage::value("state", "base_from_tip is missing, and nothing else says where the tip is")),
+            _ => {
+                return Err(BadMessage::value(
+                    "state",
+                    "base_from_tip is missing, and nothing else says where the tip is",
+                ));
+            }
         };
         Ok(Self { stamp_s: state.stamp, base_from_tip, joints: state.joints_rad, moving: state.moving })
     }

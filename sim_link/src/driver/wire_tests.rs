@@ -107,6 +107,9 @@ fn mutated(count: usize, seed: u64) {
     for _ in 0..count {
         let mut bytes = whole.clone();
         for _ in 0..rng.random_range(1..6) {
+            if bytes.is_empty() {
+                break;
+            }
             let at = rng.random_range(0..bytes.len());
             let structural = *b"{}[]\",:\n0129-+eE.\\u".get(rng.random_range(0..19)).unwrap();
             match rng.random_range(0..6) {

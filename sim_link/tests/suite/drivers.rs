@@ -111,7 +111,11 @@ fn a_motion_is_stopped_on_its_way_by_whoever_asks_for_it() {
             assert!(Instant::now() < until, "it does not begin to move");
             std::thread::yield_now();
         }
-        if by_another_thread { driver.stop().unwrap() } else { cancel.cancel() }
+        if by_another_thread {
+            driver.stop().unwrap()
+        } else {
+            cancel.cancel()
+        }
         assert_eq!(moving.join().unwrap().unwrap(), MoveEnd::Stopped("stop".to_owned()));
     }
 }
@@ -253,7 +257,8 @@ fn a_fake_cell_over_tcp_sees_its_board_and_goes_where_it_is_told_with_robot_and_
     let scene = Scene::reference().unwrap();
     let server = CellServer::start(CellConfig::new(scene.clone())).unwrap();
     let connect = Some(server.endpoint().parse().unwrap());
-    let part = |part, clock_s| FakeOptions { connect: connect.clone(), part, clock_s, ..FakeOptions::new(scene.clone()) };
+    let part =
+        |part, clock_s| FakeOptions { connect: connect.clone(), part, clock_s, ..FakeOptions::new(scene.clone()) };
     let (robot, robot_thread) = listening_fake(part(FakePart::Robot, 0.0), 1);
     let (camera, camera_thread) = listening_fake(part(FakePart::Camera, 500.0), 1);
     let cancel = CancelToken::default();
@@ -418,7 +423,8 @@ mod slow {
                         let is_still = allow_motion || !mark.exists();
                         let is_quick = began.elapsed() < Duration::from_secs(60);
                         if !(is_told && is_still && is_quick) {
-                            let what = format!("{fault} (still {is_still}, {:?}): wanted {says}\n{text}", began.elapsed());
+                            let what =
+                                format!("{fault} (still {is_still}, {:?}): wanted {says}\n{text}", began.elapsed());
                             failures.lock().unwrap().push(what);
                         }
                     }

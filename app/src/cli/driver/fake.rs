@@ -62,8 +62,9 @@ pub fn run(args: &FakeArgs) -> Result<(), Failure> {
 
 /// One workbench after the other, until the program is ended.
 fn listen(fake: &Fake, address: &str) -> Result<(), Failure> {
-    let listener = TcpListener::bind(address)
-        .map_err(|error| Failure::failed(anyhow::anyhow!("cannot listen at {address}: {error}; port 0 finds a free one")))?;
+    let listener = TcpListener::bind(address).map_err(|error| {
+        Failure::failed(anyhow::anyhow!("cannot listen at {address}: {error}; port 0 finds a free one"))
+    })?;
     let here = listener.local_addr().map_err(Failure::failed)?;
     if !here.ip().to_canonical().is_loopback() {
         out::note(format_args!(

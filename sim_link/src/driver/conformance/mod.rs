@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 
 use handeye_core::progress::CancelToken;
 
-use super::client::{Driver, move_message};
+use super::client::Driver;
 use super::error::{DriverError, Ending};
 use super::message::Ability;
+use super::motion::move_message;
 use super::options::DriverOptions;
 use super::shared::{Burial, Inner, Progress};
 use super::spec::DriverSpec;
@@ -33,7 +34,7 @@ pub struct ConformanceOptions {
 }
 
 /// A check, or how it failed.
-type Checked = fn(&Run<'_>) -> Result<Check, Check>;
+type Checked<'a> = fn(&Run<'a>) -> Result<Check, Check>;
 
 /// Runs all checks that the driver's abilities call for.
 ///
@@ -71,9 +72,9 @@ struct Run<'a> {
     cancel: &'a CancelToken,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
     fn all(&self, report: &mut Report) -> Result<(), ()> {
-        let checks: [(&'static str, Checked); 7] = [
+        let checks: [(&'static str, Checked<'a>); 7] = [
             ("hello", Self::hello),
             ("clock", Self::clock),
             ("states", Self::states),
@@ -88,7 +89,7 @@ impl Run<'_> {
                 report.add(skipped(name, "not tried"));
                 continue;
             }
-            let found = check(self).unwrap_or_else(|failure| failure);
+            let (Ok(found) | Err(found)) = check(self);
             report.add(found);
             // A connection that is over may have ended unnoticed by the check.
             if let Err(gone) = self.driver.check() {
@@ -138,12 +139,13 @@ impl Run<'_> {
         let line = "{\"type\":\"of_a_later_version\",\"with\":[1,{\"a\":null}],\"id\":0}\n".to_owned();
         gone(NAME, shared.send_line(line))?;
         let before = shared.lock().pongs;
-        let heard = shared.wait(self.options.driver.silence, Some(self.cancel), |inner| {
-            (inner.pongs > before + 1).then_some(())
-        });
+        let heard = shared
+            .wait(self.options.driver.silence, Some(self.cancel), |inner| (inner.pongs > before + 1).then_some(()));
         match heard {
             Ok(Some(())) => Ok(passed(NAME, "a message of an unknown type is ignored")),
-            Ok(None) => Err(wrong(NAME, "after a message of an unknown type no ping is answered: ignore what is not known")),
+            Ok(None) => {
+                Err(wrong(NAME, "after a message of an unknown type no ping is answered: ignore what is not known"))
+            }
             Err(error) => {
                 let found = failed(NAME, &error);
                 Err(Check { text: format!("after a message of an unknown type, {}", found.text), ..found })

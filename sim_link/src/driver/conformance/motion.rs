@@ -6,8 +6,8 @@ use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::super::client::{Goal, MoveEnd, move_message};
 use super::super::message::Ability;
+use super::super::motion::{Goal, MoveEnd, move_message};
 use super::super::shared::{Inner, Progress};
 use super::super::states::Reading;
 use super::{Check, Run, gone, passed, skipped, warning, wrong};
@@ -107,7 +107,9 @@ impl Run<'_> {
         match gone(name, self.driver.move_to(goal, SPEED, self.cancel))? {
             MoveEnd::Arrived => {}
             MoveEnd::Stopped(why) => return Err(wrong(name, format!("a motion was stopped that nobody ended: {why}"))),
-            MoveEnd::Refused(why) => return Err(wrong(name, format!("a motion of 0.2 rad or 2 cm was refused: {why}"))),
+            MoveEnd::Refused(why) => {
+                return Err(wrong(name, format!("a motion of 0.2 rad or 2 cm was refused: {why}")));
+            }
         }
         // The state that says so may be a moment behind.
         self.wait(name, Duration::from_millis(200))?;
@@ -184,7 +186,8 @@ impl Run<'_> {
         self.wait(name, Duration::from_millis(100))?;
         let crept = far(&self.here(name)?, &self.goal_here(&first));
         if crept > AT_REST {
-            let why = format!("{what} was answered, and the arm moves on: by {crept:.4} rad or m in a tenth of a second");
+            let why =
+                format!("{what} was answered, and the arm moves on: by {crept:.4} rad or m in a tenth of a second");
             return Err(wrong(name, why));
         }
         Ok(true)

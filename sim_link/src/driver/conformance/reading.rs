@@ -69,7 +69,10 @@ impl Run<'_> {
             return Err(wrong(NAME, format!("{rate_hz:.1} a second, at least 10 are needed, also at rest")));
         }
         if after_s <= before_s {
-            return Err(wrong(NAME, format!("all have the stamp {after_s}: each has the time at which it was measured")));
+            return Err(wrong(
+                NAME,
+                format!("all have the stamp {after_s}: each has the time at which it was measured"),
+            ));
         }
         let now = gone(NAME, self.driver.state())?;
         let Some(newest) = now else { return Err(wrong(NAME, "none has come")) };
@@ -89,7 +92,8 @@ impl Run<'_> {
             let (min, max) = (joint.min.unwrap_or(f64::NEG_INFINITY), joint.max.unwrap_or(f64::INFINITY));
             // Calibrated arms stand a little past their limits at the stops.
             if !(min - 0.01..=max + 0.01).contains(value) {
-                let why = format!("{} is at {value}, outside {min} to {max}: radians and metres are needed", joint.name);
+                let why =
+                    format!("{} is at {value}, outside {min} to {max}: radians and metres are needed", joint.name);
                 return Err(wrong(name, why));
             }
         }

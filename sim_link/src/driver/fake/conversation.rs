@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 use handeye_core::progress::CancelToken;
 use serde::Serialize;
 
-use super::super::client::Goal;
 use super::super::message::{
-    Ability, AnswerMessage, DepthEncoding, DepthMessage, ImageEncoding, ImageMessage, JointMessage, LogLevel, LogMessage, PongMessage,
-    PoseMessage, StateMessage, ToDriver,
+    Ability, AnswerMessage, DepthEncoding, DepthMessage, ImageEncoding, ImageMessage, JointMessage, LogLevel,
+    LogMessage, PongMessage, PoseMessage, StateMessage, ToDriver,
 };
+use super::super::motion::Goal;
 use super::super::wire::MAX_LINE;
 use super::{Fake, FakeError};
 use crate::client::cell::{Arm, Frame, MotionTolerance};
@@ -180,7 +180,9 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
                 let stamp = self.stamps().now_s();
                 self.send("pong", &PongMessage { id, stamp }, &[])
             }
-            ToDriver::NextImage { id, .. } if !self.can(Ability::Image) => self.answer("refused", id, "there is no camera"),
+            ToDriver::NextImage { id, .. } if !self.can(Ability::Image) => {
+                self.answer("refused", id, "there is no camera")
+            }
             ToDriver::NextImage { id, after, depth } => {
                 self.lock().wanted = Some(Wanted { id, after, depth });
                 self.changed.notify_all();
@@ -361,15 +363,11 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
     /// Motions, one at a time.
     fn go(&self) -> Result<(), FakeError> {
         let mut arm = self.fake.arm()?;
-        let mut ended = Ok(());
         while let Some(motion) = self.next(|asked| asked.motion.clone()) {
-            let (kind, why) = match drive(&mut arm, &motion) {
+            let driven = drive(&mut arm, &motion);
+            let (kind, why) = match &driven {
                 Ok(()) => ("done", String::new()),
                 Err(LinkError::Cancelled { .. }) => ("stopped", "it was stopped on its way".to_owned()),
-                Err(error) if error.is_connection_loss() => {
-                    ended = Err(error.into());
-                    ("stopped", "the cell is gone".to_owned())
-                }
                 Err(error) => ("stopped", error.to_string()),
             };
             let at_rest = {
@@ -381,8 +379,13 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
             for id in at_rest {
                 self.answer("done", id, "")?;
             }
-            ended?;
-            ended = Ok(());
+            let is_lost =
+                |error: &LinkError| error.is_connection_loss() && !matches!(error, LinkError::Cancelled { .. });
+            if let Err(error) = driven
+                && is_lost(&error)
+            {
+                return Err(error.into());
+            }
         }
         Ok(())
     }

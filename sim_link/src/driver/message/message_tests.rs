@@ -1,6 +1,8 @@
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+
 use super::*;
 
-const PAGE: &str = include_str!("../../../docs/drivers.md");
+const PAGE: &str = include_str!("../../../../docs/drivers.md");
 
 /// The messages of the page's conversation from one side, lines that are broken for the page put together again.
 fn messages(side: &str) -> Vec<String> {
@@ -41,19 +43,21 @@ fn every_message_of_the_page_is_one() {
 fn the_page_names_every_type_every_ability_and_every_limit() {
     let names = ["hello", "ping", "next_image", "arm", "move", "stop", "bye"];
     let names = names.into_iter().chain(["pong", "state", "image", "depth", "accepted", "done", "stopped", "refused"]);
-    let names = names.chain(["log", "error", "joints", "move_joints", "move_tip", "rgb8", "bgr8", "mono8", "jpeg", "png"]);
-    for name in names.chain(["u16_mm", "f32_m", "base_from_flange", "flange_from_tcp", "base_from_tip", "depth_limits_m"]) {
+    let names =
+        names.chain(["log", "error", "joints", "move_joints", "move_tip", "rgb8", "bgr8", "mono8", "jpeg", "png"]);
+    for name in
+        names.chain(["u16_mm", "f32_m", "base_from_flange", "flange_from_tcp", "base_from_tip", "depth_limits_m"])
+    {
         assert!(PAGE.contains(&format!("`{name}`")), "{name}");
     }
     for limit in ["65 536 bytes", "67 108 864", "10 to 500 times a second"] {
         assert!(PAGE.contains(limit), "{limit}");
     }
-    assert_eq!((super::super::wire::MAX_LINE, super::super::wire::MAX_BYTES), (65_536, 67_108_864));
+    assert_eq!((crate::driver::wire::MAX_LINE, crate::driver::wire::MAX_BYTES), (65_536, 67_108_864));
 }
 
 #[test]
 fn poses_go_over_the_wire_and_back() {
-    use handeye_core::geometry::frames::{Base, Tip};
     let pose = Pose::<Base, Tip>::from_translation_xyzw([0.1, -0.2, 0.3], [0.5, -0.5, 0.5, 0.5]);
     let back = PoseMessage::of(&pose).pose::<Base, Tip>("base_from_tip").unwrap();
     let (off_m, off_rad) = pose.distance_to(&back);

@@ -1,0 +1,243 @@
+//! The messages of the driver protocol, in both directions: `docs/drivers.md` describes them, this is their form in Rust.
+//!
+//! What a driver sends is checked here once, so that nothing behind this module sees a number that is none, a quaternion
+//! that is no rotation, or an encoding without a meaning.
+
+mod error;
+mod hello;
+mod images;
+mod robot;
+
+use handeye_core::geometry::arm::JointValues;
+use serde::{Deserialize, Serialize};
+
+pub use error::BadMessage;
+pub use hello::{Ability, ArmMessage, CameraMessage, Hello, JointMessage, LensMessage};
+pub use images::{DepthEncoding, DepthMessage, ImageEncoding, ImageMessage, MAX_IMAGE_SIDE};
+pub use robot::{PoseMessage, StateMessage};
+
+/// The version of the protocol that is spoken here.
+pub const PROTOCOL: u32 = 1;
+/// Longest text of the parser that is shown, in characters.
+const LONGEST_SAID: usize = 300;
+
+/// What the workbench sends.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum ToDriver {
+    /// The first message; answered by the driver's `hello`.
+    Hello {
+        /// [`PROTOCOL`].
+        protocol: u32,
+        /// Version of the workbench.
+        workbench: String,
+    },
+    /// Answered by `pong` at once; five times a second.
+    Ping {
+        /// Number of this ping.
+        id: u64,
+    },
+    /// Answered by `image`, and by `depth` where that is wanted, as soon as there is an image newer than `after`.
+    NextImage {
+        /// Number of this request.
+        id: u64,
+        /// Stamp of the newest image that the workbench has; `None` for any.
+        #[serde(default)]
+        after: Option<f64>,
+        /// Whether the depth image of the same instant is wanted too.
+        #[serde(default)]
+        depth: bool,
+    },
+    /// Allows or forbids motion; answered by `done` or `refused`.
+    Arm {
+        /// Number of this request.
+        id: u64,
+        /// Whether the driver may move the arm from now on.
+        on: bool,
+    },
+    /// Answered by `accepted` and then `done` or `stopped`, or by `refused`.
+    Move {
+        /// Number of this request.
+        id: u64,
+        /// Where to, as joint values; one of the two is given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        joints_rad: Option<JointValues>,
+        /// Where to, as a pose of the tip.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        base_from_tip: Option<PoseMessage>,
+        /// Share of the highest speed, over 0 and up to 1.
+        speed: f64,
+    },
+    /// Brings the arm to rest; answered by `done` once it is.
+    Stop {
+        /// Number of this request.
+        id: u64,
+    },
+    /// The last message: the driver brings the arm to rest and ends.
+    Bye {},
+}
+
+impl ToDriver {
+    /// The line, with its end.
+    pub fn line(&self) -> String {
+        // Structs of strings and finite numbers: JSON has a form for each.
+        let mut line = serde_json::to_string(self).unwrap_or_default();
+        line.push('\n');
+        line
+    }
+}
+/// Answers a ping.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PongMessage {
+    /// Of the ping.
+    pub id: u64,
+    /// The driver's clock while it answers, seconds.
+    pub stamp: f64,
+}
+
+/// Answers a request by its number.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AnswerMessage {
+    /// Of the request.
+    pub id: u64,
+    /// Why, for people; with `refused` and `stopped`.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub why: String,
+}
+
+/// How much a log line matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LogLevel {
+    /// For the driver's author.
+    Debug,
+    /// Good to know.
+    Info,
+    /// Something does not work as it should.
+    #[serde(alias = "warning")]
+    Warn,
+    /// Something does not work.
+    Error,
+}
+
+/// A line for the log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LogMessage {
+    /// How much it matters.
+    #[serde(default = "info")]
+    pub level: LogLevel,
+    /// What to show.
+    pub text: String,
+}
+
+fn info() -> LogLevel {
+    LogLevel::Info
+}
+
+/// What a driver sends. Bytes that follow a line are with whoever read them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FromDriver {
+    /// Answers `hello`.
+    Hello(Box<Hello>),
+    /// Answers `ping`.
+    Pong(PongMessage),
+    /// Where the robot is; sent by itself.
+    State(Box<StateMessage>),
+    /// Answers `next_image`.
+    Image(ImageMessage),
+    /// Answers `next_image` with `depth`.
+    Depth(DepthMessage),
+    /// A motion begins.
+    Accepted(AnswerMessage),
+    /// What was asked for is done; after `move` and `stop` the arm is at rest.
+    Done(AnswerMessage),
+    /// A motion ended before its goal; the arm is at rest.
+    Stopped(AnswerMessage),
+    /// What was asked for is not begun.
+    Refused(AnswerMessage),
+    /// For the log.
+    Log(LogMessage),
+    /// The driver cannot go on and ends.
+    Error(LogMessage),
+    /// A type that this version does not know: ignored.
+    Unknown(String),
+}
+
+/// What every message has.
+#[derive(Debug, Deserialize)]
+struct Header {
+    #[serde(rename = "type")]
+    kind: String,
+    #[serde(default)]
+    bytes: u64,
+}
+
+impl FromDriver {
+    /// Reads one line, with or without its end. Gives the message and the number of bytes that follow it.
+    ///
+    /// # Errors
+    /// [`BadMessage`] says what is wrong with it.
+    pub fn parse(line: &str) -> Result<(Self, u64), BadMessage> {
+        // An array can be read as a struct too, and is none here.
+        if !line.trim_start().starts_with('{') {
+            return Err(if line.trim().is_empty() { BadMessage::Empty } else { BadMessage::Chatter });
+        }
+        let header: Header = serde_json::from_str(line).map_err(|error| not_a_message(line, &error))?;
+        let kind = header.kind.as_str();
+        let message = match kind {
+            "hello" => Self::Hello(Box::new(body(kind, line)?)),
+            "pong" => Self::Pong(body(kind, line)?),
+            "state" => Self::State(Box::new(body(kind, line)?)),
+            "image" => Self::Image(body(kind, line)?),
+            "depth" => Self::Depth(body(kind, line)?),
+            "accepted" => Self::Accepted(body(kind, line)?),
+            "done" => Self::Done(body(kind, line)?),
+            "stopped" => Self::Stopped(body(kind, line)?),
+            "refused" => Self::Refused(body(kind, line)?),
+            "log" => Self::Log(body(kind, line)?),
+            "error" => Self::Error(body(kind, line)?),
+            _ => Self::Unknown(header.kind),
+        };
+        message.check()?;
+        let takes_bytes = matches!(message, Self::Image(_) | Self::Depth(_) | Self::Unknown(_));
+        if header.bytes > 0 && !takes_bytes {
+            return Err(BadMessage::value("bytes", "only image and depth are followed by bytes"));
+        }
+        Ok((message, header.bytes))
+    }
+
+    fn check(&self) -> Result<(), BadMessage> {
+        match self {
+            Self::Hello(hello) => hello.check(),
+            Self::Image(image) => image.check(),
+            Self::Depth(depth) => depth.check(),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn body<'a, T: Deserialize<'a>>(kind: &str, line: &'a str) -> Result<T, BadMessage> {
+    serde_json::from_str(line).map_err(|error| BadMessage::Field { kind: kind.to_owned(), why: said(&error) })
+}
+
+/// What the parser says, which may repeat what a driver has sent: on one line, and in its beginning.
+fn said(error: &serde_json::Error) -> String {
+    let one_line = |c: char| if c.is_control() { ' ' } else { c };
+    error.to_string().chars().map(one_line).take(LONGEST_SAID).collect()
+}
+
+fn not_a_message(line: &str, error: &serde_json::Error) -> BadMessage {
+    if error.is_data() {
+        BadMessage::Field { kind: "message".to_owned(), why: said(error) }
+    } else if line.contains("NaN") || line.contains("Infinity") {
+        // What Python writes for numbers that are none.
+        BadMessage::NotJson { why: format!("{}: JSON has no NaN and no Infinity, leave the field out", said(error)) }
+    } else {
+        BadMessage::NotJson { why: said(error) }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[path = "message_tests.rs"]
+mod tests;
