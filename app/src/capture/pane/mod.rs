@@ -56,11 +56,17 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
     ui.advance_cursor_after_rect(room);
     ui.scope_builder(egui::UiBuilder::new().max_rect(above), |ui| {
         if table.rows.is_empty() {
-            let detail = tr!(
+            let by_hand = tr!(
+                language,
+                "With the whole board in the image, Guide me says how to move the robot. Or press Space at ten poses with the board \
+                 tilted and turned to all sides."
+            );
+            let by_itself = tr!(
                 language,
                 "With the whole board in the image, Calibrate for me moves the arm from pose to pose, and Guide me says how \
                  to move it yourself. Or press Space at ten poses with the board tilted and turned to all sides."
             );
+            let detail = if model.moves() == Moves::Freely { by_itself } else { by_hand };
             marks::nothing_yet_ui(ui, tr!(language, "No captures yet"), detail);
         } else {
             table::table_ui(ui, model, &table, row, thumbnails, outbox);

@@ -63,9 +63,14 @@ pub fn drivers_ui(ui: &mut Ui, model: &Model, freehand: bool, draft: &mut Draft)
     is_whole.then_some(CellSource::Drivers(drivers))
 }
 
-/// Those that were used before, newest first, of this kind.
+/// Those that are used and were used before, newest first, of this kind.
 fn known(model: &Model, freehand: bool) -> Vec<Drivers> {
-    model.drivers.iter().filter(|drivers| drivers.robot.is_none() == freehand).cloned().collect()
+    let now = match &model.source {
+        CellSource::Drivers(drivers) => Some(drivers),
+        CellSource::BuiltIn | CellSource::Address(_) => None,
+    };
+    let earlier = model.drivers.iter().filter(|drivers| Some(*drivers) != now);
+    now.into_iter().chain(earlier).filter(|drivers| drivers.robot.is_none() == freehand).cloned().collect()
 }
 
 fn field_ui(ui: &mut Ui, name: &str, label: &str, hint: &str, value: &mut String) {

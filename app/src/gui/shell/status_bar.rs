@@ -10,7 +10,7 @@ use crate::gui::style::numbers;
 use crate::gui::style::theme::{CAPTION, Palette};
 use crate::guided;
 use crate::live::pane::waiting;
-use crate::model::{FollowStatus, Model, Motion, RobotState, RotationFormat, Severity};
+use crate::model::{CellSource, FollowStatus, Model, Motion, RobotState, RotationFormat, Severity};
 use crate::text::Text;
 use crate::{text, tr};
 
@@ -50,7 +50,11 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         );
         field_ui(
             ui,
-            tr!(language, "Simulation"),
+            if matches!(model.source, CellSource::Drivers(_)) {
+                tr!(language, "Time")
+            } else {
+                tr!(language, "Simulation")
+            },
             &text(|robot| format!("{:.2} s", robot.sim_time_s)),
             "8888.88 s",
             colour,

@@ -130,7 +130,11 @@ fn views_are_planned_for_the_arm_and_the_board_of_a_cell_that_is_connected_to() 
         let cell = CellProcess::start(&[&["--fast", "--scene", scene.to_str().expect("UTF-8")], only].concat());
         let address = format!("tcp://127.0.0.1:{}", cell.port());
         let result = auto(folder.path(), &["--poses", "auto", "--connect", &address]);
-        assert!(result.views.iter().filter(|view| view.status == ViewRecordStatus::Used).count() >= 15, "{:?}", result.views);
+        assert!(
+            result.views.iter().filter(|view| view.status == ViewRecordStatus::Used).count() >= 15,
+            "{:?}",
+            result.views
+        );
     }
 }
 

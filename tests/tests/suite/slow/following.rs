@@ -268,7 +268,10 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
         cell.paced(false);
         bench.until("the end of following", |model| matches!(model.track.follow, FollowStatus::Ended(_)));
         assert!(fastest_rad_s <= limits.joint_speed_rad_s * 1.001, "trial {trial}: {fastest_rad_s} rad/s");
-        assert!(limits.workspace.contains(&before.base_from_tip.expect("a cell reports it").translation()), "trial {trial}: outside its box");
+        assert!(
+            limits.workspace.contains(&before.base_from_tip.expect("a cell reports it").translation()),
+            "trial {trial}: outside its box"
+        );
         bench.click(Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: 0.1 }));
         bench.click(Command::HideBoard(false));
         bench.click(Command::GoToCapture(FIRST));
