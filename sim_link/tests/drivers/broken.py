@@ -177,8 +177,8 @@ def hello():
     elif fault == "floods standard error":
         threading.Thread(target=lambda: [os.write(2, b"x" * 100_000) for _ in range(1000)], daemon=True).start()
     elif fault == "floods log":
-        for i in range(20_000):
-            send({"type": "log", "text": f"{i} " + "y" * 1000})
+        lines = ({"type": "log", "text": f"{i} " + "y" * 1000} for i in range(10_000))
+        threading.Thread(target=lambda: [send(line) for line in lines], daemon=True).start()
     elif fault == "does not read":
         time.sleep(3600)
 

@@ -18,6 +18,7 @@ use super::motion::move_message;
 use super::options::DriverOptions;
 use super::shared::{Burial, Inner, Progress};
 use super::spec::DriverSpec;
+use super::wire::Excerpt;
 
 pub use report::{Check, Outcome, Report};
 
@@ -53,7 +54,8 @@ pub fn run(spec: &DriverSpec, options: &ConformanceOptions, cancel: &CancelToken
     let run = Run { driver: &driver, options, cancel };
     let ended = run.all(&mut report);
     let log = driver.take_log();
-    report.log.extend(log.iter().rev().take(LOG_LINES).rev().map(|line| line.text.clone()));
+    let last = log.iter().rev().take(LOG_LINES).rev();
+    report.log.extend(last.map(|line| Excerpt::of(line.text.as_bytes()).to_string()));
     if ended.is_ok() {
         let closed = closed_without_farewell(driver, &options.driver);
         let is_fine = closed.outcome != Outcome::Failed;
