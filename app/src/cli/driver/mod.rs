@@ -11,7 +11,7 @@ use handeye_sim_link::drivers::{self, Device};
 
 use super::Failure;
 
-pub const EXAMPLES: &str = "Examples:
+pub const EXAMPLES: &str = "Example:
   handeye driver test \"python3 assets/drivers/template.py\" --allow-motion
   handeye driver test tcp://192.168.0.7:7000
   handeye driver fake --listen 127.0.0.1:7000";
