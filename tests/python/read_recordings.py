@@ -91,7 +91,8 @@ def visp(folder):
     out = {}
     for file in folder.glob("franka_pose_rPe_*.yaml"):
         v = np.array(yaml.safe_load(file.read_text())["data"]).ravel()
-        out[f"franka_image-{re.search(r'(\d+)', file.stem).group(1)}.png"] = pose(v[:3], of_vector(v[3:]))
+        number = re.search(r"(\d+)", file.stem).group(1)
+        out[f"franka_image-{number}.png"] = pose(v[:3], of_vector(v[3:]))
     return out, None
 
 

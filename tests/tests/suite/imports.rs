@@ -27,7 +27,7 @@ struct Sample {
 
 const HAND: &str = "mode=eye_in_hand";
 
-const SAMPLES: [Sample; 8] = [
+const SAMPLES: [Sample; 7] = [
     Sample {
         kind: "table",
         files: &["importers/table_eye_in_hand"],
@@ -80,13 +80,6 @@ const SAMPLES: [Sample; 8] = [
         files: &["visp_franka_eye_in_hand"],
         arguments: &[],
         first: &[("mode", "eye_in_hand"), ("pose", "base_from_tip"), ("rotation", "rotation_vector")],
-        views: 8,
-    },
-    Sample {
-        kind: "visp",
-        files: &["visp_franka_eye_to_hand"],
-        arguments: &[],
-        first: &[("mode", "eye_to_hand"), ("pose", "base_from_tip")],
         views: 8,
     },
     Sample {

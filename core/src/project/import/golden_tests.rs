@@ -93,7 +93,6 @@ fn samples() -> Vec<Sample> {
             &[("mode", "eye_in_hand"), ("pose", "base_from_tip"), ("rotation", "rotation_vector")],
             10.0,
         ),
-        decided(&["visp_franka_eye_to_hand"], None, &[], &[("mode", "eye_to_hand"), ("pose", "base_from_tip")], 10.0),
         decided(
             &["caliban_no_curv/images", "caliban_no_curv/robot_cali.txt"],
             board(14, 9, 0.0121),

@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn json_and_yaml_give_the_same_tree() {
-        let text = r#"{"pose": [0.1, -2e-3, 3], "name": "a.png", "nested": {"q": [[1, 0], [0, 1]]}}"#;
+        let text = r#"{"name": "a.png", "nested": {"q": [[1, 0], [0, 1]]}, "pose": [0.1, -2e-3, 3]}"#;
         assert_eq!(yaml(text).expect("read"), [json(text).expect("read")]);
     }
 }

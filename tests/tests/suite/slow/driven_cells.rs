@@ -10,7 +10,7 @@ use handeye_core::geometry::frames::{Camera, Pose, Tip};
 use handeye_core::project::taught_poses::Goal;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{Arm, CellPaths, SettleOptions};
+use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint};
 use handeye_tests::handeye_binary;
 use handeye_tests::workbench::Workbench;
@@ -81,8 +81,9 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     let killed = Program::new("pkill").args(["-KILL", "-f", "--", &robots]).status();
     assert!(killed.expect("pkill runs").success());
     bench.until("the end of the sequence", |model| !model.sequence_runs && model.capture.is_none());
-    bench.until("the robot again", |model| is_connected(model) && model.mover.is_connected() && model.robot.is_some());
-    assert!(!bench.model().is_armed(), "a new connection begins read-only");
+    bench.until("the robot again, which is only read", |model| {
+        is_connected(model) && model.mover.is_connected() && model.robot.is_some() && !model.is_armed()
+    });
     bench.click(Command::Arm(true));
     bench.until("the permission", Model::is_armed);
     bench.click(Command::ContinueSequence);
@@ -107,9 +108,9 @@ fn a_robot_that_is_moved_by_hand_is_calibrated_with_poses_that_are_typed() {
     let mut hand = arm(&endpoint);
     let cancel = CancelToken::default();
     for (number, pose) in taught.iter().enumerate().take(8) {
-        let Goal::Joints(joints) = &pose.goal else { panic!("the reference poses are joints") };
-        let limits = limits::of_joints(&limits::SEQUENCE, 1.0, hand.info().joint_kinds());
-        hand.move_to_joints(joints, &limits, &cancel).expect("it is moved");
+        let Goal::Tip(goal) = &pose.goal else { panic!("the reference poses are poses of the tip") };
+        let limits = limits::of_tip(&limits::SEQUENCE, 1.0);
+        hand.move_to_pose(goal, &limits, &MotionTolerance::default(), &cancel).expect("it is moved");
         hand.settle(&SettleOptions::default(), &cancel).expect("it stands");
         bench.click(Command::TypePose(hand.base_from_tip().expect("the pendant shows it")));
         bench.until("the typed pose", |model| model.robot.is_some());

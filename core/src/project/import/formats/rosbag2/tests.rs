@@ -78,8 +78,8 @@ pub(in crate::project::import) fn bag(poses: &[Isometry3<f64>]) -> Vec<u8> {
                     &Message::default().u32(1).header(time, "base_link").text("link6").transform(&link6).done(),
                 );
                 let mut pixels = vec![0u8; 16 * 12];
-                // A moving image is of no view.
-                pixels[0] = if step <= 20 { view as u8 } else { 255 };
+                // A moving image is of no view; after the last pose nothing moves.
+                pixels[0] = if step <= 20 || view + 1 == poses.len() { view as u8 } else { 255 };
                 let mut image =
                     Message::default().header(time, "camera").u32(12).u32(16).text("mono8").number([0u8]).u32(16);
                 image = image.u32(pixels.len() as u32);
