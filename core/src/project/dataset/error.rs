@@ -53,9 +53,7 @@ pub enum DatasetProblem {
     #[error("cannot be read: {0}")]
     Unreadable(String),
     /// The folder has no description.
-    #[error(
-        "has no dataset.toml: name a dataset folder or a session folder, or make one of a recording with `handeye import`"
-    )]
+    #[error("has no dataset.toml: name a dataset folder or a session folder")]
     NotADataset,
     /// Not text.
     #[error("is not UTF-8 text: save it as UTF-8")]
