@@ -111,6 +111,7 @@ impl RtdeRobot {
     }
 
     /// On port 30004 of an address of the loopback interface where it is free, for clients that know no other port.
+    #[expect(clippy::needless_pass_by_value, reason = "the server keeps it")]
     pub fn start_on_its_own_port(script: RtdeScript) -> std::io::Result<Self> {
         let mut last = None;
         for host in 2..=254 {

@@ -168,6 +168,7 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
         }
     }
 
+    #[expect(clippy::needless_pass_by_value, reason = "a message is used up")]
     fn obey(&self, message: ToDriver) -> Result<(), FakeError> {
         match message {
             ToDriver::Hello { .. } => {

@@ -99,6 +99,7 @@ impl Fake {
     ///
     /// # Errors
     /// [`FakeError`].
+    #[expect(clippy::single_match_else, reason = "two ways to a cell, of the same weight")]
     pub fn start(options: FakeOptions) -> Result<Self, FakeError> {
         let FakeOptions { mut scene, seed, connect, part, clock_s } = options;
         let (server, endpoint, paths) = match connect {

@@ -50,6 +50,7 @@ impl Folder {
     }
 
     /// The newest of the captures that are there already, with how many there are.
+    #[expect(clippy::unused_self, reason = "beside what asks for it")]
     fn newest(&self, watch: &mut Watch, outlet: &Outlet) -> Result<(Option<Capture>, usize), Fault> {
         let start = Instant::now();
         let mut newest: Option<Capture> = None;

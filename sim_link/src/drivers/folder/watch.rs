@@ -110,7 +110,7 @@ impl Watch {
         let mut names = Vec::new();
         for entry in std::fs::read_dir(&self.folder).map_err(fault)? {
             let path = entry.map_err(fault)?.path();
-            let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+            let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
             let is_image = ending.is_some_and(|ending| ENDINGS.iter().any(|known| ending == *known));
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             if !is_image || self.taken.contains(&name) {
@@ -222,6 +222,7 @@ struct NotRead {
 }
 
 /// Size and bytes of an image that is whole. PNG and JPEG stay as they are.
+#[expect(clippy::type_complexity, reason = "size, encoding and bytes")]
 fn read_image(path: &Path) -> Result<((u32, u32), ImageEncoding, Vec<u8>), NotRead> {
     let fail = |text: String| NotRead { text, is_incomplete: true };
     let image: RgbImage = image_file::load_rgb(path).map_err(|error| fail(error.to_string()))?;
