@@ -234,6 +234,7 @@ fn outcome_of_following(end: FollowEnd) -> MotionOutcome {
 }
 
 /// Why the arm came to rest.
+#[expect(clippy::needless_pass_by_value, reason = "it is used up")]
 pub fn end_of_following(end: FollowEnd) -> Text {
     match end {
         FollowEnd::Released => text!("it was released"),

@@ -26,6 +26,7 @@ pub enum Failure {
 
 impl Failure {
     /// What was given is at fault.
+    #[expect(clippy::needless_pass_by_value, reason = "it is used up")]
     pub fn input(error: impl ToString) -> Self {
         Self::Input(error.to_string())
     }

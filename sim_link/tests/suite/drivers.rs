@@ -112,9 +112,9 @@ fn a_motion_is_stopped_on_its_way_by_whoever_asks_for_it() {
             std::thread::yield_now();
         }
         if by_another_thread {
-            driver.stop().unwrap()
+            driver.stop().unwrap();
         } else {
-            cancel.cancel()
+            cancel.cancel();
         }
         assert_eq!(moving.join().unwrap().unwrap(), MoveEnd::Stopped("stop".to_owned()));
     }
@@ -421,7 +421,7 @@ mod slow {
                         let text = report.text();
                         let is_told = !report.passed && text.contains(says);
                         let is_still = allow_motion || !mark.exists();
-                        let is_quick = began.elapsed() < Duration::from_secs(60);
+                        let is_quick = began.elapsed() < Duration::from_mins(1);
                         if !(is_told && is_still && is_quick) {
                             let what =
                                 format!("{fault} (still {is_still}, {:?}): wanted {says}\n{text}", began.elapsed());

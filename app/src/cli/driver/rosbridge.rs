@@ -91,6 +91,7 @@ fn joint(joint: &Joint) -> JointMessage {
     JointMessage { name: joint.name.clone(), kind: joint.kind, min, max }
 }
 
+#[expect(clippy::ptr_arg, reason = "as an iterator over names has it")]
 fn revolute(name: &String) -> JointMessage {
     JointMessage { name: name.clone(), kind: JointKind::Revolute, min: None, max: None }
 }

@@ -58,7 +58,7 @@ impl CameraPort for DriverCamera {
     fn depth_limits_m(&self) -> [f32; 2] {
         let camera = self.cell.camera().filter(|camera| camera.hello().can(Ability::Depth));
         let limits = camera.and_then(|camera| camera.hello().depth_limits_m);
-        limits.map_or(USUAL_DEPTHS_M, |limits| limits.map(|limit| limit as f32))
+        limits.unwrap_or(USUAL_DEPTHS_M)
     }
 }
 

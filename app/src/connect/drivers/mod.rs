@@ -116,6 +116,7 @@ fn spec(drivers: &Drivers) -> Result<DriverCellSpec, BadSpec> {
 }
 
 /// What an error of a driver means for a connection.
+#[expect(clippy::needless_pass_by_value, reason = "it is used up")]
 fn port_error(error: DriverError) -> PortError {
     let text = Text::verbatim(error.to_string());
     match error {

@@ -67,7 +67,7 @@ fn both_clients_read_the_same(version: RosVersion, name: &str, fragment_size: Op
 }
 
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
 }
 
 #[test]

@@ -143,7 +143,12 @@ fn what_is_wrong_with_the_controller_is_said_with_what_to_do() {
             "no output actual_TCP_speed, robot_mode",
             robot(|script| script.outputs.retain(|name, _| !["actual_TCP_speed", "robot_mode"].contains(name))),
         ),
-        ("of the types", robot(|script| drop(script.outputs.insert("robot_mode", Output::Double(7.0))))),
+        (
+            "of the types",
+            robot(|script| {
+                script.outputs.insert("robot_mode", Output::Double(7.0));
+            }),
+        ),
         ("sent nothing for 2.0 s", robot(|script| script.silent_after = Some(60))),
         ("closed the connection", robot(|script| script.closes_after = Some(60))),
         ("this is not RTDE", robot(|script| script.garbage = Some(b"\0\x01SSH-2.0".to_vec()))),
@@ -165,7 +170,9 @@ fn a_controller_that_is_not_there_is_named_with_its_port() {
 
 #[test]
 fn an_arm_that_is_switched_off_has_no_pose_until_it_is_switched_on() {
-    let robot = robot(|script| drop(script.outputs.insert("robot_mode", Output::Int(3))));
+    let robot = robot(|script| {
+        script.outputs.insert("robot_mode", Output::Int(3));
+    });
     let mut talk = Talk::start(device(&robot));
     talk.hello();
     talk.wait(|message, _| match message {
