@@ -73,9 +73,8 @@ impl Lens {
 }
 
 fn model(name: &str) -> Result<Distortion, Failure> {
-    Distortion::from_name(name).ok_or_else(|| {
-        Failure::Input(format!("{name:?} is no lens model: none, brown_conrady, rational or fisheye"))
-    })
+    Distortion::from_name(name)
+        .ok_or_else(|| Failure::Input(format!("{name:?} is no lens model: none, brown_conrady, rational or fisheye")))
 }
 
 /// What a calibration is made from.
@@ -172,13 +171,20 @@ fn view_corners(
     let mut corners = Vec::with_capacity(pixels.len());
     for (number, [u, v]) in numbers.into_iter().zip(pixels) {
         let index = usize::try_from(number).ok().filter(|index| *index < all).ok_or_else(|| {
-            format!("corner {number} is not on the target, whose {} × {} points are 0 to {}", grid.columns, grid.rows, all - 1)
+            format!(
+                "corner {number} is not on the target, whose {} × {} points are 0 to {}",
+                grid.columns,
+                grid.rows,
+                all - 1
+            )
         })?;
         if !seen.insert(index) {
             return Err(format!("corner {index} is there twice"));
         }
         if !(u.is_finite() && v.is_finite()) {
-            return Err(format!("corner {index} is not finite: leave it out, and with corner_ids say which the others are"));
+            return Err(format!(
+                "corner {index} is not finite: leave it out, and with corner_ids say which the others are"
+            ));
         }
         if !(is_inside(*u, width) && is_inside(*v, height)) {
             return Err(format!("corner {index} at {u}, {v} is outside of the image of {width} × {height} pixels"));

@@ -20,7 +20,7 @@ mod _handeye {
     #[pymodule_export]
     use crate::answer::{calibrate, diagnose};
     #[pymodule_export]
-    use crate::closed_form::closed_form;
+    use crate::closed_form::by_name;
     #[pymodule_export]
     use crate::folder::read_folder;
     #[pymodule_export]
