@@ -127,7 +127,13 @@ def corners_give_the_answer_with_its_uncertainty(rng):
                                mode="eye_in_hand", progress=lambda stage, part: told.append((stage, part)))
     millimetres, degrees = simulated.error(result.tip_from_camera)
     assert millimetres < 1.0 and degrees < 0.1, (millimetres, degrees)
-    assert 0.02 < result.tip_error_95_mm < 2.0, result.tip_error_95_mm
+    # Where the board was seen the answer is off by less than it says; with the lens known it says less.
+    point = np.array([*result.document["estimate"]["reference_point_m"], 1.0])
+    off_mm = 1e3 * np.linalg.norm((result.tip_from_camera - TIP_FROM_CAMERA) @ point)
+    assert off_mm < result.tip_error_95_mm, (off_mm, result.tip_error_95_mm)
+    known = handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, intrinsics=LENS,
+                              mode="eye_in_hand")
+    assert 0 < known.tip_error_95_mm < result.tip_error_95_mm
     for covariance in (result.hand_eye_covariance, result.target_covariance):
         assert covariance.shape == (6, 6)
         near(covariance, covariance.T, 1e-15)
@@ -236,7 +242,7 @@ def bad_input_is_an_exception_that_says_what_to_do(rng):
     bad(["base_from_tip is missing"], base_from_tip=None)
     bad(["keep corners"], camera_from_target=s.camera_from_target)
     bad(["same name"], names=["a"] * 8)
-    bad(["no method 'tsai'", "tsai_lenz"], method="tsai")
+    bad(['no method "tsai"', "tsai_lenz"], method="tsai")
     bad(["grid"], target=rng.normal(size=(70, 3)))
     bad(["leave that option out"], corners=None, target=None, image_size=None, camera_from_target=s.camera_from_target,
         joint_offsets=True)
@@ -380,7 +386,7 @@ def the_document_is_what_the_schema_says(rng):
 
 @check
 def other_threads_run_while_it_computes_and_ctrl_c_ends_it(rng):
-    s = session(rng, 120, 0.1, 0.1, 0.02)
+    s = session(rng, 60, 0.1, 0.1, 0.02)
     arguments = dict(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, image_size=SIZE, mode="eye_in_hand")
     began = time.monotonic()
     handeye.calibrate(**arguments)

@@ -4,6 +4,8 @@
 //! become the documents that the command line writes. Arrays cross as bytes of doubles in the order of C, small things as
 //! JSON.
 
+#![expect(clippy::needless_pass_by_value, reason = "functions that Python calls own what they take")]
+
 mod answer;
 mod background;
 mod closed_form;

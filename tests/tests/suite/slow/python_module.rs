@@ -27,9 +27,7 @@ fn installed(python: &Path) -> TempDir {
         .arg("--target-dir")
         .arg(target)
         .arg("--out")
-        .arg(wheels.path())
-        // As the workspace was built: other flags would compile every crate again.
-        .env("CARGO", env!("CARGO")));
+        .arg(wheels.path()));
     let found: Vec<PathBuf> = std::fs::read_dir(wheels.path()).expect("a folder").flatten().map(|e| e.path()).collect();
     let [wheel] = found.as_slice() else { panic!("one wheel was to be built: {found:?}") };
     let name = wheel.file_name().and_then(|name| name.to_str()).expect("a name");
@@ -64,7 +62,7 @@ fn python_gets_what_opencv_the_command_line_and_the_truth_say() {
     let Some(text) = script("handeye_module.py", &[&handeye_binary(), &schema, folder.path()]) else { return };
     println!("{text}");
     // A line for each check.
-    assert_eq!(text.lines().count(), 15, "{text}");
+    assert_eq!(text.lines().count(), 14, "{text}");
 }
 
 #[test]
