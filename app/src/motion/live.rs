@@ -229,13 +229,12 @@ fn no_views(why: &PlanError) -> Text {
 fn outcome_of_following(end: FollowEnd) -> MotionOutcome {
     match end {
         FollowEnd::Released | FollowEnd::Stopped => MotionOutcome::Stopped,
-        obstacle => MotionOutcome::Failed(end_of_following(obstacle)),
+        obstacle => MotionOutcome::Failed(end_of_following(&obstacle)),
     }
 }
 
 /// Why the arm came to rest.
-#[expect(clippy::needless_pass_by_value, reason = "it is used up")]
-pub fn end_of_following(end: FollowEnd) -> Text {
+pub fn end_of_following(end: &FollowEnd) -> Text {
     match end {
         FollowEnd::Released => text!("it was released"),
         FollowEnd::Stopped => text!("The arm was stopped"),
@@ -247,7 +246,7 @@ pub fn end_of_following(end: FollowEnd) -> Text {
                  Jog it to where it has more room and start again"
             )
         }
-        FollowEnd::NotFollowing { joint } => not_following(joint),
+        FollowEnd::NotFollowing { joint } => not_following(*joint),
         FollowEnd::OtherTip => other_tip(),
     }
 }

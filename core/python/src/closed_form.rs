@@ -9,7 +9,6 @@ use crate::error::Failure;
 use crate::numbers::{bytes_of, of_pose, poses};
 
 /// `mount_from_camera` and `anchor_from_target`, 4 × 4 each, by the method of that name.
-#[expect(clippy::needless_pass_by_value, reason = "Python hands it over")]
 #[pyfunction]
 #[pyo3(name = "closed_form")]
 pub fn by_name<'py>(

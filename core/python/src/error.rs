@@ -26,7 +26,6 @@ pub enum Failure {
 
 impl Failure {
     /// What was given is at fault.
-    #[expect(clippy::needless_pass_by_value, reason = "it is used up")]
     pub fn input(error: impl ToString) -> Self {
         Self::Input(error.to_string())
     }

@@ -16,7 +16,6 @@ type CornerBytes<'py> = (Bound<'py, PyBytes>, Bound<'py, PyBytes>);
 
 /// A dataset folder: what a calibration is made from, what is small as JSON, and arrays by their names. An array that no
 /// view has is left out; a pose that one view lacks is not finite.
-#[expect(clippy::needless_pass_by_value, reason = "Python hands it over")]
 #[pyfunction]
 pub fn read_folder(py: Python<'_>, folder: PathBuf) -> Result<(Observations, String, Bound<'_, PyDict>), Failure> {
     let dataset = py.detach(|| Dataset::read(&folder)).map_err(Failure::input)?;

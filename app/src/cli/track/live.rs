@@ -172,8 +172,8 @@ impl Live {
             return Ok(());
         }
         let why = match end {
-            FollowEnd::Released => line.take_ended().unwrap_or_else(|| end_of_following(FollowEnd::Released)),
-            end => end_of_following(end),
+            FollowEnd::Released => line.take_ended().unwrap_or_else(|| end_of_following(&FollowEnd::Released)),
+            end => end_of_following(&end),
         };
         let why = why.say(Language::English);
         let error = Failure::failed(anyhow::anyhow!("following ended by itself: {why}"));

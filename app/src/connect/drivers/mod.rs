@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverOptions};
+use handeye_sim_link::driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverHost, DriverOptions};
 
 use crate::model::Drivers;
 use crate::text::Text;
@@ -24,27 +24,22 @@ use motion::DriverMotion;
 /// Starts the drivers, or connects to them, once for all workers; and again when they have ended.
 pub struct DriverConnector {
     drivers: Drivers,
-    cell: Mutex<Option<DriverCell>>,
+    /// Or why these drivers are none.
+    host: Result<DriverHost, BadSpec>,
     typed: TypedPose,
 }
 
 impl DriverConnector {
     /// Nothing is started yet.
     pub fn new(drivers: Drivers) -> Self {
-        Self { drivers, cell: Mutex::new(None), typed: TypedPose::default() }
+        let host = spec(&drivers).map(|spec| DriverHost::new(spec, DriverOptions::default()));
+        Self { drivers, host, typed: TypedPose::default() }
     }
 
     /// The drivers that run. The other workers wait for the first.
     fn cell(&self, shutdown: &CancelToken) -> Result<DriverCell, PortError> {
-        let mut cell = self.cell.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(cell) = cell.as_ref().filter(|cell| cell.check().is_ok()) {
-            return Ok(cell.clone());
-        }
-        // The one that has ended is buried first: it may hold what the next one needs.
-        *cell = None;
-        let spec = spec(&self.drivers).map_err(|why| PortError::Hopeless(Text::verbatim(why.to_string())))?;
-        let started = DriverCell::start(&spec, &DriverOptions::default(), shutdown).map_err(port_error)?;
-        Ok(cell.insert(started).clone())
+        let host = self.host.as_ref().map_err(|why| PortError::Hopeless(Text::verbatim(why.to_string())))?;
+        host.cell(shutdown).map_err(port_error)
     }
 
     fn is_freehand(&self) -> bool {

@@ -164,13 +164,12 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
             if message == (ToDriver::Bye {}) {
                 return Ok(());
             }
-            self.obey(message)?;
+            self.obey(&message)?;
         }
     }
 
-    #[expect(clippy::needless_pass_by_value, reason = "a message is used up")]
-    fn obey(&self, message: ToDriver) -> Result<(), FakeError> {
-        match message {
+    fn obey(&self, message: &ToDriver) -> Result<(), FakeError> {
+        match *message {
             ToDriver::Hello { .. } => {
                 self.send("hello", &self.fake.hello, &[])?;
                 self.lock().is_greeted = true;
@@ -198,7 +197,7 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
                 self.rest(id)
             }
             ToDriver::Stop { id } => self.rest(id),
-            ToDriver::Move { id, joints_rad, base_from_tip, speed } => {
+            ToDriver::Move { id, ref joints_rad, ref base_from_tip, speed } => {
                 let tip = base_from_tip.map(|pose| pose.pose("base_from_tip").map(Goal::Tip)).transpose();
                 match tip {
                     Ok(tip) => self.begin(id, joints_rad.map(Goal::Joints).or(tip), speed),

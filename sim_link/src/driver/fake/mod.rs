@@ -99,18 +99,16 @@ impl Fake {
     ///
     /// # Errors
     /// [`FakeError`].
-    #[expect(clippy::single_match_else, reason = "two ways to a cell, of the same weight")]
     pub fn start(options: FakeOptions) -> Result<Self, FakeError> {
         let FakeOptions { mut scene, seed, connect, part, clock_s } = options;
-        let (server, endpoint, paths) = match connect {
-            Some(endpoint) => (None, endpoint, CellPaths::default()),
-            None => {
-                scene.simulation.time_step_s = TIME_STEP_S;
-                let paths = CellPaths::below(&scene.robot.name);
-                let server = CellServer::start(CellConfig { seed, ..CellConfig::new(scene) })?;
-                let endpoint = server.endpoint().parse()?;
-                (Some(server), endpoint, paths)
-            }
+        let (server, endpoint, paths) = if let Some(endpoint) = connect {
+            (None, endpoint, CellPaths::default())
+        } else {
+            scene.simulation.time_step_s = TIME_STEP_S;
+            let paths = CellPaths::below(&scene.robot.name);
+            let server = CellServer::start(CellConfig { seed, ..CellConfig::new(scene) })?;
+            let endpoint = server.endpoint().parse()?;
+            (Some(server), endpoint, paths)
         };
         let link = ConnectionOptions::default();
         let mut arm = Arm::connect(&endpoint, &link, &paths)?;

@@ -50,8 +50,7 @@ impl Folder {
     }
 
     /// The newest of the captures that are there already, with how many there are.
-    #[expect(clippy::unused_self, reason = "beside what asks for it")]
-    fn newest(&self, watch: &mut Watch, outlet: &Outlet) -> Result<(Option<Capture>, usize), Fault> {
+    fn newest(watch: &mut Watch, outlet: &Outlet) -> Result<(Option<Capture>, usize), Fault> {
         let start = Instant::now();
         let mut newest: Option<Capture> = None;
         let mut count = 0;
@@ -81,7 +80,7 @@ impl Device for Folder {
             return Err(Fault(format!("{} is no folder", folder.display())));
         }
         let mut watch = Watch::new(folder.clone(), self.options.format.clone());
-        let (newest, _) = self.newest(&mut watch, outlet)?;
+        let (newest, _) = Self::newest(&mut watch, outlet)?;
         let Some((width, height)) = newest.as_ref().map(|capture| capture.size).or(self.options.size) else {
             let why = watch.remarks.join("\n");
             return Err(Fault(format!(

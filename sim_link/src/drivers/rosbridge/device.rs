@@ -23,7 +23,7 @@ const AGAIN: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(50);
 /// States are no closer than this: 500 a second.
 const CLOSEST_S: f64 = 0.002;
-/// A clock that goes back by so much was set anew.
+/// A clock that goes back by more than this was set anew.
 const RESET_S: f64 = 1.0;
 /// So long without a new pose is worth a line in the log.
 const STALE: Duration = Duration::from_secs(2);
