@@ -310,15 +310,19 @@ fn the_goal_is_judged_over_the_box_that_was_chosen_for_the_expected_error() {
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::solved());
-    let judged_over = |app: &App| {
-        let guided = app.model().sequence.as_ref().and_then(|it| it.guided.as_deref()).expect("a guided sequence");
+    let judged_over = |app: &mut App| {
+        app.apply(Command::CalibrateForMe);
+        // The answer that there is stands for the one from the present method.
+        app.model.solve.status = SolveStatus::Idle;
+        app.model.solve.fresh = true;
+        app.guided_step();
+        assert_eq!(waits(app), Some(Waits::Choice));
+        let guided = app.model.sequence.as_ref().and_then(|it| it.guided.as_deref()).expect("a guided sequence");
         guided.guide.options().tool_box
     };
-    app.apply(Command::CalibrateForMe);
     assert_eq!(judged_over(app), None);
     app.apply(Command::Stop);
     app.apply(Command::SetTipBox(Some(WorkBox { from_m: [0.3, 0.0, 0.0], to_m: [0.5, 0.2, 0.1] })));
-    app.apply(Command::CalibrateForMe);
     let [low, high] = judged_over(app).expect("a box").bounds();
     assert_eq!((low.coords.as_slice(), high.coords.as_slice()), (&[0.3, 0.0, 0.0][..], &[0.5, 0.2, 0.1][..]));
 }
