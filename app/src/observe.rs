@@ -1,6 +1,7 @@
 //! From a dataset folder or a session to observations: loading every image and finding the target in it.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use handeye_core::detect::{self, DetectOptions, VisionError};
@@ -8,7 +9,7 @@ use handeye_core::estimate::Observations;
 use handeye_core::image::GrayImage;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::{Dataset, DatasetError};
-use handeye_core::project::files::image_file::gray_from_rgb;
+use handeye_core::project::files::image_file::{self, gray_from_rgb};
 use handeye_core::project::session::{CaptureId, Session, SessionError, SessionObservations};
 use handeye_core::targets::observation::Corner;
 use handeye_core::targets::{Grid, TargetSpec};
@@ -100,6 +101,47 @@ pub fn observe_session(
     let corners: BTreeMap<CaptureId, Vec<Corner>> =
         captures.iter().zip(corners).filter_map(|(capture, corners)| Some((capture.id, corners?))).collect();
     Ok(session.document.observations(image_size, |id| corners.get(&id).cloned()))
+}
+
+/// Finds the target in images that belong to no data set yet, on all cores. One that cannot be read shows nothing.
+///
+/// # Errors
+/// [`ObserveError::OtherChessboard`], [`ObserveError::Vision`], [`ObserveError::Cancelled`].
+pub fn observe_images(
+    images: &[PathBuf],
+    target: &TargetSpec,
+    progress: Progress<'_>,
+    cancel: &CancelToken,
+) -> Result<Vec<Option<Vec<Corner>>>, ObserveError> {
+    let names: Vec<String> = images.iter().map(|image| image.display().to_string()).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    corners_of(&names, |index| Ok(image_file::load_gray(&images[index]).ok()), target, progress, cancel)
+}
+
+/// The chessboards that images show, by their sides in inner corners, with how many images show each.
+///
+/// # Errors
+/// [`ObserveError::Vision`], [`ObserveError::Cancelled`].
+pub fn chessboards_in_sight(
+    images: &[PathBuf],
+    progress: Progress<'_>,
+    cancel: &CancelToken,
+) -> Result<BTreeMap<(usize, usize), usize>, ObserveError> {
+    // What is looked for says only how small squares may be.
+    const USUAL: Grid = Grid { columns: 9, rows: 6, square_m: 0.02 };
+    let look = |index: usize| {
+        let Ok(image) = image_file::load_gray(&images[index]) else { return Ok(None) };
+        let name = images[index].display().to_string();
+        detect::chessboard_in_sight(&image, &USUAL, cancel).map_err(|source| match source {
+            VisionError::Cancelled => ObserveError::Cancelled,
+            source => ObserveError::Vision { name, source },
+        })
+    };
+    let mut seen = BTreeMap::new();
+    for sides in of_each(images.len(), progress, cancel, look)?.into_iter().flatten() {
+        *seen.entry(sides).or_default() += 1;
+    }
+    Ok(seen)
 }
 
 /// The corners of every image that there is, where the target is seen.

@@ -13,6 +13,7 @@ mod driver;
 mod export;
 mod failure;
 mod gate;
+mod import;
 mod object_arg;
 mod out;
 mod output;
@@ -73,6 +74,9 @@ enum Command {
     /// Try a driver, or be one: a program between the workbench and any robot or camera (docs/drivers.md).
     #[command(after_help = driver::EXAMPLES)]
     Driver(driver::DriverArgs),
+    /// Turn somebody's recording into a dataset folder: images with a table, a file to a pose, what other tools write.
+    #[command(after_help = import::after_help())]
+    Import(import::ImportArgs),
     /// Write calibration files from a solved session or a result JSON.
     #[command(after_help = "Example:\n  handeye export session --format ros_camera_info easy_handeye2 --out files")]
     Export(export::ExportArgs),
@@ -105,6 +109,7 @@ pub fn main() -> ExitCode {
         Command::Track(args) => track::run(&args),
         Command::Driver(args) => driver::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Target(args) => target::run(&args),
     };
     ended(result)

@@ -100,9 +100,11 @@ fn not_a_data_set(folder: &Path, error: DatasetError) -> Failure {
     }
     Failure::unusable(anyhow!(
         "{} has no dataset.toml, or an empty one: the text on standard output is one with what was found; save it in the \
-         folder under this name and take in what is true of the lines that begin with {:?}",
+         folder under this name and take in what is true of the lines that begin with {:?}; of somebody's recording `handeye \
+         import {}` makes a data set, and tries what the files leave open",
         folder.display(),
-        CHOICE.trim_end()
+        CHOICE.trim_end(),
+        folder.display()
     ))
 }
 

@@ -1,7 +1,7 @@
 //! `handeye target`: a target on paper.
 
 use anyhow::anyhow;
-use clap::{Args, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
 use handeye_core::project::dataset::write::target_table;
 use handeye_core::targets::print::{Page, PrintError, Sheet, pdf};
 use handeye_core::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
@@ -17,15 +17,22 @@ pub const EXAMPLES: &str = "Example:
 /// Options of `handeye target`.
 #[derive(Debug, Args)]
 pub struct TargetArgs {
-    /// What to print.
-    #[arg(long, value_enum)]
-    kind: Kind,
+    #[command(flatten)]
+    target: DescribedTarget,
     /// File to write; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     pdf: Output,
     /// Page: a4, a3, letter, or fit for one as large as the target needs.
     #[arg(long, value_name = "PAGE", default_value = "a4")]
     page: Page,
+}
+
+/// A target, described.
+#[derive(Debug, Args)]
+struct DescribedTarget {
+    /// What it is.
+    #[arg(long, value_enum)]
+    kind: Kind,
     /// Inner corners, dots or tags along x.
     #[arg(long, value_name = "N")]
     columns: Option<usize>,
@@ -88,7 +95,7 @@ enum LayoutName {
 }
 
 pub fn run(args: &TargetArgs) -> Result<(), Failure> {
-    let target = target(args).map_err(Failure::unusable)?;
+    let target = target(&args.target).map_err(Failure::unusable)?;
     let sheet = Sheet::new(&target, args.page).map_err(|error| match error {
         PrintError::Markers { .. } => Failure::failed(error),
         _ => Failure::unusable(error),
@@ -107,7 +114,38 @@ pub fn run(args: &TargetArgs) -> Result<(), Failure> {
     out::print(&table)
 }
 
-fn target(args: &TargetArgs) -> anyhow::Result<TargetSpec> {
+/// The target of a text: `10x7x15`, inner corners and square in mm of a chessboard, or `kind=charuco,columns=4,…` with the
+/// options of this command.
+pub fn of_text(text: &str) -> anyhow::Result<TargetSpec> {
+    let sides: Vec<&str> = text.split(['x', 'X', '×']).collect();
+    if let [columns, rows, square_mm] = sides.as_slice()
+        && let (Ok(columns), Ok(rows), Ok(square_mm)) = (columns.parse(), rows.parse(), square_mm.parse::<f64>())
+    {
+        let target = TargetSpec::Chessboard(Grid { columns, rows, square_m: metres("the square", Some(square_mm))? });
+        target.check()?;
+        return Ok(target);
+    }
+    let mut words = vec!["--target".to_owned()];
+    for pair in text.split(',') {
+        let (key, value) = pair.split_once('=').ok_or_else(|| {
+            anyhow!("--target {text}: 10x7x15 is inner corners and square in mm; others begin with kind=charuco,…")
+        })?;
+        words.push(format!("--{}", key.trim()));
+        words.push(value.trim().to_owned());
+    }
+    let parsed = TextTarget::try_parse_from(words)
+        .map_err(|e| anyhow!("--target {text}: {}", e.to_string().lines().next().unwrap_or_default()))?;
+    target(&parsed.target)
+}
+
+/// To read a described target by itself.
+#[derive(Debug, Parser)]
+struct TextTarget {
+    #[command(flatten)]
+    target: DescribedTarget,
+}
+
+fn target(args: &DescribedTarget) -> anyhow::Result<TargetSpec> {
     use Kind as K;
     let of = |kinds: &[Kind]| kinds.contains(&args.kind);
     let tags = [K::AprilGrid, K::AprilTag];

@@ -3,6 +3,7 @@
 pub mod dataset;
 pub mod export;
 pub mod files;
+pub mod import;
 pub mod result;
 pub mod session;
 pub mod taught_poses;

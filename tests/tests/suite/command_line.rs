@@ -55,7 +55,9 @@ distortion = []
 
 #[test]
 fn every_subcommand_has_help_with_an_example() {
-    for command in ["gui", "cell", "auto", "calibrate", "doctor", "driver", "plan", "track", "export", "target"] {
+    for command in
+        ["gui", "cell", "auto", "calibrate", "doctor", "driver", "plan", "track", "export", "import", "target"]
+    {
         let output = handeye(&[command, "--help"]);
         assert_eq!(output.status.code(), Some(0));
         assert!(text(&output.stdout).contains("Example:\n  handeye "), "{command}");

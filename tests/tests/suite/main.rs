@@ -5,6 +5,7 @@
 mod command_line;
 mod exports;
 mod hostile_clients;
+mod imports;
 mod kinematics;
 mod layering;
 mod reference_sets;

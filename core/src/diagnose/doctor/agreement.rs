@@ -1,6 +1,6 @@
 //! A hand-eye transform that most views agree on, without weights: robust against views that are simply wrong.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 
 use super::views::SessionViews;
 use crate::estimate::handeye::closed_form::{ClosedForm, ClosedFormSolution, ParkMartin, Shah};
@@ -21,7 +21,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
 /// A solution and how far it is from each view.
 #[derive(Clone)]
-pub(super) struct Agreement {
+pub(crate) struct Agreement {
     pub solution: ClosedFormSolution,
     /// Distance between where the chain puts the target's outer points and where the camera saw them, RMS per view,
     /// metres.
@@ -40,11 +40,15 @@ pub(super) fn pairs_of(sight: &SessionViews, poses: &[Pose<Base, Tip>]) -> Vec<P
 }
 
 /// The solution with the least median misfit over a fixed set of choices of views. `thorough` tries the choices; without
-/// it only all views together are solved.
+/// it only all views together are solved. `outer` are the outer points of the target, where misfits are measured.
 ///
 /// # Errors
 /// That of the closed form when no choice has a solution.
-pub(super) fn agreement(sight: &SessionViews, pairs: &[PosePair], thorough: bool) -> Result<Agreement, HandEyeError> {
+pub(crate) fn agreement(
+    outer: &[Point3<f64>; 4],
+    pairs: &[PosePair],
+    thorough: bool,
+) -> Result<Agreement, HandEyeError> {
     let all: Vec<usize> = (0..pairs.len()).collect();
     let mut tried = Vec::new();
     let mut error = None;
@@ -53,7 +57,7 @@ pub(super) fn agreement(sight: &SessionViews, pairs: &[PosePair], thorough: bool
             subset::spread(chosen.len(), MOST_SOLVED).into_iter().map(|i| pairs[chosen[i]]).collect();
         for method in [&ParkMartin as &dyn ClosedForm, &Shah] {
             match method.solve(&some) {
-                Ok(solution) => tried.push(judged(sight, pairs, solution)),
+                Ok(solution) => tried.push(judged(outer, pairs, solution)),
                 Err(e) => error = Some(e),
             }
         }
@@ -91,13 +95,13 @@ fn some_of(count: usize, size: usize, choice: usize) -> Vec<usize> {
     order.into_iter().take(size).map(|(_, i)| i).collect()
 }
 
-fn judged(sight: &SessionViews, pairs: &[PosePair], solution: ClosedFormSolution) -> Agreement {
+fn judged(outer: &[Point3<f64>; 4], pairs: &[PosePair], solution: ClosedFormSolution) -> Agreement {
     let misfit_m: Vec<f64> = pairs
         .iter()
         .map(|pair| {
             let chain =
                 solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
-            misfit(sight, chain.isometry(), pair.camera_from_target.isometry())
+            misfit(outer, chain.isometry(), pair.camera_from_target.isometry())
         })
         .collect();
     let median_m = median(misfit_m.iter().copied()).unwrap_or(f64::INFINITY);
@@ -114,11 +118,11 @@ pub(super) fn misfit_of(
 ) -> f64 {
     let anchor_from_mount = sight.mode.anchor_from_mount(base_from_tip);
     let chain = solution.mount_from_camera.inverse() * anchor_from_mount.inverse() * solution.anchor_from_target;
-    misfit(sight, chain.isometry(), seen)
+    misfit(&sight.outer, chain.isometry(), seen)
 }
 
 /// RMS distance of the target's outer points at two poses, metres.
-pub(super) fn misfit(sight: &SessionViews, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
-    let squared: f64 = sight.outer.iter().map(|p| (a * p - b * p).norm_squared()).sum();
-    (squared / sight.outer.len() as f64).sqrt()
+pub(crate) fn misfit(outer: &[Point3<f64>; 4], a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+    let squared: f64 = outer.iter().map(|p| (a * p - b * p).norm_squared()).sum();
+    (squared / outer.len() as f64).sqrt()
 }

@@ -207,7 +207,7 @@ fn solve(sight: &SessionViews, change: &Change, thorough: bool) -> Result<Agreem
     let most = if *change == Change::NONE { usize::MAX } else { MOST_VIEWS };
     let chosen: Vec<_> = subset::spread(count, most).into_iter().filter(|i| pose_of(*i).is_some()).collect();
     let chosen: Vec<_> = chosen.into_iter().map(|i| pairs[i]).collect();
-    agreement(sight, &chosen, thorough)
+    agreement(&sight.outer, &chosen, thorough)
 }
 
 #[cfg(test)]

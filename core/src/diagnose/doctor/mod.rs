@@ -18,7 +18,7 @@
 //! [`Diagnosis::untested`] says so, and the findings say what is. Views out of the fit count for nothing. Of more than
 //! [`MOST_VIEWS`] views so many are examined, spread over the session.
 
-mod agreement;
+pub(crate) mod agreement;
 mod claim;
 mod effect;
 mod gross;

@@ -142,7 +142,7 @@ fn one_sided(sight: &SessionViews) -> Vec<(bool, ClosedFormSolution)> {
             continue;
         }
         for (first, side) in [(true, &pairs[..size]), (false, &pairs[count - size..])] {
-            let agreed: Option<Agreement> = agreement::agreement(sight, side, false).ok();
+            let agreed: Option<Agreement> = agreement::agreement(&sight.outer, side, false).ok();
             solutions.extend(agreed.map(|agreed| (first, agreed.solution)));
         }
     }

@@ -32,7 +32,7 @@ const ROUNDS: usize = 6;
 const NOISY: f64 = 2.0;
 
 /// A row of the pose table, whether the target was seen in its image or not.
-pub(super) struct TableRow {
+pub(crate) struct TableRow {
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Place of its image when the images are sorted by number (1, 2, 10).
     pub rank_by_number: usize,
@@ -41,7 +41,7 @@ pub(super) struct TableRow {
 }
 
 /// One view with a robot pose and a pose of the target.
-pub(super) struct SessionView {
+pub(crate) struct SessionView {
     pub name: String,
     /// Its row in the table of those in the fit.
     pub row: usize,
@@ -60,7 +60,7 @@ pub(super) struct SessionView {
 }
 
 /// All views as the camera saw them.
-pub(super) struct SessionViews {
+pub(crate) struct SessionViews {
     pub mode: Mode,
     pub views: Vec<SessionView>,
     /// Every row of the table that is in the fit.

@@ -53,7 +53,9 @@ pub enum DatasetProblem {
     #[error("cannot be read: {0}")]
     Unreadable(String),
     /// The folder has no description.
-    #[error("has no dataset.toml: name a dataset folder or a session folder")]
+    #[error(
+        "has no dataset.toml: name a dataset folder or a session folder, or make one of a recording with `handeye import`"
+    )]
     NotADataset,
     /// Not text.
     #[error("is not UTF-8 text: save it as UTF-8")]

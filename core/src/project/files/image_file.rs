@@ -89,7 +89,8 @@ fn decode(path: &Path) -> Result<DynamicImage, ImageFileError> {
     decode_bytes(&bytes)
 }
 
-fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, ImageFileError> {
+/// The image of the bytes of a file.
+pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, ImageFileError> {
     let open = || {
         ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| ImageFileError::Unreadable(one_line(&e)))
     };

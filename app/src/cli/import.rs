@@ -1,0 +1,445 @@
+//! `handeye import`: other people's recordings as dataset folders.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use clap::Args;
+use handeye_core::estimate::CameraKnowledge;
+use handeye_core::progress::CancelToken;
+use handeye_core::project::import::{
+    self, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Settings, Sight, Sights, Source, Verdict, write,
+};
+use handeye_core::targets::TargetSpec;
+use serde_json::json;
+
+use super::output::Output;
+use super::{Failure, out, solve, target};
+use crate::observe::{self, ObserveError};
+
+/// At the end of its help.
+pub fn after_help() -> String {
+    format!(
+        "Keys of --set:\n{}\n\nExample:\n  handeye import recording --target 11x8x20\n  handeye import recording --target 11x8x20 \
+         --set mode=eye_in_hand --out my_robot_images\n  handeye import recording --target \
+         kind=charuco,columns=4,rows=6,square=33,marker=20,dictionary=6x6_250 --take best --out my_robot_images",
+        import::KEYS
+    )
+}
+
+/// Options of `handeye import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// Folder or file of the recording.
+    path: PathBuf,
+    /// Write a dataset folder here; it must not be there yet, or be empty. Without it the hypotheses are only listed.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What was looked at: 10x7x15 is a chessboard of 10 × 7 inner corners with squares of 15 mm; others as `handeye target`
+    /// names them, kind=charuco,columns=4,rows=6,square=33,marker=20,dictionary=6x6_250.
+    #[arg(long, value_name = "SPEC")]
+    target: Option<String>,
+    /// Take one of several hypotheses that explain the recording: `best` for the first, or its number in the list.
+    #[arg(long, value_name = "best|N")]
+    take: Option<Take>,
+    /// Fix a convention that the files do not state; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Leave the images where they are; the data set names them there.
+    #[arg(long)]
+    link: bool,
+    /// Write what was found as JSON to this file; `-` for standard output instead of the text.
+    #[arg(long, value_name = "FILE")]
+    json: Option<Output>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Take {
+    Best,
+    Number(usize),
+}
+
+impl std::str::FromStr for Take {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.parse()) {
+            ("best", _) => Ok(Self::Best),
+            (_, Ok(number)) if number > 0 => Ok(Self::Number(number)),
+            _ => Err("`best`, or the number of a hypothesis in the list".into()),
+        }
+    }
+}
+
+pub fn run(args: &ImportArgs) -> Result<(), Failure> {
+    let cancel = solve::cancel_on_ctrl_c();
+    let mut settings = Settings::default();
+    for assignment in &args.set {
+        settings.set(assignment).map_err(Failure::unusable)?;
+    }
+    if let Some(folder) = &args.out {
+        write::check_out(folder).map_err(Failure::unusable)?;
+    }
+    let given = args.target.as_deref().map(target::of_text).transpose().map_err(Failure::unusable)?;
+    let recording = import::open(&args.path).map_err(Failure::unusable)?;
+    let mut told = Told { text: found(&recording), notes: Vec::new() };
+    let outcome = import(args, &recording, given, &settings, &mut told, &cancel);
+    // What was found is said in any case: it is what a refusal is about.
+    let findings = match &outcome {
+        Ok(done) => done.findings.clone(),
+        Err(refused) => refused.findings.clone().unwrap_or(serde_json::Value::Null),
+    };
+    told.publish(args, &recording, &findings)?;
+    outcome.map(|_| ()).map_err(|refused| refused.failure)
+}
+
+struct Done {
+    findings: serde_json::Value,
+}
+
+struct Refused {
+    failure: Failure,
+    findings: Option<serde_json::Value>,
+}
+
+impl From<Failure> for Refused {
+    fn from(failure: Failure) -> Self {
+        Self { failure, findings: None }
+    }
+}
+
+/// What is said on standard output.
+struct Told {
+    text: String,
+    notes: Vec<String>,
+}
+
+impl Told {
+    fn note(&mut self, note: impl std::fmt::Display) {
+        let note = note.to_string();
+        self.line(format_args!("note: {note}"));
+        self.notes.push(note);
+    }
+
+    fn line(&mut self, line: impl std::fmt::Display) {
+        // Writing to a string cannot fail.
+        let _ok = writeln!(self.text, "{line}").is_ok();
+    }
+
+    fn publish(&self, args: &ImportArgs, recording: &Recording, findings: &serde_json::Value) -> Result<(), Failure> {
+        if let Some(output) = &args.json {
+            let document = json!({
+                "format": "handeye-import",
+                "version": 1,
+                "found": recording.beliefs,
+                "warnings": recording.warnings,
+                "notes": self.notes,
+                "judgement": findings,
+            });
+            let text = serde_json::to_string_pretty(&document).map_err(Failure::failed)?;
+            output.write(format!("{text}\n").as_bytes())?;
+        }
+        if args.json.as_ref().is_some_and(Output::is_standard) { Ok(()) } else { out::print(&self.text) }
+    }
+}
+
+fn import(
+    args: &ImportArgs,
+    recording: &Recording,
+    given: Option<TargetSpec>,
+    settings: &Settings,
+    told: &mut Told,
+    cancel: &CancelToken,
+) -> Result<Done, Refused> {
+    let target = target_of(recording, given, told);
+    let (sights, cameras) = sights(recording, target.as_ref().map(|(t, _)| *t), settings, told, cancel)?;
+    let judgement = import::judge(recording, &sights, settings, cancel).map_err(|error| match error {
+        ImportError::NoPoses { .. } => Failure::failed(error),
+        error => Failure::unusable(error),
+    })?;
+    if cancel.is_cancelled() {
+        return Err(Failure::failed(anyhow!("cancelled")).into());
+    }
+    told.text.push_str(&listed(recording, &judgement));
+    let mut findings = as_json(recording, &judgement);
+    let refuse = |failure: Failure, findings: serde_json::Value| Refused { failure, findings: Some(findings) };
+    let Some(folder) = &args.out else { return Ok(Done { findings }) };
+    let (index, is_taken) = match choose(&judgement, args.take) {
+        Ok(chosen) => chosen,
+        Err(failure) => return Err(refuse(failure, findings)),
+    };
+    let h = &judgement.hypotheses[index];
+    let camera = match h.source {
+        Source::Stream(i) => cameras.get(i).cloned().flatten(),
+        Source::Track(_) => None,
+    };
+    let known = write::Context { recording, judgement: &judgement, settings, target, camera, is_taken };
+    if args.link {
+        // Names are relative to the folder, which has to be there to be a place.
+        std::fs::create_dir_all(folder).map_err(|e| Failure::unusable(anyhow!("{}: {e}", folder.display())))?;
+    }
+    let plan = import::plan(h, &known, args.link.then_some(folder.as_path()));
+    let progress = |done: usize, of: usize| {
+        if done == of || done % 50 == 0 {
+            tracing::info!("{done} of {of} images copied");
+        }
+    };
+    write::write(&plan, folder, progress).map_err(Failure::failed)?;
+    for line in &plan.left_out {
+        told.note(format_args!("not written: {line}"));
+    }
+    told.line(format_args!(
+        "Wrote {} views to {}. Solve it with: handeye calibrate {}",
+        plan.views,
+        folder.display(),
+        folder.display()
+    ));
+    findings["written"] = json!({ "hypothesis": index + 1, "views": plan.views, "left_out": plan.left_out });
+    Ok(Done { findings })
+}
+
+/// The hypothesis to write, and whether a person took it out of several.
+fn choose(judgement: &Judgement, take: Option<Take>) -> Result<(usize, bool), Failure> {
+    let nothing = |what: String| Err(Failure::failed(anyhow!("nothing was written: {what}")));
+    match (take, &judgement.verdict) {
+        (None | Some(Take::Best | Take::Number(1)), Verdict::Decided) => Ok((0, false)),
+        (Some(Take::Number(n)), _) => match judgement.hypotheses.get(n - 1) {
+            Some(_) => Ok((n - 1, true)),
+            None => nothing(format!("there are {} hypotheses", judgement.hypotheses.len())),
+        },
+        (Some(Take::Best), Verdict::Ambiguous(_)) => Ok((0, true)),
+        (None, Verdict::Ambiguous(count)) => nothing(format!(
+            "{count} hypotheses explain the recording and differ: fix what you know with --set KEY=VALUE, or take one with \
+             --take N or --take best"
+        )),
+        (_, Verdict::Unexplained) => nothing(
+            "no hypothesis explains the recording: images and poses may not belong together, or the target be another; \
+             --take N takes one all the same"
+                .into(),
+        ),
+    }
+}
+
+/// The target that was given, or the only one that files describe.
+fn target_of(recording: &Recording, given: Option<TargetSpec>, told: &mut Told) -> Option<(TargetSpec, String)> {
+    if let Some(target) = given {
+        return Some((target, "given with --target".into()));
+    }
+    let (first, file) = recording.targets.first()?;
+    if recording.targets.iter().any(|(target, _)| target != first) {
+        told.note("the files describe several targets: say which with --target");
+        return None;
+    }
+    Some((*first, format!("described in {file}")))
+}
+
+/// Finds the target in the images of every stream that may be meant.
+fn sights(
+    recording: &Recording,
+    target: Option<TargetSpec>,
+    settings: &Settings,
+    told: &mut Told,
+    cancel: &CancelToken,
+) -> Result<(Sights, Vec<Option<FoundCamera>>), Refused> {
+    let mut sights = Sights { streams: vec![None; recording.streams.len()], target };
+    let mut cameras = vec![None; recording.streams.len()];
+    let is_wanted = |i: usize| {
+        let stream = &recording.streams[i];
+        match &settings.images {
+            Some(name) => *name == stream.name,
+            None => !stream.is_depth || recording.streams.iter().all(|s| s.is_depth),
+        }
+    };
+    let wanted: Vec<usize> = (0..recording.streams.len()).filter(|i| is_wanted(*i)).collect();
+    if settings.target_poses.is_some() || wanted.is_empty() || recording.tracks.is_empty() {
+        return Ok((sights, cameras));
+    }
+    let mut troubles = Vec::new();
+    for i in wanted {
+        let stream = &recording.streams[i];
+        let paths: Vec<PathBuf> = stream.images.iter().map(|image| recording.root.join(&image.path)).collect();
+        let progress = |done: usize, of: usize| {
+            if done.is_multiple_of(20) {
+                tracing::info!("{done} of {of} images looked at");
+            }
+        };
+        let Some(target) = target else {
+            troubles.push(in_sight(&stream.name, &paths, &progress, cancel)?);
+            continue;
+        };
+        let (camera, note) = import::chosen_camera(recording, stream.size, settings).map_err(Failure::unusable)?;
+        if let Some(note) = note {
+            told.note(note);
+        }
+        match observe::observe_images(&paths, &target, &progress, cancel) {
+            Err(ObserveError::Cancelled) => return Err(Failure::failed(ObserveError::Cancelled).into()),
+            Err(error) => troubles.push(format!("{}: {error}", stream.name)),
+            Ok(corners) => {
+                let seen = corners.iter().flatten().count();
+                told.line(format_args!("{target} found in {seen} of {} images {}", corners.len(), stream.name));
+                let known = camera.as_ref().map_or(CameraKnowledge::NOTHING, |c| CameraKnowledge::Fixed(c.intrinsics));
+                match Sight::of_corners(target, stream.size, known, &corners) {
+                    Ok(sight) => {
+                        sights.streams[i] = Some(sight);
+                        cameras[i] = camera;
+                    }
+                    Err(why) => troubles.push(format!("{}: {why}", stream.name)),
+                }
+            }
+        }
+    }
+    if sights.streams.iter().any(Option::is_some) {
+        for trouble in troubles {
+            told.note(trouble);
+        }
+        return Ok((sights, cameras));
+    }
+    let has_target_poses = recording.tracks.iter().any(|track| track.role == import::Role::Target);
+    if has_target_poses {
+        for trouble in troubles {
+            told.note(trouble);
+        }
+        return Ok((sights, cameras));
+    }
+    let what = if target.is_some() { "the target was not found" } else { "the files do not say what was looked at" };
+    Err(Failure::failed(anyhow!("nothing was written: {what}: {}", troubles.join("; "))).into())
+}
+
+/// What chessboards the images of a stream show, in a sentence.
+fn in_sight(
+    name: &str,
+    paths: &[PathBuf],
+    progress: &(dyn Fn(usize, usize) + Sync),
+    cancel: &CancelToken,
+) -> Result<String, Failure> {
+    let seen = observe::chessboards_in_sight(paths, progress, cancel).map_err(Failure::failed)?;
+    let mut sizes: Vec<((usize, usize), usize)> = seen.into_iter().collect::<BTreeMap<_, _>>().into_iter().collect();
+    sizes.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let listed: Vec<String> =
+        sizes.iter().take(4).map(|((c, r), count)| format!("{c} × {r} inner corners in {count}")).collect();
+    Ok(match sizes.first() {
+        None => format!("{name} shows no chessboard: name the target with --target"),
+        Some(((columns, rows), _)) => format!(
+            "{name} shows chessboards of {} of {} images: give it with its square in mm, --target {columns}x{rows}xMM",
+            listed.join(", "),
+            paths.len()
+        ),
+    })
+}
+
+/// What is in the folder.
+fn found(recording: &Recording) -> String {
+    let mut text = String::from("Found:\n");
+    for belief in &recording.beliefs {
+        text.push_str(&format!("  {belief}\n"));
+    }
+    for warning in &recording.warnings {
+        text.push_str(&format!("  note: {warning}\n"));
+    }
+    text
+}
+
+/// Hypotheses that are shown.
+const SHOWN: usize = 12;
+
+fn listed(recording: &Recording, judgement: &Judgement) -> String {
+    let shown: Vec<&Hypothesis> = judgement.hypotheses.iter().take(SHOWN).collect();
+    let all: Vec<Vec<import::Convention>> = shown.iter().map(|h| h.conventions(recording)).collect();
+    let value = |of: &[import::Convention], key: &str| of.iter().find(|c| c.key == key).map(|c| c.value.clone());
+    let differs = |key: &str| all.iter().any(|of| value(of, key) != value(&all[0], key));
+    let mut text = String::new();
+    let mut line = |line: String| {
+        text.push_str(&line);
+        text.push('\n');
+    };
+    if let Some(first) = all.first() {
+        line(String::new());
+        line("What all hypotheses below share:".into());
+        for convention in first.iter().filter(|c| !differs(c.key)) {
+            line(format!("  {} = {} ({})", convention.key, convention.value, convention.means));
+        }
+    }
+    line(String::new());
+    line(format!("{} hypotheses tried; what each leaves, the best first:", judgement.tried));
+    for (number, (h, conventions)) in shown.iter().zip(&all).enumerate() {
+        let fit = h.fit.as_ref().map_or_else(
+            || "no solution".to_owned(),
+            |fit| format!("{:>9.2} mm {:>8.3}°  {} views", fit.median_m * 1e3, fit.median_rad.to_degrees(), fit.views),
+        );
+        let different: Vec<String> =
+            conventions.iter().filter(|c| differs(c.key)).map(|c| format!("{}={}", c.key, c.value)).collect();
+        line(format!("{:>3}. {fit}  {}", number + 1, different.join(" ")));
+        if let Some(fit) = &h.fit {
+            if differs("mode") && !different.is_empty() {
+                let (camera, target) = (fit.camera_at_m * 1e3, fit.target_at_m * 1e3);
+                let (carries_camera, carries_target) = match h.mode {
+                    handeye_core::estimate::handeye::Mode::EyeInHand => ("tip", "base"),
+                    handeye_core::estimate::handeye::Mode::EyeToHand => ("base", "tip"),
+                };
+                line(format!(
+                    "       the camera {camera:.0} mm from the {carries_camera}, the target {target:.0} mm from the {carries_target}"
+                ));
+            }
+            if !fit.disagreeing.is_empty() {
+                line(format!("       {} views disagree with the others", fit.disagreeing.len()));
+            }
+        }
+        for same in &h.same_as {
+            line(format!("       the same poses: {same}"));
+        }
+        for why in &h.contradictions {
+            line(format!("       contradicted: {why}"));
+        }
+    }
+    if judgement.hypotheses.len() > SHOWN {
+        line(format!("     and {} more", judgement.tried - SHOWN));
+    }
+    line(String::new());
+    line(match &judgement.verdict {
+        Verdict::Decided => "The first is the only one that explains the recording.".into(),
+        Verdict::Ambiguous(count) => {
+            format!("The first {count} explain the recording; nothing here tells which is true.")
+        }
+        Verdict::Unexplained => "None explains the recording.".into(),
+    });
+    text
+}
+
+fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
+    let one = |(number, h): (usize, &Hypothesis)| {
+        let conventions: BTreeMap<&str, String> =
+            h.conventions(recording).into_iter().map(|c| (c.key, c.value)).collect();
+        let samples = &recording.tracks[h.robot].samples;
+        let fit = h.fit.as_ref().map(|fit| {
+            json!({
+                "median_mm": fit.median_m * 1e3,
+                "median_deg": fit.median_rad.to_degrees(),
+                "views": fit.views,
+                "camera_mm": fit.camera_at_m * 1e3,
+                "target_mm": fit.target_at_m * 1e3,
+                "disagreeing": fit.disagreeing.iter().map(|(sample, misfit_m)| {
+                    json!({ "pose": samples[*sample].place, "mm": misfit_m * 1e3 })
+                }).collect::<Vec<_>>(),
+            })
+        });
+        json!({
+            "number": number + 1,
+            "conventions": conventions,
+            "fit": fit,
+            "same_as": h.same_as,
+            "contradictions": h.contradictions,
+        })
+    };
+    let verdict = match &judgement.verdict {
+        Verdict::Decided => "decided",
+        Verdict::Ambiguous(_) => "ambiguous",
+        Verdict::Unexplained => "unexplained",
+    };
+    json!({
+        "verdict": verdict,
+        "tried": judgement.tried,
+        "distance_mm": judgement.distance_m * 1e3,
+        "hypotheses": judgement.hypotheses.iter().enumerate().map(one).collect::<Vec<_>>(),
+    })
+}

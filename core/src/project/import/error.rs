@@ -1,0 +1,67 @@
+//! Why a recording cannot be imported.
+
+use std::path::PathBuf;
+
+/// Why a recording cannot be read or a data set not be written. One line each: what, where, and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// The file system says no.
+    #[error("{}: cannot be read: {why}", file.display())]
+    Unreadable {
+        /// The file or folder.
+        file: PathBuf,
+        /// What the system says.
+        why: String,
+    },
+    /// More than any recording has.
+    #[error("{}: {what}: at most {limit} are read; name the folder of one recording", file.display())]
+    TooMuch {
+        /// The file or folder.
+        file: PathBuf,
+        /// What there is too much of.
+        what: &'static str,
+        /// What is read.
+        limit: u64,
+    },
+    /// It is a data set or a session already.
+    #[error("{} is a data set or a session already: solve it with `handeye calibrate`", .0.display())]
+    AlreadyADataset(PathBuf),
+    /// There is nothing that could be robot poses.
+    #[error(
+        "{}: no series of at least {need} poses was found (tables, JSON, YAML, npz and rosbag2 are read): {seen}",
+        folder.display()
+    )]
+    NoPoses {
+        /// The folder.
+        folder: PathBuf,
+        /// How many poses a calibration needs.
+        need: usize,
+        /// What was found instead.
+        seen: String,
+    },
+    /// A choice that is none.
+    #[error("{key} = {value:?} is not a choice here: {choices}")]
+    BadChoice {
+        /// The key.
+        key: String,
+        /// What was given.
+        value: String,
+        /// What may be given.
+        choices: String,
+    },
+    /// What was chosen excludes everything.
+    #[error("nothing is left to try with {0}: these choices exclude each other, or the recording does not have them")]
+    NothingLeft(String),
+    /// The folder to write is there and has something in it.
+    #[error("{}: is not empty: an import is written into a new folder, name another one", .0.display())]
+    OutNotEmpty(PathBuf),
+    /// It could not be written.
+    #[error("{}: cannot be written: {why}", file.display())]
+    Unwritable {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        why: String,
+    },
+}

@@ -1,0 +1,329 @@
+//! The files of a recording, within bounds.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::error::ImportError;
+use super::recording::{ImageFile, Stream};
+use crate::natural_order;
+use crate::project::files::image_file::{self, one_line};
+use crate::project::files::own_folder::DESCRIPTION;
+
+/// Most files that are looked at.
+const MAX_FILES: usize = 20_000;
+/// Folders below the one that was named.
+const MAX_DEPTH: usize = 4;
+/// Most bytes of a file of text: ten thousand poses are two million.
+const MAX_TEXT_BYTES: u64 = 1 << 26;
+/// Images of one naming that make a stream.
+const LEAST_IMAGES: usize = 3;
+
+const IMAGES: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
+
+/// The files of a folder and of those in it, in natural order, as paths below it. Hidden ones are none. Of a file that was
+/// named, it and what lies beside it.
+pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>), ImportError> {
+    let found = fs::metadata(path).map_err(|e| unreadable(path, &e))?;
+    let (root, only) = if found.is_dir() {
+        (path.to_path_buf(), None)
+    } else {
+        let root = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        (root.to_path_buf(), path.file_name().map(PathBuf::from))
+    };
+    let mut files = Vec::new();
+    walk(&root, Path::new(""), if only.is_some() { 0 } else { MAX_DEPTH }, &mut files)?;
+    if let Some(only) = only {
+        // Beside a file that was named only what it may refer to counts: images, the description of a camera.
+        let is_series =
+            |f: &Path| ["csv", "txt", "tsv", "json", "samples", "npz", "npy", "mcap", "db3"].contains(&&*ending(f));
+        files.retain(|file| {
+            let is_others = ending(file) == "calib" && file.file_stem() != only.file_stem();
+            *file == only || !(is_series(file) || is_others)
+        });
+    }
+    files.sort_by(|a, b| natural_order::compare(&a.to_string_lossy(), &b.to_string_lossy()));
+    Ok((root, files))
+}
+
+fn walk(root: &Path, below: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), ImportError> {
+    let here = root.join(below);
+    for entry in fs::read_dir(&here).map_err(|e| unreadable(&here, &e))? {
+        let entry = entry.map_err(|e| unreadable(&here, &e))?;
+        let name = entry.file_name();
+        if name.to_string_lossy().starts_with('.') {
+            continue;
+        }
+        let path = below.join(&name);
+        // A link to a folder may lead in a circle, and a pipe would never end.
+        let Ok(found) = entry.file_type() else { continue };
+        if found.is_dir() && depth > 0 {
+            // Data sets are what imports have written, some of them beside what they were made from.
+            if root.join(&path).join(DESCRIPTION).exists() {
+                continue;
+            }
+            walk(root, &path, depth - 1, files)?;
+        } else if fs::metadata(root.join(&path)).is_ok_and(|m| m.is_file()) {
+            files.push(path);
+        }
+        if files.len() > MAX_FILES {
+            let limit = MAX_FILES as u64;
+            return Err(ImportError::TooMuch { file: here, what: "has too many files", limit });
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn unreadable(path: &Path, error: &std::io::Error) -> ImportError {
+    ImportError::Unreadable { file: path.to_path_buf(), why: one_line(error) }
+}
+
+/// How a name ends, in lower case.
+pub(super) fn ending(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
+
+pub(super) fn is_image(path: &Path) -> bool {
+    IMAGES.contains(&&*ending(path))
+}
+
+/// The bytes of a file that is not too large.
+pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, ImportError> {
+    let found = fs::metadata(path).map_err(|e| unreadable(path, &e))?;
+    if found.len() > MAX_TEXT_BYTES {
+        let file = path.to_path_buf();
+        return Err(ImportError::TooMuch { file, what: "has too many bytes", limit: MAX_TEXT_BYTES });
+    }
+    fs::read(path).map_err(|e| unreadable(path, &e))
+}
+
+/// The text of a file; bytes that are no UTF-8 stand as signs that are no part of a number.
+pub(super) fn text(path: &Path) -> Result<String, ImportError> {
+    let bytes = bytes(path)?;
+    let text = match bytes.as_slice() {
+        // What Windows calls Unicode.
+        [0xff, 0xfe, rest @ ..] => {
+            let units = rest.chunks_exact(2).map(|c| u16::from_le_bytes([c[0], c[1]]));
+            char::decode_utf16(units).map(|c| c.unwrap_or('\u{fffd}')).collect()
+        }
+        _ => String::from_utf8_lossy(&bytes).into_owned(),
+    };
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// A name as its parts: what is the same in all files of a series, and the numbers.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Naming {
+    folder: PathBuf,
+    template: String,
+    runs: usize,
+}
+
+impl Naming {
+    /// The name without its numbers and without its folder.
+    pub fn template(&self) -> &str {
+        &self.template
+    }
+
+    /// As a person reads it: `#` stands for a number.
+    pub fn shown(&self) -> String {
+        self.folder.join(&self.template).display().to_string()
+    }
+}
+
+/// The naming of a file and the numbers in its name.
+pub(super) fn naming(path: &Path, with_ending: bool) -> (Naming, Vec<u64>) {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (mut template, mut numbers) = (String::new(), Vec::new());
+    let mut rest = stem.as_str();
+    while let Some(c) = rest.chars().next() {
+        let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+        if digits > 0 {
+            // More digits than a number has are a hash, which counts nothing.
+            numbers.push(rest[..digits].parse().unwrap_or(u64::MAX));
+            template.push('#');
+            rest = &rest[digits..];
+        } else {
+            template.push(c);
+            rest = &rest[c.len_utf8()..];
+        }
+    }
+    if with_ending {
+        template.push('.');
+        template.push_str(&ending(path));
+    }
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    (Naming { folder, template, runs: numbers.len() }, numbers)
+}
+
+/// Files of one naming, each with the number that differs among them; `None` where none or several do.
+pub(super) fn groups(files: &[PathBuf], with_ending: bool) -> Vec<Vec<(PathBuf, Option<u64>)>> {
+    let mut by_naming: BTreeMap<Naming, Vec<(PathBuf, Vec<u64>)>> = BTreeMap::new();
+    for file in files {
+        let (naming, numbers) = naming(file, with_ending);
+        by_naming.entry(naming).or_default().push((file.clone(), numbers));
+    }
+    by_naming
+        .into_values()
+        .map(|members| {
+            let runs = members.first().map_or(0, |(_, numbers)| numbers.len());
+            let varying: Vec<usize> =
+                (0..runs).filter(|run| members.iter().any(|(_, n)| n[*run] != members[0].1[*run])).collect();
+            // Of one file alone the last number is taken, as most programs count at the end.
+            let counting = match varying.as_slice() {
+                [run] => Some(*run),
+                [] => runs.checked_sub(1),
+                _ => None,
+            };
+            members.into_iter().map(|(file, numbers)| (file, counting.map(|run| numbers[run]))).collect()
+        })
+        .collect()
+}
+
+/// The streams of images in a list of files, the largest first, and what is odd about them.
+pub(super) fn streams(root: &Path, files: &[PathBuf], warnings: &mut Vec<String>) -> Vec<Stream> {
+    let images: Vec<PathBuf> = files.iter().filter(|file| is_image(file)).cloned().collect();
+    let mut streams = Vec::new();
+    let mut single: BTreeMap<PathBuf, Vec<(PathBuf, Option<u64>)>> = BTreeMap::new();
+    for members in merged(&images) {
+        if members.len() >= LEAST_IMAGES {
+            take(root, members, &mut streams, warnings);
+        } else {
+            for member in members {
+                let folder = member.0.parent().map(Path::to_path_buf).unwrap_or_default();
+                single.entry(folder).or_default().push(member);
+            }
+        }
+    }
+    for (folder, members) in single {
+        let has_stream = streams.iter().any(|s: &Stream| s.images[0].path.parent() == Some(folder.as_path()));
+        if has_stream || members.len() < LEAST_IMAGES {
+            let names: Vec<String> = members.iter().map(|(path, _)| path.display().to_string()).take(4).collect();
+            warnings.push(format!(
+                "{} {} no series and {} not used: {}",
+                members.len(),
+                if members.len() == 1 { "image is of" } else { "images are of" },
+                if members.len() == 1 { "is" } else { "are" },
+                names.join(", ")
+            ));
+        } else {
+            take(root, members.into_iter().map(|(path, _)| (path, None)).collect(), &mut streams, warnings);
+        }
+    }
+    streams.sort_by(|a, b| a.is_depth.cmp(&b.is_depth).then(b.images.len().cmp(&a.images.len())));
+    streams
+}
+
+/// Groups by naming; two endings are one series unless they count the same numbers.
+fn merged(images: &[PathBuf]) -> Vec<Vec<(PathBuf, Option<u64>)>> {
+    let mut out = Vec::new();
+    for members in groups(images, false) {
+        let mut endings: Vec<String> = members.iter().map(|(path, _)| ending(path)).collect();
+        endings.sort();
+        endings.dedup();
+        let stems: std::collections::BTreeSet<_> = members.iter().map(|(path, _)| path.file_stem()).collect();
+        if endings.len() > 1 && stems.len() < members.len() {
+            for one in endings {
+                out.push(members.iter().filter(|(path, _)| ending(path) == one).cloned().collect());
+            }
+        } else {
+            out.push(members);
+        }
+    }
+    out
+}
+
+/// Streams of one size out of images of one naming.
+fn take(root: &Path, members: Vec<(PathBuf, Option<u64>)>, streams: &mut Vec<Stream>, warnings: &mut Vec<String>) {
+    let mut by_size: BTreeMap<((u32, u32), bool), Vec<ImageFile>> = BTreeMap::new();
+    for (path, number) in members {
+        match image_file::image_size(&root.join(&path)) {
+            Ok(size) => {
+                let is_depth = is_sixteen_bits_of_grey(&root.join(&path));
+                by_size.entry((size, is_depth)).or_default().push(ImageFile { path, number, same_as: None });
+            }
+            Err(why) => warnings.push(format!("{}: {why}", path.display())),
+        }
+    }
+    let sizes = by_size.len();
+    for ((size, is_depth), mut images) in by_size {
+        images.sort_by(|a, b| natural_order::compare(&a.path.to_string_lossy(), &b.path.to_string_lossy()));
+        if images.len() < LEAST_IMAGES {
+            warnings.push(format!("{} has another size ({}×{}) than the others", images[0].shown(), size.0, size.1));
+            continue;
+        }
+        find_doubled(root, &mut images, warnings);
+        let mut name = stream_name(&images);
+        if sizes > 1 {
+            name = format!("{name} ({}×{})", size.0, size.1);
+        }
+        streams.push(Stream { name, images, size, is_depth });
+    }
+}
+
+fn stream_name(images: &[ImageFile]) -> String {
+    let (naming, _) = naming(&images[0].path, true);
+    naming.shown()
+}
+
+/// Depth is kept so by cameras that have both; only the header is read.
+fn is_sixteen_bits_of_grey(path: &Path) -> bool {
+    use image::ImageDecoder as _;
+    if ending(path) != "png" {
+        return false;
+    }
+    let Ok(file) = fs::File::open(path) else { return false };
+    image::codecs::png::PngDecoder::new(std::io::BufReader::new(file))
+        .is_ok_and(|decoder| decoder.color_type() == image::ColorType::L16)
+}
+
+fn find_doubled(root: &Path, images: &mut [ImageFile], warnings: &mut Vec<String>) {
+    use sha2::Digest as _;
+    let mut by_length: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+    for (i, image) in images.iter().enumerate() {
+        let length = fs::metadata(root.join(&image.path)).map_or(0, |m| m.len());
+        by_length.entry(length).or_default().push(i);
+    }
+    for same in by_length.into_values().filter(|same| same.len() > 1) {
+        let mut seen: BTreeMap<Vec<u8>, usize> = BTreeMap::new();
+        for i in same {
+            let Ok(bytes) = fs::read(root.join(&images[i].path)) else { continue };
+            match seen.entry(sha2::Sha256::digest(&bytes).to_vec()) {
+                std::collections::btree_map::Entry::Vacant(new) => {
+                    new.insert(i);
+                }
+                std::collections::btree_map::Entry::Occupied(first) => {
+                    images[i].same_as = Some(*first.get());
+                    let (copy, original) = (images[i].shown(), images[*first.get()].shown());
+                    warnings.push(format!("{copy} is a copy of {original}, byte by byte"));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(names: &[&str]) -> Vec<Vec<(String, Option<u64>)>> {
+        let files: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
+        groups(&files, false)
+            .into_iter()
+            .map(|group| group.into_iter().map(|(path, n)| (path.display().to_string(), n)).collect())
+            .collect()
+    }
+
+    #[test]
+    fn the_number_that_counts_is_the_one_that_differs() {
+        let found = numbers(&["cam0_3.png", "cam0_12.png", "other.png"]);
+        assert_eq!(found[0], [("cam0_3.png".into(), Some(3)), ("cam0_12.png".into(), Some(12))]);
+        assert_eq!(found[1], [("other.png".into(), None)]);
+    }
+
+    #[test]
+    fn names_with_several_numbers_that_differ_count_nothing() {
+        let found = numbers(&["10-01-55.png", "10-02-03.png"]);
+        assert!(found[0].iter().all(|(_, number)| number.is_none()), "{found:?}");
+    }
+}

@@ -1,0 +1,11 @@
+//! One file a format. Each turns files into series of poses, or says that they are none of its.
+
+pub(super) mod easy_handeye;
+pub(super) mod industrial_calibration;
+pub(super) mod intrinsics;
+pub(super) mod moveit;
+pub(super) mod npz;
+pub(super) mod rosbag2;
+pub(super) mod table;
+pub(super) mod tree;
+pub(super) mod visp;

@@ -1,0 +1,41 @@
+//! Other people's recordings as data sets: images with a table, a file to a pose, what other tools write.
+//!
+//! [`open`] recognises what is in a folder ([`Recording`]): streams of images and series of poses as they were written. The
+//! target is then found in the images by the caller ([`Sight::of_corners`]). [`judge`] tries every convention that the files
+//! leave unsaid, and every pairing of images and poses, against what was seen, and lists them with what they leave
+//! ([`Hypothesis`]). [`plan`] and [`write`](write::write) make a dataset folder of one of them.
+//!
+//! Nothing is assumed in silence: what several hypotheses explain equally well is [ambiguous](Verdict::Ambiguous), and a
+//! pairing that images contradict is never one that explains.
+
+mod camera;
+mod conventions;
+mod error;
+mod folder;
+mod formats;
+mod hypothesis;
+mod judge;
+mod pairing;
+mod recognise;
+mod recording;
+mod settings;
+mod sight;
+mod value;
+pub mod write;
+
+#[cfg(all(test, feature = "opencv"))]
+mod golden_tests;
+#[cfg(test)]
+mod tests;
+
+pub use camera::chosen as chosen_camera;
+pub use conventions::{AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm};
+pub use error::ImportError;
+pub use hypothesis::{Convention, Fit, Hypothesis, Source};
+pub use judge::{Judgement, NEED, Sights, TIMES, Verdict, judge};
+pub use pairing::Pairing;
+pub use recognise::open;
+pub use recording::{FoundCamera, ImageFile, Known, Numbers, Recording, Role, Sample, Stated, Stream, Track};
+pub use settings::{KEYS, Settings};
+pub use sight::Sight;
+pub use write::{Plan, plan};

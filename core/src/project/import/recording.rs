@@ -1,0 +1,158 @@
+//! What was found: images and series of poses, as the files have them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use nalgebra::Matrix4;
+use tempfile::TempDir;
+
+use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
+use crate::estimate::handeye::Mode;
+use crate::geometry::camera::Intrinsics;
+use crate::targets::TargetSpec;
+
+/// A recording as it was found. Nothing of it is interpreted yet: numbers stand as they were written.
+#[derive(Debug, Clone, Default)]
+pub struct Recording {
+    /// The folder.
+    pub root: PathBuf,
+    /// What is there and why it is taken for that, one sentence each.
+    pub beliefs: Vec<String>,
+    /// Streams of images: of one naming and one size in one folder, in natural order.
+    pub streams: Vec<Stream>,
+    /// Series of poses.
+    pub tracks: Vec<Track>,
+    /// Cameras that files describe.
+    pub cameras: Vec<FoundCamera>,
+    /// Targets that files describe.
+    pub targets: Vec<(TargetSpec, String)>,
+    /// Where the camera sits, when a file says so, and which one.
+    pub mode: Option<Known<Mode>>,
+    /// What a person should know of the files: doubled ones, some that cannot be read.
+    pub warnings: Vec<String>,
+    /// Where images lie that were unpacked; it goes with the recording.
+    pub scratch: Option<Arc<TempDir>>,
+}
+
+/// Images of one naming in one folder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stream {
+    /// As `--set images=` names it.
+    pub name: String,
+    /// In natural order.
+    pub images: Vec<ImageFile>,
+    /// Width and height in pixels of all of them.
+    pub size: (u32, u32),
+    /// One channel of 16 bits: depth, where there are other images.
+    pub is_depth: bool,
+}
+
+/// An image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImageFile {
+    /// Where it is, below the folder of the recording; of one that was unpacked as a whole.
+    pub path: PathBuf,
+    /// The number in its name that differs from image to image.
+    pub number: Option<u64>,
+    /// An earlier image of the stream with the same bytes, by its index.
+    pub same_as: Option<usize>,
+}
+
+impl ImageFile {
+    /// Its path as text.
+    pub fn shown(&self) -> String {
+        self.path.display().to_string()
+    }
+}
+
+/// What the poses of a series are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Of the robot, by its name or because there is nothing else.
+    Robot,
+    /// Of the target as seen by the camera.
+    Target,
+    /// Either.
+    Unknown,
+}
+
+/// A series of poses.
+#[derive(Debug, Clone)]
+pub struct Track {
+    /// As `--set poses=` names it.
+    pub name: String,
+    /// What they are of.
+    pub role: Role,
+    /// What the file says of its conventions.
+    pub stated: Stated,
+    /// In the order of the file, or of the files' numbers.
+    pub samples: Vec<Sample>,
+}
+
+/// One pose as it was written.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// The image that it names.
+    pub image: Option<String>,
+    /// Its number in the file, or the number of its file.
+    pub number: Option<u64>,
+    /// Where it stands, for messages: file and row.
+    pub place: String,
+    /// The numbers.
+    pub numbers: Numbers,
+    /// Joint values that stand with it, in the unit of the file.
+    pub joints: Vec<f64>,
+}
+
+/// The numbers of a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Numbers {
+    /// x y z and three numbers of a rotation.
+    Angles([f64; 6]),
+    /// x y z and a quaternion of unit length.
+    Quaternion([f64; 7]),
+    /// A rigid transform.
+    Matrix(Matrix4<f64>),
+}
+
+/// What a file says of the conventions of a series, and how it is known. `None`: not stated.
+#[derive(Debug, Clone, Default)]
+pub struct Stated {
+    /// Of lengths.
+    pub length: Option<Known<LengthUnit>>,
+    /// Of angles.
+    pub angle: Option<Known<AngleUnit>>,
+    /// Of rotations: the ones that are left open by what is known.
+    pub rotation: Option<Known<Vec<RotationForm>>>,
+    /// Which way it maps.
+    pub direction: Option<Known<Direction>>,
+    /// Of the direction with the place of the camera, where one follows from the other.
+    pub direction_in: Option<Known<[(Mode, Direction); 2]>>,
+}
+
+/// A fact and why it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Known<T> {
+    /// The fact.
+    pub value: T,
+    /// Who says so.
+    pub why: String,
+}
+
+impl<T> Known<T> {
+    /// By whom.
+    pub fn by(why: impl Into<String>, value: T) -> Self {
+        Self { value, why: why.into() }
+    }
+}
+
+/// A camera that a file describes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundCamera {
+    /// The file, as `--set camera=` names it.
+    pub name: String,
+    /// It. Width and height are 0 where the file does not say them.
+    pub intrinsics: Intrinsics,
+    /// What kind of file it is.
+    pub why: String,
+}

@@ -1,0 +1,241 @@
+//! JSON and YAML as one tree, within bounds: files come from strangers.
+
+use saphyr_parser::{Event, Parser, ScalarStyle};
+
+/// Deepest nesting that is read; recordings have four or five levels.
+const MAX_DEPTH: usize = 32;
+/// Most values in one file: ten thousand poses as 4×4 matrices.
+const MAX_VALUES: usize = 1_000_000;
+
+/// A value of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Value {
+    /// Nothing, or what an alias stands for: what no pose is made of.
+    Other,
+    Flag(bool),
+    Number(f64),
+    Text(String),
+    List(Vec<Value>),
+    /// In the order of the file; a key may be there twice.
+    Map(Vec<(String, Value)>),
+}
+
+impl Value {
+    /// The value of a key, ignoring case.
+    pub fn get(&self, key: &str) -> Option<&Value> {
+        let Self::Map(entries) = self else { return None };
+        entries.iter().find(|(name, _)| name.eq_ignore_ascii_case(key)).map(|(_, value)| value)
+    }
+
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(*number),
+            _ => None,
+        }
+    }
+
+    pub fn text(&self) -> Option<&str> {
+        match self {
+            Self::Text(text) => Some(text),
+            _ => None,
+        }
+    }
+
+    pub fn flag(&self) -> Option<bool> {
+        match self {
+            Self::Flag(flag) => Some(*flag),
+            _ => None,
+        }
+    }
+
+    pub fn list(&self) -> &[Value] {
+        match self {
+            Self::List(items) => items,
+            _ => &[],
+        }
+    }
+
+    /// A whole number that is not negative.
+    pub fn whole(&self) -> Option<u64> {
+        self.number().filter(|n| *n >= 0.0 && n.fract() == 0.0 && *n < 1e15).map(|n| n as u64)
+    }
+
+    /// The numbers of a list of numbers, of lists of them, or of a matrix as OpenCV writes it, at most `most`; `None` when
+    /// anything else is among them.
+    pub fn numbers(&self, most: usize) -> Option<Vec<f64>> {
+        let mut numbers = Vec::new();
+        let whole = match self {
+            Self::Map(_) => self.get("rows").and(self.get("cols")).and(self.get("data"))?,
+            other => other,
+        };
+        collect(whole, most, &mut numbers)?;
+        (!numbers.is_empty()).then_some(numbers)
+    }
+}
+
+fn collect(value: &Value, most: usize, numbers: &mut Vec<f64>) -> Option<()> {
+    match value {
+        Value::Number(number) if numbers.len() < most => {
+            numbers.push(*number);
+            Some(())
+        }
+        Value::List(items) => items.iter().try_for_each(|item| collect(item, most, numbers)),
+        _ => None,
+    }
+}
+
+/// Reads JSON.
+pub(super) fn json(text: &str) -> Result<Value, String> {
+    // serde_json refuses more than 128 levels by itself.
+    let value: serde_json::Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    let mut left = MAX_VALUES;
+    of_json(value, 0, &mut left)
+}
+
+fn of_json(value: serde_json::Value, depth: usize, left: &mut usize) -> Result<Value, String> {
+    use serde_json::Value as J;
+    *left = left.checked_sub(1).ok_or_else(too_many)?;
+    if depth > MAX_DEPTH {
+        return Err(too_deep());
+    }
+    Ok(match value {
+        J::Null => Value::Other,
+        J::Bool(flag) => Value::Flag(flag),
+        J::Number(number) => Value::Number(number.as_f64().unwrap_or(f64::NAN)),
+        J::String(text) => Value::Text(text),
+        J::Array(items) => {
+            Value::List(items.into_iter().map(|item| of_json(item, depth + 1, left)).collect::<Result<_, _>>()?)
+        }
+        J::Object(entries) => Value::Map(
+            entries
+                .into_iter()
+                .map(|(key, value)| Ok((key, of_json(value, depth + 1, left)?)))
+                .collect::<Result<_, String>>()?,
+        ),
+    })
+}
+
+fn too_many() -> String {
+    format!("has more than {MAX_VALUES} values")
+}
+
+fn too_deep() -> String {
+    format!("is nested more than {MAX_DEPTH} levels deep")
+}
+
+/// Reads YAML: the documents of a file, one after the other. Tags are ignored; an alias stands for nothing, so that no
+/// file grows when it is read.
+pub(super) fn yaml(text: &str) -> Result<Vec<Value>, String> {
+    // OpenCV writes a first line that no version of YAML allows: `%YAML:1.0`.
+    let text = match text.strip_prefix("%YAML:") {
+        Some(rest) => rest.split_once('\n').map_or("", |(_, rest)| rest),
+        None => text,
+    };
+    let mut parser = Parser::new_from_str(text);
+    let mut documents = Vec::new();
+    let mut open: Vec<Open> = Vec::new();
+    let mut values = 0;
+    while let Some(event) = parser.next_event() {
+        let (event, _) = event.map_err(|e| e.to_string())?;
+        values += 1;
+        if values > 2 * MAX_VALUES {
+            return Err(too_many());
+        }
+        if open.len() > MAX_DEPTH {
+            return Err(too_deep());
+        }
+        let done = match event {
+            Event::SequenceStart(..) => {
+                open.push(Open::List(Vec::new()));
+                continue;
+            }
+            Event::MappingStart(..) => {
+                open.push(Open::Map(Vec::new(), None));
+                continue;
+            }
+            Event::SequenceEnd | Event::MappingEnd => match open.pop() {
+                Some(Open::List(items)) => Value::List(items),
+                Some(Open::Map(entries, _)) => Value::Map(entries),
+                None => continue,
+            },
+            Event::Scalar(text, style, ..) => scalar(&text, style),
+            Event::Alias(_) => Value::Other,
+            _ => continue,
+        };
+        match open.last_mut() {
+            None => documents.push(done),
+            Some(Open::List(items)) => items.push(done),
+            Some(Open::Map(entries, key)) => match key.take() {
+                Some(key) => entries.push((key, done)),
+                None => *key = Some(as_key(done)),
+            },
+        }
+    }
+    Ok(documents)
+}
+
+/// What is being read.
+enum Open {
+    List(Vec<Value>),
+    /// And the key whose value comes next.
+    Map(Vec<(String, Value)>, Option<String>),
+}
+
+fn as_key(value: Value) -> String {
+    match value {
+        Value::Text(text) => text,
+        Value::Number(number) => number.to_string(),
+        _ => String::new(),
+    }
+}
+
+fn scalar(text: &str, style: ScalarStyle) -> Value {
+    if style != ScalarStyle::Plain {
+        return Value::Text(text.to_owned());
+    }
+    match text {
+        "" | "~" | "null" => Value::Other,
+        "true" | "True" => Value::Flag(true),
+        "false" | "False" => Value::Flag(false),
+        ".nan" | ".NaN" | ".Nan" => Value::Number(f64::NAN),
+        _ => number(text).map_or_else(|| Value::Text(text.to_owned()), Value::Number),
+    }
+}
+
+/// A number as people and programs write it: `1.`, `.5`, `1e-3`, `+2`; not `inf` and not `nan`.
+pub(super) fn number(text: &str) -> Option<f64> {
+    let first = text.bytes().find(|b| !matches!(b, b'+' | b'-'))?;
+    (first.is_ascii_digit() || first == b'.').then(|| text.parse().ok()).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_line_that_opencv_writes_and_its_matrices_are_read() {
+        let text = "%YAML:1.0\n---\nframeCount: 2\nT1_0: !!opencv-matrix\n   rows: 2\n   cols: 2\n   dt: d\n   \
+                    data: [ 1., 2.5e-01,\n       -3., .5 ]\n";
+        let documents = yaml(text).expect("read");
+        let matrix = documents[0].get("T1_0").expect("there").numbers(16);
+        assert_eq!(matrix, Some(vec![1.0, 0.25, -3.0, 0.5]));
+        assert_eq!(documents[0].get("framecount").and_then(Value::whole), Some(2));
+    }
+
+    #[test]
+    fn what_is_nested_too_deep_or_refers_to_itself_is_no_danger() {
+        for text in ["[".repeat(50_000), "- ".repeat(50_000), "{a: ".repeat(50_000)] {
+            assert!(yaml(&text).is_err(), "{} brackets", text.len());
+            assert!(json(&text).is_err());
+        }
+        let laughs = "a: &a [1, 1]\nb: &b [*a, *a]\nc: [*b, *b]\n";
+        let documents = yaml(laughs).expect("read");
+        assert_eq!(documents[0].get("c"), Some(&Value::List(vec![Value::Other, Value::Other])));
+    }
+
+    #[test]
+    fn json_and_yaml_give_the_same_tree() {
+        let text = r#"{"name": "a.png", "nested": {"q": [[1, 0], [0, 1]]}, "pose": [0.1, -2e-3, 3]}"#;
+        assert_eq!(yaml(text).expect("read"), [json(text).expect("read")]);
+    }
+}

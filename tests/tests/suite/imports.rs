@@ -1,0 +1,217 @@
+//! `handeye import` on recordings in other people's formats, compared with an independent reader in Python.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use handeye_core::project::dataset::Dataset;
+use handeye_core::testing::{data_folder, python};
+use handeye_tests::workspace_root;
+use nalgebra::Matrix4;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::solved::{command, text};
+
+/// A recording, and what is known of it.
+struct Sample {
+    /// How the reader in Python calls it.
+    kind: &'static str,
+    /// Files of the reference data; a folder is taken whole.
+    files: &'static [&'static str],
+    arguments: &'static [&'static str],
+    /// Conventions that the first hypothesis has to have.
+    first: &'static [(&'static str, &'static str)],
+    views: usize,
+}
+
+const HAND: &str = "mode=eye_in_hand";
+
+const SAMPLES: [Sample; 7] = [
+    Sample {
+        kind: "table",
+        files: &["importers/table_eye_in_hand"],
+        arguments: &["--target", "11x8x20", "--set", HAND],
+        first: &[
+            ("rotation", "euler_zyx_321"),
+            ("pose", "base_from_tip"),
+            ("length_unit", "m"),
+            ("angle_unit", "rad"),
+            ("pairing", "row+0"),
+        ],
+        views: 20,
+    },
+    Sample {
+        kind: "json_per_pose",
+        files: &["importers/json_per_pose_rgbd/Hand-Eye-Data"],
+        arguments: &["--target", "kind=charuco,columns=4,rows=6,square=33,marker=20,dictionary=6x6_250", "--set", HAND],
+        first: &[("rotation", "rotation_vector"), ("pose", "base_from_tip"), ("length_unit", "m"), ("pairing", "file")],
+        views: 24,
+    },
+    Sample {
+        kind: "easy_handeye2_in_hand",
+        files: &[
+            "importers/easy_handeye2/easy_handeye2_demo_eih.samples",
+            "importers/easy_handeye2/easy_handeye2_demo_eih.calib",
+        ],
+        arguments: &[],
+        first: &[("mode", "eye_in_hand"), ("pose", "base_from_tip")],
+        views: 0,
+    },
+    Sample {
+        kind: "easy_handeye2_on_base",
+        files: &[
+            "importers/easy_handeye2/easy_handeye2_demo_eob.samples",
+            "importers/easy_handeye2/easy_handeye2_demo_eob.calib",
+        ],
+        arguments: &[],
+        first: &[("mode", "eye_to_hand"), ("pose", "tip_from_base")],
+        views: 0,
+    },
+    Sample {
+        kind: "moveit",
+        files: &["moveit_pose_samples/pose_samples.json"],
+        arguments: &[],
+        first: &[("mode", "eye_to_hand"), ("pose", "base_from_tip")],
+        views: 50,
+    },
+    Sample {
+        kind: "visp",
+        files: &["visp_franka_eye_in_hand"],
+        arguments: &[],
+        first: &[("mode", "eye_in_hand"), ("pose", "base_from_tip"), ("rotation", "rotation_vector")],
+        views: 8,
+    },
+    Sample {
+        kind: "blocks_in_mm",
+        files: &["caliban_no_curv/images", "caliban_no_curv/robot_cali.txt"],
+        arguments: &["--target", "14x9x12.1", "--set", HAND],
+        first: &[("pose", "tip_from_base"), ("length_unit", "mm"), ("pairing", "row+0")],
+        views: 20,
+    },
+];
+
+/// The sample without what this project has added to it.
+fn copied(data: &Path, files: &[&str]) -> (TempDir, PathBuf) {
+    let home = tempfile::tempdir().expect("a folder");
+    let folder = home.path().join("recording");
+    std::fs::create_dir(&folder).expect("made");
+    for file in files {
+        let from = data.join(file);
+        let members: Vec<PathBuf> = if from.is_dir() {
+            std::fs::read_dir(&from).expect("listed").map(|entry| entry.expect("entry").path()).collect()
+        } else {
+            vec![from]
+        };
+        for member in members.into_iter().filter(|member| member.is_file()) {
+            let name = member.file_name().expect("a name").to_string_lossy().into_owned();
+            let is_ours =
+                ["dataset.toml", "poses.csv", "corners.csv", "points.csv", "views.json", "README.md"].contains(&&*name);
+            if !is_ours {
+                std::fs::copy(&member, folder.join(name)).expect("copied");
+            }
+        }
+    }
+    (home, folder)
+}
+
+fn matrices(value: &Value) -> BTreeMap<String, Matrix4<f64>> {
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let matrix = |value: &Value| {
+        let rows =
+            value.as_array().expect("rows").iter().flat_map(|row| row.as_array().expect("a row").iter().map(number));
+        Matrix4::from_row_iterator(rows)
+    };
+    let entries = value.as_object().expect("an object");
+    entries.iter().map(|(key, value)| (key.clone(), matrix(value))).collect()
+}
+
+#[test]
+fn recordings_of_others_are_read_as_an_independent_reader_reads_them() {
+    let Some(data) = data_folder() else { return };
+    let Some(python) = python() else { return };
+    for sample in SAMPLES {
+        let (home, folder) = copied(&data, sample.files);
+        let (out, found) = (home.path().join("set"), home.path().join("found.json"));
+        let run = command()
+            .args(["import", "--quiet", "--take", "best"])
+            .args(sample.arguments)
+            .arg("--out")
+            .arg(&out)
+            .arg("--json")
+            .arg(&found)
+            .arg(&folder)
+            .output()
+            .expect("it runs");
+        let (said, errors) = (text(&run.stdout), text(&run.stderr));
+        let what = format!("{} {:?}\n{said}\n{errors}", sample.kind, sample.files);
+        assert!(run.status.success(), "{what}");
+        let found: Value = serde_json::from_slice(&std::fs::read(&found).expect("written")).expect("JSON");
+        let first = &found["judgement"]["hypotheses"][0]["conventions"];
+        for (key, value) in sample.first {
+            assert_eq!(first[key], *value, "{key} of {what}");
+        }
+        let read = Command::new(&python)
+            .arg(workspace_root().join("tests/python/read_recordings.py"))
+            .arg(sample.kind)
+            .arg(&folder)
+            .output()
+            .expect("Python runs");
+        assert!(read.status.success(), "{}", text(&read.stderr));
+        let truth: Value = serde_json::from_slice(&read.stdout).expect("JSON");
+        let (robot, target) =
+            (matrices(&truth["robot"]), truth["target"].as_object().map(|_| matrices(&truth["target"])));
+        let dataset = Dataset::read(&out).unwrap_or_else(|e| panic!("{e}: {what}"));
+        assert!(dataset.entries.len() >= sample.views.max(3), "{} views of {what}", dataset.entries.len());
+        for (i, entry) in dataset.entries.iter().enumerate() {
+            let key = match &entry.image_path {
+                Some(path) => path.file_name().expect("a name").to_string_lossy().into_owned(),
+                None => i.to_string(),
+            };
+            let off = (entry.base_from_tip.expect("a pose").matrix() - robot[&key]).amax();
+            assert!(off < 1e-9, "{key}: {off} of {what}");
+            if let Some(target) = &target {
+                let off = (entry.camera_from_target.expect("a pose").matrix() - target[&key]).amax();
+                assert!(off < 1e-9, "the target of {key}: {off} of {what}");
+            }
+        }
+        let solved = command().args(["calibrate", "--quiet", "--json", "-"]).arg(&out).output().expect("it runs");
+        assert!(solved.status.success(), "{}: {what}", text(&solved.stderr));
+    }
+}
+
+#[test]
+fn what_the_files_leave_open_is_listed_and_nothing_is_written() {
+    let Some(data) = data_folder() else { return };
+    let (home, folder) = copied(&data, &["importers/easy_handeye2/easy_handeye2_demo_eob.samples"]);
+    let out = home.path().join("set");
+    let run = command().arg("import").arg(&folder).arg("--out").arg(&out).output().expect("it runs");
+    assert_eq!(run.status.code(), Some(1), "{}", text(&run.stderr));
+    let said = text(&run.stdout);
+    assert!(said.contains("mode=eye_in_hand") && said.contains("mode=eye_to_hand"), "{said}");
+    assert!(text(&run.stderr).contains("--take"), "{}", text(&run.stderr));
+    assert!(!out.exists(), "nothing is written");
+    let known = ["--set", "mode=eye_to_hand"];
+    let run = command().arg("import").arg(&folder).arg("--out").arg(&out).args(known).output().expect("it runs");
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let described = std::fs::read_to_string(out.join("dataset.toml")).expect("written");
+    assert!(described.contains("mode = eye_to_hand") && described.contains("given with --set"), "{described}");
+    let again = command().arg("import").arg(&folder).arg("--out").arg(&out).args(known).output().expect("it runs");
+    assert_eq!(again.status.code(), Some(2), "a folder with something in it is refused");
+}
+
+#[test]
+fn squares_counted_for_corners_and_a_target_not_named_are_said_with_what_is_seen() {
+    let Some(data) = data_folder() else { return };
+    let (home, folder) = copied(&data, &["visp_franka_eye_in_hand"]);
+    std::fs::remove_file(folder.join("chessboard-data.txt")).expect("the note of the target goes");
+    let out = home.path().join("set");
+    for (arguments, code) in [(&[][..], 1), (&["--target", "10x7x23.6"][..], 1)] {
+        let run =
+            command().arg("import").arg(&folder).arg("--out").arg(&out).args(arguments).output().expect("it runs");
+        let said = text(&run.stderr);
+        assert_eq!(run.status.code(), Some(code), "{said}");
+        assert!(said.contains("9 × 6 inner corners"), "{said}");
+        assert!(!out.exists());
+    }
+}
