@@ -12,7 +12,7 @@ use handeye_core::project::dataset::{Dataset, DatasetError};
 use handeye_core::project::files::image_file::{self, gray_from_rgb};
 use handeye_core::project::session::{CaptureId, Session, SessionError, SessionObservations};
 use handeye_core::targets::observation::Corner;
-use handeye_core::targets::{Grid, TargetSpec};
+use handeye_core::targets::{AprilTag, Grid, TargetSpec};
 use rayon::prelude::*;
 
 /// Why a data set or a session could not be observed.
@@ -140,6 +140,28 @@ pub fn chessboards_in_sight(
     let mut seen = BTreeMap::new();
     for sides in of_each(images.len(), progress, cancel, look)?.into_iter().flatten() {
         *seen.entry(sides).or_default() += 1;
+    }
+    Ok(seen)
+}
+
+/// How many images show each number of the tags of a tag's family. An image that cannot be read shows none.
+///
+/// # Errors
+/// [`ObserveError::Vision`], [`ObserveError::Cancelled`].
+pub fn tags_in_sight(
+    images: &[PathBuf],
+    tag: &AprilTag,
+    progress: Progress<'_>,
+    cancel: &CancelToken,
+) -> Result<BTreeMap<usize, usize>, ObserveError> {
+    let look = |index: usize| {
+        let Ok(image) = image_file::load_gray(&images[index]) else { return Ok(Vec::new()) };
+        let failed = |source| ObserveError::Vision { name: images[index].display().to_string(), source };
+        detect::tags_in_sight(&image, tag).map_err(failed)
+    };
+    let mut seen = BTreeMap::new();
+    for id in of_each(images.len(), progress, cancel, look)?.into_iter().flatten() {
+        *seen.entry(id).or_default() += 1;
     }
     Ok(seen)
 }

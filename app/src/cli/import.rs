@@ -11,7 +11,7 @@ use handeye_core::progress::CancelToken;
 use handeye_core::project::import::{
     self, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Settings, Sight, Sights, Source, Verdict, write,
 };
-use handeye_core::targets::TargetSpec;
+use handeye_core::targets::{AprilTag, TargetSpec};
 use serde_json::json;
 
 use super::output::Output;
@@ -152,7 +152,7 @@ fn import(
     told: &mut Told,
     cancel: &CancelToken,
 ) -> Result<Done, Refused> {
-    let target = target_of(recording, given, told);
+    let target = target_of(recording, given, settings, told, cancel)?;
     let (sights, cameras) = sights(recording, target.as_ref().map(|(t, _)| *t), settings, told, cancel)?;
     let judgement = import::judge(recording, &sights, settings, cancel).map_err(|error| match error {
         ImportError::NoPoses { .. } => Failure::failed(error),
@@ -222,16 +222,75 @@ fn choose(judgement: &Judgement, take: Option<Take>) -> Result<(usize, bool), Fa
 }
 
 /// The target that was given, or the only one that files describe.
-fn target_of(recording: &Recording, given: Option<TargetSpec>, told: &mut Told) -> Option<(TargetSpec, String)> {
+fn target_of(
+    recording: &Recording,
+    given: Option<TargetSpec>,
+    settings: &Settings,
+    told: &mut Told,
+    cancel: &CancelToken,
+) -> Result<Option<(TargetSpec, String)>, Refused> {
     if let Some(target) = given {
-        return Some((target, "given with --target".into()));
+        return Ok(Some((target, "given with --target".into())));
     }
-    let (first, file) = recording.targets.first()?;
-    if recording.targets.iter().any(|(target, _)| target != first) {
+    let Some(first) = recording.targets.first() else { return Ok(None) };
+    if recording.targets.iter().any(|found| found.target != first.target) {
         told.note("the files describe several targets: say which with --target");
-        return None;
+        return Ok(None);
     }
-    Some((*first, format!("described in {file}")))
+    let described = format!("described in {}", first.file);
+    match first.target {
+        TargetSpec::AprilTag(tag) if first.is_id_open => {
+            let id = tag_in_sight(recording, &tag, settings, cancel)?;
+            let why = format!("{described}, its number by the images: the only tag of its family in most of them");
+            Ok(Some((TargetSpec::AprilTag(AprilTag { id, ..tag }), why)))
+        }
+        target => Ok(Some((target, described))),
+    }
+}
+
+/// The number of a tag that files describe without it: of the only one that most images show.
+fn tag_in_sight(
+    recording: &Recording,
+    tag: &AprilTag,
+    settings: &Settings,
+    cancel: &CancelToken,
+) -> Result<usize, Refused> {
+    let streams = wanted_streams(recording, settings);
+    let paths: Vec<PathBuf> = streams.iter().flat_map(|i| recording.image_paths(*i)).collect();
+    let seen = observe::tags_in_sight(&paths, tag, &looked_at, cancel).map_err(Failure::failed)?;
+    let often: Vec<usize> = seen.iter().filter(|(_, count)| 2 * **count > paths.len()).map(|(id, _)| *id).collect();
+    if let [id] = often[..] {
+        return Ok(id);
+    }
+    let listed: Vec<String> = seen.iter().map(|(id, count)| format!("number {id} in {count}")).collect();
+    let listed = if listed.is_empty() { "none".to_owned() } else { listed.join(", ") };
+    Err(Failure::failed(anyhow!(
+        "nothing was written: the files do not say which tag of {} it is, and {} images show {listed}: give it with --target \
+         kind=apriltag,tag={},family={},id=N",
+        tag.family,
+        paths.len(),
+        tag.tag_m * 1e3,
+        tag.family
+    ))
+    .into())
+}
+
+/// The streams in which the target may be.
+fn wanted_streams(recording: &Recording, settings: &Settings) -> Vec<usize> {
+    let is_wanted = |i: &usize| {
+        let stream = &recording.streams[*i];
+        match &settings.images {
+            Some(name) => *name == stream.name,
+            None => !stream.is_depth || recording.streams.iter().all(|s| s.is_depth),
+        }
+    };
+    (0..recording.streams.len()).filter(is_wanted).collect()
+}
+
+fn looked_at(done: usize, of: usize) {
+    if done.is_multiple_of(20) {
+        tracing::info!("{done} of {of} images looked at");
+    }
 }
 
 /// Finds the target in the images of every stream that may be meant.
@@ -244,35 +303,23 @@ fn sights(
 ) -> Result<(Sights, Vec<Option<FoundCamera>>), Refused> {
     let mut sights = Sights { streams: vec![None; recording.streams.len()], target };
     let mut cameras = vec![None; recording.streams.len()];
-    let is_wanted = |i: usize| {
-        let stream = &recording.streams[i];
-        match &settings.images {
-            Some(name) => *name == stream.name,
-            None => !stream.is_depth || recording.streams.iter().all(|s| s.is_depth),
-        }
-    };
-    let wanted: Vec<usize> = (0..recording.streams.len()).filter(|i| is_wanted(*i)).collect();
+    let wanted = wanted_streams(recording, settings);
     if settings.target_poses.is_some() || wanted.is_empty() || recording.tracks.is_empty() {
         return Ok((sights, cameras));
     }
     let mut troubles = Vec::new();
     for i in wanted {
         let stream = &recording.streams[i];
-        let paths: Vec<PathBuf> = stream.images.iter().map(|image| recording.root.join(&image.path)).collect();
-        let progress = |done: usize, of: usize| {
-            if done.is_multiple_of(20) {
-                tracing::info!("{done} of {of} images looked at");
-            }
-        };
+        let paths = recording.image_paths(i);
         let Some(target) = target else {
-            troubles.push(in_sight(&stream.name, &paths, &progress, cancel)?);
+            troubles.push(in_sight(&stream.name, &paths, cancel)?);
             continue;
         };
         let (camera, note) = import::chosen_camera(recording, stream.size, settings).map_err(Failure::unusable)?;
         if let Some(note) = note {
             told.note(note);
         }
-        match observe::observe_images(&paths, &target, &progress, cancel) {
+        match observe::observe_images(&paths, &target, &looked_at, cancel) {
             Err(ObserveError::Cancelled) => return Err(Failure::failed(ObserveError::Cancelled).into()),
             Err(error) => troubles.push(format!("{}: {error}", stream.name)),
             Ok(corners) => {
@@ -307,13 +354,8 @@ fn sights(
 }
 
 /// What chessboards the images of a stream show, in a sentence.
-fn in_sight(
-    name: &str,
-    paths: &[PathBuf],
-    progress: &(dyn Fn(usize, usize) + Sync),
-    cancel: &CancelToken,
-) -> Result<String, Failure> {
-    let seen = observe::chessboards_in_sight(paths, progress, cancel).map_err(Failure::failed)?;
+fn in_sight(name: &str, paths: &[PathBuf], cancel: &CancelToken) -> Result<String, Failure> {
+    let seen = observe::chessboards_in_sight(paths, &looked_at, cancel).map_err(Failure::failed)?;
     let mut sizes: Vec<((usize, usize), usize)> = seen.into_iter().collect::<BTreeMap<_, _>>().into_iter().collect();
     sizes.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let listed: Vec<String> =

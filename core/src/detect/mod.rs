@@ -16,6 +16,7 @@ mod order;
 pub use checkerboard::chessboard_in_sight;
 pub use dispatch::{detect, detect_with};
 pub use error::VisionError;
+pub use markers::april::tags_in_sight;
 pub use markers::charuco::charuco_layout;
 pub use options::{DetectOptions, Effort};
 

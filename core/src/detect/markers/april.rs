@@ -1,5 +1,7 @@
 //! Boards of tags, and single tags.
 
+use std::collections::BTreeSet;
+
 use image::GrayImage;
 use nalgebra::{Matrix3, Vector2};
 
@@ -7,8 +9,8 @@ use super::{Marker, Placed, edges, spread};
 use crate::detect::options::Effort;
 use crate::detect::{VisionError, markers};
 use crate::geometry::planar_pose::homography::{homography, mapped};
-use crate::targets::AprilGrid;
 use crate::targets::observation::Corner;
+use crate::targets::{AprilGrid, AprilTag};
 
 /// Borders that are in use, in bits: Kalibr's, and that of nearly everyone else.
 const BORDERS: [usize; 2] = [2, 1];
@@ -37,6 +39,16 @@ pub(in crate::detect) fn find(
         return Ok(spread::is_enough(&corners, |index| board.point(index)).then_some(corners));
     }
     Ok(None)
+}
+
+/// The numbers of the tags in sight that are of a tag's family and border, ascending, each once.
+///
+/// # Errors
+/// [`VisionError::OpenCv`].
+pub fn tags_in_sight(image: &GrayImage, tag: &AprilTag) -> Result<Vec<usize>, VisionError> {
+    let markers = markers::find(image, tag.family, tag.border_bits.unwrap_or(1), Effort::Thorough)?;
+    let ids: BTreeSet<usize> = markers.into_iter().map(|marker| marker.id).collect();
+    Ok(ids.into_iter().collect())
 }
 
 /// The tags that lie as the board has them, and whether they stand upright, half a turn from how OpenCV reads them; `None`

@@ -27,20 +27,17 @@ pub fn chosen(
         camera
     };
     let fitting: Vec<FoundCamera> = recording.cameras.iter().filter(fits).map(sized).collect();
-    match settings.camera.as_deref() {
-        Some("none") => return Ok((None, None)),
-        Some(name) => {
-            return match fitting.iter().find(|camera| camera.name == name) {
-                Some(camera) => Ok((Some(camera.clone()), None)),
-                None => {
-                    let mut choices: Vec<&str> = fitting.iter().map(|camera| camera.name.as_str()).collect();
-                    choices.push("none");
-                    let choices = format!("{} (of {}×{} px)", choices.join(", "), size.0, size.1);
-                    Err(ImportError::BadChoice { key: "camera".into(), value: name.to_owned(), choices })
-                }
-            };
+    if let Some(name) = settings.camera.as_deref() {
+        if name == "none" {
+            return Ok((None, None));
         }
-        None => {}
+        if let Some(camera) = fitting.iter().find(|camera| camera.name == name) {
+            return Ok((Some(camera.clone()), None));
+        }
+        let mut choices: Vec<&str> = fitting.iter().map(|camera| camera.name.as_str()).collect();
+        choices.push("none");
+        let choices = format!("{} (of {}×{} px)", choices.join(", "), size.0, size.1);
+        return Err(ImportError::BadChoice { key: "camera".into(), value: name.to_owned(), choices });
     }
     let differ = fitting.iter().any(|camera| camera.intrinsics != fitting[0].intrinsics);
     if differ {

@@ -154,7 +154,7 @@ mod slow {
             let recording = open(&folder).unwrap_or_else(|e| panic!("{e}"));
             let mut settings = Settings::default();
             sample.settings.iter().for_each(|s| settings.set(s).expect("a choice"));
-            let target = sample.target.or_else(|| recording.targets.first().map(|(target, _)| *target));
+            let target = sample.target.or_else(|| recording.targets.first().map(|found| found.target));
             let sight = |stream: &Stream| {
                 let target = target.filter(|_| !stream.is_depth)?;
                 let look = |image: &ImageFile| {

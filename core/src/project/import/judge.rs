@@ -95,6 +95,26 @@ struct Case {
     labels: Vec<(Mode, Direction)>,
 }
 
+impl Case {
+    /// The case of a hypothesis, without its pairing.
+    fn of(h: &Hypothesis) -> Self {
+        let class = match (h.mode, h.direction) {
+            (Mode::EyeInHand, direction) => direction,
+            (Mode::EyeToHand, Direction::Forward) => Direction::Inverse,
+            (Mode::EyeToHand, Direction::Inverse) => Direction::Forward,
+        };
+        Self {
+            source: h.source,
+            robot: h.robot,
+            pairing: 0,
+            reading: h.reading,
+            target_reading: h.target_reading,
+            class,
+            labels: Vec::new(),
+        }
+    }
+}
+
 /// A way to pair a source with a series.
 struct Paired {
     source: Source,
@@ -651,7 +671,7 @@ impl Judge<'_> {
             if samples > MOST || images > MOST {
                 continue;
             }
-            let mut case = self.case_of(h);
+            let mut case = Case::of(h);
             let mut pairing = h.pairing.clone();
             for _ in 0..2 {
                 let Some((solution, median_m)) = self.solve_paired(&case, &pairing, MOST_VIEWS, true) else { break };
@@ -675,23 +695,6 @@ impl Judge<'_> {
             out.extend(self.judged_paired(&case, &pairing));
         }
         out
-    }
-
-    fn case_of(&self, h: &Hypothesis) -> Case {
-        let class = match (h.mode, h.direction) {
-            (Mode::EyeInHand, direction) => direction,
-            (Mode::EyeToHand, Direction::Forward) => Direction::Inverse,
-            (Mode::EyeToHand, Direction::Inverse) => Direction::Forward,
-        };
-        Case {
-            source: h.source,
-            robot: h.robot,
-            pairing: 0,
-            reading: h.reading,
-            target_reading: h.target_reading,
-            class,
-            labels: Vec::new(),
-        }
     }
 }
 

@@ -35,7 +35,9 @@ pub use hypothesis::{Convention, Fit, Hypothesis, Source};
 pub use judge::{Judgement, NEED, Sights, TIMES, Verdict, judge};
 pub use pairing::Pairing;
 pub use recognise::open;
-pub use recording::{FoundCamera, ImageFile, Known, Numbers, Recording, Role, Sample, Stated, Stream, Track};
+pub use recording::{
+    FoundCamera, FoundTarget, ImageFile, Known, Numbers, Recording, Role, Sample, Stated, Stream, Track,
+};
 pub use settings::{KEYS, Settings};
 pub use sight::Sight;
 pub use write::{Plan, plan};

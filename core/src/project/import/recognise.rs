@@ -6,7 +6,7 @@ use super::error::ImportError;
 use super::folder;
 use super::formats::tree::{self, LEAST_POSES};
 use super::formats::{easy_handeye, industrial_calibration, intrinsics, moveit, npz, rosbag2, table, visp};
-use super::recording::{Recording, Sample, Stated, Track};
+use super::recording::{FoundTarget, Recording, Sample, Stated, Track};
 use super::value::{self, Value};
 use crate::project::files::own_folder::{DESCRIPTION, is_session};
 
@@ -58,8 +58,9 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
     for camera in &recording.cameras {
         recording.beliefs.push(format!("a camera in {}: {}", camera.name, camera.why));
     }
-    for (target, file) in &recording.targets {
-        recording.beliefs.push(format!("a target in {file}: {target}"));
+    for FoundTarget { target, file, is_id_open } in &recording.targets {
+        let open = if *is_id_open { ", which number of its family is not said" } else { "" };
+        recording.beliefs.push(format!("a target in {file}: {target}{open}"));
     }
     Ok(recording)
 }
@@ -114,16 +115,7 @@ impl Reader<'_> {
             "json" | "yaml" | "yml" | "samples" | "calib" => self.documents(members),
             "csv" | "txt" | "tsv" | "dat" | "" | "log" => self.tables(members),
             "npz" | "npy" => self.arrays(members),
-            "mcap" => {
-                for (file, _) in members {
-                    let name = file.display().to_string();
-                    let read = rosbag2::bytes(&self.root.join(file))
-                        .and_then(|bytes| rosbag2::read(&name, &bytes, &mut self.recording));
-                    if let Err(why) = read {
-                        self.warn(file, format_args!("is not used: {why}"));
-                    }
-                }
-            }
+            "mcap" | "db3" => self.bags(members),
             "xml" => self.each(members, |reader, file, text| {
                 let camera = visp::camera(text, &file.display().to_string());
                 reader.recording.cameras.extend(camera);
@@ -142,6 +134,23 @@ impl Reader<'_> {
                 }
             }
             _ => {}
+        }
+    }
+
+    /// Files of a bag with its description beside them are one; others are each a bag.
+    fn bags(&mut self, members: &[(PathBuf, Option<u64>)]) {
+        let folder = members[0].0.parent().unwrap_or(Path::new(""));
+        let mut bags: Vec<Vec<&Path>> = members.iter().map(|(file, _)| vec![file.as_path()]).collect();
+        if self.root.join(folder).join("metadata.yaml").is_file() {
+            bags = vec![bags.concat()];
+        }
+        for files in bags {
+            let parts: Vec<PathBuf> = files.iter().map(|file| self.root.join(file)).collect();
+            let name = if files.len() > 1 { folder } else { files[0] };
+            let read = rosbag2::read(&name.display().to_string(), &parts, &mut self.recording);
+            if let Err(why) = read {
+                self.warn(files[0], format_args!("is not used: {why}"));
+            }
         }
     }
 
@@ -220,7 +229,7 @@ impl Reader<'_> {
             self.mode(mode);
         }
         if let Some(target) = industrial_calibration::target(value) {
-            self.recording.targets.push((target, name.clone()));
+            self.recording.targets.push(FoundTarget { target, file: name.clone(), is_id_open: false });
         }
         let mut found: Vec<Track> = Vec::new();
         if let Some(tracks) = easy_handeye::samples(value, &name) {
@@ -267,7 +276,7 @@ impl Reader<'_> {
         }
         for (file, _, text) in texts {
             let name = file.display().to_string();
-            self.recording.targets.extend(visp::target(&text).map(|target| (target, name.clone())));
+            self.recording.targets.extend(visp::target(&text, &name));
             self.recording.tracks.extend(table::read(&name, &text));
         }
     }

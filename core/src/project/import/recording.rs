@@ -25,13 +25,20 @@ pub struct Recording {
     /// Cameras that files describe.
     pub cameras: Vec<FoundCamera>,
     /// Targets that files describe.
-    pub targets: Vec<(TargetSpec, String)>,
+    pub targets: Vec<FoundTarget>,
     /// Where the camera sits, when a file says so, and which one.
     pub mode: Option<Known<Mode>>,
     /// What a person should know of the files: doubled ones, some that cannot be read.
     pub warnings: Vec<String>,
-    /// Where images lie that were unpacked; it goes with the recording.
-    pub scratch: Option<Arc<TempDir>>,
+    /// Where images lie that were unpacked; they go with the recording.
+    pub scratch: Vec<Arc<TempDir>>,
+}
+
+impl Recording {
+    /// The files of the images of a stream, by its place in [`streams`](Self::streams).
+    pub fn image_paths(&self, stream: usize) -> Vec<PathBuf> {
+        self.streams[stream].images.iter().map(|image| self.root.join(&image.path)).collect()
+    }
 }
 
 /// Images of one naming in one folder.
@@ -144,6 +151,17 @@ impl<T> Known<T> {
     pub fn by(why: impl Into<String>, value: T) -> Self {
         Self { value, why: why.into() }
     }
+}
+
+/// A target that a file describes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundTarget {
+    /// It.
+    pub target: TargetSpec,
+    /// The file.
+    pub file: String,
+    /// It is a tag and the file does not say which of its family: the images have to.
+    pub is_id_open: bool,
 }
 
 /// A camera that a file describes.

@@ -247,9 +247,8 @@ fn comments(h: &Hypothesis, known: &Context<'_>, left_out: &[String]) -> String 
     if known.is_taken {
         comment(&mut text, "Taken by --take out of several hypotheses; the recording alone did not decide.");
     }
-    match (&known.target, &known.camera) {
-        (Some((_, why)), _) => comment(&mut text, format_args!("  target: {why}")),
-        (None, _) => {}
+    if let Some((_, why)) = &known.target {
+        comment(&mut text, format_args!("  target: {why}"));
     }
     if let Some(camera) = &known.camera {
         comment(&mut text, format_args!("  camera: {}, {}; fixed = false estimates it anew", camera.name, camera.why));

@@ -158,7 +158,7 @@ fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
 /// Four rows of four numbers to a pose, as `numpy.savetxt` and others write them.
 fn blocks(file: &str, rows: &[&Line]) -> Option<Track> {
     let numbers: Vec<Vec<f64>> = rows.iter().map(|row| row.numbers()).collect();
-    if numbers.len() < 4 * LEAST_POSES || numbers.len() % 4 != 0 || numbers.iter().any(|row| row.len() != 4) {
+    if numbers.len() < 4 * LEAST_POSES || !numbers.len().is_multiple_of(4) || numbers.iter().any(|row| row.len() != 4) {
         return None;
     }
     let samples: Option<Vec<Sample>> = numbers

@@ -4,7 +4,7 @@
 use super::tree;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::project::import::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
-use crate::project::import::recording::{FoundCamera, Known, Role, Stated, Track};
+use crate::project::import::recording::{FoundCamera, FoundTarget, Known, Role, Stated, Track};
 use crate::project::import::value::Value;
 use crate::targets::{AprilTag, Dictionary, Grid, TargetSpec};
 
@@ -61,8 +61,9 @@ pub(in crate::project::import) fn camera(text: &str, file: &str) -> Option<Found
     })
 }
 
-/// A target from the note that lies beside ViSP's data: `Chessboard`, `9 x 6`, `square size: 0.0236 m`.
-pub(in crate::project::import) fn target(text: &str) -> Option<TargetSpec> {
+/// A target from the note that lies beside ViSP's data: `Chessboard`, `9 x 6`, `square size: 0.0236 m`, or the family of a tag
+/// and its size, without its number.
+pub(in crate::project::import) fn target(text: &str, file: &str) -> Option<FoundTarget> {
     let lower = text.to_lowercase();
     let size = |key: &str| -> Option<f64> {
         let rest = lower.split_once(key)?.1;
@@ -74,21 +75,19 @@ pub(in crate::project::import) fn target(text: &str) -> Option<TargetSpec> {
             _ => None,
         }
     };
+    let found = |target: TargetSpec, is_id_open: bool| FoundTarget { target, file: file.to_owned(), is_id_open };
     if lower.contains("36h11") {
-        return Some(TargetSpec::AprilTag(AprilTag {
-            tag_m: size("size:")?,
-            id: 0,
-            family: "apriltag_36h11".parse::<Dictionary>().ok()?,
-            border_bits: Some(1),
-        }));
+        let family = "apriltag_36h11".parse::<Dictionary>().ok()?;
+        let tag = AprilTag { tag_m: size("size:")?, id: 0, family, border_bits: Some(1) };
+        return Some(found(TargetSpec::AprilTag(tag), true));
     }
     if !lower.contains("chessboard") {
         return None;
     }
     let words: Vec<&str> = lower.split_whitespace().collect();
-    let counts = words.windows(3).find_map(|w| match w {
+    let (columns, rows) = words.windows(3).find_map(|w| match w {
         [columns, "x", rows] => Some((columns.parse().ok()?, rows.parse().ok()?)),
         _ => None,
     })?;
-    Some(TargetSpec::Chessboard(Grid { columns: counts.0, rows: counts.1, square_m: size("size:")? }))
+    Some(found(TargetSpec::Chessboard(Grid { columns, rows, square_m: size("size:")? }), false))
 }

@@ -1,24 +1,22 @@
-//! Bags of ROS 2 in MCAP: images where the robot stood still, its poses from the tree of frames or from messages of poses,
+//! Bags of ROS 2, in MCAP or SQLite: images where the robot stood still, its poses from the tree of frames or from messages of poses,
 //! joint values, cameras.
 //!
 //! Frames of the tree are composed by the stamps of their transforms; an instant is at rest when nothing that moves in the bag
 //! moves around it. Of each rest one image is taken.
 
 mod cdr;
+mod images;
+mod storage;
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::sync::Arc;
+use std::path::PathBuf;
 
-use image::{DynamicImage, GrayImage, RgbImage};
 use nalgebra::Isometry3;
 
 use super::tree;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::project::import::conventions::{Direction, LengthUnit, RotationForm};
-use crate::project::import::recording::{
-    FoundCamera, ImageFile, Known, Numbers, Recording, Role, Sample, Stated, Stream, Track,
-};
+use crate::project::import::recording::{FoundCamera, Known, Numbers, Recording, Role, Sample, Stated, Track};
 use cdr::Reader;
 
 /// Half of the time around an instant in which nothing may move.
@@ -46,13 +44,15 @@ struct Bag {
     images: BTreeMap<String, Vec<i64>>,
 }
 
-/// Takes what a bag has into a recording.
+/// Takes what a bag has into a recording; `parts` are its files in order.
 ///
 /// # Errors
 /// A sentence, where it is no bag or its images cannot be unpacked.
-pub(in crate::project::import) fn read(file: &str, bytes: &[u8], recording: &mut Recording) -> Result<(), String> {
+pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording: &mut Recording) -> Result<(), String> {
     let mut bag = Bag::default();
-    visit(bytes, |topic, kind, data, log_ns| bag.take(topic, kind, data, log_ns))?;
+    for part in parts {
+        storage::visit(part, &mut |message| bag.take(&message))?;
+    }
     bag.sort();
     if bag.images.is_empty() {
         return Err("has no images".into());
@@ -72,7 +72,7 @@ pub(in crate::project::import) fn read(file: &str, bytes: &[u8], recording: &mut
     if chosen.is_empty() {
         return Err("has no three instants at which the robot stood still, by its transforms or joint values".into());
     }
-    unpack(file, bytes, &chosen, recording)?;
+    images::unpack(file, parts, &chosen, recording)?;
     for (topic, stamps) in &chosen {
         recording.tracks.extend(bag.tracks(file, topic, stamps));
     }
@@ -80,24 +80,10 @@ pub(in crate::project::import) fn read(file: &str, bytes: &[u8], recording: &mut
     Ok(())
 }
 
-/// Calls with topic, type, data and time of every message.
-fn visit(bytes: &[u8], mut each: impl FnMut(&str, &str, &[u8], i64)) -> Result<(), String> {
-    let stream = mcap::MessageStream::new(bytes).map_err(|e| e.to_string())?;
-    for message in stream {
-        // A bag that was cut has what came before.
-        let Ok(message) = message else { break };
-        let Some(schema) = &message.channel.schema else { continue };
-        if message.channel.message_encoding == "cdr" {
-            each(&message.channel.topic, &schema.name, &message.data, message.log_time as i64);
-        }
-    }
-    Ok(())
-}
-
 impl Bag {
-    fn take(&mut self, topic: &str, kind: &str, data: &[u8], log_ns: i64) {
+    fn take(&mut self, message: &storage::Message) {
         // A message that is not as its type says is left out.
-        let _read = self.read(topic, kind, data, log_ns);
+        let _read = self.read(message.topic, message.kind, message.data, message.log_ns);
     }
 
     fn read(&mut self, topic: &str, kind: &str, data: &[u8], log_ns: i64) -> Option<()> {
@@ -182,7 +168,7 @@ impl Bag {
         let mut rest: Vec<i64> = Vec::new();
         for stamp in stamps {
             let goes_on = rest.first().is_none_or(|first| self.is_still(*first, *stamp));
-            if self.is_still(stamp - REST_NS, stamp + REST_NS) && goes_on {
+            if self.is_still(stamp.saturating_sub(REST_NS), stamp.saturating_add(REST_NS)) && goes_on {
                 rest.push(*stamp);
                 continue;
             }
@@ -258,11 +244,11 @@ impl Bag {
             let pose = (*pose)?;
             let (t, q) = (pose.translation.vector, pose.rotation.coords);
             let joints = self.joints.values().find_map(|values| {
-                let at = values.iter().min_by_key(|(other, _)| (other - stamp).abs())?;
-                ((at.0 - stamp).abs() < REST_NS).then(|| at.1.clone())
+                let at = values.iter().min_by_key(|(other, _)| other.abs_diff(*stamp))?;
+                (at.0.abs_diff(*stamp) < REST_NS.unsigned_abs()).then(|| at.1.clone())
             });
             Some(Sample {
-                image: Some(image_name(topic, *stamp)),
+                image: Some(images::name(topic, *stamp)),
                 number: None,
                 place: format!("{file}, {name} at {:.3} s", *stamp as f64 * 1e-9),
                 numbers: Numbers::Quaternion([t.x, t.y, t.z, q.x, q.y, q.z, q.w]),
@@ -344,118 +330,8 @@ fn between<T>(values: &[(i64, T)], from: i64, to: i64) -> &[(i64, T)] {
 
 /// The pose nearest in time, if it is near.
 fn nearest(moving: &[(i64, Isometry3<f64>)], stamp: i64) -> Option<Isometry3<f64>> {
-    let within = between(moving, stamp - REST_NS, stamp + REST_NS);
-    within.iter().min_by_key(|(other, _)| (other - stamp).abs()).map(|(_, pose)| *pose)
-}
-
-fn image_name(topic: &str, stamp: i64) -> String {
-    let topic: String = topic.trim_matches('/').chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
-    format!("{topic}_{stamp}.png")
-}
-
-/// Writes the chosen images into a folder of this machine's temporary files, which goes with the recording.
-fn unpack(
-    file: &str,
-    bytes: &[u8],
-    chosen: &BTreeMap<String, Vec<i64>>,
-    recording: &mut Recording,
-) -> Result<(), String> {
-    let scratch = tempfile::tempdir().map_err(|e| e.to_string())?;
-    let mut streams: BTreeMap<String, Stream> = BTreeMap::new();
-    let mut troubles = Vec::new();
-    visit(bytes, |topic, kind, data, log_ns| {
-        let Some(stamps) = chosen.get(topic) else { return };
-        let found = stamp_of(data, log_ns).filter(|stamp| stamps.binary_search(stamp).is_ok());
-        let Some(stamp) = found else { return };
-        let path = scratch.path().join(image_name(topic, stamp));
-        let saved = decoded(kind, data).and_then(|image| image.save(&path).map(|()| image).map_err(|e| e.to_string()));
-        match saved {
-            Ok(image) => {
-                let stream = streams.entry(topic.to_owned()).or_insert_with(|| Stream {
-                    name: topic.to_owned(),
-                    images: Vec::new(),
-                    size: (image.width(), image.height()),
-                    is_depth: matches!(image, DynamicImage::ImageLuma16(_)),
-                });
-                stream.images.push(ImageFile { path, number: None, same_as: None });
-            }
-            Err(why) => troubles.push(format!("{file}: an image on {topic} is not used: {why}")),
-        }
-    })?;
-    troubles.truncate(5);
-    recording.warnings.extend(troubles);
-    for mut stream in streams.into_values() {
-        stream.images.sort_by(|a, b| a.path.cmp(&b.path));
-        stream.images.dedup();
-        recording.streams.push(stream);
-    }
-    recording.scratch = Some(Arc::new(scratch));
-    Ok(())
-}
-
-fn stamp_of(data: &[u8], log_ns: i64) -> Option<i64> {
-    let stamp = Reader::new(data)?.header()?.stamp_ns;
-    Some(if stamp == 0 { log_ns } else { stamp })
-}
-
-fn decoded(kind: &str, data: &[u8]) -> Result<DynamicImage, String> {
-    let short = || "its message ends early".to_owned();
-    let mut reader = Reader::new(data).ok_or_else(short)?;
-    reader.header().ok_or_else(short)?;
-    if kind.ends_with("CompressedImage") {
-        reader.text().ok_or_else(short)?;
-        let bytes = reader.blob().ok_or_else(short)?;
-        return crate::project::files::image_file::decode_bytes(bytes).map_err(|e| e.to_string());
-    }
-    let sizes = (reader.u32(), reader.u32());
-    let (Some(height), Some(width)) = sizes else { return Err(short()) };
-    let encoding = reader.text().ok_or_else(short)?;
-    reader.u8().ok_or_else(short)?;
-    let step = reader.u32().ok_or_else(short)? as usize;
-    let bytes = reader.blob().ok_or_else(short)?;
-    raw(&encoding, (width, height), step, bytes)
-}
-
-/// An image of which every row takes `step` bytes.
-fn raw(encoding: &str, (width, height): (u32, u32), step: usize, bytes: &[u8]) -> Result<DynamicImage, String> {
-    let channels = match encoding {
-        "rgb8" | "bgr8" | "8UC3" => 3,
-        "rgba8" | "bgra8" => 4,
-        "mono8" | "8UC1" => 1,
-        other => return Err(format!("its encoding is {other:?}: rgb8, bgr8, rgba8, bgra8 and mono8 are read")),
-    };
-    let wide = width as usize * channels;
-    if wide == 0 || height == 0 || step < wide {
-        return Err("its size is none".into());
-    }
-    let mut pixels = Vec::new();
-    for row in 0..height as usize {
-        let start = row.checked_mul(step).ok_or("its size is none")?;
-        let row = bytes.get(start..start.saturating_add(wide)).ok_or("its message ends early")?;
-        match encoding {
-            "bgr8" | "8UC3" | "bgra8" => pixels.extend(row.chunks_exact(channels).flat_map(|p| [p[2], p[1], p[0]])),
-            "rgba8" => pixels.extend(row.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]])),
-            _ => pixels.extend_from_slice(row),
-        }
-    }
-    let none = "its size is none".to_owned();
-    if channels == 1 {
-        GrayImage::from_raw(width, height, pixels).map(DynamicImage::ImageLuma8).ok_or(none)
-    } else {
-        RgbImage::from_raw(width, height, pixels).map(DynamicImage::ImageRgb8).ok_or(none)
-    }
-}
-
-/// Most bytes of a bag.
-const MOST_BYTES: u64 = 1 << 32;
-
-/// The bytes of a bag that is not too large.
-pub(in crate::project::import) fn bytes(path: &Path) -> Result<Vec<u8>, String> {
-    let found = std::fs::metadata(path).map_err(|e| e.to_string())?;
-    if found.len() > MOST_BYTES {
-        return Err(format!("has more than {MOST_BYTES} bytes: cut it to the calibration with `ros2 bag convert`"));
-    }
-    std::fs::read(path).map_err(|e| e.to_string())
+    let within = between(moving, stamp.saturating_sub(REST_NS), stamp.saturating_add(REST_NS));
+    within.iter().min_by_key(|(other, _)| other.abs_diff(stamp)).map(|(_, pose)| *pose)
 }
 
 #[cfg(test)]

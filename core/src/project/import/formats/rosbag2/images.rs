@@ -1,0 +1,116 @@
+//! Images of a bag.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use image::{DynamicImage, GrayImage, RgbImage};
+
+use super::cdr::Reader;
+use super::storage::visit;
+use crate::project::import::recording::{ImageFile, Recording, Stream};
+
+/// The file of the image of a topic with a stamp.
+pub(super) fn name(topic: &str, stamp: i64) -> String {
+    let topic: String = topic.trim_matches('/').chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+    format!("{topic}_{stamp}.png")
+}
+
+/// Writes the chosen images into a folder of this machine's temporary files, which goes with the recording.
+///
+/// # Errors
+/// A sentence, where nothing can be written there.
+pub(super) fn unpack(
+    file: &str,
+    parts: &[PathBuf],
+    chosen: &BTreeMap<String, Vec<i64>>,
+    recording: &mut Recording,
+) -> Result<(), String> {
+    let scratch = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let mut streams: BTreeMap<String, Stream> = BTreeMap::new();
+    let mut troubles = Vec::new();
+    for part in parts {
+        visit(part, &mut |message| {
+            let Some(stamps) = chosen.get(message.topic) else { return };
+            let found = stamp_of(message.data, message.log_ns).filter(|stamp| stamps.binary_search(stamp).is_ok());
+            let Some(stamp) = found else { return };
+            let path = scratch.path().join(name(message.topic, stamp));
+            let saved = decoded(message.kind, message.data)
+                .and_then(|image| image.save(&path).map(|()| image).map_err(|e| e.to_string()));
+            match saved {
+                Ok(image) => {
+                    let stream = streams.entry(message.topic.to_owned()).or_insert_with(|| Stream {
+                        name: message.topic.to_owned(),
+                        images: Vec::new(),
+                        size: (image.width(), image.height()),
+                        is_depth: matches!(image, DynamicImage::ImageLuma16(_)),
+                    });
+                    stream.images.push(ImageFile { path, number: None, same_as: None });
+                }
+                Err(why) => troubles.push(format!("{file}: an image on {} is not used: {why}", message.topic)),
+            }
+        })?;
+    }
+    troubles.truncate(5);
+    recording.warnings.extend(troubles);
+    for mut stream in streams.into_values() {
+        stream.images.sort_by(|a, b| a.path.cmp(&b.path));
+        stream.images.dedup();
+        recording.streams.push(stream);
+    }
+    recording.scratch.push(Arc::new(scratch));
+    Ok(())
+}
+
+fn stamp_of(data: &[u8], log_ns: i64) -> Option<i64> {
+    let stamp = Reader::new(data)?.header()?.stamp_ns;
+    Some(if stamp == 0 { log_ns } else { stamp })
+}
+
+fn decoded(kind: &str, data: &[u8]) -> Result<DynamicImage, String> {
+    let short = || "its message ends early".to_owned();
+    let mut reader = Reader::new(data).ok_or_else(short)?;
+    reader.header().ok_or_else(short)?;
+    if kind.ends_with("CompressedImage") {
+        reader.text().ok_or_else(short)?;
+        let bytes = reader.blob().ok_or_else(short)?;
+        return crate::project::files::image_file::decode_bytes(bytes).map_err(|e| e.to_string());
+    }
+    let sizes = (reader.u32(), reader.u32());
+    let (Some(height), Some(width)) = sizes else { return Err(short()) };
+    let encoding = reader.text().ok_or_else(short)?;
+    reader.u8().ok_or_else(short)?;
+    let step = reader.u32().ok_or_else(short)? as usize;
+    let bytes = reader.blob().ok_or_else(short)?;
+    raw(&encoding, (width, height), step, bytes)
+}
+
+/// An image of which every row takes `step` bytes.
+fn raw(encoding: &str, (width, height): (u32, u32), step: usize, bytes: &[u8]) -> Result<DynamicImage, String> {
+    let channels = match encoding {
+        "rgb8" | "bgr8" | "8UC3" => 3,
+        "rgba8" | "bgra8" => 4,
+        "mono8" | "8UC1" => 1,
+        other => return Err(format!("its encoding is {other:?}: rgb8, bgr8, rgba8, bgra8 and mono8 are read")),
+    };
+    let wide = width as usize * channels;
+    if wide == 0 || height == 0 || step < wide {
+        return Err("its size is none".into());
+    }
+    let mut pixels = Vec::new();
+    for row in 0..height as usize {
+        let start = row.checked_mul(step).ok_or("its size is none")?;
+        let row = bytes.get(start..start.saturating_add(wide)).ok_or("its message ends early")?;
+        match encoding {
+            "bgr8" | "8UC3" | "bgra8" => pixels.extend(row.chunks_exact(channels).flat_map(|p| [p[2], p[1], p[0]])),
+            "rgba8" => pixels.extend(row.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]])),
+            _ => pixels.extend_from_slice(row),
+        }
+    }
+    let none = "its size is none".to_owned();
+    if channels == 1 {
+        GrayImage::from_raw(width, height, pixels).map(DynamicImage::ImageLuma8).ok_or(none)
+    } else {
+        RgbImage::from_raw(width, height, pixels).map(DynamicImage::ImageRgb8).ok_or(none)
+    }
+}
