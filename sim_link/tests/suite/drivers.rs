@@ -100,17 +100,22 @@ fn a_motion_is_stopped_on_its_way_by_whoever_asks_for_it() {
     driver.first_state(PATIENCE, &CancelToken::default()).unwrap();
     driver.arm(true).unwrap();
     let goal = Goal::Joints(JointValues::from_fn(6, |_| 3.0));
+    let is_seen = |moving: bool| {
+        let until = Instant::now() + PATIENCE;
+        while driver.state().unwrap().is_none_or(|now| now.reading.moving != Some(moving)) {
+            assert!(Instant::now() < until, "moving: {moving} is not reported");
+            std::thread::yield_now();
+        }
+    };
     for by_another_thread in [false, true] {
+        // What it reported last may be of the motion before.
+        is_seen(false);
         let cancel = CancelToken::default();
         let moving = std::thread::spawn({
             let (driver, cancel) = (driver.clone(), cancel.clone());
             move || driver.move_to(&goal, 0.05, &cancel)
         });
-        let until = Instant::now() + PATIENCE;
-        while driver.state().unwrap().is_none_or(|now| now.reading.moving != Some(true)) {
-            assert!(Instant::now() < until, "it does not begin to move");
-            std::thread::yield_now();
-        }
+        is_seen(true);
         if by_another_thread {
             driver.stop().unwrap();
         } else {
