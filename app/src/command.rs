@@ -23,11 +23,11 @@ use serde::{Deserialize, Serialize};
 use crate::by_hand::state::HandChoice;
 use crate::guided::state::ChoiceOutcome;
 use crate::model::{
-    BoardMotion, CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, DepthScale,
-    Dialog, FolderListing, FollowStatus, FollowWish, FrameImages, FrameInfo, ImagePoint, JobId, Jog, JogSettings, Link,
-    LinkState, LiveDetection, MotionGoal, MotionId, MotionOutcome, Observed, Overlays, Pane, Preview, RecentSession,
-    RerunState, RobotState, RotationFormat, SceneView, SessionState, Severity, Solved, Step, ThemeChoice, Tracked,
-    Viewport, WorkBox, Written,
+    BoardMotion, CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellFacts, CellSource, Converted,
+    DepthScale, Dialog, FolderListing, FollowStatus, FollowWish, Found, FrameImages, FrameInfo, ImagePoint, ImportWork,
+    JobId, Jog, JogSettings, Link, LinkState, LiveDetection, MotionGoal, MotionId, MotionOutcome, Observed, Overlays,
+    Pane, Preview, RecentSession, RerunState, RobotState, RotationFormat, SceneView, SessionState, Severity, Solved,
+    Step, ThemeChoice, Tracked, Viewport, WorkBox, Written,
 };
 use crate::text::{Language, Text};
 
@@ -63,6 +63,19 @@ pub enum Command {
     JogHeld(Jog),
     /// It was released.
     JogReleased,
+    /// The target of the recording that is imported, as it is typed; empty: as its files have it.
+    SetImportTarget(String),
+    /// A convention of that recording, which the data need not tell.
+    FixConvention {
+        /// Its key, as `handeye import --set` has it.
+        key: String,
+        /// Its value; `None`: as the data tell.
+        value: Option<String>,
+    },
+    /// Take this hypothesis about the recording, by its place in the list.
+    ChooseHypothesis(usize),
+    /// Make a session of the recording.
+    ConvertRecording,
     /// How the tip is jogged.
     SetJog(JogSettings),
     /// Take a capture as soon as robot and image have settled.
@@ -339,6 +352,33 @@ pub enum Event {
     SessionFailed {
         /// Why.
         why: Text,
+    },
+    /// There is neither a session nor a data set: it may be somebody's recording.
+    NoSession(PathBuf),
+    /// How far a recording is looked at, or converted.
+    ImportProgress {
+        /// The number of the request.
+        number: u64,
+        /// How far.
+        work: ImportWork,
+    },
+    /// A recording was looked at.
+    #[serde(skip)]
+    RecordingLooked {
+        /// The number of the request.
+        number: u64,
+        /// What was found; `None` where its files cannot be read.
+        found: Option<Arc<Found>>,
+        /// Why no more was.
+        trouble: Option<Text>,
+    },
+    /// A recording was made a data set, or cannot be.
+    #[serde(skip)]
+    RecordingConverted {
+        /// The number of the request.
+        number: u64,
+        /// The data set.
+        converted: Result<Arc<Converted>, Text>,
     },
     /// A capture is on the disk.
     Captured {

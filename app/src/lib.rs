@@ -10,6 +10,7 @@ pub mod connect;
 pub mod export;
 pub mod gui;
 pub mod guided;
+pub mod import;
 pub mod keep_out;
 pub mod limits;
 pub mod live;

@@ -74,6 +74,8 @@ pub(crate) struct Numbers {
     pub(crate) plan: Option<MotionId>,
     /// The request for a view for a person to bring about.
     pub(crate) view: u64,
+    /// The request about a recording.
+    pub(crate) import: u64,
 }
 
 impl App {
@@ -227,6 +229,10 @@ impl App {
             Command::SetCamera(camera) => self.set_camera(camera),
             Command::NewSession(folder) => self.new_session(folder),
             Command::Open(folder) => self.open(folder),
+            Command::SetImportTarget(typed) => self.set_import_target(typed),
+            Command::FixConvention { key, value } => self.fix_convention(key, value),
+            Command::ChooseHypothesis(place) => self.choose_hypothesis(place),
+            Command::ConvertRecording => self.convert_recording(),
             Command::SaveAs(folder) => self.save_as(folder),
             Command::ListFolder(folder) => self.list_folder(folder),
             Command::OpenFolder(folder) => self.open_folder(folder),
@@ -299,6 +305,10 @@ impl App {
             Event::Document(state) => self.document_changed(*state),
             Event::SessionOpened { exported } => self.session_opened(exported),
             Event::SessionFailed { why } => self.session_failed(why),
+            Event::NoSession(path) => self.import(path),
+            Event::ImportProgress { number, work } => self.import_progress(number, work),
+            Event::RecordingLooked { number, found, trouble } => self.recording_looked(number, found, trouble),
+            Event::RecordingConverted { number, converted } => self.recording_converted(number, converted),
             Event::Observed { id, target, observed } => self.observed(id, target, observed),
             Event::Review { id, images } => self.reviewed(id, images),
             Event::Folder(listing) => self.model.folder = Some(listing),

@@ -6,17 +6,15 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use clap::Args;
-use handeye_core::estimate::CameraKnowledge;
 use handeye_core::progress::CancelToken;
-use handeye_core::project::import::{
-    self, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Settings, Sight, Sights, Source, Verdict, write,
-};
-use handeye_core::targets::{AprilTag, TargetSpec};
+use handeye_core::project::import::{self, Hypothesis, ImportError, Judgement, Recording, Settings, Verdict, write};
+use handeye_core::targets::TargetSpec;
+use handeye_core::wording::English;
 use serde_json::json;
 
 use super::output::Output;
 use super::{Failure, out, solve, target};
-use crate::observe::{self, ObserveError};
+use crate::import::understand::{self, NotUnderstood};
 
 /// At the end of its help.
 pub fn after_help() -> String {
@@ -152,15 +150,19 @@ fn import(
     told: &mut Told,
     cancel: &CancelToken,
 ) -> Result<Done, Refused> {
-    let target = target_of(recording, given, settings, told, cancel)?;
-    let (sights, cameras) = sights(recording, target.as_ref().map(|(t, _)| *t), settings, told, cancel)?;
-    let judgement = import::judge(recording, &sights, settings, cancel).map_err(|error| match error {
-        ImportError::NoPoses { .. } => Failure::failed(error),
-        error => Failure::unusable(error),
-    })?;
-    if cancel.is_cancelled() {
-        return Err(Failure::failed(anyhow!("cancelled")).into());
+    let refused = |error: NotUnderstood| match error {
+        NotUnderstood::Import(ImportError::NoPoses { .. }) => Failure::failed(error),
+        NotUnderstood::Import(error) => Failure::unusable(error),
+        NotUnderstood::Target(_) => Failure::failed(anyhow!("nothing was written: {error}; --target gives it")),
+        error => Failure::failed(error),
+    };
+    let looked = understand::look(recording, given, settings, &looked_at, cancel).map_err(refused)?;
+    for (stream, seen, images) in &looked.seen {
+        let target = looked.target.as_ref().map(|(target, _)| target.to_string()).unwrap_or_default();
+        told.line(format_args!("{target} found in {seen} of {images} images {stream}"));
     }
+    looked.notes.iter().for_each(|note| told.note(note.say(English)));
+    let judgement = looked.judge(recording, settings, cancel).map_err(refused)?;
     told.text.push_str(&listed(recording, &judgement));
     let mut findings = as_json(recording, &judgement);
     let refuse = |failure: Failure, findings: serde_json::Value| Refused { failure, findings: Some(findings) };
@@ -170,11 +172,7 @@ fn import(
         Err(failure) => return Err(refuse(failure, findings)),
     };
     let h = &judgement.hypotheses[index];
-    let camera = match h.source {
-        Source::Stream(i) => cameras.get(i).cloned().flatten(),
-        Source::Track(_) => None,
-    };
-    let known = write::Context { recording, judgement: &judgement, settings, target, camera, is_taken };
+    let known = looked.context(recording, &judgement, settings, h, is_taken);
     if args.link {
         // Names are relative to the folder, which has to be there to be a place.
         std::fs::create_dir_all(folder).map_err(|e| Failure::unusable(anyhow!("{}: {e}", folder.display())))?;
@@ -221,153 +219,10 @@ fn choose(judgement: &Judgement, take: Option<Take>) -> Result<(usize, bool), Fa
     }
 }
 
-/// The target that was given, or the only one that files describe.
-fn target_of(
-    recording: &Recording,
-    given: Option<TargetSpec>,
-    settings: &Settings,
-    told: &mut Told,
-    cancel: &CancelToken,
-) -> Result<Option<(TargetSpec, String)>, Refused> {
-    if let Some(target) = given {
-        return Ok(Some((target, "given with --target".into())));
-    }
-    let Some(first) = recording.targets.first() else { return Ok(None) };
-    if recording.targets.iter().any(|found| found.target != first.target) {
-        told.note("the files describe several targets: say which with --target");
-        return Ok(None);
-    }
-    let described = format!("described in {}", first.file);
-    match first.target {
-        TargetSpec::AprilTag(tag) if first.is_id_open => {
-            let id = tag_in_sight(recording, &tag, settings, cancel)?;
-            let why = format!("{described}, its number by the images: the only tag of its family in most of them");
-            Ok(Some((TargetSpec::AprilTag(AprilTag { id, ..tag }), why)))
-        }
-        target => Ok(Some((target, described))),
-    }
-}
-
-/// The number of a tag that files describe without it: of the only one that most images show.
-fn tag_in_sight(
-    recording: &Recording,
-    tag: &AprilTag,
-    settings: &Settings,
-    cancel: &CancelToken,
-) -> Result<usize, Refused> {
-    let streams = wanted_streams(recording, settings);
-    let paths: Vec<PathBuf> = streams.iter().flat_map(|i| recording.image_paths(*i)).collect();
-    let seen = observe::tags_in_sight(&paths, tag, &looked_at, cancel).map_err(Failure::failed)?;
-    let often: Vec<usize> = seen.iter().filter(|(_, count)| 2 * **count > paths.len()).map(|(id, _)| *id).collect();
-    if let [id] = often[..] {
-        return Ok(id);
-    }
-    let listed: Vec<String> = seen.iter().map(|(id, count)| format!("number {id} in {count}")).collect();
-    let listed = if listed.is_empty() { "none".to_owned() } else { listed.join(", ") };
-    Err(Failure::failed(anyhow!(
-        "nothing was written: the files do not say which tag of {} it is, and {} images show {listed}: give it with --target \
-         kind=apriltag,tag={},family={},id=N",
-        tag.family,
-        paths.len(),
-        tag.tag_m * 1e3,
-        tag.family
-    ))
-    .into())
-}
-
-/// The streams in which the target may be.
-fn wanted_streams(recording: &Recording, settings: &Settings) -> Vec<usize> {
-    let is_wanted = |i: &usize| {
-        let stream = &recording.streams[*i];
-        match &settings.images {
-            Some(name) => *name == stream.name,
-            None => !stream.is_depth || recording.streams.iter().all(|s| s.is_depth),
-        }
-    };
-    (0..recording.streams.len()).filter(is_wanted).collect()
-}
-
 fn looked_at(done: usize, of: usize) {
     if done.is_multiple_of(20) {
         tracing::info!("{done} of {of} images looked at");
     }
-}
-
-/// Finds the target in the images of every stream that may be meant.
-fn sights(
-    recording: &Recording,
-    target: Option<TargetSpec>,
-    settings: &Settings,
-    told: &mut Told,
-    cancel: &CancelToken,
-) -> Result<(Sights, Vec<Option<FoundCamera>>), Refused> {
-    let mut sights = Sights { streams: vec![None; recording.streams.len()], target };
-    let mut cameras = vec![None; recording.streams.len()];
-    let wanted = wanted_streams(recording, settings);
-    if settings.target_poses.is_some() || wanted.is_empty() || recording.tracks.is_empty() {
-        return Ok((sights, cameras));
-    }
-    let mut troubles = Vec::new();
-    for i in wanted {
-        let stream = &recording.streams[i];
-        let paths = recording.image_paths(i);
-        let Some(target) = target else {
-            troubles.push(in_sight(&stream.name, &paths, cancel)?);
-            continue;
-        };
-        let (camera, note) = import::chosen_camera(recording, stream.size, settings).map_err(Failure::unusable)?;
-        if let Some(note) = note {
-            told.note(note);
-        }
-        match observe::observe_images(&paths, &target, &looked_at, cancel) {
-            Err(ObserveError::Cancelled) => return Err(Failure::failed(ObserveError::Cancelled).into()),
-            Err(error) => troubles.push(format!("{}: {error}", stream.name)),
-            Ok(corners) => {
-                let seen = corners.iter().flatten().count();
-                told.line(format_args!("{target} found in {seen} of {} images {}", corners.len(), stream.name));
-                let known = camera.as_ref().map_or(CameraKnowledge::NOTHING, |c| CameraKnowledge::Fixed(c.intrinsics));
-                match Sight::of_corners(target, stream.size, known, &corners) {
-                    Ok(sight) => {
-                        sights.streams[i] = Some(sight);
-                        cameras[i] = camera;
-                    }
-                    Err(why) => troubles.push(format!("{}: {why}", stream.name)),
-                }
-            }
-        }
-    }
-    if sights.streams.iter().any(Option::is_some) {
-        for trouble in troubles {
-            told.note(trouble);
-        }
-        return Ok((sights, cameras));
-    }
-    let has_target_poses = recording.tracks.iter().any(|track| track.role == import::Role::Target);
-    if has_target_poses {
-        for trouble in troubles {
-            told.note(trouble);
-        }
-        return Ok((sights, cameras));
-    }
-    let what = if target.is_some() { "the target was not found" } else { "the files do not say what was looked at" };
-    Err(Failure::failed(anyhow!("nothing was written: {what}: {}", troubles.join("; "))).into())
-}
-
-/// What chessboards the images of a stream show, in a sentence.
-fn in_sight(name: &str, paths: &[PathBuf], cancel: &CancelToken) -> Result<String, Failure> {
-    let seen = observe::chessboards_in_sight(paths, &looked_at, cancel).map_err(Failure::failed)?;
-    let mut sizes: Vec<((usize, usize), usize)> = seen.into_iter().collect::<BTreeMap<_, _>>().into_iter().collect();
-    sizes.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    let listed: Vec<String> =
-        sizes.iter().take(4).map(|((c, r), count)| format!("{c} × {r} inner corners in {count}")).collect();
-    Ok(match sizes.first() {
-        None => format!("{name} shows no chessboard: name the target with --target"),
-        Some(((columns, rows), _)) => format!(
-            "{name} shows chessboards of {} of {} images: give it with its square in mm, --target {columns}x{rows}xMM",
-            listed.join(", "),
-            paths.len()
-        ),
-    })
 }
 
 /// What is in the folder.

@@ -22,7 +22,7 @@ mod record;
 pub mod rerun_arg;
 mod shared;
 mod solve;
-mod target;
+pub(crate) mod target;
 mod track;
 
 use std::io::{IsTerminal as _, Write as _};

@@ -26,6 +26,9 @@ impl App {
 
     pub(crate) fn set_dialog(&mut self, dialog: Option<Dialog>) {
         self.model.dialog = dialog;
+        if dialog != Some(Dialog::Import) {
+            self.forget_import();
+        }
         if matches!(
             self.model.dialog,
             Some(

@@ -27,6 +27,7 @@ pub use crate::capture::state::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureUnderWay, CaptureWait, LiveDetection, RefusalKind,
 };
 pub use crate::export::state::{ExportState, Preview, PreviewFile, Written};
+pub use crate::import::state::{Converted, Found, ImportState, ImportWork};
 pub use crate::live::state::{
     ColouredDepth, FrameImages, FrameInfo, ImagePoint, LiveFrame, Overlays, PickedPoint, SceneView, Viewport,
     exports_of,
@@ -313,6 +314,8 @@ pub struct Model {
     pub planning: bool,
     /// A person is guided from view to view.
     pub by_hand: Option<Box<ByHand>>,
+    /// The recording that is being imported.
+    pub import: Option<Box<ImportState>>,
     /// The session.
     pub session: SessionState,
     /// Whether a session is being opened.
@@ -403,6 +406,7 @@ impl Model {
             sequence: None,
             sequence_runs: false,
             by_hand: None,
+            import: None,
             planning: false,
             session: SessionState {
                 folder: None,

@@ -96,6 +96,8 @@ pub enum Dialog {
     New,
     /// Which session or data set to open.
     Open,
+    /// What a recording means that is to be imported.
+    Import,
     /// Where a copy of the session goes.
     SaveAs,
     /// Which file of taught poses to read.

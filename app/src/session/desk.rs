@@ -12,6 +12,7 @@ use super::archive::{Archive, ArchiveTask};
 use crate::by_hand::worker::{HandJob, choose};
 use crate::capture::Measured;
 use crate::command::Event;
+use crate::import::worker::{ImportJob, perform};
 use crate::solve::observer::{self, ObserveJob};
 use crate::solve::worker::SolveJob;
 use crate::solve::worker::solve;
@@ -32,6 +33,7 @@ pub struct SessionThreads {
     observer: NewestWins<ObserveJob>,
     solver: NewestWins<SolveJob>,
     chooser: NewestWins<HandJob>,
+    importer: NewestWins<ImportJob>,
     events: Receiver<Event>,
     sessions: PathBuf,
     threads: Vec<Started>,
@@ -63,6 +65,8 @@ impl SessionThreads {
         let (solver, solving) = NewestWins::start("solver", move |job, cancel| solve(&job, cancel, &out))?;
         let out = outlet();
         let (chooser, choosing) = NewestWins::start("views", move |job, cancel| choose(&job, cancel, &out))?;
+        let out = outlet();
+        let (importer, importing) = NewestWins::start("importer", move |job, cancel| perform(&job, cancel, &out))?;
         Ok(Self {
             archive: Some(archive),
             captures,
@@ -70,9 +74,10 @@ impl SessionThreads {
             observer,
             solver,
             chooser,
+            importer,
             events,
             sessions,
-            threads: vec![archiving, filing, observing, solving, choosing],
+            threads: vec![archiving, filing, observing, solving, choosing, importing],
         })
     }
 
@@ -124,6 +129,16 @@ impl SessionThreads {
         self.chooser.submit(job);
     }
 
+    /// Looks at a recording.
+    pub fn import(&mut self, job: ImportJob) {
+        self.importer.submit(job);
+    }
+
+    /// No longer.
+    pub fn cancel_import(&self) {
+        self.importer.cancel();
+    }
+
     /// Cancels the solve.
     pub fn cancel_solve(&self) {
         self.solver.cancel();
@@ -134,6 +149,7 @@ impl SessionThreads {
         self.observer.cancel();
         self.solver.cancel();
         self.chooser.cancel();
+        self.importer.cancel();
     }
 
     /// Ends the threads, and waits for them no longer than until `end`. What was handed to the archive is still written;

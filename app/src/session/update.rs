@@ -190,8 +190,8 @@ impl App {
         self.model.export.is_present = exported;
         self.model.selection.clear();
         self.model.review = None;
-        if matches!(self.model.dialog, Some(Dialog::Open | Dialog::SaveAs | Dialog::New)) {
-            self.model.dialog = None;
+        if matches!(self.model.dialog, Some(Dialog::Open | Dialog::Import | Dialog::SaveAs | Dialog::New)) {
+            self.set_dialog(None);
         }
         if let Some(folder) = self.model.session.folder.clone() {
             self.say(Severity::Info, text!("Session {folder} is open", folder = folder.display()));

@@ -86,7 +86,8 @@ pub fn calibrate(
 fn of_solution(solution: &PoseGraphSolution) -> PoseFit {
     let shape = BoardShape { scale: solution.scale, ..BoardShape::FLAT };
     let scaled = |sigma| ShapeEstimate { shape, warp_sigma_m: None, scale_sigma: Some(sigma) };
-    PoseFit { sigma_m: solution.sigma_m, sigma_rad: solution.sigma_rad, shape: solution.scale_sigma.map(scaled) }
+    let levels = solution.levels;
+    PoseFit { sigma_m: levels.position_m, sigma_rad: levels.rotation_rad(), shape: solution.scale_sigma.map(scaled) }
 }
 
 /// Where the estimate begins.

@@ -1,16 +1,22 @@
 //! A data set becomes a session: its images and poses are copied, and it stays as it is.
 
+use std::fs;
 use std::path::Path;
 
-use handeye_core::project::dataset::Dataset;
+use handeye_core::project::dataset::{DESCRIPTION, Dataset};
+use handeye_core::project::files::atomic_file;
 use handeye_core::project::session::{Capture, Document, Role, Store};
 
 use super::{Archive, free_folder, timestamp_rfc3339};
 use crate::command::Event;
+use crate::import::state::Converted;
 use crate::model::Severity;
 use crate::session::start;
 use crate::text;
 use crate::text::Text;
+
+/// How a recording was understood, in the session that it became.
+const IMPORTED: &str = "imported.toml";
 
 /// What a library says of a file, in its own words.
 fn said_by(error: impl std::error::Error) -> Text {
@@ -19,7 +25,31 @@ fn said_by(error: impl std::error::Error) -> Text {
 
 impl Archive {
     pub(super) fn import(&mut self, dataset: &Path) {
-        let imported = self.copy(dataset).map_err(|why| text!("The data set was not opened: {why}", why = why));
+        let name = dataset.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        self.import_as(dataset, &name);
+    }
+
+    /// The session keeps how the recording was understood.
+    pub(super) fn import_converted(&mut self, converted: &Converted) {
+        let described = converted.folder.path().join(DESCRIPTION);
+        let Some(store) = self.import_as(converted.folder.path(), &converted.name) else { return };
+        let kept = fs::read(&described).and_then(|bytes| atomic_file::write(&store.folder().join(IMPORTED), &bytes));
+        if let Err(error) = kept {
+            tracing::warn!(%error, "how the recording was understood was not kept");
+        }
+        let left_out = converted.left_out.len();
+        if left_out > 0 {
+            let text = text!(
+                "{count} {count|pose or image was|poses and images were} left out; {file} in the session says why",
+                count = left_out,
+                file = IMPORTED
+            );
+            self.outlet.notice(Severity::Warning, text);
+        }
+    }
+
+    fn import_as(&mut self, dataset: &Path, name: &str) -> Option<&Store> {
+        let imported = self.copy(dataset, name).map_err(|why| text!("The data set was not opened: {why}", why = why));
         match imported {
             Ok((store, outside)) => {
                 let folder = store.folder().display().to_string();
@@ -36,15 +66,18 @@ impl Archive {
                     self.outlet.notice(Severity::Warning, text);
                 }
             }
-            Err(why) => self.outlet.report(Event::SessionFailed { why }),
+            Err(why) => {
+                self.outlet.report(Event::SessionFailed { why });
+                return None;
+            }
         }
+        self.store.as_ref()
     }
 
     /// The session, and how many files of the data set lie outside of its folder.
-    fn copy(&self, folder: &Path) -> Result<(Store, usize), Text> {
+    fn copy(&self, folder: &Path, name: &str) -> Result<(Store, usize), Text> {
         let dataset = Dataset::read(folder).map_err(said_by)?;
-        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let target_folder = free_folder(&self.sessions, &name);
+        let target_folder = free_folder(&self.sessions, name);
         let mut meta = start::meta(None, timestamp_rfc3339());
         meta.target = dataset.target;
         meta.camera = dataset.camera;
@@ -95,7 +128,6 @@ impl Archive {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
     use std::sync::Arc;
 
     use super::*;

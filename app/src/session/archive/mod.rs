@@ -15,6 +15,7 @@ use handeye_core::project::taught_poses::TaughtPose;
 
 use crate::capture::Measured;
 use crate::command::Event;
+use crate::import::state::Converted;
 use crate::model::{CaptureRefused, CaptureWait, FolderKind, Observed, RefusalKind, SessionState, Severity};
 use crate::text;
 use crate::text::Text;
@@ -46,6 +47,8 @@ pub enum ArchiveTask {
     },
     /// Go on with a session, or begin one with the images and poses of a data set.
     Open(PathBuf),
+    /// Begin a session with a recording that was made a data set.
+    Import(Arc<Converted>),
     /// Go on with the session in a folder, or begin one there when there is none.
     OpenOrNew {
         /// Where.
@@ -124,6 +127,7 @@ impl Archive {
             }
             ArchiveTask::New { folder, beginning } => self.begin(folder, *beginning),
             ArchiveTask::Open(folder) => self.open(&folder),
+            ArchiveTask::Import(converted) => self.import_converted(&converted),
             ArchiveTask::OpenOrNew { folder, beginning } => {
                 if kind_of(&folder) == FolderKind::Plain {
                     self.begin(Some(folder), *beginning);
@@ -141,9 +145,10 @@ impl Archive {
     }
 
     fn open(&mut self, folder: &Path) {
-        if kind_of(folder) == FolderKind::Dataset {
-            self.import(folder);
-            return;
+        match kind_of(folder) {
+            FolderKind::Dataset => return self.import(folder),
+            FolderKind::Plain if folder.exists() => return self.outlet.report(Event::NoSession(folder.to_path_buf())),
+            _ => {}
         }
         if self.store.as_ref().is_some_and(|store| store.folder() == folder) {
             self.outlet.report(Event::SessionOpened { exported: exported::is_exported(folder) });

@@ -152,7 +152,7 @@ impl Purpose {
             }
             Dialog::ImportKeepOut => is_file.then_some(Command::ImportKeepOut(path)),
             Dialog::ExportFolder => Some(Command::SetExportFolder(Some(path))),
-            Dialog::Help | Dialog::Palette | Dialog::About | Dialog::RerunAddress => None,
+            Dialog::Help | Dialog::Palette | Dialog::About | Dialog::RerunAddress | Dialog::Import => None,
         }
     }
 }

@@ -1,15 +1,17 @@
 //! The estimate from pose pairs alone, for sessions that kept target poses but no corners.
 //!
-//! Minimises `Σ |log(camera_from_target_i⁻¹ * predicted_i)|²` over `mount_from_camera` and `anchor_from_target`, with
-//! translation and rotation weighted by their own scatter. Camera and robot noise cannot be told apart from pose pairs;
-//! the two levels stated are those of the disagreement between them.
+//! Minimises `Σ eᵢᵀ Vᵢ⁻¹ eᵢ` of `eᵢ = log(camera_from_target_i⁻¹ * predicted_i)` over `mount_from_camera` and
+//! `anchor_from_target`. `Vᵢ` has three levels, [`Levels`], by restricted maximum likelihood: positions, rotations of the
+//! target, and rotations of the robot, which move the target by its distance from the mount and are told from the others by
+//! that.
 //!
 //! The unit of the target poses may be unknown, as that of a single moving camera is, or of markers of unknown size. Then a
 //! scale of their translations is one more unknown, which the robot's translations tell.
 //!
-//! Reference: Andreff, Horaud & Espiau 2001, "Robot hand-eye calibration using structure-from-motion" (scale); Strobl & Hirzinger 2006, "Optimal hand-eye calibration", with the weights re-estimated from residuals.
+//! Reference: Andreff, Horaud & Espiau 2001, "Robot hand-eye calibration using structure-from-motion" (scale); Strobl & Hirzinger 2006, "Optimal hand-eye calibration", with the weights re-estimated from residuals; Harville 1977, "Maximum likelihood approaches to
+//! variance component estimation and to related problems", JASA 72 (levels).
 
-use nalgebra::{Cholesky, Matrix6, Point3, SMatrix, SVector, Unit, Vector3, Vector6};
+use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, SMatrix, SVector, Unit, Vector3, Vector6};
 
 use super::closed_form::ClosedFormSolution;
 use super::motion::MIN_VIEWS;
@@ -27,14 +29,49 @@ pub struct PoseGraphSolution {
     pub anchor_from_target: Pose<Anchor, Target>,
     /// Covariance of both, right perturbations, metres and radians.
     pub covariance: SMatrix<f64, 12, 12>,
-    /// Disagreement per axis in translation, metres.
-    pub sigma_m: f64,
-    /// Disagreement per axis in rotation, radians.
-    pub sigma_rad: f64,
+    /// Disagreement of the two poses of a pair per axis.
+    pub levels: Levels,
     /// The true length of a target pose's translation over the stated one; 1 when it is taken as exact.
     pub scale: f64,
     /// Its standard deviation; `None` when it is taken as exact.
     pub scale_sigma: Option<f64>,
+}
+
+/// How far the two poses of a pair disagree, per axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Levels {
+    /// In position, without what rotations of the robot move the target by; metres.
+    pub position_m: f64,
+    /// By rotations about the target's origin, as errors of the target's pose are; radians.
+    pub target_rad: f64,
+    /// By rotations about the mount's origin, as errors of the robot's pose are; radians.
+    pub robot_rad: f64,
+}
+
+impl Levels {
+    /// Disagreement in rotation, radians.
+    pub fn rotation_rad(&self) -> f64 {
+        self.target_rad.hypot(self.robot_rad)
+    }
+
+    /// What the covariance of a residual has of each level, at a level of 1.
+    fn parts(target_from_mount: &Vector3<f64>) -> [Matrix6<f64>; 3] {
+        let (position, rotation) =
+            (Vector6::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), Vector6::new(0.0, 0.0, 0.0, 1.0, 1.0, 1.0));
+        let mut moved = SMatrix::<f64, 6, 3>::zeros();
+        moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&se3::skew(target_from_mount));
+        moved.fixed_view_mut::<3, 3>(3, 0).copy_from(&Matrix3::identity());
+        [Matrix6::from_diagonal(&position), Matrix6::from_diagonal(&rotation), moved * moved.transpose()]
+    }
+
+    fn variances(&self) -> [f64; 3] {
+        [self.position_m, self.target_rad, self.robot_rad].map(|level| level * level)
+    }
+
+    /// The covariance of a residual in the axes of the target.
+    fn covariance(&self, parts: &[Matrix6<f64>; 3]) -> Matrix6<f64> {
+        parts.iter().zip(self.variances()).map(|(part, variance)| part * variance).sum()
+    }
 }
 
 impl PoseGraphSolution {
@@ -54,9 +91,9 @@ impl PoseGraphSolution {
         let unknowns = 12 + usize::from(self.scale_sigma.is_some());
         let freedom = 0.5 * (6.0 * kept.len() as f64 - unknowns as f64);
         let limit = limit(pairs.len(), freedom.max(4.0));
-        let own = Matrix6::from_diagonal(&weights((self.sigma_m, self.sigma_rad)).map(f64::recip));
         let judged = pairs.iter().enumerate().map(|(index, pair)| {
             let (seen, predicted) = (self.in_metres(pair), self.predicted(pair));
+            let own = self.levels.covariance(&Levels::parts(&lever(pair, &self.anchor_from_target)));
             let jacobian = jacobian(&seen, &predicted).fixed_columns::<12>(0).into_owned();
             let shared = jacobian * self.covariance * jacobian.transpose();
             let expected = if kept.binary_search(&index).is_ok() { own - shared } else { own + shared };
@@ -82,8 +119,8 @@ pub(crate) fn scaled(pose: &Pose<Camera, Target>, scale: f64) -> Pose<Camera, Ta
     Pose::from_isometry(isometry)
 }
 
-/// Steps; Gauss–Newton from a closed form needs about five, the weights a few more.
-const MAX_STEPS: usize = 50;
+/// Steps; Gauss–Newton from a closed form needs about five, the levels more.
+const MAX_STEPS: usize = 200;
 /// A step below a tenth of a nanometre and nanoradian ends the iteration.
 const STEP_TOLERANCE: f64 = 1e-10;
 /// Both links, and the logarithm of the scale.
@@ -93,6 +130,9 @@ const SCALE_AT: usize = 12;
 pub(crate) const METHOD: &str = "the pose graph";
 /// Floor of the levels, so that exact data do not divide by zero.
 const LEVEL_FLOOR: f64 = 1e-12;
+/// The least part of the rotation's level that either of its two has: what is below changes nothing, and a level of zero
+/// would stay there.
+const LEAST_PART: f64 = 1e-2;
 
 /// Refines a closed-form answer.
 ///
@@ -145,18 +185,25 @@ fn refine_with(
     let mut x = start.mount_from_camera;
     let mut y = start.anchor_from_target;
     let mut scale = free_scale.unwrap_or(1.0);
-    let mut levels = (1e-3, 1e-3);
+    let singular = || HandEyeError::NoSolution {
+        method: METHOD,
+        views: pairs.len(),
+        reason: "the normal equations are singular: add views turned about other axes",
+    };
+    let mut levels = Levels { position_m: 1e-3, target_rad: 1e-3, robot_rad: 1e-3 };
     let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
-    for _ in 0..MAX_STEPS {
-        let weight = weights(levels);
+    for step_number in 0..MAX_STEPS {
+        let rows: Vec<Row> = pairs
+            .iter()
+            .map(|pair| Row::new(pair, &x, &y, scale, &levels))
+            .collect::<Option<_>>()
+            .ok_or_else(singular)?;
         normal = SMatrix::zeros();
         let mut gradient = SVector::<f64, UNKNOWNS>::zeros();
-        for pair in pairs {
-            let (seen, predicted) = (scaled(&pair.camera_from_target, scale), predict(pair, &x, &y));
-            let jacobian = jacobian(&seen, &predicted);
-            let weighted = Matrix6::from_diagonal(&weight) * jacobian;
-            normal += jacobian.transpose() * weighted;
-            gradient += weighted.transpose() * residual(&seen, &predicted);
+        for row in &rows {
+            let weighted = row.weight * row.jacobian;
+            normal += row.jacobian.transpose() * weighted;
+            gradient += weighted.transpose() * row.error;
         }
         if free_scale.is_none() {
             normal.fill_row(SCALE_AT, 0.0);
@@ -170,17 +217,19 @@ fn refine_with(
             normal += along * along.transpose() * precision;
             gradient += along * (precision * axis.dot(&x.translation()));
         }
-        let factor = Cholesky::new(normal).ok_or(HandEyeError::NoSolution {
-            method: METHOD,
-            views: pairs.len(),
-            reason: "the normal equations are singular: add views turned about other axes",
-        })?;
+        let factor = Cholesky::new(normal).ok_or_else(singular)?;
         let step = -factor.solve(&gradient);
         x = x.perturbed(&step.fixed_rows::<6>(0).into_owned());
         y = y.perturbed(&step.fixed_rows::<6>(6).into_owned());
         scale *= step[SCALE_AT].exp();
-        let next = scatter(pairs, &x, &y, scale);
-        let settled = (next.0 / levels.0).ln().abs() < 1e-6 && (next.1 / levels.1).ln().abs() < 1e-6;
+        // Residuals of the start say little of the levels.
+        let next = if step_number == 0 {
+            scatter(pairs, &x, &y, scale)
+        } else {
+            let moved = |row: &Row| row.error + row.jacobian * step;
+            levels.improved(&rows, &factor.inverse(), moved)
+        };
+        let settled = next.is_near(&levels);
         levels = next;
         if step.norm() < STEP_TOLERANCE && settled {
             break;
@@ -191,11 +240,78 @@ fn refine_with(
         mount_from_camera: x,
         anchor_from_target: y,
         covariance: covariance.fixed_view::<12, 12>(0, 0).into_owned(),
-        sigma_m: levels.0,
-        sigma_rad: levels.1,
+        levels,
         scale,
         scale_sigma: free_scale.map(|_| scale * covariance[(SCALE_AT, SCALE_AT)].sqrt()),
     })
+}
+
+/// A pair as a part of the normal equations.
+struct Row {
+    error: Vector6<f64>,
+    jacobian: SMatrix<f64, 6, UNKNOWNS>,
+    parts: [Matrix6<f64>; 3],
+    weight: Matrix6<f64>,
+}
+
+impl Row {
+    /// `None` where the covariance is singular.
+    fn new(
+        pair: &PosePair,
+        x: &Pose<Mount, Camera>,
+        y: &Pose<Anchor, Target>,
+        scale: f64,
+        levels: &Levels,
+    ) -> Option<Self> {
+        let (seen, predicted) = (scaled(&pair.camera_from_target, scale), predict(pair, x, y));
+        let parts = Levels::parts(&lever(pair, y));
+        let weight = Cholesky::new(levels.covariance(&parts))?.inverse();
+        Some(Self { error: residual(&seen, &predicted), jacobian: jacobian(&seen, &predicted), parts, weight })
+    }
+}
+
+impl Levels {
+    /// A step of restricted maximum likelihood: each variance by the square of what the residuals have of it over what they
+    /// should have (Harville 1977, the fixed point of its equation 5.1); `inverse` is that of the normal matrix.
+    fn improved(
+        &self,
+        rows: &[Row],
+        inverse: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+        error: impl Fn(&Row) -> Vector6<f64>,
+    ) -> Self {
+        let (mut have, mut should) = ([0.0; 3], [0.0; 3]);
+        for row in rows {
+            let weighted = row.weight * error(row);
+            let seen = row.weight * row.jacobian;
+            // What the unknowns take of this pair.
+            let left = row.weight - seen * inverse * seen.transpose();
+            for (k, part) in row.parts.iter().enumerate() {
+                have[k] += weighted.dot(&(part * weighted));
+                should[k] += left.component_mul(part).sum();
+            }
+        }
+        let ratio = |k: usize| if should[k] > 0.0 { (have[k] / should[k]).sqrt() } else { 1.0 };
+        let (target, robot) = (self.target_rad * ratio(1), self.robot_rad * ratio(2));
+        let least = LEAST_PART * target.hypot(robot);
+        Self {
+            position_m: (self.position_m * ratio(0)).max(LEVEL_FLOOR),
+            target_rad: target.max(least).max(LEVEL_FLOOR),
+            robot_rad: robot.max(least).max(LEVEL_FLOOR),
+        }
+    }
+
+    /// Whether another step would change nothing that matters: a ten-thousandth of a level.
+    fn is_near(&self, other: &Self) -> bool {
+        let near = |a: f64, b: f64| (a / b).ln().abs() < 1e-4;
+        near(self.position_m, other.position_m)
+            && (self.target_rad - other.target_rad).abs() < 1e-4 * self.rotation_rad()
+            && (self.robot_rad - other.robot_rad).abs() < 1e-4 * self.rotation_rad()
+    }
+}
+
+/// The mount as seen from the target.
+fn lever(pair: &PosePair, y: &Pose<Anchor, Target>) -> Vector3<f64> {
+    (y.inverse() * pair.anchor_from_mount).translation()
 }
 
 fn predict(pair: &PosePair, x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>) -> Pose<Camera, Target> {
@@ -223,13 +339,8 @@ fn jacobian(seen: &Pose<Camera, Target>, predicted: &Pose<Camera, Target>) -> SM
     jacobian
 }
 
-fn weights((metres, radians): (f64, f64)) -> Vector6<f64> {
-    let (t, r) = (metres.powi(-2), radians.powi(-2));
-    Vector6::new(t, t, t, r, r, r)
-}
-
-/// Levels from the residuals, with the unknowns' share of the degrees of freedom taken off evenly.
-fn scatter(pairs: &[PosePair], x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>, scale: f64) -> (f64, f64) {
+/// Levels from the residuals, with the unknowns' share of the degrees of freedom taken off evenly: where the iteration begins.
+fn scatter(pairs: &[PosePair], x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>, scale: f64) -> Levels {
     let mut squares = (0.0, 0.0);
     for pair in pairs {
         let r = residual(&scaled(&pair.camera_from_target, scale), &predict(pair, x, y));
@@ -237,7 +348,9 @@ fn scatter(pairs: &[PosePair], x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>
         squares.1 += r.fixed_rows::<3>(3).norm_squared();
     }
     let freedom = 3.0 * pairs.len() as f64 - 6.0;
-    ((squares.0 / freedom).sqrt().max(LEVEL_FLOOR), (squares.1 / freedom).sqrt().max(LEVEL_FLOOR))
+    let level = |squares: f64| (squares / freedom).sqrt().max(LEVEL_FLOOR);
+    let half = level(0.5 * squares.1);
+    Levels { position_m: level(squares.0), target_rad: half, robot_rad: half }
 }
 
 #[cfg(test)]

@@ -80,7 +80,7 @@ fn visit_mcap(mut file: impl Read, each: &mut dyn FnMut(Message)) -> Result<(), 
 }
 
 fn visit_db3(file: &Path, each: &mut dyn FnMut(Message)) -> Result<(), String> {
-    let open = || -> rusqlite::Result<()> {
+    let mut open = || -> rusqlite::Result<()> {
         // Whoever records still holds its journal: nothing beside the file is made.
         let bag =
             Connection::open_with_flags(file, OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;

@@ -1,0 +1,285 @@
+//! What a recording may mean, before anything of it is written.
+
+mod conventions;
+mod places;
+
+use egui::{
+    Align, Button, Image, Layout, RichText, ScrollArea, TextEdit, TextureOptions, Ui, Vec2, WidgetInfo, WidgetType,
+};
+use handeye_core::project::import::{Hypothesis, Numbers, Source, Stream, Track, Verdict};
+
+use crate::command::{Command, Outbox};
+use crate::gui::style::parts;
+use crate::gui::style::theme::{Palette, TITLE, Tone};
+use crate::model::{Found, ImportState, ImportWork, Model};
+use crate::text::{Language, Text};
+use crate::{text, tr};
+
+/// Hypotheses that are listed.
+const LISTED: usize = 12;
+/// Height of the first images.
+const PREVIEW: f32 = 72.0;
+
+/// The dialog.
+pub fn import_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let Some(import) = model.import.as_deref() else { return };
+    ui.label(RichText::new(tr!(language, "Import a recording")).size(TITLE).color(Palette::of(ui).text));
+    parts::hint_ui(ui, &import.path.display().to_string());
+    let room = ui.ctx().content_rect().height() - 230.0;
+    ScrollArea::vertical().id_salt("import").max_height(room.max(200.0)).auto_shrink([false, true]).show(ui, |ui| {
+        ui.set_width(ui.available_width() - 8.0);
+        if let Some(found) = import.found.as_deref() {
+            files_ui(ui, found, language);
+            images_ui(ui, import, found, language);
+        }
+        target_ui(ui, import, language, outbox);
+        meaning_ui(ui, import, language, outbox);
+    });
+    buttons_ui(ui, model, import, language, outbox);
+}
+
+/// What is in the folder.
+fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
+    let recording = &found.recording;
+    parts::section_ui(ui, tr!(language, "What is there"));
+    let streams = recording.streams.iter().map(of_stream);
+    let tracks = recording.tracks.iter().map(of_track);
+    let cameras =
+        recording.cameras.iter().map(|camera| text!("A camera in {file}: {why}", file = &camera.name, why = &camera.why));
+    let targets = recording
+        .targets
+        .iter()
+        .map(|target| text!("A target in {file}: {target}", file = &target.file, target = target.target));
+    for line in streams.chain(tracks).chain(cameras).chain(targets) {
+        ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
+    }
+    if let Some(looked) = found.looked.as_deref() {
+        for (stream, seen, images) in &looked.seen {
+            let line = text!(
+                "The target is found in {seen} of {images} images {stream}",
+                seen = seen,
+                images = images,
+                stream = stream
+            );
+            ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
+        }
+        for note in &looked.notes {
+            parts::hint_ui(ui, &note.say(language));
+        }
+    }
+    for warning in &recording.warnings {
+        parts::hint_ui(ui, warning);
+    }
+}
+
+fn of_stream(stream: &Stream) -> Text {
+    let Stream { name, images, size: (width, height), is_depth } = stream;
+    let line = if *is_depth {
+        text!("{count} depth images {name} of {width} × {height} px", count = images.len(), name = name)
+    } else {
+        text!("{count} images {name} of {width} × {height} px", count = images.len(), name = name)
+    };
+    line.with("width", width).with("height", height)
+}
+
+fn of_track(track: &Track) -> Text {
+    let kind = match track.samples.first().map(|sample| sample.numbers) {
+        Some(Numbers::Quaternion(_)) => text!("position and quaternion"),
+        Some(Numbers::Matrix(_)) => text!("matrices"),
+        Some(Numbers::Angles(_)) | None => text!("position and three angles"),
+    };
+    text!("{count} poses in {name}: {kind}", count = track.samples.len(), name = &track.name, kind = kind)
+}
+
+/// The first images of what is looked at, with the pose that belongs to each by the hypothesis that is chosen.
+fn images_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language) {
+    let hypothesis = found.hypotheses().get(import.chosen.unwrap_or(0));
+    let stream = match hypothesis.map(|h| h.source) {
+        Some(Source::Stream(stream)) => stream,
+        Some(Source::Track(_)) => return,
+        None => 0,
+    };
+    let Some(previews) = found.previews.get(stream).filter(|previews| !previews.is_empty()) else { return };
+    ui.horizontal(|ui| {
+        for (index, preview) in previews.iter().enumerate() {
+            let image = &found.recording.streams[stream].images[index];
+            let pose = hypothesis.and_then(|h| pose_of(found, h, index));
+            let uri = format!("bytes://import/{}/{index}", image.shown());
+            let size = [preview.width() as usize, preview.height() as usize];
+            // A key of the picture itself: another recording may have an image of the same name.
+            let id = egui::Id::new((uri, std::sync::Arc::as_ptr(preview) as usize));
+            let texture = ui.ctx().data_mut(|data| data.get_temp::<egui::TextureHandle>(id)).unwrap_or_else(|| {
+                let pixels = egui::ColorImage::from_rgb(size, preview.as_raw());
+                let texture = ui.ctx().load_texture("recording", pixels, TextureOptions::LINEAR);
+                ui.ctx().data_mut(|data| data.insert_temp(id, texture.clone()));
+                texture
+            });
+            ui.vertical(|ui| {
+                let width = PREVIEW * size[0] as f32 / size[1].max(1) as f32;
+                let shown = ui.add(Image::new(&texture).fit_to_exact_size(Vec2::new(width, PREVIEW)));
+                let named = text!("Image {name}", name = image.shown());
+                shown.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, named.say(language)));
+                parts::caption_ui(ui, &image.shown());
+                parts::caption_ui(ui, &pose.unwrap_or_else(|| "–".to_owned()));
+            });
+        }
+    });
+}
+
+/// The position of the tip, in short.
+fn pose_of(found: &Found, h: &Hypothesis, image: usize) -> Option<String> {
+    let sample = h.pairing.image_of.iter().position(|of| *of == Some(image))?;
+    let tip = h.base_from_tip(&found.recording.tracks[h.robot].samples[sample])?.translation() * 1e3;
+    Some(format!("{:.0} {:.0} {:.0} mm", tip.x, tip.y, tip.z))
+}
+
+fn target_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
+    parts::section_ui(ui, tr!(language, "Target"));
+    let id = ui.id().with("target of the recording");
+    let mut typed: String = ui.data_mut(|data| data.get_temp(id)).unwrap_or_else(|| import.target.clone());
+    ui.horizontal(|ui| {
+        let field = TextEdit::singleline(&mut typed)
+            .desired_width(ui.available_width() - 120.0)
+            .char_limit(400)
+            .hint_text(tr!(language, "10x7x15, or as the files have it"));
+        let response = ui.add(field);
+        response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, tr!(language, "Target")));
+        let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if ui.button(tr!(language, "Look again")).clicked() || entered {
+            outbox.send(Command::SetImportTarget(typed.clone()));
+        }
+    });
+    ui.data_mut(|data| data.insert_temp(id, typed));
+    parts::hint_ui(
+        ui,
+        tr!(
+            language,
+            "Inner corners and the square in mm; or kind=charuco,columns=4,rows=6,square=33,marker=20,dictionary=6x6_250"
+        ),
+    );
+}
+
+/// The hypotheses.
+fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
+    parts::section_ui(ui, tr!(language, "What it may mean"));
+    if let Some(work) = import.work {
+        let (said, part) = said_of(work);
+        if parts::progress_ui(ui, part, &said.say(language), tr!(language, "Cancel")) {
+            outbox.send(Command::SetDialog(None));
+        }
+        return;
+    }
+    if let Some(why) = &import.trouble {
+        parts::notice_ui(ui, Tone::Warning, &why.say(language), |_| ());
+    }
+    let Some(found) = import.found.as_deref() else { return };
+    let Some(judgement) = &found.judgement else { return };
+    let (tone, verdict) = match &judgement.verdict {
+        Verdict::Decided => (Tone::Good, text!("One of {tried} explains the recording.", tried = judgement.tried)),
+        Verdict::Ambiguous(count) => (
+            Tone::Warning,
+            text!(
+                "{count} of {tried} explain the recording, and nothing here tells which is true: choose, or fix what you know.",
+                count = count,
+                tried = judgement.tried
+            ),
+        ),
+        Verdict::Unexplained => (
+            Tone::Bad,
+            text!(
+                "None of {tried} explains the recording: images and poses may not belong together, or the target be another.",
+                tried = judgement.tried
+            ),
+        ),
+    };
+    parts::notice_ui(ui, tone, &verdict.say(language), |_| ());
+    conventions::fixed_ui(ui, import, found, language, outbox);
+    ui.horizontal_top(|ui| {
+        let width = ui.available_width() - places::SIDE - 12.0;
+        ui.vertical(|ui| {
+            ui.set_width(width);
+            list_ui(ui, import, found, language, outbox);
+        });
+        let shown = found.hypotheses().get(import.chosen.unwrap_or(0));
+        if let Some(shown) = shown {
+            places::places_ui(ui, found, shown, language);
+        }
+    });
+}
+
+fn said_of(work: ImportWork) -> (Text, f32) {
+    let part = |done: usize, of: usize| done as f32 / of.max(1) as f32;
+    match work {
+        ImportWork::Looking(_, 0) => (text!("The files are read"), 0.0),
+        ImportWork::Looking(done, of) => {
+            (text!("{done} of {of} images looked at", done = done, of = of), part(done, of))
+        }
+        ImportWork::Writing(done, of) => (text!("{done} of {of} images copied", done = done, of = of), part(done, of)),
+    }
+}
+
+fn list_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language, outbox: &mut Outbox) {
+    let differing = conventions::differing(found);
+    for (place, h) in found.hypotheses().iter().take(LISTED).enumerate() {
+        let fit = h.fit.as_ref().map_or_else(
+            || tr!(language, "no solution").to_owned(),
+            |fit| format!("{:.2} mm  {:.3}°", fit.median_m * 1e3, fit.median_rad.to_degrees()),
+        );
+        let of: Vec<String> = h
+            .conventions(&found.recording)
+            .into_iter()
+            .filter(|convention| differing.contains(&convention.key))
+            .map(|convention| convention.value)
+            .collect();
+        let line = format!("{}.  {fit}  {}", place + 1, of.join("  "));
+        let colour = if h.explains() { Palette::of(ui).text } else { Palette::of(ui).weak };
+        let chosen = import.chosen == Some(place);
+        if ui.radio(chosen, RichText::new(line).color(colour)).clicked() {
+            outbox.send(Command::ChooseHypothesis(place));
+        }
+        if chosen && let Some(fit) = &h.fit {
+            let (camera, target) = (fit.camera_at_m * 1e3, fit.target_at_m * 1e3);
+            let line = text!(
+                "{views} views; the camera {camera} mm and the target {target} mm from what carries them; {off} views disagree",
+                views = fit.views,
+                camera = format!("{camera:.0}"),
+                target = format!("{target:.0}"),
+                off = fit.disagreeing.len()
+            );
+            parts::hint_ui(ui, &line.say(language));
+            for why in &h.contradictions {
+                parts::hint_ui(ui, why);
+            }
+        }
+    }
+    parts::hint_ui(
+        ui,
+        tr!(
+            language,
+            "Median distance and angle between where robot and camera put the target: how well they agree, not how accurate \
+             the result is."
+        ),
+    );
+}
+
+fn buttons_ui(ui: &mut Ui, model: &Model, import: &ImportState, language: Language, outbox: &mut Outbox) {
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        let can = import.chosen.is_some() && import.work.is_none() && !model.opening;
+        let reason = if can { None } else { Some(tr!(language, "Choose what it means first")) };
+        let button = Button::new(RichText::new(tr!(language, "Import")).strong());
+        if parts::gated_ui(ui, reason, button).clicked() {
+            outbox.send(Command::ConvertRecording);
+        }
+        if ui.button(tr!(language, "Close")).clicked() {
+            outbox.send(Command::SetDialog(None));
+        }
+        if model.opening {
+            parts::hint_ui(ui, tr!(language, "Just a moment…"));
+        }
+    });
+}
+
+#[cfg(test)]
+#[path = "dialog_tests.rs"]
+mod tests;

@@ -1,0 +1,82 @@
+//! A recording that is looked at to be imported.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use handeye_core::image::RgbImage;
+use handeye_core::project::import::{Hypothesis, Judgement, Recording, Settings, Verdict};
+use serde::{Deserialize, Serialize};
+use tempfile::TempDir;
+
+use super::understand::Looked;
+use crate::text::Text;
+
+/// What the dialog shows.
+#[derive(Debug, Clone)]
+pub struct ImportState {
+    /// The recording.
+    pub path: PathBuf,
+    /// Of the newest request: answers to earlier ones are of no interest.
+    pub number: u64,
+    /// The target as it was typed; empty: as the files have it.
+    pub target: String,
+    /// Conventions that were fixed, by their key.
+    pub fixed: BTreeMap<String, String>,
+    /// What is being done.
+    pub work: Option<ImportWork>,
+    /// What was found.
+    pub found: Option<Arc<Found>>,
+    /// Why nothing can be made of it yet.
+    pub trouble: Option<Text>,
+    /// The hypothesis that was chosen, by its place.
+    pub chosen: Option<usize>,
+}
+
+/// What is being done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ImportWork {
+    /// Files are read and images looked at; so many of so many.
+    Looking(usize, usize),
+    /// It becomes a session; so many images of so many.
+    Writing(usize, usize),
+}
+
+/// What was found in a recording.
+#[derive(Debug)]
+pub struct Found {
+    /// Its files.
+    pub recording: Arc<Recording>,
+    /// What the images show; `None` where nothing could be looked for.
+    pub looked: Option<Arc<Looked>>,
+    /// What the hypotheses were tried with.
+    pub settings: Settings,
+    /// The hypotheses.
+    pub judgement: Option<Judgement>,
+    /// The first images of every stream, small, by their place in the stream.
+    pub previews: Arc<Vec<Vec<Arc<RgbImage>>>>,
+}
+
+impl Found {
+    /// The hypotheses, the best first.
+    pub fn hypotheses(&self) -> &[Hypothesis] {
+        self.judgement.as_ref().map_or(&[], |judgement| &judgement.hypotheses)
+    }
+
+    /// The hypothesis that needs nobody to choose it.
+    pub fn decided(&self) -> Option<usize> {
+        let verdict = self.judgement.as_ref().map(|judgement| &judgement.verdict);
+        (verdict == Some(&Verdict::Decided)).then_some(0)
+    }
+}
+
+/// A recording as a data set, on its way into a session.
+#[derive(Debug)]
+pub struct Converted {
+    /// The data set; it goes when the session is there.
+    pub folder: TempDir,
+    /// What the session is called.
+    pub name: String,
+    /// Poses and images that are not in it, and why.
+    pub left_out: Vec<String>,
+}

@@ -1,0 +1,231 @@
+//! From the files of a recording to the hypotheses about it: what the command line and the window both do.
+
+use std::path::PathBuf;
+
+use handeye_core::estimate::CameraKnowledge;
+use handeye_core::progress::CancelToken;
+use handeye_core::project::import::{
+    self, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Role, Settings, Sight, Sights, Source, write,
+};
+use handeye_core::targets::{AprilTag, TargetSpec};
+use handeye_core::wording::English;
+
+use crate::observe::{self, ObserveError, Progress};
+use crate::text;
+use crate::text::Text;
+
+/// Why nothing was made of a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum NotUnderstood {
+    /// The files, or the choices.
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    /// The images.
+    #[error(transparent)]
+    Observe(#[from] ObserveError),
+    /// The target is not known, or not in the images; and what to give.
+    #[error("{}", .0.say(English))]
+    Target(Text),
+}
+
+impl NotUnderstood {
+    /// Whether somebody asked for it.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Observe(ObserveError::Cancelled))
+    }
+}
+
+/// What the images of a recording show.
+#[derive(Debug)]
+pub struct Looked {
+    /// The target, and who says so; `None` where only its poses are known.
+    pub target: Option<(TargetSpec, String)>,
+    /// By stream: its name, in how many images the target was found, and of how many.
+    pub seen: Vec<(String, usize, usize)>,
+    /// What else a person should know.
+    pub notes: Vec<Text>,
+    sights: Sights,
+    /// By stream, the camera that is taken as known.
+    cameras: Vec<Option<FoundCamera>>,
+}
+
+impl Looked {
+    /// Tries every hypothesis that the files and the settings leave open. Settings that say what to look at
+    /// ([`Settings::images`], [`Settings::target_poses`], [`Settings::camera`]) have to be those of [`look`].
+    ///
+    /// # Errors
+    /// [`NotUnderstood`].
+    pub fn judge(
+        &self,
+        recording: &Recording,
+        settings: &Settings,
+        cancel: &CancelToken,
+    ) -> Result<Judgement, NotUnderstood> {
+        let judgement = import::judge(recording, &self.sights, settings, cancel)?;
+        if cancel.is_cancelled() { Err(ObserveError::Cancelled.into()) } else { Ok(judgement) }
+    }
+
+    /// What goes into the data set beside a hypothesis; `is_taken`: a person took it out of several.
+    pub fn context<'a>(
+        &self,
+        recording: &'a Recording,
+        judgement: &'a Judgement,
+        settings: &'a Settings,
+        hypothesis: &Hypothesis,
+        is_taken: bool,
+    ) -> write::Context<'a> {
+        let camera = match hypothesis.source {
+            Source::Stream(i) => self.cameras.get(i).cloned().flatten(),
+            Source::Track(_) => None,
+        };
+        write::Context { recording, judgement, settings, target: self.target.clone(), camera, is_taken }
+    }
+}
+
+/// Finds the target in the images. `given` is a target that a person names; without it the one that files describe is taken.
+///
+/// # Errors
+/// [`NotUnderstood`].
+pub fn look(
+    recording: &Recording,
+    given: Option<TargetSpec>,
+    settings: &Settings,
+    progress: Progress<'_>,
+    cancel: &CancelToken,
+) -> Result<Looked, NotUnderstood> {
+    let mut look = Look { recording, settings, progress, cancel, notes: Vec::new(), seen: Vec::new() };
+    let target = look.target(given)?;
+    let (sights, cameras) = look.sights(target.as_ref().map(|(target, _)| *target))?;
+    Ok(Looked { target, seen: look.seen, notes: look.notes, sights, cameras })
+}
+
+struct Look<'a> {
+    recording: &'a Recording,
+    settings: &'a Settings,
+    progress: Progress<'a>,
+    cancel: &'a CancelToken,
+    notes: Vec<Text>,
+    seen: Vec<(String, usize, usize)>,
+}
+
+impl Look<'_> {
+    /// The target that was given, or the only one that files describe.
+    fn target(&mut self, given: Option<TargetSpec>) -> Result<Option<(TargetSpec, String)>, NotUnderstood> {
+        if let Some(target) = given {
+            return Ok(Some((target, "given with --target".into())));
+        }
+        let Some(first) = self.recording.targets.first() else { return Ok(None) };
+        if self.recording.targets.iter().any(|found| found.target != first.target) {
+            self.notes.push(text!("the files describe several targets: say which it is"));
+            return Ok(None);
+        }
+        let described = format!("described in {}", first.file);
+        match first.target {
+            TargetSpec::AprilTag(tag) if first.is_id_open => {
+                let id = self.tag_in_sight(&tag)?;
+                let why = format!("{described}, its number by the images: the only tag of its family in most of them");
+                Ok(Some((TargetSpec::AprilTag(AprilTag { id, ..tag }), why)))
+            }
+            target => Ok(Some((target, described))),
+        }
+    }
+
+    /// The number of a tag that files describe without it: of the only one that most images show.
+    fn tag_in_sight(&self, tag: &AprilTag) -> Result<usize, NotUnderstood> {
+        let paths: Vec<PathBuf> = self.streams().into_iter().flat_map(|i| self.recording.image_paths(i)).collect();
+        let seen = observe::tags_in_sight(&paths, tag, self.progress, self.cancel)?;
+        let often: Vec<usize> = seen.iter().filter(|(_, count)| 2 * **count > paths.len()).map(|(id, _)| *id).collect();
+        if let [id] = often[..] {
+            return Ok(id);
+        }
+        let listed = seen.iter().map(|(id, count)| text!("number {id} in {count}", id = id, count = count));
+        let listed = if seen.is_empty() { text!("none") } else { Text::list(listed) };
+        Err(NotUnderstood::Target(text!(
+            "the files do not say which tag of {family} it is, and {images} images show {listed}: give the target as \
+             kind=apriltag,tag={tag},family={family},id=N",
+            family = tag.family,
+            images = paths.len(),
+            listed = listed,
+            tag = tag.tag_m * 1e3
+        )))
+    }
+
+    /// The streams in which the target may be.
+    fn streams(&self) -> Vec<usize> {
+        let streams = &self.recording.streams;
+        let is_wanted = |i: &usize| match &self.settings.images {
+            Some(name) => *name == streams[*i].name,
+            None => !streams[*i].is_depth || streams.iter().all(|s| s.is_depth),
+        };
+        (0..streams.len()).filter(is_wanted).collect()
+    }
+
+    /// Finds the target in the images of every stream that may be meant.
+    fn sights(&mut self, target: Option<TargetSpec>) -> Result<(Sights, Vec<Option<FoundCamera>>), NotUnderstood> {
+        let recording = self.recording;
+        let mut sights = Sights { streams: vec![None; recording.streams.len()], target };
+        let mut cameras = vec![None; recording.streams.len()];
+        let wanted = self.streams();
+        if self.settings.target_poses.is_some() || wanted.is_empty() || recording.tracks.is_empty() {
+            return Ok((sights, cameras));
+        }
+        let mut troubles: Vec<Text> = Vec::new();
+        for i in wanted {
+            let stream = &recording.streams[i];
+            let paths = recording.image_paths(i);
+            let Some(target) = target else {
+                troubles.push(self.chessboards_in_sight(&stream.name, &paths)?);
+                continue;
+            };
+            let (camera, note) = import::chosen_camera(recording, stream.size, self.settings)?;
+            self.notes.extend(note.map(Text::verbatim));
+            let corners = match observe::observe_images(&paths, &target, self.progress, self.cancel) {
+                Err(ObserveError::Cancelled) => return Err(ObserveError::Cancelled.into()),
+                Err(error) => {
+                    troubles.push(text!("{name}: {why}", name = &stream.name, why = error));
+                    continue;
+                }
+                Ok(corners) => corners,
+            };
+            self.seen.push((stream.name.clone(), corners.iter().flatten().count(), corners.len()));
+            let known = camera.as_ref().map_or(CameraKnowledge::NOTHING, |c| CameraKnowledge::Fixed(c.intrinsics));
+            match Sight::of_corners(target, stream.size, known, &corners) {
+                Ok(sight) => (sights.streams[i], cameras[i]) = (Some(sight), camera),
+                Err(why) => troubles.push(text!("{name}: {why}", name = &stream.name, why = why)),
+            }
+        }
+        let has_target_poses = recording.tracks.iter().any(|track| track.role == Role::Target);
+        if sights.streams.iter().all(Option::is_none) && !has_target_poses {
+            let troubles = Text::list(troubles);
+            return Err(NotUnderstood::Target(if target.is_some() {
+                text!("the target was not found: {troubles}", troubles = troubles)
+            } else {
+                text!("the files do not say what was looked at: {troubles}", troubles = troubles)
+            }));
+        }
+        self.notes.extend(troubles);
+        Ok((sights, cameras))
+    }
+
+    /// What chessboards the images of a stream show.
+    fn chessboards_in_sight(&self, name: &str, paths: &[PathBuf]) -> Result<Text, NotUnderstood> {
+        let seen = observe::chessboards_in_sight(paths, self.progress, self.cancel)?;
+        let mut sizes: Vec<((usize, usize), usize)> = seen.into_iter().collect();
+        sizes.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        let Some(((columns, rows), _)) = sizes.first() else {
+            return Ok(text!("{name} shows no chessboard: name the target", name = name));
+        };
+        let listed = sizes.iter().take(4).map(|((columns, rows), count)| {
+            text!("{columns} × {rows} inner corners in {count}", columns = columns, rows = rows, count = count)
+        });
+        Ok(text!(
+            "{name} shows chessboards of {listed} of {images} images: give the target with its square in mm, as \
+             {columns}x{rows}xMM",
+            name = name,
+            listed = Text::list(listed),
+            images = paths.len(),
+            columns = columns,
+            rows = rows
+        ))
+    }
+}

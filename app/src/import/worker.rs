@@ -1,0 +1,182 @@
+//! Looks at recordings and converts them, away from the window.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use handeye_core::image::RgbImage;
+use handeye_core::progress::CancelToken;
+use handeye_core::project::files::image_file;
+use handeye_core::project::import::{self, Recording, Settings, Source, write};
+use handeye_core::targets::TargetSpec;
+
+use super::state::{Converted, Found, ImportWork};
+use super::understand::{self, NotUnderstood};
+use crate::capture::thumbnail;
+use crate::command::Event;
+use crate::text;
+use crate::text::Text;
+use crate::worker::link::Outlet;
+
+/// Images of a stream that are shown before anything is written.
+const PREVIEWS: usize = 4;
+
+/// What can be asked for.
+pub struct ImportJob {
+    /// Its number.
+    pub number: u64,
+    /// What.
+    pub task: ImportTask,
+}
+
+/// What can be asked for.
+pub enum ImportTask {
+    /// Read the files and look for the target.
+    Look {
+        /// The recording.
+        path: PathBuf,
+        /// What was found in it before.
+        known: Option<Arc<Found>>,
+        /// The target; `None`: as the files have it.
+        target: Option<TargetSpec>,
+        /// What was fixed.
+        settings: Settings,
+    },
+    /// Try the hypotheses again with other settings, of what was looked at.
+    Judge {
+        /// What was found.
+        known: Arc<Found>,
+        /// What was fixed.
+        settings: Settings,
+    },
+    /// Make a data set of a hypothesis.
+    Convert {
+        /// What was found.
+        known: Arc<Found>,
+        /// Its place.
+        hypothesis: usize,
+        /// Whether a person took it out of several.
+        is_taken: bool,
+    },
+}
+
+/// Does it and reports.
+pub fn perform(job: &ImportJob, cancel: &CancelToken, outlet: &Outlet) {
+    let number = job.number;
+    let defect = |_panic| {
+        // It must not take the thread along, nor leave a person waiting.
+        tracing::error!("a recording was not read by a defect of this program: report it");
+        text!("it was not read by a defect of this program: report it")
+    };
+    let event = match &job.task {
+        ImportTask::Convert { known, hypothesis, is_taken } => {
+            let work = || convert(known, *hypothesis, *is_taken, number, outlet);
+            let converted = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(defect(panic)));
+            Event::RecordingConverted { number, converted: converted.map(Arc::new) }
+        }
+        ImportTask::Look { path, known, target, settings } => {
+            let work = || look(path, known.as_deref(), *target, settings, number, cancel, outlet);
+            let (found, trouble) =
+                catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| (None, Some(defect(panic))));
+            Event::RecordingLooked { number, found: found.map(Arc::new), trouble }
+        }
+        ImportTask::Judge { known, settings } => {
+            let work = || judged(known, settings, cancel);
+            let (found, trouble) =
+                catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| (None, Some(defect(panic))));
+            Event::RecordingLooked { number, found: found.map(Arc::new), trouble }
+        }
+    };
+    if !cancel.is_cancelled() {
+        outlet.report(event);
+    }
+}
+
+/// What was found, and why no more was.
+type Answer = (Option<Found>, Option<Text>);
+
+fn said(error: NotUnderstood) -> Text {
+    match error {
+        NotUnderstood::Target(why) => why,
+        error => Text::verbatim(error.to_string()),
+    }
+}
+
+fn look(
+    path: &Path,
+    known: Option<&Found>,
+    target: Option<TargetSpec>,
+    settings: &Settings,
+    number: u64,
+    cancel: &CancelToken,
+    outlet: &Outlet,
+) -> Answer {
+    let read = || -> Result<_, NotUnderstood> {
+        if let Some(known) = known {
+            return Ok((Arc::clone(&known.recording), Arc::clone(&known.previews)));
+        }
+        let recording = Arc::new(import::open(path)?);
+        let previews = Arc::new(previews(&recording));
+        Ok((recording, previews))
+    };
+    let (recording, previews) = match read() {
+        Ok(read) => read,
+        Err(error) => return (None, Some(said(error))),
+    };
+    let mut found = Found {
+        recording: Arc::clone(&recording),
+        looked: None,
+        settings: settings.clone(),
+        judgement: None,
+        previews,
+    };
+    let progress = |done, of| outlet.report(Event::ImportProgress { number, work: ImportWork::Looking(done, of) });
+    let outcome = understand::look(&recording, target, settings, &progress, cancel).and_then(|looked| {
+        let judgement = looked.judge(&recording, settings, cancel);
+        found.looked = Some(Arc::new(looked));
+        found.judgement = Some(judgement?);
+        Ok(())
+    });
+    (Some(found), outcome.err().map(said))
+}
+
+fn judged(known: &Found, settings: &Settings, cancel: &CancelToken) -> Answer {
+    let Found { recording, looked, previews, .. } = known;
+    let (recording, looked, previews) = (Arc::clone(recording), looked.clone(), Arc::clone(previews));
+    let judgement = looked.as_ref().map(|looked| looked.judge(&recording, settings, cancel)).transpose();
+    let (judgement, trouble) = match judgement {
+        Ok(judgement) => (judgement, None),
+        Err(error) => (None, Some(said(error))),
+    };
+    (Some(Found { recording, looked, settings: settings.clone(), judgement, previews }), trouble)
+}
+
+fn previews(recording: &Recording) -> Vec<Vec<Arc<RgbImage>>> {
+    let small =
+        |path: &PathBuf| image_file::load_rgb(path).map_or_else(|_| RgbImage::new(1, 1), |image| thumbnail(&image));
+    let of_stream = |stream: usize| {
+        let paths = recording.image_paths(stream);
+        paths.iter().take(PREVIEWS).map(|path| Arc::new(small(path))).collect()
+    };
+    (0..recording.streams.len()).map(of_stream).collect()
+}
+
+fn convert(known: &Found, hypothesis: usize, is_taken: bool, number: u64, outlet: &Outlet) -> Result<Converted, Text> {
+    let Found { recording, looked, settings, judgement, .. } = known;
+    let (Some(looked), Some(judgement)) = (looked, judgement) else { return Err(text!("nothing was found")) };
+    let Some(chosen) = judgement.hypotheses.get(hypothesis) else { return Err(text!("nothing was found")) };
+    if matches!(chosen.source, Source::Track(_)) {
+        return Err(text!(
+            "this recording has poses of the target and no images, which a session needs: “handeye import” and “handeye \
+             calibrate” solve it"
+        ));
+    }
+    let plan = import::plan(chosen, &looked.context(recording, judgement, settings, chosen, is_taken), None);
+    let said = |error: &dyn std::fmt::Display| Text::verbatim(error.to_string());
+    let folder = tempfile::tempdir().map_err(|e| said(&e))?;
+    let progress = |done, of| outlet.report(Event::ImportProgress { number, work: ImportWork::Writing(done, of) });
+    write::write(&plan, folder.path(), progress).map_err(|e| said(&e))?;
+    let name =
+        recording.root.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy().into_owned());
+    Ok(Converted { folder, name, left_out: plan.left_out })
+}
