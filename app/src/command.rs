@@ -255,6 +255,8 @@ pub enum Event {
     },
     /// The robot was read.
     Robot(RobotState),
+    /// Nobody says any more where the robot is.
+    NoRobot,
     /// New images.
     Frame {
         /// Their circumstances.
