@@ -268,6 +268,8 @@ pub enum Event {
     },
     /// The robot was read.
     Robot(RobotState),
+    /// Nobody says any more where the robot is.
+    NoRobot,
     /// New images.
     Frame {
         /// Their circumstances.

@@ -274,6 +274,7 @@ impl App {
                 self.model.trail.add(robot.base_from_tip.translation().into());
                 self.model.robot = Some(robot);
             }
+            Event::NoRobot => self.model.robot = None,
             Event::Cell(facts) => self.cell_found(*facts),
             Event::Heard { severity, words } => self.heard(severity, words),
             Event::Stopped => self.stopped(),

@@ -170,9 +170,6 @@ impl App {
     pub(crate) fn type_pose(&mut self, pose: Option<Pose<Base, Tip>>) {
         let asked = self.workers.ask_control(Request::Do(ControlTask::TypePose(pose)));
         self.expect(text!("The pose was not taken"), asked);
-        if pose.is_none() {
-            self.model.robot = None;
-        }
     }
 
     /// A pose that was typed is that of one capture: the next one is from another place, and the old pose would be wrong.

@@ -68,7 +68,9 @@ pub enum ControlTask {
 /// The duty of the control worker.
 pub struct Control {
     stop: Arc<StopLine>,
-    robot: Arc<LatestSlot<RobotState>>,
+    robot: Arc<LatestSlot<Option<RobotState>>>,
+    /// The newest state that was put there was one.
+    is_known: bool,
     /// The built-in cell belongs to this program, which starts its simulation; on somebody's CoppeliaSim that is for
     /// the user to decide.
     start_by_itself: bool,
@@ -78,8 +80,8 @@ pub struct Control {
 
 impl Control {
     /// For a cell, with the places that it shares with the application.
-    pub fn new(source: &CellSource, stop: Arc<StopLine>, robot: Arc<LatestSlot<RobotState>>) -> Self {
-        Self { stop, robot, start_by_itself: *source == CellSource::BuiltIn, owes_facts: true }
+    pub fn new(source: &CellSource, stop: Arc<StopLine>, robot: Arc<LatestSlot<Option<RobotState>>>) -> Self {
+        Self { stop, robot, is_known: false, start_by_itself: *source == CellSource::BuiltIn, owes_facts: true }
     }
 
     fn stop_if_pressed(&self, port: &mut dyn ControlPort, outlet: &Outlet) -> Result<(), PortError> {
@@ -126,7 +128,9 @@ impl Duty for Control {
         for (severity, words) in port.heard() {
             outlet.report(Event::Heard { severity, words });
         }
-        if let Some(state) = port.state()? {
+        let state = port.state()?;
+        let was_known = std::mem::replace(&mut self.is_known, state.is_some());
+        if was_known || state.is_some() {
             self.robot.put(state);
             (outlet.waker)();
         }

@@ -83,7 +83,7 @@ pub struct Workers {
     stop: Arc<StopLine>,
     desk: Arc<MotionQueue>,
     clock: Clock,
-    robot: Arc<LatestSlot<RobotState>>,
+    robot: Arc<LatestSlot<Option<RobotState>>>,
     frames: Arc<LatestSlot<LiveFrame>>,
     detections: Arc<LatestSlot<LiveDetection>>,
     tracked: Arc<LatestSlot<Tracked>>,
@@ -179,7 +179,7 @@ impl Workers {
         }
         self.desk.take_said().into_iter().for_each(&mut absorb);
         if let Some((robot, _)) = self.robot.take() {
-            absorb(Event::Robot(robot));
+            absorb(robot.map_or(Event::NoRobot, Event::Robot));
         }
         if let Some((LiveFrame { info, images }, dropped)) = self.frames.take() {
             absorb(Event::Frame { info, dropped, images: Some(images) });
