@@ -58,6 +58,7 @@ const CHINESE: &[(&str, &str)] = &[
     ("app", include_str!("../../assets/text/zh-CN/app.toml")),
     ("capture", include_str!("../../assets/text/zh-CN/capture.toml")),
     ("export", include_str!("../../assets/text/zh-CN/export.toml")),
+    ("import", include_str!("../../assets/text/zh-CN/import.toml")),
     ("frame", include_str!("../../assets/text/zh-CN/frame.toml")),
     ("jog", include_str!("../../assets/text/zh-CN/jog.toml")),
     ("live", include_str!("../../assets/text/zh-CN/live.toml")),

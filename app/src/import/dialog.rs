@@ -45,8 +45,10 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     parts::section_ui(ui, tr!(language, "What is there"));
     let streams = recording.streams.iter().map(of_stream);
     let tracks = recording.tracks.iter().map(of_track);
-    let cameras =
-        recording.cameras.iter().map(|camera| text!("A camera in {file}: {why}", file = &camera.name, why = &camera.why));
+    let cameras = recording
+        .cameras
+        .iter()
+        .map(|camera| text!("A camera in {file}: {why}", file = &camera.name, why = &camera.why));
     let targets = recording
         .targets
         .iter()

@@ -1,1 +1,163 @@
+use std::path::PathBuf;
+use std::sync::Arc;
 
+use egui::Ui;
+use egui::accesskit::Role;
+use egui_kittest::kittest::Queryable as _;
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::image::RgbImage;
+use handeye_core::project::import::{
+    AngleUnit, Direction, Fit, ImageFile, Judgement, LengthUnit, Pairing, Reading, Recording, Role as TrackRole,
+    RotationForm, Sample, Settings, Stated,
+};
+
+use super::*;
+use crate::gui::testing::driven::Driven;
+use crate::gui::testing::sample;
+use crate::model::Dialog;
+
+fn shown_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    ui.set_max_width(680.0);
+    import_ui(ui, model, outbox);
+}
+
+fn hypothesis(mode: Mode, direction: Direction, contradictions: &[&str]) -> Hypothesis {
+    let reading = Reading { length: LengthUnit::Metre, angle: AngleUnit::Radian, rotation: RotationForm::Xyzw };
+    let image_of = (0..4).map(Some).collect();
+    Hypothesis {
+        source: Source::Stream(0),
+        robot: 0,
+        pairing: Pairing { rule: "order".into(), text: "in order".into(), image_of, is_by_content: false },
+        reading,
+        direction,
+        target_reading: None,
+        mode,
+        fit: Some(Fit {
+            median_m: 3.5e-4,
+            relative: 1e-3,
+            median_rad: 1e-3,
+            views: 4,
+            disagreeing: Vec::new(),
+            camera_at_m: 0.08,
+            target_at_m: 0.5,
+        }),
+        same_as: Vec::new(),
+        contradictions: contradictions.iter().map(|why| (*why).to_owned()).collect(),
+    }
+}
+
+fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
+    let sample = |k: usize| Sample {
+        image: None,
+        number: None,
+        place: format!("poses.txt, row {}", k + 1),
+        numbers: Numbers::Quaternion([0.4, 0.1 * k as f64, 0.3, 0.0, 0.0, 0.0, 1.0]),
+        joints: Vec::new(),
+    };
+    let image = |k: usize| ImageFile { path: format!("image{k}.png").into(), number: Some(k as u64), same_as: None };
+    let stream =
+        Stream { name: "image#.png".into(), images: (0..4).map(image).collect(), size: (640, 480), is_depth: false };
+    let track = Track {
+        name: "poses.txt".into(),
+        role: TrackRole::Robot,
+        stated: Stated::default(),
+        samples: (0..4).map(sample).collect(),
+    };
+    let recording = Recording {
+        root: "/data/tuesday".into(),
+        streams: vec![stream],
+        tracks: vec![track],
+        warnings: vec!["image7.png is a copy of image3.png, byte by byte".into()],
+        ..Recording::default()
+    };
+    let judgement = Judgement { hypotheses, tried: 912, distance_m: 0.4, verdict };
+    Found {
+        recording: Arc::new(recording),
+        looked: None,
+        settings: Settings::default(),
+        judgement: Some(judgement),
+        previews: Arc::new(vec![vec![Arc::new(RgbImage::new(16, 12)); 4]]),
+    }
+}
+
+fn driven(found: Option<Found>, chosen: Option<usize>) -> Driven {
+    let mut model = sample::captured();
+    model.dialog = Some(Dialog::Import);
+    model.import = Some(Box::new(ImportState {
+        path: PathBuf::from("/data/tuesday"),
+        number: 1,
+        target: String::new(),
+        fixed: std::collections::BTreeMap::new(),
+        work: None,
+        found: found.map(Arc::new),
+        trouble: None,
+        chosen,
+    }));
+    let mut driven = Driven::new(shown_ui, model);
+    driven.widen(720.0);
+    driven.commands();
+    driven
+}
+
+fn two() -> Found {
+    let hypotheses = vec![
+        hypothesis(Mode::EyeInHand, Direction::Forward, &[]),
+        hypothesis(Mode::EyeToHand, Direction::Inverse, &[]),
+    ];
+    found(hypotheses, Verdict::Ambiguous(2))
+}
+
+#[test]
+fn what_the_data_do_not_tell_waits_for_a_person() {
+    let mut pane = driven(Some(two()), None);
+    assert!(pane.sees("4 images image#.png of 640 × 480 px"));
+    assert!(pane.sees("4 poses in poses.txt: position and quaternion"));
+    assert!(pane.sees("image7.png is a copy of image3.png, byte by byte"));
+    assert!(!pane.is_enabled("Import"), "nothing is taken in silence");
+    let second = "2.  0.35 mm  0.057°  eye_to_hand  tip_from_base";
+    assert_eq!(pane.click(second), [Command::ChooseHypothesis(1)]);
+    pane.model().import.as_deref_mut().expect("open").chosen = Some(1);
+    pane.steps();
+    assert!(pane.sees("0 views disagree"));
+    assert_eq!(pane.click("Import"), [Command::ConvertRecording]);
+}
+
+#[test]
+fn what_is_known_is_fixed_and_given_back_to_the_data() {
+    let mut pane = driven(Some(two()), None);
+    pane.harness.get_by_role_and_label(Role::ComboBox, "Where the camera sits").click();
+    pane.steps();
+    let value = Some("eye_to_hand".to_owned());
+    assert_eq!(pane.click("eye_to_hand"), [Command::FixConvention { key: "mode".to_owned(), value }]);
+}
+
+#[test]
+fn a_recording_that_is_contradicted_or_not_read_says_why() {
+    let wrong = hypothesis(Mode::EyeInHand, Direction::Forward, &["image2.png fits the pose of poses.txt, row 3"]);
+    let mut pane = driven(Some(found(vec![wrong], Verdict::Unexplained)), Some(0));
+    assert!(pane.sees("None of 912 explains the recording"));
+    assert!(pane.sees("image2.png fits the pose of poses.txt, row 3"));
+    pane.model().import.as_deref_mut().expect("open").trouble = Some(Text::verbatim("poses.txt: cannot be read"));
+    pane.steps();
+    assert!(pane.sees("poses.txt: cannot be read"));
+}
+
+#[test]
+fn progress_is_shown_and_can_be_ended() {
+    let mut pane = driven(None, None);
+    pane.model().import.as_deref_mut().expect("open").work = Some(ImportWork::Looking(3, 20));
+    pane.steps();
+    assert!(pane.sees("3 of 20 images looked at"));
+    assert!(!pane.is_enabled("Import"));
+    assert_eq!(pane.click("Cancel"), [Command::SetDialog(None)]);
+}
+
+#[test]
+fn nothing_is_cut_off_in_both_languages() {
+    for language in Language::ALL {
+        let mut pane = driven(Some(two()), Some(0));
+        pane.model().view.language = language;
+        pane.steps();
+        assert!(pane.nothing_is_cut_off(), "{language:?}");
+    }
+}

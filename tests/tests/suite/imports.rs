@@ -4,8 +4,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use handeye_app::command::Command as AppCommand;
+use handeye_app::model::{CellSource, Dialog, Model};
+use handeye_app::text::Language;
 use handeye_core::project::dataset::Dataset;
 use handeye_core::testing::{data_folder, python};
+use handeye_tests::workbench::Workbench;
 use handeye_tests::workspace_root;
 use nalgebra::Matrix4;
 use serde_json::Value;
@@ -27,7 +31,7 @@ struct Sample {
 
 const HAND: &str = "mode=eye_in_hand";
 
-const SAMPLES: [Sample; 7] = [
+const SAMPLES: [Sample; 8] = [
     Sample {
         kind: "table",
         files: &["importers/table_eye_in_hand"],
@@ -80,6 +84,14 @@ const SAMPLES: [Sample; 7] = [
         files: &["visp_franka_eye_in_hand"],
         arguments: &[],
         first: &[("mode", "eye_in_hand"), ("pose", "base_from_tip"), ("rotation", "rotation_vector")],
+        views: 8,
+    },
+    // Its tag is described without a number, which the images have.
+    Sample {
+        kind: "visp",
+        files: &["visp_franka_eye_to_hand"],
+        arguments: &[],
+        first: &[("mode", "eye_to_hand"), ("pose", "base_from_tip"), ("rotation", "rotation_vector")],
         views: 8,
     },
     Sample {
@@ -214,4 +226,73 @@ fn squares_counted_for_corners_and_a_target_not_named_are_said_with_what_is_seen
         assert!(said.contains("9 × 6 inner corners"), "{said}");
         assert!(!out.exists());
     }
+}
+
+/// A bag of a writer that is not ours, of a robot that goes from view to view, in both kinds of file.
+#[test]
+fn a_bag_gives_the_images_where_the_robot_rested_with_its_poses_there() {
+    let Some(data) = data_folder() else { return };
+    let Some(python) = python() else { return };
+    let (home, folder) = copied(&data, &["importers/table_eye_in_hand"]);
+    let read = Command::new(&python)
+        .arg(workspace_root().join("tests/python/read_recordings.py"))
+        .arg("table")
+        .arg(&folder)
+        .output()
+        .expect("Python runs");
+    let truth: Value = serde_json::from_slice(&read.stdout).expect("JSON");
+    let robot = matrices(&truth["robot"]);
+    for kind in ["sqlite3", "mcap"] {
+        let (bag, out) = (home.path().join(kind), home.path().join(format!("{kind}_set")));
+        let wrote = Command::new(&python)
+            .arg(workspace_root().join("tests/python/write_bag.py"))
+            .args([&folder, &bag])
+            .arg(kind)
+            .output()
+            .expect("Python runs");
+        assert!(wrote.status.success(), "{}", text(&wrote.stderr));
+        let run = command()
+            .args(["import", "--quiet", "--target", "11x8x20", "--set", HAND, "--out"])
+            .args([&out, &bag])
+            .output()
+            .expect("it runs");
+        let what = format!("{kind}\n{}\n{}", text(&run.stdout), text(&run.stderr));
+        assert!(run.status.success(), "{what}");
+        let dataset = Dataset::read(&out).expect("a data set");
+        assert_eq!(dataset.entries.len(), robot.len(), "{what}");
+        for (i, entry) in dataset.entries.iter().enumerate() {
+            let off = (entry.base_from_tip.expect("a pose").matrix() - robot[&format!("images{i}.jpg")]).amax();
+            assert!(off < 1e-9, "{i}: {off} of {what}");
+        }
+    }
+}
+
+/// What is dropped on the window and is neither a session nor a data set.
+#[test]
+fn a_recording_becomes_a_session_in_the_window_once_a_person_has_said_what_the_files_do_not() {
+    let Some(data) = data_folder() else { return };
+    let (home, folder) = copied(&data, &["importers/table_eye_in_hand"]);
+    let sessions = home.path().join("sessions");
+    let mut bench = Workbench::start(CellSource::BuiltIn, &sessions, None);
+    let import = |model: &Model| model.import.clone().filter(|import| import.work.is_none());
+    bench.click(AppCommand::Open(folder.clone()));
+    bench.until("the question for the target", |model| import(model).is_some_and(|import| import.trouble.is_some()));
+    assert_eq!(bench.model().dialog, Some(Dialog::Import));
+    let why = import(bench.model()).and_then(|import| import.trouble).expect("a reason").say(Language::English);
+    assert!(why.contains("11 × 8 inner corners"), "what is in sight is said: {why}");
+    bench.click(AppCommand::SetImportTarget("11x8x20".to_owned()));
+    let hypotheses =
+        |model: &Model| import(model).and_then(|import| import.found).map_or(0, |it| it.hypotheses().len());
+    bench.until("hypotheses", |model| hypotheses(model) > 0);
+    assert_eq!(import(bench.model()).expect("open").chosen, None, "both places of the camera explain it");
+    bench.click(AppCommand::FixConvention { key: "mode".to_owned(), value: Some("eye_in_hand".to_owned()) });
+    bench.until("the one that is left", |model| import(model).is_some_and(|import| import.chosen == Some(0)));
+    bench.click(AppCommand::ConvertRecording);
+    bench.until("the session", |model| model.document().captures.len() == 20 && model.dialog.is_none());
+    bench.until("a solution", |model| model.solve.fresh && model.solve.solved.is_some());
+    let session = bench.model().session.folder.clone().expect("on the disk");
+    assert!(session.starts_with(&sessions), "{}", session.display());
+    let said = std::fs::read_to_string(session.join("imported.toml")).expect("how it was understood");
+    assert!(said.contains("rotation = euler_zyx_321") && said.contains("given with --set"), "{said}");
+    assert!(bench.model().import.is_none(), "nothing is left open");
 }

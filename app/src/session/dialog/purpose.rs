@@ -66,8 +66,11 @@ impl Purpose {
                 tr!(language, "Choose"),
             ),
             _ => (
-                tr!(language, "Open a session or data set"),
-                tr!(language, "A data set is copied into a new session and stays as it is."),
+                tr!(language, "Open a session, data set or recording"),
+                tr!(
+                    language,
+                    "A data set or a recording of another program is copied into a new session and stays as it is."
+                ),
                 tr!(language, "Open"),
             ),
         };

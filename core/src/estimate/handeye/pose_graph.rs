@@ -130,6 +130,10 @@ const SCALE_AT: usize = 12;
 pub(crate) const METHOD: &str = "the pose graph";
 /// Floor of the levels, so that exact data do not divide by zero.
 const LEVEL_FLOOR: f64 = 1e-12;
+/// Largest change of the log of a variance in a step.
+const LARGEST_STEP: f64 = 2.0;
+/// A step that changes the levels by less than this part of them ends the iteration.
+const SETTLED: f64 = 1e-6;
 /// The least part of the rotation's level that either of its two has: what is below changes nothing, and a level of zero
 /// would stay there.
 const LEAST_PART: f64 = 1e-2;
@@ -193,11 +197,14 @@ fn refine_with(
     let mut levels = Levels { position_m: 1e-3, target_rad: 1e-3, robot_rad: 1e-3 };
     let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
     for step_number in 0..MAX_STEPS {
-        let rows: Vec<Row> = pairs
+        let mut rows: Vec<Row> = pairs
             .iter()
             .map(|pair| Row::new(pair, &x, &y, scale, &levels))
             .collect::<Option<_>>()
             .ok_or_else(singular)?;
+        if free_scale.is_none() {
+            rows.iter_mut().for_each(|row| row.jacobian.fill_column(SCALE_AT, 0.0));
+        }
         normal = SMatrix::zeros();
         let mut gradient = SVector::<f64, UNKNOWNS>::zeros();
         for row in &rows {
@@ -206,9 +213,7 @@ fn refine_with(
             gradient += weighted.transpose() * row.error;
         }
         if free_scale.is_none() {
-            normal.fill_row(SCALE_AT, 0.0);
-            normal.fill_column(SCALE_AT, 0.0);
-            (normal[(SCALE_AT, SCALE_AT)], gradient[SCALE_AT]) = (1.0, 0.0);
+            normal[(SCALE_AT, SCALE_AT)] = 1.0;
         }
         if let Some(axis) = open {
             let mut along = SVector::<f64, UNKNOWNS>::zeros();
@@ -271,41 +276,45 @@ impl Row {
 }
 
 impl Levels {
-    /// A step of restricted maximum likelihood: each variance by the square of what the residuals have of it over what they
-    /// should have (Harville 1977, the fixed point of its equation 5.1); `inverse` is that of the normal matrix.
+    /// A step of Fisher scoring of the restricted likelihood in the logs of the variances (Harville 1977, §5); `inverse` is that of
+    /// the normal matrix. The information is that of each pair by itself.
     fn improved(
         &self,
         rows: &[Row],
         inverse: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
         error: impl Fn(&Row) -> Vector6<f64>,
     ) -> Self {
-        let (mut have, mut should) = ([0.0; 3], [0.0; 3]);
+        let (mut gradient, mut information) = (Vector3::<f64>::zeros(), Matrix3::<f64>::zeros());
+        let variances = Vector3::from(self.variances());
         for row in rows {
             let weighted = row.weight * error(row);
             let seen = row.weight * row.jacobian;
-            // What the unknowns take of this pair.
+            // What the unknowns leave of this pair.
             let left = row.weight - seen * inverse * seen.transpose();
-            for (k, part) in row.parts.iter().enumerate() {
-                have[k] += weighted.dot(&(part * weighted));
-                should[k] += left.component_mul(part).sum();
+            let turned = row.parts.map(|part| left * part);
+            for k in 0..3 {
+                gradient[k] += variances[k] * (weighted.dot(&(row.parts[k] * weighted)) - turned[k].trace());
+                for l in 0..3 {
+                    information[(k, l)] += variances[k] * variances[l] * (turned[k] * turned[l]).trace();
+                }
             }
         }
-        let ratio = |k: usize| if should[k] > 0.0 { (have[k] / should[k]).sqrt() } else { 1.0 };
-        let (target, robot) = (self.target_rad * ratio(1), self.robot_rad * ratio(2));
-        let least = LEAST_PART * target.hypot(robot);
-        Self {
-            position_m: (self.position_m * ratio(0)).max(LEVEL_FLOOR),
-            target_rad: target.max(least).max(LEVEL_FLOOR),
-            robot_rad: robot.max(least).max(LEVEL_FLOOR),
-        }
+        // A level of nothing has no information either, and falls as far as it may in one step.
+        let least = 1e-9 * information.trace() + f64::MIN_POSITIVE;
+        let step = Cholesky::new(information + Matrix3::identity() * least).map_or_else(Vector3::zeros, |factor| {
+            factor.solve(&gradient).map(|k: f64| k.clamp(-LARGEST_STEP, LARGEST_STEP))
+        });
+        let level = |k: usize| (variances[k] * step[k].exp()).sqrt().max(LEVEL_FLOOR);
+        let least = LEAST_PART * level(1).hypot(level(2));
+        Self { position_m: level(0), target_rad: level(1).max(least), robot_rad: level(2).max(least) }
     }
 
-    /// Whether another step would change nothing that matters: a ten-thousandth of a level.
+    /// Whether another step would change nothing that matters.
     fn is_near(&self, other: &Self) -> bool {
-        let near = |a: f64, b: f64| (a / b).ln().abs() < 1e-4;
+        let near = |a: f64, b: f64| (a / b).ln().abs() < SETTLED;
         near(self.position_m, other.position_m)
-            && (self.target_rad - other.target_rad).abs() < 1e-4 * self.rotation_rad()
-            && (self.robot_rad - other.robot_rad).abs() < 1e-4 * self.rotation_rad()
+            && (self.target_rad - other.target_rad).abs() < SETTLED * self.rotation_rad()
+            && (self.robot_rad - other.robot_rad).abs() < SETTLED * self.rotation_rad()
     }
 }
 

@@ -395,7 +395,7 @@ pub(in crate::project::import) fn role(name: &str) -> Role {
 
 fn part(path: &str, items: &[Value]) -> Option<Part> {
     let rows: Vec<Vec<f64>> = items.iter().map(|item| item.numbers(9)).collect::<Option<_>>()?;
-    Some(Part { name: path.to_owned(), rows })
+    (!rows.is_empty()).then(|| Part { name: path.to_owned(), rows })
 }
 
 /// Series of which rotations and translations stand apart, as `calibrateHandEye` takes them.
@@ -528,5 +528,11 @@ mod tests {
             names,
             [("a.json:R_gripper2base+t_gripper2base", Role::Robot), ("a.json:R_target2cam+t_target2cam", Role::Target)]
         );
+    }
+
+    #[test]
+    fn lists_of_nothing_are_no_series() {
+        let text = r#"{"topic": {"rotations": [], "translations": []}, "rotation": {"a": [], "b": []}}"#;
+        assert!(found(text).is_empty());
     }
 }
