@@ -159,6 +159,15 @@ def compared(sequence, result, from_corners):
                        else inside(result[name], None, true) for name, true in zip(('hand_eye', 'target'), links)]}
 
 
+def offset_of(sequence):
+    """Ours of the clocks of a sequence, in KinHEC's sign."""
+    camera = sequence.camera.T_cam_target_meas
+    seen = np.isfinite(camera).all(axis=(1, 2))
+    found = handeye.clock_offset(sequence.robot.t, sequence.robot.T_base_ee_meas, sequence.camera.t[seen], camera[seen],
+                                 mode='eye_in_hand' if sequence.eye_in_hand else 'eye_to_hand')
+    return found
+
+
 def ours_on(sequence, offset):
     """By name: errors, or a sentence."""
     frames, robot, target = keyframes(sequence, offset)
@@ -247,13 +256,21 @@ def main():
         by_sync = {}
         for name in manifest[manifest.track == track].sequence_id:
             sequence = load_sequence(arguments.data, name, manifest)
-            modes = ['oracle'] if sequence.synchronous else ['oracle', 'estimated']
+            modes = ['oracle'] if sequence.synchronous else ['oracle', 'estimated', 'by ours']
             for mode in modes:
                 offset = None if sequence.synchronous else sequence.time_offset
                 if mode == 'estimated':
                     offset, _ = benchmark.solvers.estimate_time_offset(
                         sequence.robot.t, sequence.robot.T_base_ee_meas, sequence.camera.t, sequence.camera.T_cam_target_meas)
-                found = {**theirs_on(sequence, mode), **ours_on(sequence, offset)}
+                if mode == 'by ours':
+                    clocks = offset_of(sequence)
+                    offset = -clocks.offset_s
+                if mode != 'oracle':
+                    said = f' ± {1e3 * clocks.sigma_s:.3f}' if mode == 'by ours' else ''
+                    print(f'{name}, offset {mode}: off by {1e3 * (offset - sequence.time_offset):+.3f}{said} ms')
+                # The others know no offset but their own estimate.
+                theirs = theirs_on(sequence, 'oracle' if mode == 'oracle' else 'estimated')
+                found = {**theirs, **ours_on(sequence, offset)}
                 key = mode if not sequence.synchronous else ''
                 by_sync.setdefault(key, {})[name] = found
                 if arguments.each:

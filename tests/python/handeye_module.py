@@ -64,6 +64,36 @@ def noisy_pairs(rng, views, robot_mm=0.3, robot_deg=0.05):
     return s, np.array(seen)
 
 
+def swaying(times):
+    """An arm that moves without repeating itself."""
+    wave = lambda k: np.sin(2 * np.pi * (0.11 + 0.047 * k) * times + 1.7 * k) + np.sin(2 * np.pi * (0.4 + 0.05 * k) * times)
+    turns = np.stack([0.5 * wave(k) for k in range(3)], axis=-1)
+    shifts = np.stack([0.4 + 0.1 * wave(k + 3) for k in range(3)], axis=-1)
+    return np.array([pose(turn, shift) for turn, shift in zip(turns, shifts)])
+
+
+@check
+def the_offset_of_two_clocks_is_told_and_robot_poses_are_there_at_the_times_of_images(rng):
+    robot_stamps, camera_stamps = np.arange(0, 10, 0.008), np.arange(0.2, 9.8, 1 / 30)
+    robot, there = swaying(robot_stamps), swaying(camera_stamps)
+    for mode in ("eye_in_hand", "eye_to_hand"):
+        mount, link = (there, TIP_FROM_CAMERA) if mode == "eye_in_hand" else (inverse(there), BASE_FROM_TARGET)
+        other = BASE_FROM_TARGET if mode == "eye_in_hand" else TIP_FROM_CAMERA
+        jitter = [pose(rng.normal(0, 1e-3, 3), rng.normal(0, 5e-4, 3)) for _ in there]
+        seen = np.array([inverse(link) @ inverse(m) @ other @ j for m, j in zip(mount, jitter)])
+        found = handeye.clock_offset(robot_stamps, robot, camera_stamps - 0.08, seen, mode=mode)
+        assert abs(found.offset_s - 0.08) < 5 * found.sigma_s < 5e-3, f"{mode}: {found}"
+    poses, within = handeye.poses_at(camera_stamps, robot_stamps, robot)
+    assert within.all()
+    near(poses, there, 1e-3)
+    assert not handeye.poses_at([11.0], robot_stamps, robot)[1].any()
+    raises(handeye.InputError, ["robot", "rise", "entry 1"], handeye.clock_offset, np.zeros(len(robot)), robot, camera_stamps,
+           seen, mode=mode)
+    still = np.repeat(robot[:1], len(robot), axis=0)
+    raises(handeye.CalibrationError, [], handeye.clock_offset, robot_stamps, still, camera_stamps,
+           np.repeat(seen[:1], len(seen), axis=0), mode=mode)
+
+
 @check
 def exact_pairs_give_the_truth_and_what_opencv_gives(rng):
     s = session(rng, 12)

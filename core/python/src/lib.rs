@@ -8,6 +8,7 @@
 
 mod answer;
 mod background;
+mod clocks;
 mod closed_form;
 mod error;
 mod folder;
@@ -21,6 +22,8 @@ use pyo3::prelude::*;
 mod _handeye {
     #[pymodule_export]
     use crate::answer::{calibrate, diagnose};
+    #[pymodule_export]
+    use crate::clocks::{of_streams, poses_at};
     #[pymodule_export]
     use crate::closed_form::by_name;
     #[pymodule_export]

@@ -4,6 +4,7 @@
 
 mod bend;
 pub mod claim;
+pub mod clock_offset;
 mod corners;
 mod detected_view;
 pub mod handeye;

@@ -1,11 +1,12 @@
 """Hand-eye calibration that says how accurate it is.
 
 `calibrate` takes corners or pose pairs as numpy arrays, `calibrate_hand_eye` the arguments of OpenCV's calibrateHandEye,
-`doctor` says what is wrong with the data, `load_dataset` reads a dataset folder. Transforms are 4 × 4 arrays named
+`doctor` says what is wrong with the data, `clock_offset` relates two clocks, `load_dataset` reads a dataset folder. Transforms are 4 × 4 arrays named
 `dst_from_src`, lengths metres, angles radians and pixels OpenCV's, unless a name says otherwise.
 """
 
 from ._calibrate import calibrate, doctor
+from ._clocks import ClockOffset, clock_offset, poses_at
 from ._dataset import Dataset, load_dataset
 from ._errors import CalibrationError, CalibrationWarning, HandeyeError, InputError
 from ._handeye import __version__
@@ -17,6 +18,7 @@ __all__ = [
     "Calibration",
     "CalibrationError",
     "CalibrationWarning",
+    "ClockOffset",
     "Dataset",
     "Diagnosis",
     "Finding",
@@ -30,6 +32,8 @@ __all__ = [
     "calibrate",
     "calibrate_hand_eye",
     "calibrate_robot_world_hand_eye",
+    "clock_offset",
     "doctor",
     "load_dataset",
+    "poses_at",
 ]

@@ -203,7 +203,9 @@ fn refine_with(
             .collect::<Option<_>>()
             .ok_or_else(singular)?;
         if free_scale.is_none() {
-            rows.iter_mut().for_each(|row| row.jacobian.fill_column(SCALE_AT, 0.0));
+            for row in &mut rows {
+                row.jacobian.fill_column(SCALE_AT, 0.0);
+            }
         }
         normal = SMatrix::zeros();
         let mut gradient = SVector::<f64, UNKNOWNS>::zeros();
@@ -249,6 +251,46 @@ fn refine_with(
         scale,
         scale_sigma: free_scale.map(|_| scale * covariance[(SCALE_AT, SCALE_AT)].sqrt()),
     })
+}
+
+impl PoseGraphSolution {
+    fn rows(&self, pairs: &[PosePair]) -> Option<Vec<Row>> {
+        let (x, y) = (&self.mount_from_camera, &self.anchor_from_target);
+        pairs.iter().map(|pair| Row::new(pair, x, y, self.scale, &self.levels)).collect()
+    }
+
+    /// How far on the way from `before` to `after`, two neighbours of these pairs, all of them would fit best, with both links
+    /// free: 0 is here, 1 as far as `after` is from `before`. With its standard deviation; `None` where nothing tells it.
+    pub(crate) fn shift(&self, pairs: &[PosePair], before: &[PosePair], after: &[PosePair]) -> Option<(f64, f64)> {
+        let mut normal = SMatrix::<f64, 12, 12>::zeros();
+        let (mut cross, mut gradient) = (SVector::<f64, 12>::zeros(), SVector::<f64, 12>::zeros());
+        let (mut own, mut own_gradient) = (0.0, 0.0);
+        for ((row, before), after) in self.rows(pairs)?.iter().zip(before).zip(after) {
+            let error = |pair: &PosePair| residual(&self.in_metres(pair), &self.predicted(pair));
+            let along = error(after) - error(before);
+            let jacobian = row.jacobian.fixed_columns::<12>(0);
+            let weighted = row.weight * along;
+            normal += jacobian.transpose() * row.weight * jacobian;
+            cross += jacobian.transpose() * weighted;
+            gradient += jacobian.transpose() * row.weight * row.error;
+            own += along.dot(&weighted);
+            own_gradient += weighted.dot(&row.error);
+        }
+        let factor = Cholesky::new(normal)?;
+        let information = own - cross.dot(&factor.solve(&cross));
+        let left = own_gradient - cross.dot(&factor.solve(&gradient));
+        (information > 0.0).then(|| (-left / information, information.sqrt().recip()))
+    }
+
+    /// Minus twice the log-likelihood of each pair, without constants; one that is off by more than `most_off` standard deviations
+    /// counts as one that is off by so many.
+    pub(crate) fn deviances(&self, pairs: &[PosePair], most_off: f64) -> Vec<f64> {
+        let of_row = |row: Row| {
+            let squared = row.error.dot(&(row.weight * row.error)).min(most_off.powi(2));
+            squared - row.weight.determinant().ln()
+        };
+        self.rows(pairs).unwrap_or_default().into_iter().map(of_row).collect()
+    }
 }
 
 /// A pair as a part of the normal equations.
