@@ -1,0 +1,280 @@
+//! What is tried: every series with every source, in every pairing, under every convention that is left open.
+
+use super::Sights;
+use crate::estimate::handeye::Mode;
+use crate::geometry::statistics::median;
+use crate::project::import::conventions::{
+    AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm, angles_for, lengths_for,
+};
+use crate::project::import::error::ImportError;
+use crate::project::import::formats::tree::LEAST_POSES;
+use crate::project::import::hypothesis::{Hypothesis, Source};
+use crate::project::import::pairing::{Pairing, pairings};
+use crate::project::import::recording::{ImageFile, Numbers, Recording, Role, Sample, Stated, Track};
+use crate::project::import::settings::Settings;
+
+/// Targets are not seen from nearer or farther than this, metres.
+const NEAREST_M: f64 = 0.03;
+const FARTHEST_M: f64 = 20.0;
+
+/// A hypothesis as it is tried: both places of the camera that give its equations are one.
+pub(super) struct Case {
+    pub source: Source,
+    pub robot: usize,
+    pub pairing: usize,
+    pub reading: Reading,
+    pub target_reading: Option<(Reading, Direction)>,
+    /// `anchor_from_mount` is what is written, or its inverse.
+    pub class: Direction,
+    /// The places of the camera and the directions that mean it.
+    pub labels: Vec<(Mode, Direction)>,
+}
+
+impl Case {
+    /// The case of a hypothesis, without its pairing.
+    pub fn of(h: &Hypothesis) -> Self {
+        let class = match (h.mode, h.direction) {
+            (Mode::EyeInHand, direction) => direction,
+            (Mode::EyeToHand, Direction::Forward) => Direction::Inverse,
+            (Mode::EyeToHand, Direction::Inverse) => Direction::Forward,
+        };
+        Self {
+            source: h.source,
+            robot: h.robot,
+            pairing: 0,
+            reading: h.reading,
+            target_reading: h.target_reading,
+            class,
+            labels: Vec::new(),
+        }
+    }
+}
+
+/// A way to pair a source with a series.
+pub(super) struct Paired {
+    pub source: Source,
+    pub robot: usize,
+    pub pairing: Pairing,
+}
+
+/// Every pair of a series of the robot and a source of the target, in every pairing.
+pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Settings) -> Result<Vec<Paired>, ImportError> {
+    let named = |name: &Option<String>, key: &str, of: Vec<&str>| match name {
+        Some(name) if !of.contains(&name.as_str()) => Err(ImportError::BadChoice {
+            key: key.into(),
+            value: name.clone(),
+            choices: if of.is_empty() { "there are none".into() } else { of.join(", ") },
+        }),
+        _ => Ok(()),
+    };
+    let track_names: Vec<&str> = recording.tracks.iter().map(|t| t.name.as_str()).collect();
+    named(&settings.poses, "poses", track_names.clone())?;
+    named(&settings.target_poses, "target_poses", track_names)?;
+    named(&settings.images, "images", recording.streams.iter().map(|s| s.name.as_str()).collect())?;
+    let is_wanted = |name: &str, wanted: &Option<String>| wanted.as_deref().is_none_or(|wanted| wanted == name);
+    let robots = |track: &Track| {
+        let named = settings.poses.is_some() && is_wanted(&track.name, &settings.poses);
+        named || (track.role != Role::Target && settings.poses.is_none())
+    };
+    let mut out = Vec::new();
+    let mut rules = Vec::new();
+    let mut pair = |source: Source, robot: usize, images: &[ImageFile]| {
+        for pairing in pairings(&recording.tracks[robot].samples, images, LEAST_POSES) {
+            rules.push(pairing.rule.clone());
+            // What is found by its content is made after the others.
+            if settings.pairing.as_deref().is_none_or(|rule| rule == pairing.rule || rule == "aligned") {
+                out.push(Paired { source, robot, pairing });
+            }
+        }
+    };
+    let with_images = settings.target_poses.is_none() && sights.streams.iter().any(Option::is_some);
+    for robot in (0..recording.tracks.len()).filter(|i| robots(&recording.tracks[*i])) {
+        if with_images {
+            for (i, stream) in recording.streams.iter().enumerate() {
+                if sights.streams.get(i).is_some_and(Option::is_some) && is_wanted(&stream.name, &settings.images) {
+                    pair(Source::Stream(i), robot, &stream.images);
+                }
+            }
+            continue;
+        }
+        for (i, target) in recording.tracks.iter().enumerate() {
+            let is_target = if settings.target_poses.is_some() {
+                is_wanted(&target.name, &settings.target_poses)
+            } else {
+                target.role != Role::Robot || settings.poses.is_some()
+            };
+            if i != robot && is_target {
+                pair(Source::Track(i), robot, &as_images(target));
+            }
+        }
+    }
+    if out.is_empty() {
+        if let Some(rule) = settings.pairing.as_ref().filter(|rule| !rules.contains(rule) && !rules.is_empty()) {
+            let choices = rules.join(", ");
+            return Err(ImportError::BadChoice { key: "pairing".into(), value: rule.clone(), choices });
+        }
+        let seen = if recording.tracks.is_empty() {
+            "no file has poses of 6, 7, 12 or 16 numbers".to_owned()
+        } else if with_images {
+            "none of the series of poses has as many as images".to_owned()
+        } else {
+            format!(
+                "there are poses in {}, and neither images in which a target was found nor poses of a target beside them",
+                recording.tracks.iter().map(|t| t.name.as_str()).take(5).collect::<Vec<_>>().join(", ")
+            )
+        };
+        let need = LEAST_POSES;
+        return Err(ImportError::NoPoses { folder: recording.root.clone(), need, seen });
+    }
+    Ok(out)
+}
+
+/// Poses of a target stand for the images that they were found in.
+fn as_images(track: &Track) -> Vec<ImageFile> {
+    let image = |(i, sample): (usize, &Sample)| ImageFile {
+        // In the order of the series, whatever they are called.
+        path: sample.image.clone().unwrap_or_else(|| format!("{:06}", i + 1)).into(),
+        number: sample.number,
+        same_as: None,
+    };
+    track.samples.iter().enumerate().map(image).collect()
+}
+
+/// Largest magnitudes of lengths and of angles in a series.
+fn largest(track: &Track) -> (f64, f64) {
+    let mut out = (0.0f64, 0.0f64);
+    for sample in &track.samples {
+        let (lengths, angles): (Vec<f64>, Vec<f64>) = match &sample.numbers {
+            Numbers::Angles(n) => (n[..3].to_vec(), n[3..].to_vec()),
+            Numbers::Quaternion(n) => (n[..3].to_vec(), Vec::new()),
+            Numbers::Matrix(m) => ((0..3).map(|i| m[(i, 3)]).collect(), Vec::new()),
+        };
+        out.0 = lengths.into_iter().map(f64::abs).fold(out.0, f64::max);
+        out.1 = angles.into_iter().map(f64::abs).fold(out.1, f64::max);
+    }
+    out
+}
+
+/// What the numbers of a series may mean.
+fn readings(
+    track: &Track,
+    length: Option<LengthUnit>,
+    angle: Option<AngleUnit>,
+    rotation: Option<RotationForm>,
+) -> Vec<Reading> {
+    let Some(first) = track.samples.first() else { return Vec::new() };
+    let (largest_length, largest_angle) = largest(track);
+    let Stated { length: said_length, angle: said_angle, rotation: said_rotation, .. } = &track.stated;
+    // A person knows better than a file.
+    let lengths = match (length, said_length) {
+        (Some(unit), _) => vec![unit],
+        (None, Some(known)) => vec![known.value],
+        (None, None) => lengths_for(largest_length),
+    };
+    let forms = match (rotation, said_rotation) {
+        (Some(form), _) => vec![form],
+        (None, Some(known)) => known.value.clone(),
+        (None, None) => RotationForm::all_for(&first.numbers),
+    };
+    let mut out = Vec::new();
+    for form in forms {
+        let angles = match (angle, said_angle, form.has_angles()) {
+            (_, _, false) => vec![AngleUnit::Radian],
+            (Some(unit), ..) => vec![unit],
+            (None, Some(known), true) => vec![known.value],
+            (None, None, true) => angles_for(largest_angle),
+        };
+        for angle in angles {
+            for length in &lengths {
+                let reading = Reading { length: *length, angle, rotation: form };
+                if reading.transform(&first.numbers).is_some() {
+                    out.push(reading);
+                }
+            }
+        }
+    }
+    out
+}
+
+pub(super) fn cases(recording: &Recording, paired: &[Paired], settings: &Settings) -> Vec<Case> {
+    let mut out = Vec::new();
+    for (number, pair) in paired.iter().enumerate() {
+        let track = &recording.tracks[pair.robot];
+        let mut robot_readings = readings(track, settings.length, settings.angle, settings.rotation);
+        if matches!(pair.source, Source::Track(_)) {
+            robot_readings = without_centimetres(robot_readings);
+        }
+        let target_readings: Vec<Option<(Reading, Direction)>> = match pair.source {
+            Source::Stream(_) => vec![None],
+            Source::Track(i) => target_readings(&recording.tracks[i], settings).into_iter().map(Some).collect(),
+        };
+        for class in Direction::ALL {
+            let labels = labels(recording, track, class, settings);
+            if labels.is_empty() {
+                continue;
+            }
+            for reading in &robot_readings {
+                for target_reading in &target_readings {
+                    out.push(Case {
+                        source: pair.source,
+                        robot: pair.robot,
+                        pairing: number,
+                        reading: *reading,
+                        target_reading: *target_reading,
+                        class,
+                        labels: labels.clone(),
+                    });
+                }
+            }
+        }
+    }
+    out
+}
+
+/// When both sides are in one unit no data tell which it is, and nobody has recorded both in centimetres: only where it is
+/// the one that is left.
+fn without_centimetres(readings: Vec<Reading>) -> Vec<Reading> {
+    let is_other = |reading: &Reading| reading.length != LengthUnit::Centimetre;
+    if readings.iter().any(is_other) { readings.into_iter().filter(is_other).collect() } else { readings }
+}
+
+fn target_readings(track: &Track, settings: &Settings) -> Vec<(Reading, Direction)> {
+    let readings = readings(track, settings.target_length, None, settings.target_rotation);
+    let mut readings = without_centimetres(readings);
+    readings.retain(|reading| {
+        let distances = track.samples.iter().filter_map(|s| reading.transform(&s.numbers));
+        let distance_m = median(distances.map(|pose| pose.translation.vector.norm()));
+        distance_m.is_some_and(|distance_m| (NEAREST_M..FARTHEST_M).contains(&distance_m))
+    });
+    // Poses of a target are written by programs, which have vectors, quaternions and matrices, and seldom angles.
+    if readings.len() > 12 {
+        let common = [RotationForm::Vector, RotationForm::Euler(Euler::RPY), RotationForm::Euler(Euler::KUKA)];
+        readings.retain(|reading| common.contains(&reading.rotation));
+    }
+    let directions = match (settings.target_direction, &track.stated.direction) {
+        (Some(direction), _) => vec![direction],
+        (None, Some(known)) => vec![known.value],
+        (None, None) => Direction::ALL.to_vec(),
+    };
+    directions.iter().flat_map(|d| readings.iter().map(move |r| (*r, *d))).collect()
+}
+
+/// The places of the camera and the directions that give these equations and that nothing rules out.
+fn labels(recording: &Recording, track: &Track, class: Direction, settings: &Settings) -> Vec<(Mode, Direction)> {
+    let other = match class {
+        Direction::Forward => Direction::Inverse,
+        Direction::Inverse => Direction::Forward,
+    };
+    let mode = settings.mode.or(recording.mode.as_ref().map(|known| known.value));
+    let allowed = |(place, direction): &(Mode, Direction)| {
+        let by_mode = mode.is_none_or(|mode| mode == *place);
+        let by_direction = match (settings.direction, &track.stated.direction, &track.stated.direction_in) {
+            (Some(set), ..) => set == *direction,
+            (None, Some(known), _) => known.value == *direction,
+            (None, None, Some(known)) => known.value.contains(&(*place, *direction)),
+            (None, None, None) => true,
+        };
+        by_mode && by_direction
+    };
+    [(Mode::EyeInHand, class), (Mode::EyeToHand, other)].into_iter().filter(allowed).collect()
+}
