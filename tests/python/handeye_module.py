@@ -64,36 +64,6 @@ def noisy_pairs(rng, views, robot_mm=0.3, robot_deg=0.05):
     return s, np.array(seen)
 
 
-def swaying(times):
-    """An arm that moves without repeating itself."""
-    wave = lambda k: np.sin(2 * np.pi * (0.11 + 0.047 * k) * times + 1.7 * k) + np.sin(2 * np.pi * (0.4 + 0.05 * k) * times)
-    turns = np.stack([0.5 * wave(k) for k in range(3)], axis=-1)
-    shifts = np.stack([0.4 + 0.1 * wave(k + 3) for k in range(3)], axis=-1)
-    return np.array([pose(turn, shift) for turn, shift in zip(turns, shifts)])
-
-
-@check
-def the_offset_of_two_clocks_is_told_and_robot_poses_are_there_at_the_times_of_images(rng):
-    robot_stamps, camera_stamps = np.arange(0, 10, 0.008), np.arange(0.2, 9.8, 1 / 30)
-    robot, there = swaying(robot_stamps), swaying(camera_stamps)
-    for mode in ("eye_in_hand", "eye_to_hand"):
-        mount, link = (there, TIP_FROM_CAMERA) if mode == "eye_in_hand" else (inverse(there), BASE_FROM_TARGET)
-        other = BASE_FROM_TARGET if mode == "eye_in_hand" else TIP_FROM_CAMERA
-        jitter = [pose(rng.normal(0, 1e-3, 3), rng.normal(0, 5e-4, 3)) for _ in there]
-        seen = np.array([inverse(link) @ inverse(m) @ other @ j for m, j in zip(mount, jitter)])
-        found = handeye.clock_offset(robot_stamps, robot, camera_stamps - 0.08, seen, mode=mode)
-        assert abs(found.offset_s - 0.08) < 5 * found.sigma_s < 5e-3, f"{mode}: {found}"
-    poses, within = handeye.poses_at(camera_stamps, robot_stamps, robot)
-    assert within.all()
-    near(poses, there, 1e-3)
-    assert not handeye.poses_at([11.0], robot_stamps, robot)[1].any()
-    raises(handeye.InputError, ["robot", "rise", "entry 1"], handeye.clock_offset, np.zeros(len(robot)), robot, camera_stamps,
-           seen, mode=mode)
-    still = np.repeat(robot[:1], len(robot), axis=0)
-    raises(handeye.CalibrationError, [], handeye.clock_offset, robot_stamps, still, camera_stamps,
-           np.repeat(seen[:1], len(seen), axis=0), mode=mode)
-
-
 @check
 def exact_pairs_give_the_truth_and_what_opencv_gives(rng):
     s = session(rng, 12)
@@ -156,7 +126,10 @@ def corners_give_the_answer_with_its_uncertainty(rng):
     result = handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, image_size=SIZE,
                                mode="eye_in_hand", progress=lambda stage, part: told.append((stage, part)))
     millimetres, degrees = simulated.error(result.tip_from_camera)
-    assert millimetres < 1.0 and degrees < 0.1, (millimetres, degrees)
+    # Three times the RMS error that it states for itself: by chance once in a million.
+    variances = np.diag(result.hand_eye_covariance)
+    stated_mm, stated_degrees = 1e3 * np.sqrt(variances[:3].sum()), np.degrees(np.sqrt(variances[3:].sum()))
+    assert millimetres < 3 * stated_mm and degrees < 3 * stated_degrees, (millimetres, degrees, stated_mm, stated_degrees)
     # Where the board was seen the answer is off by less than it says; with the lens known it says less.
     point = np.array([*result.document["estimate"]["reference_point_m"], 1.0])
     off_mm = 1e3 * np.linalg.norm((result.tip_from_camera - TIP_FROM_CAMERA) @ point)
@@ -462,6 +435,36 @@ def everything_public_is_documented_and_opencv_is_not_inside(rng):
     with open(os.path.join(folder, library), "rb") as file:
         assert b"libopencv" not in file.read()
     assert re.fullmatch(r"\d+\.\d+\.\d+", handeye.__version__)
+
+
+def swaying(times):
+    """An arm that moves without repeating itself."""
+    wave = lambda k: np.sin(2 * np.pi * (0.11 + 0.047 * k) * times + 1.7 * k) + np.sin(2 * np.pi * (0.4 + 0.05 * k) * times)
+    turns = np.stack([0.5 * wave(k) for k in range(3)], axis=-1)
+    shifts = np.stack([0.4 + 0.1 * wave(k + 3) for k in range(3)], axis=-1)
+    return np.array([pose(turn, shift) for turn, shift in zip(turns, shifts)])
+
+
+@check
+def the_offset_of_two_clocks_is_told_and_robot_poses_are_there_at_the_times_of_images(rng):
+    robot_stamps, camera_stamps = np.arange(0, 10, 0.008), np.arange(0.2, 9.8, 1 / 30)
+    robot, there = swaying(robot_stamps), swaying(camera_stamps)
+    for mode in ("eye_in_hand", "eye_to_hand"):
+        mount, link = (there, TIP_FROM_CAMERA) if mode == "eye_in_hand" else (np.linalg.inv(there), BASE_FROM_TARGET)
+        other = BASE_FROM_TARGET if mode == "eye_in_hand" else TIP_FROM_CAMERA
+        jitter = [pose(rng.normal(0, 1e-3, 3), rng.normal(0, 5e-4, 3)) for _ in there]
+        seen = np.array([inverse(link) @ inverse(m) @ other @ j for m, j in zip(mount, jitter)])
+        found = handeye.clock_offset(robot_stamps, robot, camera_stamps - 0.08, seen, mode=mode)
+        assert abs(found.offset_s - 0.08) < 5 * found.sigma_s < 5e-3, f"{mode}: {found}"
+    poses, within = handeye.poses_at(camera_stamps, robot_stamps, robot)
+    assert within.all()
+    near(poses, there, 1e-3)
+    assert not handeye.poses_at([11.0], robot_stamps, robot)[1].any()
+    raises(handeye.InputError, ["robot", "rise", "entry 1"], handeye.clock_offset, np.zeros(len(robot)), robot, camera_stamps,
+           seen, mode=mode)
+    still = np.repeat(robot[:1], len(robot), axis=0)
+    raises(handeye.CalibrationError, [], handeye.clock_offset, robot_stamps, still, camera_stamps,
+           np.repeat(seen[:1], len(seen), axis=0), mode=mode)
 
 
 def main():

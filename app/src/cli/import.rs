@@ -154,7 +154,7 @@ fn import(
         NotUnderstood::Import(ImportError::NoPoses { .. }) => Failure::failed(error),
         NotUnderstood::Import(error) => Failure::unusable(error),
         NotUnderstood::Target(_) => Failure::failed(anyhow!("nothing was written: {error}; --target gives it")),
-        error => Failure::failed(error),
+        NotUnderstood::Observe(error) => Failure::failed(error),
     };
     let looked = understand::look(recording, given, settings, &looked_at, cancel).map_err(refused)?;
     for (stream, seen, images) in &looked.seen {
@@ -179,7 +179,7 @@ fn import(
     }
     let plan = import::plan(h, &known, args.link.then_some(folder.as_path()));
     let progress = |done: usize, of: usize| {
-        if done == of || done % 50 == 0 {
+        if done == of || done.is_multiple_of(50) {
             tracing::info!("{done} of {of} images copied");
         }
     };
@@ -229,10 +229,10 @@ fn looked_at(done: usize, of: usize) {
 fn found(recording: &Recording) -> String {
     let mut text = String::from("Found:\n");
     for belief in &recording.beliefs {
-        text.push_str(&format!("  {belief}\n"));
+        text.extend(["  ", belief, "\n"]);
     }
     for warning in &recording.warnings {
-        text.push_str(&format!("  note: {warning}\n"));
+        text.extend(["  note: ", warning, "\n"]);
     }
     text
 }

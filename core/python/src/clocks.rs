@@ -10,11 +10,9 @@ use crate::background::run;
 use crate::error::Failure;
 use crate::numbers::{bytes_of, doubles, of_pose, poses};
 
-fn stream<Dst: Frame, Src: Frame>(
-    what: &str,
-    stamps_s: &[u8],
-    matrices: &[u8],
-) -> Result<Vec<(f64, Pose<Dst, Src>)>, Failure> {
+type Stream<Dst, Src> = Vec<(f64, Pose<Dst, Src>)>;
+
+fn stream<Dst: Frame, Src: Frame>(what: &str, stamps_s: &[u8], matrices: &[u8]) -> Result<Stream<Dst, Src>, Failure> {
     let stamps = doubles(stamps_s);
     let names: Vec<String> = (0..stamps.len()).map(|index| index.to_string()).collect();
     Ok(stamps.into_iter().zip(poses(what, matrices, &names)?).collect())

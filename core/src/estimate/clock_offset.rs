@@ -155,7 +155,7 @@ pub fn clock_offset(
     };
     let ClockOffset { offset_s, sigma_s } = best.offset;
     // In less time than it is uncertain by the motion has not changed.
-    if !(2.0 * sigma_s < WINDOW_S) {
+    if 2.0 * sigma_s >= WINDOW_S {
         return Err(ClockOffsetError::Uncertain { sigma_s });
     }
     let is_other = |other: &&Refined| (other.offset.offset_s - offset_s).abs() > step_s + 3.0 * sigma_s;

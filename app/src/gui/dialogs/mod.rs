@@ -34,7 +34,7 @@ pub fn dialogs_ui(ctx: &Context, model: &Model, outbox: &mut Outbox) {
             over_ui(ctx, NARROW, outbox, |ui, outbox| crate::connect::dialog::address_ui(ui, model, outbox));
         }
         Some(Dialog::Import) => {
-            over_ui(ctx, WIDE, outbox, |ui, outbox| crate::import::dialog::import_ui(ui, model, outbox))
+            over_ui(ctx, WIDE, outbox, |ui, outbox| crate::import::dialog::import_ui(ui, model, outbox));
         }
         Some(dialog) => {
             over_ui(ctx, NARROW, outbox, |ui, outbox| crate::session::dialog::folders_ui(ui, model, dialog, outbox));

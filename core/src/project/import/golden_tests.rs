@@ -25,8 +25,8 @@ struct Sample {
     verdict: Verdict,
 }
 
-const fn board(columns: usize, rows: usize, square_m: f64) -> Option<TargetSpec> {
-    Some(TargetSpec::Chessboard(Grid { columns, rows, square_m }))
+const fn board(columns: usize, rows: usize, square_m: f64) -> TargetSpec {
+    TargetSpec::Chessboard(Grid { columns, rows, square_m })
 }
 
 fn samples() -> Vec<Sample> {
@@ -47,7 +47,7 @@ fn samples() -> Vec<Sample> {
     vec![
         decided(
             &["importers/table_eye_in_hand"],
-            board(11, 8, 0.02),
+            Some(board(11, 8, 0.02)),
             &["mode=eye_in_hand"],
             &[("rotation", "euler_zyx_321"), ("pose", "base_from_tip"), ("length_unit", "m"), ("angle_unit", "rad")],
             4.0,
@@ -95,7 +95,7 @@ fn samples() -> Vec<Sample> {
         ),
         decided(
             &["caliban_no_curv/images", "caliban_no_curv/robot_cali.txt"],
-            board(14, 9, 0.0121),
+            Some(board(14, 9, 0.0121)),
             &["mode=eye_in_hand"],
             &[("pose", "tip_from_base"), ("length_unit", "mm"), ("pairing", "row+0")],
             0.2,
@@ -104,7 +104,7 @@ fn samples() -> Vec<Sample> {
         // nearer to the base than the camera to the tip, as no real one is, and the likelier one is the wrong one.
         Sample {
             files: &["caliban_no_curv/images", "caliban_no_curv/robot_cali.txt"],
-            target: board(14, 9, 0.0121),
+            target: Some(board(14, 9, 0.0121)),
             settings: &[],
             first: &[("length_unit", "mm"), ("pairing", "row+0")],
             limit_mm: 0.2,
@@ -112,7 +112,7 @@ fn samples() -> Vec<Sample> {
         },
         Sample {
             files: &["importers/table_eye_in_hand"],
-            target: board(11, 8, 0.02),
+            target: Some(board(11, 8, 0.02)),
             settings: &[],
             first: &[("mode", "eye_in_hand"), ("pose", "base_from_tip"), ("rotation", "euler_zyx_321")],
             limit_mm: 4.0,

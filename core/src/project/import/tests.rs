@@ -371,30 +371,24 @@ fn happened_folder(session: &Observations, what: Happened, link: Link, rng: &mut
     }
     let written = WRITTEN[rng.random_range(0..WRITTEN.len())];
     let text_of = |view: usize, by: &str| row(&numbers(written, &pose_of(session, view)), by);
-    match link {
-        Link::Files => {
-            for (place, view) in rows.iter().enumerate() {
-                let stem = if what == Happened::LettersOrder || what == Happened::RowDoubled {
-                    format!("pose_{}", place + first)
-                } else {
-                    format!("pose_{}", view + first)
-                };
-                let text = format!("{{\"pose\": [{}]}}", text_of(*view, ", "));
-                fs::write(folder.path().join(format!("{stem}.json")), text).expect("written");
-            }
+    if link == Link::Files {
+        for (place, view) in rows.iter().enumerate() {
+            let is_by_place = what == Happened::LettersOrder || what == Happened::RowDoubled;
+            let stem = if is_by_place { format!("pose_{}", place + first) } else { format!("pose_{}", view + first) };
+            let text = format!("{{\"pose\": [{}]}}", text_of(*view, ", "));
+            fs::write(folder.path().join(format!("{stem}.json")), text).expect("written");
         }
-        _ => {
-            let mut table = String::new();
-            for view in rows {
-                let _ok = match link {
-                    Link::Names => writeln!(table, "{}.png {}", name[view], text_of(view, " ")),
-                    Link::Numbers => writeln!(table, "{} {}", view + first, text_of(view, " ")),
-                    _ => writeln!(table, "{}", text_of(view, " ")),
-                };
-            }
-            fs::write(folder.path().join("poses.txt"), table).expect("written");
-        }
+        return folder;
     }
+    let mut table = String::new();
+    for view in rows {
+        let _ok = match link {
+            Link::Names => writeln!(table, "{}.png {}", name[view], text_of(view, " ")),
+            Link::Numbers => writeln!(table, "{} {}", view + first, text_of(view, " ")),
+            Link::Order | Link::Files => writeln!(table, "{}", text_of(view, " ")),
+        };
+    }
+    fs::write(folder.path().join("poses.txt"), table).expect("written");
     folder
 }
 
@@ -420,9 +414,9 @@ fn damaged_folders(seeds: std::ops::Range<u64>) -> (usize, usize) {
         let wrong = pairs.iter().filter(|(image, pose)| *pose != Some(*image)).count();
         assert_eq!(wrong, 0, "{seed} {what:?} {link:?} {:?}: {pairs:?}\n{best:#?}", judgement.verdict);
         if judgement.verdict == Verdict::Decided {
-            right += 1
+            right += 1;
         } else {
-            refused += 1
+            refused += 1;
         }
         if what == Happened::Nothing {
             assert_eq!(judgement.verdict, Verdict::Decided, "{seed} {link:?}: {judgement:#?}");

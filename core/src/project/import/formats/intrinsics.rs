@@ -186,7 +186,7 @@ mod tests {
     use super::*;
     use crate::project::import::value::{json, yaml};
 
-    fn only(found: Vec<FoundCamera>) -> Intrinsics {
+    fn only(found: &[FoundCamera]) -> Intrinsics {
         assert_eq!(found.len(), 1, "{found:?}");
         found[0].intrinsics
     }
@@ -213,10 +213,10 @@ mod tests {
             distortion: Distortion::BrownConrady([0.082, -0.191, 0.0006, -0.0004, 0.0]),
         };
         for text in [ros, opencv, kalibr] {
-            assert_eq!(only(of_document(&yaml(text).expect("YAML")[0], "f")), want);
+            assert_eq!(only(&of_document(&yaml(text).expect("YAML")[0], "f")), want);
         }
-        assert_eq!(only(of_document(&json(own).expect("JSON"), "f")), want);
-        assert_eq!(only(mrcal(mrcal_text, "f").into_iter().collect()), want);
+        assert_eq!(only(&of_document(&json(own).expect("JSON"), "f")), want);
+        assert_eq!(only(mrcal(mrcal_text, "f").as_slice()), want);
     }
 
     #[test]
