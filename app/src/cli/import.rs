@@ -290,7 +290,7 @@ fn listed(recording: &Recording, judgement: &Judgement) -> String {
         }
     }
     if judgement.hypotheses.len() > SHOWN {
-        line(format!("     and {} more", judgement.tried - SHOWN));
+        line(format!("     and {} more", judgement.hypotheses.len() - SHOWN));
     }
     line(String::new());
     line(match &judgement.verdict {

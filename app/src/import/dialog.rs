@@ -3,9 +3,13 @@
 mod conventions;
 mod places;
 
+use std::sync::Arc;
+
 use egui::{
-    Align, Button, Image, Layout, RichText, ScrollArea, TextEdit, TextureOptions, Ui, Vec2, WidgetInfo, WidgetType,
+    Align, Button, ColorImage, Id, Image, Layout, RichText, ScrollArea, TextEdit, TextureHandle, TextureOptions, Ui,
+    Vec2, WidgetInfo, WidgetType,
 };
+use handeye_core::image::RgbImage;
 use handeye_core::project::import::{Hypothesis, Numbers, Source, Stream, Track, Verdict};
 
 use crate::command::{Command, Outbox};
@@ -107,16 +111,19 @@ fn images_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Languag
         for (index, preview) in previews.iter().enumerate() {
             let image = &found.recording.streams[stream].images[index];
             let pose = hypothesis.and_then(|h| pose_of(found, h, index));
-            let uri = format!("bytes://import/{}/{index}", image.shown());
             let size = [preview.width() as usize, preview.height() as usize];
-            // A key of the picture itself: another recording may have an image of the same name.
-            let id = egui::Id::new((uri, std::sync::Arc::as_ptr(preview) as usize));
-            let texture = ui.ctx().data_mut(|data| data.get_temp::<egui::TextureHandle>(id)).unwrap_or_else(|| {
-                let pixels = egui::ColorImage::from_rgb(size, preview.as_raw());
-                let texture = ui.ctx().load_texture("recording", pixels, TextureOptions::LINEAR);
-                ui.ctx().data_mut(|data| data.insert_temp(id, texture.clone()));
-                texture
-            });
+            // What it shows is kept with it, so that another recording takes its place.
+            let id = Id::new(("image of a recording", index));
+            let kept = ui.ctx().data_mut(|data| data.get_temp::<(Arc<RgbImage>, TextureHandle)>(id));
+            let texture = kept.filter(|(shown, _)| Arc::ptr_eq(shown, preview)).map_or_else(
+                || {
+                    let pixels = ColorImage::from_rgb(size, preview.as_raw());
+                    let texture = ui.ctx().load_texture("recording", pixels, TextureOptions::LINEAR);
+                    ui.ctx().data_mut(|data| data.insert_temp(id, (Arc::clone(preview), texture.clone())));
+                    texture
+                },
+                |(_, texture)| texture,
+            );
             ui.vertical(|ui| {
                 let width = PREVIEW * size[0] as f32 / size[1].max(1) as f32;
                 let shown = ui.add(Image::new(&texture).fit_to_exact_size(Vec2::new(width, PREVIEW)));
@@ -138,7 +145,8 @@ fn pose_of(found: &Found, h: &Hypothesis, image: usize) -> Option<String> {
 
 fn target_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
     parts::section_ui(ui, tr!(language, "Target"));
-    let id = ui.id().with("target of the recording");
+    // Of another recording it is another one.
+    let id = Id::new(("target of the recording", &import.path));
     let mut typed: String = ui.data_mut(|data| data.get_temp(id)).unwrap_or_else(|| import.target.clone());
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(&mut typed)

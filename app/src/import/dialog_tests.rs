@@ -1,11 +1,9 @@
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use egui::Ui;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable as _;
 use handeye_core::estimate::handeye::Mode;
-use handeye_core::image::RgbImage;
 use handeye_core::project::import::{
     AngleUnit, Direction, Fit, ImageFile, Judgement, LengthUnit, Pairing, Reading, Recording, Role as TrackRole,
     RotationForm, Sample, Settings, Stated,

@@ -28,13 +28,6 @@ pub enum NotUnderstood {
     Target(Text),
 }
 
-impl NotUnderstood {
-    /// Whether somebody asked for it.
-    pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Observe(ObserveError::Cancelled))
-    }
-}
-
 /// What the images of a recording show.
 #[derive(Debug)]
 pub struct Looked {

@@ -125,7 +125,10 @@ pub fn clock_offset(
     check("robot", robot)?;
     check("camera", camera)?;
     let step_s = 0.5 * spacing(robot).max(spacing(camera));
-    let found = candidates(robot, camera, within_s, step_s);
+    let found = candidates(robot, camera, within_s, step_s, cancel);
+    if cancel.is_cancelled() {
+        return Err(HandEyeError::Cancelled.into());
+    }
     if found.is_empty() {
         return Err(ClockOffsetError::Apart { within_s });
     }
@@ -201,7 +204,13 @@ fn spacing<Dst, Src>(stream: &Stream<Dst, Src>) -> f64 {
 }
 
 /// Offsets at which the angles of both streams agree best, the best first.
-fn candidates(robot: &Stream<Anchor, Mount>, camera: &Stream<Camera, Target>, within_s: f64, step_s: f64) -> Vec<f64> {
+fn candidates(
+    robot: &Stream<Anchor, Mount>,
+    camera: &Stream<Camera, Target>,
+    within_s: f64,
+    step_s: f64,
+    cancel: &CancelToken,
+) -> Vec<f64> {
     let window = ((WINDOW_S / spacing(camera)).round() as usize).clamp(1, camera.len() - 1);
     let starts = subset::spread(camera.len() - window, MOST);
     let seen: Vec<(f64, f64, f64)> = starts
@@ -226,15 +235,20 @@ fn candidates(robot: &Stream<Anchor, Mount>, camera: &Stream<Camera, Target>, wi
         let agreeing = (AGREEING * squares.len() as f64).ceil() as usize;
         Some(squares[..agreeing].iter().sum::<f64>() / agreeing as f64)
     };
-    let count = (within_s / step_s).ceil() as i64;
-    let of: Vec<Option<f64>> = (-count..=count).map(|k| disagreement(k as f64 * step_s)).collect();
+    // Beyond these the streams have nothing in common.
+    let ends = |at: usize, of: usize| robot[at].0 - camera[of].0;
+    let low_s = ends(0, camera.len() - 1).max(-within_s);
+    let high_s = ends(robot.len() - 1, 0).min(within_s);
+    let (first, last) = ((low_s / step_s).floor() as i64, (high_s / step_s).ceil() as i64);
+    let of: Vec<Option<f64>> =
+        (first..=last).map(|k| if cancel.is_cancelled() { None } else { disagreement(k as f64 * step_s) }).collect();
     let at = |k: usize| of[k].unwrap_or(f64::INFINITY);
     let is_least =
         |k: &usize| (*k == 0 || at(*k) <= at(k - 1)) && (*k + 1 == of.len() || at(*k) < at(k + 1)) && of[*k].is_some();
     let mut least: Vec<usize> = (0..of.len()).filter(is_least).collect();
     least.sort_by(|a, b| at(*a).total_cmp(&at(*b)));
     let limit = least.first().map_or(0.0, |best| NEARLY * at(*best));
-    least.into_iter().filter(|k| at(*k) <= limit).take(CANDIDATES).map(|k| (k as i64 - count) as f64 * step_s).collect()
+    least.into_iter().filter(|k| at(*k) <= limit).take(CANDIDATES).map(|k| (k as i64 + first) as f64 * step_s).collect()
 }
 
 struct Refined {
