@@ -117,6 +117,16 @@ fn influence_is_what_leaving_the_view_out_does() {
 }
 
 #[test]
+fn noise_that_views_share_is_none_or_one_that_counts() {
+    // What rounding leaves of none would be a level more to integrate out.
+    for seed in 0..12 {
+        let t = trial(Mode::EyeToHand, 8, &REALISTIC, camera(), seed);
+        let noise = fit(&t.problem(false, None), &t.start(), &CancelToken::default()).expect("solves").noise;
+        assert!(noise.view_px == 0.0 || noise.view_px > NO_VIEW_NOISE * noise.corner_px, "{seed}: {noise:?}");
+    }
+}
+
+#[test]
 fn too_few_views_and_cancelling_are_typed_errors() {
     let t = trial(Mode::EyeInHand, 2, &REALISTIC, camera(), 1);
     let result = estimate(&t.problem(false, None), &t.start(), &CancelToken::default());

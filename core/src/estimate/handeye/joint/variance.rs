@@ -133,7 +133,12 @@ fn to_noise(logs: &Logs, levels: Levels) -> Noise {
     let corner_px = level(0, LOWEST.corner_px, HIGHEST.corner_px);
     Noise {
         corner_px,
-        view_px: (logs[3].exp() - corner_px.powi(2)).clamp(0.0, HIGHEST.view_px.powi(2)).sqrt(),
+        // Of a level that is not estimated rounding would leave a difference, which then counted as one.
+        view_px: if levels.view {
+            (logs[3].exp() - corner_px.powi(2)).clamp(0.0, HIGHEST.view_px.powi(2)).sqrt()
+        } else {
+            0.0
+        },
         robot_m: level(1, LOWEST.robot_m, HIGHEST.robot_m),
         robot_rad: level(2, LOWEST.robot_rad, HIGHEST.robot_rad),
         field_m: if levels.field { level(4, LOWEST.field_m, HIGHEST.field_m) } else { 0.0 },
