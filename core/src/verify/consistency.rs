@@ -117,7 +117,7 @@ impl Sums {
         let mut by_shared = DMatrix::zeros(6, self.covariance.nrows());
         by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
-        by_shared.columns_mut(LINKS, form).copy_from(&by_form.columns(0, form));
+        by_shared.columns_mut(LINKS, form).copy_from(&by_form);
         by_shared.columns_mut(LINKS + form, joints).copy_from(&chain.by_joints.columns(0, joints));
         if let Some(field) = &calibrated.field {
             let columns = field::columns(&field.place(&view.base_from_tip), &chain.by_correction);

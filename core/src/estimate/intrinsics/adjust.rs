@@ -1,12 +1,12 @@
 //! Levenberg–Marquardt on lens, shape and all poses, the poses eliminated view by view.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix6, Matrix6xX, Vector6};
 
 use super::{IntrinsicsError, SeenView};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::planar_pose::mirror;
 use crate::geometry::se3;
-use crate::geometry::view_equations::{FreeParameters, MAX_FORM, PoseEquations, ViewInput};
+use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::progress::CancelToken;
 use crate::targets::bent::{BoardPoints, BoardShape};
 
@@ -57,7 +57,7 @@ pub(super) struct Estimate {
 /// The equations of one view's pose.
 struct Block {
     pose: Matrix6<f64>,
-    pose_by_form: SMatrix<f64, 6, MAX_FORM>,
+    pose_by_form: Matrix6xX<f64>,
     gradient: Vector6<f64>,
 }
 
@@ -71,14 +71,11 @@ impl Block {
     }
 }
 
-type FormMatrix = SMatrix<f64, MAX_FORM, MAX_FORM>;
-type FormVector = SVector<f64, MAX_FORM>;
-
 /// All views linearised at one estimate.
 pub(super) struct Linear {
     blocks: Vec<Block>,
-    form: FormMatrix,
-    form_gradient: FormVector,
+    form: DMatrix<f64>,
+    form_gradient: DVector<f64>,
     /// `Σ ‖W r‖²`
     pub cost: f64,
 }
@@ -86,12 +83,9 @@ pub(super) struct Linear {
 impl Linear {
     /// `None` where a corner has no image.
     pub fn new(problem: &Problem<'_>, estimate: &Estimate) -> Result<Option<Self>, IntrinsicsError> {
-        let mut all = Self {
-            blocks: Vec::with_capacity(problem.views.len()),
-            form: FormMatrix::zeros(),
-            form_gradient: FormVector::zeros(),
-            cost: 0.0,
-        };
+        let n = problem.free.count(&estimate.intrinsics);
+        let blocks = Vec::with_capacity(problem.views.len());
+        let mut all = Self { blocks, form: DMatrix::zeros(n, n), form_gradient: DVector::zeros(n), cost: 0.0 };
         for (view, pose) in problem.views.iter().zip(&estimate.poses) {
             problem.check_cancel()?;
             let seen = seen(view, problem.board, &estimate.shape, &estimate.intrinsics);
@@ -108,10 +102,12 @@ impl Linear {
         Ok(all.cost.is_finite().then_some(all))
     }
 
-    /// Normal equations of the first `n` columns of the form without the poses: their matrix and gradient, and what the
-    /// poses alone can take from the cost. `None` where a view leaves its pose undetermined.
-    fn eliminate(&self, n: usize, damping: f64) -> Option<(FormMatrix, FormVector, f64)> {
-        let (mut matrix, mut gradient, mut decrease) = (self.form, self.form_gradient, 0.0);
+    /// Normal equations of the form without the poses: their matrix and gradient, and what the poses alone can take from
+    /// the cost. `None` where a view leaves its pose undetermined.
+    fn eliminate(&self, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>, f64)> {
+        let n = self.form_gradient.len();
+        let (mut matrix, mut gradient, mut decrease) = (self.form.clone(), self.form_gradient.clone(), 0.0);
+        let mut gains = vec![[0.0; 6]; n];
         for i in 0..n {
             matrix[(i, i)] *= 1.0 + damping;
         }
@@ -127,42 +123,36 @@ impl Linear {
                 out
             };
             let dot = |a: &[f64; 6], b: &[f64; 6]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-            let mut gains = [[0.0; 6]; MAX_FORM];
-            for (k, gain) in gains[..n].iter_mut().enumerate() {
-                *gain = forward(block.pose_by_form.column(k).into_owned().data.0[0]);
+            for (gain, column) in gains.iter_mut().zip(block.pose_by_form.column_iter()) {
+                *gain = forward(column.into_owned().data.0[0]);
             }
             let own = forward(block.gradient.data.0[0]);
             decrease += dot(&own, &own);
-            for (j, gain) in gains[..n].iter().enumerate() {
+            for (j, gain) in gains.iter().enumerate() {
                 for (i, other) in gains[..=j].iter().enumerate() {
                     matrix[(i, j)] -= dot(gain, other);
                 }
                 gradient[j] -= dot(gain, &own);
             }
         }
-        for j in 0..n {
-            for i in 0..j {
-                matrix[(j, i)] = matrix[(i, j)];
-            }
-        }
+        matrix.fill_lower_triangle_with_upper_triangle();
         Some((matrix, gradient, decrease))
     }
 
     /// The damped step from `estimate` and the decrease of the cost that it promises.
     fn step(&self, problem: &Problem<'_>, estimate: &Estimate, damping: f64) -> Option<(Estimate, f64)> {
-        let n = problem.free.count(&estimate.intrinsics);
-        let (matrix, gradient, by_poses) = self.eliminate(n, damping)?;
+        let (matrix, gradient, by_poses) = self.eliminate(damping)?;
+        let n = gradient.len();
         // Columns differ by many orders (pixels, lens coefficients, metres).
         let scale = DVector::from_fn(n, |i, _| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
         let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-        let gradient = DVector::from_fn(n, |i, _| gradient[i] * scale[i]);
+        let gradient = gradient.component_mul(&scale);
         let solved = Cholesky::new(scaled)?.solve(&gradient);
         let promised = by_poses + gradient.dot(&solved);
-        let mut form = FormVector::zeros();
-        form.rows_mut(0, n).copy_from(&-solved.component_mul(&scale));
+        let form = -solved.component_mul(&scale);
         let mut poses = Vec::with_capacity(self.blocks.len());
         for (block, pose) in self.blocks.iter().zip(&estimate.poses) {
-            let own = -block.factor(damping)?.solve(&(block.gradient + block.pose_by_form * form));
+            let own = -block.factor(damping)?.solve(&(block.gradient + &block.pose_by_form * &form));
             poses.push(pose * se3::exp(&own));
         }
         let lens: Vec<f64> = estimate.intrinsics.parameters().iter().zip(form.iter()).map(|(p, d)| p + d).collect();

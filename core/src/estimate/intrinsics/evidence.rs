@@ -25,7 +25,7 @@ use super::IntrinsicsError;
 use super::adjust::{Estimate, Problem, seen};
 use super::information::inverse;
 use crate::estimate::bend::Deflection;
-use crate::estimate::handeye::joint::view_block::own_pose_eliminated;
+use crate::estimate::handeye::joint::view_block::split;
 use crate::geometry::planar_pose::PoseError;
 use crate::geometry::statistics::median;
 use crate::geometry::view_equations::{FreeParameters, PoseEquations};
@@ -81,13 +81,10 @@ impl Evidence {
             problem.check_cancel()?;
             let seen = seen(view, problem.board, &estimate.shape, &estimate.intrinsics);
             let behind = |_| IntrinsicsError::NotACamera { reason: "a corner is not in front of it".into() };
-            let mut equations = PoseEquations::new(&seen, pose, columns).map_err(behind)?;
+            let equations = PoseEquations::new(&seen, pose, columns).map_err(behind)?;
             cost += equations.squared_px;
-            let rest = own_pose_eliminated(&mut equations).ok_or(PoseError::CollinearCorners { view: index })?;
-            let score = Score {
-                information: rest.form.view((0, 0), (n, n)).into_owned(),
-                gradient: DVector::from_column_slice(&rest.gradient.as_slice()[..n]),
-            };
+            let (_, rest) = split(&equations).ok_or(PoseError::CollinearCorners { view: index })?;
+            let score = Score { information: rest.form, gradient: rest.gradient };
             information += &score.information;
             gradient += &score.gradient;
             scores.push(score);

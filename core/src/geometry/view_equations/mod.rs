@@ -2,7 +2,7 @@
 
 mod gram;
 
-use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix2, Matrix3, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
 
 use crate::geometry::camera::{CameraError, Intrinsics, MAX_PARAMETERS};
 use crate::targets::bent::{BoardPoints, BoardShape};
@@ -59,19 +59,19 @@ pub(crate) struct ViewInput<'a> {
 }
 
 /// Normal equations of one view, with residuals `r = predicted − measured` in pixels (times the whitener of the corner)
-/// and the pose perturbed as `camera_from_target * exp(xi)`. Columns of the form beyond its count are zero.
+/// and the pose perturbed as `camera_from_target * exp(xi)`.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseEquations {
     /// `Jpᵀ Jp`
     pub pose: Matrix6<f64>,
     /// `Jpᵀ Jf`
-    pub pose_by_form: SMatrix<f64, 6, MAX_FORM>,
+    pub pose_by_form: Matrix6xX<f64>,
     /// `Jfᵀ Jf`
-    pub form: SMatrix<f64, MAX_FORM, MAX_FORM>,
+    pub form: DMatrix<f64>,
     /// `Jpᵀ r`
     pub pose_gradient: Vector6<f64>,
     /// `Jfᵀ r`
-    pub form_gradient: SVector<f64, MAX_FORM>,
+    pub form_gradient: DVector<f64>,
     /// `rᵀ r`, squared pixels.
     pub squared_px: f64,
     /// Number of corners.
@@ -110,25 +110,12 @@ impl PoseEquations {
 
     fn from_products<const QUADS: usize>(products: &Products<QUADS>, count: usize, corners: usize) -> Self {
         let residual = POSE + count;
-        let mut pose_by_form = SMatrix::zeros();
-        let mut form = SMatrix::zeros();
-        let mut form_gradient = SVector::zeros();
-        for j in 0..count {
-            for i in 0..POSE {
-                pose_by_form[(i, j)] = products.at(i, POSE + j);
-            }
-            for i in 0..=j {
-                form[(i, j)] = products.at(POSE + i, POSE + j);
-                form[(j, i)] = form[(i, j)];
-            }
-            form_gradient[j] = products.at(POSE + j, residual);
-        }
         Self {
             pose: Matrix6::from_fn(|i, j| products.at(i, j)),
-            pose_by_form,
-            form,
+            pose_by_form: Matrix6xX::from_fn(count, |i, j| products.at(i, POSE + j)),
+            form: DMatrix::from_fn(count, count, |i, j| products.at(POSE + i, POSE + j)),
             pose_gradient: Vector6::from_fn(|i, _| products.at(i, residual)),
-            form_gradient,
+            form_gradient: DVector::from_fn(count, |i, _| products.at(POSE + i, residual)),
             squared_px: products.at(residual, residual),
             corners,
         }

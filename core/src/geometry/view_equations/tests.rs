@@ -114,7 +114,6 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
                     assert!(error <= allowed, "{distortion:?} {free:?} ({i}, {j}): {error:e} of {allowed:e}");
                 }
             }
-            assert!(found.form.view((0, n - 6), (MAX_FORM, MAX_FORM + 6 - n)).iter().all(|v| *v == 0.0));
         }
     }
 }

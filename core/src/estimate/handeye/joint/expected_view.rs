@@ -11,7 +11,7 @@ use nalgebra::{Cholesky, DMatrix, Matrix6, Vector2, Vector6};
 
 use super::chain::Chain;
 use super::field::{HALF, RobotField, SLOPES};
-use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight};
+use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight, whitened};
 use super::{Free, Noise};
 use crate::estimate::Calibration;
 use crate::estimate::handeye::{HandEye, Mode};
@@ -147,7 +147,7 @@ impl ViewModel {
         };
         let equations = PoseEquations::new(&seen, &chain.camera_from_target, self.free.form()).ok()?;
         let place = self.field.as_ref().map(|field| field.place(base_from_tip));
-        ViewBlock::new(&chain, equations, self.layout, place.as_ref())
+        ViewBlock::new(&chain, &equations, self.layout, place.as_ref())
     }
 
     fn chain(&self, base_from_tip: &Pose<Base, Tip>) -> Chain {
@@ -173,26 +173,16 @@ impl ViewModel {
         let block = self.block(base_from_tip, corners)?;
         let weights = PixelWeights::new(&self.noise);
         let n = self.unknowns();
-        let whiten = Cholesky::new(block.equations.pose)?;
-        let of_pose = block.pose_shared(self.layout);
-        let mut of_pose = of_pose.columns(0, n).into_owned();
-        whiten.l_dirty().solve_lower_triangular_mut(&mut of_pose).then_some(())?;
-        // Jdᵀ Jd = Dᵀ G D, and the whitened columns of the correction are Lᵀ D.
-        let by_robot = whiten.l().transpose() * self.by_correction(base_from_tip) * weights.pose.sqrt();
+        let by_robot = block.by_correction * weights.pose.sqrt();
         let spread = Matrix6::from_diagonal(&prior_weight(&self.noise).map(f64::recip));
-        let noise = Cholesky::new(Matrix6::identity() + by_robot * spread * by_robot.transpose())?;
-        let mut of_pose = of_pose * weights.pose.sqrt();
-        noise.l_dirty().solve_lower_triangular_mut(&mut of_pose).then_some(())?;
-        let rest = block.rest.form.view((0, 0), (self.layout.form, self.layout.form)) * weights.rest;
+        let noise = Cholesky::new(Matrix6::identity() + by_robot * spread * by_robot.transpose())?.l();
+        let of_pose = whitened(&noise, block.by_shared.transpose() * weights.pose.sqrt());
+        let rest = block.rest.form * weights.rest;
         let rest = half_root(rest);
         let mut rows = DMatrix::zeros(6 + rest.nrows(), n);
         rows.rows_mut(0, 6).copy_from(&of_pose);
         rows.view_mut((6, Layout::FORM_AT), rest.shape()).copy_from(&rest);
         Some(ExpectedView { rows })
-    }
-
-    fn by_correction(&self, base_from_tip: &Pose<Base, Tip>) -> Matrix6<f64> {
-        self.chain(base_from_tip).by_correction
     }
 
     /// How well the pose of the target in a view is foretold with shared unknowns of that covariance: covariance of the

@@ -44,8 +44,7 @@ fn what_views_are_expected_to_say_is_what_the_estimator_takes_from_them() {
         state.field.clone_from(&model.field);
         let system = System::new(&problem, &state, &CancelToken::default()).expect("in front of the camera");
         for (view, block) in trial.views.iter().zip(&system.blocks) {
-            let (expected, _) =
-                block.information(system.layout, model.noise(), &Vector6::zeros()).expect("it determines a pose");
+            let (expected, _) = block.information(model.noise(), &Vector6::zeros()).expect("it determines a pose");
             let corners: Vec<usize> = view.corners.iter().map(|corner| corner.index).collect();
             let got = model.expected(&view.base_from_tip, &corners).expect("it determines a pose").information();
             let scale = DMatrix::from_fn(got.nrows(), got.ncols(), |i, j| {

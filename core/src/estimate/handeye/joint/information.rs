@@ -17,7 +17,7 @@ use super::Noise;
 use super::field::HALF;
 use super::normal::System;
 use super::variance::{Levels, Likelihood};
-use super::view_block::{PixelWeights, prior_weight};
+use super::view_block::{Layout, PixelWeights, prior_weight};
 
 /// Levels that are told by something else than the poses' part.
 const OTHERS: [usize; 5] = [0, 1, 2, 4, 5];
@@ -25,19 +25,20 @@ const OTHERS: [usize; 5] = [0, 1, 2, 4, 5];
 /// Fisher's information of the log-variances at these levels; zero for a level that is not estimated.
 pub fn information(system: &System, noise: &Noise, at: &Likelihood, levels: Levels) -> Matrix6<f64> {
     let shared = &at.covariance;
-    let robot = OfRobot::new(system, noise, at);
-    let carried = robot.moments.each_ref().map(|moment| shared * moment);
-    let mut traces = robot.own;
-    for (k, l) in [(1, 1), (1, 2), (2, 2)] {
-        traces[(k, l)] += trace_of_product(&carried[k - 1], &carried[l - 1]);
+    let mut traces = of_robot(system, noise, at);
+    let prior = prior_weight(noise);
+    let carried = [0, 1].map(|k| shared * &at.moments[k] * prior[3 * k]);
+    for (k, l) in [(0, 0), (0, 1), (1, 1)] {
+        traces[(1 + k, 1 + l)] += trace_of_product(&carried[k], &carried[l]);
     }
-    let form = system.rest_information() / noise.corner_px.powi(2);
-    let through = shared * form;
-    let by_rest = &through * shared;
+    // The rests say something of the form alone.
+    let by_form = shared.columns(Layout::FORM_AT, system.layout.form);
+    let through = by_form * (system.rest_information() / noise.corner_px.powi(2));
+    let of_form = through.rows(Layout::FORM_AT, system.layout.form).into_owned();
     let rest_count = (system.residual_count() - 6 * system.blocks.len()) as f64;
-    traces[(0, 0)] = rest_count - 2.0 * through.trace() + trace_of_product(&through, &through);
-    for k in [1, 2] {
-        traces[(0, k)] = by_rest.component_mul(&robot.moments[k - 1]).sum();
+    traces[(0, 0)] = rest_count - 2.0 * of_form.trace() + trace_of_product(&of_form, &of_form);
+    for k in 0..2 {
+        traces[(0, 1 + k)] = by_form.dot(&(&at.moments[k] * &through)) * prior[3 * k];
     }
     if levels.field {
         let half = |k: usize| {
@@ -45,12 +46,13 @@ pub fn information(system: &System, noise: &Noise, at: &Likelihood, levels: Leve
             first..first + HALF
         };
         let sigma = [noise.field_m, noise.field_rad];
-        let diagonal = |matrix: &DMatrix<f64>, k: usize| half(k).map(|i| matrix[(i, i)]).sum::<f64>();
         for k in 0..2 {
-            traces[(0, 4 + k)] = diagonal(&by_rest, k) / sigma[k].powi(2);
-            for of_robot in [1, 2] {
-                let by_robot = &carried[of_robot - 1] * shared;
-                traces[(of_robot, 4 + k)] = diagonal(&by_robot, k) / sigma[k].powi(2);
+            let through_half = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
+                half(k).map(|i| left.row(i).dot(&right.row(i))).sum::<f64>() / sigma[k].powi(2)
+            };
+            traces[(0, 4 + k)] = through_half(&through, &by_form.into_owned());
+            for of_robot in 0..2 {
+                traces[(1 + of_robot, 4 + k)] = through_half(&carried[of_robot], shared);
             }
             for l in k..2 {
                 let pairs = half(k).flat_map(|i| half(l).map(move |j| (i, j)));
@@ -72,39 +74,25 @@ fn trace_of_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     a.component_mul(&b.transpose()).sum()
 }
 
-/// The corrections' part, position and orientation apart.
-struct OfRobot {
-    /// Traces without what two corrections have in common through the shared unknowns, at the levels' places.
-    own: Matrix6<f64>,
-    /// Sums of `F_iᵀ F_i` over the views, in terms of the level.
-    moments: [DMatrix<f64>; 2],
-}
-
-impl OfRobot {
-    fn new(system: &System, noise: &Noise, at: &Likelihood) -> Self {
-        let n = at.covariance.nrows();
-        let sigma = prior_weight(noise).map(|weight| weight.sqrt().recip());
-        let (to, from) = (Matrix6::from_diagonal(&sigma.map(f64::recip)), Matrix6::from_diagonal(&sigma));
-        let weight = PixelWeights::new(noise).pose;
-        let mut out = Self { own: Matrix6::zeros(), moments: [DMatrix::zeros(n, n), DMatrix::zeros(n, n)] };
-        for (block, own) in system.blocks.iter().zip(&at.reduced.own) {
-            // 1 − O⁻¹ in terms of the levels, without the difference of what is nearly equal.
-            let seen = to * own.factor.solve(&(block.own * weight)) * from;
-            let follows = own.follows(n);
-            let follows = to * follows.columns(0, n);
-            let through = &follows * &at.covariance * follows.transpose();
-            for (k, l) in [(0, 0), (0, 1), (1, 1)] {
-                let seen: Matrix3<f64> = seen.fixed_view::<3, 3>(3 * k, 3 * l).into_owned();
-                let through: Matrix3<f64> = through.fixed_view::<3, 3>(3 * k, 3 * l).into_owned();
-                out.own[(1 + k, 1 + l)] += seen.norm_squared() - 2.0 * seen.dot(&through);
-            }
-            for (k, moment) in out.moments.iter_mut().enumerate() {
-                let rows = follows.rows(3 * k, 3);
-                *moment += rows.tr_mul(&rows);
-            }
+/// Traces of position and orientation of the corrections without what two corrections have in common through the shared
+/// unknowns, at the levels' places.
+fn of_robot(system: &System, noise: &Noise, at: &Likelihood) -> Matrix6<f64> {
+    let sigma = prior_weight(noise).map(|weight| weight.sqrt().recip());
+    let (to, from) = (Matrix6::from_diagonal(&sigma.map(f64::recip)), Matrix6::from_diagonal(&sigma));
+    let weight = PixelWeights::new(noise).pose;
+    let mut out = Matrix6::zeros();
+    for (block, own) in system.blocks.iter().zip(&at.reduced.own) {
+        // 1 − O⁻¹ in terms of the levels, without the difference of what is nearly equal.
+        let seen = to * own.factor.solve(&(block.own * weight)) * from;
+        let follows = own.follows();
+        let through = to * follows.tr_mul(&(&at.covariance * &follows)) * to;
+        for (k, l) in [(0, 0), (0, 1), (1, 1)] {
+            let seen: Matrix3<f64> = seen.fixed_view::<3, 3>(3 * k, 3 * l).into_owned();
+            let through: Matrix3<f64> = through.fixed_view::<3, 3>(3 * k, 3 * l).into_owned();
+            out[(1 + k, 1 + l)] += seen.norm_squared() - 2.0 * seen.dot(&through);
         }
-        out
     }
+    out
 }
 
 #[cfg(test)]

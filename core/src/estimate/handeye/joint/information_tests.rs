@@ -25,7 +25,7 @@ fn counts_change_with_the_levels_as_the_information_says() {
         let mut state = State::new(&problem, &t.start());
         let cancel = CancelToken::default();
         let start = System::new(&problem, &state, &cancel).expect("regular");
-        let descent = Descent::new(&problem, &noise, optimise::FAR);
+        let descent = Descent { problem: &problem, noise: &noise, damping: optimise::FAR };
         let (system, _) = optimise::minimise(descent, &mut state, start, &cancel).expect("solves");
         let logs = to_logs(&noise);
         let at = evaluate(&system, &logs, levels).expect("regular");

@@ -90,7 +90,7 @@ pub fn integrate(
 ) -> Result<Integrated, HandEyeError> {
     let start = lifted(system, noise, levels)?;
     let found = variance::most_likely(system, start, levels, Aim::Posterior)?;
-    let axes = Axes::new(&found, levels);
+    let axes = Axes::new(&found.information(system, levels, Aim::Posterior), levels);
     let level_sigma = |logs: &Matrix6<f64>| [0, 1, 2].map(|k| 0.5 * logs[(k, k)].max(0.0).sqrt());
     if system.blocks.len() > MANY_VIEWS {
         let level_sigma = level_sigma(&axes.covariance());
@@ -145,10 +145,10 @@ struct Axes {
 }
 
 impl Axes {
-    fn new(found: &MostLikely, levels: Levels) -> Self {
+    fn new(information: &Matrix6<f64>, levels: Levels) -> Self {
         let places: Vec<usize> = levels.estimated().collect();
         let n = places.len();
-        let information = DMatrix::from_fn(n, n, |i, j| found.information[(places[i], places[j])]);
+        let information = DMatrix::from_fn(n, n, |i, j| information[(places[i], places[j])]);
         let eigen = information.symmetric_eigen();
         // A level is known to a factor of e⁴ even where the information at one point says nothing.
         let width = eigen.eigenvalues.map(|v| v.max(0.25).sqrt().recip());
@@ -181,7 +181,10 @@ impl Axes {
 struct Point {
     weight: f64,
     logs: Logs,
-    at: Likelihood,
+    /// Of the shared unknowns.
+    information: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    step: DVector<f64>,
 }
 
 fn points(system: &System, found: &MostLikely, mut axes: Axes, levels: Levels) -> Result<Vec<Point>, HandEyeError> {
@@ -216,7 +219,9 @@ fn points(system: &System, found: &MostLikely, mut axes: Axes, levels: Levels) -
         let wanted = axes.at(&found.logs, &place);
         let logs = variance::kept(wanted, levels);
         let Some((value, at)) = posterior(&logs)? else { continue };
-        points.push(Point { weight: -0.5 * (value - top) - log_density, logs, at });
+        let Likelihood { reduced, covariance, step, .. } = at;
+        let weight = -0.5 * (value - top) - log_density;
+        points.push(Point { weight, logs, information: reduced.information, covariance, step });
     }
     let most = points.iter().map(|point| point.weight).fold(f64::NEG_INFINITY, f64::max);
     for point in &mut points {
@@ -259,11 +264,11 @@ fn range(points: &[Point], level: usize) -> [f64; 2] {
 
 /// The shape of the t, before its size is known; `None` where the covariances have no inverse.
 fn shape(points: &[Point]) -> Option<DMatrix<f64>> {
-    let n = points.first()?.at.covariance.nrows();
+    let n = points.first()?.covariance.nrows();
     let (mut information, mut shifts) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
-    for Point { weight, at, .. } in points {
-        information += at.reduced.information() * *weight;
-        shifts += &at.step * at.step.transpose() * *weight;
+    for point in points {
+        information += &point.information * point.weight;
+        shifts += &point.step * point.step.transpose() * point.weight;
     }
     Some(normal::covariance_of(&information)? + shifts)
 }
@@ -281,8 +286,8 @@ impl Mixture {
         let of_hand_eye: Vec<_> = points
             .iter()
             .map(|point| {
-                let covariance: Matrix6<f64> = point.at.covariance.fixed_view::<6, 6>(0, 0).into_owned();
-                let shift: Vector6<f64> = point.at.step.fixed_rows::<6>(0).into_owned();
+                let covariance: Matrix6<f64> = point.covariance.fixed_view::<6, 6>(0, 0).into_owned();
+                let shift: Vector6<f64> = point.step.fixed_rows::<6>(0).into_owned();
                 (point.weight, covariance, shift)
             })
             .collect();

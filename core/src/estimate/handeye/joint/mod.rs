@@ -45,6 +45,8 @@ mod variance;
 pub(crate) mod view_block;
 mod weights;
 
+use std::sync::Arc;
+
 use nalgebra::Point3;
 pub use problem::{Free, JointProblem, JointStart, LensPrior, Noise};
 pub use residual_distortion::ShownDistortion;
@@ -128,7 +130,7 @@ pub(crate) fn fit<'a>(
     for round in 0..MAX_ROUNDS {
         work.report(Stage::Joint, round, MAX_ROUNDS);
         let damping = if round == 0 { optimise::FAR } else { optimise::NEAR };
-        let descent = Descent::new(problem, &noise, damping);
+        let descent = Descent { problem, noise: &noise, damping };
         let (found, steps) = optimise::minimise(descent, &mut state, system, work.cancel)?;
         system = found;
         iterations += steps;
@@ -154,9 +156,9 @@ pub(crate) fn fit<'a>(
         // It was asked for on the way and is not needed at the end.
         noise.view_px = 0.0;
     }
-    let descent = Descent::new(problem, &noise, optimise::NEAR);
+    let descent = Descent { problem, noise: &noise, damping: optimise::NEAR };
     let (system, steps) = optimise::minimise(descent, &mut state, system, work.cancel)?;
-    let solution = finish(problem, &state, &system, noise, &work)?;
+    let solution = finish(problem, &state, system, noise, &work)?;
     Ok(JointSolution { iterations: iterations + steps, deviance, ..solution })
 }
 
@@ -180,33 +182,40 @@ pub(crate) fn with_stated_error(
 ) -> Result<JointSolution, HandEyeError> {
     let problem = &JointProblem { free: solution.free, ..*problem };
     let (state, noise) = (State::of(&solution), &solution.noise);
-    let system = normal::System::new(problem, &state, cancel)?;
+    let system = solution.linearised(problem)?;
     let reduced = system.reduce(noise)?;
     let plain = reduced.inverse();
     let integrated = if problem.noise.is_some() {
         Integrated { covariance: plain.clone(), small_sample: SmallSample::KNOWN }
     } else {
         let levels = Levels { view: noise.view_px > 0.0, field: state.field.is_some() };
-        integrated::integrate(&system, noise, levels, plain.clone(), &solution.reference_point)?
+        integrated::integrate(system, noise, levels, plain.clone(), &solution.reference_point)?
     };
-    let optimum = Optimum { problem, state: &state, system: &system, noise, reduced: &reduced, covariance: &plain };
+    let optimum = Optimum { problem, state: &state, system, noise, reduced: &reduced, covariance: &plain };
     let covariance = optimum.widened(integrated.covariance, &solution.reference_point)?;
-    Ok(JointSolution { covariance, small_sample: integrated.small_sample, ..solution })
+    let mut views = solution.views.clone();
+    for (view, block) in views.iter_mut().zip(&system.blocks) {
+        if cancel.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        view.influence_m = reduced.influence_of(block, noise, &view.correction, &solution.reference_point);
+    }
+    Ok(JointSolution { covariance, small_sample: integrated.small_sample, views, ..solution })
 }
 
 fn finish(
     problem: &JointProblem<'_>,
     state: &State,
-    system: &normal::System,
+    system: normal::System,
     noise: Noise,
     work: &Work<'_>,
 ) -> Result<JointSolution, HandEyeError> {
-    let reduced = system.reduce(&noise)?;
+    let covariance = system.reduce(&noise)?.inverse();
     let reference_point = state.mean_target_centre(problem);
     let points = problem.board.points(&state.shape);
     let mut views = Vec::with_capacity(problem.views.len());
     let (mut squared_px, mut corners) = (0.0, 0usize);
-    for ((block, correction), view) in system.blocks.iter().zip(&state.corrections).zip(problem.views) {
+    for (correction, view) in state.corrections.iter().zip(problem.views) {
         if work.is_cancelled() {
             return Err(HandEyeError::Cancelled);
         }
@@ -218,7 +227,7 @@ fn finish(
             rms_px: (of_view / view.corners.len() as f64).sqrt(),
             correction: *correction,
             camera_from_target: Pose::from_isometry(camera_from_target),
-            influence_m: reduced.influence_of(block, system.layout, &noise, correction, &reference_point),
+            influence_m: None,
         });
     }
     Ok(JointSolution {
@@ -228,7 +237,7 @@ fn finish(
         joint_offsets_rad: state.joints_rad.clone(),
         field: state.field.clone(),
         deviance: None,
-        covariance: reduced.inverse(),
+        covariance,
         small_sample: SmallSample::KNOWN,
         free: problem.free,
         noise,
@@ -236,6 +245,7 @@ fn finish(
         rms_px: (squared_px / corners as f64).sqrt(),
         reference_point,
         iterations: 0,
+        system: Arc::new(system),
     })
 }
 

@@ -3,9 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, Vector6};
 
 use super::field::HALF;
-use super::view_block::{
-    Layout, Own, PixelWeights, Rest, SharedMatrix, SharedVector, ViewBlock, add_form, add_form_gradient, prior_weight,
-};
+use super::view_block::{Layout, Own, PixelWeights, Rest, ViewBlock, add_rest, add_square, columns, prior_weight};
 use super::{JOINT_PRIOR_RAD, JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
@@ -27,7 +25,7 @@ struct SharedPrior {
 }
 
 /// What is known of the lens beforehand.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct KnownLens {
     /// Current values minus those expected.
     offset: DVector<f64>,
@@ -35,6 +33,7 @@ struct KnownLens {
 }
 
 /// All views linearised at one estimate.
+#[derive(Debug)]
 pub struct System {
     pub blocks: Vec<ViewBlock>,
     pub corrections: Vec<Vector6<f64>>,
@@ -45,8 +44,9 @@ pub struct System {
     /// Slopes of the field.
     pub slopes: Vec<f64>,
     /// Sum of `Jsᵀ Js` over the poses' parts of the views, upper triangle.
-    shared: SharedMatrix,
-    shared_gradient: SharedVector,
+    shared: DMatrix<f64>,
+    /// Sum of `Jsᵀ r` likewise.
+    shared_gradient: DVector<f64>,
     /// Sum of the rests of the views.
     rest: Rest,
     /// Polled at every view by whatever loops over them.
@@ -56,6 +56,7 @@ pub struct System {
 impl System {
     pub fn new(problem: &JointProblem<'_>, state: &State, cancel: &CancelToken) -> Result<Self, HandEyeError> {
         let layout = state.layout(problem);
+        let n = layout.count();
         let mut system = Self {
             blocks: Vec::with_capacity(problem.views.len()),
             corrections: state.corrections.clone(),
@@ -63,9 +64,9 @@ impl System {
             priors: priors(state, layout),
             known_lens: known_lens(problem, state),
             slopes: state.field.as_ref().map_or_else(Vec::new, |field| field.slopes().to_vec()),
-            shared: SharedMatrix::zeros(),
-            shared_gradient: SharedVector::zeros(),
-            rest: Rest::nothing(),
+            shared: DMatrix::zeros(n, n),
+            shared_gradient: DVector::zeros(n),
+            rest: Rest::nothing(layout.form),
             cancel: cancel.clone(),
         };
         for index in 0..problem.views.len() {
@@ -78,62 +79,28 @@ impl System {
     }
 
     fn add(&mut self, block: ViewBlock) {
-        block.add_shared(self.layout, &mut self.shared);
-        self.shared_gradient += block.shared_gradient;
-        self.rest.form += block.rest.form;
-        self.rest.gradient += block.rest.gradient;
-        self.rest.squared_px += block.rest.squared_px;
+        add_square(&mut self.shared, columns(&block.by_shared), 1.0);
+        self.shared_gradient.gemv(1.0, &block.by_shared, &block.residual, 1.0);
+        self.rest.add(&block.rest);
         self.blocks.push(block);
-    }
-
-    /// The same with the views alone that are asked for.
-    pub fn of_views(&self, keep: impl Fn(usize) -> bool) -> Self {
-        let kept = |index: &usize| keep(*index);
-        let corrections = (0..self.blocks.len()).filter(kept).map(|i| self.corrections[i]).collect();
-        let mut system = Self {
-            blocks: Vec::with_capacity(self.blocks.len()),
-            corrections,
-            layout: self.layout,
-            priors: self.priors.clone(),
-            known_lens: self.known_lens.clone(),
-            slopes: self.slopes.clone(),
-            shared: SharedMatrix::zeros(),
-            shared_gradient: SharedVector::zeros(),
-            rest: Rest::nothing(),
-            cancel: self.cancel.clone(),
-        };
-        for index in (0..self.blocks.len()).filter(kept) {
-            system.add(self.blocks[index].clone());
-        }
-        system
     }
 
     /// Weighted squares of the rests after a step of the shared unknowns, and their expectation on top of it when these
     /// have the covariance given; both unweighted, squared pixels.
     pub fn rest_squares(&self, step: &DVector<f64>, covariance: &DMatrix<f64>) -> (f64, f64) {
-        let f = self.layout.form;
-        let moved = step.rows(Layout::FORM_AT, f);
-        let (mut squares, mut expected) = (self.rest.squared_px, 0.0);
-        for j in 0..f {
-            squares += 2.0 * self.rest.gradient[j] * moved[j];
-            for i in 0..f {
-                squares += self.rest.form[(i, j)] * moved[i] * moved[j];
-                expected += self.rest.form[(i, j)] * covariance[(Layout::FORM_AT + i, Layout::FORM_AT + j)];
-            }
-        }
-        (squares.max(0.0), expected)
+        let (at, f) = (Layout::FORM_AT, self.layout.form);
+        let moved = step.rows(at, f);
+        let squares = self.rest.squared_px + moved.dot(&(&self.rest.form * moved + &self.rest.gradient * 2.0));
+        (squares.max(0.0), self.rest.form.dot(&covariance.view((at, at), (f, f))))
     }
 
-    /// What the rests of the views say of the shared unknowns, for corners of a noise of one pixel.
-    pub fn rest_information(&self) -> DMatrix<f64> {
-        let (n, f) = (self.layout.count(), self.layout.form);
-        let mut out = DMatrix::zeros(n, n);
-        out.view_mut((Layout::FORM_AT, Layout::FORM_AT), (f, f)).copy_from(&self.rest.form.view((0, 0), (f, f)));
-        out
+    /// What the rests of the views say of the form, for corners of a noise of one pixel.
+    pub fn rest_information(&self) -> &DMatrix<f64> {
+        &self.rest.form
     }
 
     pub fn residual_count(&self) -> usize {
-        2 * self.blocks.iter().map(ViewBlock::corner_count).sum::<usize>()
+        2 * self.blocks.iter().map(|block| block.corners).sum::<usize>()
     }
 
     /// Minus twice the log of the joint density at the point of linearisation, without the normalising terms.
@@ -201,25 +168,20 @@ impl System {
     pub fn reduce_damped(&self, noise: &Noise, damping: f64) -> Result<Reduced, HandEyeError> {
         let weights = PixelWeights::new(noise);
         let prior = prior_weight(noise);
-        let n = self.layout.count();
-        let mut matrix = self.shared * weights.pose;
-        let mut gradient = self.shared_gradient * weights.pose;
-        add_form(self.layout, &self.rest.form, weights.rest, &mut matrix);
-        add_form_gradient(self.layout, &self.rest.gradient, weights.rest, &mut gradient);
+        let mut matrix = &self.shared * weights.pose;
+        let mut gradient = &self.shared_gradient * weights.pose;
+        add_rest(&self.rest, weights.rest, &mut matrix, &mut gradient);
         for p in self.known(noise) {
             matrix[(p.index, p.index)] += p.precision;
             gradient[p.index] += p.precision * p.offset;
         }
         if let Some(KnownLens { offset, information }) = &self.known_lens {
-            let pull = information * offset;
-            for j in 0..offset.len() {
-                gradient[Layout::FORM_AT + j] += pull[j];
-                for i in 0..=j {
-                    matrix[(Layout::FORM_AT + i, Layout::FORM_AT + j)] += information[(i, j)];
-                }
-            }
+            let mut of_lens = matrix.view_mut((Layout::FORM_AT, Layout::FORM_AT), information.shape());
+            of_lens += information;
+            let mut of_lens = gradient.rows_mut(Layout::FORM_AT, offset.len());
+            of_lens += information * offset;
         }
-        for i in 0..n {
+        for i in 0..gradient.len() {
             matrix[(i, i)] *= 1.0 + damping;
         }
         let mut eliminated = Vec::with_capacity(self.blocks.len());
@@ -227,18 +189,18 @@ impl System {
             if self.cancel.is_cancelled() {
                 return Err(HandEyeError::Cancelled);
             }
-            let own = Own::new(block, n, correction, weights.pose, &prior, damping)
+            let own = Own::new(block, correction, weights.pose, &prior, damping)
                 .ok_or_else(|| self.singular("the pose correction of a view is undetermined"))?;
-            own.take_from(n, &mut matrix, &mut gradient);
+            own.take_from(&mut matrix, &mut gradient);
             eliminated.push(own);
         }
-        let full = DMatrix::from_fn(n, n, |i, j| matrix[(i.min(j), i.max(j))]);
-        let Some((factor, scale)) = scaled_cholesky(&full) else {
+        matrix.fill_lower_triangle_with_upper_triangle();
+        let Some((factor, scale)) = scaled_cholesky(&matrix) else {
             return Err(self.singular(
                 "some direction of the answer leaves every residual unchanged: add views turned about other axes",
             ));
         };
-        Ok(Reduced { factor, scale, gradient: DVector::from_fn(n, |i, _| gradient[i]), own: eliminated })
+        Ok(Reduced { information: matrix, factor, scale, gradient, own: eliminated })
     }
 
     fn singular(&self, reason: &'static str) -> HandEyeError {
@@ -282,7 +244,7 @@ fn linearise(problem: &JointProblem<'_>, state: &State, index: usize) -> Result<
         }
     })?;
     let place = state.field.as_ref().map(|field| field.place(&view.base_from_tip));
-    ViewBlock::new(&chain, equations, state.layout(problem), place.as_ref()).ok_or(HandEyeError::NoSolution {
+    ViewBlock::new(&chain, &equations, state.layout(problem), place.as_ref()).ok_or(HandEyeError::NoSolution {
         method: METHOD,
         views: problem.views.len(),
         reason: "the corners of a view lie on a line and determine no pose",
@@ -295,17 +257,43 @@ const SINGULAR_PIVOT: f64 = 1.5e-8;
 
 /// Cholesky factor of an information matrix scaled to unit diagonal, and the scale; `None` when singular.
 fn scaled_cholesky(matrix: &DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
-    let n = matrix.nrows();
-    let scale = DVector::from_fn(n, |i, _| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
-    // Columns differ by many orders (metres, radians, lens coefficients); scaled, the pivots say what is singular.
-    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-    let factor = Cholesky::new(scaled).filter(|f| f.l_dirty().diagonal().iter().all(|p| *p > SINGULAR_PIVOT))?;
-    Some((factor, scale))
+    let scale = matrix.diagonal().map(|d| d.max(f64::MIN_POSITIVE).sqrt().recip());
+    Some((cholesky(matrix, &scale)?, scale))
 }
 
+/// Columns differ by many orders (metres, radians, lens coefficients); scaled, the pivots say what is singular.
+fn cholesky(matrix: &DMatrix<f64>, scale: &DVector<f64>) -> Option<Cholesky<f64, Dyn>> {
+    let scaled = DMatrix::from_fn(scale.len(), scale.len(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    Cholesky::new(scaled).filter(|f| f.l_dirty().diagonal().iter().all(|p| *p > SINGULAR_PIVOT))
+}
+
+/// The inverse of what was scaled, as the square of that of its factor: every column of `L⁻ᵀ` adds to the entries that it
+/// has.
 fn scaled_inverse(factor: &Cholesky<f64, Dyn>, scale: &DVector<f64>) -> DMatrix<f64> {
-    let inverse = factor.inverse();
-    DMatrix::from_fn(inverse.nrows(), inverse.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j])
+    let upper = factor.l_dirty().transpose();
+    let n = upper.nrows();
+    let mut inverse = DMatrix::zeros(n, n);
+    let mut column = vec![0.0; n];
+    for k in 0..n {
+        column.fill(0.0);
+        column[k] = 1.0;
+        for i in (0..=k).rev() {
+            column[i] /= upper[(i, i)];
+            let (above, at) = column.split_at_mut(i);
+            above.iter_mut().zip(&upper.as_slice()[i * n..]).for_each(|(value, u)| *value -= at[0] * u);
+        }
+        for j in 0..=k {
+            let sums = &mut inverse.as_mut_slice()[j * n..][..=j];
+            sums.iter_mut().zip(&column).for_each(|(sum, value)| *sum += column[j] * value);
+        }
+    }
+    for j in 0..n {
+        for i in 0..=j {
+            inverse[(i, j)] *= scale[i] * scale[j];
+        }
+    }
+    inverse.fill_lower_triangle_with_upper_triangle();
+    inverse
 }
 
 /// Inverse of an information matrix; `None` when it leaves a direction free.
@@ -315,6 +303,8 @@ pub fn covariance_of(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// The system in the shared unknowns alone.
 pub struct Reduced {
+    /// Of the shared unknowns.
+    pub information: DMatrix<f64>,
     factor: Cholesky<f64, Dyn>,
     scale: DVector<f64>,
     gradient: DVector<f64>,
@@ -339,21 +329,12 @@ impl Reduced {
 
     /// The step of every correction that goes with a shared step.
     pub fn own_steps(&self, shared_step: &DVector<f64>) -> Vec<Vector6<f64>> {
-        let mut wide = SharedVector::zeros();
-        wide.rows_mut(0, shared_step.len()).copy_from(shared_step);
-        self.own.iter().map(|own| own.step(&wide)).collect()
+        self.own.iter().map(|own| own.step(shared_step)).collect()
     }
 
     /// Inverse of the reduced matrix: the covariance of the shared unknowns when the system is undamped.
     pub fn inverse(&self) -> DMatrix<f64> {
         scaled_inverse(&self.factor, &self.scale)
-    }
-
-    /// The reduced matrix itself.
-    pub fn information(&self) -> DMatrix<f64> {
-        let lower = self.factor.l();
-        let scaled = &lower * lower.transpose();
-        DMatrix::from_fn(scaled.nrows(), scaled.ncols(), |i, j| scaled[(i, j)] / (self.scale[i] * self.scale[j]))
     }
 
     /// Log-determinant of the whole normal matrix, shared unknowns and corrections.
@@ -369,34 +350,32 @@ impl Reduced {
         shared + self.own.iter().map(Own::decrease).sum::<f64>()
     }
 
-    /// The step of the shared unknowns when one view is taken away: one Newton step of the remaining system, whose
-    /// gradient is minus that of the view. `None` when the rest does not determine an answer.
-    pub fn step_without(
+    /// The step of the shared unknowns from an optimum when views are taken away: one Newton step of the remaining system,
+    /// whose gradient is minus theirs. `None` when the rest does not determine an answer.
+    pub fn step_without<'a>(
         &self,
-        block: &ViewBlock,
-        layout: Layout,
+        views: impl IntoIterator<Item = (&'a ViewBlock, &'a Vector6<f64>)>,
         noise: &Noise,
-        correction: &Vector6<f64>,
     ) -> Option<DVector<f64>> {
-        let (matrix, gradient) = block.information(layout, noise, correction)?;
-        let n = self.gradient.len();
-        let full = self.factor.l() * self.factor.l().transpose();
-        let rest = DMatrix::from_fn(n, n, |i, j| full[(i, j)] - matrix[(i, j)] * self.scale[i] * self.scale[j]);
-        let factor = Cholesky::new(rest).filter(|f| f.l_dirty().diagonal().iter().all(|p| *p > SINGULAR_PIVOT))?;
-        let rhs = DVector::from_fn(n, |i, _| gradient[i] * self.scale[i]);
-        Some(factor.solve(&rhs).component_mul(&self.scale))
+        let (mut rest, mut pull) = (self.information.clone(), DVector::zeros(self.gradient.len()));
+        for (block, correction) in views {
+            let (information, gradient) = block.information(noise, correction)?;
+            rest -= information;
+            pull += gradient;
+        }
+        let factor = cholesky(&rest, &self.scale)?;
+        Some(factor.solve(&pull.component_mul(&self.scale)).component_mul(&self.scale))
     }
 
     /// Displacement of `point` (camera coordinates) in the mount when one view is taken away.
     pub fn influence_of(
         &self,
         block: &ViewBlock,
-        layout: Layout,
         noise: &Noise,
         correction: &Vector6<f64>,
         point: &Point3<f64>,
     ) -> Option<f64> {
-        let step = self.step_without(block, layout, noise, correction)?;
+        let step = self.step_without([(block, correction)], noise)?;
         let translation = step.fixed_rows::<3>(0) - skew(&point.coords) * step.fixed_rows::<3>(3);
         Some(translation.norm())
     }

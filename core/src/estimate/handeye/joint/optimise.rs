@@ -24,21 +24,12 @@ pub struct Descent<'a> {
     pub noise: &'a Noise,
     /// First damping.
     pub damping: f64,
-    /// Ends when the quadratic model promises less than this part of the cost.
-    pub tolerance: f64,
-}
-
-impl<'a> Descent<'a> {
-    /// To the optimum itself.
-    pub fn new(problem: &'a JointProblem<'a>, noise: &'a Noise, damping: f64) -> Self {
-        Self { problem, noise, damping, tolerance: COST_TOLERANCE }
-    }
 }
 
 /// Minimises the cost from `state`, which holds the best point found afterwards; `system` is linearised there. Returns the
 /// system at that point and the number of steps.
 pub fn minimise(
-    Descent { problem, noise, mut damping, tolerance }: Descent<'_>,
+    Descent { problem, noise, mut damping }: Descent<'_>,
     state: &mut State,
     mut system: System,
     cancel: &CancelToken,
@@ -60,7 +51,7 @@ pub fn minimise(
                     continue;
                 }
             };
-            if promised <= tolerance * cost.max(f64::MIN_POSITIVE) {
+            if promised <= COST_TOLERANCE * cost.max(f64::MIN_POSITIVE) {
                 return Ok((system, step));
             }
             // A step that puts the target behind the camera is as bad as one that raises the cost.

@@ -9,11 +9,11 @@
 
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, SMatrix, Vector6};
+use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, Vector6};
 
 use super::field;
 use super::normal::System;
-use super::view_block::{MAX_SHARED, prior_weight};
+use super::view_block::{Layout, prior_weight};
 use super::{JointProblem, JointSolution, JointStart, Noise, fit};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
@@ -23,7 +23,7 @@ use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::se3;
 use crate::geometry::statistics::pooled_freedom;
 use crate::geometry::view_equations::{FreeParameters, PoseEquations};
-use crate::progress::{CancelToken, Work};
+use crate::progress::Work;
 use crate::targets::observation::{Corner, View};
 
 /// An estimate and what it was made without.
@@ -96,7 +96,7 @@ impl Estimator for OfViews<'_> {
     }
 
     fn judge(&self, solution: &JointSolution, kept: &[usize]) -> Result<Vec<Judged>, HandEyeError> {
-        distances(self.problem, self.views, (solution, kept), self.own, self.work.cancel)
+        distances(self.problem, self.views, (solution, kept), self.own)
     }
 }
 
@@ -129,20 +129,17 @@ fn distances(
     views: &[View],
     (solution, kept): (&JointSolution, &[usize]),
     own: &[Pose<Camera, Target>],
-    cancel: &CancelToken,
 ) -> Result<Vec<Judged>, HandEyeError> {
-    let chosen: Vec<View> = kept.iter().map(|&i| views[i].clone()).collect();
-    let inside = JointProblem { views: &chosen, ..*problem };
     let mut state = State::of(solution);
     state.field = state.field.map(|field| field.reaching(views.iter().map(|view| &view.base_from_tip)));
-    let system = System::new(&inside, &state, cancel)?;
+    let system = &*solution.system;
     let covariance = system.reduce(&solution.noise)?.inverse();
     let layout = system.layout;
     // What is known of an unknown beforehand takes no residuals to find.
     let determined = layout.count() as f64 - system.prior_trace(&solution.noise, &covariance);
     let freedom = 0.5 * (6.0 * kept.len() as f64 - determined);
     let of_noise = freedom.max(4.0);
-    let slopes = slopes(&system, &solution.noise, &covariance);
+    let slopes = slopes(system, &solution.noise, &covariance);
     let robot = prior_weight(&solution.noise).map(f64::recip);
     let in_pixels = solution.noise.corner_px.powi(2) + solution.noise.view_px.powi(2);
     let centre = centre(problem, &solution.as_start());
@@ -158,21 +155,15 @@ fn distances(
         let Some(factor) = Cholesky::new(equations.pose) else { return gone() };
         let (metres, radians) = apart(&chain.camera_from_target, &seen, &centre);
         let error = se3::log(&(chain.camera_from_target.inverse() * seen));
-        let mut by_shared = SMatrix::<f64, 6, MAX_SHARED>::zeros();
+        let mut by_shared = DMatrix::zeros(6, layout.count());
         by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
-        let by_form = factor.solve(&equations.pose_by_form);
-        for j in 0..layout.form {
-            by_shared.set_column(12 + j, &by_form.column(j));
-        }
-        for j in 0..layout.joints {
-            by_shared.set_column(layout.joints_at() + j, &chain.by_joints.column(j));
-        }
+        by_shared.columns_mut(Layout::FORM_AT, layout.form).copy_from(&factor.solve(&equations.pose_by_form));
+        by_shared.columns_mut(layout.joints_at(), layout.joints).copy_from(&chain.by_joints.columns(0, layout.joints));
         if let Some(field) = &state.field {
             let columns = field::columns(&field.place(&view.base_from_tip), &chain.by_correction);
             by_shared.columns_mut(layout.field_at(), field::SLOPES).copy_from(&columns);
         }
-        let by_shared: DMatrix<f64> = DMatrix::from_fn(6, layout.count(), |r, c| by_shared[(r, c)]);
         let shared = &by_shared * &covariance * by_shared.transpose();
         let shared = Matrix6::from_fn(|r, c| shared[(r, c)]);
         let own = chain.by_correction * Matrix6::from_diagonal(&robot) * chain.by_correction.transpose()

@@ -10,7 +10,7 @@ use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::geometry::point_error;
-use crate::progress::{Stage, Work};
+use crate::progress::{CancelToken, Stage, Work};
 
 /// Points of a curve at the most: enough for any chart, and a thousand views cost no more than a few hundred.
 const MOST_POINTS: usize = 100;
@@ -73,7 +73,7 @@ pub fn error_by_views<'a>(
 ) -> Result<ErrorCurve, HandEyeError> {
     let work = work.into();
     let count = problem.views.len();
-    let system = System::new(problem, &state_of(problem, solution)?, work.cancel)?;
+    let system = solution.linearised(problem)?;
     let wanted = spaced(MIN_VIEWS, count);
     let mut wanted = wanted.iter().peekable();
     let n = system.layout.count();
@@ -86,7 +86,7 @@ pub fn error_by_views<'a>(
         }
         let views = index + 1;
         work.report(Stage::Prediction, index, count);
-        if let Some((of_view, _)) = block.information(system.layout, &solution.noise, &Vector6::zeros()) {
+        if let Some((of_view, _)) = block.information(&solution.noise, &Vector6::zeros()) {
             information += of_view;
         }
         if wanted.next_if_eq(&&views).is_some() {
@@ -117,14 +117,17 @@ pub fn error_by_views<'a>(
     Ok(ErrorCurve { gathered, further })
 }
 
-/// The state of a solution, if it is one of this problem.
-fn state_of(problem: &JointProblem<'_>, solution: &JointSolution) -> Result<State, HandEyeError> {
-    let views = problem.views.len();
-    if solution.views.len() != views || views < MIN_VIEWS {
-        let reason = "the solution is of another set of views";
-        return Err(HandEyeError::NoSolution { method: "the prediction", views, reason });
-    }
-    Ok(State::of(solution))
+/// The views linearised at a solution with the robot where it was reported to be.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
+pub(crate) fn reported(
+    problem: &JointProblem<'_>,
+    solution: &JointSolution,
+    cancel: &CancelToken,
+) -> Result<System, HandEyeError> {
+    let corrections = vec![Vector6::zeros(); solution.linearised(problem)?.blocks.len()];
+    System::new(problem, &State { corrections, ..State::of(solution) }, cancel)
 }
 
 /// Numbers from `first` to `last`, all of them or [`MOST_POINTS`] evenly spaced; both ends are among them.
@@ -160,14 +163,13 @@ pub fn expected_residuals<'a>(
     work: impl Into<Work<'a>>,
 ) -> Result<ExpectedResiduals, HandEyeError> {
     let work = work.into();
-    let state = State { corrections: vec![Vector6::zeros(); problem.views.len()], ..state_of(problem, solution)? };
-    let system = System::new(problem, &state, work.cancel)?;
+    let system = reported(problem, solution, work.cancel)?;
     let robot_variance = prior_weight(&solution.noise).map(f64::recip);
     let (mut robot, mut shared, mut corners) = (0.0, 0.0, 0usize);
     for block in &system.blocks {
         robot += block.own.diagonal().dot(&robot_variance);
-        shared += block.shared_trace(system.layout, &solution.covariance);
-        corners += block.corner_count();
+        shared += block.shared_trace(&solution.covariance);
+        corners += block.corners;
     }
     let corner_squares = 2.0 * corners as f64 * solution.noise.corner_px.powi(2)
         + 6.0 * system.blocks.len() as f64 * solution.noise.view_px.powi(2);

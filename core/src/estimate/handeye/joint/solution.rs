@@ -1,11 +1,15 @@
 //! What the joint estimate finds.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
 
-use crate::estimate::handeye::HandEye;
+use crate::estimate::handeye::joint::JointProblem;
 use crate::estimate::handeye::joint::field::{RobotField, corrected_base_from_tip};
 use crate::estimate::handeye::joint::integrated::SmallSample;
+use crate::estimate::handeye::joint::normal::System;
 use crate::estimate::handeye::joint::problem::{Free, JointStart, Noise};
+use crate::estimate::handeye::{HandEye, HandEyeError};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::targets::bent::BoardShape;
@@ -21,7 +25,7 @@ pub struct ViewFit {
     /// The target's pose by the chain with the robot pose corrected.
     pub camera_from_target: Pose<Camera, Target>,
     /// How far the camera point [`JointSolution::reference_point`] moves when this view is left out, metres, to first
-    /// order; `None` when the rest does not determine an answer.
+    /// order; `None` when the rest does not determine an answer, and before the error is stated.
     pub influence_m: Option<f64>,
 }
 
@@ -58,9 +62,24 @@ pub struct JointSolution {
     pub reference_point: Point3<f64>,
     /// Steps of the optimiser in all rounds together.
     pub iterations: usize,
+    /// The views, linearised where the fit ended.
+    pub(super) system: Arc<System>,
 }
 
 impl JointSolution {
+    /// The views, linearised at the solution.
+    ///
+    /// # Errors
+    /// [`HandEyeError::NoSolution`] when it is not a solution of the problem.
+    pub(crate) fn linearised(&self, problem: &JointProblem<'_>) -> Result<&System, HandEyeError> {
+        let views = problem.views.len();
+        if self.views.len() != views || self.free != problem.free {
+            let reason = "the solution is of another problem";
+            return Err(HandEyeError::NoSolution { method: "what follows the joint estimate", views, reason });
+        }
+        Ok(&self.system)
+    }
+
     /// Covariance of the hand-eye transform `[t; r]`, right perturbation.
     pub fn hand_eye_covariance(&self) -> Matrix6<f64> {
         self.covariance.fixed_view::<6, 6>(0, 0).into_owned()

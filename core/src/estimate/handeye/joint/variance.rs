@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use super::field::HALF;
 use super::information::information;
 use super::normal::{Reduced, System};
-use super::view_block::prior_weight;
+use super::view_block::{add_square, columns, prior_weight};
 use super::{JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
@@ -121,6 +121,8 @@ pub struct Likelihood {
     /// the noise of the other levels. Those of the corners' rest and of the poses' part are apart, also where the two are one
     /// level.
     pub counts: Logs,
+    /// Sums of `F_iᵀ F_i` over the views, see [`super::information`], for the corrections of position and of orientation.
+    pub moments: [DMatrix<f64>; 2],
     pub reduced: Reduced,
     /// Of the shared unknowns.
     pub covariance: DMatrix<f64>,
@@ -191,21 +193,31 @@ pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likeliho
     // Expected sums of squares of the corrections: estimate plus posterior variance.
     let mut squares = Vector6::zeros();
     let mut variances = Vector6::zeros();
+    let mut moments = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
     for ((own, step), correction) in reduced.own.iter().zip(&steps).zip(&system.corrections) {
         if system.cancel.is_cancelled() {
             return Err(HandEyeError::Cancelled);
         }
         let estimate = correction + step;
         squares += estimate.component_mul(&estimate);
-        variances += own.variances(&covariance);
+        variances += own.factor.inverse().diagonal();
+        let follows = own.follows();
+        let [x, y, z, rx, ry, rz] = columns(&follows);
+        add_square(&mut moments[0], [x, y, z], 1.0);
+        add_square(&mut moments[1], [rx, ry, rz], 1.0);
     }
+    moments.iter_mut().for_each(DMatrix::fill_lower_triangle_with_upper_triangle);
     let (squares, traces) = (squares.component_mul(&prior), variances.component_mul(&prior));
+    let halves = [0, 1].map(|k| {
+        let (at, through) = (3 * k, moments[k].dot(&covariance) * prior[3 * k]);
+        (squares.fixed_rows::<3>(at).sum(), traces.fixed_rows::<3>(at).sum() + through)
+    });
     let unknowns = n as f64 + in_poses;
     // tr(H H⁻¹) counts the unknowns; what the priors do not take of it is the corners' share.
     let known_cost = system.prior_cost(&noise, Some(&step));
     let known_trace = system.prior_trace(&noise, &covariance);
     let corner_squares = least_cost - squares.sum() - known_cost;
-    let corner_trace = unknowns - traces.sum() - known_trace;
+    let corner_trace = unknowns - halves[0].1 - halves[1].1 - known_trace;
     let rest = system.rest_squares(&step, &covariance);
     let (rest_squares, rest_trace) = (rest.0 / noise.corner_px.powi(2), rest.1 / noise.corner_px.powi(2));
     let (mut field_squares, mut field_traces) = ([0.0; 2], [0.0; 2]);
@@ -222,7 +234,7 @@ pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likeliho
         + 3.0 * views * (logs[1] + logs[2])
         + reduced.log_determinant()
         + least_cost;
-    let [m, rad] = [0, 3].map(|at| (squares.fixed_rows::<3>(at).sum(), traces.fixed_rows::<3>(at).sum()));
+    let [m, rad] = halves;
     let counts = Logs::new(
         in_rest - rest_trace,
         3.0 * views - m.1,
@@ -234,16 +246,20 @@ pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likeliho
     let squares =
         Logs::new(rest_squares, m.0, rad.0, corner_squares - rest_squares, field_squares[0], field_squares[1]);
     let gradient = levels.folded(counts - squares);
-    Ok(Likelihood { value, gradient, counts, reduced, covariance, step })
+    Ok(Likelihood { value, gradient, counts, moments, reduced, covariance, step })
 }
 
 /// The most likely noise levels of a linearised system, and what goes with them.
 pub struct MostLikely {
     pub logs: Logs,
     pub at: Likelihood,
-    /// About half the second derivatives of what was minimised, by the log-variances; zero for a level that is not
-    /// estimated.
-    pub information: Matrix6<f64>,
+}
+
+impl MostLikely {
+    /// About half the second derivatives of what was minimised, by the log-variances; zero for a level that is not estimated.
+    pub fn information(&self, system: &System, levels: Levels, aim: Aim) -> Matrix6<f64> {
+        0.5 * slope(system, &self.logs, &self.at, levels, aim).1
+    }
 }
 
 /// What is minimised.
@@ -293,8 +309,7 @@ pub fn most_likely(system: &System, start: Logs, levels: Levels, aim: Aim) -> Re
             break;
         }
     }
-    let (_, curvature) = slope(system, &logs, &at, levels, aim);
-    Ok(MostLikely { logs, at, information: 0.5 * curvature })
+    Ok(MostLikely { logs, at })
 }
 
 /// What was evaluated; `None` at levels that leave the answer undetermined, which are not the ones that were looked for.

@@ -10,21 +10,17 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use super::{Check, Evidence};
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::handeye::joint::normal::{System, covariance_of};
-use crate::estimate::handeye::joint::state::State;
-use crate::estimate::handeye::joint::view_block::{Layout, ViewBlock, add_form_gradient, prior_weight};
+use crate::estimate::handeye::joint::normal::covariance_of;
+use crate::estimate::handeye::joint::prediction::reported;
+use crate::estimate::handeye::joint::view_block::{ViewBlock, prior_weight};
 use crate::estimate::handeye::joint::{JointProblem, JointSolution, Noise};
 use crate::progress::Work;
 
 /// Predicts every view from the others.
 pub fn check(problem: &JointProblem<'_>, solution: &JointSolution, work: &Work<'_>) -> Result<Check, HandEyeError> {
-    let at_solution = State::of(solution);
-    let reported = State { corrections: vec![Vector6::zeros(); problem.views.len()], ..at_solution.clone() };
-    let fitted = System::new(problem, &at_solution, work.cancel)?;
-    let reported = System::new(problem, &reported, work.cancel)?;
-    let layout = fitted.layout;
-    let of_view =
-        |(block, correction): (&ViewBlock, &Vector6<f64>)| block.information(layout, &solution.noise, correction);
+    let fitted = solution.linearised(problem)?;
+    let reported = reported(problem, solution, work.cancel)?;
+    let of_view = |(block, correction): (&ViewBlock, &Vector6<f64>)| block.information(&solution.noise, correction);
     let told: Vec<_> = fitted.blocks.iter().zip(&fitted.corrections).map(of_view).collect();
     let all = told
         .iter()
@@ -38,29 +34,20 @@ pub fn check(problem: &JointProblem<'_>, solution: &JointSolution, work: &Work<'
         // A view without which there is no answer cannot be predicted.
         let Some((information, gradient)) = told else { continue };
         let Some(covariance) = covariance_of(&(&all - information)) else { continue };
-        let step = &covariance * gradient.rows(0, layout.count());
-        pairs.push(squares(seen, layout, &step, &covariance, &solution.noise));
+        pairs.push(squares(seen, &(&covariance * gradient), &covariance, &solution.noise));
     }
     Ok(compare(&pairs))
 }
 
 /// Squares of the residuals of one view at its reported pose after a step: shown and promised.
-fn squares(
-    seen: &ViewBlock,
-    layout: Layout,
-    step: &DVector<f64>,
-    covariance: &DMatrix<f64>,
-    noise: &Noise,
-) -> (f64, f64) {
-    let mut gradient = seen.shared_gradient;
-    add_form_gradient(layout, &seen.rest.gradient, 1.0, &mut gradient);
-    let shown = seen.equations.squared_px
+fn squares(seen: &ViewBlock, step: &DVector<f64>, covariance: &DMatrix<f64>, noise: &Noise) -> (f64, f64) {
+    let shown = seen.residual.norm_squared()
         + seen.rest.squared_px
-        + 2.0 * gradient.rows(0, layout.count()).dot(step)
-        + seen.shared_trace(layout, &(step * step.transpose()));
+        + 2.0 * seen.shared_gradient().dot(step)
+        + seen.shared_squares(step);
     let promised = seen.own.diagonal().dot(&prior_weight(noise).map(f64::recip))
-        + seen.shared_trace(layout, covariance)
-        + 2.0 * seen.corner_count() as f64 * noise.corner_px.powi(2)
+        + seen.shared_trace(covariance)
+        + 2.0 * seen.corners as f64 * noise.corner_px.powi(2)
         + 6.0 * noise.view_px.powi(2);
     (shown, promised)
 }

@@ -3,8 +3,6 @@
 use nalgebra::{DMatrix, Matrix6, UnitQuaternion, Vector6};
 
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::handeye::joint::normal::System;
-use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::view_block::{Own, PixelWeights, ViewBlock, prior_weight};
 use crate::estimate::handeye::joint::{JointProblem, JointSolution};
 use crate::geometry::frames::{Base, Pose, Tip};
@@ -40,10 +38,7 @@ pub fn views(
 ) -> Result<Vec<LinearView>, HandEyeError> {
     let count = problem.views.len();
     let fails = |reason| HandEyeError::NoSolution { method: "the check of the uncertainty", views: count, reason };
-    if solution.views.len() != count || solution.free != problem.free {
-        return Err(fails("the solution is of another problem"));
-    }
-    let system = System::new(problem, &State::of(solution), work.cancel)?;
+    let system = solution.linearised(problem)?;
     let all = system.reduce(&solution.noise)?.inverse();
     let hand_eye: Matrix6<f64> = all.fixed_view::<6, 6>(0, 0).into_owned();
     let root = hand_eye.cholesky().ok_or_else(|| fails("the covariance is singular"))?.l();
@@ -55,7 +50,7 @@ pub fn views(
         if work.is_cancelled() {
             return Err(HandEyeError::Cancelled);
         }
-        let linear = LinearView::new(&system, block, correction, &view.base_from_tip, &covariance, solution);
+        let linear = LinearView::new(block, correction, &view.base_from_tip, &covariance, solution);
         views.push(linear.ok_or_else(|| fails("the pose correction of a view is undetermined"))?);
     }
     Ok(views)
@@ -63,7 +58,6 @@ pub fn views(
 
 impl LinearView {
     fn new(
-        system: &System,
         block: &ViewBlock,
         correction: &Vector6<f64>,
         base_from_tip: &Pose<Base, Tip>,
@@ -71,21 +65,20 @@ impl LinearView {
         solution: &JointSolution,
     ) -> Option<Self> {
         let noise = &solution.noise;
-        let n = system.layout.count();
-        let (information, gradient) = block.information(system.layout, noise, correction)?;
+        let (information, gradient) = block.information(noise, correction)?;
         // C M C less what the view's own part in the estimate takes of it, C M C M C.
         let by_view = &covariance.whitened * information;
         let expected = &by_view * covariance.whitened.transpose() - &by_view * &covariance.all * by_view.transpose();
         // An error d of the robot shows as own⁻¹ P d in the correction, and its effect on the rest goes through `cross`.
         let weight = PixelWeights::new(noise).pose;
         let prior = prior_weight(noise);
-        let own = Own::new(block, n, correction, weight, &prior, 0.0)?;
+        let own = Own::new(block, correction, weight, &prior, 0.0)?;
         let to_base = turned(&base_from_tip.rotation());
         let scale = Matrix6::from_diagonal(&prior.map(f64::sqrt));
-        let gain = block.cross.columns(0, n).transpose() * weight;
+        let gain = &block.cross * weight;
         let by_robot = &covariance.whitened * gain * own.factor.inverse() * scale * to_base.transpose();
         Some(Self {
-            pull: (&covariance.whitened * gradient.rows(0, n)).fixed_rows::<6>(0).into_owned(),
+            pull: (&covariance.whitened * gradient).fixed_rows::<6>(0).into_owned(),
             expected: expected.fixed_view::<6, 6>(0, 0).into_owned(),
             robot: to_base * scale * correction,
             by_robot: by_robot.fixed_view::<6, 6>(0, 0).into_owned(),

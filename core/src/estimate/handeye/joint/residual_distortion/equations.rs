@@ -1,12 +1,12 @@
 //! The equations of the coefficients of a residual distortion, and its level.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Matrix6xX};
+use nalgebra::{DMatrix, DVector, Matrix6xX};
 
 use super::GAIN;
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::handeye::joint::normal::{Reduced, System};
+use crate::estimate::handeye::joint::normal::Reduced;
 use crate::estimate::handeye::joint::state::State;
-use crate::estimate::handeye::joint::view_block::{Layout, Own, PixelWeights, ViewBlock};
+use crate::estimate::handeye::joint::view_block::{Layout, Own, PixelWeights, ViewBlock, whitened};
 use crate::estimate::handeye::joint::{JointProblem, JointSolution, Noise};
 use crate::geometry::camera::residual_distortion::{basis, functions};
 use crate::geometry::view_equations::{MAX_FORM, POSE, Pair, Rows};
@@ -52,7 +52,7 @@ impl Equations {
         cancel: &CancelToken,
     ) -> Result<Option<Self>, HandEyeError> {
         let (state, noise) = (State::of(solution), &solution.noise);
-        let system = System::new(problem, &state, cancel)?;
+        let system = solution.linearised(problem)?;
         let unknowns = 6 * problem.views.len() + system.layout.form;
         let residuals = system.residual_count().saturating_sub(unknowns) as f64;
         if residuals <= 0.0 {
@@ -68,9 +68,7 @@ impl Equations {
             }
             let Some(products) = Products::new(problem, &state, index, degree) else { return Ok(None) };
             let (block, own) = (&system.blocks[index], &reduced.own[index]);
-            if sums.add(&products, block, own, system.layout, noise).is_none() {
-                return Ok(None);
-            }
+            sums.add(&products, block, own, noise);
         }
         Ok(Some(Self::eliminated(&sums, &reduced, residuals)))
     }
@@ -182,8 +180,6 @@ impl Spectrum {
 
 /// Inner products of the columns of the coefficients with all columns of a view, those of the displacement along x first.
 struct Products {
-    /// How the pose turns with the correction of the view.
-    by_correction: Matrix6<f64>,
     by_pose: Matrix6xX<f64>,
     by_form: DMatrix<f64>,
     by_residual: DVector<f64>,
@@ -202,7 +198,7 @@ impl Products {
         let columns = POSE + rows.count + 1;
         let size = (state.intrinsics.width, state.intrinsics.height);
         let mut functions = DMatrix::zeros(f, n);
-        let mut weighted: [DMatrix<f64>; 3] = std::array::from_fn(|_| DMatrix::zeros(f, n));
+        let mut weights = [vec![1.0; n], vec![0.0; n], vec![1.0; n]];
         let mut others: [DMatrix<f64>; 2] = std::array::from_fn(|_| DMatrix::zeros(columns, n));
         let mut row = [Pair::default(); POSE + MAX_FORM + 1];
         for (i, corner) in view.corners.iter().enumerate() {
@@ -210,8 +206,8 @@ impl Products {
             let basis = DVector::from_vec(basis(size, degree, &corner.px));
             let [[a, b], [c, d]] =
                 sqrt_weights.get(i).map_or([[1.0, 0.0], [0.0, 1.0]], |w| [[w.m11, w.m12], [w.m21, w.m22]]);
-            for (weighted, weight) in weighted.iter_mut().zip([a * a + c * c, a * b + c * d, b * b + d * d]) {
-                weighted.set_column(i, &(&basis * weight));
+            for (weights, weight) in weights.iter_mut().zip([a * a + c * c, a * b + c * d, b * b + d * d]) {
+                weights[i] = weight;
             }
             functions.set_column(i, &basis);
             for (j, [x, y]) in row[..columns].iter().enumerate() {
@@ -220,7 +216,14 @@ impl Products {
             }
         }
         let transposed = functions.transpose();
-        let [xx, xy, yy] = weighted.map(|weighted| weighted * &transposed);
+        let weighed = |weights: &[f64]| DMatrix::from_fn(f, n, |i, j| functions[(i, j)] * weights[j]) * &transposed;
+        let xx = weighed(&weights[0]);
+        // Corners that count alike have the same weight along both axes, and none between them.
+        let (xy, yy) = if sqrt_weights.is_empty() {
+            (DMatrix::zeros(f, f), xx.clone())
+        } else {
+            (weighed(&weights[1]), weighed(&weights[2]))
+        };
         let mut own = DMatrix::zeros(2 * f, 2 * f);
         own.view_mut((0, 0), (f, f)).copy_from(&xx);
         own.view_mut((0, f), (f, f)).copy_from(&xy);
@@ -231,7 +234,6 @@ impl Products {
             by.columns_mut(half * f, f).copy_from(&(others * &transposed));
         }
         Some(Self {
-            by_correction: chain.by_correction,
             by_pose: by.fixed_rows::<POSE>(0).into_owned(),
             by_form: by.rows(POSE, rows.count).into_owned(),
             by_residual: by.row(columns - 1).transpose(),
@@ -249,23 +251,21 @@ struct Sums {
 }
 
 impl Sums {
-    /// Adds a view; `None` when its corners determine no pose.
-    fn add(&mut self, products: &Products, block: &ViewBlock, own: &Own, layout: Layout, noise: &Noise) -> Option<()> {
+    /// Adds a view.
+    fn add(&mut self, products: &Products, block: &ViewBlock, own: &Own, noise: &Noise) {
         let weights = PixelWeights::new(noise);
         let excess = weights.pose - weights.rest;
-        let (n, form) = (layout.count(), layout.form);
-        let solved = Cholesky::new(block.equations.pose)?.solve(&products.by_pose);
-        self.information += &products.own * weights.rest + products.by_pose.tr_mul(&solved) * excess;
-        self.gradient += &products.by_residual * weights.rest + solved.tr_mul(&block.equations.pose_gradient) * excess;
-        self.cross += block.pose_by_shared.columns(0, n).tr_mul(&products.by_pose) * weights.pose;
-        let of_form =
-            &products.by_form * weights.rest + block.equations.pose_by_form.columns(0, form).tr_mul(&solved) * excess;
-        let mut cross = self.cross.rows_mut(Layout::FORM_AT, form);
-        cross += of_form;
-        let whitened = own.whiten(products.by_correction.tr_mul(&products.by_pose) * weights.pose);
-        self.information -= whitened.tr_mul(&whitened);
-        self.gradient -= whitened.tr_mul(&own.whitened_gradient);
-        self.cross -= own.whitened.columns(0, n).tr_mul(&whitened);
-        Some(())
+        // As the residuals are, what the coefficients do is split into what a pose could explain and the rest.
+        let of_pose = whitened(&block.root, products.by_pose.clone());
+        self.information += &products.own * weights.rest + of_pose.tr_mul(&of_pose) * excess;
+        self.gradient += &products.by_residual * weights.rest + of_pose.tr_mul(&block.residual) * excess;
+        let mut cross = &block.by_shared * &of_pose * weights.pose;
+        let mut of_form = cross.rows_mut(Layout::FORM_AT, products.by_form.nrows());
+        of_form *= excess / weights.pose;
+        of_form += &products.by_form * weights.rest;
+        let taken = whitened(own.factor.l_dirty(), block.by_correction.tr_mul(&of_pose) * weights.pose);
+        self.information -= taken.tr_mul(&taken);
+        self.gradient -= taken.tr_mul(&own.whitened_gradient);
+        self.cross += cross - &own.whitened * &taken;
     }
 }

@@ -9,9 +9,8 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::Equations;
 use super::{ShownDistortion, enlarged, with_variances};
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::handeye::joint::normal::{System, covariance_of};
+use crate::estimate::handeye::joint::normal::covariance_of;
 use crate::estimate::handeye::joint::shared_lens::LensEstimate;
-use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::view_block::Layout;
 use crate::estimate::handeye::joint::{JointProblem, JointSolution};
 use crate::progress::CancelToken;
@@ -43,7 +42,7 @@ impl Share {
         cancel: &CancelToken,
     ) -> Result<Option<Self>, HandEyeError> {
         let Some(own) = Equations::new(problem, solution, degree, cancel)? else { return Ok(None) };
-        let covariance = System::new(problem, &State::of(solution), cancel)?.reduce(&solution.noise)?.inverse();
+        let covariance = solution.linearised(problem)?.reduce(&solution.noise)?.inverse();
         let (at, count) = (Layout::FORM_AT, solution.intrinsics.parameter_count());
         let by_lens = covariance.columns(at, count).into_owned();
         let Some(of_lens) = covariance_of(&by_lens.rows(at, count).into_owned()) else { return Ok(None) };
