@@ -7,7 +7,7 @@ use super::*;
 use crate::driver::{DriverSpec, Ending};
 
 /// Longest wait for what comes within a second on a machine that has nothing else to do.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A driver that notes in a file that it was started, and then does this.
 fn host(noted: &Path, then: &str) -> DriverHost {
