@@ -40,6 +40,8 @@ pub enum Command {
     StartSimulation,
     /// Try to connect now, without waiting for the next try.
     Reconnect,
+    /// Start drivers that are gone no more, until [`Command::Reconnect`].
+    StopTrying,
     /// Light or dark.
     SetTheme(ThemeChoice),
     /// How rotations are written.

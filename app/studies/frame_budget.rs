@@ -10,21 +10,20 @@
 //! situation the median, the 99th percentile and the worst of the frames on the clock, what other threads take of the
 //! processor included, and how many shapes the last frame had.
 
+mod window;
+
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use handeye_app::app::{App, Connect, Start};
+use handeye_app::app::App;
 use handeye_app::command::{Command, Event};
-use handeye_app::gui::{Layout, Window};
-use handeye_app::model::{CellSource, MotionGoal, Observed, SessionState, ViewSettings, ViewerState};
+use handeye_app::model::{CellSource, MotionGoal, Observed, SessionState, ViewerState};
 use handeye_app::rerun_log::RerunChoice;
 use handeye_app::session::start::{self, BOARD};
-use handeye_app::settings::SettingsFile;
 use handeye_app::text::Text;
-use handeye_app::worker::{Clock, Waker};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
@@ -35,9 +34,7 @@ use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::ConnectionOptions;
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
-
-/// Refresh of a usual screen.
-const PERIOD: Duration = Duration::from_micros(16_667);
+use window::Drawn;
 
 /// Bytes per second of the slow line.
 const SLOW_LINE: usize = 1_000_000;
@@ -131,72 +128,34 @@ fn recorded(
     rerun: RerunChoice,
     begin: impl FnOnce(&mut App),
 ) -> anyhow::Result<()> {
-    let sessions = std::env::temp_dir().join(format!("handeye-frame-budget-{}", std::process::id()));
-    let began = Instant::now();
-    let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
-    let waker: Waker = Arc::new(|| {});
-    let connect: Connect = Arc::new(handeye_app::connect::connector);
-    let start = Start {
-        source,
-        view: ViewSettings::default(),
-        addresses: Vec::new(),
-        drivers: Vec::new(),
-        objects: CellPaths::default(),
-        keep_out: None,
-        // A session, so that there is a file to record into.
-        open: Some(sessions.join("session")),
-        sessions: sessions.clone(),
-        rerun,
-    };
-    let app = App::start(start, connect, clock, waker)?;
-    let ctx = egui::Context::default();
-    let mut window = Window::new(app, Layout::default(), SettingsFile::default(), &ctx);
+    let mut drawn = Drawn::open(source, rerun)?;
     let mut begin = Some(begin);
-    let (mut times_ms, mut shapes) = (Vec::new(), 0);
     let mut first_image = None;
     let warm_up = Duration::from_secs(3);
-    while began.elapsed() < duration + warm_up {
-        let frame = Instant::now();
-        let input = egui::RawInput {
-            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1440.0, 900.0))),
-            time: Some(began.elapsed().as_secs_f64()),
-            ..egui::RawInput::default()
-        };
-        window.collect(&ctx);
-        let mut output = ctx.run_ui(input, |ui| window.window_ui(ui));
-        // There is no graphics card that wants them.
-        output.textures_delta.clear();
-        shapes = output.shapes.len();
-        std::hint::black_box(ctx.tessellate(output.shapes, output.pixels_per_point).len());
+    while drawn.age() < duration + warm_up {
+        drawn.draw();
         // The first frames make fonts and connections; they are not what a user waits for.
-        if began.elapsed() > warm_up {
-            times_ms.push(frame.elapsed().as_secs_f64() * 1e3);
-            if let (None, Some(image)) = (first_image, &window.app_mut().model().frame) {
-                first_image = Some((image.info.number, Instant::now()));
-            }
-            if let Some(begin) = begin.take() {
-                begin(window.app_mut());
-            }
+        if drawn.age() < warm_up {
+            drawn.times_ms.clear();
+            continue;
         }
-        thread::sleep(PERIOD.saturating_sub(frame.elapsed()));
+        if let (None, Some(image)) = (first_image, &drawn.app().model().frame) {
+            first_image = Some((image.info.number, Instant::now()));
+        }
+        if let Some(begin) = begin.take() {
+            begin(drawn.app());
+        }
     }
-    let newest = window.app_mut().model().frame.as_ref().map_or(0, |image| image.info.number);
+    let newest = drawn.app().model().frame.as_ref().map_or(0, |image| image.info.number);
     let rate_hz = first_image.map_or(0.0, |(first, at)| (newest - first) as f64 / at.elapsed().as_secs_f64());
     println!(
-        "{what:<30} {:>7} {shapes:>9} {:>26} {rate_hz:>10.1} {:>6}",
-        times_ms.len(),
-        summary(times_ms),
+        "{what:<30} {:>7} {:>9} {:>26} {rate_hz:>10.1} {:>6}",
+        drawn.times_ms.len(),
+        drawn.shapes,
+        drawn.summary(),
         resident_mb()
     );
-    drop(window);
-    let _gone = std::fs::remove_dir_all(sessions).is_ok();
     Ok(())
-}
-
-fn summary(mut times_ms: Vec<f64>) -> String {
-    times_ms.sort_by(f64::total_cmp);
-    let at = |part: f64| times_ms.get(((times_ms.len() - 1) as f64 * part).round() as usize).copied().unwrap_or(0.0);
-    format!("{:>8.2} {:>8.2} {:>8.2}", at(0.5), at(0.99), at(1.0))
 }
 
 /// A line to the server that carries so many bytes a second in each direction.

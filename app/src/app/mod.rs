@@ -163,6 +163,7 @@ impl App {
             Command::Stop => self.stop(),
             Command::StartSimulation => self.start_simulation(),
             Command::Reconnect => self.reconnect(),
+            Command::StopTrying => self.stop_trying(),
             Command::Connect(source) => self.connect(source),
             Command::Arm(on) => self.arm(on),
             Command::TypePose(pose) => self.type_pose(Some(pose)),

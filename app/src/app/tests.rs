@@ -116,7 +116,7 @@ fn a_lost_connection_is_said_and_a_retry_does_not_hide_why() {
     let connected = LinkState::Connected { address: "tcp://a:1".to_owned(), server: "sim".to_owned() };
     let why = Text::verbatim("the cable is out");
     bench.app.absorb(Event::Link { link: Link::Camera, state: connected });
-    let lost = LinkState::Lost { since_s: 1.0, why: why.clone(), attempt: 0 };
+    let lost = LinkState::Lost { since_s: 1.0, why: why.clone(), attempt: 0, next_s: 1.5 };
     bench.app.absorb(Event::Link { link: Link::Camera, state: lost });
     assert_eq!(said(&bench.app), "Camera connection lost: the cable is out");
     let retrying = LinkState::Retrying { since_s: 1.0, why, attempt: 1 };
@@ -200,7 +200,7 @@ fn commands_and_events_survive_being_written_down() {
         let text = serde_json::to_string(&command).expect("it can be written");
         assert_eq!(serde_json::from_str::<Command>(&text).expect("it can be read"), command);
     }
-    let state = LinkState::Lost { since_s: 1.5, why: Text::verbatim("gone"), attempt: 2 };
+    let state = LinkState::Lost { since_s: 1.5, why: Text::verbatim("gone"), attempt: 2, next_s: 2.0 };
     let text = serde_json::to_string(&Event::Link { link: Link::Control, state: state.clone() }).expect("written");
     let Event::Link { state: read, .. } = serde_json::from_str(&text).expect("read") else { panic!("another event") };
     assert_eq!(read, state);

@@ -177,6 +177,7 @@ fn words(model: &Model, state: &LinkState) -> (Tone, Text) {
             let ago = status::duration(model.now_s - since_s);
             (Tone::Warning, text!("lost {ago} ago, try {attempt}", ago = ago, attempt = attempt))
         }
+        LinkState::Resting { .. } => (Tone::Warning, text!("not tried")),
         LinkState::Failed { .. } => (Tone::Bad, text!("failed")),
     }
 }

@@ -55,6 +55,12 @@ impl App {
         self.expect(text!("The connection was not tried again"), asked);
     }
 
+    /// Starts drivers that are gone no more.
+    pub(crate) fn stop_trying(&mut self) {
+        let asked = self.workers.stop_trying();
+        self.expect(text!("Trying to connect was not stopped"), asked);
+    }
+
     /// Works with another cell. What is open stays open: a session belongs to its captures, not to a connection.
     pub(crate) fn connect(&mut self, source: CellSource) {
         match &source {

@@ -4,7 +4,7 @@
 use egui::{Key, KeyboardShortcut, Modifiers};
 
 use crate::command::Command;
-use crate::model::{CapturePurpose, Dialog, Model, Pane, Step, ThemeChoice};
+use crate::model::{CapturePurpose, CellSource, Dialog, Model, Pane, Step, ThemeChoice};
 use crate::text::Language;
 use crate::tr;
 
@@ -119,6 +119,13 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
         action(tr!(language, "Solve"), Group::Work, &[], Command::Solve),
         action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation),
         action(tr!(language, "Try to connect now"), Group::Work, &[], Command::Reconnect),
+        Action {
+            name: tr!(language, "Stop trying"),
+            group: Group::Work,
+            keys: &[],
+            command: (matches!(model.source, CellSource::Drivers(_)) && !model.control.is_connected())
+                .then_some(Command::StopTrying),
+        },
         Action {
             name: tr!(language, "Undo"),
             group: Group::Session,

@@ -107,7 +107,8 @@ fn searching() -> Model {
 /// Solved, and then the cable was pulled: the images are as old as the loss.
 fn lost() -> Model {
     let since_s = 88.0;
-    let lost = LinkState::Lost { since_s, why: Text::verbatim("the cell closed the connection"), attempt: 2 };
+    let lost =
+        LinkState::Lost { since_s, why: Text::verbatim("the cell closed the connection"), attempt: 2, next_s: since_s };
     let mut model = sample::solved();
     if let Some(frame) = &mut model.frame {
         frame.info.received_s = since_s;

@@ -8,6 +8,9 @@ use crate::text::Text;
 /// Old enough \[s\] to say so: an image that should come many times a second.
 pub const STALE_AFTER_S: f64 = 1.0;
 
+/// A pause \[s\] that is over before it is read.
+const SOON_S: f64 = 2.0;
+
 /// A state for the user.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Status {
@@ -26,6 +29,10 @@ pub struct Status {
 pub enum Action {
     /// Try to connect now.
     Reconnect,
+    /// Try to connect now, or start drivers no more.
+    ReconnectOrStop,
+    /// Start drivers no more.
+    StopTrying,
     /// Let simulated time advance.
     StartSimulation,
     /// Lets a paused simulation go on.
@@ -82,7 +89,7 @@ fn rank(state: &LinkState) -> u8 {
         LinkState::Connected { .. } => 0,
         LinkState::StartingCell { .. } | LinkState::Searching { .. } => 1,
         LinkState::Retrying { .. } | LinkState::Lost { .. } => 2,
-        LinkState::Failed { .. } => 3,
+        LinkState::Resting { .. } | LinkState::Failed { .. } => 3,
     }
 }
 
@@ -115,7 +122,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
                 Some(why) => text!("Try {attempt}. {why}", attempt = attempt, why = sentence(why)),
             };
             let title = text!("Searching for {address}…", address = address);
-            status(Tone::Busy, title, detail, Some(Action::Reconnect))
+            status(Tone::Busy, title, detail, Some(try_now(model)))
         }
         LinkState::Connected { address, server } => {
             let title = match model.source {
@@ -124,18 +131,27 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
             };
             status(Tone::Good, title, Text::verbatim(address.clone()), None)
         }
-        LinkState::Lost { since_s, why, .. } => status(
-            Tone::Warning,
-            text!("{half} lost {ago} ago", half = half, ago = duration(model.now_s - since_s)),
-            text!("{why} It is tried again in a moment.", why = sentence(why)),
-            Some(Action::Reconnect),
-        ),
+        LinkState::Lost { since_s, why, attempt, next_s } => {
+            let pause_s = next_s - model.now_s;
+            let detail = if pause_s < SOON_S {
+                text!("{why} It is tried again in a moment.", why = sentence(why))
+            } else {
+                let (why, number, pause) = (sentence(why), attempt + 1, duration(pause_s));
+                text!("{why} Try {number} comes in {pause}.", why = why, number = number, pause = pause)
+            };
+            let title = text!("{half} lost {ago} ago", half = half, ago = duration(model.now_s - since_s));
+            status(Tone::Warning, title, detail, Some(try_now(model)))
+        }
         LinkState::Retrying { since_s, why, attempt } => status(
             Tone::Warning,
             text!("{half} lost {ago} ago, retrying", half = half, ago = duration(model.now_s - since_s)),
             text!("{why} Try {attempt} is under way.", why = sentence(why), attempt = attempt),
-            None,
+            may_be_given_up(model).then_some(Action::StopTrying),
         ),
+        LinkState::Resting { why } => {
+            let detail = text!("{why} It is not tried again until you ask for it.", why = sentence(why));
+            status(Tone::Warning, text!("Not connected"), detail, Some(Action::Reconnect))
+        }
         LinkState::Failed { why } => {
             let title = match &model.source {
                 CellSource::BuiltIn => text!("The built-in cell did not start"),
@@ -145,6 +161,15 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
             status(Tone::Bad, title, sentence(why), Some(Action::Reconnect))
         }
     }
+}
+
+/// A try of these starts a program, which a person may not want.
+fn may_be_given_up(model: &Model) -> bool {
+    matches!(model.source, CellSource::Drivers(_))
+}
+
+fn try_now(model: &Model) -> Action {
+    if may_be_given_up(model) { Action::ReconnectOrStop } else { Action::Reconnect }
 }
 
 /// A reason as a sentence; those of our own are.

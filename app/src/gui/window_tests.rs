@@ -8,7 +8,7 @@ use handeye_core::targets::TargetSpec;
 use super::*;
 use crate::command::Event;
 use crate::gui::testing::{Silent, connected, frame, robot};
-use crate::model::{CellSource, ImagePoint, Link, LinkState, Model, Pane, RotationFormat, Simulation, Step};
+use crate::model::{CellSource, Drivers, ImagePoint, Link, LinkState, Model, Pane, RotationFormat, Simulation, Step};
 use crate::text::{Language, Text};
 
 #[test]
@@ -34,7 +34,7 @@ fn every_state_of_the_connection_says_what_goes_on() {
 fn a_lost_connection_says_since_when_and_why_and_keeps_the_last_image() {
     let mut silent = Silent::live();
     let why = Text::verbatim("the cable is out");
-    let lost = LinkState::Lost { since_s: 88.0, why: why.clone(), attempt: 0 };
+    let lost = LinkState::Lost { since_s: 88.0, why: why.clone(), attempt: 0, next_s: 100.0 };
     silent.absorb(Event::Link { link: Link::Camera, state: lost });
     assert!(silent.sees("Camera connection lost 12 s ago"));
     assert!(silent.sees("The cable is out."));
@@ -42,9 +42,26 @@ fn a_lost_connection_says_since_when_and_why_and_keeps_the_last_image() {
     let retrying = LinkState::Retrying { since_s: 88.0, why: why.clone(), attempt: 2 };
     silent.absorb(Event::Link { link: Link::Camera, state: retrying });
     assert!(silent.sees("retrying"));
-    let later = LinkState::Lost { since_s: 95.0, why, attempt: 0 };
+    let later = LinkState::Lost { since_s: 95.0, why, attempt: 0, next_s: 100.0 };
     silent.absorb(Event::Link { link: Link::Control, state: later });
     assert!(silent.sees("Connection lost 12 s ago"), "the first loss counts");
+}
+
+#[test]
+fn a_driver_that_is_gone_says_why_and_when_it_is_started_again_and_a_person_can_have_enough() {
+    let drivers = Drivers { robot: Some("python3 my_driver.py".to_owned()), camera: None };
+    let mut silent = Silent::new(CellSource::Drivers(drivers));
+    let why = Text::verbatim("the driver `python3 my_driver.py` ended (exit status: 1): no camera");
+    let since_s = silent.app().model().now_s - 5.0;
+    let next_s = since_s + 5.0 + 9.5;
+    silent.links(&LinkState::Lost { since_s, why: why.clone(), attempt: 3, next_s });
+    assert!(silent.sees("Connection lost 5 s ago"));
+    assert!(silent.sees("ended (exit status: 1): no camera. Try 4 comes in 9 s."));
+    assert!(silent.harness.query_by_label("Stop trying").is_some());
+    silent.links(&LinkState::Resting { why });
+    assert!(silent.sees("Not connected") && silent.sees("It is not tried again until you ask for it."));
+    assert!(silent.harness.query_by_label("Try again now").is_some());
+    assert!(silent.harness.query_by_label("Stop trying").is_none());
 }
 
 #[test]

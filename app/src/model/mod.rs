@@ -127,6 +127,8 @@ pub enum LinkState {
         why: Text,
         /// How many times it was tried since.
         attempt: u32,
+        /// When it is tried next.
+        next_s: f64,
     },
     /// It worked and broke, and is being tried right now.
     Retrying {
@@ -136,6 +138,11 @@ pub enum LinkState {
         why: Text,
         /// How many times it was tried since, this one included.
         attempt: u32,
+    },
+    /// The user wants that it is not tried.
+    Resting {
+        /// Why there is no connection.
+        why: Text,
     },
     /// Trying again cannot help until the user does something.
     Failed {

@@ -115,7 +115,7 @@ impl<D: Duty> LinkLoop<'_, D> {
                         Err(error) => reconnect.lost(&error, self.outlet.now_s()),
                     }
                 }
-                Err(error) => reconnect.failed(&error),
+                Err(error) => reconnect.failed(&error, self.outlet.now_s()),
             };
             if self.shutdown.is_cancelled() {
                 return;

@@ -88,6 +88,8 @@ pub struct Workers {
     detections: Arc<LatestSlot<LiveDetection>>,
     tracked: Arc<LatestSlot<Tracked>>,
     follow: Arc<FollowLine>,
+    /// Until they end: a cell that it started ends with it.
+    connector: Option<Arc<dyn Connector>>,
     shutdown: CancelToken,
     threads: Vec<Started>,
 }
@@ -106,7 +108,7 @@ impl Workers {
         waker: &Waker,
     ) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
-        let mut workers = Self::idle(events, clock, waker);
+        let mut workers = Self::idle(events, connector, clock, waker);
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
         workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
@@ -129,7 +131,7 @@ impl Workers {
     }
 
     /// No threads yet.
-    fn idle(events: Receiver<Event>, clock: &Clock, waker: &Waker) -> Self {
+    fn idle(events: Receiver<Event>, connector: &Arc<dyn Connector>, clock: &Clock, waker: &Waker) -> Self {
         Self {
             control: None,
             camera: None,
@@ -144,6 +146,7 @@ impl Workers {
             detections: Arc::default(),
             tracked: Arc::default(),
             follow: Arc::default(),
+            connector: Some(Arc::clone(connector)),
             shutdown: CancelToken::default(),
             threads: Vec::new(),
         }
@@ -308,6 +311,20 @@ impl Workers {
     /// # Errors
     /// [`Busy`] when one does not take requests.
     pub fn reconnect(&self) -> Result<(), Busy> {
+        self.connector.iter().for_each(|connector| connector.again());
+        self.look_at_connection()
+    }
+
+    /// Has no worker try to connect any more until [`Self::reconnect`], where a try starts a program.
+    ///
+    /// # Errors
+    /// As [`Self::reconnect`].
+    pub fn stop_trying(&self) -> Result<(), Busy> {
+        self.connector.iter().for_each(|connector| connector.rest());
+        self.look_at_connection()
+    }
+
+    fn look_at_connection(&self) -> Result<(), Busy> {
         let motion = ask(self.motion.as_ref(), Request::Reconnect);
         self.ask_control(Request::Reconnect).and(self.ask_camera(Request::Reconnect)).and(motion)
     }
@@ -364,6 +381,7 @@ impl Workers {
         self.motion = None;
         self.vision = None;
         self.events = None;
+        self.connector = None;
         let end = Instant::now() + deadline;
         self.threads.drain(..).map(|thread| thread.join_until(end)).filter(|has_ended| !has_ended).count()
     }

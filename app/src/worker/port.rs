@@ -1,5 +1,7 @@
 //! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
 
+use std::time::Duration;
+
 use handeye_core::depth::DepthImage;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -23,13 +25,26 @@ pub enum PortError {
     Refused(Text),
     /// It cannot work before the user changes something.
     Hopeless(Text),
+    /// As [`Self::Lost`], where the cell itself is not to be tried more often than this.
+    Later {
+        /// Why there is none.
+        why: Text,
+        /// How many tries in a row came to nothing.
+        tries: u32,
+        /// How long until the next.
+        pause: Duration,
+    },
+    /// The user wants that it is not tried.
+    Rests(Text),
 }
 
 impl PortError {
     /// Why, for the screen.
     pub fn why(&self) -> &Text {
         match self {
-            Self::Lost(why) | Self::Refused(why) | Self::Hopeless(why) => why,
+            Self::Lost(why) | Self::Refused(why) | Self::Hopeless(why) | Self::Later { why, .. } | Self::Rests(why) => {
+                why
+            }
         }
     }
 }
@@ -63,6 +78,13 @@ pub trait Connector: Send + Sync {
     /// # Errors
     /// As [`Self::connect_control`].
     fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError>;
+
+    /// The user wants no more tries: from now on a connection that is not there is [`PortError::Rests`], and a try under way is
+    /// given up. Waits for nothing. Only where a try starts a program is there reason to.
+    fn rest(&self) {}
+
+    /// The user wants it to be tried now. Waits for nothing.
+    fn again(&self) {}
 }
 
 /// The robot and the simulation.

@@ -100,11 +100,13 @@ impl Driver {
         spawned("driver-errors", Box::new(move || threads::collect_errors(&listening, errors)))?;
 
         shared.send(&ToDriver::Hello { protocol: PROTOCOL, workbench: env!("CARGO_PKG_VERSION").to_owned() })?;
-        let greeted = shared
-            .wait(options.hello, Some(cancel), |inner| inner.hello.clone().map(|hello| (hello, inner.arm.clone())))?;
-        let Some((hello, arm)) = greeted else {
+        let greeted = shared.wait(options.hello, Some(cancel), |inner| {
+            let hello = inner.hello.clone().map(|hello| Some((hello, inner.arm.clone())));
+            hello.or_else(|| options.halt.is_cancelled().then_some(None))
+        })?;
+        let Some((hello, arm)) = greeted.flatten() else {
             let last_line = shared.lock().log.last_printed();
-            let why = if cancel.is_cancelled() {
+            let why = if cancel.is_cancelled() || options.halt.is_cancelled() {
                 Ending::ClosedHere
             } else {
                 Ending::NoHello { after: options.hello, last_line }

@@ -1,25 +1,78 @@
 //! One cell of drivers for several threads, started when it is needed and again when it is gone.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use handeye_core::progress::CancelToken;
 
 use super::cell::{DriverCell, DriverCellSpec};
 use super::error::DriverError;
 use super::options::DriverOptions;
+use super::starts::{Failure, Permit, Starts};
 
 /// Keeps a cell running. Threads ask it for the cell whenever theirs is gone; what it gives is the same cell for all.
+///
+/// A cell that is gone is started again when somebody asks, with pauses that grow as long as starts come to nothing, and in the
+/// end no more until [`Self::again`]. Whoever asks in a pause is told how long it is, and nothing is started.
 #[derive(Debug)]
 pub struct DriverHost {
     spec: DriverCellSpec,
     options: DriverOptions,
-    cell: Mutex<Option<DriverCell>>,
+    kept: Mutex<Kept>,
+    /// Nothing is to be started.
+    rests: AtomicBool,
+    /// A person has asked since the last start.
+    is_asked: AtomicBool,
+    /// Gives up the start under way.
+    halt: Mutex<CancelToken>,
+}
+
+#[derive(Debug, Default)]
+struct Kept {
+    cell: Option<DriverCell>,
+    starts: Starts,
+    /// Why there is none.
+    error: Option<DriverError>,
+}
+
+/// Why there is no cell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NoCell {
+    /// Starts came to nothing, and the next is after a pause.
+    Later {
+        /// Why the last one did.
+        error: DriverError,
+        /// How many in a row.
+        tries: u32,
+        /// How long the pause is yet.
+        pause: Duration,
+    },
+    /// Starts came to nothing, and there is none by itself any more.
+    Over {
+        /// Why the last one did.
+        error: DriverError,
+        /// How many in a row.
+        tries: u32,
+    },
+    /// Somebody wants that nothing is started.
+    Rests {
+        /// Why the last start came to nothing, or how the last cell ended.
+        error: Option<DriverError>,
+    },
 }
 
 impl DriverHost {
     /// Nothing is started yet.
     pub fn new(spec: DriverCellSpec, options: DriverOptions) -> Self {
-        Self { spec, options, cell: Mutex::new(None) }
+        Self {
+            spec,
+            options,
+            kept: Mutex::default(),
+            rests: AtomicBool::new(false),
+            is_asked: AtomicBool::new(false),
+            halt: Mutex::default(),
+        }
     }
 
     /// Which drivers.
@@ -31,24 +84,94 @@ impl DriverHost {
     /// the same start.
     ///
     /// # Errors
-    /// As [`DriverCell::start`].
-    pub fn cell(&self, cancel: &CancelToken) -> Result<DriverCell, DriverError> {
-        let mut kept = self.cell.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(cell) = kept.as_ref().filter(|cell| cell.check().is_ok()) {
-            return Ok(cell.clone());
+    /// [`NoCell`].
+    pub fn cell(&self, cancel: &CancelToken) -> Result<DriverCell, NoCell> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cell) = kept.cell.take() {
+            match cell.check() {
+                Ok(()) => return Ok(kept.cell.insert(cell).clone()),
+                Err(error) => kept.error = Some(error),
+            }
+            // Both halves of it, whoever has them yet: a device takes one program at a time.
+            cell.close();
+            kept.starts.ended(self.now_s());
         }
-        // The old one first, both halves of it, whoever has them yet: a device takes one program at a time.
-        if let Some(old) = kept.take() {
-            old.close();
+        if self.is_asked.swap(false, Ordering::AcqRel) {
+            kept.starts.again();
         }
-        let cell = DriverCell::start(&self.spec, &self.options, cancel)?;
-        Ok(kept.insert(cell).clone())
+        // Before the question whether it rests: a rest that is wanted after that cancels this one.
+        let halt = self.halt().clone();
+        if self.rests.load(Ordering::Acquire) {
+            return Err(NoCell::Rests { error: kept.error.clone() });
+        }
+        let (permit, error) = (kept.starts.permit(self.now_s()), kept.error.clone());
+        if let (Permit::In(_) | Permit::No, Some(error)) = (permit, error) {
+            return Err(refusal(permit, error, kept.starts.failures()));
+        }
+        let options = DriverOptions { halt, ..self.options.clone() };
+        match DriverCell::start(&self.spec, &options, cancel) {
+            Ok(cell) => {
+                kept.starts.began(self.now_s());
+                Ok(kept.cell.insert(cell).clone())
+            }
+            Err(error) if options.halt.is_cancelled() => {
+                Err(NoCell::Rests { error: kept.error.clone().or(Some(error)) })
+            }
+            Err(error) => {
+                kept.error = Some(error.clone());
+                let now_s = self.now_s();
+                kept.starts.failed(now_s, kind(&error));
+                Err(refusal(kept.starts.permit(now_s), error, kept.starts.failures()))
+            }
+        }
+    }
+
+    /// Starts nothing until [`Self::again`], and gives up the start under way. A cell that works goes on. Waits for nothing.
+    pub fn rest(&self) {
+        self.rests.store(true, Ordering::Release);
+        self.halt().cancel();
+    }
+
+    /// Has the next who asks start at once, however often that came to nothing before. Waits for nothing.
+    pub fn again(&self) {
+        *self.halt() = CancelToken::default();
+        self.is_asked.store(true, Ordering::Release);
+        self.rests.store(false, Ordering::Release);
     }
 
     /// Ends the cell, whoever has it yet.
     pub fn close(&self) {
-        if let Some(cell) = self.cell.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        if let Some(cell) = self.kept.lock().unwrap_or_else(PoisonError::into_inner).cell.take() {
             cell.close();
         }
     }
+
+    fn halt(&self) -> MutexGuard<'_, CancelToken> {
+        self.halt.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn now_s(&self) -> f64 {
+        self.options.timebase.now_s()
+    }
 }
+
+fn refusal(permit: Permit, error: DriverError, tries: u32) -> NoCell {
+    match permit {
+        Permit::Now => NoCell::Later { error, tries, pause: Duration::ZERO },
+        Permit::In(pause) => NoCell::Later { error, tries, pause },
+        Permit::No => NoCell::Over { error, tries },
+    }
+}
+
+fn kind(error: &DriverError) -> Failure {
+    match error {
+        DriverError::Connect { .. } => Failure::Nobody,
+        DriverError::Gone { .. } | DriverError::NoAnswer { .. } => Failure::Ended,
+        _ => Failure::Hopeless,
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[path = "host_tests.rs"]
+mod tests;

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use handeye_core::progress::CancelToken;
+
 use super::clock::Timebase;
 
 /// How a connection to a driver behaves.
@@ -21,6 +23,8 @@ pub struct DriverOptions {
     pub farewell: Duration,
     /// The clock of the workbench. Drivers that belong together share it.
     pub timebase: Timebase,
+    /// Gives up a start that waits for `hello`.
+    pub halt: CancelToken,
 }
 
 impl Default for DriverOptions {
@@ -33,6 +37,7 @@ impl Default for DriverOptions {
             motion: Duration::from_mins(5),
             farewell: Duration::from_secs(1),
             timebase: Timebase::start(),
+            halt: CancelToken::default(),
         }
     }
 }

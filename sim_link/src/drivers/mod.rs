@@ -11,6 +11,8 @@ mod outlet;
 pub mod rosbridge;
 mod serve;
 pub mod ur_rtde;
+#[cfg(target_os = "linux")]
+pub mod v4l;
 
 pub use outlet::{DepthFrame, Frame, Outlet};
 pub use serve::serve;

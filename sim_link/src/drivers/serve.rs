@@ -1,6 +1,7 @@
 //! The driver's side of the protocol.
 
 use std::io::{BufRead as _, BufReader, Read, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
@@ -124,9 +125,15 @@ impl<D: Device> Serving<D> {
         let Some(mut device) = self.device.take() else { return Ok(()) };
         let (outlet, events) = (self.outlet.clone(), self.events.clone());
         spawn("driver-device", move || {
-            let result = device.open(&outlet).and_then(|hello| {
-                outlet.greet(&hello);
-                device.run(&outlet)
+            // What fails in a library would leave a driver that answers pings and has nothing to say.
+            let result = catch_unwind(AssertUnwindSafe(|| {
+                device.open(&outlet).and_then(|hello| {
+                    outlet.greet(&hello);
+                    device.run(&outlet)
+                })
+            }));
+            let result = result.unwrap_or_else(|_panic| {
+                Err(Fault("the program of this driver has a fault; standard error says where".into()))
             });
             // Nobody listens when the workbench has gone.
             drop(events.send(Event::Device(result)));
@@ -145,5 +152,33 @@ impl<D: Device> Serving<D> {
         if kind.as_ref().map_or(true, |kind| KNOWN.contains(&kind.as_str())) {
             self.outlet.log(LogLevel::Warn, format!("a message of the workbench cannot be read: {error}"));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::driver::message::Hello;
+
+    struct Faulty;
+
+    impl Device for Faulty {
+        fn open(&mut self, _outlet: &Outlet) -> Result<Hello, Fault> {
+            panic!("what a library does with a device that it does not know")
+        }
+
+        fn run(&mut self, _outlet: &Outlet) -> Result<(), Fault> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_device_that_fails_in_its_library_ends_the_driver_with_a_reason() {
+        // The input stays open, as that of a driver does: only the device can end it.
+        let (input, mut workbench) = std::io::pipe().expect("a pipe");
+        let hello = ToDriver::Hello { protocol: PROTOCOL, workbench: "0".into() }.line();
+        workbench.write_all(hello.as_bytes()).expect("it is read");
+        let fault = serve(Faulty, input, std::io::sink()).expect_err("it cannot go on");
+        assert!(fault.0.contains("has a fault"), "{fault}");
     }
 }

@@ -138,6 +138,29 @@ fn matrices(value: &Value) -> BTreeMap<String, Matrix4<f64>> {
     entries.iter().map(|(key, value)| (key.clone(), matrix(value))).collect()
 }
 
+/// Hypotheses that the list shows; what is left out is counted.
+const SHOWN: usize = 12;
+
+#[test]
+fn the_list_of_hypotheses_counts_what_it_leaves_out_and_says_nothing_of_more_where_it_shows_all() {
+    let Some(data) = data_folder() else { return };
+    let many = (&["importers/table_eye_in_hand"][..], &["--target", "11x8x20"][..]);
+    let few = (&["moveit_pose_samples/pose_samples.json"][..], &[][..]);
+    let counts = [many, few].map(|(files, arguments)| {
+        let (home, folder) = copied(&data, files);
+        let found = home.path().join("found.json");
+        let run = command().args(["import", "--quiet"]).args(arguments).arg("--json").arg(&found).arg(&folder).output();
+        let said = text(&run.expect("it runs").stdout);
+        let found: Value = serde_json::from_slice(&std::fs::read(&found).expect("written")).expect("JSON");
+        let all = found["judgement"]["hypotheses"].as_array().expect("a list").len();
+        let more = said.lines().find_map(|line| line.trim().strip_prefix("and ")?.strip_suffix(" more"));
+        let left_out = more.map(|count| count.parse::<usize>().expect("a number"));
+        assert_eq!(left_out, (all > SHOWN).then(|| all - SHOWN), "{all} hypotheses:\n{said}");
+        all
+    });
+    assert!(counts[0] > SHOWN && counts[1] < SHOWN, "both cases are there: {counts:?}");
+}
+
 #[test]
 fn recordings_of_others_are_read_as_an_independent_reader_reads_them() {
     let Some(data) = data_folder() else { return };

@@ -8,7 +8,7 @@ use clap::Args;
 use handeye_core::project::dataset::PoseFormat;
 use handeye_sim_link::drivers::folder::{Folder, FolderOptions};
 
-use super::serve;
+use super::{serve, size};
 use crate::cli::Failure;
 
 /// Options of `handeye driver folder`.
@@ -89,12 +89,6 @@ fn format(args: &FolderArgs) -> Result<PoseFormat, Failure> {
         writeln!(keys, "joints = {joints}").map_err(Failure::failed)?;
     }
     PoseFormat::parse(Path::new("options"), &keys).map_err(Failure::unusable)
-}
-
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let number = |text: &str| text.parse::<u32>().ok().filter(|&pixels| pixels > 0);
-    let parts = text.split_once(['x', '×']).and_then(|(width, height)| Some((number(width)?, number(height)?)));
-    parts.ok_or_else(|| "width and height in pixels, such as 1280x720".into())
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

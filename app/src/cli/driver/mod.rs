@@ -5,6 +5,8 @@ mod folder;
 mod rosbridge;
 mod test;
 mod ur_rtde;
+#[cfg(target_os = "linux")]
+mod v4l;
 
 use clap::{Args, Subcommand};
 use handeye_sim_link::drivers::{self, Device};
@@ -48,6 +50,12 @@ enum DriverCommand {
                             --pose base_from_tip"
     )]
     Folder(folder::FolderArgs),
+    /// Be a driver of a USB camera, or another one of Video4Linux.
+    #[cfg(target_os = "linux")]
+    #[command(
+        after_help = "Example:\n  handeye driver test \"handeye driver v4l --device /dev/video0 --size 1280x720\""
+    )]
+    V4l(v4l::V4lArgs),
 }
 
 pub fn run(args: &DriverArgs) -> Result<(), Failure> {
@@ -57,10 +65,19 @@ pub fn run(args: &DriverArgs) -> Result<(), Failure> {
         DriverCommand::UrRtde(args) => ur_rtde::run(args),
         DriverCommand::Rosbridge(args) => rosbridge::run(args),
         DriverCommand::Folder(args) => folder::run(args),
+        #[cfg(target_os = "linux")]
+        DriverCommand::V4l(args) => v4l::run(args),
     }
 }
 
 /// Speaks for a device on standard input and output until the workbench leaves.
 fn serve(device: impl Device) -> Result<(), Failure> {
     drivers::serve(device, std::io::stdin(), std::io::stdout()).map_err(Failure::failed)
+}
+
+/// Width and height in pixels.
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let number = |text: &str| text.parse::<u32>().ok().filter(|&pixels| pixels > 0);
+    let parts = text.split_once(['x', '×']).and_then(|(width, height)| Some((number(width)?, number(height)?)));
+    parts.ok_or_else(|| "width and height in pixels, such as 1280x720".into())
 }

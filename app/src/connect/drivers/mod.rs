@@ -12,9 +12,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverHost, DriverOptions};
+use handeye_sim_link::driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverHost, DriverOptions, NoCell};
 
 use crate::model::Drivers;
+use crate::text;
 use crate::text::Text;
 use crate::worker::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError};
 use camera::DriverCamera;
@@ -39,7 +40,7 @@ impl DriverConnector {
     /// The drivers that run. The other workers wait for the first.
     fn cell(&self, shutdown: &CancelToken) -> Result<DriverCell, PortError> {
         let host = self.host.as_ref().map_err(|why| PortError::Hopeless(Text::verbatim(why.to_string())))?;
-        host.cell(shutdown).map_err(port_error)
+        host.cell(shutdown).map_err(no_cell)
     }
 
     fn is_freehand(&self) -> bool {
@@ -70,9 +71,8 @@ impl Connector for DriverConnector {
     fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
         let cell = self.cell(shutdown)?;
         if cell.camera().is_none() {
-            let said = crate::text!(
-                "The driver has no images: name a driver for the camera under Connect, beside that of the robot"
-            );
+            let said =
+                text!("The driver has no images: name a driver for the camera under Connect, beside that of the robot");
             return Err(PortError::Hopeless(said));
         }
         let port = DriverCamera::new(cell.clone(), self.is_freehand().then(|| self.typed.clone()), shutdown.clone());
@@ -82,6 +82,18 @@ impl Connector for DriverConnector {
     fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
         let cell = self.cell(shutdown)?;
         Ok(self.connected(Box::new(DriverMotion::new(cell.clone())), &cell))
+    }
+
+    fn rest(&self) {
+        if let Ok(host) = &self.host {
+            host.rest();
+        }
+    }
+
+    fn again(&self) {
+        if let Ok(host) = &self.host {
+            host.again();
+        }
     }
 }
 
@@ -107,6 +119,25 @@ fn spec(drivers: &Drivers) -> Result<DriverCellSpec, BadSpec> {
         (Some(robot), camera) => Ok(DriverCellSpec { robot, camera }),
         (None, Some(camera)) => Ok(DriverCellSpec { robot: camera, camera: None }),
         (None, None) => Err(BadSpec::Empty),
+    }
+}
+
+/// Why there are no drivers, for a connection.
+fn no_cell(why: NoCell) -> PortError {
+    match why {
+        NoCell::Later { error, tries, pause } => {
+            PortError::Later { why: Text::verbatim(error.to_string()), tries, pause }
+        }
+        NoCell::Over { error, tries } if tries > 1 => PortError::Hopeless(text!(
+            "{tries} starts in a row came to nothing, and there are no more by themselves: {why}. Look at the command and at \
+             what the driver says, then try again",
+            tries = tries,
+            why = error
+        )),
+        NoCell::Over { error, .. } => port_error(error),
+        NoCell::Rests { error } => PortError::Rests(
+            error.map_or_else(|| text!("The driver was not started"), |error| Text::verbatim(error.to_string())),
+        ),
     }
 }
 

@@ -114,7 +114,12 @@ fn a_driver_without_images_says_what_is_missing_and_one_that_is_not_there_is_tri
     assert!(matches!(robot_alone.connect_camera(&shutdown), Err(PortError::Hopeless(_))));
     let free = TcpListener::bind("127.0.0.1:0").expect("a free port").local_addr().expect("bound");
     let nobody = connector(Some(format!("tcp://{free}")), None);
-    assert!(matches!(nobody.connect_control(&shutdown), Err(PortError::Lost(_))));
+    assert!(matches!(nobody.connect_control(&shutdown), Err(PortError::Later { .. })));
+    nobody.rest();
+    let Err(PortError::Rests(why)) = nobody.connect_control(&shutdown) else { panic!("it is tried on") };
+    assert!(why.foreign_words().is_some_and(|why| why.contains("no driver listens")), "{why:?}");
+    nobody.again();
+    assert!(matches!(nobody.connect_control(&shutdown), Err(PortError::Later { .. })));
     let no_program = connector(Some("no-such-program-anywhere --x".to_owned()), None);
     assert!(matches!(no_program.connect_control(&shutdown), Err(PortError::Hopeless(_))));
 }

@@ -1,4 +1,4 @@
-//! The button for what a status asks a person to do.
+//! The buttons for what a status asks a person to do.
 
 use egui::Ui;
 
@@ -7,15 +7,21 @@ use crate::gui::status::Action;
 use crate::text::Language;
 use crate::tr;
 
-/// The button for an action.
+/// The buttons for an action.
 pub(crate) fn action_ui(ui: &mut Ui, action: Option<Action>, language: Language, outbox: &mut Outbox) {
-    let (text, command) = match action {
+    let reconnect = (tr!(language, "Try again now"), Command::Reconnect);
+    let stop = (tr!(language, "Stop trying"), Command::StopTrying);
+    let buttons = match action {
         None => return,
-        Some(Action::Reconnect) => (tr!(language, "Try again now"), Command::Reconnect),
-        Some(Action::StartSimulation) => (tr!(language, "Start simulation"), Command::StartSimulation),
-        Some(Action::ContinueSimulation) => (tr!(language, "Continue simulation"), Command::StartSimulation),
+        Some(Action::Reconnect) => vec![reconnect],
+        Some(Action::ReconnectOrStop) => vec![reconnect, stop],
+        Some(Action::StopTrying) => vec![stop],
+        Some(Action::StartSimulation) => vec![(tr!(language, "Start simulation"), Command::StartSimulation)],
+        Some(Action::ContinueSimulation) => vec![(tr!(language, "Continue simulation"), Command::StartSimulation)],
     };
-    if ui.button(text).clicked() {
-        outbox.send(command);
+    for (text, command) in buttons {
+        if ui.button(text).clicked() {
+            outbox.send(command);
+        }
     }
 }

@@ -5,7 +5,7 @@ use std::process::Command as Program;
 
 use handeye_app::command::Command;
 use handeye_app::limits;
-use handeye_app::model::{CapturePurpose, CellSource, Drivers, Model, Motion, SolveStatus};
+use handeye_app::model::{CapturePurpose, CellSource, Drivers, LinkState, Model, Motion, SolveStatus};
 use handeye_core::geometry::frames::{Camera, Pose, Tip};
 use handeye_core::project::taught_poses::Goal;
 use handeye_sim_link::cell::scene::Scene;
@@ -127,4 +127,29 @@ fn a_robot_that_is_moved_by_hand_is_calibrated_with_poses_that_are_typed() {
     bench.click(Command::Capture(CapturePurpose::Calibrate));
     bench.until("the refusal", |model| model.refused.is_some());
     assert!(bench.said().contains("type the pose that its pendant shows"), "{}", bench.said());
+}
+
+#[test]
+fn a_driver_that_ends_at_once_is_tried_a_few_times_says_why_and_then_waits_for_a_person() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let noted = folder.path().join("noted");
+    let script = format!("echo started >> {}; echo no camera is plugged in >&2; exit 3", noted.display());
+    let starts = || std::fs::read_to_string(&noted).map_or(0, |text| text.lines().count());
+    let drivers = Drivers { robot: Some(format!("sh -c '{script}'")), camera: None };
+    let mut bench = Workbench::start(CellSource::Drivers(drivers), &folder.path().join("sessions"), None);
+    bench.until("the reason", |model| matches!(&model.control, LinkState::Searching { why: Some(_), .. }));
+    bench.until("the end of the tries", |model| {
+        [&model.control, &model.camera].iter().all(|link| matches!(link, LinkState::Failed { .. }))
+    });
+    let said = bench.said();
+    assert!(said.contains("starts in a row came to nothing") && said.contains("no camera is plugged in"), "{said}");
+    let tried = starts();
+    assert!((3..20).contains(&tried), "{tried} starts by three threads");
+
+    bench.click(Command::Reconnect);
+    bench.until("another try", |model| matches!(model.control, LinkState::Searching { .. }) && starts() > tried);
+    bench.click(Command::StopTrying);
+    bench.until("the rest", |model| {
+        [&model.control, &model.camera, &model.mover].iter().all(|link| matches!(link, LinkState::Resting { .. }))
+    });
 }
