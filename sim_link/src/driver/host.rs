@@ -106,7 +106,7 @@ impl DriverHost {
         }
         let (permit, error) = (kept.starts.permit(self.now_s()), kept.error.clone());
         if let (Permit::In(_) | Permit::No, Some(error)) = (permit, error) {
-            return Err(refusal(permit, error, kept.starts.failures()));
+            return Err(refusal(permit, error, kept.starts.tries()));
         }
         let options = DriverOptions { halt, ..self.options.clone() };
         match DriverCell::start(&self.spec, &options, cancel) {
@@ -121,7 +121,7 @@ impl DriverHost {
                 kept.error = Some(error.clone());
                 let now_s = self.now_s();
                 kept.starts.failed(now_s, kind(&error));
-                Err(refusal(kept.starts.permit(now_s), error, kept.starts.failures()))
+                Err(refusal(kept.starts.permit(now_s), error, kept.starts.tries()))
             }
         }
     }

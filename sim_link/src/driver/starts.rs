@@ -41,8 +41,10 @@ pub enum Permit {
 /// Counts starts. No clock: times are given, in seconds on any steady one.
 #[derive(Debug, Default)]
 pub struct Starts {
-    /// In a row.
+    /// Starts in a row that came to nothing.
     failures: u32,
+    /// Times in a row that nobody listened; none of them is a start.
+    knocks: u32,
     began_s: Option<f64>,
     has_worked: bool,
     not_before_s: Option<f64>,
@@ -50,9 +52,9 @@ pub struct Starts {
 }
 
 impl Starts {
-    /// How many starts in a row came to nothing.
-    pub fn failures(&self) -> u32 {
-        self.failures
+    /// How many tries in a row came to nothing.
+    pub fn tries(&self) -> u32 {
+        self.failures.saturating_add(self.knocks)
     }
 
     /// Whether to start at this time.
@@ -70,11 +72,12 @@ impl Starts {
         self.not_before_s = None;
     }
 
-    /// What had begun is gone. It is started again at once, if it worked for a while or for the first time after such.
+    /// What had begun is gone. It is started again at once where it had worked for a while, or where no start before came to
+    /// nothing.
     pub fn ended(&mut self, now_s: f64) {
         let Some(began_s) = self.began_s.take() else { return };
         if now_s - began_s >= STEADY_S {
-            (self.failures, self.has_worked) = (0, true);
+            (self.failures, self.knocks, self.has_worked) = (0, 0, true);
         } else {
             self.count(now_s, Failure::Ended);
             if self.failures == 1 {
@@ -90,20 +93,20 @@ impl Starts {
 
     /// A person asks for it.
     pub fn again(&mut self) {
-        (self.failures, self.not_before_s, self.is_over) = (0, None, false);
+        (self.failures, self.knocks, self.not_before_s, self.is_over) = (0, 0, None, false);
     }
 
     fn count(&mut self, now_s: f64, why: Failure) {
-        self.failures = self.failures.saturating_add(1);
-        let index = (self.failures.saturating_sub(1) as usize).min(PAUSES_S.len() - 1);
-        let (pause_s, most) = match why {
-            Failure::Nobody => (PAUSES_S[index].min(KNOCKING_S), u32::MAX),
-            Failure::Ended if self.has_worked => (PAUSES_S[index], MOST_LATER),
-            Failure::Ended => (PAUSES_S[index], MOST_AT_FIRST),
-            Failure::Hopeless => (0.0, 1),
+        let (count, longest_s, most) = match why {
+            Failure::Nobody => (&mut self.knocks, KNOCKING_S, u32::MAX),
+            Failure::Ended if self.has_worked => (&mut self.failures, f64::INFINITY, MOST_LATER),
+            Failure::Ended => (&mut self.failures, f64::INFINITY, MOST_AT_FIRST),
+            Failure::Hopeless => (&mut self.failures, 0.0, 0),
         };
-        self.not_before_s = Some(now_s + pause_s);
-        self.is_over = self.failures >= most;
+        *count = count.saturating_add(1);
+        let index = (*count as usize).min(PAUSES_S.len()) - 1;
+        self.is_over = *count >= most;
+        self.not_before_s = Some(now_s + PAUSES_S[index].min(longest_s));
     }
 }
 
@@ -145,7 +148,7 @@ mod tests {
         let mut starts = Starts::default();
         starts.began(0.0);
         starts.ended(3600.0);
-        assert_eq!((starts.permit(3600.0), starts.failures()), (Permit::Now, 0));
+        assert_eq!((starts.permit(3600.0), starts.tries()), (Permit::Now, 0));
         let mut now_s = 3600.0;
         while let Permit::Now | Permit::In(_) = starts.permit(now_s) {
             starts.failed(now_s, Failure::Ended);
@@ -172,6 +175,17 @@ mod tests {
             let Permit::In(pause) = starts.permit(now_s) else { panic!("{:?}", starts.permit(now_s)) };
             assert!(pause.as_secs_f64() <= KNOCKING_S);
         }
+    }
+
+    #[test]
+    fn waiting_for_an_address_takes_no_start_from_the_driver_that_comes_up_there() {
+        let mut starts = Starts::default();
+        for i in 0..1000 {
+            starts.failed(f64::from(i), Failure::Nobody);
+        }
+        starts.failed(1e4, Failure::Ended);
+        assert!(matches!(starts.permit(1e4), Permit::In(_)), "{:?}", starts.permit(1e4));
+        assert_eq!(starts.tries(), 1001);
     }
 
     #[test]
