@@ -236,7 +236,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let ended = cell.arm().stop().and_then(|()| {
         let sim = cell.arm().sim();
         sim.set_stepping(false)?;
-        if ran_before { Ok(()) } else { sim.stop_simulation() }
+        if ran_before { Ok(()) } else { sim.stop_simulation_and_wait() }
     });
     if captured.is_err() && !session.document().captures.is_empty() {
         let (count, folder) = (session.document().captures.len(), folder.display());

@@ -1,5 +1,7 @@
 //! The simulation as a whole: run, pause, stop, step, and the simulator's settings.
 
+use std::time::Duration;
+
 use ciborium::Value;
 
 use super::Sim;
@@ -8,6 +10,9 @@ use crate::client::constants::INT_PROGRAM_VERSION;
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
 use crate::client::protocol::ProtocolVersion;
+
+/// How long the end of a simulation is waited for: it takes some three passes, and those of a large scene are slow.
+const END: Duration = Duration::from_secs(10);
 
 impl Sim {
     /// Starts the simulation, or lets a paused one go on.
@@ -33,6 +38,24 @@ impl Sim {
     /// Any [`LinkError`] of a call.
     pub fn stop_simulation(&mut self) -> Result<(), LinkError> {
         self.call("sim.stopSimulation", Vec::new()).map(drop)
+    }
+
+    /// [`Sim::stop_simulation`], and waits for the end: until then a start is ignored, and whoever comes next and starts
+    /// it would be left with a simulation that ends.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] of a call; [`LinkError::Timeout`] when the end does not come within ten seconds.
+    pub fn stop_simulation_and_wait(&mut self) -> Result<(), LinkError> {
+        self.stop_simulation()?;
+        let began = std::time::Instant::now();
+        while self.get_simulation_state()? != SimulationState::Stopped {
+            if began.elapsed() > END {
+                return Err(LinkError::Timeout { call: "sim.stopSimulation".to_owned(), after: began.elapsed() });
+            }
+            // A pass later, or at once where none comes any more.
+            self.step(&CallOptions::default())?;
+        }
+        Ok(())
     }
 
     /// Whether time advances.

@@ -84,6 +84,19 @@ fn a_pose_that_is_none_is_refused_with_the_name_of_the_call() {
 }
 
 #[test]
+fn the_end_of_a_simulation_is_waited_for() {
+    let mut codes = [17, 21, 22, 0].into_iter();
+    let (mut sim, log) = sim(move |request| match func(request) {
+        "sim.getSimulationState" => ret([Value::from(codes.next().expect("nobody asks after the end"))]),
+        _ => ret([]),
+    });
+    sim.stop_simulation_and_wait().expect("it ends");
+    let functions = log.functions();
+    assert_eq!(functions[0], "sim.stopSimulation");
+    assert_eq!(functions.iter().filter(|name| *name == "sim.getSimulationState").count(), 4);
+}
+
+#[test]
 fn the_second_number_of_an_interval_is_its_length() {
     let (mut sim, _log) = answering(vec![Value::from(false), wire::floats([-1.0, 3.0])]);
     let interval = sim.get_joint_interval(OBJECT).expect("an interval");
