@@ -64,6 +64,7 @@ const CHINESE: &[(&str, &str)] = &[
     ("live", include_str!("../../assets/text/zh-CN/live.toml")),
     ("poses", include_str!("../../assets/text/zh-CN/poses.toml")),
     ("result", include_str!("../../assets/text/zh-CN/result.toml")),
+    ("serve", include_str!("../../assets/text/zh-CN/serve.toml")),
     ("session", include_str!("../../assets/text/zh-CN/session.toml")),
     ("track", include_str!("../../assets/text/zh-CN/track.toml")),
 ];

@@ -1,4 +1,5 @@
-//! The window on a screen of its own (Xvfb), pressed by a real mouse and keyboard (xdotool).
+//! The window as a person has it before him: on a screen of its own (Xvfb), pressed by a real mouse and keyboard (xdotool),
+//! or in a browser, pressed by its events.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -6,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use handeye_core::testing::{Need, programs};
 
+use crate::browser::{Browser, Tab};
 use crate::process;
 use crate::watch::Watch;
 
@@ -16,16 +18,23 @@ const LOOK: Duration = Duration::from_secs(1);
 /// The list of widgets is written, closed and renamed for every frame.
 const CHANGES_OF_A_FRAME: usize = 3;
 
-/// A screen with the workbench on it. Both end when it is dropped.
+/// A screen or a browser with the workbench on it. Both end when it is dropped.
 pub struct Desktop {
-    screen: Child,
+    surface: Surface,
     window: Child,
-    display: String,
     widgets: PathBuf,
     shots: PathBuf,
     clicks: u32,
     watch: Watch,
     home: tempfile::TempDir,
+}
+
+/// Where the window is shown.
+enum Surface {
+    /// On a screen without a monitor.
+    Screen { server: Child, display: String },
+    /// In a browser; touched, or pointed at with a mouse.
+    Page { browser: Browser, tab: Tab, touch: bool },
 }
 
 /// A control on the screen.
@@ -40,6 +49,26 @@ struct Widget {
 /// Whether the programs are there that a [`Desktop`] needs; where one is not, the running test has said that it skips.
 pub fn is_possible() -> bool {
     programs(Need::Xvfb, &["Xvfb", "xdotool", "import"])
+}
+
+/// Whether the browser is there that a [`Desktop::in_browser`] needs; where it is not, the running test has said that it
+/// skips.
+pub fn is_possible_in_browser() -> bool {
+    programs(Need::Chromium, &["chromium"])
+}
+
+/// `handeye`, with a home folder of its own.
+fn handeye(command: &str, home: &Path) -> Command {
+    let mut handeye = Command::new(crate::handeye_binary());
+    handeye
+        .arg(command)
+        .env("HOME", home)
+        .env("XDG_CONFIG_HOME", home.join("config"))
+        .env("XDG_DATA_HOME", home.join("data"))
+        .env("HANDEYE_WIDGETS", home.join("widgets"))
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("DISPLAY");
+    handeye
 }
 
 impl Desktop {
@@ -63,21 +92,54 @@ impl Desktop {
         let display = format!(":{}", number.trim());
         let widgets = home.path().join("widgets");
         let watch = Watch::folder(home.path());
-        let window = Command::new(crate::handeye_binary())
-            .arg("gui")
+        let window = handeye("gui", home.path())
             .args(arguments)
             .env("DISPLAY", &display)
-            .env("HOME", home.path())
-            .env("XDG_CONFIG_HOME", home.path().join("config"))
-            .env("XDG_DATA_HOME", home.path().join("data"))
-            .env_remove("WAYLAND_DISPLAY")
             .env("LIBGL_ALWAYS_SOFTWARE", "1")
-            .env("HANDEYE_WIDGETS", &widgets)
             .envs(environment.iter().copied())
             .spawn()
             .expect("the workbench starts");
         std::fs::create_dir_all(shots).expect("a folder");
-        Self { screen, window, display, widgets, shots: shots.to_path_buf(), clicks: 0, watch, home }
+        let surface = Surface::Screen { server: screen, display };
+        Self { surface, window, widgets, shots: shots.to_path_buf(), clicks: 0, watch, home }
+    }
+
+    /// Starts `handeye serve` and a browser with its page, of a size in points.
+    ///
+    /// # Panics
+    /// When one of them does not start.
+    pub fn in_browser(size: (u32, u32), touch: bool, shots: &Path, arguments: &[&str]) -> Self {
+        let home = tempfile::tempdir().expect("a folder");
+        let watch = Watch::folder(home.path());
+        let mut window = handeye("serve", home.path())
+            .args(["--quiet", "--port", "0"])
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the workbench starts");
+        let mut line = String::new();
+        let stdout = window.stdout.take().expect("its output");
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut line).expect("a line");
+        let url = line.trim().strip_prefix("the workbench is at ").expect("an address").to_owned();
+        let browser = Browser::start();
+        let tab = browser.open(&url, size, touch);
+        // What is pressed before there is a picture is pressed beside it.
+        browser.until(&tab, &format!("show.picture?.size[0] === {}", size.0));
+        std::fs::create_dir_all(shots).expect("a folder");
+        let widgets = home.path().join("widgets");
+        let surface = Surface::Page { browser, tab, touch };
+        Self { surface, window, widgets, shots: shots.to_path_buf(), clicks: 0, watch, home }
+    }
+
+    /// The browser and the page in it.
+    ///
+    /// # Panics
+    /// When it is a screen.
+    pub fn page(&self) -> (&Browser, &Tab) {
+        match &self.surface {
+            Surface::Page { browser, tab, .. } => (browser, tab),
+            Surface::Screen { .. } => panic!("there is no page"),
+        }
     }
 
     /// Clicks of the mouse and presses of keys so far.
@@ -163,8 +225,14 @@ impl Desktop {
             }
             at = next;
         }
-        let (x, y) = at;
-        self.mouse(&["mousemove", &format!("{x:.0}"), &format!("{y:.0}"), "click", "1"]);
+        match &self.surface {
+            Surface::Screen { display, .. } => {
+                let (x, y) = at;
+                xdotool(display, &["mousemove", &format!("{x:.0}"), &format!("{y:.0}"), "click", "1"]);
+            }
+            Surface::Page { browser, tab, touch: true } => browser.tap(tab, at),
+            Surface::Page { browser, tab, touch: false } => browser.click(tab, at),
+        }
         self.clicks += 1;
     }
 
@@ -177,7 +245,10 @@ impl Desktop {
     }
 
     /// Where the middle of a button is that can be pressed; waits for it.
-    fn place_of(&mut self, label: &str) -> (f64, f64) {
+    ///
+    /// # Panics
+    /// When it does not come.
+    pub fn place_of(&mut self, label: &str) -> (f64, f64) {
         let pressable = |widget: &Widget| {
             widget.enabled && widget.role != "Label" && (widget.label == label || widget.label.starts_with(label))
         };
@@ -192,13 +263,11 @@ impl Desktop {
 
     /// Presses a key by its name, for example `space` or `ctrl+z`.
     pub fn press(&mut self, key: &str) {
-        self.mouse(&["key", key]);
+        match &self.surface {
+            Surface::Screen { display, .. } => xdotool(display, &["key", key]),
+            Surface::Page { browser, tab, .. } => browser.press(tab, key),
+        }
         self.clicks += 1;
-    }
-
-    fn mouse(&self, arguments: &[&str]) {
-        let done = Command::new("xdotool").args(arguments).env("DISPLAY", &self.display).status();
-        assert!(done.is_ok_and(|status| status.success()), "xdotool {arguments:?}");
     }
 
     /// Sends the workbench a signal by its name, `TERM`, and waits for its end: the status that it exits with, and how long
@@ -212,7 +281,11 @@ impl Desktop {
 
     /// An image of the screen, `NAME.png`; the pointer is moved out of the way first, and what it opened closes.
     pub fn photograph(&self, name: &str) {
-        self.mouse(&["mousemove", "700", "12"]);
+        match &self.surface {
+            Surface::Screen { display, .. } => xdotool(display, &["mousemove", "700", "12"]),
+            Surface::Page { browser, tab, touch: false } => browser.point(tab, (700.0, 12.0)),
+            Surface::Page { .. } => {}
+        }
         // The window is drawn again without what the pointer was over, then without what hung there. The list of widgets is
         // written before its frame is on the screen, so that one more has to begin.
         self.frame_drawn();
@@ -222,14 +295,30 @@ impl Desktop {
             self.watch.changes_within(LOOK);
         }
         let file = self.shots.join(format!("{name}.png"));
-        let taken = Command::new("import").args(["-window", "root"]).arg(&file).env("DISPLAY", &self.display).status();
-        assert!(taken.is_ok_and(|status| status.success()), "{}", file.display());
+        match &self.surface {
+            Surface::Screen { display, .. } => {
+                let taken = Command::new("import").args(["-window", "root"]).arg(&file).env("DISPLAY", display).status();
+                assert!(taken.is_ok_and(|status| status.success()), "{}", file.display());
+            }
+            Surface::Page { browser, tab, .. } => {
+                std::fs::write(&file, browser.photograph(tab)).expect("written");
+            }
+        }
     }
+}
+
+fn xdotool(display: &str, arguments: &[&str]) {
+    let done = Command::new("xdotool").args(arguments).env("DISPLAY", display).status();
+    assert!(done.is_ok_and(|status| status.success()), "xdotool {arguments:?}");
 }
 
 impl Drop for Desktop {
     fn drop(&mut self) {
-        for child in [&mut self.window, &mut self.screen] {
+        let screen = match &mut self.surface {
+            Surface::Screen { server, .. } => Some(server),
+            Surface::Page { .. } => None,
+        };
+        for child in std::iter::once(&mut self.window).chain(screen) {
             let _ended = child.kill().and_then(|()| child.wait()).is_ok();
         }
     }

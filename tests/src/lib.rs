@@ -1,5 +1,6 @@
 //! Support for the end-to-end tests: where things are, and how to run them as a user does.
 
+pub mod browser;
 pub mod desktop;
 pub mod hostile;
 pub mod process;

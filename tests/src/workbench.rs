@@ -53,6 +53,7 @@ impl Workbench {
             sessions: sessions.to_path_buf(),
             open,
             rerun,
+            in_browser: None,
         };
         match App::start(start, connect, clock, waker) {
             Ok(app) => Self { app, woken },

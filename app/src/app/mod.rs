@@ -4,6 +4,7 @@
 //! its own here; all of them change the model of the one [`App`] and hand work to threads, and none waits.
 
 mod leave;
+mod reach;
 
 use std::io;
 use std::path::PathBuf;
@@ -14,10 +15,12 @@ use handeye_sim_link::client::cell::CellPaths;
 
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, Drivers, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
-use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice};
+use crate::rerun_log::{Pace, Recorder, RecorderOptions, Relay, RerunChoice, WebViewer};
 use crate::settings::SettingsWrite;
 use crate::text;
 use crate::worker::{Clock, Connector, FileTask, SessionThreads, Waker, Workers};
+
+pub use reach::Reach;
 
 /// Makes what connects to a cell.
 pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Connector> + Send + Sync>;
@@ -42,6 +45,17 @@ pub struct Start {
     pub open: Option<PathBuf>,
     /// Where the recording for Rerun goes.
     pub rerun: RerunChoice,
+    /// What can be reached where the window is shown in browsers; nothing is then opened on the screen of this machine.
+    pub in_browser: Option<InBrowser>,
+}
+
+/// How a window is shown in browsers.
+#[derive(Clone)]
+pub struct InBrowser {
+    /// What can be reached from there.
+    pub reach: Reach,
+    /// Where the recording is found for the viewer that is shown beside it.
+    pub recording: Arc<Relay>,
 }
 
 /// Model and workers.
@@ -60,6 +74,8 @@ pub struct App {
     pub(crate) recorded: crate::rerun_log::recorded::Recorded,
     /// Until when everything has to be over, once the application ends.
     pub(crate) leave_by: Option<Instant>,
+    /// What commands may reach, if not everything.
+    reach: Option<Reach>,
 }
 
 /// The last numbers that were given to requests.
@@ -84,18 +100,20 @@ impl App {
     /// # Errors
     /// When the system has no more threads, or the file of the recording cannot be made.
     pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
-        let Start { source, view, addresses, drivers, objects, keep_out, sessions, open, rerun } = start;
+        let Start { source, view, addresses, drivers, objects, keep_out, sessions, open, rerun, in_browser } = start;
         let recorder = Recorder::start(RecorderOptions {
             choice: rerun,
             pace: Pace::Live,
             beside_session: true,
-            open_browser: true,
+            web: in_browser.as_ref().map_or(WebViewer::Here, |shown| WebViewer::Relayed(Arc::clone(&shown.recording))),
             waker: Arc::clone(&waker),
         })?;
         let desk = SessionThreads::start(sessions, &clock, &waker)?;
         let workers = Workers::start(&source, &view, &connect(&source, &objects), desk.captures(), &clock, &waker)?;
+        let sessions = desk.sessions().to_path_buf();
+        let shown = in_browser.is_some();
         let model =
-            Model { addresses, drivers, objects, sessions: desk.sessions().to_path_buf(), ..Model::new(source, view) };
+            Model { addresses, drivers, objects, sessions, in_browser: shown, ..Model::new(source, view) };
         let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
         let model = Model { keep_out, ..model };
         let numbers = Numbers::default();
@@ -112,6 +130,7 @@ impl App {
             recorder,
             recorded,
             leave_by: None,
+            reach: in_browser.map(|shown| shown.reach),
         };
         if let Some(fault) = fault {
             app.say(Severity::Error, fault);
@@ -159,6 +178,10 @@ impl App {
 
     /// Does what the user wants, or has a worker do it. Never waits for a worker.
     pub fn apply(&mut self, command: Command) {
+        if let Some(why) = self.reach.as_ref().and_then(|reach| reach.refusal(&command)) {
+            self.say(Severity::Warning, why);
+            return;
+        }
         match command {
             Command::Stop => self.stop(),
             Command::StartSimulation => self.start_simulation(),

@@ -46,6 +46,7 @@ fn bench_with(connect: Connect) -> Bench {
         sessions: sessions.path().to_path_buf(),
         open: None,
         rerun: RerunChoice::Off,
+        in_browser: None,
     };
     Bench { app: App::start(start, connect, clock, waker).expect("threads"), _sessions: sessions }
 }

@@ -32,6 +32,7 @@ use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 use crate::gui::GuiArgs;
+use crate::serve::ServeArgs;
 
 pub use failure::Failure;
 pub use object_arg::ObjectArgs;
@@ -53,6 +54,9 @@ enum Command {
     /// Open the workbench (the default).
     #[command(after_help = "Example:\n  handeye gui --connect tcp://192.168.0.7:23000")]
     Gui(GuiArgs),
+    /// Show the workbench in a browser, here or on another machine, until Ctrl-C (docs/browser.md).
+    #[command(after_help = "Examples:\n  handeye serve\n  handeye serve --bind 0.0.0.0 --port 8600")]
+    Serve(ServeArgs),
     /// Serve the built-in cell over the ZeroMQ remote API until Ctrl-C.
     #[command(after_help = "Example:\n  handeye cell --port 0 --scene assets/scenes/realistic.toml --seed 7")]
     Cell(cell::CellArgs),
@@ -101,6 +105,13 @@ pub fn main() -> ExitCode {
     start_logging(cli.quiet);
     let result = match cli.command.unwrap_or_else(|| Command::Gui(GuiArgs::default())) {
         Command::Gui(args) => args.rerun.check().and_then(|()| crate::gui::run(args).map_err(Failure::failed)),
+        Command::Serve(args) => {
+            // Nobody may listen to it any more: it is served all the same.
+            let announce = |url: &str| {
+                let _told = out::line(format_args!("the workbench is at {url}")).is_ok();
+            };
+            args.gui.rerun.check().and_then(|()| crate::serve::run(args, announce).map_err(Failure::failed))
+        }
         Command::Cell(args) => cell::run(&args),
         Command::Auto(args) => auto::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),

@@ -9,7 +9,7 @@ use handeye_core::progress::CancelToken;
 
 use super::{Failure, out};
 use crate::model::ViewerState;
-use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice};
+use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice, WebViewer};
 use crate::text::Language;
 
 /// How long a command waits at its end for what is still to be written. A pipe to a viewer elsewhere may be slow.
@@ -98,7 +98,7 @@ impl RerunArg {
             choice: self.choice(otherwise),
             pace,
             beside_session,
-            open_browser: false,
+            web: WebViewer::AtAddress,
             waker: std::sync::Arc::new(|| {}),
         })
         .map_err(Failure::failed)?;

@@ -114,7 +114,12 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     };
     parts::hint_ui(ui, &said.say(language));
     ui.horizontal(|ui| {
-        if ui.button(tr!(language, "Open the folder")).clicked() {
+        let words = if model.in_browser {
+            tr!(language, "Download the folder")
+        } else {
+            tr!(language, "Open the folder")
+        };
+        if ui.button(words).clicked() {
             outbox.send(Command::OpenFolder(folder.clone()));
         }
         parts::copy_ui(ui, language, tr!(language, "the path of the folder"), || folder.display().to_string());

@@ -1,5 +1,6 @@
 //! The window: collects what happened, draws the panes, applies what the user wants.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -27,7 +28,7 @@ use crate::settings::SettingsFile;
 const CLOCK_PERIOD: Duration = Duration::from_millis(250);
 
 /// What is remembered from one start to the next besides settings and layout.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Remembered {
     overlays: Overlays,
@@ -40,6 +41,7 @@ pub struct Remembered {
 
 impl Remembered {
     /// Key in eframe's storage.
+    #[cfg(feature = "window")]
     const STORAGE_KEY: &str = "remembered";
     /// So many sessions are remembered.
     const SESSIONS: usize = 12;
@@ -48,11 +50,6 @@ impl Remembered {
         let ViewSettings { overlays, jog, capture, goal, .. } = model.view;
         let recent = model.recent.iter().take(Self::SESSIONS).cloned().collect();
         Self { overlays, jog, capture, goal, recent }
-    }
-
-    /// As it was at the end of the last time; the defaults when that cannot be read.
-    pub fn stored(storage: Option<&dyn eframe::Storage>) -> Self {
-        storage.and_then(|storage| eframe::get_value(storage, Self::STORAGE_KEY)).unwrap_or_default()
     }
 
     /// Settings with what is remembered here.
@@ -102,7 +99,7 @@ impl Window {
     }
 
     /// Closes the window if it is time; the arm need not wait for the last frames.
-    fn heed_signals(&mut self, ctx: &egui::Context) {
+    pub(crate) fn heed_signals(&mut self, ctx: &egui::Context) {
         if !self.leaving && self.signals.as_ref().is_some_and(|signals| signals.is_asked()) {
             self.leaving = true;
             self.app.begin_to_leave();
@@ -146,7 +143,7 @@ impl Window {
         if outbox.is_empty() {
             ui.request_repaint_after(CLOCK_PERIOD);
         } else {
-            self.apply_all();
+            self.apply_all(ui.ctx());
             ui.request_repaint();
         }
     }
@@ -186,11 +183,19 @@ impl Window {
         }
     }
 
-    fn apply_all(&mut self) {
+    fn apply_all(&mut self, ctx: &egui::Context) {
         let commands: Vec<_> = self.outbox.drain().collect();
         for (command, place) in commands {
             tracing::trace!(?command, %place, "command");
-            self.apply(command);
+            match command {
+                // A browser has the file manager of another machine.
+                Command::OpenFolder(folder) if self.app.model().in_browser => ctx.open_url(download(&folder)),
+                Command::OpenRerun if self.app.model().in_browser => {
+                    ctx.open_url(egui::OpenUrl::new_tab(crate::rerun_log::RELAY_PATH));
+                    self.apply(Command::OpenRerun);
+                }
+                command => self.apply(command),
+            }
         }
         let model = self.app.model();
         if let Some(settings) = self.settings.keep(model.view, &model.addresses, &model.drivers, &model.objects) {
@@ -219,6 +224,11 @@ impl Window {
         }
     }
 
+    /// What the next start begins with.
+    pub fn remembered(&self) -> (Remembered, Layout) {
+        (Remembered::of(self.app.model()), self.layout.clone())
+    }
+
     /// The application.
     pub fn app_mut(&mut self) -> &mut App {
         &mut self.app
@@ -243,6 +253,13 @@ impl Window {
     }
 }
 
+/// Where a browser finds a folder as an archive.
+fn download(folder: &Path) -> egui::OpenUrl {
+    let folder = percent_encoding::percent_encode(folder.as_os_str().as_encoded_bytes(), percent_encoding::NON_ALPHANUMERIC);
+    egui::OpenUrl::new_tab(format!("/download?folder={folder}"))
+}
+
+#[cfg(feature = "window")]
 impl eframe::App for Window {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.heed_signals(ctx);
@@ -254,9 +271,21 @@ impl eframe::App for Window {
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
-        eframe::set_value(storage, layout::STORAGE_KEY, &self.layout);
-        eframe::set_value(storage, Remembered::STORAGE_KEY, &Remembered::of(self.app.model()));
+        let (remembered, layout) = self.remembered();
+        eframe::set_value(storage, layout::STORAGE_KEY, &layout);
+        eframe::set_value(storage, Remembered::STORAGE_KEY, &remembered);
     }
+}
+
+/// As it was at the end of the last time; the first layout and the defaults where that cannot be read.
+#[cfg(feature = "window")]
+pub fn stored(storage: Option<&dyn eframe::Storage>) -> (Remembered, Layout) {
+    let Some(storage) = storage else { return Default::default() };
+    let layout = eframe::get_value::<Layout>(storage, layout::STORAGE_KEY);
+    (
+        eframe::get_value(storage, Remembered::STORAGE_KEY).unwrap_or_default(),
+        layout.map_or_else(Layout::default, Layout::brought_up_to_date),
+    )
 }
 
 #[cfg(test)]

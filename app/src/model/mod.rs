@@ -269,6 +269,8 @@ impl Default for Goal {
 #[expect(clippy::struct_excessive_bools, reason = "each is a state of its own")]
 #[derive(Debug, Clone)]
 pub struct Model {
+    /// Whether the window is shown in browsers, on other machines than the one whose files are read and written.
+    pub in_browser: bool,
     /// Which cell.
     pub source: CellSource,
     /// The present time.
@@ -388,6 +390,7 @@ impl Model {
     pub fn new(source: CellSource, view: ViewSettings) -> Self {
         let first = LinkState::first(&source);
         Self {
+            in_browser: false,
             source,
             now_s: 0.0,
             control: first.clone(),

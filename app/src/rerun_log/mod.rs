@@ -37,8 +37,9 @@ mod viewer;
 pub use choice::{ChoiceError, RerunChoice};
 pub use entry::Entry;
 pub use pace::Pace;
-pub use recorder::{Recorder, RecorderOptions};
+pub use recorder::{Recorder, RecorderOptions, WebViewer};
 pub use scene::{RecordError, SceneWriter};
+pub use serving::relay::{PATH as RELAY_PATH, Relay};
 pub use viewer::ViewerWish;
 
 /// Under which viewers keep layouts and recordings of this program.

@@ -7,13 +7,23 @@ use std::time::Duration;
 use super::pace::Pace;
 use super::reports::Reports;
 use super::shared::Shared;
-use super::{Entry, RerunChoice, ViewerWish, viewer};
+use super::{Entry, Relay, RerunChoice, ViewerWish, viewer};
 use crate::command::Event;
 use crate::model::RerunState;
 use crate::worker::Waker;
 
 /// How long the end of the program waits for what is still to be written.
 const DEADLINE: Duration = Duration::from_secs(2);
+
+/// Where the web viewer is shown.
+pub enum WebViewer {
+    /// In the browser of this machine, which is opened.
+    Here,
+    /// On a port of its own; who wants to look opens a browser.
+    AtAddress,
+    /// By somebody who serves it; no viewer is opened on this machine.
+    Relayed(Arc<Relay>),
+}
 
 /// How to record.
 pub struct RecorderOptions {
@@ -23,8 +33,8 @@ pub struct RecorderOptions {
     pub pace: Pace,
     /// Whether a file is written beside the session when nothing else is said.
     pub beside_session: bool,
-    /// Whether a browser is opened with the web viewer.
-    pub open_browser: bool,
+    /// Where the web viewer is shown.
+    pub web: WebViewer,
     /// Called when there is something to report.
     pub waker: Waker,
 }
@@ -46,12 +56,12 @@ impl Recorder {
     /// # Errors
     /// When the file that was named cannot be made, or the system has no more threads.
     pub fn start(options: RecorderOptions) -> io::Result<Self> {
-        let RecorderOptions { choice, pace, beside_session, open_browser, waker } = options;
+        let RecorderOptions { choice, pace, beside_session, web, waker } = options;
         if choice == RerunChoice::Off {
             return Ok(Self::off());
         }
         let beside_session = beside_session && !matches!(choice, RerunChoice::Save(_));
-        let shared = Arc::new(Shared::new(Reports::new(waker), pace, open_browser, beside_session));
+        let shared = Arc::new(Shared::new(Reports::new(waker), pace, web, beside_session));
         let recorder = Self { shared: Some(Arc::clone(&shared)) };
         match choice {
             RerunChoice::Save(path) => shared.save_to(path)?,

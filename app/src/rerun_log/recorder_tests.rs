@@ -19,7 +19,7 @@ fn start(choice: RerunChoice) -> Recorder {
         choice,
         pace: Pace::Live,
         beside_session: true,
-        open_browser: false,
+        web: WebViewer::AtAddress,
         waker: Arc::new(|| {}),
     })
     .expect("a recorder")
@@ -109,7 +109,7 @@ fn a_named_file_that_cannot_be_made_is_an_error_at_once() {
         choice,
         pace: Pace::Everything,
         beside_session: false,
-        open_browser: false,
+        web: WebViewer::AtAddress,
         waker: Arc::new(|| {}),
     };
     assert!(Recorder::start(options).is_err());

@@ -10,6 +10,7 @@ use super::lasting::{Item, Lasting, Recording, Trail, is_live};
 use super::pace::Pace;
 use super::pump::{Pump, Route};
 use super::queue::Queue;
+use super::recorder::WebViewer;
 use super::reports::Reports;
 use super::serving::{Page, Servers};
 use super::stream::{Target, file_sink};
@@ -24,8 +25,8 @@ pub(super) struct Shared {
     /// What is told to the window.
     pub reports: Arc<Reports>,
     viewers: Mutex<Viewers>,
-    /// Whether a browser may be opened.
-    pub open_browser: bool,
+    /// Where the web viewer is shown.
+    pub web: WebViewer,
     pace: Pace,
     beside_session: bool,
     ended: AtomicBool,
@@ -58,7 +59,7 @@ pub(super) struct Viewers {
 
 impl Shared {
     /// Nothing was noted yet, and nobody writes.
-    pub fn new(reports: Reports, pace: Pace, open_browser: bool, beside_session: bool) -> Self {
+    pub fn new(reports: Reports, pace: Pace, web: WebViewer, beside_session: bool) -> Self {
         let state = State {
             recording: Recording { id: new_id(0), name: "Handeye".to_owned(), folder: None },
             recordings: 0,
@@ -72,7 +73,7 @@ impl Shared {
             state: Mutex::new(state),
             reports: Arc::new(reports),
             viewers: Mutex::default(),
-            open_browser,
+            web,
             pace,
             beside_session,
             ended: AtomicBool::new(false),

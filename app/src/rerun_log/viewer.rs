@@ -7,10 +7,11 @@ use std::time::Duration;
 
 use rerun::sink::{GrpcSink, GrpcSinkConnectionState};
 
+use super::recorder::WebViewer;
 use super::serving::Servers;
 use super::shared::{Shared, Viewers};
 use super::stream::{SharedSink, Target};
-use super::{browser, native};
+use super::{RELAY_PATH, browser, native};
 use crate::model::{Severity, ViewerState};
 use crate::text;
 use crate::text::Text;
@@ -49,6 +50,7 @@ pub(super) fn open(shared: &Arc<Shared>, wish: ViewerWish) {
         return;
     }
     let work = Arc::clone(shared);
+    let wish = if matches!(shared.web, WebViewer::Relayed(_)) { ViewerWish::Web } else { wish };
     let started = Builder::new().name("rerun-opener".to_owned()).spawn(move || {
         let opened = match wish {
             ViewerWish::Best => work.native().or_else(|why| {
@@ -145,9 +147,16 @@ impl Shared {
 
     fn web(&self) -> Result<(), Text> {
         self.serve()?;
+        if let WebViewer::Relayed(relay) = &self.web {
+            let viewers = self.viewers();
+            let served = viewers.servers.as_ref().map_or(Ok(()), |servers| servers.relay(relay));
+            served.map_err(|error| text!("No viewer was opened: {error}", error = error))?;
+            self.reports.set_viewer(ViewerState::Web { url: RELAY_PATH.to_owned() });
+            return Ok(());
+        }
         let url = self.page()?;
         self.reports.set_viewer(ViewerState::Web { url: url.clone() });
-        if self.open_browser {
+        if matches!(self.web, WebViewer::Here) {
             let opened = browser::open(&url);
             let text = if opened {
                 text!("The recording is shown in the browser: {url}", url = url)

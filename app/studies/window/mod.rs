@@ -47,6 +47,7 @@ impl Drawn {
             open: Some(sessions.join("session")),
             sessions: sessions.clone(),
             rerun,
+            in_browser: None,
         };
         let app = App::start(start, connect, clock, waker)?;
         let ctx = egui::Context::default();

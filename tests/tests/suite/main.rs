@@ -12,6 +12,7 @@ mod reference_sets;
 mod renderer_truth;
 mod rerun_doors;
 mod restart;
+mod served_doors;
 mod sessions;
 mod shared_intrinsics;
 mod solved;
@@ -35,6 +36,7 @@ mod slow {
     mod rerun_recording;
     mod rerun_viewers;
     mod robots;
+    mod served;
     mod tracking;
     mod verifying;
     mod web_page;

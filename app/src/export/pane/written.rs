@@ -43,6 +43,13 @@ pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if model.export.folder.is_some() && ui.button(tr!(language, "In the session")).clicked() {
             outbox.send(Command::SetExportFolder(None));
         }
+        if model.in_browser
+            && model.export.is_present
+            && let Some(folder) = model.export.folder.clone().or_else(|| Some(exports_of(model.session.folder.as_ref()?)))
+            && ui.button(tr!(language, "Download as one archive")).clicked()
+        {
+            outbox.send(Command::OpenFolder(folder));
+        }
         if model.export.writing {
             ui.add(Spinner::new().size(16.0));
         }

@@ -145,8 +145,8 @@ impl Behavior<Slot> for Panes<'_> {
         ui.add_space(5.0);
     }
 
-    fn tab_bar_height(&self, _style: &Style) -> f32 {
-        TABS
+    fn tab_bar_height(&self, style: &Style) -> f32 {
+        TABS.max(style.spacing.interact_size.y)
     }
 
     fn gap_width(&self, _style: &Style) -> f32 {

@@ -14,6 +14,11 @@ pub const CARD_RADIUS: u8 = 8;
 /// Distance between cards, and from cards to the edge.
 pub const GAP: f32 = 8.0;
 
+/// Height of what is pressed with a pointer \[points\].
+const POINTER: f32 = 26.0;
+/// Height of what is pressed with a finger \[points\].
+const FINGER: f32 = 40.0;
+
 /// Colours with a meaning.
 #[derive(Debug, Clone, Copy)]
 pub struct Palette {
@@ -180,6 +185,15 @@ pub fn install(ctx: &egui::Context) {
     ctx.style_mut_of(egui::Theme::Light, |style| shape(style, Visuals::light(), &LIGHT));
 }
 
+/// Makes what is pressed large enough for fingers, or as large as a pointer needs it.
+pub fn for_fingers(ctx: &egui::Context, fingers: bool) {
+    let (height, padding) = if fingers { (FINGER, 12.0) } else { (POINTER, 4.0) };
+    ctx.all_styles_mut(|style| {
+        style.spacing.interact_size.y = height;
+        style.spacing.button_padding.y = padding;
+    });
+}
+
 /// Switches to a theme.
 pub fn choose(ctx: &egui::Context, theme: ThemeChoice) {
     ctx.set_theme(match theme {
@@ -199,7 +213,7 @@ fn shape(style: &mut egui::Style, visuals: Visuals, palette: &Palette) {
     .into();
     style.spacing.item_spacing = Vec2::new(8.0, 4.0);
     style.spacing.button_padding = Vec2::new(10.0, 4.0);
-    style.spacing.interact_size.y = 26.0;
+    style.spacing.interact_size.y = POINTER;
     style.spacing.window_margin = Margin::same(16);
     style.spacing.menu_margin = Margin::same(6);
     style.spacing.combo_width = 140.0;

@@ -68,6 +68,7 @@ impl Silent {
             sessions: folder.path().to_path_buf(),
             rerun: RerunChoice::Off,
             open: None,
+            in_browser: None,
         };
         let mut app = App::start(start, connect, clock, waker).expect("threads");
         // The fake's line for motions refuses nobody; it has nothing to report once it is there.

@@ -27,8 +27,8 @@ use crate::live::textures::LiveTextures;
 use crate::model::{ImagePoint, Model};
 use crate::tr;
 
-/// Height of the line over an image.
-const HEADER: f32 = 34.0;
+/// Room above and below the controls of the line at the top \[points\].
+const HEADER_MARGIN: f32 = 4.0;
 /// Height of what is under an image, the same for both so that they stay of one size.
 const FOOTER: f32 = 46.0;
 /// Distance of text to the edge of a pane.
@@ -126,7 +126,8 @@ fn tile_ui<R>(
     let palette = Palette::of(ui);
     let rect = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(rect);
-    let header = Rect::from_min_max(rect.min, Pos2::new(rect.max.x, rect.min.y + HEADER));
+    let height = ui.spacing().interact_size.y + 2.0 * HEADER_MARGIN;
+    let header = Rect::from_min_max(rect.min, Pos2::new(rect.max.x, rect.min.y + height));
     let footer = Rect::from_min_max(Pos2::new(rect.min.x, rect.max.y - FOOTER), rect.max);
     let row = |rect: Rect| {
         UiBuilder::new().max_rect(rect.shrink2(Vec2::new(INSET, 0.0))).layout(Layout::left_to_right(Align::Center))

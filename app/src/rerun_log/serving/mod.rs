@@ -7,19 +7,19 @@
 //! Rerun's own server listens by itself and answers whoever asks. What it serves is taken out of it here and put behind a
 //! [`Door`], in this process: there is no port behind the door that somebody else could find.
 
-mod door;
 mod engine;
-mod names;
 mod page;
 mod proxy;
+pub mod relay;
 
 use engine::Engine;
 use std::io;
 use std::sync::Arc;
 
 use super::stream::{SharedSink, Target};
-use door::Door;
-use proxy::ProxySink;
+use crate::http::door::Door;
+use proxy::{ProxySink, Reader};
+use relay::{Relay, Relayed};
 
 pub use page::Page;
 
@@ -40,6 +40,7 @@ pub struct Servers {
 struct Served {
     sink: Arc<ProxySink>,
     door: Door,
+    reader: Reader,
 }
 
 impl Servers {
@@ -50,8 +51,8 @@ impl Servers {
     pub fn start() -> io::Result<Self> {
         let engine = Arc::new(Engine::start()?);
         let served = |limit_bytes| -> io::Result<Served> {
-            let (sink, door) = proxy::serve(&engine, limit_bytes)?;
-            Ok(Served { sink: Arc::new(sink), door })
+            let (sink, door, reader) = proxy::serve(&engine, limit_bytes)?;
+            Ok(Served { sink: Arc::new(sink), door, reader })
         };
         Ok(Self { lasting: served(LASTING_BYTES)?, live: served(LIVE_BYTES)?, engine })
     }
@@ -65,6 +66,15 @@ impl Servers {
     /// What viewers read.
     pub fn urls(&self) -> [String; 2] {
         [&self.lasting, &self.live].map(|served| format!("rerun+http://{}/proxy", served.door.address()))
+    }
+
+    /// Has page and recording served by somebody else.
+    ///
+    /// # Errors
+    /// When there is no page.
+    pub fn relay(&self, relay: &Relay) -> io::Result<()> {
+        relay.serve(Relayed::new([&self.lasting, &self.live].map(|served| served.reader.clone()))?);
+        Ok(())
     }
 
     /// Serves the page with the web viewer.

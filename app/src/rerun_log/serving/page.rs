@@ -17,7 +17,7 @@ use re_web_viewer_server::WebViewerData;
 use tonic::body::Body;
 
 use super::Engine;
-use super::door::{Door, Limits, plain};
+use crate::http::door::{Door, Limits, plain};
 
 /// What the viewer's page reads its progress from.
 const FINAL_LENGTH: HeaderName = HeaderName::from_static("rerun-final-length");
@@ -30,7 +30,7 @@ pub struct Page {
 }
 
 /// What is served.
-struct Files {
+pub(super) struct Files {
     viewer: Arc<WebViewerData>,
     index: Bytes,
     policy: HeaderValue,
@@ -51,10 +51,7 @@ impl Page {
     /// # Errors
     /// When there is no port.
     pub(super) fn start(engine: &Arc<Engine>, urls: &[String]) -> io::Result<Self> {
-        let viewer = WebViewerData::load(None).map_err(io::Error::other)?;
-        let index = without_foreign_links(&String::from_utf8_lossy(viewer.index_html())).into();
-        let policy = HeaderValue::from_str(&policy(urls)).map_err(io::Error::other)?;
-        let files = Arc::new(Files { viewer: Arc::new(viewer), index, policy });
+        let files = Arc::new(Files::load(urls)?);
         let door = Door::open(engine.handle()?, Limits::USUAL, move |request| {
             let answer = files.answer(request.method(), request.uri().path());
             async move { answer }
@@ -74,7 +71,15 @@ impl Page {
 }
 
 impl Files {
-    fn answer(&self, method: &Method, path: &str) -> Response<Body> {
+    /// The viewer, which may read recordings from these addresses and from where it comes from itself.
+    pub(super) fn load(urls: &[String]) -> io::Result<Self> {
+        let viewer = WebViewerData::load(None).map_err(io::Error::other)?;
+        let index = without_foreign_links(&String::from_utf8_lossy(viewer.index_html())).into();
+        let policy = HeaderValue::from_str(&policy(urls)).map_err(io::Error::other)?;
+        Ok(Self { viewer: Arc::new(viewer), index, policy })
+    }
+
+    pub(super) fn answer(&self, method: &Method, path: &str) -> Response<Body> {
         if !matches!(*method, Method::GET | Method::HEAD) {
             return plain(StatusCode::METHOD_NOT_ALLOWED, "only GET\n");
         }
@@ -135,7 +140,7 @@ fn without_foreign_links(html: &str) -> String {
 }
 
 /// As a value in the query of an address.
-fn encoded(value: &str) -> String {
+pub(super) fn encoded(value: &str) -> String {
     let encode = |byte: u8| -> Cow<'static, str> {
         match byte {
             b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' => char::from(byte).to_string().into(),

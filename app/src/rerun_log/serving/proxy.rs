@@ -28,10 +28,13 @@ use tonic_web::GrpcWebLayer;
 use tower::Layer as _;
 
 use super::Engine;
-use super::door::{Door, Limits, plain};
+use crate::http::door::{Door, Limits, plain};
 
 /// What a viewer asks for; what else the service can do is to write into the recording.
-const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
+pub(super) const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
+
+/// Reads from a server without a connection.
+pub(super) type Reader = MessageProxyServiceClient<MessageProxyServiceServer<MessageProxy>>;
 
 /// Messages on their way to the server; an image is one.
 const ON_THE_WAY: usize = 8;
@@ -53,7 +56,7 @@ enum OnTheWay {
 ///
 /// # Errors
 /// When there is no port.
-pub(super) fn serve(engine: &Arc<Engine>, limit_bytes: u64) -> io::Result<(ProxySink, Door)> {
+pub(super) fn serve(engine: &Arc<Engine>, limit_bytes: u64) -> io::Result<(ProxySink, Door, Reader)> {
     let runtime = engine.handle()?;
     let options = ServerOptions {
         playback_behavior: PlaybackBehavior::OldestFirst,
@@ -66,7 +69,8 @@ pub(super) fn serve(engine: &Arc<Engine>, limit_bytes: u64) -> io::Result<(Proxy
         .max_encoding_message_size(MAX_ENCODING_MESSAGE_SIZE);
 
     let (to_server, messages) = mpsc::channel(ON_THE_WAY);
-    let mut client = MessageProxyServiceClient::new(service.clone());
+    let mut client = Reader::new(service.clone());
+    let reader = client.clone().max_decoding_message_size(MAX_DECODING_MESSAGE_SIZE);
     runtime.spawn(async move {
         let messages = ReceiverStream::new(messages).filter_map(|it| match it {
             OnTheWay::Message(message) => Some(*message),
@@ -92,7 +96,7 @@ pub(super) fn serve(engine: &Arc<Engine>, limit_bytes: u64) -> io::Result<(Proxy
             answer.await.unwrap_or_else(|never| match never {})
         }
     })?;
-    Ok((ProxySink { to_server, _engine: Arc::clone(engine) }, door))
+    Ok((ProxySink { to_server, _engine: Arc::clone(engine) }, door, reader))
 }
 
 impl LogSink for ProxySink {

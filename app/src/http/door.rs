@@ -1,8 +1,8 @@
 //! A port of this machine behind which something is served.
 //!
-//! Whoever runs a program on this machine can connect, and so can every page that its browser shows. The door lets
-//! requests in that use a name of this machine ([`names`]), holds a bounded number of connections, and gives up those on
-//! which nothing is asked or nothing is taken.
+//! Whoever runs a program on this machine can connect, and so can every page that its browser shows. A door for this
+//! machine lets requests in that use a name of it ([`names`]). Every door holds a bounded number of connections, and
+//! gives up those on which nothing is asked or nothing is taken.
 
 use std::convert::Infallible;
 use std::io;
@@ -80,7 +80,29 @@ impl Door {
         A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
         F: Future<Output = Response<Body>> + Send + 'static,
     {
-        let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+        let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        Self::at(here, runtime, limits, move |request| {
+            let answered = names::are_of_this_machine(&request).then(|| answer(request));
+            async move {
+                match answered {
+                    Some(answered) => answered.await,
+                    None => plain(StatusCode::FORBIDDEN, names::REFUSAL),
+                }
+            }
+        })
+    }
+
+    /// Listens at an address and gives everything that is asked to `answer`, which has to see to it who asks. A request
+    /// may become another protocol.
+    ///
+    /// # Errors
+    /// When the address is not one of this machine or the port is taken.
+    pub fn at<A, F>(address: SocketAddr, runtime: &Handle, limits: Limits, answer: A) -> io::Result<Self>
+    where
+        A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
+        F: Future<Output = Response<Body>> + Send + 'static,
+    {
+        let listener = std::net::TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let _inside = runtime.enter();
@@ -167,15 +189,11 @@ where
     let watched = Watched { client, activity: Arc::clone(&activity) };
     let service = service_fn(move |request: Request<Incoming>| {
         let busy = Busy::new(&activity);
-        let answered =
-            names::are_of_this_machine(&request).then(|| tokio::time::timeout(limits.answer, answer(request)));
+        let answered = tokio::time::timeout(limits.answer, answer(request));
         async move {
-            let response = match answered {
-                None => plain(StatusCode::FORBIDDEN, names::REFUSAL),
-                Some(answered) => match answered.await {
-                    Ok(response) => response,
-                    Err(_late) => plain(StatusCode::REQUEST_TIMEOUT, "The request took too long.\n"),
-                },
+            let response = match answered.await {
+                Ok(response) => response,
+                Err(_late) => plain(StatusCode::REQUEST_TIMEOUT, "The request took too long.\n"),
             };
             // A request is being answered until the last of the answer was made.
             Ok::<_, Infallible>(response.map(|body| {
@@ -194,7 +212,7 @@ where
         .keep_alive_timeout(limits.stalled.saturating_sub(PING).max(PING))
         .max_concurrent_streams(STREAMS);
     tokio::select! {
-        ended = http.serve_connection(TokioIo::new(watched), service) => {
+        ended = http.serve_connection_with_upgrades(TokioIo::new(watched), service) => {
             if let Err(error) = ended {
                 tracing::debug!(%error, "a connection of a viewer has ended");
             }

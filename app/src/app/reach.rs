@@ -1,0 +1,115 @@
+//! What can be reached from a browser: whoever sits there need not be who started the program.
+
+use std::path::{Component, Path, PathBuf};
+
+use crate::command::Command;
+use crate::model::{CellSource, Drivers};
+use crate::text;
+use crate::text::Text;
+
+/// Folders that are read and written for browsers, and programs that are started for them.
+#[derive(Debug, Clone, Default)]
+pub struct Reach {
+    folders: Vec<PathBuf>,
+    drivers: Vec<Drivers>,
+}
+
+impl Reach {
+    /// These folders with all that is in them.
+    pub fn new(folders: impl IntoIterator<Item = PathBuf>) -> Self {
+        Self { folders: folders.into_iter().map(|folder| real(&folder)).collect(), drivers: Vec::new() }
+    }
+
+    /// Drivers that may be started: those that somebody at this machine has started before.
+    #[must_use]
+    pub fn with_drivers(self, drivers: Vec<Drivers>) -> Self {
+        Self { drivers, ..self }
+    }
+
+    /// Whether a file or folder, which need not exist, is in one of the folders. Links are followed.
+    pub fn has(&self, path: &Path) -> bool {
+        let path = real(path);
+        !path.components().any(|part| part == Component::ParentDir)
+            && self.folders.iter().any(|folder| path.starts_with(folder))
+    }
+
+    /// Why a command is not carried out; `None` if it may be.
+    pub fn refusal(&self, command: &Command) -> Option<Text> {
+        match command {
+            Command::Open(path)
+            | Command::SaveAs(path)
+            | Command::ListFolder(path)
+            | Command::OpenFolder(path)
+            | Command::NewSession(Some(path))
+            | Command::SetExportFolder(Some(path))
+            | Command::ImportKeepOut(path)
+            | Command::ExportKeepOut(path)
+            | Command::ImportTaught(path)
+            | Command::ExportTaught(path)
+                if !self.has(path) =>
+            {
+                Some(text!(
+                    "From a browser {path} cannot be reached: start `handeye serve` with --allow and its folder",
+                    path = path.display()
+                ))
+            }
+            Command::Connect(CellSource::Drivers(drivers)) if !self.may_start(drivers) => Some(text!(
+                "From a browser no program is started that was not started here before: start `handeye serve` with \
+                 --driver, or give an address tcp://HOST:PORT"
+            )),
+            _ => None,
+        }
+    }
+
+    fn may_start(&self, drivers: &Drivers) -> bool {
+        let is_address = |driver: &Option<String>| driver.as_ref().is_none_or(|driver| driver.starts_with("tcp://"));
+        (is_address(&drivers.robot) && is_address(&drivers.camera)) || self.drivers.contains(drivers)
+    }
+}
+
+/// The path without links, as far as it exists; what does not exist is added as it stands.
+fn real(path: &Path) -> PathBuf {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    for there in path.ancestors() {
+        if let Ok(real) = there.canonicalize() {
+            let rest = path.strip_prefix(there).unwrap_or_else(|_| Path::new(""));
+            // To add nothing would add a separator, with which a file is none.
+            return if rest.as_os_str().is_empty() { real } else { real.join(rest) };
+        }
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_outside_is_not_reached_by_any_way() {
+        let base = tempfile::tempdir().expect("a folder");
+        let inside = base.path().join("sessions");
+        std::fs::create_dir_all(inside.join("one")).expect("made");
+        std::fs::create_dir(base.path().join("sessions of others")).expect("made");
+        std::os::unix::fs::symlink(base.path(), inside.join("out")).expect("linked");
+        let reach = Reach::new([inside.clone()]);
+        for path in ["", "one", "one/new/folder", "one/../one"] {
+            assert!(reach.has(&inside.join(path)), "{path}");
+        }
+        for path in ["..", "../sessions of others", "out", "out/x", "one/../../x", "new/../../x", "/etc/passwd"] {
+            assert!(!reach.has(&inside.join(path)), "{path}");
+        }
+        assert!(reach.refusal(&Command::Open(PathBuf::from("/etc"))).is_some());
+        assert!(reach.refusal(&Command::Open(inside)).is_none());
+        assert!(reach.refusal(&Command::Solve).is_none());
+    }
+
+    #[test]
+    fn programs_are_started_from_a_browser_only_if_they_were_started_before() {
+        let driver = |robot: &str| Drivers { robot: Some(robot.to_owned()), camera: None };
+        let connect = |robot: &str| Command::Connect(CellSource::Drivers(driver(robot)));
+        let reach = Reach::default().with_drivers(vec![driver("python3 mine.py")]);
+        assert!(reach.refusal(&connect("rm -r /")).is_some());
+        assert!(reach.refusal(&connect("python3 mine.py")).is_none());
+        assert!(reach.refusal(&connect("tcp://127.0.0.1:9")).is_none());
+    }
+}

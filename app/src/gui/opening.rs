@@ -1,0 +1,119 @@
+//! What a window is opened with, on the desktop and for a browser: command line, settings, and what the last one left.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use handeye_core::plan::Surroundings;
+use handeye_sim_link::client::cell::CellPaths;
+
+use super::shell::layout::Layout;
+use super::window::{Remembered, Window};
+use super::{GuiArgs, widget_list};
+use crate::app::{App, Connect, InBrowser, Start};
+use crate::command::Event;
+use crate::model::{CellSource, Drivers};
+use crate::rerun_log::RerunChoice;
+use crate::settings::{self, Settings, SettingsFile, Warning};
+use crate::worker::{Clock, Waker};
+
+/// What the workers report within this time is drawn at once: an image and the board in it, the robot's state.
+const GATHER: Duration = Duration::from_millis(20);
+
+/// Name of the file of boxes beside the settings.
+const KEEP_OUT_FILE: &str = "keep_out.toml";
+
+/// All that is known before there is a window.
+pub(crate) struct Opening {
+    args: GuiArgs,
+    file: SettingsFile,
+    settings: Settings,
+    warnings: Vec<Warning>,
+    source: CellSource,
+    objects: CellPaths,
+}
+
+impl Opening {
+    /// Reads the settings; what cannot be read there is said in the window.
+    ///
+    /// # Errors
+    /// When there are boxes that the arm keeps out of and they cannot be read.
+    pub fn read(args: GuiArgs) -> anyhow::Result<Self> {
+        let (file, settings, warnings) = SettingsFile::open(settings::default_path(), variable);
+        let drivers = Drivers { robot: args.driver.clone(), camera: args.camera_driver.clone() };
+        let source = match &args.connect {
+            Some(address) => CellSource::Address(address.clone()),
+            None if drivers != Drivers::default() => CellSource::Drivers(drivers),
+            None => settings.source(),
+        };
+        let objects = args.objects.paths(settings.objects.clone());
+        let file = file.with_objects(&objects);
+        if let Some(file) = &args.keep_out {
+            // A window that moves the arm without them would be worse than none.
+            Surroundings::read(file)?;
+        }
+        Ok(Self { args, file, settings, warnings, source, objects })
+    }
+
+    /// The session to open, as the command line has it.
+    pub fn session(&self) -> Option<&std::path::Path> {
+        self.args.session.as_deref()
+    }
+
+    /// Drivers that the command line or the settings name.
+    pub fn drivers(&self) -> Vec<Drivers> {
+        let asked = match &self.source {
+            CellSource::Drivers(drivers) => Some(drivers.clone()),
+            _ => None,
+        };
+        self.settings.drivers.iter().cloned().chain(asked).collect()
+    }
+
+    /// The folder of sessions.
+    pub fn sessions(&self) -> std::path::PathBuf {
+        self.settings.sessions_folder()
+    }
+
+    /// Starts the workers and puts a window over them.
+    ///
+    /// # Errors
+    /// When a thread cannot be started.
+    pub fn window(
+        self,
+        ctx: &egui::Context,
+        remembered: Remembered,
+        layout: Layout,
+        in_browser: Option<InBrowser>,
+    ) -> anyhow::Result<Window> {
+        let Self { args, file, settings, warnings, source, objects } = self;
+        let woken = ctx.clone();
+        let waker: Waker = Arc::new(move || woken.request_repaint_after(GATHER));
+        let started = Instant::now();
+        let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
+        let connect: Connect = Arc::new(crate::connect::connector);
+        let start = Start {
+            source,
+            view: remembered.view(settings.view()),
+            addresses: settings.addresses.clone(),
+            drivers: settings.drivers.clone(),
+            objects,
+            keep_out: args.keep_out.or_else(|| settings::default_path().map(|path| path.with_file_name(KEEP_OUT_FILE))),
+            sessions: settings.sessions_folder(),
+            open: args.session,
+            rerun: args.rerun.choice(RerunChoice::Record),
+            in_browser,
+        };
+        let mut app = App::start(start, connect, clock, waker)?;
+        app.absorb(Event::Recent(remembered.recent));
+        for warning in warnings {
+            app.absorb(warning.into());
+        }
+        if let Some(file) = variable(widget_list::VARIABLE) {
+            ctx.add_plugin(widget_list::WidgetList::new(file.into()));
+        }
+        Ok(Window::new(app, layout, file, ctx))
+    }
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok()
+}

@@ -1,0 +1,325 @@
+//! The thread that owns the window: it takes in what was done, draws, and shows the pictures to the pages.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::Receiver;
+use egui::{Event, OutputCommand, Pos2, RawInput, Rect, Vec2, ViewportCommand, ViewportId};
+
+use super::chunks;
+use super::hub::{Errand, Hub, Words};
+use super::input::{Held, Screen};
+use super::memory::Memory;
+use super::picture::{Picture, Typing, cursor_name};
+use super::textures::Textures;
+use crate::app::InBrowser;
+use crate::command::Command;
+use crate::gui::opening::Opening;
+use crate::gui::signals::Signals;
+use crate::gui::style::theme;
+use crate::gui::{LEAST_SIZE, SIZE, Window};
+use crate::text::Language;
+use crate::tr;
+
+/// Between two pictures: a screen shows no more.
+const PERIOD: Duration = Duration::from_millis(16);
+
+/// Between two pictures when something was done.
+const PERIOD_OF_INPUT: Duration = Duration::from_millis(8);
+
+/// What happened is taken in at least this often, also when nobody looks.
+const COLLECT: Duration = Duration::from_millis(250);
+
+/// What is held down moves nothing any more when the page was not heard for so long. Pages say it every 80 ms: three are
+/// missed before, and with the way to the arm it stands within half a second.
+const SILENCE: Duration = Duration::from_millis(260);
+
+/// Between two looks at what is to be remembered.
+const REMEMBER: Duration = Duration::from_secs(10);
+
+/// Widest texture that every browser has.
+const TEXTURE_SIDE: usize = 4096;
+
+/// A window that pages show.
+pub struct Host {
+    ctx: egui::Context,
+    window: Window,
+    hub: Arc<Hub>,
+    wakes: Receiver<()>,
+    signals: Arc<Signals>,
+    memory: Memory,
+    /// When the next picture is wanted.
+    due: Arc<Mutex<Option<Instant>>>,
+    began: Instant,
+    drawn: Option<Instant>,
+    collected: Instant,
+    remembered: Instant,
+    screen: Option<Screen>,
+    held: Held,
+    /// Something is held at a page that was not heard for too long.
+    is_silent: bool,
+    must_draw: bool,
+    events: Vec<Event>,
+    textures: Textures,
+    shown: Arc<Picture>,
+    language: Option<Language>,
+}
+
+impl Host {
+    /// Opens the window.
+    ///
+    /// # Errors
+    /// As for the window of a desktop, except that no screen is needed.
+    pub fn open(
+        opening: Opening,
+        shown: InBrowser,
+        hub: Arc<Hub>,
+        wakes: Receiver<()>,
+        signals: Arc<Signals>,
+    ) -> anyhow::Result<Self> {
+        let ctx = egui::Context::default();
+        let due = Arc::new(Mutex::new(Some(Instant::now())));
+        let (asked, woken) = (Arc::clone(&due), Arc::clone(&hub));
+        ctx.set_request_repaint_callback(move |info| {
+            if sooner(&asked, info.delay) {
+                woken.wake();
+            }
+        });
+        signals.wakes(&ctx);
+        let memory = Memory::open();
+        let (remembered, layout) = memory.last();
+        let window = opening.window(&ctx, remembered, layout, Some(shown))?;
+        let now = Instant::now();
+        Ok(Self {
+            ctx,
+            window,
+            hub,
+            wakes,
+            signals,
+            memory,
+            due,
+            began: now,
+            drawn: None,
+            collected: now,
+            remembered: now,
+            screen: None,
+            held: Held::default(),
+            is_silent: false,
+            must_draw: false,
+            events: Vec::new(),
+            textures: Textures::default(),
+            shown: Arc::default(),
+            language: None,
+        })
+    }
+
+    /// Draws until the program is asked to end.
+    pub fn run(mut self) {
+        loop {
+            let wait = self.wait();
+            let _woken = self.wakes.recv_timeout(wait).is_ok();
+            if self.hub.take_stop() {
+                self.window.app_mut().apply(Command::Stop);
+            }
+            if self.signals.is_asked() {
+                break;
+            }
+            if self.take_in().is_break() {
+                break;
+            }
+        }
+        self.window.app_mut().begin_to_leave();
+        self.memory.keep(self.window.remembered());
+    }
+
+    /// How long nothing has to be done.
+    fn wait(&self) -> Duration {
+        let now = Instant::now();
+        let mut until = self.collected + COLLECT;
+        if self.wants_picture()
+            && let Some(due) = *self.due.lock().unwrap_or_else(PoisonError::into_inner)
+        {
+            until = until.min(due.max(self.earliest()));
+        }
+        if self.held.is_any() {
+            until = until.min(now + SILENCE / 4);
+        }
+        until.saturating_duration_since(now)
+    }
+
+    /// When the next picture may be drawn.
+    fn earliest(&self) -> Instant {
+        let period = if self.events.is_empty() { PERIOD } else { PERIOD_OF_INPUT };
+        self.drawn.map_or(self.began, |drawn| drawn + period)
+    }
+
+    /// Before a page has said how large it is, there is nothing to draw for.
+    fn wants_picture(&self) -> bool {
+        self.screen.is_some() && (!self.events.is_empty() || self.hub.is_watched())
+    }
+
+    fn take_in(&mut self) -> std::ops::ControlFlow<()> {
+        let (news, heard) = self.hub.news();
+        if let Some(screen) = news.screen {
+            if self.screen.is_some_and(|before| before.touch) != screen.touch {
+                theme::for_fingers(&self.ctx, screen.touch);
+            }
+            self.screen = Some(screen);
+            sooner(&self.due, Duration::ZERO);
+        }
+        if news.changed_hands {
+            self.events.extend(self.held.release());
+            sooner(&self.due, Duration::ZERO);
+        }
+        let is_silent = self.held.is_any() && heard.elapsed() > SILENCE;
+        if is_silent != self.is_silent {
+            tracing::debug!(is_silent, "something is held at a page");
+            self.is_silent = is_silent;
+            self.events.extend(self.held.release_keys());
+            self.must_draw = true;
+        }
+        let before = self.events.len();
+        for done in news.done {
+            done.add_to(&mut self.events);
+        }
+        self.held.heed(&self.events[before..]);
+        for folder in news.opened {
+            self.window.app_mut().apply(Command::Open(folder));
+            sooner(&self.due, Duration::ZERO);
+        }
+        let now = Instant::now();
+        let is_due = {
+            let due = self.due.lock().unwrap_or_else(PoisonError::into_inner);
+            due.is_some_and(|due| due <= now)
+        };
+        let is_wanted = self.must_draw || (self.wants_picture() && (is_due || !self.events.is_empty()));
+        if is_wanted && now >= self.earliest() {
+            return self.draw();
+        }
+        if now >= self.collected + COLLECT {
+            self.collect();
+        }
+        std::ops::ControlFlow::Continue(())
+    }
+
+    fn collect(&mut self) {
+        self.window.collect(&self.ctx);
+        self.collected = Instant::now();
+        let language = self.window.app_mut().model().view.language;
+        if self.language != Some(language) {
+            self.language = Some(language);
+            self.hub.say(words(language));
+        }
+        if self.remembered.elapsed() > REMEMBER {
+            self.remembered = Instant::now();
+            self.memory.keep(self.window.remembered());
+        }
+    }
+
+    fn draw(&mut self) -> std::ops::ControlFlow<()> {
+        self.collect();
+        self.drawn = Some(Instant::now());
+        self.must_draw = false;
+        *self.due.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        let input = self.input();
+        if !self.events.is_empty() {
+            sooner(&self.due, Duration::ZERO);
+        }
+        let window = &mut self.window;
+        let mut output = self.ctx.run_ui(input, |ui| window.window_ui(ui));
+        self.textures.change(&mut output.textures_delta);
+        let platform = output.platform_output;
+        for command in platform.commands {
+            match command {
+                OutputCommand::CopyText(text) => self.hub.send(Errand::Copy { text }),
+                OutputCommand::OpenUrl(open) => self.hub.send(Errand::Visit { url: open.url }),
+                OutputCommand::CopyImage(_) => tracing::debug!("images are not copied into browsers"),
+            }
+        }
+        let mut ends = false;
+        if let Some(viewport) = output.viewport_output.get(&ViewportId::ROOT) {
+            ends = viewport.commands.contains(&ViewportCommand::Close);
+            sooner(&self.due, viewport.repaint_delay);
+        }
+        let picture = Picture {
+            size: self.size().0.into(),
+            pixels_per_point: output.pixels_per_point,
+            chunks: chunks::of(&self.ctx, output.shapes, output.pixels_per_point),
+            textures: self.textures.clone(),
+            cursor: cursor_name(platform.cursor_icon),
+            typing: platform.ime.map(|ime| {
+                let Rect { min, .. } = ime.cursor_rect;
+                Typing { cursor: [min.x, min.y, ime.cursor_rect.width(), ime.cursor_rect.height()] }
+            }),
+        };
+        if !picture.is_same(&self.shown) {
+            self.shown = Arc::new(picture);
+            self.hub.show(Arc::clone(&self.shown));
+        }
+        if ends { std::ops::ControlFlow::Break(()) } else { std::ops::ControlFlow::Continue(()) }
+    }
+
+    /// Size of the window \[points\], and pixels of a point. On a page that is smaller than the panes have room for,
+    /// everything is smaller.
+    fn size(&self) -> (Vec2, f32) {
+        let usual = Screen { width: SIZE[0], height: SIZE[1], scale: 1.0, touch: false };
+        let Screen { width, height, scale, .. } = self.screen.unwrap_or(usual);
+        let shrink = (width / LEAST_SIZE[0]).min(height / LEAST_SIZE[1]).min(1.0);
+        (Vec2::new(width, height) / shrink, scale * shrink)
+    }
+
+    fn input(&mut self) -> RawInput {
+        let (size, scale) = self.size();
+        let mut input = RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, size)),
+            max_texture_side: Some(TEXTURE_SIDE),
+            time: Some(self.began.elapsed().as_secs_f64()),
+            events: up_to_a_press(&mut self.events),
+            // As a window that has lost the focus: what is held moves nothing, and a click that comes late is still one.
+            focused: !self.is_silent,
+            ..RawInput::default()
+        };
+        if let Some(viewport) = input.viewports.get_mut(&ViewportId::ROOT) {
+            viewport.native_pixels_per_point = Some(scale);
+            viewport.inner_rect = input.screen_rect;
+        }
+        input
+    }
+}
+
+/// Notes that a picture is wanted after a while; whether that is sooner than one was wanted before.
+fn sooner(due: &Mutex<Option<Instant>>, delay: Duration) -> bool {
+    let mut due = due.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(wanted) = Instant::now().checked_add(delay) else { return false };
+    let is_sooner = due.is_none_or(|due| wanted < due);
+    if is_sooner {
+        *due = Some(wanted);
+    }
+    is_sooner
+}
+
+/// Takes the events up to the first press. What was pressed has to be drawn once before it is released: a finger that is
+/// gone at the end of a frame has touched nothing in it.
+fn up_to_a_press(events: &mut Vec<Event>) -> Vec<Event> {
+    let press = events.iter().position(|event| matches!(event, Event::PointerButton { pressed: true, .. }));
+    let rest = press.map_or(events.len(), |press| press + 1);
+    events.drain(..rest).collect()
+}
+
+fn words(language: Language) -> Words {
+    let say = |english: &'static str| english.to_owned();
+    Words {
+        language: match language {
+            Language::English => "en",
+            Language::Chinese => "zh-CN",
+        },
+        watching: say(tr!(language, "You are watching: somebody else drives")),
+        nobody: say(tr!(language, "Nobody drives")),
+        drive: say(tr!(language, "Drive")),
+        stop: say(tr!(language, "STOP")),
+        lost: say(tr!(language, "The connection is lost; trying again…")),
+        ended: say(tr!(language, "The workbench has ended")),
+        uploading: say(tr!(language, "Uploading…")),
+        not_uploaded: say(tr!(language, "The files could not be uploaded")),
+    }
+}

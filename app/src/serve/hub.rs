@@ -1,0 +1,432 @@
+//! Between the pages and the window: who is there, who drives, what was done, and what there is to see.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use crossbeam_channel::{Receiver, Sender};
+use serde::Serialize;
+use tokio::sync::watch;
+
+use super::input::{Done, Screen};
+use super::picture::Picture;
+
+/// Pages at a time.
+pub const MOST_PAGES: usize = 32;
+
+/// What was done and not taken in yet; a page that says more than the window takes in is not in order.
+const MOST_EVENTS: usize = 10_000;
+
+/// Number of a page.
+pub type PageId = u64;
+
+/// Between the pages and the window.
+pub struct Hub {
+    state: Mutex<State>,
+    wake: Sender<()>,
+    stop: AtomicBool,
+    pictures: watch::Sender<(u64, Arc<Picture>)>,
+    people: watch::Sender<People>,
+    words: watch::Sender<Words>,
+}
+
+/// Who is there.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct People {
+    /// The page that drives.
+    pub driver: Option<PageId>,
+    /// How many pages there are.
+    pub pages: usize,
+}
+
+/// What pages say by themselves, in the language of the window.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Words {
+    /// The language, as pages name it.
+    pub language: &'static str,
+    /// Another page drives.
+    pub watching: String,
+    /// Nobody drives.
+    pub nobody: String,
+    /// The button to drive.
+    pub drive: String,
+    /// The button that stops the arm.
+    pub stop: String,
+    /// The connection is gone.
+    pub lost: String,
+    /// The window was closed.
+    pub ended: String,
+    /// Files are on their way.
+    pub uploading: String,
+    /// Files did not arrive.
+    pub not_uploaded: String,
+}
+
+/// What the window is to do for the page that drives, outside of what is drawn.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "t", rename_all = "snake_case")]
+pub enum Errand {
+    /// Text goes to the clipboard.
+    Copy {
+        /// The text.
+        text: String,
+    },
+    /// An address is opened beside the page.
+    Visit {
+        /// The address.
+        url: String,
+    },
+}
+
+/// What happened since the window last looked.
+#[derive(Debug, Default)]
+pub struct News {
+    /// The page that drives has another size.
+    pub screen: Option<Screen>,
+    /// What was done there.
+    pub done: Vec<Done>,
+    /// Another page drives, or none: what was held is held no more.
+    pub changed_hands: bool,
+    /// Uploads that are to be opened.
+    pub opened: Vec<PathBuf>,
+}
+
+struct State {
+    next: PageId,
+    pages: BTreeMap<PageId, Page>,
+    driver: Option<PageId>,
+    news: News,
+    /// When the page that drives was last heard.
+    heard: Instant,
+}
+
+struct Page {
+    /// The name that it keeps when it is loaded again or its connection was lost.
+    name: String,
+    /// What its person sees.
+    screen: Option<Screen>,
+    visible: bool,
+    /// Whether it has the latest picture and takes another.
+    ready: bool,
+    errands: tokio::sync::mpsc::Sender<Errand>,
+}
+
+/// Errands that wait for a page.
+const MOST_ERRANDS: usize = 16;
+
+impl Hub {
+    /// Nobody is there; what wakes the window comes out of the second.
+    pub fn new() -> (Self, Receiver<()>) {
+        let (wake, wakes) = crossbeam_channel::bounded(1);
+        let state = State {
+            next: 1,
+            pages: BTreeMap::new(),
+            driver: None,
+            news: News::default(),
+            heard: Instant::now(),
+        };
+        let hub = Self {
+            state: Mutex::new(state),
+            wake,
+            stop: AtomicBool::new(false),
+            pictures: watch::Sender::default(),
+            people: watch::Sender::default(),
+            words: watch::Sender::default(),
+        };
+        (hub, wakes)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has the window look.
+    pub fn wake(&self) {
+        // Full: it is going to look anyway.
+        let _woken = self.wake.try_send(()).is_ok();
+    }
+
+    fn tell_people(&self, state: &State) {
+        let people = People { driver: state.driver, pages: state.pages.len() };
+        self.people.send_if_modified(|before| std::mem::replace(before, people) != people);
+    }
+
+    /// A page has come. It drives when nobody does, or when it did before its connection was lost.
+    pub fn join(&self, name: &str) -> Option<(PageId, tokio::sync::mpsc::Receiver<Errand>)> {
+        let mut state = self.state();
+        // The same page once more: its old connection is of no more use.
+        let before = state.pages.iter().find(|(_, page)| page.name == name).map(|(id, _)| *id);
+        if before.is_none() && state.pages.len() >= MOST_PAGES {
+            return None;
+        }
+        let drove = before.is_some_and(|before| {
+            state.pages.remove(&before);
+            state.driver == Some(before)
+        });
+        let id = state.next;
+        state.next += 1;
+        let (errands, errands_here) = tokio::sync::mpsc::channel(MOST_ERRANDS);
+        state.pages.insert(id, Page { name: name.to_owned(), screen: None, visible: true, ready: true, errands });
+        if drove || state.driver.is_none() {
+            state.take_over(id);
+        }
+        self.tell_people(&state);
+        drop(state);
+        self.wake();
+        Some((id, errands_here))
+    }
+
+    /// A page has gone.
+    pub fn leave(&self, id: PageId) {
+        let mut state = self.state();
+        state.pages.remove(&id);
+        if state.driver == Some(id) {
+            state.driver = None;
+            state.news.done.clear();
+            state.news.changed_hands = true;
+        }
+        self.tell_people(&state);
+        drop(state);
+        self.wake();
+    }
+
+    /// Whether a page is still one of them: another connection may have taken its place.
+    pub fn has(&self, id: PageId) -> bool {
+        self.state().pages.contains_key(&id)
+    }
+
+    /// A person wants to drive.
+    pub fn drive(&self, id: PageId) {
+        let mut state = self.state();
+        if state.pages.contains_key(&id) && state.driver != Some(id) {
+            state.take_over(id);
+            self.tell_people(&state);
+        }
+        drop(state);
+        self.wake();
+    }
+
+    /// Stops the arm, whoever asks for it.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Release);
+        self.wake();
+    }
+
+    /// Whether the arm is to stop; once for every time that it was asked for.
+    pub fn take_stop(&self) -> bool {
+        self.stop.swap(false, Ordering::AcqRel)
+    }
+
+    /// The page that drives was heard.
+    pub fn held(&self, id: PageId) {
+        let mut state = self.state();
+        if state.driver == Some(id) {
+            state.heard = Instant::now();
+        }
+    }
+
+    /// What a person did. It counts only at the page that drives.
+    ///
+    /// # Errors
+    /// When more comes than is taken in.
+    pub fn done(&self, id: PageId, done: Vec<Done>) -> Result<(), TooMuch> {
+        let mut state = self.state();
+        if state.driver == Some(id) {
+            state.heard = Instant::now();
+            if state.news.done.len() + done.len() > MOST_EVENTS {
+                return Err(TooMuch);
+            }
+            state.news.done.extend(done);
+            drop(state);
+            self.wake();
+        }
+        Ok(())
+    }
+
+    /// The size of a page.
+    pub fn screen(&self, id: PageId, screen: Screen) {
+        let mut state = self.state();
+        let is_driver = state.driver == Some(id);
+        let Some(page) = state.pages.get_mut(&id) else { return };
+        page.screen = Some(screen);
+        if is_driver {
+            state.news.screen = Some(screen);
+            drop(state);
+            self.wake();
+        }
+    }
+
+    /// Whether a page can be seen, and whether it takes another picture.
+    pub fn sees(&self, id: PageId, visible: Option<bool>, ready: Option<bool>) {
+        let mut state = self.state();
+        let Some(page) = state.pages.get_mut(&id) else { return };
+        let waited = page.visible && page.ready;
+        page.visible = visible.unwrap_or(page.visible);
+        page.ready = ready.unwrap_or(page.ready);
+        let waits = page.visible && page.ready;
+        drop(state);
+        if waits && !waited {
+            self.wake();
+        }
+    }
+
+    /// An upload is to be opened; only at the page that drives.
+    pub fn open(&self, id: PageId, folder: PathBuf) {
+        let mut state = self.state();
+        if state.driver == Some(id) {
+            state.news.opened.push(folder);
+            drop(state);
+            self.wake();
+        }
+    }
+
+    /// Whether somebody waits for a picture.
+    pub fn is_watched(&self) -> bool {
+        self.state().pages.values().any(|page| page.visible && page.ready)
+    }
+
+    /// What happened since the last time, and when the page that drives was last heard.
+    pub fn news(&self) -> (News, Instant) {
+        let mut state = self.state();
+        (std::mem::take(&mut state.news), state.heard)
+    }
+
+    /// Shows a picture to everybody.
+    pub fn show(&self, picture: Arc<Picture>) {
+        self.pictures.send_modify(|(number, shown)| {
+            *number += 1;
+            *shown = picture;
+        });
+    }
+
+    /// Something for the page that drives.
+    pub fn send(&self, errand: Errand) {
+        let state = self.state();
+        let driver = state.driver.and_then(|id| state.pages.get(&id));
+        if driver.is_some_and(|page| page.errands.try_send(errand).is_err()) {
+            tracing::debug!("a page takes no errands");
+        }
+    }
+
+    /// What pages say by themselves.
+    pub fn say(&self, words: Words) {
+        self.words.send_if_modified(|before| {
+            let is_new = *before != words;
+            *before = words;
+            is_new
+        });
+    }
+
+    /// The pictures, by number.
+    pub fn pictures(&self) -> watch::Receiver<(u64, Arc<Picture>)> {
+        self.pictures.subscribe()
+    }
+
+    /// Who is there.
+    pub fn people(&self) -> watch::Receiver<People> {
+        self.people.subscribe()
+    }
+
+    /// What pages say by themselves.
+    pub fn words(&self) -> watch::Receiver<Words> {
+        self.words.subscribe()
+    }
+}
+
+impl State {
+    fn take_over(&mut self, id: PageId) {
+        self.driver = Some(id);
+        self.news.done.clear();
+        self.news.changed_hands = true;
+        self.heard = Instant::now();
+        self.news.screen = self.pages.get(&id).and_then(|page| page.screen);
+    }
+}
+
+/// More comes from a page than the window takes in.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("more comes from a page than can be done")]
+pub struct TooMuch;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hub() -> Hub {
+        Hub::new().0
+    }
+
+    fn join(hub: &Hub, name: &str) -> PageId {
+        hub.join(name).expect("there is room").0
+    }
+
+    fn driver(hub: &Hub) -> Option<PageId> {
+        hub.people().borrow().driver
+    }
+
+    #[test]
+    fn the_first_page_drives_others_watch_and_one_click_takes_over() {
+        let hub = hub();
+        let (first, second) = (join(&hub, "a"), join(&hub, "b"));
+        assert_eq!(driver(&hub), Some(first));
+        hub.done(second, vec![Done::Leave]).expect("ignored");
+        assert!(hub.news().0.done.is_empty(), "who watches does nothing");
+        hub.drive(second);
+        assert_eq!(driver(&hub), Some(second));
+        let (news, _) = hub.news();
+        assert!(news.changed_hands && news.done.is_empty());
+        hub.done(second, vec![Done::Leave]).expect("room");
+        assert_eq!(hub.news().0.done, [Done::Leave]);
+    }
+
+    #[test]
+    fn everybody_stops_the_arm_also_who_only_watches() {
+        let hub = hub();
+        let (_first, _second) = (join(&hub, "a"), join(&hub, "b"));
+        assert!(!hub.take_stop());
+        hub.stop();
+        assert!(hub.take_stop() && !hub.take_stop());
+    }
+
+    #[test]
+    fn a_page_that_comes_back_drives_again_and_its_old_connection_does_not_count() {
+        let hub = hub();
+        let (first, second) = (join(&hub, "a"), join(&hub, "b"));
+        let again = join(&hub, "a");
+        assert_eq!(driver(&hub), Some(again));
+        assert!(!hub.has(first) && hub.has(second));
+        hub.leave(first);
+        assert_eq!(driver(&hub), Some(again));
+        // Nobody is made to drive when the driver leaves: moving an arm is something that one wants to do.
+        hub.leave(again);
+        assert_eq!(driver(&hub), None);
+        assert!(hub.news().0.changed_hands);
+    }
+
+    #[test]
+    fn pages_and_events_are_bounded() {
+        let hub = hub();
+        for page in 0..MOST_PAGES {
+            join(&hub, &page.to_string());
+        }
+        assert!(hub.join("one more").is_none());
+        assert_eq!(hub.done(1, vec![Done::Leave; MOST_EVENTS]), Ok(()));
+        assert_eq!(hub.done(1, vec![Done::Leave]), Err(TooMuch));
+    }
+
+    #[test]
+    fn a_page_that_cannot_be_seen_or_is_slow_asks_for_no_pictures() {
+        let hub = hub();
+        assert!(!hub.is_watched());
+        let page = join(&hub, "a");
+        assert!(hub.is_watched());
+        hub.sees(page, None, Some(false));
+        assert!(!hub.is_watched());
+        hub.sees(page, Some(false), Some(true));
+        assert!(!hub.is_watched());
+        hub.sees(page, Some(true), None);
+        assert!(hub.is_watched());
+    }
+}

@@ -1,0 +1,425 @@
+//! What a page says, and the events that egui makes of it.
+
+use egui::{Event, ImeEvent, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase, Vec2};
+use serde::Deserialize;
+
+/// Sizes of a page that are drawn for \[points\].
+const SIZES: std::ops::RangeInclusive<f32> = 100.0..=8192.0;
+
+/// Pixels of a point that are drawn for.
+const SCALES: std::ops::RangeInclusive<f32> = 0.5..=4.0;
+
+/// A message of a page.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "t", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Said {
+    /// What a person did, in order.
+    Input {
+        /// The events.
+        events: Vec<Done>,
+    },
+    /// The size of the page.
+    Screen(Screen),
+    /// A picture is on the screen.
+    Shown {
+        /// Its number.
+        number: u64,
+    },
+    /// Whether the page can be seen.
+    Visible {
+        /// It can.
+        visible: bool,
+    },
+    /// A button, key or finger is still down.
+    Held,
+    /// The arm is to stop.
+    Stop,
+    /// The person wants to drive.
+    Drive,
+    /// Files that were uploaded are to be opened.
+    Open {
+        /// Name of the upload.
+        upload: String,
+    },
+}
+
+/// The size of a page.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Screen {
+    /// Width \[points\].
+    pub width: f32,
+    /// Height \[points\].
+    pub height: f32,
+    /// Pixels of a point.
+    pub scale: f32,
+    /// Whether it is touched and not pointed at.
+    #[serde(default)]
+    pub touch: bool,
+}
+
+impl Screen {
+    /// Whether it can be drawn for.
+    pub fn is_sensible(&self) -> bool {
+        SIZES.contains(&self.width) && SIZES.contains(&self.height) && SCALES.contains(&self.scale)
+    }
+}
+
+/// Something that a person did. Places are in points of the picture that the page shows, from the
+/// left top corner.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "e", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Done {
+    /// The pointer is elsewhere.
+    Move {
+        /// Where.
+        at: [f32; 2],
+    },
+    /// A button of the pointer was pressed or released.
+    Button {
+        /// Where.
+        at: [f32; 2],
+        /// 0 primary, 1 middle, 2 secondary, as browsers count them.
+        button: u8,
+        /// Pressed.
+        down: bool,
+        /// See [`modifiers`].
+        modifiers: u8,
+    },
+    /// The pointer left the page.
+    Leave,
+    /// The wheel was turned.
+    Wheel {
+        /// How far the content moves.
+        by: [f32; 2],
+        /// By lines, not by points.
+        lines: bool,
+        /// See [`modifiers`].
+        modifiers: u8,
+    },
+    /// A finger.
+    Touch {
+        /// Which one.
+        id: u32,
+        /// Where.
+        at: [f32; 2],
+        /// What it did.
+        phase: Phase,
+        /// Whether it is the first one, which also acts as a pointer.
+        first: bool,
+    },
+    /// A key was pressed or released.
+    Key {
+        /// As browsers call it.
+        key: String,
+        /// Pressed.
+        down: bool,
+        /// See [`modifiers`].
+        modifiers: u8,
+    },
+    /// Text was typed.
+    Text {
+        /// The text.
+        text: String,
+    },
+    /// Text is being composed.
+    Compose {
+        /// As it is so far.
+        text: String,
+    },
+    /// Text was composed.
+    Composed {
+        /// The text.
+        text: String,
+    },
+    /// Text comes from the clipboard.
+    Paste {
+        /// The text.
+        text: String,
+    },
+    /// The selection is to be copied.
+    Copy,
+    /// The selection is to be cut.
+    Cut,
+    /// The page has the keyboard, or has not.
+    Focus {
+        /// It has.
+        focused: bool,
+    },
+}
+
+/// What a finger did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// It came down.
+    Start,
+    /// It moved.
+    Move,
+    /// It was lifted.
+    End,
+    /// The browser took it for something of its own.
+    Cancel,
+}
+
+/// Bits: 1 Alt, 2 Ctrl, 4 Shift, 8 the command key of a Mac.
+fn modifiers(bits: u8) -> Modifiers {
+    let (alt, ctrl, shift, mac_cmd) = (bits & 1 != 0, bits & 2 != 0, bits & 4 != 0, bits & 8 != 0);
+    Modifiers { alt, ctrl, shift, mac_cmd, command: ctrl || mac_cmd }
+}
+
+fn place([x, y]: [f32; 2]) -> Option<Pos2> {
+    (x.is_finite() && y.is_finite()).then(|| Pos2::new(x.clamp(-1e5, 1e5), y.clamp(-1e5, 1e5)))
+}
+
+impl Done {
+    /// Adds the events that it means. What makes no sense means nothing.
+    pub fn add_to(self, events: &mut Vec<Event>) {
+        match self {
+            Self::Move { at } => events.extend(place(at).map(Event::PointerMoved)),
+            Self::Button { at, button, down, modifiers: bits } => {
+                let button = match button {
+                    0 => PointerButton::Primary,
+                    1 => PointerButton::Middle,
+                    2 => PointerButton::Secondary,
+                    _ => return,
+                };
+                let Some(pos) = place(at) else { return };
+                events.push(Event::PointerMoved(pos));
+                events.push(Event::PointerButton { pos, button, pressed: down, modifiers: modifiers(bits) });
+            }
+            Self::Leave => events.push(Event::PointerGone),
+            Self::Wheel { by: [x, y], lines, modifiers: bits } => {
+                if x.is_finite() && y.is_finite() {
+                    events.push(Event::MouseWheel {
+                        unit: if lines { MouseWheelUnit::Line } else { MouseWheelUnit::Point },
+                        delta: Vec2::new(x.clamp(-1e4, 1e4), y.clamp(-1e4, 1e4)),
+                        phase: TouchPhase::Move,
+                        modifiers: modifiers(bits),
+                    });
+                }
+            }
+            Self::Touch { id, at, phase, first } => touch(id, at, phase, first, events),
+            Self::Key { key, down, modifiers: bits } => {
+                if let Some(key) = named(&key) {
+                    let modifiers = modifiers(bits);
+                    events.push(Event::Key { key, physical_key: None, pressed: down, repeat: false, modifiers });
+                }
+            }
+            Self::Text { text } => {
+                let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
+                if !text.is_empty() {
+                    events.push(Event::Text(text));
+                }
+            }
+            Self::Compose { text } => events.push(Event::Ime(ImeEvent::Preedit { text, active_range_chars: None })),
+            Self::Composed { text } => events.push(Event::Ime(ImeEvent::Commit(text))),
+            Self::Paste { text } => events.push(Event::Paste(text)),
+            Self::Copy => events.push(Event::Copy),
+            Self::Cut => events.push(Event::Cut),
+            Self::Focus { focused } => events.push(Event::WindowFocused(focused)),
+        }
+    }
+}
+
+/// A finger, and what it does as a pointer.
+fn touch(id: u32, at: [f32; 2], phase: Phase, first: bool, events: &mut Vec<Event>) {
+    let Some(pos) = place(at) else { return };
+    let egui_phase = match phase {
+        Phase::Start => TouchPhase::Start,
+        Phase::Move => TouchPhase::Move,
+        Phase::End => TouchPhase::End,
+        Phase::Cancel => TouchPhase::Cancel,
+    };
+    let id = TouchId(u64::from(id));
+    events.push(Event::Touch { device_id: TouchDeviceId(0), id, phase: egui_phase, pos, force: None });
+    if !first {
+        return;
+    }
+    let button = |pressed| Event::PointerButton {
+        pos,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::NONE,
+    };
+    match phase {
+        Phase::Start => events.extend([Event::PointerMoved(pos), button(true)]),
+        Phase::Move => events.push(Event::PointerMoved(pos)),
+        Phase::End => events.extend([button(false), Event::PointerGone]),
+        Phase::Cancel => events.push(Event::PointerGone),
+    }
+}
+
+fn named(key: &str) -> Option<Key> {
+    match key {
+        " " => Some(Key::Space),
+        // Letters come as they are typed, with Shift or without.
+        key if key.len() == 1 => Key::from_name(&key.to_ascii_uppercase()),
+        key => Key::from_name(key),
+    }
+}
+
+/// What is held down, so that it can be released when nothing is heard of the page any more.
+#[derive(Debug, Default)]
+pub struct Held {
+    buttons: Vec<PointerButton>,
+    keys: Vec<Key>,
+    touches: Vec<TouchId>,
+}
+
+impl Held {
+    /// Whether something is.
+    pub fn is_any(&self) -> bool {
+        !(self.buttons.is_empty() && self.keys.is_empty() && self.touches.is_empty())
+    }
+
+    /// Takes notice of events.
+    pub fn heed(&mut self, events: &[Event]) {
+        for event in events {
+            match event {
+                Event::PointerButton { button, pressed, .. } => note(&mut self.buttons, *button, *pressed),
+                Event::Key { key, pressed, .. } => note(&mut self.keys, *key, *pressed),
+                Event::Touch { id, phase, .. } => {
+                    note(&mut self.touches, *id, matches!(phase, TouchPhase::Start | TouchPhase::Move));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Releases the keys, each of which would otherwise do again what it does when the page is heard again.
+    pub fn release_keys(&mut self) -> Vec<Event> {
+        let released = |key| {
+            let modifiers = Modifiers::NONE;
+            Event::Key { key, physical_key: None, pressed: false, repeat: false, modifiers }
+        };
+        std::mem::take(&mut self.keys).into_iter().map(released).collect()
+    }
+
+    /// Releases all of it where it does nothing but end: a button that is let go far away is not clicked.
+    pub fn release(&mut self) -> Vec<Event> {
+        const NOWHERE: Pos2 = Pos2::new(-1e4, -1e4);
+        let mut events = self.release_keys();
+        let Self { buttons, touches, .. } = std::mem::take(self);
+        if !(buttons.is_empty() && touches.is_empty()) {
+            events.push(Event::PointerMoved(NOWHERE));
+        }
+        for id in touches {
+            let (device_id, phase) = (TouchDeviceId(0), TouchPhase::Cancel);
+            events.push(Event::Touch { device_id, id, phase, pos: NOWHERE, force: None });
+        }
+        for button in buttons {
+            events.push(Event::PointerButton { pos: NOWHERE, button, pressed: false, modifiers: Modifiers::NONE });
+        }
+        if !events.is_empty() {
+            events.push(Event::PointerGone);
+        }
+        events
+    }
+}
+
+fn note<T: PartialEq>(held: &mut Vec<T>, what: T, is_down: bool) {
+    held.retain(|held| *held != what);
+    if is_down {
+        held.push(what);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(json: &str) -> Said {
+        serde_json::from_str(json).expect("a message")
+    }
+
+    fn events(json: &str) -> Vec<Event> {
+        let Said::Input { events: done } = said(json) else { panic!("no input: {json}") };
+        let mut events = Vec::new();
+        for done in done {
+            done.add_to(&mut events);
+        }
+        events
+    }
+
+    #[test]
+    fn a_click_with_control_is_one() {
+        let events = events(
+            r#"{"t":"input","events":[{"e":"button","at":[3,4],"button":0,"down":true,"modifiers":2},
+                {"e":"button","at":[3,4],"button":0,"down":false,"modifiers":2}]}"#,
+        );
+        let Some(Event::PointerButton { pos, button, pressed, modifiers }) = events.get(1) else { panic!("{events:?}") };
+        assert_eq!((*pos, *button, *pressed), (Pos2::new(3.0, 4.0), PointerButton::Primary, true));
+        assert!(modifiers.ctrl && modifiers.command && !modifiers.shift);
+    }
+
+    #[test]
+    fn keys_are_known_by_the_names_of_browsers() {
+        for (name, key) in [
+            ("a", Key::A),
+            ("A", Key::A),
+            (" ", Key::Space),
+            ("Escape", Key::Escape),
+            ("ArrowLeft", Key::ArrowLeft),
+            ("Delete", Key::Delete),
+            ("F1", Key::F1),
+            ("Enter", Key::Enter),
+            ("Backspace", Key::Backspace),
+            ("?", Key::Questionmark),
+            ("7", Key::Num7),
+            ("PageDown", Key::PageDown),
+        ] {
+            assert_eq!(named(name), Some(key), "{name}");
+        }
+        assert_eq!(named("Dead"), None);
+    }
+
+    #[test]
+    fn what_makes_no_sense_means_nothing() {
+        for json in [
+            r#"{"t":"input","events":[{"e":"button","at":[3,4],"button":9,"down":true,"modifiers":0}]}"#,
+            r#"{"t":"input","events":[{"e":"key","key":"Hyper","down":true,"modifiers":255}]}"#,
+            r#"{"t":"input","events":[{"e":"text","text":"\n\u0007"}]}"#,
+        ] {
+            assert!(events(json).is_empty(), "{json}");
+        }
+        let huge = events(r#"{"t":"input","events":[{"e":"move","at":[1e30,-1e30]}]}"#);
+        assert_eq!(huge, [Event::PointerMoved(Pos2::new(1e5, -1e5))]);
+        for refused in [r#"{"t":"input","events":[{"e":"move"}]}"#, r#"{"t":"fly"}"#, "[]", r#"{"t":"stop","x":1}"#] {
+            assert!(serde_json::from_str::<Said>(refused).is_err(), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_page_that_is_heard_of_no_more_holds_nothing() {
+        let down = events(
+            r#"{"t":"input","events":[{"e":"button","at":[30,40],"button":0,"down":true,"modifiers":0},
+                {"e":"key","key":"ArrowUp","down":true,"modifiers":0}]}"#,
+        );
+        let mut held = Held::default();
+        held.heed(&down);
+        assert!(held.is_any());
+        let released = held.release();
+        assert!(!held.is_any());
+        let far = |event: &Event| matches!(event, Event::PointerButton { pressed: false, pos, .. } if pos.x < -1e3);
+        assert!(released.iter().any(far));
+        assert!(released.iter().any(|event| matches!(event, Event::Key { key: Key::ArrowUp, pressed: false, .. })));
+        // Released by the person: nothing is left to release.
+        held.heed(&down);
+        held.heed(&released);
+        assert_eq!(held.release(), []);
+    }
+
+    #[test]
+    fn the_first_finger_is_a_pointer_and_others_are_not() {
+        let finger = |first: bool, phase: &str| {
+            events(&format!(
+                r#"{{"t":"input","events":[{{"e":"touch","id":1,"at":[5,6],"phase":"{phase}","first":{first}}}]}}"#
+            ))
+        };
+        assert!(finger(true, "start").iter().any(|event| matches!(event, Event::PointerButton { pressed: true, .. })));
+        assert_eq!(finger(true, "end").last(), Some(&Event::PointerGone));
+        assert_eq!(finger(false, "start").len(), 1);
+        assert!(!finger(true, "cancel").iter().any(|event| matches!(event, Event::PointerButton { .. })));
+    }
+}

@@ -1,0 +1,385 @@
+// The page of the Handeye Workbench: shows the pictures that `handeye serve` draws, and sends what a person does.
+// The messages are described in docs/browser.md.
+'use strict';
+
+const element = (id) => document.getElementById(id);
+const [canvas, typing, bar, barText, driveButton, stopButton, keyboardButton, note] =
+  ['picture', 'typing', 'bar', 'bar-text', 'drive', 'stop', 'keyboard', 'note'].map(element);
+
+/// While something is held down, it is said so often [ms]; when it is no longer said, the window lets go of it.
+const RENEWAL_MS = 80;
+/// Between two attempts to connect, at first and at most [ms].
+const RETRY_MS = [300, 4000];
+/// Heard at least so often, or the connection is made anew [ms].
+const SILENCE_MS = 15000;
+
+let words = {
+  watching: 'You are watching', nobody: 'Nobody drives', drive: 'Drive', stop: 'STOP',
+  lost: 'The connection is lost; trying again…', ended: '', uploading: 'Uploading…',
+  not_uploaded: 'The files could not be uploaded',
+};
+let people = { you: true, driven: true, pages: 1 };
+/// Whether fingers are used here: the keyboard of the screen then comes only when it is asked for.
+let touched = matchMedia('(pointer: coarse)').matches;
+
+// ---------------------------------------------------------------- the picture
+
+/// What is on the screen, drawn by painter.js.
+const show = {
+  picture: null,
+  painter: new Worker('/painter.js'),
+
+  begin() {
+    const surface = canvas.transferControlToOffscreen();
+    this.painter.postMessage({ canvas: surface }, [surface]);
+    this.painter.onmessage = ({ data }) => this.heard(data);
+  },
+
+  heard(data) {
+    // Drawing starts anew after the graphics driver did.
+    if (data.lost) { setTimeout(() => location.reload(), 500); return; }
+    if (data.lost === false) { sayNote(data.failed); return; }
+    if (data.connection !== connection.count) return;
+    if (data.failed) { connection.again(); return; }
+    this.picture = { size: data.size };
+    canvas.style.cursor = people.you ? data.cursor : 'default';
+    fit();
+    placeTyping(data.typing);
+    connection.send({ t: 'shown', number: data.number });
+  },
+
+  /// A place of the page in points of the picture.
+  pointOf(event) {
+    const area = canvas.getBoundingClientRect();
+    const size = this.picture?.size ?? [area.width, area.height];
+    return [(event.clientX - area.left) * size[0] / area.width, (event.clientY - area.top) * size[1] / area.height];
+  },
+};
+
+/// The picture as large as there is room for; where one drives, it is made for this room.
+function fit() {
+  if (!show.picture) return;
+  const stage = element('stage');
+  const [width, height] = show.picture.size;
+  const scale = Math.min(stage.clientWidth / width, stage.clientHeight / height);
+  canvas.style.width = `${width * scale}px`;
+  canvas.style.height = `${height * scale}px`;
+}
+
+// ---------------------------------------------------------------- connection
+
+class Connection {
+  constructor() {
+    this.retry = RETRY_MS[0];
+    /// How many connections there were.
+    this.count = 0;
+    this.name = sessionStorage.getItem('page') ?? [...crypto.getRandomValues(new Uint8Array(12))]
+      .map((byte) => byte.toString(16).padStart(2, '0')).join('');
+    sessionStorage.setItem('page', this.name);
+    this.open();
+  }
+
+  open() {
+    clearTimeout(this.timer);
+    const socket = new WebSocket(`${location.origin.replace(/^http/, 'ws')}/socket?page=${this.name}`);
+    socket.binaryType = 'arraybuffer';
+    this.socket = socket;
+    socket.onopen = () => {
+      if (socket !== this.socket) return;
+      this.retry = RETRY_MS[0];
+      this.count += 1;
+      show.painter.postMessage({ connection: this.count });
+      sayNote('');
+      sayScreen();
+      this.send({ t: 'visible', visible: !document.hidden });
+    };
+    socket.onmessage = ({ data }) => {
+      if (socket !== this.socket) return;
+      this.watch();
+      if (data instanceof ArrayBuffer) show.painter.postMessage({ picture: data }, [data]);
+      else heard(JSON.parse(data));
+    };
+    socket.onclose = () => {
+      if (socket !== this.socket) return;
+      sayNote(words.lost);
+      letGo();
+      this.timer = setTimeout(() => this.open(), this.retry);
+      this.retry = Math.min(this.retry * 2, RETRY_MS[1]);
+    };
+    this.watch();
+  }
+
+  /// A network that is gone says nothing, not even that.
+  watch() {
+    clearTimeout(this.watchdog);
+    this.watchdog = setTimeout(() => this.again(), SILENCE_MS);
+  }
+
+  again() {
+    const { socket } = this;
+    this.socket = null;
+    socket?.close();
+    sayNote(words.lost);
+    this.open();
+  }
+
+  send(said) {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(said));
+  }
+}
+
+function heard(told) {
+  if (told.t === 'people') {
+    people = told;
+    if (!people.you) letGo();
+    sayBar();
+    sayScreen();
+  } else if (told.t === 'words') {
+    words = told;
+    document.documentElement.lang = told.language;
+    sayBar();
+  } else if (told.t === 'copy') {
+    copy(told.text);
+  } else if (told.t === 'visit') {
+    visit(told.url);
+  }
+}
+
+function sayBar() {
+  bar.hidden = people.you;
+  barText.textContent = people.driven ? words.watching : words.nobody;
+  driveButton.textContent = words.drive;
+  stopButton.textContent = words.stop;
+  fit();
+}
+
+function sayNote(text, quiet = false) {
+  note.hidden = !text;
+  note.textContent = text;
+  note.classList.toggle('quiet', quiet);
+}
+
+function sayScreen() {
+  if (!people.you) return;
+  const stage = element('stage');
+  const [width, height] = [stage.clientWidth, stage.clientHeight];
+  if (width < 100 || height < 100) return;
+  const scale = Math.min(Math.max(devicePixelRatio, 0.5), 4);
+  connection.send({ t: 'screen', width, height, scale, touch: touched });
+}
+
+async function copy(text) {
+  if (navigator.clipboard) {
+    try { return await navigator.clipboard.writeText(text); } catch { /* Without the right to it, the old way. */ }
+  }
+  typing.value = text;
+  typing.select();
+  document.execCommand('copy');
+  typing.value = '';
+}
+
+function visit(url) {
+  const link = document.createElement('a');
+  link.href = url;
+  if (url.startsWith('/download')) link.download = '';
+  else link.target = '_blank';
+  link.rel = 'noopener noreferrer';
+  link.click();
+}
+
+// ---------------------------------------------------------------- what a person does
+
+let pending = [];
+const down = { buttons: new Set(), keys: new Map(), touches: new Set() };
+let renewal = 0;
+
+function done(event) {
+  if (!people.you) return;
+  if (!pending.length) queueMicrotask(flush);
+  const last = pending[pending.length - 1];
+  if (event.e === 'move' && last?.e === 'move') pending[pending.length - 1] = event;
+  else pending.push(event);
+}
+
+function flush() {
+  const events = pending;
+  pending = [];
+  if (events.length) connection.send({ t: 'input', events });
+}
+
+/// As long as something is down and the page is in front, the window hears of it.
+function renew() {
+  const held = down.buttons.size || down.keys.size || down.touches.size;
+  if (held && !renewal) renewal = setInterval(() => connection.send({ t: 'held' }), RENEWAL_MS);
+  if (!held) {
+    clearInterval(renewal);
+    renewal = 0;
+  }
+}
+
+/// Nothing is down any more, as far as this page knows; the window lets go when it hears nothing.
+function letGo() {
+  for (const held of Object.values(down)) held.clear();
+  renew();
+}
+
+const modifiersOf = (event) =>
+  (event.altKey ? 1 : 0) | (event.ctrlKey ? 2 : 0) | (event.shiftKey ? 4 : 0) | (event.metaKey ? 8 : 0);
+
+function pointer(event) {
+  touched = event.pointerType === 'touch';
+  const at = show.pointOf(event);
+  if (touched) return finger(event, at);
+  if (event.type === 'pointermove') return done({ e: 'move', at });
+  const isDown = event.type === 'pointerdown';
+  if (event.type === 'pointercancel') return letGo();
+  if (isDown) {
+    canvas.setPointerCapture(event.pointerId);
+    typing.focus({ preventScroll: true });
+  }
+  if (isDown) down.buttons.add(event.button);
+  else down.buttons.delete(event.button);
+  done({ e: 'button', at, button: event.button, down: isDown, modifiers: modifiersOf(event) });
+  renew();
+}
+
+function finger(event, at) {
+  const phase = { pointerdown: 'start', pointermove: 'move', pointerup: 'end', pointercancel: 'cancel' }[event.type];
+  if (phase === 'move' && !down.touches.has(event.pointerId)) return;
+  if (phase === 'start') {
+    canvas.setPointerCapture(event.pointerId);
+    down.touches.add(event.pointerId);
+  } else if (phase !== 'move') {
+    down.touches.delete(event.pointerId);
+  }
+  done({ e: 'touch', id: event.pointerId >>> 0, at, phase, first: event.isPrimary });
+  renew();
+}
+
+for (const kind of ['pointerdown', 'pointermove', 'pointerup', 'pointercancel']) {
+  canvas.addEventListener(kind, (event) => { event.preventDefault(); pointer(event); });
+}
+canvas.addEventListener('pointerleave', (event) => { if (event.pointerType !== 'touch') done({ e: 'leave' }); });
+canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+canvas.addEventListener('wheel', (event) => {
+  event.preventDefault();
+  const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE;
+  done({ e: 'wheel', by: [-event.deltaX, -event.deltaY], lines, modifiers: modifiersOf(event) });
+}, { passive: false });
+
+/// Keys that the browser would do something of its own with, and that the window has a use for.
+const OURS = new Set(['Tab', 'F1', 'Escape', 'ArrowUp', 'ArrowDown', 'ArrowLeft', 'ArrowRight', 'PageUp', 'PageDown',
+  'Home', 'End', 'Delete', 'Backspace', 'Enter', 'Alt']);
+const OURS_WITH_CTRL = new Set(['k', 'p', 's', 'o', 'z', 'y', 'a', 'n', 'f', 'Enter']);
+
+document.addEventListener('keydown', (event) => {
+  if (event.target instanceof HTMLButtonElement && event.key !== 'Escape') return;
+  if (event.isComposing || event.keyCode === 229) return;
+  if (event.key === 'Escape') connection.send({ t: 'stop' });
+  const withCtrl = event.ctrlKey || event.metaKey;
+  const letter = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  if (withCtrl ? OURS_WITH_CTRL.has(letter) : OURS.has(event.key)) event.preventDefault();
+  // The clipboard speaks for itself.
+  if (withCtrl && ['c', 'x', 'v'].includes(letter)) return;
+  down.keys.set(event.code, event.key);
+  renew();
+  done({ e: 'key', key: event.key, down: true, modifiers: modifiersOf(event) });
+});
+document.addEventListener('keyup', (event) => {
+  const key = down.keys.get(event.code);
+  down.keys.delete(event.code);
+  renew();
+  if (key !== undefined) done({ e: 'key', key, down: false, modifiers: modifiersOf(event) });
+});
+
+typing.addEventListener('compositionupdate', (event) => done({ e: 'compose', text: event.data }));
+typing.addEventListener('compositionend', (event) => {
+  done({ e: 'composed', text: event.data });
+  typing.value = '';
+});
+typing.addEventListener('input', (event) => {
+  if (event.isComposing) return;
+  if (event.inputType === 'deleteContentBackward' && !down.keys.size) {
+    // A keyboard of the screen deletes without a key.
+    for (const isDown of [true, false]) done({ e: 'key', key: 'Backspace', down: isDown, modifiers: 0 });
+  } else if (event.data && event.inputType !== 'insertCompositionText') {
+    done({ e: 'text', text: event.data });
+  }
+  typing.value = '';
+});
+document.addEventListener('copy', (event) => { event.preventDefault(); done({ e: 'copy' }); });
+document.addEventListener('cut', (event) => { event.preventDefault(); done({ e: 'cut' }); });
+document.addEventListener('paste', (event) => {
+  event.preventDefault();
+  done({ e: 'paste', text: event.clipboardData.getData('text/plain') });
+});
+
+/// Where text is typed, a keyboard of the screen and the candidates of an input method have their place.
+function placeTyping(place) {
+  const wanted = Boolean(place) && people.you;
+  keyboardButton.hidden = !(wanted && touched && document.activeElement !== typing);
+  if (!wanted) {
+    if (touched && document.activeElement === typing) typing.blur();
+    return;
+  }
+  const area = canvas.getBoundingClientRect();
+  const stage = element('stage').getBoundingClientRect();
+  const scale = area.width / show.picture.size[0];
+  typing.style.left = `${area.left - stage.left + place.cursor[0] * scale}px`;
+  typing.style.top = `${area.top - stage.top + place.cursor[1] * scale}px`;
+}
+keyboardButton.addEventListener('click', () => { typing.focus(); keyboardButton.hidden = true; });
+
+driveButton.addEventListener('click', () => connection.send({ t: 'drive' }));
+stopButton.addEventListener('click', () => connection.send({ t: 'stop' }));
+
+document.addEventListener('visibilitychange', () => {
+  if (document.hidden) letGo();
+  connection.send({ t: 'visible', visible: !document.hidden });
+});
+addEventListener('blur', () => { letGo(); done({ e: 'focus', focused: false }); });
+addEventListener('focus', () => { done({ e: 'focus', focused: true }); if (!touched) typing.focus(); });
+addEventListener('resize', () => { sayScreen(); fit(); });
+
+// ---------------------------------------------------------------- files
+
+/// Every file of what was dropped, with its path from there.
+async function filesOf(entry, path = '') {
+  const name = path + entry.name;
+  if (entry.isFile) return [[name, await new Promise((resolve, reject) => entry.file(resolve, reject))]];
+  const reader = entry.createReader();
+  const files = [];
+  for (;;) {
+    const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+    if (!some.length) return files;
+    for (const inner of some) files.push(...await filesOf(inner, `${name}/`));
+  }
+}
+
+async function upload(entries) {
+  const name = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, '0')).join('');
+  const files = (await Promise.all(entries.map((entry) => filesOf(entry)))).flat();
+  for (const [index, [path, file]] of files.entries()) {
+    sayNote(`${words.uploading} ${index + 1}/${files.length}`, true);
+    const target = `/upload/${name}/${path.split('/').map(encodeURIComponent).join('/')}`;
+    const answer = await fetch(target, { method: 'POST', body: file, headers: { 'x-handeye': '1' } });
+    if (!answer.ok) throw new Error(`${path}: ${await answer.text()}`);
+  }
+  sayNote('');
+  if (files.length) connection.send({ t: 'open', upload: name });
+}
+
+addEventListener('dragover', (event) => event.preventDefault());
+addEventListener('drop', (event) => {
+  event.preventDefault();
+  if (!people.you) return;
+  const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry()).filter(Boolean);
+  upload(entries).catch((error) => {
+    sayNote(`${words.not_uploaded}: ${error.message}`);
+    setTimeout(() => sayNote(''), 8000);
+  });
+});
+
+const connection = new Connection();
+show.begin();
+if (!touched) typing.focus();

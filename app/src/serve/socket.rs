@@ -1,0 +1,199 @@
+//! The connection of a page: pictures and words one way, what a person does the other way.
+//!
+//! Two tasks, so that a page that takes its pictures slowly is heard all the same: a STOP waits for no picture.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt as _, StreamExt as _};
+use hyper::upgrade::Upgraded;
+use hyper_util::rt::TokioIo;
+use serde::Serialize;
+use tokio::sync::{mpsc, watch};
+use tokio::time::{Instant, interval, timeout};
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::protocol::{Message, Role, WebSocketConfig};
+
+use super::difference::Shown;
+use super::hub::{Errand, Hub, PageId, People, Words};
+use super::input::Said;
+use super::upload::Uploads;
+
+/// Longest message of a page \[bytes\]: what is pasted is in it.
+const MOST_BYTES: usize = 1 << 20;
+
+/// Pictures on their way to a page. With one, the page would wait for the next after every one.
+const ON_THE_WAY: u64 = 2;
+
+/// How often a page is asked whether it is there.
+const PING: Duration = Duration::from_secs(5);
+
+/// A page of which nothing was heard for so long is gone.
+const GONE: Duration = Duration::from_secs(15);
+
+/// A page that takes nothing for so long is gone.
+const STALLED: Duration = Duration::from_secs(30);
+
+type Socket = WebSocketStream<TokioIo<Upgraded>>;
+
+/// What a page is told besides pictures.
+#[derive(Serialize)]
+#[serde(tag = "t", rename_all = "snake_case")]
+enum Told<'a> {
+    /// Who drives.
+    People {
+        you: bool,
+        driven: bool,
+        pages: usize,
+    },
+    /// What the page says by itself.
+    Words {
+        #[serde(flatten)]
+        words: &'a Words,
+    },
+}
+
+/// Talks to a page until it has gone.
+pub async fn attend(upgraded: Upgraded, name: String, hub: Arc<Hub>, uploads: Arc<Uploads>) {
+    let config = WebSocketConfig::default()
+        .max_message_size(Some(MOST_BYTES))
+        .max_frame_size(Some(MOST_BYTES))
+        .max_write_buffer_size(usize::MAX);
+    let socket: Socket =
+        WebSocketStream::from_raw_socket(TokioIo::new(upgraded), Role::Server, Some(config)).await;
+    let (to_page, from_page) = socket.split();
+    let Some((id, errands)) = hub.join(&name) else {
+        tracing::info!("a page was not let in: there are too many");
+        return;
+    };
+    let (shown, acknowledged) = watch::channel(0);
+    // Either ends the other.
+    let ended = tokio::select! {
+        ended = write(to_page, id, &hub, errands, acknowledged) => ended,
+        ended = read(from_page, id, &hub, &uploads, shown) => ended,
+    };
+    hub.leave(id);
+    tracing::debug!(page = id, why = ended, "a page has gone");
+}
+
+async fn read(
+    mut from_page: SplitStream<Socket>,
+    id: PageId,
+    hub: &Hub,
+    uploads: &Uploads,
+    shown: watch::Sender<u64>,
+) -> &'static str {
+    loop {
+        let message = match timeout(GONE, from_page.next()).await {
+            Ok(Some(Ok(message))) => message,
+            Ok(Some(Err(_)) | None) => return "closed",
+            Err(_late) => return "silent",
+        };
+        let text = match message {
+            Message::Text(text) => text,
+            Message::Ping(_) | Message::Pong(_) => continue,
+            Message::Close(_) => return "closed by the page",
+            Message::Binary(_) | Message::Frame(_) => return "not understood",
+        };
+        let Ok(said) = serde_json::from_str::<Said>(&text) else { return "not understood" };
+        match said {
+            Said::Input { events } => {
+                if hub.done(id, events).is_err() {
+                    return "too much";
+                }
+            }
+            Said::Screen(screen) if screen.is_sensible() => hub.screen(id, screen),
+            Said::Screen(_) => return "no size",
+            Said::Shown { number } => {
+                shown.send_replace(number);
+            }
+            Said::Visible { visible } => hub.sees(id, Some(visible), None),
+            Said::Held => hub.held(id),
+            Said::Stop => hub.stop(),
+            Said::Drive => hub.drive(id),
+            Said::Open { upload } => {
+                if let Some(folder) = uploads.finished(&upload) {
+                    hub.open(id, folder);
+                }
+            }
+        }
+    }
+}
+
+async fn write(
+    mut to_page: SplitSink<Socket, Message>,
+    id: PageId,
+    hub: &Hub,
+    mut errands: mpsc::Receiver<Errand>,
+    mut acknowledged: watch::Receiver<u64>,
+) -> &'static str {
+    let (mut pictures, mut people, mut words) = (hub.pictures(), hub.people(), hub.words());
+    pictures.mark_changed();
+    people.mark_changed();
+    words.mark_changed();
+    let mut pings = interval(PING);
+    let mut page = Shown::default();
+    let (mut sent, mut last) = (0, 0);
+    let mut taken = Instant::now();
+    loop {
+        let has_room = sent - (*acknowledged.borrow()).min(sent) < ON_THE_WAY;
+        hub.sees(id, None, Some(has_room));
+        let message = tokio::select! {
+            biased;
+            changed = people.changed() => {
+                if changed.is_err() {
+                    return "ended";
+                }
+                if !hub.has(id) {
+                    return "replaced";
+                }
+                let People { driver, pages } = *people.borrow_and_update();
+                json(&Told::People { you: driver == Some(id), driven: driver.is_some(), pages })
+            }
+            changed = words.changed() => {
+                if changed.is_err() {
+                    return "ended";
+                }
+                let words = words.borrow_and_update();
+                json(&Told::Words { words: &words })
+            }
+            Some(errand) = errands.recv() => json(&errand),
+            changed = acknowledged.changed() => {
+                if changed.is_err() {
+                    return "ended";
+                }
+                taken = Instant::now();
+                continue;
+            }
+            changed = pictures.changed(), if has_room => {
+                if changed.is_err() {
+                    return "ended";
+                }
+                let (number, picture) = pictures.borrow_and_update().clone();
+                if number == 0 || number == last {
+                    continue;
+                }
+                last = number;
+                sent += 1;
+                Message::binary(page.message(sent, &picture))
+            }
+            _ = pings.tick() => {
+                if !has_room && taken.elapsed() > STALLED {
+                    return "stalled";
+                }
+                Message::Ping(Vec::new().into())
+            }
+        };
+        match timeout(STALLED, to_page.send(message)).await {
+            Ok(Ok(())) => {}
+            Ok(Err(_)) => return "closed",
+            Err(_late) => return "stalled",
+        }
+    }
+}
+
+fn json(told: &impl Serialize) -> Message {
+    // Words and numbers only: they can be written.
+    Message::text(serde_json::to_string(told).unwrap_or_default())
+}

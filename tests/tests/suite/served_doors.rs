@@ -1,0 +1,192 @@
+//! Who is let in by `handeye serve`, and what it holds for those who are not.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tungstenite::Message;
+use tungstenite::client::IntoClientRequest as _;
+use tungstenite::http::HeaderValue;
+
+/// Longer than anything takes on a busy machine.
+const SOON: Duration = Duration::from_mins(2);
+
+/// The served workbench; it ends when it is dropped.
+struct Served {
+    child: Child,
+    address: String,
+    /// With the key, where there is one.
+    url: String,
+    _home: tempfile::TempDir,
+}
+
+impl Served {
+    fn start(arguments: &[&str]) -> Self {
+        let home = tempfile::tempdir().expect("a folder");
+        let mut child = Command::new(handeye_tests::handeye_binary())
+            .args(["serve", "--quiet", "--port", "0", "--rerun", "off"])
+            .args(arguments)
+            .env("HOME", home.path())
+            .env("XDG_CONFIG_HOME", home.path().join("config"))
+            .env("XDG_DATA_HOME", home.path().join("data"))
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("it starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("a line");
+        let url = line.trim().strip_prefix("the workbench is at ").expect("an address").to_owned();
+        let port = url.trim_start_matches("http://").split('/').next().and_then(|host| host.rsplit(':').next());
+        let address = format!("127.0.0.1:{}", port.expect("a port"));
+        Self { child, address, url, _home: home }
+    }
+
+    /// The head of the answer to a request.
+    fn ask(&self, request: &str) -> String {
+        let mut socket = TcpStream::connect(&self.address).expect("it listens");
+        socket.set_read_timeout(Some(SOON)).expect("set");
+        socket.write_all(request.replace("ADDRESS", &self.address).as_bytes()).expect("sent");
+        let mut answer = Vec::new();
+        let mut piece = [0; 4096];
+        while !String::from_utf8_lossy(&answer).contains("\r\n\r\n") {
+            match socket.read(&mut piece) {
+                Ok(count) if count > 0 => answer.extend_from_slice(&piece[..count]),
+                _ => break,
+            }
+        }
+        String::from_utf8_lossy(&answer).into_owned()
+    }
+
+    fn page(&self, name: &str) -> tungstenite::WebSocket<TcpStream> {
+        let mut request = format!("ws://{}/socket?page={name}", self.address).into_client_request().expect("a request");
+        let origin = HeaderValue::from_str(&format!("http://{}", self.address)).expect("a header");
+        request.headers_mut().insert("origin", origin);
+        let stream = TcpStream::connect(&self.address).expect("it listens");
+        stream.set_read_timeout(Some(SOON)).expect("set");
+        tungstenite::client(request, stream).expect("a page").0
+    }
+
+    /// Memory that it holds \[MB\].
+    fn megabytes(&self) -> f64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).expect("it runs");
+        let line = status.lines().find(|line| line.starts_with("VmRSS:")).expect("its memory");
+        line.split_whitespace().nth(1).and_then(|kilobytes| kilobytes.parse::<f64>().ok()).expect("a number") / 1024.0
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ended = self.child.kill().and_then(|()| self.child.wait()).is_ok();
+    }
+}
+
+/// Reads until a picture has come, and says that it is shown.
+fn picture(page: &mut tungstenite::WebSocket<TcpStream>) -> u64 {
+    loop {
+        let Message::Binary(bytes) = page.read().expect("an answer") else { continue };
+        let end = 4 + u32::from_le_bytes(bytes[..4].try_into().expect("four bytes")) as usize;
+        let head: Value = serde_json::from_slice(&bytes[4..end]).expect("JSON");
+        let number = head["number"].as_u64().expect("a number");
+        page.send(Message::text(json!({"t": "shown", "number": number}).to_string())).expect("sent");
+        return number;
+    }
+}
+
+/// A request to become the connection of a page.
+fn upgrade(host: &str, more: &str) -> String {
+    format!(
+        "GET /socket?page=x HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{more}\r\n"
+    )
+}
+
+#[test]
+fn pages_of_other_sites_files_elsewhere_and_forms_are_refused() {
+    let served = Served::start(&[]);
+    let status = |request: &str| served.ask(request).split_whitespace().nth(1).unwrap_or_default().to_owned();
+    assert_eq!(status("GET / HTTP/1.1\r\nHost: ADDRESS\r\n\r\n"), "200");
+    assert_eq!(status(&upgrade("ADDRESS", "Origin: http://ADDRESS\r\n")), "101");
+    for (host, more) in [
+        ("ADDRESS", "Origin: http://evil.example\r\n"),
+        ("ADDRESS", "Origin: null\r\n"),
+        ("evil.example", "Origin: http://evil.example\r\n"),
+        ("evil.example", ""),
+    ] {
+        assert_eq!(status(&upgrade(host, more)), "403", "{host} {more}");
+    }
+    // A program that is no page.
+    assert_eq!(status(&upgrade("ADDRESS", "")), "400");
+    for path in ["/../Cargo.toml", "/client.js/../../etc/passwd", "/%2e%2e/etc/passwd", "/exports"] {
+        assert_eq!(status(&format!("GET {path} HTTP/1.1\r\nHost: ADDRESS\r\n\r\n")), "404", "{path}");
+    }
+    for folder in ["/etc", "%2Fetc", "..", "/", ""] {
+        let request = format!("GET /download?folder={folder} HTTP/1.1\r\nHost: ADDRESS\r\n\r\n");
+        assert_eq!(status(&request), "403", "{folder}");
+    }
+    // What a form of another site can send, and names that lead out.
+    let post = |path: &str, headers: &str| {
+        status(&format!("POST {path} HTTP/1.1\r\nHost: ADDRESS\r\nContent-Length: 1\r\n{headers}\r\nx"))
+    };
+    assert_eq!(post("/upload/a/x.txt", "Origin: http://evil.example\r\nX-Handeye: 1\r\n"), "403");
+    assert_eq!(post("/upload/a/x.txt", "Content-Type: text/plain\r\n"), "403");
+    for path in ["/upload/a/..%2Fx", "/upload/a/%2Fetc%2Fx", "/upload/..%2Fa/x", "/upload/a/b%5Cx", "/upload/a/%ff"] {
+        assert_eq!(post(path, "X-Handeye: 1\r\n"), "400", "{path}");
+    }
+    assert_eq!(post("/", ""), "405");
+}
+
+#[test]
+fn from_elsewhere_nobody_enters_without_the_key() {
+    let served = Served::start(&["--bind", "0.0.0.0"]);
+    let head = |request: &str| served.ask(request);
+    let key = served.url.split("handeye_key=").nth(1).expect("a key in the address");
+    assert_eq!(key.len(), 32, "128 bits");
+    assert!(head("GET / HTTP/1.1\r\nHost: ADDRESS\r\n\r\n").starts_with("HTTP/1.1 401"));
+    assert!(head(&upgrade("ADDRESS", "Origin: http://ADDRESS\r\n")).starts_with("HTTP/1.1 401"));
+    let welcome = head(&format!("GET /?handeye_key={key} HTTP/1.1\r\nHost: ADDRESS\r\n\r\n"));
+    assert!(welcome.starts_with("HTTP/1.1 303") && welcome.contains("HttpOnly"), "{welcome}");
+    let cookie = format!("Cookie: handeye_key={key}\r\n");
+    assert!(head(&format!("GET / HTTP/1.1\r\nHost: ADDRESS\r\n{cookie}\r\n")).starts_with("HTTP/1.1 200"));
+    assert!(head(&upgrade("ADDRESS", &format!("Origin: http://ADDRESS\r\n{cookie}"))).starts_with("HTTP/1.1 101"));
+    assert!(head(&upgrade("ADDRESS", &format!("Origin: http://evil.example\r\n{cookie}"))).starts_with("HTTP/1.1 403"));
+}
+
+#[test]
+fn broken_messages_and_a_thousand_silent_connections_leave_the_driving_page_alone() {
+    let served = Served::start(&[]);
+    let mut driver = served.page("driver");
+    let screen = json!({"t": "screen", "width": 1440.0, "height": 900.0, "scale": 1.0, "touch": false});
+    driver.send(Message::text(screen.to_string())).expect("sent");
+    let first = picture(&mut driver);
+    let before = served.megabytes();
+
+    let silent: Vec<TcpStream> = (0..1000).filter_map(|_| TcpStream::connect(&served.address).ok()).collect();
+    // Each of these ends its own connection and nothing else.
+    let broken: Vec<Message> = vec![
+        Message::text("{"),
+        Message::text("[]"),
+        Message::text(r#"{"t":"input","events":[{"e":"move","at":[1]}]}"#),
+        Message::text(r#"{"t":"screen","width":1e9,"height":1,"scale":1}"#),
+        Message::text(r#"{"t":"screen","width":null,"height":900,"scale":1}"#),
+        Message::binary(vec![0; 1000]),
+        Message::text("x".repeat(2 << 20)),
+        Message::text(format!(r#"{{"t":"input","events":[{}]}}"#, vec![r#"{"e":"leave"}"#; 20_000].join(","))),
+    ];
+    for (number, message) in broken.into_iter().enumerate() {
+        let mut page = served.page(&format!("broken{number}"));
+        // It may be closed while it still sends.
+        let _sent = page.send(message).is_ok();
+        if number != 7 {
+            while page.read().is_ok() {}
+        }
+    }
+    let now = picture(&mut driver);
+    assert!(now > first);
+    drop(silent);
+    let grown = served.megabytes() - before;
+    println!("1,000 silent connections and 8 broken pages: {grown:.0} MB more");
+    assert!(grown < 100.0, "{grown} MB");
+}

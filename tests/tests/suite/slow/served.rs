@@ -1,0 +1,217 @@
+//! The workbench in a browser: a real one, with real events, over the real connection.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use handeye_sim_link::client::cell::{Arm, CellPaths};
+use handeye_sim_link::client::{ConnectionOptions, Endpoint};
+use handeye_tests::CellProcess;
+use handeye_tests::desktop::{self, Desktop};
+use serde_json::Value;
+
+/// From the last sign of a held button to an arm at rest.
+const AT_REST: Duration = Duration::from_millis(500);
+
+/// An arm that stays where it is for so long is at rest; a pass takes 50 ms.
+const STILL: Duration = Duration::from_millis(400);
+
+fn shots(name: &str) -> PathBuf {
+    std::env::var_os("HANDEYE_SCREENSHOTS")
+        .filter(|folder| !folder.is_empty())
+        .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name), PathBuf::from)
+}
+
+/// From the start to exported files, with few clicks; and what the page said to its console on the way.
+fn first_user(desktop: &mut Desktop) {
+    desktop.until_seen("Connected to the built-in cell");
+    desktop.until_seen("Board in view");
+    desktop.photograph("1-connected");
+    desktop.click("Calibrate for me");
+    desktop.until_seen("Lowers the expected error");
+    desktop.photograph("2-guided");
+    desktop.until_seen("The goal is reached");
+    desktop.until_seen("3 captures");
+    desktop.click("4 Solve");
+    desktop.until_seen("Expected error");
+    desktop.photograph("3-solved");
+    desktop.click("6 Export");
+    desktop.click("Export 4 formats");
+    desktop.until_seen("read back and compared");
+    desktop.photograph("4-exported");
+    let sessions = desktop.home().join("handeye-sessions");
+    let session = std::fs::read_dir(&sessions).expect("the sessions").flatten().next().expect("a session").path();
+    for file in ["result.json", "exports/calibration.json", "exports/opencv.yaml"] {
+        assert!(session.join(file).is_file(), "{file}");
+    }
+    let (browser, _) = desktop.page();
+    assert_eq!(browser.said(), [] as [String; 0], "the page complains");
+}
+
+#[test]
+fn a_first_user_gets_to_exported_files_in_a_browser_and_downloads_them() {
+    if !desktop::is_possible_in_browser() {
+        return;
+    }
+    let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &[]);
+    first_user(&mut desktop);
+    // What the button asks for, as the page asks for it.
+    desktop.place_of("Download as one archive");
+    let session = desktop.home().join("handeye-sessions");
+    let session = std::fs::read_dir(session).expect("the sessions").flatten().next().expect("a session").path();
+    let folder = session.join("exports");
+    let (browser, tab) = desktop.page();
+    let fetched = browser.evaluate(
+        tab,
+        &format!(
+            "fetch('/download?folder=' + encodeURIComponent({folder:?}))
+                .then(async (answer) => [answer.status, answer.headers.get('content-type'), \
+                 (await answer.arrayBuffer()).byteLength])"
+        ),
+    );
+    assert_eq!((&fetched[0], &fetched[1]), (&Value::from(200), &Value::from("application/zip")), "{fetched}");
+    assert!(fetched[2].as_u64().is_some_and(|bytes| bytes > 1000), "{fetched}");
+}
+
+#[test]
+fn a_first_user_gets_to_exported_files_with_fingers_on_a_tablet() {
+    if !desktop::is_possible_in_browser() {
+        return;
+    }
+    let mut desktop = Desktop::in_browser((1024, 768), true, &shots("served_tablet"), &[]);
+    first_user(&mut desktop);
+}
+
+/// The first place of the tip in the bar at the bottom.
+fn tip(desktop: &mut Desktop) -> String {
+    desktop.label("Tip in base, x y z [mm]:")
+}
+
+/// Holds a button that moves the arm, and waits until it moves.
+fn hold_a_jog(desktop: &mut Desktop) {
+    desktop.until_seen("Board in view");
+    desktop.click("Jog");
+    desktop.click("Hold");
+    let place = desktop.place_of("Move +Z");
+    let before = tip(desktop);
+    let (browser, tab) = desktop.page();
+    browser.hold(tab, place);
+    desktop.until_other("Tip in base, x y z [mm]:", &before);
+}
+
+/// How long the arm still moves; it is at rest when it stays where it is for some passes.
+fn moves_for(arm: &mut Arm) -> Duration {
+    let began = Instant::now();
+    let (mut last, mut moved) = (arm.joint_values().expect("a call"), began);
+    while moved.elapsed() < STILL {
+        let now = arm.joint_values().expect("a call");
+        if now != last {
+            (last, moved) = (now, Instant::now());
+        }
+    }
+    moved - began
+}
+
+#[test]
+fn a_browser_that_stands_still_lets_go_of_the_arm_and_comes_back() {
+    if !desktop::is_possible_in_browser() {
+        return;
+    }
+    let cell = CellProcess::start(&[]);
+    let endpoint = Endpoint::local(cell.port());
+    let mut arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
+    arm.sim().start_simulation().expect("it starts");
+    let address = endpoint.to_string();
+    let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &["--connect", &address]);
+    hold_a_jog(&mut desktop);
+    desktop.page().0.signal("STOP");
+    let took = moves_for(&mut arm);
+    println!("a page that stands still: the arm at rest after {:.0} ms", took.as_secs_f64() * 1e3);
+    // With half a second as the goal; a machine that builds beside it takes longer to everything.
+    assert!(took < 4 * AT_REST, "{took:?}");
+    let rested = arm.joint_values().expect("a call");
+    desktop.page().0.signal("CONT");
+    let (browser, tab) = desktop.page();
+    browser.until(tab, "show.picture && document.getElementById('note').hidden && people.you");
+    desktop.click("Poses");
+    desktop.until_seen("No captures yet");
+    assert_eq!(arm.joint_values().expect("a call"), rested, "it goes on by itself");
+}
+
+#[test]
+fn others_watch_stop_the_arm_and_take_over_with_one_click() {
+    if !desktop::is_possible_in_browser() {
+        return;
+    }
+    let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &[]);
+    desktop.until_seen("Board in view");
+    let (browser, driver) = desktop.page();
+    let url = browser.evaluate(driver, "location.href").as_str().expect("an address").to_owned();
+    let watcher = browser.open(&url, (900, 700), false);
+    browser.until(&watcher, "show.picture && !people.you && !document.getElementById('bar').hidden");
+    let (browser, driver) = desktop.page();
+    assert_eq!(browser.evaluate(driver, "people.pages"), Value::from(2));
+
+    // What is done at a page that watches has no effect; its STOP has.
+    hold_a_jog(&mut desktop);
+    let (browser, _) = desktop.page();
+    browser.evaluate(&watcher, "document.getElementById('stop').click()");
+    desktop.until_seen("The arm is at rest");
+
+    let (browser, driver) = desktop.page();
+    browser.evaluate(&watcher, "document.getElementById('drive').click()");
+    browser.until(&watcher, "people.you && show.picture.size[0] === 1024");
+    browser.until(driver, "!people.you && !document.getElementById('bar').hidden");
+    std::fs::write(shots("served").join("watching.png"), browser.photograph(driver)).expect("written");
+
+    // The page that drives has gone: nobody drives until somebody wants to.
+    browser.close(&watcher);
+    browser.until(driver, "!people.driven");
+    browser.evaluate(driver, "document.getElementById('drive').click()");
+    browser.until(driver, "people.you && document.getElementById('bar').hidden");
+}
+
+#[test]
+fn files_that_are_dropped_on_the_page_are_opened_as_a_session() {
+    if !desktop::is_possible_in_browser() {
+        return;
+    }
+    let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &[]);
+    desktop.until_seen("Board in view");
+    // A recording as people have it, made by the command line on the built-in cell.
+    let folder = tempfile::tempdir().expect("a folder");
+    let session = folder.path().join("recorded");
+    let made = std::process::Command::new(handeye_tests::handeye_binary())
+        .args(["auto", "--quiet", "--out"])
+        .arg(&session)
+        .current_dir(folder.path())
+        .status();
+    assert!(made.is_ok_and(|status| status.success()));
+    let mut files = Vec::new();
+    collect(&session, "recorded", &mut files);
+    let (browser, tab) = desktop.page();
+    for (name, bytes) in &files {
+        let base64 = data_encoding::BASE64.encode(bytes);
+        let put = browser.evaluate(
+            tab,
+            &format!(
+                "fetch('/upload/abc123/{name}', {{ method: 'POST', headers: {{ 'x-handeye': '1' }}, \
+                 body: Uint8Array.from(atob('{base64}'), (letter) => letter.charCodeAt(0)) }}).then((a) => a.status)"
+            ),
+        );
+        assert_eq!(put, Value::from(204), "{name}");
+    }
+    browser.evaluate(tab, "connection.send({ t: 'open', upload: 'abc123' })");
+    desktop.until_seen("10 poses");
+    desktop.until_seen("(95 %)");
+}
+
+fn collect(folder: &std::path::Path, name: &str, files: &mut Vec<(String, Vec<u8>)>) {
+    for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+        let name = format!("{name}/{}", entry.file_name().to_string_lossy());
+        if entry.path().is_dir() {
+            collect(&entry.path(), &name, files);
+        } else {
+            files.push((name, std::fs::read(entry.path()).expect("a file")));
+        }
+    }
+}
