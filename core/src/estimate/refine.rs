@@ -20,7 +20,7 @@ use crate::estimate::uncertainty::{quality, widening};
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::progress::Work;
 use crate::targets::TargetSpec;
-use crate::targets::observation::View;
+use crate::targets::observation::{Corners, View};
 
 /// Joint offsets are taken when they lower the error on held-out views by so much of it.
 const JOINTS_GAIN: f64 = 0.05;
@@ -69,7 +69,7 @@ fn sampled(view: &View) -> View {
     const CORNERS: usize = 6;
     let count = view.corners.len();
     let taken = CORNERS.min(count);
-    let corners = (0..taken).map(|k| view.corners[k * (count - 1) / (taken - 1).max(1)]).collect();
+    let corners: Corners = (0..taken).map(|k| view.corners[k * (count - 1) / (taken - 1).max(1)]).collect();
     View::new(view.name.clone(), view.base_from_tip, corners)
 }
 
