@@ -112,3 +112,20 @@ pub fn renumber(corners: &mut [Corner], target: &TargetSpec) {
     }
     corners.sort_by_key(|corner| corner.index);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_share_their_corners_until_one_is_changed() {
+        let first: Corners = (0..4).map(|i| Corner::new(i, Vector2::new(i as f64, 0.0))).collect();
+        let mut second = first.clone();
+        assert!(std::ptr::eq(&*first, &*second), "ten thousand views would be copied");
+        second[0].px.x = 7.0;
+        second.retain(|corner| corner.index < 2);
+        assert_eq!(first.len(), 4, "whoever holds the others sees no change");
+        assert_eq!(first[0].px.x, 0.0);
+        assert_eq!(second.iter().map(|corner| corner.px.x).collect::<Vec<_>>(), [7.0, 1.0]);
+    }
+}

@@ -80,6 +80,8 @@ pub fn with_shown_distortion(
     let Some(all) = Equations::new(problem, without, most, cancel)? else { return Ok(None) };
     let mut last = None;
     let shown = settled(&without.intrinsics, &all, views, |field, degree| {
+        // That of the round before is not needed any more, and is large where views are many.
+        last = None;
         let corrected = corrected(views, field);
         let problem = JointProblem { views: &corrected, ..*problem };
         let solution = match fit(&problem, &without.as_start(), cancel) {
