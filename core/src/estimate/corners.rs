@@ -266,8 +266,9 @@ fn with_robot(
             return Err(CalibrateError::NoRobotPose { name: s.view.name.clone() });
         };
         views.push(View {
+            corners: s.corners.clone(),
             tip_by_joint: s.view.tip_by_joint.clone(),
-            ..View::new(s.view.name.clone(), base_from_tip, s.corners.clone())
+            ..View::new(s.view.name.clone(), base_from_tip, Vec::new())
         });
         pairs.push(PosePair {
             anchor_from_mount: mode.anchor_from_mount(&base_from_tip),

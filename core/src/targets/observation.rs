@@ -99,7 +99,7 @@ pub struct View {
 
 impl View {
     /// A view of a robot whose joints are not known.
-    pub fn new(name: String, base_from_tip: Pose<Base, Tip>, corners: impl Into<Corners>) -> Self {
+    pub fn new(name: String, base_from_tip: Pose<Base, Tip>, corners: Vec<Corner>) -> Self {
         Self { name, base_from_tip, corners: corners.into(), tip_by_joint: Vec::new() }
     }
 }

@@ -48,7 +48,9 @@ fn sights(recording: &Recording, session: &Observations) -> Sights {
         let corners: Vec<_> = stream
             .images
             .iter()
-            .map(|image| session.views[view_of(&recording.root.join(&image.path))].corners.clone())
+            .map(|image| {
+                session.views[view_of(&recording.root.join(&image.path))].corners.as_deref().map(<[_]>::to_vec)
+            })
             .collect();
         Sight::of_corners(session.target, session.image_size, CameraKnowledge::Fixed(camera), &corners).ok()
     };

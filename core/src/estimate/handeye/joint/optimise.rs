@@ -3,7 +3,7 @@
 use super::normal::System;
 use super::state::State;
 use super::{JointProblem, Noise};
-use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::{HandEyeError, determined};
 use crate::progress::CancelToken;
 
 /// Steps of one minimisation; a handful is usual.
@@ -57,9 +57,8 @@ pub fn minimise(
             // Two systems of many views are half of all memory, and few steps are refused, so the place that was left is
             // linearised once more for these.
             drop(system);
-            match System::new(problem, &next, cancel) {
-                Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-                Ok(next_system) if next_system.cost(noise) < cost => {
+            match determined(System::new(problem, &next, cancel))? {
+                Some(next_system) if next_system.cost(noise) < cost => {
                     (*state, system) = (next, next_system);
                     cost = system.cost(noise);
                     damping = (damping * 0.1).max(1e-12);

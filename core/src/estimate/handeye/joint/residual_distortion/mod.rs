@@ -20,7 +20,7 @@ pub mod shared;
 use nalgebra::DMatrix;
 
 use super::{JointProblem, JointSolution, fit};
-use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::{HandEyeError, determined};
 use crate::geometry::camera::{Intrinsics, ResidualDistortion};
 use crate::progress::CancelToken;
 use crate::targets::observation::{Corner, View};
@@ -84,11 +84,7 @@ pub fn with_shown_distortion(
         last = None;
         let corrected = corrected(views, field);
         let problem = JointProblem { views: &corrected, ..*problem };
-        let solution = match fit(&problem, &without.as_start(), cancel) {
-            Ok(solution) => solution,
-            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-            Err(_) => return Ok(None),
-        };
+        let Some(solution) = determined(fit(&problem, &without.as_start(), cancel))? else { return Ok(None) };
         let equations = Equations::new(&problem, &solution, degree, cancel)?;
         last = Some(solution);
         Ok(equations)
