@@ -169,7 +169,7 @@ impl Solution {
         let verifying = verification.iter().map(|(id, view)| (id, Some(view.corners.clone())));
         for (id, corners) in fitted.chain(verifying) {
             let observed = Observed {
-                corners,
+                corners: corners.map(|corners| corners.to_vec()),
                 image_size: observations.image_size,
                 // Nobody looks at small copies here.
                 thumbnail: Arc::default(),

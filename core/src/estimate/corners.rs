@@ -235,7 +235,10 @@ fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens
         view.status = ViewStatus::Used;
         view.rms_px = Some(lens.rms_px[i]);
         view.corners_aside.clone_from(&lens.aside[i]);
-        view.residuals = residuals(&lens.intrinsics, &lens.camera_from_target[i], &points, &corners);
+        if observations.mode.is_none() {
+            // With a robot the residuals are those of its chain.
+            view.residuals = residuals(&lens.intrinsics, &lens.camera_from_target[i], &points, &corners);
+        }
         view.camera_from_target = Some(lens.camera_from_target[i]);
         corners_used.push(corners.len());
     }
@@ -243,6 +246,7 @@ fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens
     Calibration {
         camera: Some(CalibratedCamera { intrinsics: lens.intrinsics, fixed: !lens.free, sigma_px }),
         camera_fit: lens.fit,
+        lens_by_corners: (lens.free && !lens.is_bent()).then_some(lens.intrinsics),
         rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(corners_used))),
         views,
         ..Calibration::default()
@@ -262,8 +266,9 @@ fn with_robot(
             return Err(CalibrateError::NoRobotPose { name: s.view.name.clone() });
         };
         views.push(View {
+            corners: s.corners.clone(),
             tip_by_joint: s.view.tip_by_joint.clone(),
-            ..View::new(s.view.name.clone(), base_from_tip, s.corners.to_vec())
+            ..View::new(s.view.name.clone(), base_from_tip, Vec::new())
         });
         pairs.push(PosePair {
             anchor_from_mount: mode.anchor_from_mount(&base_from_tip),

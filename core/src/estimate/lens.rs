@@ -1,11 +1,14 @@
 //! The camera, and the target's pose in every view that goes with it.
 
+use std::borrow::Cow;
+
 use nalgebra::Vector2;
 
 use super::{CalibrateError, CameraFit, CameraKnowledge, Observations};
 use crate::estimate::detected_view::DetectedView;
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::intrinsics::{self, Bend, Found, IntrinsicsError, Options, Screened};
+use crate::estimate::wrong_corners::without;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::planar_pose::{self, PlanarPose, Solution};
@@ -44,7 +47,7 @@ impl Lens {
             CameraKnowledge::Fixed(intrinsics) => Self::given(intrinsics, observations, seen, work),
             CameraKnowledge::Estimate { model, start } => {
                 work.report(Stage::Intrinsics, 0, 1);
-                let views: Vec<&[Corner]> = seen.iter().map(|s| s.corners).collect();
+                let views: Vec<&[Corner]> = seen.iter().map(|s| &**s.corners).collect();
                 let options = Options { start, bend: Bend::IfShown, ..Options::new(model) };
                 let (target, size) = (&observations.target, observations.image_size);
                 let screened = intrinsics::solve_screened(&views, target, size, &options, keep_outliers, work.cancel);
@@ -107,8 +110,8 @@ impl Lens {
     }
 
     /// The corners of a view that the camera was found from.
-    pub fn corners_left(&self, view: usize, corners: &[Corner]) -> Vec<Corner> {
-        left(corners, &self.aside[view])
+    pub fn corners_left<'a>(&self, view: usize, corners: &'a [Corner]) -> Cow<'a, [Corner]> {
+        without(corners, &self.aside[view])
     }
 }
 
@@ -141,19 +144,14 @@ fn alternatives(
     aside: &[Vec<usize>],
 ) -> Vec<Option<Pose<Camera, Target>>> {
     let board = BoardPoints::new(&observations.target.points());
-    let kept: Vec<Vec<Corner>> = seen.iter().zip(aside).map(|(s, aside)| left(s.corners, aside)).collect();
-    let poses: Vec<PlanarPose> = (kept.iter().zip(&found.camera_from_target).zip(&found.rms_px))
-        .map(|((corners, pose), rms_px)| {
+    let kept: Vec<Cow<'_, [Corner]>> = seen.iter().zip(aside).map(|(s, aside)| without(s.corners, aside)).collect();
+    let poses: Vec<PlanarPose> = (kept.iter().zip(&found.camera_from_target).zip(&found.rms_px).zip(&found.mirrored))
+        .map(|(((corners, pose), rms_px), mirrored)| {
             let (intrinsics, shape) = (&found.intrinsics, &found.shape);
             let view = ViewInput { intrinsics, board: &board, shape, corners, sqrt_weights: &[] };
             let best = Solution { camera_from_target: *pose, rms_px: *rms_px };
-            PlanarPose { best, alternative: planar_pose::other(&view, &best) }
+            PlanarPose { best, alternative: mirrored.and_then(|near| planar_pose::other(&view, &best, &near)) }
         })
         .collect();
-    possible(&poses, &kept.iter().map(Vec::len).collect::<Vec<_>>())
-}
-
-/// The corners of a view without some.
-fn left(corners: &[Corner], aside: &[usize]) -> Vec<Corner> {
-    corners.iter().filter(|corner| aside.binary_search(&corner.index).is_err()).copied().collect()
+    possible(&poses, &kept.iter().map(|corners| corners.len()).collect::<Vec<_>>())
 }

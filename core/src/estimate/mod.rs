@@ -37,7 +37,7 @@ use crate::geometry::planar_pose::PoseError;
 use crate::progress::{Stage, Work};
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardShape;
-use crate::targets::observation::{Corner, View};
+use crate::targets::observation::{Corner, Corners, View};
 
 /// What was observed, from a dataset folder, a session or a live capture.
 #[derive(Debug, Clone)]
@@ -62,7 +62,7 @@ pub struct ObservedView {
     /// The reported robot pose; `None` when there is no robot.
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// The corners; `None` when the target was not found.
-    pub corners: Option<Vec<Corner>>,
+    pub corners: Option<Corners>,
     /// How the tip turns with each joint, as in [`crate::targets::observation::View::tip_by_joint`]; empty where it is not known.
     pub tip_by_joint: Vec<Vector6<f64>>,
     /// A target pose measured elsewhere, used when there are no corners.
@@ -77,7 +77,7 @@ impl ObservedView {
         Self {
             name: name.into(),
             base_from_tip,
-            corners,
+            corners: corners.map(Corners::from),
             tip_by_joint: Vec::new(),
             camera_from_target: None,
             in_fit: true,
@@ -90,7 +90,8 @@ impl From<&View> for ObservedView {
     fn from(view: &View) -> Self {
         Self {
             tip_by_joint: view.tip_by_joint.clone(),
-            ..Self::new(view.name.clone(), Some(view.base_from_tip), Some(view.corners.clone()))
+            corners: Some(view.corners.clone()),
+            ..Self::new(view.name.clone(), Some(view.base_from_tip), None)
         }
     }
 }
@@ -273,6 +274,9 @@ pub struct Calibration {
     pub camera_fit: Option<CameraFit>,
     /// What an estimate from poses of the target alone says of them; `None` for one from corners, and for a closed form.
     pub pose_fit: Option<PoseFit>,
+    /// An estimated lens as the corners alone show it, by a flat target: it does not depend on the robot, which may be what is
+    /// wrong. `None` where it was given, and where the corners show a bent target.
+    pub(crate) lens_by_corners: Option<Intrinsics>,
     /// RMS of 2-D corner residuals, pixels.
     pub rms_px: Option<f64>,
     /// What only the joint estimate knows; `None` for a closed form, and without a robot.

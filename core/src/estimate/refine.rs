@@ -13,7 +13,7 @@ use crate::estimate::handeye::joint::residual_distortion::{corrected, with_its_e
 use crate::estimate::handeye::joint::{
     self, CornerWeights, Free, JointProblem, JointSolution, JointStart, ShownDistortion, with_shown_field,
 };
-use crate::estimate::handeye::{HandEyeError, PosePair};
+use crate::estimate::handeye::{HandEyeError, PosePair, determined};
 use crate::estimate::residuals::squared_residuals;
 use crate::estimate::uncertainty::widening::Widening;
 use crate::estimate::uncertainty::{quality, widening};
@@ -191,13 +191,8 @@ fn bent(
     if !one_step.is_some_and(may_be_shown) {
         return Ok(None);
     }
-    // A target seen square on says nothing of its shape.
-    let determined = |solution: Result<JointSolution, HandEyeError>| match solution {
-        Ok(solution) => Ok(Some(solution)),
-        Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
-        Err(_) => Ok(None),
-    };
     let start = screened.solution.as_start();
+    // A target seen square on says nothing of its shape.
     let Some(solution) = determined(joint::fit(&with_warp, &start, work.cancel))? else { return Ok(None) };
     // What estimated noise levels and a curved cost do to the covariance makes it larger.
     let fitted = joint::warp_ratio(&with_warp, &solution, work.cancel)?;
@@ -229,11 +224,8 @@ fn offsets(
     }
     let without = kept_problem(problem, &views, &screened.solution);
     let with = JointProblem { free: Free { joints: true, ..without.free }, ..without };
-    let solution = match joint::fit(&with, &screened.solution.as_start(), work.cancel) {
-        Ok(solution) => solution,
-        Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-        Err(_) => return Ok(None),
-    };
+    let fit = joint::fit(&with, &screened.solution.as_start(), work.cancel);
+    let Some(solution) = determined(fit)? else { return Ok(None) };
     let held_out =
         |problem: &JointProblem<'_>, solution: &JointSolution| quality::held_out_rms_px(problem, solution, work.cancel);
     let before = held_out(&without, &screened.solution)?;

@@ -1,5 +1,9 @@
 //! From where a corner is simply wrong: one rule, for the joint estimate and for the camera alone.
 
+use std::borrow::Cow;
+
+use crate::targets::observation::Corner;
+
 /// A corner is wrong beyond so many times the residual that nine in ten corners stay below: seven and a half standard
 /// deviations of Gaussian noise.
 const TIMES_COMMON: f64 = 3.5;
@@ -19,4 +23,12 @@ pub(super) fn limit(mut lengths: Vec<f64>) -> Option<f64> {
 /// Whether the corners of a view that are left are enough.
 pub(super) fn enough(left: usize, of: usize) -> bool {
     left as f64 >= LEAST_PART * of as f64 && left >= LEAST
+}
+
+/// The corners of a view without some, given by the index of their point, ascending.
+pub(super) fn without<'a>(corners: &'a [Corner], aside: &[usize]) -> Cow<'a, [Corner]> {
+    if aside.is_empty() {
+        return Cow::Borrowed(corners);
+    }
+    corners.iter().filter(|corner| aside.binary_search(&corner.index).is_err()).copied().collect()
 }

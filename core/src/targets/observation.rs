@@ -1,5 +1,8 @@
 //! What a solver is given: corners in an image and the pose that the robot reported for it.
 
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
+
 use nalgebra::{Matrix2, Vector2, Vector6};
 
 use crate::geometry::frames::{Base, Pose, Tip};
@@ -24,6 +27,62 @@ impl Corner {
     }
 }
 
+/// The corners of one image, in any order. Copies share them until one is changed: what is observed, judged and kept for a
+/// fit are the same corners, which for many views are the most of all memory.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Corners(Arc<Vec<Corner>>);
+
+impl Corners {
+    /// Keeps those that a condition is true of.
+    pub fn retain(&mut self, keep: impl FnMut(&Corner) -> bool) {
+        Arc::make_mut(&mut self.0).retain(keep);
+    }
+}
+
+impl Deref for Corners {
+    type Target = [Corner];
+
+    fn deref(&self) -> &[Corner] {
+        &self.0
+    }
+}
+
+impl DerefMut for Corners {
+    fn deref_mut(&mut self) -> &mut [Corner] {
+        Arc::make_mut(&mut self.0).as_mut_slice()
+    }
+}
+
+impl From<Vec<Corner>> for Corners {
+    fn from(corners: Vec<Corner>) -> Self {
+        Self(Arc::new(corners))
+    }
+}
+
+impl FromIterator<Corner> for Corners {
+    fn from_iter<T: IntoIterator<Item = Corner>>(corners: T) -> Self {
+        Vec::from_iter(corners).into()
+    }
+}
+
+impl<'a> IntoIterator for &'a Corners {
+    type Item = &'a Corner;
+    type IntoIter = std::slice::Iter<'a, Corner>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.iter()
+    }
+}
+
+impl<'a> IntoIterator for &'a mut Corners {
+    type Item = &'a mut Corner;
+    type IntoIter = std::slice::IterMut<'a, Corner>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter_mut()
+    }
+}
+
 /// One image of the target and the robot pose it was taken at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
@@ -32,7 +91,7 @@ pub struct View {
     /// Tip pose as the controller reported it.
     pub base_from_tip: Pose<Base, Tip>,
     /// The target points found; empty when the target was not found.
-    pub corners: Vec<Corner>,
+    pub corners: Corners,
     /// How the tip turns with each joint: entry `j` is the twist `[t; r]` per radian with which joint `j` perturbs
     /// `base_from_tip` on the right, metres and radians. Empty where the joint angles or the arm are not known.
     pub tip_by_joint: Vec<Vector6<f64>>,
@@ -41,7 +100,7 @@ pub struct View {
 impl View {
     /// A view of a robot whose joints are not known.
     pub fn new(name: String, base_from_tip: Pose<Base, Tip>, corners: Vec<Corner>) -> Self {
-        Self { name, base_from_tip, corners, tip_by_joint: Vec::new() }
+        Self { name, base_from_tip, corners: corners.into(), tip_by_joint: Vec::new() }
     }
 }
 
@@ -52,4 +111,21 @@ pub fn renumber(corners: &mut [Corner], target: &TargetSpec) {
         corner.index = count - 1 - corner.index;
     }
     corners.sort_by_key(|corner| corner.index);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_share_their_corners_until_one_is_changed() {
+        let first: Corners = (0..4).map(|i| Corner::new(i, Vector2::new(i as f64, 0.0))).collect();
+        let mut second = first.clone();
+        assert!(std::ptr::eq(&*first, &*second), "ten thousand views would be copied");
+        second[0].px.x = 7.0;
+        second.retain(|corner| corner.index < 2);
+        assert_eq!(first.len(), 4, "whoever holds the others sees no change");
+        assert_eq!(first[0].px.x, 0.0);
+        assert_eq!(second.iter().map(|corner| corner.px.x).collect::<Vec<_>>(), [7.0, 1.0]);
+    }
 }

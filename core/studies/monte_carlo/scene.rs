@@ -174,12 +174,13 @@ impl Trial {
             &self.anchor_from_target,
         );
         let (points, intrinsics) = (&self.points, &self.intrinsics);
-        self.views[index].corners.retain_mut(|corner| {
+        let moved = |corner: &Corner| {
             let pixel = |p: Point3<f64>| intrinsics.project(&(camera_from_target.isometry() * p)).ok();
             let point = points[corner.index];
-            let (Some(before), Some(after)) = (pixel(point), pixel(point + shift)) else { return false };
-            corner.px += after - before;
-            intrinsics.contains(&corner.px)
-        });
+            let px = corner.px + pixel(point + shift)? - pixel(point)?;
+            intrinsics.contains(&px).then_some(Corner { px, ..*corner })
+        };
+        let corners = &mut self.views[index].corners;
+        *corners = corners.iter().filter_map(moved).collect();
     }
 }

@@ -185,7 +185,8 @@ fn examine(
     work: &Work<'_>,
 ) -> Result<(), String> {
     let cancelled = || "cancelled".to_owned();
-    let sight = crate::diagnose::doctor::views::SessionViews::new(observations)?;
+    let lens = calibration.as_deref().and_then(|calibration| calibration.lens_by_corners);
+    let sight = views::SessionViews::new(observations, lens)?;
     diagnosis.findings.extend(words::not_finite(&sight));
     diagnosis.findings.extend(words::wrong_corners(&sight));
     let views = sight.views.len();

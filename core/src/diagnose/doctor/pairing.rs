@@ -166,7 +166,7 @@ mod tests {
     /// A step explains what it repairs, not what the solution beside it happens to suit better.
     #[test]
     fn a_step_is_believed_by_the_views_that_it_pairs_anew() {
-        let healthy = SessionViews::new(&session(&Setup::new(Mode::EyeInHand, 14, 71))).expect("views");
+        let healthy = SessionViews::new(&session(&Setup::new(Mode::EyeInHand, 14, 71)), None).expect("views");
         let (mount_from_camera, anchor_from_target) = links(Mode::EyeInHand);
         let right = ClosedFormSolution { mount_from_camera, anchor_from_target };
         let off = Vector6::new(0.02, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -183,7 +183,7 @@ mod tests {
         for (view, pose) in shifted.views[9..14].iter_mut().zip(&poses[7..12]) {
             view.base_from_tip = *pose;
         }
-        let shifted = SessionViews::new(&shifted).expect("views");
+        let shifted = SessionViews::new(&shifted, None).expect("views");
         let step = Pairing::Stepped { from: 7, before: 0, after: 2 };
         assert!(explains(&shifted, step, Some(&poor), &right, wrong_m));
     }

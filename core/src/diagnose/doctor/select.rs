@@ -13,11 +13,12 @@ use crate::progress::Work;
 pub(super) const NEED: usize = 5;
 /// Outlier views at the most, as a part of all: beyond it the others are no majority to judge by.
 const MOST_ASIDE: f64 = 0.34;
-/// A view whose misfit is so many times the median belongs to the set of views that may be left out as an outlier together.
+/// A view whose misfit is so many times the median belongs to the set of views that may be left out as an outlier together. It
+/// proposes them; whether they are outliers is a matter of the test of all hypotheses.
 const FAR: f64 = 5.0;
 /// Rounds of moving the solution to where the majority wants it; the second already changes it by a rounding.
 const ROUNDS: usize = 3;
-/// Hypotheses taken in at the most.
+/// Hypotheses taken in at the most, which bounds the work: one for every view that is an outlier by itself, and some more.
 const MOST_TAKEN: usize = 12;
 /// Views that are tested together at the most.
 const MOST_TOGETHER: usize = 40;

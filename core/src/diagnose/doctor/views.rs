@@ -17,7 +17,7 @@ use crate::natural_order;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 
 /// A corner this many robust standard deviations from where its view puts it is wrong. Real detectors have long tails,
 /// so the limit is wide.
@@ -107,7 +107,7 @@ fn table(views: &[&ObservedView]) -> Vec<TableRow> {
 }
 
 struct Fit {
-    corners: Vec<Corner>,
+    corners: Corners,
     wrong: Vec<usize>,
     pose: PlanarPose,
 }
@@ -118,8 +118,9 @@ impl SessionViews {
         self.views.iter().map(|v| v.tip_by_joint.len()).min().unwrap_or(0)
     }
 
-    /// Looks at all views in the fit that have a robot pose and the target. `Err` says why nothing can be tested.
-    pub fn new(observations: &Observations) -> Result<Self, String> {
+    /// Looks at all views in the fit that have a robot pose and the target. `lens` is the camera as the corners alone show it,
+    /// where that was found before. `Err` says why nothing can be tested.
+    pub fn new(observations: &Observations, lens: Option<Intrinsics>) -> Result<Self, String> {
         let Some(mode) = observations.mode else { return Err("there are no robot poses".to_owned()) };
         let in_fit: Vec<&ObservedView> = observations.views.iter().filter(|v| v.in_fit).collect();
         let rows = in_fit.iter().copied().enumerate();
@@ -150,7 +151,7 @@ impl SessionViews {
             sight.take_poses(&seen);
         } else {
             let with_corners: Vec<Row<'_>> = seen.into_iter().filter(|(_, v)| v.corners.is_some()).collect();
-            sight.take_corners(observations, &with_corners)?;
+            sight.take_corners(observations, &with_corners, lens)?;
         }
         let middle = Point3::from(outer.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / 4.0);
         let distances = sight.views.iter().map(|v| (v.camera_from_target * middle).coords.norm());
@@ -176,12 +177,17 @@ impl SessionViews {
         }
     }
 
-    fn take_corners(&mut self, observations: &Observations, seen: &[Row<'_>]) -> Result<(), String> {
-        let all: Vec<Vec<Corner>> = seen.iter().map(|(_, v)| v.corners.clone().unwrap_or_default()).collect();
-        let mut camera = camera_of(observations, &all)?;
+    fn take_corners(
+        &mut self,
+        observations: &Observations,
+        seen: &[Row<'_>],
+        lens: Option<Intrinsics>,
+    ) -> Result<(), String> {
+        let all: Vec<Corners> = seen.iter().map(|(_, v)| v.corners.clone().unwrap_or_default()).collect();
+        let mut camera = lens.map_or_else(|| camera_of(observations, &all), Ok)?;
         let mut fits = fit_all(&all, &observations.target, &camera);
-        if self.lens_free && fits.iter().flatten().any(|f| !f.wrong.is_empty()) {
-            let kept: Vec<Vec<Corner>> = fits.iter().flatten().map(|f| f.corners.clone()).collect();
+        if self.lens_free && lens.is_none() && fits.iter().flatten().any(|f| !f.wrong.is_empty()) {
+            let kept: Vec<Corners> = fits.iter().flatten().map(|f| f.corners.clone()).collect();
             camera = camera_of(observations, &kept)?;
             fits = fit_all(&all, &observations.target, &camera);
         }
@@ -229,7 +235,7 @@ impl SessionViews {
                 by_form: DMatrix::from_iterator(6, count, by_form.iter().copied()),
                 tip_by_joint: view.tip_by_joint.clone(),
                 wrong_corners: fit.wrong,
-                corners: view.corners.as_ref().map_or(0, Vec::len),
+                corners: view.corners.as_ref().map_or(0, |corners| corners.len()),
             });
         }
         Ok(())
@@ -273,7 +279,7 @@ fn board(points: &[Point3<f64>]) -> ([Point3<f64>; 4], Matrix6<f64>) {
 }
 
 /// The camera given, or found from the corners alone: the robot may be what is wrong.
-fn camera_of(observations: &Observations, views: &[Vec<Corner>]) -> Result<Intrinsics, String> {
+fn camera_of(observations: &Observations, views: &[Corners]) -> Result<Intrinsics, String> {
     match observations.camera {
         CameraKnowledge::Fixed(intrinsics) => Ok(intrinsics),
         CameraKnowledge::Estimate { model, start } => {
@@ -288,7 +294,7 @@ fn camera_of(observations: &Observations, views: &[Vec<Corner>]) -> Result<Intri
     }
 }
 
-fn fit_all(views: &[Vec<Corner>], target: &TargetSpec, camera: &Intrinsics) -> Vec<Option<Fit>> {
+fn fit_all(views: &[Corners], target: &TargetSpec, camera: &Intrinsics) -> Vec<Option<Fit>> {
     let solve = |corners: &[Corner]| planar_pose::solve(corners, target, camera).ok();
     let mut fits: Vec<Option<Fit>> = views
         .iter()
@@ -315,7 +321,7 @@ fn set_wrong_aside(
     solve: &impl Fn(&[Corner]) -> Option<PlanarPose>,
 ) {
     let most = (WRONG_PART * fit.corners.len() as f64) as usize;
-    let (mut corners, mut wrong, mut pose) = (fit.corners.clone(), Vec::new(), fit.pose);
+    let (mut corners, mut wrong, mut pose) = (fit.corners.to_vec(), Vec::new(), fit.pose);
     for _ in 0..ROUNDS {
         let chain = pose.best.camera_from_target;
         let off = |c: &Corner| {
@@ -327,7 +333,7 @@ fn set_wrong_aside(
         let worst = corners.iter().map(&off).fold(0.0, f64::max);
         if worst <= limit_px {
             if !wrong.is_empty() {
-                *fit = Fit { corners, wrong, pose };
+                *fit = Fit { corners: corners.into(), wrong, pose };
             }
             return;
         }

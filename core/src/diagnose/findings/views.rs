@@ -25,7 +25,7 @@ const TILT_DEG: f64 = 20.0;
 const FOCAL_SIGMA: f64 = 0.003;
 /// Cells of the image on which coverage is judged.
 const CELLS: (usize, usize) = (8, 6);
-/// Part of the cells that should have been seen.
+/// Part of the cells that should have been seen: a lens is extrapolated over the rest. It gives advice, never an alarm.
 const COVERED: f64 = 0.5;
 
 pub fn findings(observations: &Observations, calibration: Option<&Calibration>) -> Vec<Finding> {

@@ -195,3 +195,15 @@ pub enum HandEyeError {
         reason: &'static str,
     },
 }
+
+/// What was found; `None` where the data determine nothing.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`].
+pub(crate) fn determined<T>(found: Result<T, HandEyeError>) -> Result<Option<T>, HandEyeError> {
+    match found {
+        Ok(found) => Ok(Some(found)),
+        Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
+        Err(_) => Ok(None),
+    }
+}

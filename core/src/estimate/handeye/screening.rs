@@ -16,17 +16,18 @@
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::HandEyeError;
 use super::motion::MIN_VIEWS;
+use super::{HandEyeError, determined};
 use crate::geometry::statistics::{median, outliers};
 
 /// Share of healthy sessions in which some view may be left out as an outlier.
 const FALSE_ALARM: f64 = 0.001;
 /// Views below which none can be told from the others.
 const NEED: usize = 6;
-/// Part of the views that a fit begins with when wrong ones hide each other.
+/// Part of the views that a fit begins with when wrong ones hide each other: free of them while four in ten are wrong.
 const CORE: f64 = 0.6;
-/// Part of the views that has to remain; with fewer it is not a matter of some wrong views.
+/// Part of the views that has to remain; with fewer it is not a matter of some wrong views: those left out would be about as
+/// many, and might agree as well.
 const LEAST_KEPT: f64 = 0.55;
 /// Median of chi-square with six degrees of freedom.
 const MEDIAN: f64 = 5.348;
@@ -121,9 +122,8 @@ pub(crate) fn screened<E: Estimator>(estimator: &E, misfits: &[f64]) -> Result<F
         core
     } else {
         match fit_all() {
-            Ok(fit) => fit,
-            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-            Err(error) => core().ok_or(error)?,
+            Err(error) if error != HandEyeError::Cancelled => core().ok_or(error)?,
+            fit => fit?,
         }
     };
     if views >= NEED {
@@ -184,11 +184,8 @@ fn settle<E: Estimator>(estimator: &E, mut fit: Fit<E::Solution>) -> Result<Fit<
             good.retain(|i| fit.kept.contains(i));
         }
         seen.push(good.clone());
-        match fitted(estimator, good, Some(&fit.solution)) {
-            Ok(next) => fit = next,
-            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-            Err(_) => break,
-        }
+        let Some(next) = determined(fitted(estimator, good, Some(&fit.solution)))? else { break };
+        fit = next;
     }
     Ok(fit)
 }
@@ -205,12 +202,9 @@ fn without_farthest<E: Estimator>(
     let farthest = fit.kept.iter().copied().max_by(|&a, &b| of_limit(a).total_cmp(&of_limit(b)));
     let Some(farthest) = farthest.filter(|&i| fit.kept.len() > NEED && of_limit(i) > SUSPECT) else { return Ok(None) };
     let rest = fit.kept.iter().copied().filter(|&i| i != farthest).collect();
-    match fitted(estimator, rest, Some(&fit.solution)) {
-        Ok(next) => Ok(next.wrong().contains(&farthest).then_some(next)),
-        Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
-        // Without it nothing is determined: it cannot be judged.
-        Err(_) => Ok(None),
-    }
+    // Where nothing is determined without it, it cannot be judged.
+    let next = determined(fitted(estimator, rest, Some(&fit.solution)))?;
+    Ok(next.filter(|next| next.wrong().contains(&farthest)))
 }
 
 /// Whether some view is so far from the start that it may lead a fit astray.

@@ -52,6 +52,8 @@ pub(super) struct Estimate {
     pub intrinsics: Intrinsics,
     pub shape: BoardShape,
     pub poses: Vec<Isometry3<f64>>,
+    /// Near it, the other minimum of each, where there is one; empty before any was looked for.
+    pub mirrored: Vec<Option<Isometry3<f64>>>,
 }
 
 /// The equations of one view's pose.
@@ -164,7 +166,7 @@ impl Linear {
         }
         let intrinsics = estimate.intrinsics.with_parameters(&lens);
         (promised.is_finite() && intrinsics.validate().is_ok())
-            .then_some((Estimate { intrinsics, shape, poses }, promised))
+            .then_some((Estimate { intrinsics, shape, poses, mirrored: estimate.mirrored.clone() }, promised))
     }
 }
 
@@ -221,16 +223,20 @@ pub(super) fn minimise(problem: &Problem<'_>, estimate: &mut Estimate) -> Result
 /// descent ends in the one nearer to its start.
 pub(super) fn mirror_poses(problem: &Problem<'_>, estimate: &mut Estimate) -> Result<bool, IntrinsicsError> {
     let mut improved = false;
-    let Estimate { intrinsics, shape, poses } = estimate;
+    let Estimate { intrinsics, shape, poses, mirrored } = estimate;
+    mirrored.clear();
     for (view, pose) in problem.views.iter().zip(poses.iter_mut()) {
         problem.check_cancel()?;
         let seen = seen(view, problem.board, shape, intrinsics);
-        let Some(other) = mirror::refined(&seen, pose, MIRROR_STEPS) else { continue };
-        let Ok(own) = PoseEquations::new(&seen, pose, FreeParameters::default()) else { continue };
-        if other.squared_px < (1.0 - WORTHWHILE) * own.squared_px {
-            *pose = other.pose;
+        let mut other = mirror::refined(&seen, pose, MIRROR_STEPS);
+        if let Some(other) = &mut other
+            && let Ok(own) = PoseEquations::new(&seen, pose, FreeParameters::default())
+            && other.squared_px < (1.0 - WORTHWHILE) * own.squared_px
+        {
+            std::mem::swap(pose, &mut other.pose);
             improved = true;
         }
+        mirrored.push(other.map(|other| other.pose));
     }
     Ok(improved)
 }

@@ -30,7 +30,7 @@ mod seen_view;
 mod start;
 
 pub use error::IntrinsicsError;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Isometry3};
 pub use screened::{Screened, solve_screened};
 pub use seen_view::SeenView;
 
@@ -93,6 +93,8 @@ pub struct Found {
     pub shape: BoardShape,
     /// The target's pose in each view, in the order given.
     pub camera_from_target: Vec<Pose<Camera, Target>>,
+    /// Near it, the other minimum of the reprojection error that the flat target of a view has, where there is one.
+    pub(crate) mirrored: Vec<Option<Isometry3<f64>>>,
     /// Root mean square of the 2-D residuals of each view, in the order given, pixels, without whiteners.
     pub rms_px: Vec<f64>,
     /// The cost at the optimum, `Σ ‖W r‖²`: squared pixels where all corners count alike.
@@ -234,7 +236,7 @@ fn first_optimum(
 
 fn optimum_from(problem: &Problem<'_>, camera: Intrinsics) -> Result<Option<(Estimate, usize)>, IntrinsicsError> {
     let Some(poses) = start::poses(problem, &camera)? else { return Ok(None) };
-    let mut estimate = Estimate { intrinsics: camera, shape: BoardShape::default(), poses };
+    let mut estimate = Estimate { intrinsics: camera, shape: BoardShape::default(), poses, mirrored: Vec::new() };
     let steps = adjust::minimise(problem, &mut estimate)?;
     Ok(steps.filter(|_| estimate.intrinsics.validate().is_ok()).map(|steps| (estimate, steps)))
 }
@@ -259,6 +261,7 @@ fn finish(
         intrinsics: estimate.intrinsics,
         shape: estimate.shape,
         camera_from_target: estimate.poses.into_iter().map(Pose::from_isometry).collect(),
+        mirrored: estimate.mirrored,
         rms_px,
         cost: evidence.cost,
         corners,

@@ -69,10 +69,8 @@ pub fn solve_screened(
         if aside == now.aside {
             break;
         }
-        let without = |(view, aside): (&&'_ [Corner], &Vec<usize>)| -> Vec<Corner> {
-            view.iter().filter(|corner| aside.binary_search(&corner.index).is_err()).copied().collect()
-        };
-        let left: Vec<Cow<'_, [Corner]>> = views.iter().zip(&aside).map(|pair| Cow::Owned(without(pair))).collect();
+        let left: Vec<Cow<'_, [Corner]>> =
+            views.iter().zip(&aside).map(|(view, aside)| wrong_corners::without(view, aside)).collect();
         let options = Options { start: Some(now.found.intrinsics), ..*options };
         now = Screened { found: fit(&left, &options)?, aside };
     }

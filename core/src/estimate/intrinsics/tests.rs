@@ -116,7 +116,7 @@ fn what_a_bend_would_do_is_known_without_a_fit_that_has_it() {
     let free = FreeParameters { lens: true, warp: false, scale: false };
     let problem = Problem { views: &seen, board: &board, free, cancel: &cancel };
     let poses: Vec<Isometry3<f64>> = flat.camera_from_target.iter().map(|p| *p.isometry()).collect();
-    let estimate = Estimate { intrinsics: flat.intrinsics, shape: flat.shape, poses };
+    let estimate = Estimate { intrinsics: flat.intrinsics, shape: flat.shape, poses, mirrored: Vec::new() };
     let columns = FreeParameters { warp: true, ..free };
     let evidence = Evidence::new(&problem, &estimate, columns).expect("in front");
     let covariance = bent.covariance();
@@ -196,7 +196,8 @@ fn a_pose_that_began_as_its_mirror_image_is_turned_round() {
     let free = FreeParameters { lens: true, warp: false, scale: false };
     let problem = Problem { views: &seen, board: &board, free, cancel: &cancel };
     let poses: Vec<Isometry3<f64>> = found.camera_from_target.iter().map(|p| *p.isometry()).collect();
-    let mut estimate = Estimate { intrinsics: found.intrinsics, shape: found.shape, poses: poses.clone() };
+    let (intrinsics, shape) = (found.intrinsics, found.shape);
+    let mut estimate = Estimate { intrinsics, shape, poses: poses.clone(), mirrored: Vec::new() };
     assert!(
         !adjust::mirror_poses(&problem, &mut estimate).expect("not cancelled"),
         "the optimum is the better of both"
@@ -210,6 +211,8 @@ fn a_pose_that_began_as_its_mirror_image_is_turned_round() {
     estimate.poses[4] = wrong.pose;
     assert!(adjust::mirror_poses(&problem, &mut estimate).expect("not cancelled"));
     assert!(estimate.poses[4].rotation.angle_to(&poses[4].rotation) < 1e-6);
+    let other = estimate.mirrored[4].expect("two minima are known");
+    assert!(other.rotation.angle_to(&wrong.pose.rotation) < 1e-6, "the other one is where it came from");
 }
 
 #[test]

@@ -23,7 +23,7 @@ pub(crate) mod mirror;
 pub(crate) mod refine;
 pub(crate) mod start;
 
-use nalgebra::{Matrix2, SymmetricEigen, Vector2};
+use nalgebra::{Isometry3, Matrix2, SymmetricEigen, Vector2};
 
 use crate::geometry::camera::{CameraError, Intrinsics};
 use crate::geometry::frames::{Camera, Pose, Target};
@@ -218,9 +218,9 @@ pub fn solve(corners: &[Corner], target: &TargetSpec, intrinsics: &Intrinsics) -
     Ok(PlanarPose { best, alternative })
 }
 
-/// The other minimum of the reprojection error of a view, from one of them; `None` where there is only one.
-pub(crate) fn other(seen: &ViewInput<'_>, best: &Solution) -> Option<Solution> {
-    let minimum = mirror::refined(seen, best.camera_from_target.isometry(), MAX_STEPS)?;
+/// The other minimum of the reprojection error of a view, from a pose near it; `None` where there is only one.
+pub(crate) fn other(seen: &ViewInput<'_>, best: &Solution, near: &Isometry3<f64>) -> Option<Solution> {
+    let minimum = refine::refine(seen, near, MAX_STEPS)?;
     let is_other = minimum.pose.rotation.angle_to(&best.camera_from_target.rotation()) > SAME_ROTATION;
     is_other.then(|| Solution::new(&minimum, seen.corners.len()))
 }

@@ -21,8 +21,8 @@ const COSINES: [(f64, f64); 8] = [
 const AZIMUTHS: usize = 6;
 /// Newton steps at the most; four are usual, more than ten are needed below two degrees of freedom.
 const MAX_STEPS: usize = 100;
-/// Relative step that ends them.
-const TOLERANCE: f64 = 1e-9;
+/// Relative step that ends them. The next one would be of the order of its square, far below the error of the quadrature.
+const TOLERANCE: f64 = 1e-5;
 
 /// The length that a Gaussian error vector of this covariance stays under with a probability of 95 %.
 ///
@@ -94,8 +94,9 @@ fn radius_of(scales: &[(f64, f64)], law: &Length) -> f64 {
         let (mut probability, mut density) = (0.0, 0.0);
         for (scale, weight) in scales {
             let squared = radius * radius / scale.max(f64::MIN_POSITIVE);
-            probability += weight * law.below(squared);
-            density += weight * law.density(squared) * 2.0 * radius / scale.max(f64::MIN_POSITIVE);
+            let (below, density_there) = law.at(squared);
+            probability += weight * below;
+            density += weight * density_there * 2.0 * radius / scale.max(f64::MIN_POSITIVE);
         }
         let step = (PROBABILITY - probability) / density;
         if !step.is_finite() {
@@ -138,25 +139,23 @@ impl Length {
         Self { degrees, ln_beta }
     }
 
-    /// Probability of a value below `x`.
-    fn below(&self, x: f64) -> f64 {
+    /// Probability of a value below `x`, and the density there.
+    fn at(&self, x: f64) -> (f64, f64) {
         if self.degrees >= MANY {
-            return libm::erf((0.5 * x).sqrt()) - (2.0 * x / std::f64::consts::PI).sqrt() * (-0.5 * x).exp();
+            let density = (x / std::f64::consts::TAU).sqrt() * (-0.5 * x).exp();
+            return (libm::erf((0.5 * x).sqrt()) - 2.0 * density, density);
         }
-        if x.is_finite() { beta_reg(1.5, 0.5 * self.degrees, x / (x + self.degrees)) } else { 1.0 }
-    }
-
-    fn density(&self, x: f64) -> f64 {
-        if self.degrees >= MANY {
-            return (x / std::f64::consts::TAU).sqrt() * (-0.5 * x).exp();
+        if !x.is_finite() {
+            return (1.0, 0.0);
         }
-        let part = x / (x + self.degrees);
-        let rest = self.degrees / (x + self.degrees);
+        let (part, rest) = (x / (x + self.degrees), self.degrees / (x + self.degrees));
+        let below = beta_reg(1.5, 0.5 * self.degrees, part);
         if rest <= 0.0 || part <= 0.0 {
-            return 0.0;
+            return (below, 0.0);
         }
         // dI/dx of the regularised incomplete beta function at x / (x + n), whose own derivative is rest² / n.
-        (0.5 * part.ln() + (0.5 * self.degrees + 1.0) * rest.ln() - self.ln_beta).exp() / self.degrees
+        let log = 0.5 * part.ln() + (0.5 * self.degrees + 1.0) * rest.ln() - self.ln_beta;
+        (below, log.exp() / self.degrees)
     }
 }
 

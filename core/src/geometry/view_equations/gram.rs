@@ -54,16 +54,16 @@ impl<const QUADS: usize> Gram<QUADS> {
     }
 
     /// Ends the sum.
-    pub fn finish(mut self) -> Products<QUADS> {
+    pub fn finish(&mut self) -> Products<'_, QUADS> {
         self.multiply();
-        Products(self.sums)
+        Products(&self.sums)
     }
 }
 
-/// The finished products.
-pub(crate) struct Products<const QUADS: usize>([[[[Pair; 4]; 4]; QUADS]; QUADS]);
+/// The finished products, where they were summed: they are some kilobytes, which a view has no time to copy.
+pub(crate) struct Products<'a, const QUADS: usize>(&'a [[[[Pair; 4]; 4]; QUADS]; QUADS]);
 
-impl<const QUADS: usize> Products<QUADS> {
+impl<const QUADS: usize> Products<'_, QUADS> {
     /// Of two columns.
     pub fn at(&self, i: usize, j: usize) -> f64 {
         let (i, j) = (i.min(j), i.max(j));

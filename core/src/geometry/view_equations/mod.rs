@@ -108,7 +108,7 @@ impl PoseEquations {
         Ok(Self::from_products(&gram.finish(), rows.count, seen.corners.len()))
     }
 
-    fn from_products<const QUADS: usize>(products: &Products<QUADS>, count: usize, corners: usize) -> Self {
+    fn from_products<const QUADS: usize>(products: &Products<'_, QUADS>, count: usize, corners: usize) -> Self {
         let residual = POSE + count;
         Self {
             pose: Matrix6::from_fn(|i, j| products.at(i, j)),

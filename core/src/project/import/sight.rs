@@ -44,7 +44,7 @@ impl Sight {
         };
         let views = corners.iter().enumerate().map(view).collect();
         let observations = Observations { mode: Some(Mode::EyeInHand), target, image_size, camera, views };
-        let views = SessionViews::new(&observations)?;
+        let views = SessionViews::new(&observations, None)?;
         let mut seen = vec![None; corners.len()];
         for view in &views.views {
             if let Some(slot) = seen.get_mut(view.row) {

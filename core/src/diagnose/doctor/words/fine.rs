@@ -14,7 +14,8 @@ use crate::estimate::handeye::Mode;
 use crate::text;
 use crate::wording::Text;
 
-/// A turn from which a view is likelier seen the wrong way round than moved, degrees.
+/// A turn from which a view is likelier seen the wrong way round than moved, degrees: views numbered from the wrong end are off
+/// by half a turn or a quarter, and a board that is knocked turns by less. It chooses the words only.
 const TURNED_DEG: f64 = 20.0;
 
 /// Every hypothesis: those taken in, then the best of every other kind. Views that were left out as outliers one after the other are

@@ -27,11 +27,15 @@ use statrs::function::gamma::gamma_lr;
 use super::Noise;
 use super::normal::{self, System};
 use super::variance::{self, Aim, Levels, Likelihood, Logs, MostLikely};
-use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::{HandEyeError, determined};
 use crate::geometry::point_error;
 
-/// Points of the mixture.
-const POINTS: usize = 128;
+/// Points of the mixture. Over 124 simulated sessions of 4 to 60 views the stated error differs from that of 8,192 points by
+/// 0.7 % RMS, 1.4 % with four views and 0.2 % with twenty; 128 points do no better, 64 half as well.
+const POINTS: usize = 96;
+/// Gain of the posterior that the search for its top stops at: the points are weighed by what it is at each of them, so the
+/// middle that they are spread about need not be exact.
+const TOP: f64 = 1e-3;
 /// Degrees of freedom of the points' density: tails that no level of three numbers or more exceeds by much.
 const TAILS: f64 = 5.0;
 /// Where the width on a side is taken, in units of the one that the information gives.
@@ -88,8 +92,8 @@ pub fn integrate(
     covariance: DMatrix<f64>,
     reference_point: &Point3<f64>,
 ) -> Result<Integrated, HandEyeError> {
-    let start = lifted(system, noise, levels)?;
-    let found = variance::most_likely(system, start, levels, Aim::Posterior)?;
+    let start = variance::lifted(system, noise, levels)?;
+    let found = variance::most_likely(system, start, levels, Aim::Posterior, TOP)?;
     let axes = Axes::new(&found.information(system, levels, Aim::Posterior), levels);
     let level_sigma = |logs: &Matrix6<f64>| [0, 1, 2].map(|k| 0.5 * logs[(k, k)].max(0.0).sqrt());
     if system.blocks.len() > MANY_VIEWS {
@@ -115,23 +119,6 @@ pub fn integrate(
     let small_sample =
         SmallSample { degrees_of_freedom, scale, level_sigma: level_sigma(&scatter(&points)), level_range };
     Ok(Integrated { covariance, small_sample })
-}
-
-/// The most likely levels, with those that are nothing lifted to where the noise of the others begins to hide them: the
-/// search for the most likely ones under the prior would come from far below.
-fn lifted(system: &System, noise: &Noise, levels: Levels) -> Result<Logs, HandEyeError> {
-    /// Part of all numbers of a level that is seen where it starts.
-    const SEEN: f64 = 0.2;
-    let mut logs = variance::kept(variance::to_logs(noise), levels);
-    let counts = variance::evaluate(system, &logs, levels)?.counts;
-    let views = system.blocks.len() as f64;
-    for (k, all) in [(1, 3.0 * views), (2, 3.0 * views), (4, 9.0), (5, 9.0)] {
-        let seen = (counts[k] / all).clamp(1e-12, 1.0);
-        if seen < SEEN {
-            logs[k] += (SEEN / seen).ln();
-        }
-    }
-    Ok(logs)
 }
 
 /// Axes of the levels' posterior about its top, with a width on either side.
@@ -189,7 +176,7 @@ struct Point {
 
 fn points(system: &System, found: &MostLikely, mut axes: Axes, levels: Levels) -> Result<Vec<Point>, HandEyeError> {
     let posterior = |logs: &Logs| -> Result<Option<(f64, Likelihood)>, HandEyeError> {
-        let at = variance::determined(variance::evaluate(system, logs, levels))?;
+        let at = determined(variance::evaluate(system, logs, levels))?;
         Ok(at.map(|at| (at.value + variance::prior(&at, levels), at)))
     };
     let n = axes.places.len();

@@ -72,7 +72,7 @@ use curvature::Optimum;
 use integrated::Integrated;
 use optimise::Descent;
 use state::State;
-use variance::Levels;
+use variance::{Levels, Logs, to_logs};
 
 /// Standard deviation of a joint's offset before any data: a robot that is a degree off is a broken one, and without a
 /// prior the offsets of the first and the last joint could not be told from the links.
@@ -137,12 +137,22 @@ pub(crate) fn fit<'a>(
         if problem.noise.is_some() {
             break;
         }
-        let (mut next, likelihood) = variance::restricted_likelihood(&system, &noise, levels)?;
+        let most_likely =
+            |start: &Logs, levels| variance::restricted_likelihood(&system, start, levels, variance::EXACTLY);
+        let (mut next, mut likelihood) = most_likely(&to_logs(&noise), levels)?;
         let mut settled = variance::change(&noise, &next) < ROUND_TOLERANCE;
+        let lifted = variance::lifted(&system, &next, levels)?;
+        if settled && lifted != variance::kept(to_logs(&next), levels) {
+            // A level that vanished far from the optimum would stay so at it.
+            let (found, larger) = most_likely(&lifted, levels)?;
+            if likelihood - larger > ANOTHER_TOP {
+                (next, likelihood, settled) = (found, larger, false);
+            }
+        }
         if settled && !levels.view && problem.view_noise.is_none() {
             let start = Noise { view_px: next.corner_px, ..next };
             let with_view = Levels { view: true, ..levels };
-            let (found, larger) = variance::restricted_likelihood(&system, &start, with_view)?;
+            let (found, larger) = most_likely(&to_logs(&start), with_view)?;
             if likelihood - larger > VIEW_NOISE_GAIN {
                 (levels, next, settled) = (with_view, found, false);
             }
@@ -162,7 +172,12 @@ pub(crate) fn fit<'a>(
     Ok(JointSolution { iterations: iterations + steps, deviance, ..solution })
 }
 
-/// Noise of the view below this part of a corner's noise is none.
+/// Gain of minus twice the log-likelihood from which levels found from elsewhere are another maximum of it, and not the same
+/// by a shorter way.
+const ANOTHER_TOP: f64 = 1e-3;
+
+/// Noise of the view below this part of a corner's noise is none: it adds less than three parts in a thousand to the variance
+/// of a pose.
 const NO_VIEW_NOISE: f64 = 0.05;
 
 /// Gain of minus twice the log-likelihood from which a noise that all corners of a view share is taken into the model: by

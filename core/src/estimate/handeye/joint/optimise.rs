@@ -3,7 +3,7 @@
 use super::normal::System;
 use super::state::State;
 use super::{JointProblem, Noise};
-use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::{HandEyeError, determined};
 use crate::progress::CancelToken;
 
 /// Steps of one minimisation; a handful is usual.
@@ -54,16 +54,18 @@ pub fn minimise(
             if promised <= COST_TOLERANCE * cost.max(f64::MIN_POSITIVE) {
                 return Ok((system, step));
             }
-            // A step that puts the target behind the camera is as bad as one that raises the cost.
-            let next_system = match System::new(problem, &next, cancel) {
-                Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-                other => other.ok(),
-            };
-            let next_cost = next_system.as_ref().map_or(f64::INFINITY, |s| s.cost(noise));
-            if let (Some(next_system), true) = (next_system, next_cost < cost) {
-                (*state, system, cost) = (next, next_system, next_cost);
-                damping = (damping * 0.1).max(1e-12);
-                break;
+            // Two systems of many views are half of all memory, and few steps are refused, so the place that was left is
+            // linearised once more for these.
+            drop(system);
+            match determined(System::new(problem, &next, cancel))? {
+                Some(next_system) if next_system.cost(noise) < cost => {
+                    (*state, system) = (next, next_system);
+                    cost = system.cost(noise);
+                    damping = (damping * 0.1).max(1e-12);
+                    break;
+                }
+                // A step that puts the target behind the camera is as bad as one that raises the cost.
+                _ => system = System::new(problem, state, cancel)?,
             }
             damping *= 10.0;
             if damping > LARGEST_DAMPING {

@@ -4,10 +4,10 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::normal::System;
 use super::state::State;
-use super::variance::{self, Levels};
+use super::variance::{self, Levels, to_logs};
 use super::view_block::Layout;
 use super::{JointProblem, JointSolution};
-use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::{HandEyeError, determined};
 use crate::progress::CancelToken;
 
 /// `wᵀ C⁻¹ w / 2` of the two warps of the target, one step from a solution, with noise levels found anew in the equations that
@@ -22,18 +22,14 @@ pub(crate) fn warp_ratio(
     near: &JointSolution,
     cancel: &CancelToken,
 ) -> Result<Option<f64>, HandEyeError> {
-    match ratio(with, near, cancel) {
-        Ok(ratio) => Ok(ratio),
-        Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
-        Err(_) => Ok(None),
-    }
+    Ok(determined(ratio(with, near, cancel))?.flatten())
 }
 
 fn ratio(with: &JointProblem<'_>, near: &JointSolution, cancel: &CancelToken) -> Result<Option<f64>, HandEyeError> {
     let state = State::of(near);
     let system = System::new(with, &state, cancel)?;
     let levels = Levels { view: near.noise.view_px > 0.0, field: state.field.is_some() };
-    let (noise, _) = variance::restricted_likelihood(&system, &near.noise, levels)?;
+    let (noise, _) = variance::restricted_likelihood(&system, &to_logs(&near.noise), levels, variance::ROUGHLY)?;
     let reduced = system.reduce(&noise)?;
     let (step, covariance) = (reduced.shared_step(), reduced.inverse());
     let at = Layout::FORM_AT + with.free.form().warp_at(&state.intrinsics);

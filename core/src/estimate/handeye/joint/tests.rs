@@ -88,6 +88,22 @@ fn an_exact_robot_is_recognised() {
     assert!(solution.noise.robot_m < 3e-5, "{:?}", solution.noise);
 }
 
+/// A robot taken for exact makes every view as good as its corners: the stated error is then too small.
+#[test]
+fn a_level_that_vanished_on_the_way_is_found_again() {
+    let t = trial(Mode::EyeInHand, 12, &REALISTIC, camera(), 3);
+    let cancel = CancelToken::default();
+    let usual = fit(&t.problem(false, None), &t.start(), &cancel).expect("solves");
+    assert!((0.3..3.0).contains(&(usual.noise.robot_m / REALISTIC.robot_m)), "{:?}", usual.noise);
+    let vanished = Noise { robot_m: 1e-9, ..usual.noise };
+    let found = fit(&t.problem(false, None), &JointStart { noise: Some(vanished), ..t.start() }, &cancel);
+    let noise = found.expect("solves").noise;
+    // Rounds end when a level changes by a thousandth.
+    for (a, b) in [(noise.robot_m, usual.noise.robot_m), (noise.robot_rad, usual.noise.robot_rad)] {
+        assert!((a / b - 1.0).abs() < 5e-3, "{noise:?} {:?}", usual.noise);
+    }
+}
+
 #[test]
 fn the_answer_does_not_depend_on_the_order_of_views() {
     let t = trial(Mode::EyeInHand, 12, &REALISTIC, camera(), 7);

@@ -13,8 +13,8 @@ use super::information::information;
 use super::normal::{Reduced, System};
 use super::view_block::{add_square, columns, prior_weight};
 use super::{JointProblem, Noise};
-use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
+use crate::estimate::handeye::{HandEyeError, determined};
 
 /// Lowest levels: a nanometre, a nanoradian and a millionth of a pixel are exact for every purpose here.
 const LOWEST: Noise =
@@ -28,8 +28,12 @@ const NO_FIELD: f64 = 1e-3;
 const MAX_STEPS: usize = 60;
 /// Largest change of a log-variance in one step.
 const LARGEST_STEP: f64 = 3.0;
-/// Ends when the likelihood would gain less than this: a unit of `-2 ln L` is one standard deviation.
-const GAIN_TOLERANCE: f64 = 1e-6;
+/// Gain of the likelihood below which the levels of an answer stand still: a unit of `-2 ln L` is one standard deviation, so
+/// they are off by a thousandth of one.
+pub const EXACTLY: f64 = 1e-6;
+/// And those that something is decided by, which asks for gains of some units: they are off by a tenth of a standard
+/// deviation.
+pub const ROUGHLY: f64 = 1e-2;
 
 /// Which levels are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -284,8 +288,14 @@ pub fn prior(at: &Likelihood, levels: Levels) -> f64 {
     -2.0 * levels.estimated().map(|k| counts[k].max(f64::MIN_POSITIVE).ln()).sum::<f64>()
 }
 
-/// Finds the levels where `aim` is least, beginning at `start`.
-pub fn most_likely(system: &System, start: Logs, levels: Levels, aim: Aim) -> Result<MostLikely, HandEyeError> {
+/// Finds the levels where `aim` is least, beginning at `start`, until a step gains less than `tolerance`.
+pub fn most_likely(
+    system: &System,
+    start: Logs,
+    levels: Levels,
+    aim: Aim,
+    tolerance: f64,
+) -> Result<MostLikely, HandEyeError> {
     let aimed = |at: &Likelihood| at.value + if aim == Aim::Posterior { prior(at, levels) } else { 0.0 };
     let mut logs = kept(start, levels);
     let mut at = evaluate(system, &logs, levels)?;
@@ -295,12 +305,13 @@ pub fn most_likely(system: &System, start: Logs, levels: Levels, aim: Aim) -> Re
         let mut improved = false;
         while damping < 1e9 {
             let next_logs = kept(logs + newton_step(&curvature, &gradient, damping), levels);
+            // Levels that leave the answer undetermined are not the ones that are looked for.
             let next = determined(evaluate(system, &next_logs, levels))?;
             let gain = next.as_ref().map_or(f64::NEG_INFINITY, |next| aimed(&at) - aimed(next));
             if let (Some(next), true) = (next, gain > 0.0) {
                 (logs, at) = (next_logs, next);
                 damping = (damping * 0.2).max(1e-9);
-                improved = gain > GAIN_TOLERANCE;
+                improved = gain > tolerance;
                 break;
             }
             damping = (damping * 5.0).max(1e-6);
@@ -312,16 +323,21 @@ pub fn most_likely(system: &System, start: Logs, levels: Levels, aim: Aim) -> Re
     Ok(MostLikely { logs, at })
 }
 
-/// What was evaluated; `None` at levels that leave the answer undetermined, which are not the ones that were looked for.
-///
-/// # Errors
-/// [`HandEyeError::Cancelled`].
-pub fn determined(at: Result<Likelihood, HandEyeError>) -> Result<Option<Likelihood>, HandEyeError> {
-    match at {
-        Ok(at) => Ok(Some(at)),
-        Err(HandEyeError::Cancelled) => Err(HandEyeError::Cancelled),
-        Err(_) => Ok(None),
+/// Levels to search from, with those that are nothing lifted to where the noise of the others begins to hide them. In its log
+/// a level far below makes no difference, so that a search that begins there stays there.
+pub fn lifted(system: &System, noise: &Noise, levels: Levels) -> Result<Logs, HandEyeError> {
+    /// Part of all numbers of a level that is seen where it starts.
+    const SEEN: f64 = 0.2;
+    let mut logs = kept(to_logs(noise), levels);
+    let counts = evaluate(system, &logs, levels)?.counts;
+    let (robot, field) = (3.0 * system.blocks.len() as f64, HALF as f64);
+    for (k, all) in [(1, robot), (2, robot), (4, field), (5, field)] {
+        let seen = (counts[k] / all).clamp(1e-12, 1.0);
+        if seen < SEEN {
+            logs[k] += (SEEN / seen).ln();
+        }
     }
+    Ok(logs)
 }
 
 /// Derivatives of what is minimised, the second ones as expected.
@@ -342,9 +358,15 @@ fn slope(system: &System, logs: &Logs, at: &Likelihood, levels: Levels, aim: Aim
     (gradient, curvature)
 }
 
-/// The noise levels that maximise the restricted likelihood of a linearised system, from `start`, and minus twice its log.
-pub fn restricted_likelihood(system: &System, start: &Noise, levels: Levels) -> Result<(Noise, f64), HandEyeError> {
-    let found = most_likely(system, to_logs(start), levels, Aim::Likelihood)?;
+/// The noise levels that maximise the restricted likelihood of a linearised system, from `start`, and minus twice its log; to
+/// a gain of `tolerance`.
+pub fn restricted_likelihood(
+    system: &System,
+    start: &Logs,
+    levels: Levels,
+    tolerance: f64,
+) -> Result<(Noise, f64), HandEyeError> {
+    let found = most_likely(system, *start, levels, Aim::Likelihood, tolerance)?;
     Ok((to_noise(&found.logs, levels), found.at.value))
 }
 

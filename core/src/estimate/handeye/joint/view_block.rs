@@ -120,19 +120,17 @@ pub fn whitened(root: &Matrix6<f64>, mut columns: Matrix6xX<f64>) -> Matrix6xX<f
 ///
 /// The residuals are split into the six numbers that a pose of the view could explain and the rest, because errors that
 /// all corners of a view share (lens, shape of the target, blur, light) look like a pose and weigh more than `n` corners
-/// that err independently would say. All members but [`Self::rest`] are of the six, `z = L⁻¹ Jpᵀ r`.
+/// that err independently would say. All members but [`Self::rest`] are of the six, `z = L⁻¹ Jpᵀ r` with `L Lᵀ = Jpᵀ Jp`.
+///
+/// A fit of ten thousand views has as many of these, so nothing is kept that follows from the rest of it.
 #[derive(Debug, Clone)]
 pub struct ViewBlock {
-    /// `L`, with `L Lᵀ = Jpᵀ Jp`.
-    pub root: Matrix6<f64>,
     /// `z`, pixels.
     pub residual: Vector6<f64>,
     /// How `z` turns with the shared unknowns, a row for each.
     pub by_shared: MatrixXx6<f64>,
     /// How `z` turns with the correction.
     pub by_correction: Matrix6<f64>,
-    /// `Jsᵀ Jd`
-    pub cross: MatrixXx6<f64>,
     /// `Jdᵀ Jd`
     pub own: Matrix6<f64>,
     pub rest: Rest,
@@ -155,9 +153,13 @@ impl ViewBlock {
             by_shared.columns_mut(layout.field_at(), SLOPES).copy_from(&field::columns(place, &by_correction));
         }
         let by_shared = by_shared.transpose();
-        let cross = &by_shared * by_correction;
         let own = by_correction.tr_mul(&by_correction);
-        Some(Self { root, residual, by_shared, by_correction, cross, own, rest, corners: equations.corners })
+        Some(Self { residual, by_shared, by_correction, own, rest, corners: equations.corners })
+    }
+
+    /// `L`: the pose that the target's place in the anchor turns is the view's own.
+    pub fn root(&self) -> Matrix6<f64> {
+        self.by_shared.fixed_rows::<6>(6).into_owned()
     }
 
     /// Weighted squares of all residuals.
@@ -256,16 +258,9 @@ impl Own {
         let factor = Cholesky::new(own)?;
         let mut gradient = block.by_correction.tr_mul(&block.residual) * weight + prior.component_mul(correction);
         forward(factor.l_dirty(), gradient.as_mut_slice());
-        let mut whitened = &block.cross * weight;
-        let n = whitened.nrows();
-        for i in 0..6 {
-            let (done, rest) = whitened.as_mut_slice().split_at_mut(i * n);
-            for j in 0..i {
-                take(&mut rest[..n], &done[j * n..], factor.l_dirty()[(i, j)]);
-            }
-            scale(&mut rest[..n], factor.l_dirty()[(i, i)].recip());
-        }
-        Some(Self { factor, whitened, whitened_gradient: gradient })
+        let mut by = block.by_correction.transpose() * weight;
+        by.as_mut_slice().chunks_exact_mut(6).for_each(|column| forward(factor.l_dirty(), column));
+        Some(Self { factor, whitened: times(&block.by_shared, &by.transpose()), whitened_gradient: gradient })
     }
 
     /// Takes from the upper triangle and the gradient of the shared unknowns what the correction takes up.
@@ -303,6 +298,19 @@ impl Own {
     pub fn log_determinant(&self) -> f64 {
         self.factor.l_dirty().diagonal().iter().map(|p| 2.0 * p.ln()).sum()
     }
+}
+
+/// The product of a tall matrix and a small one, without the detour of a product of large ones.
+fn times(tall: &MatrixXx6<f64>, small: &Matrix6<f64>) -> MatrixXx6<f64> {
+    let n = tall.nrows();
+    let mut product = MatrixXx6::zeros(n);
+    let from = columns(tall);
+    for (column, by) in product.as_mut_slice().chunks_exact_mut(n).zip(small.column_iter()) {
+        for (i, value) in column.iter_mut().enumerate() {
+            *value = (0..6).map(|k| from[k][i] * by[k]).sum();
+        }
+    }
+    product
 }
 
 /// Takes a multiple of one column off another.

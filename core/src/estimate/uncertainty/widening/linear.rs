@@ -75,8 +75,8 @@ impl LinearView {
         let own = Own::new(block, correction, weight, &prior, 0.0)?;
         let to_base = turned(&base_from_tip.rotation());
         let scale = Matrix6::from_diagonal(&prior.map(f64::sqrt));
-        let gain = &block.cross * weight;
-        let by_robot = &covariance.whitened * gain * own.factor.inverse() * scale * to_base.transpose();
+        let gain = &covariance.whitened * &block.by_shared * (block.by_correction * weight);
+        let by_robot = gain * own.factor.inverse() * scale * to_base.transpose();
         Some(Self {
             pull: (&covariance.whitened * gradient).fixed_rows::<6>(0).into_owned(),
             expected: expected.fixed_view::<6, 6>(0, 0).into_owned(),

@@ -256,7 +256,7 @@ impl Sums {
         let weights = PixelWeights::new(noise);
         let excess = weights.pose - weights.rest;
         // As the residuals are, what the coefficients do is split into what a pose could explain and the rest.
-        let of_pose = whitened(&block.root, products.by_pose.clone());
+        let of_pose = whitened(&block.root(), products.by_pose.clone());
         self.information += &products.own * weights.rest + of_pose.tr_mul(&of_pose) * excess;
         self.gradient += &products.by_residual * weights.rest + of_pose.tr_mul(&block.residual) * excess;
         let mut cross = &block.by_shared * &of_pose * weights.pose;

@@ -20,7 +20,7 @@ pub mod shared;
 use nalgebra::DMatrix;
 
 use super::{JointProblem, JointSolution, fit};
-use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::{HandEyeError, determined};
 use crate::geometry::camera::{Intrinsics, ResidualDistortion};
 use crate::progress::CancelToken;
 use crate::targets::observation::{Corner, View};
@@ -80,13 +80,11 @@ pub fn with_shown_distortion(
     let Some(all) = Equations::new(problem, without, most, cancel)? else { return Ok(None) };
     let mut last = None;
     let shown = settled(&without.intrinsics, &all, views, |field, degree| {
+        // That of the round before is not needed any more, and is large where views are many.
+        last = None;
         let corrected = corrected(views, field);
         let problem = JointProblem { views: &corrected, ..*problem };
-        let solution = match fit(&problem, &without.as_start(), cancel) {
-            Ok(solution) => solution,
-            Err(HandEyeError::Cancelled) => return Err(HandEyeError::Cancelled),
-            Err(_) => return Ok(None),
-        };
+        let Some(solution) = determined(fit(&problem, &without.as_start(), cancel))? else { return Ok(None) };
         let equations = Equations::new(&problem, &solution, degree, cancel)?;
         last = Some(solution);
         Ok(equations)
