@@ -181,7 +181,10 @@ fn main() -> anyhow::Result<()> {
     BufReader::new(screen.stdout.take().expect("its output")).read_line(&mut number)?;
     let _screen = Ends(screen);
     let mut window = handeye("gui", home.path(), &cell.1);
-    window.env("DISPLAY", format!(":{}", number.trim())).env("LIBGL_ALWAYS_SOFTWARE", "1").env_remove("WAYLAND_DISPLAY");
+    window
+        .env("DISPLAY", format!(":{}", number.trim()))
+        .env("LIBGL_ALWAYS_SOFTWARE", "1")
+        .env_remove("WAYLAND_DISPLAY");
     let window = Ends(window.spawn()?);
     std::thread::sleep(Duration::from_secs(6));
     let before = processor_s(window.0.id());

@@ -297,7 +297,8 @@ impl Desktop {
         let file = self.shots.join(format!("{name}.png"));
         match &self.surface {
             Surface::Screen { display, .. } => {
-                let taken = Command::new("import").args(["-window", "root"]).arg(&file).env("DISPLAY", display).status();
+                let taken =
+                    Command::new("import").args(["-window", "root"]).arg(&file).env("DISPLAY", display).status();
                 assert!(taken.is_ok_and(|status| status.success()), "{}", file.display());
             }
             Surface::Page { browser, tab, .. } => {

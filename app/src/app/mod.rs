@@ -112,8 +112,7 @@ impl App {
         let workers = Workers::start(&source, &view, &connect(&source, &objects), desk.captures(), &clock, &waker)?;
         let sessions = desk.sessions().to_path_buf();
         let shown = in_browser.is_some();
-        let model =
-            Model { addresses, drivers, objects, sessions, in_browser: shown, ..Model::new(source, view) };
+        let model = Model { addresses, drivers, objects, sessions, in_browser: shown, ..Model::new(source, view) };
         let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
         let model = Model { keep_out, ..model };
         let numbers = Numbers::default();

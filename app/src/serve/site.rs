@@ -162,7 +162,8 @@ impl Site {
     }
 
     async fn download(&self, request: &Request<Incoming>) -> Response<Body> {
-        let Some(folder) = query(request, "folder").map(PathBuf::from).filter(|folder| self.shown.reach.has(folder)) else {
+        let Some(folder) = query(request, "folder").map(PathBuf::from).filter(|folder| self.shown.reach.has(folder))
+        else {
             return plain(StatusCode::FORBIDDEN, "This folder is not for browsers.\n");
         };
         let name = archive_name(&folder);

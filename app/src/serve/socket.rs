@@ -42,11 +42,7 @@ type Socket = WebSocketStream<TokioIo<Upgraded>>;
 #[serde(tag = "t", rename_all = "snake_case")]
 enum Told<'a> {
     /// Who drives.
-    People {
-        you: bool,
-        driven: bool,
-        pages: usize,
-    },
+    People { you: bool, driven: bool, pages: usize },
     /// What the page says by itself.
     Words {
         #[serde(flatten)]
@@ -60,8 +56,7 @@ pub async fn attend(upgraded: Upgraded, name: String, hub: Arc<Hub>, uploads: Ar
         .max_message_size(Some(MOST_BYTES))
         .max_frame_size(Some(MOST_BYTES))
         .max_write_buffer_size(usize::MAX);
-    let socket: Socket =
-        WebSocketStream::from_raw_socket(TokioIo::new(upgraded), Role::Server, Some(config)).await;
+    let socket: Socket = WebSocketStream::from_raw_socket(TokioIo::new(upgraded), Role::Server, Some(config)).await;
     let (to_page, from_page) = socket.split();
     let Some((id, errands)) = hub.join(&name) else {
         tracing::info!("a page was not let in: there are too many");

@@ -45,7 +45,8 @@ pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
         if model.in_browser
             && model.export.is_present
-            && let Some(folder) = model.export.folder.clone().or_else(|| Some(exports_of(model.session.folder.as_ref()?)))
+            && let Some(folder) =
+                model.export.folder.clone().or_else(|| Some(exports_of(model.session.folder.as_ref()?)))
             && ui.button(tr!(language, "Download as one archive")).clicked()
         {
             outbox.send(Command::OpenFolder(folder));

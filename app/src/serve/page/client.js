@@ -15,7 +15,7 @@ const SILENCE_MS = 15000;
 
 let words = {
   watching: 'You are watching', nobody: 'Nobody drives', drive: 'Drive', stop: 'STOP',
-  lost: 'The connection is lost; trying again…', ended: '', uploading: 'Uploading…',
+  lost: 'The connection is lost; trying again…', uploading: 'Uploading…',
   not_uploaded: 'The files could not be uploaded',
 };
 let people = { you: true, driven: true, pages: 1 };
