@@ -52,7 +52,7 @@ impl Access {
         }
         let mut key = [0; 16];
         getrandom::fill(&mut key).map_err(io::Error::other)?;
-        Ok(Self::Key(key.iter().map(|byte| format!("{byte:02x}")).collect()))
+        Ok(Self::Key(format!("{:032x}", u128::from_be_bytes(key))))
     }
 
     /// What a person opens.

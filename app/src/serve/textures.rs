@@ -136,6 +136,7 @@ impl Textures {
     }
 
     /// Takes over what a frame changed.
+    #[expect(clippy::iter_over_hash_type, reason = "textures do not depend on one another")]
     pub fn change(&mut self, delta: &mut TexturesDelta) {
         for (id, changes) in delta.set.drain() {
             for change in changes {
