@@ -81,24 +81,24 @@ impl Browser {
     /// # Panics
     /// When the browser refuses.
     pub fn open(&self, url: &str, (width, height): (u32, u32), touch: bool) -> Tab {
-        let made = self.call(None, "Target.createTarget", json!({"url": "about:blank", "newWindow": true}));
+        let made = self.call(None, "Target.createTarget", &json!({"url": "about:blank", "newWindow": true}));
         let target = made["targetId"].as_str().expect("a page").to_owned();
-        let attached = self.call(None, "Target.attachToTarget", json!({"targetId": target, "flatten": true}));
+        let attached = self.call(None, "Target.attachToTarget", &json!({"targetId": target, "flatten": true}));
         let tab = Tab { session: attached["sessionId"].as_str().expect("a session").to_owned(), target };
-        self.call(Some(&tab), "Runtime.enable", json!({}));
-        self.call(Some(&tab), "Page.enable", json!({}));
+        self.call(Some(&tab), "Runtime.enable", &json!({}));
+        self.call(Some(&tab), "Page.enable", &json!({}));
         let screen = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": touch});
-        self.call(Some(&tab), "Emulation.setDeviceMetricsOverride", screen);
+        self.call(Some(&tab), "Emulation.setDeviceMetricsOverride", &screen);
         if touch {
-            self.call(Some(&tab), "Emulation.setTouchEmulationEnabled", json!({"enabled": true, "maxTouchPoints": 5}));
+            self.call(Some(&tab), "Emulation.setTouchEmulationEnabled", &json!({"enabled": true, "maxTouchPoints": 5}));
         }
-        self.call(Some(&tab), "Page.navigate", json!({"url": url}));
+        self.call(Some(&tab), "Page.navigate", &json!({"url": url}));
         tab
     }
 
     /// Closes a page.
     pub fn close(&self, tab: &Tab) {
-        self.call(None, "Target.closeTarget", json!({"targetId": tab.target}));
+        self.call(None, "Target.closeTarget", &json!({"targetId": tab.target}));
     }
 
     /// What an expression is in a page; a promise is waited for.
@@ -107,7 +107,7 @@ impl Browser {
     /// When it throws.
     pub fn evaluate(&self, tab: &Tab, expression: &str) -> Value {
         let what = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
-        let answer = self.call(Some(tab), "Runtime.evaluate", what);
+        let answer = self.call(Some(tab), "Runtime.evaluate", &what);
         assert!(answer["exceptionDetails"].is_null(), "{expression}: {}", answer["exceptionDetails"]);
         answer["result"]["value"].clone()
     }
@@ -153,27 +153,27 @@ impl Browser {
     fn mouse(&self, tab: &Tab, kind: &str, (x, y): (f64, f64)) {
         let button = if kind == "mouseMoved" { "none" } else { "left" };
         let event = json!({"type": kind, "x": x, "y": y, "button": button, "clickCount": 1});
-        self.call(Some(tab), "Input.dispatchMouseEvent", event);
+        self.call(Some(tab), "Input.dispatchMouseEvent", &event);
     }
 
     /// Touches a place and lifts the finger.
     pub fn tap(&self, tab: &Tab, (x, y): (f64, f64)) {
         let finger = json!({"type": "touchStart", "touchPoints": [{"x": x, "y": y}]});
-        self.call(Some(tab), "Input.dispatchTouchEvent", finger);
-        self.call(Some(tab), "Input.dispatchTouchEvent", json!({"type": "touchEnd", "touchPoints": []}));
+        self.call(Some(tab), "Input.dispatchTouchEvent", &finger);
+        self.call(Some(tab), "Input.dispatchTouchEvent", &json!({"type": "touchEnd", "touchPoints": []}));
     }
 
     /// Draws a finger from one place to another.
     pub fn swipe(&self, tab: &Tab, from: (f64, f64), to: (f64, f64)) {
         let at = |kind: &str, (x, y): (f64, f64)| {
-            self.call(Some(tab), "Input.dispatchTouchEvent", json!({"type": kind, "touchPoints": [{"x": x, "y": y}]}));
+            self.call(Some(tab), "Input.dispatchTouchEvent", &json!({"type": kind, "touchPoints": [{"x": x, "y": y}]}));
         };
         at("touchStart", from);
         for step in 1..=10 {
             let part = f64::from(step) / 10.0;
             at("touchMove", (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1)));
         }
-        self.call(Some(tab), "Input.dispatchTouchEvent", json!({"type": "touchEnd", "touchPoints": []}));
+        self.call(Some(tab), "Input.dispatchTouchEvent", &json!({"type": "touchEnd", "touchPoints": []}));
     }
 
     /// Presses a key by its name, for example `space`, `Escape` or `ctrl+k`.
@@ -191,14 +191,14 @@ impl Browser {
         if !control && !text.is_empty() {
             event["text"] = json!(text);
         }
-        self.call(Some(tab), "Input.dispatchKeyEvent", event);
+        self.call(Some(tab), "Input.dispatchKeyEvent", &event);
         let event = json!({"type": "keyUp", "key": key, "code": code, "modifiers": modifiers});
-        self.call(Some(tab), "Input.dispatchKeyEvent", event);
+        self.call(Some(tab), "Input.dispatchKeyEvent", &event);
     }
 
     /// Types text as an input method does.
     pub fn type_text(&self, tab: &Tab, text: &str) {
-        self.call(Some(tab), "Input.insertText", json!({"text": text}));
+        self.call(Some(tab), "Input.insertText", &json!({"text": text}));
     }
 
     /// What a page looks like, as PNG.
@@ -206,7 +206,7 @@ impl Browser {
     /// # Panics
     /// When it cannot be said.
     pub fn photograph(&self, tab: &Tab) -> Vec<u8> {
-        let answer = self.call(Some(tab), "Page.captureScreenshot", json!({"format": "png"}));
+        let answer = self.call(Some(tab), "Page.captureScreenshot", &json!({"format": "png"}));
         let base64 = answer["data"].as_str().expect("an image");
         data_encoding::BASE64.decode(base64.as_bytes()).expect("base 64")
     }
@@ -226,7 +226,7 @@ impl Browser {
         assert!(sent.is_ok_and(|status| status.success()), "kill -s {name} {group}");
     }
 
-    fn call(&self, tab: Option<&Tab>, method: &str, params: Value) -> Value {
+    fn call(&self, tab: Option<&Tab>, method: &str, params: &Value) -> Value {
         let mut devtools = self.devtools.borrow_mut();
         devtools.calls += 1;
         let id = devtools.calls;

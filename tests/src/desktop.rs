@@ -34,7 +34,7 @@ enum Surface {
     /// On a screen without a monitor.
     Screen { server: Child, display: String },
     /// In a browser; touched, or pointed at with a mouse.
-    Page { browser: Browser, tab: Tab, touch: bool },
+    Page { browser: Box<Browser>, tab: Tab, touch: bool },
 }
 
 /// A control on the screen.
@@ -127,7 +127,7 @@ impl Desktop {
         browser.until(&tab, &format!("show.picture?.size[0] === {}", size.0));
         std::fs::create_dir_all(shots).expect("a folder");
         let widgets = home.path().join("widgets");
-        let surface = Surface::Page { browser, tab, touch };
+        let surface = Surface::Page { browser: Box::new(browser), tab, touch };
         Self { surface, window, widgets, shots: shots.to_path_buf(), clicks: 0, watch, home }
     }
 
@@ -137,7 +137,7 @@ impl Desktop {
     /// When it is a screen.
     pub fn page(&self) -> (&Browser, &Tab) {
         match &self.surface {
-            Surface::Page { browser, tab, .. } => (browser, tab),
+            Surface::Page { browser, tab, .. } => (&**browser, tab),
             Surface::Screen { .. } => panic!("there is no page"),
         }
     }
