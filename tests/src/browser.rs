@@ -145,6 +145,11 @@ impl Browser {
         self.mouse(tab, "mousePressed", place);
     }
 
+    /// Lets the mouse go.
+    pub fn let_go(&self, tab: &Tab, place: (f64, f64)) {
+        self.mouse(tab, "mouseReleased", place);
+    }
+
     /// Moves the mouse.
     pub fn point(&self, tab: &Tab, place: (f64, f64)) {
         self.mouse(tab, "mouseMoved", place);

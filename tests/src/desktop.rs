@@ -237,7 +237,7 @@ impl Desktop {
     }
 
     /// Waits until another frame was drawn, but not for long: a window in which nothing changes is not drawn again.
-    fn frame_drawn(&self) {
+    pub fn frame_drawn(&self) {
         self.watch.forget();
         for _ in 0..CHANGES_OF_A_FRAME {
             self.watch.changes_within(LOOK);

@@ -12,6 +12,10 @@ use serde_json::Value;
 /// From the last sign of a held button to an arm at rest.
 const AT_REST: Duration = Duration::from_millis(500);
 
+/// Presses of a button until the arm moves, and frames that each is waited for.
+const TRIES: usize = 40;
+const FRAMES: usize = 20;
+
 /// An arm that stays where it is for so long is at rest; a pass takes 50 ms.
 const STILL: Duration = Duration::from_millis(400);
 
@@ -93,9 +97,21 @@ fn hold_a_jog(desktop: &mut Desktop) {
     desktop.click("Hold");
     let place = desktop.place_of("Move +Z");
     let before = tip(desktop);
-    let (browser, tab) = desktop.page();
-    browser.hold(tab, place);
-    desktop.until_other("Tip in base, x y z [mm]:", &before);
+    // On a machine that is busy enough the page is not heard in time, and the arm is let go as it has to be: a person
+    // presses again.
+    for _ in 0..TRIES {
+        let (browser, tab) = desktop.page();
+        browser.hold(tab, place);
+        for _ in 0..FRAMES {
+            desktop.frame_drawn();
+            if tip(desktop) != before {
+                return;
+            }
+        }
+        let (browser, tab) = desktop.page();
+        browser.let_go(tab, place);
+    }
+    panic!("the arm does not move");
 }
 
 /// How long the arm still moves; it is at rest when it stays where it is for some passes.
