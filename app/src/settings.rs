@@ -224,7 +224,7 @@ impl SettingsFile {
     }
 }
 
-/// A settings file that is to be written.
+/// A settings file, or what is remembered beside it, that is to be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SettingsWrite {
     path: PathBuf,
@@ -232,6 +232,11 @@ pub struct SettingsWrite {
 }
 
 impl SettingsWrite {
+    /// A file with this text.
+    pub(crate) fn new(path: PathBuf, content: String) -> Self {
+        Self { path, content }
+    }
+
     /// Writes it, as a whole or not at all.
     ///
     /// # Errors

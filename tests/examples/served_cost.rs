@@ -1,11 +1,12 @@
 //! What the workbench in a browser costs: bytes, processor time and delay, beside the desktop window on a screen without a
 //! graphics card. A page here is a program that says at
-//! once that a picture is shown; ten more watch.
+//! once that a frame is shown; ten more watch.
 //!
 //! `cargo run --release -p handeye_tests --example served_cost`
 
 use std::io::{BufRead as _, BufReader};
 use std::net::TcpStream;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -39,11 +40,14 @@ fn processor_s(id: u32) -> f64 {
     rest.split_whitespace().skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / TICKS
 }
 
-fn handeye(command: &str, home: &std::path::Path, cell: &str) -> Command {
+/// The binary; an example stands in a folder beside it.
+fn binary() -> PathBuf {
     let binary = handeye_tests::handeye_binary();
-    // An example stands in a folder beside the binary.
-    let binary = if binary.is_file() { binary } else { binary.with_file_name("../handeye") };
-    let mut handeye = Command::new(binary);
+    if binary.is_file() { binary } else { binary.with_file_name("../handeye") }
+}
+
+fn handeye(command: &str, home: &Path, cell: &str) -> Command {
+    let mut handeye = Command::new(binary());
     handeye
         .args([command, "--quiet", "--rerun", "off", "--connect", cell])
         .env("HOME", home)
@@ -56,7 +60,7 @@ fn handeye(command: &str, home: &std::path::Path, cell: &str) -> Command {
 struct Page {
     socket: WebSocket<TcpStream>,
     bytes: u64,
-    pictures: u64,
+    frames: u64,
     images: u64,
 }
 
@@ -65,7 +69,7 @@ impl Page {
         let mut request = format!("ws://{address}/socket?page={name}").into_client_request()?;
         request.headers_mut().insert("origin", HeaderValue::from_str(&format!("http://{address}"))?);
         let (socket, _) = tungstenite::client(request, TcpStream::connect(address)?)?;
-        let mut page = Self { socket, bytes: 0, pictures: 0, images: 0 };
+        let mut page = Self { socket, bytes: 0, frames: 0, images: 0 };
         page.say(&json!({"t": "screen", "width": 1440.0, "height": 900.0, "scale": 1.0}))?;
         Ok(page)
     }
@@ -74,8 +78,8 @@ impl Page {
         Ok(self.socket.send(Message::text(said.to_string()))?)
     }
 
-    /// Waits for a picture and says that it is shown; whether it brought a live image.
-    fn picture(&mut self) -> anyhow::Result<bool> {
+    /// Waits for a frame and says that it is shown; whether it brought a live image.
+    fn frame(&mut self) -> anyhow::Result<bool> {
         loop {
             let message = self.socket.read()?;
             self.bytes += message.len() as u64;
@@ -83,7 +87,7 @@ impl Page {
             let end = 4 + u32::from_le_bytes(bytes[..4].try_into()?) as usize;
             let head: Value = serde_json::from_slice(&bytes[4..end])?;
             self.say(&json!({"t": "shown", "number": head["number"]}))?;
-            self.pictures += 1;
+            self.frames += 1;
             let has_image = head["textures"].as_array().is_some_and(|all| all.iter().any(|one| one["jpeg"] == true));
             self.images += u64::from(has_image);
             return Ok(has_image);
@@ -91,18 +95,18 @@ impl Page {
     }
 
     fn measure(&mut self, name: &str, process: u32) -> anyhow::Result<f64> {
-        let (bytes, pictures, images) = (self.bytes, self.pictures, self.images);
+        let (bytes, frames, images) = (self.bytes, self.frames, self.images);
         let (began, processor) = (Instant::now(), processor_s(process));
         while began.elapsed() < LONG {
-            self.picture()?;
+            self.frame()?;
         }
         let (took, used) = (began.elapsed().as_secs_f64(), processor_s(process) - processor);
         let images = (self.images - images) as f64;
         let per_image_ms = 1e3 * used / images.max(1.0);
         println!(
-            "{name}: {:.0} kB/s, {:.1} pictures/s, {:.1} images/s, {:.0} % of a processor, {per_image_ms:.1} ms per image",
+            "{name}: {:.0} kB/s, {:.1} frames/s, {:.1} images/s, {:.0} % of a processor, {per_image_ms:.1} ms per image",
             (self.bytes - bytes) as f64 / took / 1e3,
-            (self.pictures - pictures) as f64 / took,
+            (self.frames - frames) as f64 / took,
             images / took,
             100.0 * used / took,
         );
@@ -112,9 +116,7 @@ impl Page {
 
 fn main() -> anyhow::Result<()> {
     let home = tempfile::tempdir()?;
-    let binary = handeye_tests::handeye_binary();
-    let binary = if binary.is_file() { binary } else { binary.with_file_name("../handeye") };
-    let mut cell = Command::new(binary).args(["cell", "--quiet", "--port", "0"]).stdout(Stdio::piped()).spawn()?;
+    let mut cell = Command::new(binary()).args(["cell", "--quiet", "--port", "0"]).stdout(Stdio::piped()).spawn()?;
     let mut line = String::new();
     BufReader::new(cell.stdout.take().expect("its output")).read_line(&mut line)?;
     let cell = (Ends(cell), line.trim().trim_start_matches("listening on ").to_owned());
@@ -133,22 +135,21 @@ fn main() -> anyhow::Result<()> {
     let mut page = Page::open(&address, "driver")?;
     let began = Instant::now();
     while began.elapsed() < Duration::from_secs(4) {
-        page.picture()?;
+        page.frame()?;
     }
     let one = page.measure("one page", id)?;
 
-    // From an event to the picture that shows it: the pointer goes on and off a button.
+    // The pointer goes on and off a button. A frame that was on its way already counts, so that this is the least.
     let mut delays = Vec::new();
     for turn in 0..60 {
         let at = if turn % 2 == 0 { [90.0, 140.0] } else { [700.0, 25.0] };
         let began = Instant::now();
         page.say(&json!({"t": "input", "events": [{"e": "move", "at": at}]}))?;
-        // The next picture may have been on its way; the one after it has the pointer.
-        page.picture()?;
+        page.frame()?;
         delays.push(1e3 * began.elapsed().as_secs_f64());
     }
     delays.sort_by(f64::total_cmp);
-    println!("input to the next picture: median {:.1} ms, 95 % {:.1} ms", delays[30], delays[57]);
+    println!("input to the next frame: median {:.1} ms, 95 % {:.1} ms", delays[30], delays[57]);
 
     let ends = Arc::new(AtomicBool::new(false));
     let counts = Arc::new(Mutex::new(Vec::new()));
@@ -158,7 +159,7 @@ fn main() -> anyhow::Result<()> {
             std::thread::spawn(move || -> anyhow::Result<()> {
                 let mut page = Page::open(&address, &format!("watcher{number}"))?;
                 while !ends.load(Ordering::Relaxed) {
-                    page.picture()?;
+                    page.frame()?;
                 }
                 counts.lock().expect("no panic").push(page.images);
                 Ok(())

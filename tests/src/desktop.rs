@@ -123,8 +123,8 @@ impl Desktop {
         let url = line.trim().strip_prefix("the workbench is at ").expect("an address").to_owned();
         let browser = Browser::start();
         let tab = browser.open(&url, size, touch);
-        // What is pressed before there is a picture is pressed beside it.
-        browser.until(&tab, &format!("show.picture?.size[0] === {}", size.0));
+        // What is pressed before there is a frame is pressed beside it.
+        browser.until(&tab, &format!("show.frame?.size[0] === {}", size.0));
         std::fs::create_dir_all(shots).expect("a folder");
         let widgets = home.path().join("widgets");
         let surface = Surface::Page { browser: Box::new(browser), tab, touch };

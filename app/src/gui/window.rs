@@ -1,6 +1,7 @@
 //! The window: collects what happened, draws the panes, applies what the user wants.
 
 use std::path::Path;
+#[cfg(feature = "window")]
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,7 +13,10 @@ use super::arrival::{Arrival, Busy};
 use super::dialogs;
 use super::palette::CommandPalette;
 use super::shell;
-use super::shell::layout::{self, Layout};
+use super::shell::layout::Layout;
+#[cfg(feature = "window")]
+use super::shell::layout::STORAGE_KEY;
+#[cfg(feature = "window")]
 use super::signals::Signals;
 use super::style::fonts;
 use super::style::theme;
@@ -70,7 +74,9 @@ pub struct Window {
     palette: CommandPalette,
     settings: SettingsFile,
     /// Whether the system asks for the end.
+    #[cfg(feature = "window")]
     signals: Option<Arc<Signals>>,
+    #[cfg(feature = "window")]
     leaving: bool,
 }
 
@@ -87,19 +93,23 @@ impl Window {
             arrival: Arrival::default(),
             palette: CommandPalette::default(),
             settings,
+            #[cfg(feature = "window")]
             signals: None,
+            #[cfg(feature = "window")]
             leaving: false,
         }
     }
 
     /// Closes when a signal asks for it.
+    #[cfg(feature = "window")]
     #[must_use]
     pub fn that_heeds(self, signals: Arc<Signals>) -> Self {
         Self { signals: Some(signals), ..self }
     }
 
     /// Closes the window if it is time; the arm need not wait for the last frames.
-    pub(crate) fn heed_signals(&mut self, ctx: &egui::Context) {
+    #[cfg(feature = "window")]
+    fn heed_signals(&mut self, ctx: &egui::Context) {
         if !self.leaving && self.signals.as_ref().is_some_and(|signals| signals.is_asked()) {
             self.leaving = true;
             self.app.begin_to_leave();
@@ -273,7 +283,7 @@ impl eframe::App for Window {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         let (remembered, layout) = self.remembered();
-        eframe::set_value(storage, layout::STORAGE_KEY, &layout);
+        eframe::set_value(storage, STORAGE_KEY, &layout);
         eframe::set_value(storage, Remembered::STORAGE_KEY, &remembered);
     }
 }
@@ -282,7 +292,7 @@ impl eframe::App for Window {
 #[cfg(feature = "window")]
 pub fn stored(storage: Option<&dyn eframe::Storage>) -> (Remembered, Layout) {
     let Some(storage) = storage else { return Default::default() };
-    let layout = eframe::get_value::<Layout>(storage, layout::STORAGE_KEY);
+    let layout = eframe::get_value::<Layout>(storage, STORAGE_KEY);
     (
         eframe::get_value(storage, Remembered::STORAGE_KEY).unwrap_or_default(),
         layout.map_or_else(Layout::default, Layout::brought_up_to_date),

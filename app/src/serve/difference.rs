@@ -1,4 +1,4 @@
-//! The message that turns the picture that a page has into the present one.
+//! The message that turns the frame that a page has into the present one.
 
 use std::collections::HashMap;
 
@@ -6,16 +6,16 @@ use egui::TextureFilter;
 use serde::Serialize;
 
 use super::chunks::Chunk;
-use super::picture::{Picture, Typing};
+use super::frame::{Frame, Typing};
 use super::textures::deflated;
 
-/// The highest bit of an entry: chunks of the picture before, from a place on.
+/// The highest bit of an entry: chunks of the frame before, from a place on.
 const COPY: u32 = 1 << 31;
 
 /// What a page has.
 #[derive(Default)]
 pub struct Shown {
-    /// Hashes of the chunks of its picture.
+    /// Hashes of the chunks of its frame.
     chunks: Vec<u64>,
     /// Versions of its textures.
     textures: HashMap<u32, u64>,
@@ -47,11 +47,11 @@ struct TextureHead {
 }
 
 impl Shown {
-    /// The message; what is shown is the picture afterwards.
-    pub fn message(&mut self, number: u64, picture: &Picture) -> Vec<u8> {
-        let chunks = deflated(&self.list(&picture.chunks));
-        self.chunks = picture.chunks.iter().map(|chunk| chunk.hash).collect();
-        let (news, free) = picture.textures.news(&mut self.textures);
+    /// The message; what is shown is the frame afterwards.
+    pub fn message(&mut self, number: u64, frame: &Frame) -> Vec<u8> {
+        let chunks = deflated(&self.list(&frame.chunks));
+        self.chunks = frame.chunks.iter().map(|chunk| chunk.hash).collect();
+        let (news, free) = frame.textures.news(&mut self.textures);
         let textures = news.iter().map(|(id, part)| {
             let encoded = part.encoded();
             TextureHead {
@@ -65,10 +65,10 @@ impl Shown {
         });
         let head = Head {
             number,
-            size: picture.size,
-            pixels_per_point: picture.pixels_per_point,
-            cursor: picture.cursor,
-            typing: picture.typing,
+            size: frame.size,
+            pixels_per_point: frame.pixels_per_point,
+            cursor: frame.cursor,
+            typing: frame.typing,
             chunks: chunks.len(),
             textures: textures.collect(),
             free,
@@ -86,7 +86,7 @@ impl Shown {
         message
     }
 
-    /// The chunks: runs of the picture before, and those that were not in it.
+    /// The chunks: runs of the frame before, and those that were not in it.
     fn list(&self, chunks: &[Chunk]) -> Vec<u8> {
         let mut places: HashMap<u64, usize> = HashMap::with_capacity(self.chunks.len());
         for (place, hash) in self.chunks.iter().enumerate() {
@@ -124,8 +124,8 @@ mod tests {
         Chunk { hash: u64::from(name), bytes: vec![name; 4 * usize::from(name)].into() }
     }
 
-    fn picture(names: &[u8]) -> Picture {
-        Picture { chunks: names.iter().map(|name| chunk(*name)).collect(), ..Picture::default() }
+    fn frame(names: &[u8]) -> Frame {
+        Frame { chunks: names.iter().map(|name| chunk(*name)).collect(), ..Frame::default() }
     }
 
     /// What a page makes of a message.
@@ -153,10 +153,10 @@ mod tests {
     }
 
     #[test]
-    fn a_page_that_applies_the_messages_has_every_picture() {
+    fn a_page_that_applies_the_messages_has_every_frame() {
         let mut shown = Shown::default();
         let mut page: Vec<Vec<u8>> = Vec::new();
-        let pictures: [&[u8]; 7] = [
+        let frames: [&[u8]; 7] = [
             &[1, 2, 3, 4, 5],
             &[1, 2, 9, 4, 5],
             &[4, 5, 1, 2],
@@ -165,21 +165,21 @@ mod tests {
             &[7, 7, 7, 7, 8, 8],
             &[8, 7, 6, 5, 4, 3, 2, 1],
         ];
-        for (number, names) in pictures.into_iter().enumerate() {
-            let picture = picture(names);
-            page = applied(&page, &shown.message(number as u64, &picture));
-            let expected: Vec<Vec<u8>> = picture.chunks.iter().map(|chunk| chunk.bytes.to_vec()).collect();
-            assert_eq!(page, expected, "picture {number}");
+        for (number, names) in frames.into_iter().enumerate() {
+            let frame = frame(names);
+            page = applied(&page, &shown.message(number as u64, &frame));
+            let expected: Vec<Vec<u8>> = frame.chunks.iter().map(|chunk| chunk.bytes.to_vec()).collect();
+            assert_eq!(page, expected, "frame {number}");
         }
     }
 
     #[test]
-    fn a_picture_that_did_not_change_is_one_entry() {
+    fn a_frame_that_did_not_change_is_one_entry() {
         let mut shown = Shown::default();
-        let picture = picture(&(1..=200).collect::<Vec<u8>>());
-        let first = shown.message(1, &picture).len();
-        let list = shown.list(&picture.chunks);
+        let frame = frame(&(1..=200).collect::<Vec<u8>>());
+        let first = shown.message(1, &frame).len();
+        let list = shown.list(&frame.chunks);
         assert_eq!(list.len(), 8);
-        assert!(shown.message(2, &picture).len() < first);
+        assert!(shown.message(2, &frame).len() < first);
     }
 }

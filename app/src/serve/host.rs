@@ -1,4 +1,4 @@
-//! The thread that owns the window: it takes in what was done, draws, and shows the pictures to the pages.
+//! The thread that owns the window: it takes in what was done, draws, and shows the frames to the pages.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -7,10 +7,10 @@ use crossbeam_channel::Receiver;
 use egui::{Event, OutputCommand, Pos2, RawInput, Rect, Vec2, ViewportCommand, ViewportId};
 
 use super::chunks;
+use super::frame::{Frame, Typing, cursor_name};
 use super::hub::{Errand, Hub, Words};
 use super::input::{Held, Screen};
 use super::memory::Memory;
-use super::picture::{Picture, Typing, cursor_name};
 use super::textures::Textures;
 use crate::app::InBrowser;
 use crate::command::Command;
@@ -21,10 +21,10 @@ use crate::gui::{LEAST_SIZE, SIZE, Window};
 use crate::text::Language;
 use crate::tr;
 
-/// Between two pictures: a screen shows no more.
+/// Between two frames: a screen shows no more.
 const PERIOD: Duration = Duration::from_millis(16);
 
-/// Between two pictures when something was done.
+/// Between two frames when something was done.
 const PERIOD_OF_INPUT: Duration = Duration::from_millis(8);
 
 /// What happened is taken in at least this often, also when nobody looks.
@@ -33,6 +33,10 @@ const COLLECT: Duration = Duration::from_millis(250);
 /// What is held down moves nothing any more when the page was not heard for so long. Pages say it every 80 ms: three are
 /// missed before, and with the way to the arm it stands within half a second.
 const SILENCE: Duration = Duration::from_millis(260);
+
+/// What is pressed and released within it is a click \[s\]. On its way a release may be late by what a network needs to send
+/// it again.
+const CLICK_S: f64 = 2.5;
 
 /// Between two looks at what is to be remembered.
 const REMEMBER: Duration = Duration::from_secs(10);
@@ -48,7 +52,7 @@ pub struct Host {
     wakes: Receiver<()>,
     signals: Arc<Signals>,
     memory: Memory,
-    /// When the next picture is wanted.
+    /// When the next frame is wanted.
     due: Arc<Mutex<Option<Instant>>>,
     began: Instant,
     drawn: Option<Instant>,
@@ -61,7 +65,7 @@ pub struct Host {
     must_draw: bool,
     events: Vec<Event>,
     textures: Textures,
-    shown: Arc<Picture>,
+    shown: Arc<Frame>,
     language: Option<Language>,
 }
 
@@ -79,6 +83,7 @@ impl Host {
     ) -> anyhow::Result<Self> {
         let ctx = egui::Context::default();
         let due = Arc::new(Mutex::new(Some(Instant::now())));
+        ctx.options_mut(|options| options.input_options.max_click_duration = CLICK_S);
         let (asked, woken) = (Arc::clone(&due), Arc::clone(&hub));
         ctx.set_request_repaint_callback(move |info| {
             if sooner(&asked, info.delay) {
@@ -129,14 +134,20 @@ impl Host {
             }
         }
         self.window.app_mut().begin_to_leave();
-        self.memory.keep(self.window.remembered());
+        let written = self.memory.keep(self.window.remembered()).map(|write| write.perform());
+        if let Some(Err(warning)) = written {
+            tracing::warn!("{}", warning.0.say(Language::English));
+        }
     }
 
     /// How long nothing has to be done.
     fn wait(&self) -> Duration {
         let now = Instant::now();
         let mut until = self.collected + COLLECT;
-        if self.wants_picture()
+        if self.must_draw || (self.wants_frame() && !self.events.is_empty()) {
+            // It came right after a frame was drawn.
+            until = until.min(self.earliest());
+        } else if self.wants_frame()
             && let Some(due) = *self.due.lock().unwrap_or_else(PoisonError::into_inner)
         {
             until = until.min(due.max(self.earliest()));
@@ -147,14 +158,14 @@ impl Host {
         until.saturating_duration_since(now)
     }
 
-    /// When the next picture may be drawn.
+    /// When the next frame may be drawn.
     fn earliest(&self) -> Instant {
         let period = if self.events.is_empty() { PERIOD } else { PERIOD_OF_INPUT };
         self.drawn.map_or(self.began, |drawn| drawn + period)
     }
 
     /// Before a page has said how large it is, there is nothing to draw for.
-    fn wants_picture(&self) -> bool {
+    fn wants_frame(&self) -> bool {
         self.screen.is_some() && (!self.events.is_empty() || self.hub.is_watched())
     }
 
@@ -192,7 +203,7 @@ impl Host {
             let due = self.due.lock().unwrap_or_else(PoisonError::into_inner);
             due.is_some_and(|due| due <= now)
         };
-        let is_wanted = self.must_draw || (self.wants_picture() && (is_due || !self.events.is_empty()));
+        let is_wanted = self.must_draw || (self.wants_frame() && (is_due || !self.events.is_empty()));
         if is_wanted && now >= self.earliest() {
             return self.draw();
         }
@@ -212,7 +223,9 @@ impl Host {
         }
         if self.remembered.elapsed() > REMEMBER {
             self.remembered = Instant::now();
-            self.memory.keep(self.window.remembered());
+            if let Some(write) = self.memory.keep(self.window.remembered()) {
+                self.window.app_mut().write_settings(write);
+            }
         }
     }
 
@@ -241,7 +254,7 @@ impl Host {
             ends = viewport.commands.contains(&ViewportCommand::Close);
             sooner(&self.due, viewport.repaint_delay);
         }
-        let picture = Picture {
+        let frame = Frame {
             size: self.size().0.into(),
             pixels_per_point: output.pixels_per_point,
             chunks: chunks::of(&self.ctx, output.shapes, output.pixels_per_point),
@@ -252,8 +265,8 @@ impl Host {
                 Typing { cursor: [min.x, min.y, ime.cursor_rect.width(), ime.cursor_rect.height()] }
             }),
         };
-        if !picture.is_same(&self.shown) {
-            self.shown = Arc::new(picture);
+        if !frame.is_same(&self.shown) {
+            self.shown = Arc::new(frame);
             self.hub.show(Arc::clone(&self.shown));
         }
         if ends { std::ops::ControlFlow::Break(()) } else { std::ops::ControlFlow::Continue(()) }
@@ -287,7 +300,7 @@ impl Host {
     }
 }
 
-/// Notes that a picture is wanted after a while; whether that is sooner than one was wanted before.
+/// Notes that a frame is wanted after a while; whether that is sooner than one was wanted before.
 fn sooner(due: &Mutex<Option<Instant>>, delay: Duration) -> bool {
     let mut due = due.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(wanted) = Instant::now().checked_add(delay) else { return false };

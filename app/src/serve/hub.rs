@@ -10,8 +10,8 @@ use crossbeam_channel::{Receiver, Sender};
 use serde::Serialize;
 use tokio::sync::watch;
 
+use super::frame::Frame;
 use super::input::{Done, Screen};
-use super::picture::Picture;
 
 /// Pages at a time.
 pub const MOST_PAGES: usize = 32;
@@ -27,7 +27,7 @@ pub struct Hub {
     state: Mutex<State>,
     wake: Sender<()>,
     stop: AtomicBool,
-    pictures: watch::Sender<(u64, Arc<Picture>)>,
+    frames: watch::Sender<(u64, Arc<Frame>)>,
     people: watch::Sender<People>,
     words: watch::Sender<Words>,
 }
@@ -106,7 +106,7 @@ struct Page {
     /// What its person sees.
     screen: Option<Screen>,
     visible: bool,
-    /// Whether it has the latest picture and takes another.
+    /// Whether it has the latest frame and takes another.
     ready: bool,
     errands: tokio::sync::mpsc::Sender<Errand>,
 }
@@ -124,7 +124,7 @@ impl Hub {
             state: Mutex::new(state),
             wake,
             stop: AtomicBool::new(false),
-            pictures: watch::Sender::default(),
+            frames: watch::Sender::default(),
             people: watch::Sender::default(),
             words: watch::Sender::default(),
         };
@@ -251,7 +251,7 @@ impl Hub {
         }
     }
 
-    /// Whether a page can be seen, and whether it takes another picture.
+    /// Whether a page can be seen, and whether it takes another frame.
     pub fn sees(&self, id: PageId, visible: Option<bool>, ready: Option<bool>) {
         let mut state = self.state();
         let Some(page) = state.pages.get_mut(&id) else { return };
@@ -275,7 +275,7 @@ impl Hub {
         }
     }
 
-    /// Whether somebody waits for a picture.
+    /// Whether somebody waits for a frame.
     pub fn is_watched(&self) -> bool {
         self.state().pages.values().any(|page| page.visible && page.ready)
     }
@@ -286,11 +286,11 @@ impl Hub {
         (std::mem::take(&mut state.news), state.heard)
     }
 
-    /// Shows a picture to everybody.
-    pub fn show(&self, picture: Arc<Picture>) {
-        self.pictures.send_modify(|(number, shown)| {
+    /// Shows a frame to everybody.
+    pub fn show(&self, frame: Arc<Frame>) {
+        self.frames.send_modify(|(number, shown)| {
             *number += 1;
-            *shown = picture;
+            *shown = frame;
         });
     }
 
@@ -312,9 +312,9 @@ impl Hub {
         });
     }
 
-    /// The pictures, by number.
-    pub fn pictures(&self) -> watch::Receiver<(u64, Arc<Picture>)> {
-        self.pictures.subscribe()
+    /// The frames, by number.
+    pub fn frames(&self) -> watch::Receiver<(u64, Arc<Frame>)> {
+        self.frames.subscribe()
     }
 
     /// Who is there.
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_that_cannot_be_seen_or_is_slow_asks_for_no_pictures() {
+    fn a_page_that_cannot_be_seen_or_is_slow_asks_for_no_frames() {
         let hub = hub();
         assert!(!hub.is_watched());
         let page = join(&hub, "a");

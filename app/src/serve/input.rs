@@ -22,7 +22,7 @@ pub enum Said {
     },
     /// The size of the page.
     Screen(Screen),
-    /// A picture is on the screen.
+    /// A frame is on the screen.
     Shown {
         /// Its number.
         number: u64,
@@ -67,7 +67,7 @@ impl Screen {
     }
 }
 
-/// Something that a person did. Places are in points of the picture that the page shows, from the
+/// Something that a person did. Places are in points of the frame that the page shows, from the
 /// left top corner.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "e", rename_all = "snake_case", deny_unknown_fields)]

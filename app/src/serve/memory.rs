@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use handeye_core::project::files::atomic_file;
 use serde::{Deserialize, Serialize};
 
 use crate::gui::Layout;
 use crate::gui::window::Remembered;
-use crate::settings;
+use crate::settings::{self, SettingsWrite};
 
 /// Name of the file.
 const FILE: &str = "browser.json";
@@ -41,20 +40,14 @@ impl Memory {
         (self.kept.remembered.clone(), layout)
     }
 
-    /// Writes it, if it is another than before.
-    pub fn keep(&mut self, (remembered, layout): (Remembered, Layout)) {
+    /// What is to be written, if it is another than before.
+    pub fn keep(&mut self, (remembered, layout): (Remembered, Layout)) -> Option<SettingsWrite> {
         let now = Kept { remembered, layout: Some(layout) };
         if now == self.kept {
-            return;
+            return None;
         }
         self.kept = now;
-        let (Some(path), Ok(json)) = (&self.path, serde_json::to_vec_pretty(&self.kept)) else { return };
-        let written = path
-            .parent()
-            .map_or(Ok(()), std::fs::create_dir_all)
-            .and_then(|()| atomic_file::write(path, &json).map_err(std::io::Error::other));
-        if let Err(error) = written {
-            tracing::warn!(%error, "what is remembered of the window could not be written");
-        }
+        let content = serde_json::to_string_pretty(&self.kept).ok()?;
+        Some(SettingsWrite::new(self.path.clone()?, content))
     }
 }

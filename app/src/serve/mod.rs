@@ -1,9 +1,9 @@
 //! The workbench in a browser: the window is drawn here, and pages show it (docs/browser.md has the protocol).
 //!
 //! One thread owns egui's context and the [`Window`](crate::gui::Window), as that of a desktop does ([`host`]). What it
-//! has drawn is a [`picture::Picture`]: triangles in chunks, and textures. Every page has a connection of its own
-//! ([`socket`]), which sends what changed since the picture that this page has ([`difference`]); a page that is slow gets
-//! fewer pictures and holds nobody up. What a person does at a page comes back through the [`hub`], which knows who
+//! has drawn is a [`frame::Frame`]: triangles in chunks, and textures. Every page has a connection of its own
+//! ([`socket`]), which sends what changed since the frame that this page has ([`difference`]); a page that is slow gets
+//! fewer frames and holds nobody up. What a person does at a page comes back through the [`hub`], which knows who
 //! drives.
 
 mod access;
@@ -11,11 +11,11 @@ mod archive;
 mod args;
 mod chunks;
 mod difference;
+mod frame;
 mod host;
 mod hub;
 mod input;
 mod memory;
-mod picture;
 mod site;
 mod socket;
 mod textures;

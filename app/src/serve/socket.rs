@@ -1,6 +1,6 @@
-//! The connection of a page: pictures and words one way, what a person does the other way.
+//! The connection of a page: frames and words one way, what a person does the other way.
 //!
-//! Two tasks, so that a page that takes its pictures slowly is heard all the same: a STOP waits for no picture.
+//! Two tasks, so that a page that takes its frames slowly is heard all the same: a STOP waits for no frame.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,7 +23,7 @@ use super::upload::Uploads;
 /// Longest message of a page \[bytes\]: what is pasted is in it.
 const MOST_BYTES: usize = 1 << 20;
 
-/// Pictures on their way to a page. With one, the page would wait for the next after every one.
+/// Frames on their way to a page. With one, the page would wait for the next after every one.
 const ON_THE_WAY: u64 = 2;
 
 /// How often a page is asked whether it is there.
@@ -37,7 +37,7 @@ const STALLED: Duration = Duration::from_secs(30);
 
 type Socket = WebSocketStream<TokioIo<Upgraded>>;
 
-/// What a page is told besides pictures.
+/// What a page is told besides frames.
 #[derive(Serialize)]
 #[serde(tag = "t", rename_all = "snake_case")]
 enum Told<'a> {
@@ -52,10 +52,7 @@ enum Told<'a> {
 
 /// Talks to a page until it has gone.
 pub async fn attend(upgraded: Upgraded, name: String, hub: Arc<Hub>, uploads: Arc<Uploads>) {
-    let config = WebSocketConfig::default()
-        .max_message_size(Some(MOST_BYTES))
-        .max_frame_size(Some(MOST_BYTES))
-        .max_write_buffer_size(usize::MAX);
+    let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
     let socket: Socket = WebSocketStream::from_raw_socket(TokioIo::new(upgraded), Role::Server, Some(config)).await;
     let (to_page, from_page) = socket.split();
     let Some((id, errands)) = hub.join(&name) else {
@@ -123,8 +120,8 @@ async fn write(
     mut errands: mpsc::Receiver<Errand>,
     mut acknowledged: watch::Receiver<u64>,
 ) -> &'static str {
-    let (mut pictures, mut people, mut words) = (hub.pictures(), hub.people(), hub.words());
-    pictures.mark_changed();
+    let (mut frames, mut people, mut words) = (hub.frames(), hub.people(), hub.words());
+    frames.mark_changed();
     people.mark_changed();
     words.mark_changed();
     let mut pings = interval(PING);
@@ -161,17 +158,17 @@ async fn write(
                 taken = Instant::now();
                 continue;
             }
-            changed = pictures.changed(), if has_room => {
+            changed = frames.changed(), if has_room => {
                 if changed.is_err() {
                     return "ended";
                 }
-                let (number, picture) = pictures.borrow_and_update().clone();
+                let (number, frame) = frames.borrow_and_update().clone();
                 if number == 0 || number == last {
                     continue;
                 }
                 last = number;
                 sent += 1;
-                Message::binary(page.message(sent, &picture))
+                Message::binary(page.message(sent, &frame))
             }
             _ = pings.tick() => {
                 if !has_room && taken.elapsed() > STALLED {

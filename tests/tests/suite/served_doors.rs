@@ -83,8 +83,8 @@ impl Drop for Served {
     }
 }
 
-/// Reads until a picture has come, and says that it is shown.
-fn picture(page: &mut tungstenite::WebSocket<TcpStream>) -> u64 {
+/// Reads until a frame has come, and says that it is shown.
+fn frame(page: &mut tungstenite::WebSocket<TcpStream>) -> u64 {
     loop {
         let Message::Binary(bytes) = page.read().expect("an answer") else { continue };
         let end = 4 + u32::from_le_bytes(bytes[..4].try_into().expect("four bytes")) as usize;
@@ -160,7 +160,7 @@ fn broken_messages_and_a_thousand_silent_connections_leave_the_driving_page_alon
     let mut driver = served.page("driver");
     let screen = json!({"t": "screen", "width": 1440.0, "height": 900.0, "scale": 1.0, "touch": false});
     driver.send(Message::text(screen.to_string())).expect("sent");
-    let first = picture(&mut driver);
+    let first = frame(&mut driver);
     let before = served.megabytes();
 
     let silent: Vec<TcpStream> = (0..1000).filter_map(|_| TcpStream::connect(&served.address).ok()).collect();
@@ -183,7 +183,7 @@ fn broken_messages_and_a_thousand_silent_connections_leave_the_driving_page_alon
             while page.read().is_ok() {}
         }
     }
-    let now = picture(&mut driver);
+    let now = frame(&mut driver);
     assert!(now > first);
     drop(silent);
     let grown = served.megabytes() - before;

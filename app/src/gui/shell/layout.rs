@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::{Model, Moves, Pane, Step};
 
 /// Key of the layout in eframe's storage.
+#[cfg(feature = "window")]
 pub const STORAGE_KEY: &str = "layout";
 
 /// The upper left: what the camera sees.

@@ -1,10 +1,10 @@
-// The page of the Handeye Workbench: shows the pictures that `handeye serve` draws, and sends what a person does.
+// The page of the Handeye Workbench: shows the frames that `handeye serve` draws, and sends what a person does.
 // The messages are described in docs/browser.md.
 'use strict';
 
 const element = (id) => document.getElementById(id);
 const [canvas, typing, bar, barText, driveButton, stopButton, keyboardButton, note] =
-  ['picture', 'typing', 'bar', 'bar-text', 'drive', 'stop', 'keyboard', 'note'].map(element);
+  ['frame', 'typing', 'bar', 'bar-text', 'drive', 'stop', 'keyboard', 'note'].map(element);
 
 /// While something is held down, it is said so often [ms]; when it is no longer said, the window lets go of it.
 const RENEWAL_MS = 80;
@@ -22,11 +22,11 @@ let people = { you: true, driven: true, pages: 1 };
 /// Whether fingers are used here: the keyboard of the screen then comes only when it is asked for.
 let touched = matchMedia('(pointer: coarse)').matches;
 
-// ---------------------------------------------------------------- the picture
+// ---------------------------------------------------------------- the frame
 
 /// What is on the screen, drawn by painter.js.
 const show = {
-  picture: null,
+  frame: null,
   painter: new Worker('/painter.js'),
 
   begin() {
@@ -41,26 +41,26 @@ const show = {
     if (data.lost === false) { sayNote(data.failed); return; }
     if (data.connection !== connection.count) return;
     if (data.failed) { connection.again(); return; }
-    this.picture = { size: data.size };
+    this.frame = { size: data.size };
     canvas.style.cursor = people.you ? data.cursor : 'default';
     fit();
     placeTyping(data.typing);
     connection.send({ t: 'shown', number: data.number });
   },
 
-  /// A place of the page in points of the picture.
+  /// A place of the page in points of the frame.
   pointOf(event) {
     const area = canvas.getBoundingClientRect();
-    const size = this.picture?.size ?? [area.width, area.height];
+    const size = this.frame?.size ?? [area.width, area.height];
     return [(event.clientX - area.left) * size[0] / area.width, (event.clientY - area.top) * size[1] / area.height];
   },
 };
 
-/// The picture as large as there is room for; where one drives, it is made for this room.
+/// The frame as large as there is room for; where one drives, it is made for this room.
 function fit() {
-  if (!show.picture) return;
+  if (!show.frame) return;
   const stage = element('stage');
-  const [width, height] = show.picture.size;
+  const [width, height] = show.frame.size;
   const scale = Math.min(stage.clientWidth / width, stage.clientHeight / height);
   canvas.style.width = `${width * scale}px`;
   canvas.style.height = `${height * scale}px`;
@@ -96,7 +96,7 @@ class Connection {
     socket.onmessage = ({ data }) => {
       if (socket !== this.socket) return;
       this.watch();
-      if (data instanceof ArrayBuffer) show.painter.postMessage({ picture: data }, [data]);
+      if (data instanceof ArrayBuffer) show.painter.postMessage({ frame: data }, [data]);
       else heard(JSON.parse(data));
     };
     socket.onclose = () => {
@@ -324,7 +324,7 @@ function placeTyping(place) {
   }
   const area = canvas.getBoundingClientRect();
   const stage = element('stage').getBoundingClientRect();
-  const scale = area.width / show.picture.size[0];
+  const scale = area.width / show.frame.size[0];
   typing.style.left = `${area.left - stage.left + place.cursor[0] * scale}px`;
   typing.style.top = `${area.top - stage.top + place.cursor[1] * scale}px`;
 }

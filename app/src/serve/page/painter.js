@@ -1,4 +1,4 @@
-// Draws the pictures that `handeye serve` sends, on a thread of its own: the page stays free for what a person does, and
+// Draws the frames that `handeye serve` sends, on a thread of its own: the page stays free for what a person does, and
 // says in time that a button is still held. The messages are described in docs/browser.md.
 'use strict';
 
@@ -87,16 +87,16 @@ class Painter {
     this.textures.delete(id);
   }
 
-  /// All chunks of a picture; neighbours with one texture and one clip rectangle are drawn at once.
-  paint(picture) {
+  /// All chunks of a frame; neighbours with one texture and one clip rectangle are drawn at once.
+  paint(frame) {
     const gl = this.gl;
-    const [width, height] = picture.size.map((points) => Math.round(points * picture.scale));
+    const [width, height] = frame.size.map((points) => Math.round(points * frame.scale));
     if (this.canvas.width !== width || this.canvas.height !== height) {
       this.canvas.width = width;
       this.canvas.height = height;
     }
     let [vertexCount, indexCount] = [0, 0];
-    for (const chunk of picture.chunks) {
+    for (const chunk of frame.chunks) {
       vertexCount += chunk.vertexCount;
       indexCount += chunk.indices.length;
     }
@@ -104,7 +104,7 @@ class Painter {
     if (this.indices.length < indexCount) this.indices = new Uint32Array(Math.ceil(indexCount * 1.5));
     const runs = [];
     let [vertex, index] = [0, 0];
-    for (const chunk of picture.chunks) {
+    for (const chunk of frame.chunks) {
       this.vertices.set(chunk.vertices, vertex * 20);
       for (let i = 0; i < chunk.indices.length; i++) this.indices[index + i] = chunk.indices[i] + vertex;
       const last = runs[runs.length - 1];
@@ -118,13 +118,13 @@ class Painter {
     gl.scissor(0, 0, width, height);
     gl.clearColor(0.05, 0.05, 0.06, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    gl.uniform2f(this.size, width / picture.scale, height / picture.scale);
+    gl.uniform2f(this.size, width / frame.scale, height / frame.scale);
     gl.bufferData(gl.ARRAY_BUFFER, this.vertices.subarray(0, vertexCount * 20), gl.STREAM_DRAW);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.indices.subarray(0, indexCount), gl.STREAM_DRAW);
     for (const run of runs) {
       const texture = this.textures.get(run.texture);
       if (!texture) continue;
-      const [left, top, right, bottom] = run.clip.map((edge) => Math.round(edge * picture.scale));
+      const [left, top, right, bottom] = run.clip.map((edge) => Math.round(edge * frame.scale));
       const [x, y] = [Math.max(left, 0), Math.max(top, 0)];
       const [w, h] = [Math.min(right, width) - x, Math.min(bottom, height) - y];
       if (w <= 0 || h <= 0) continue;
@@ -142,7 +142,7 @@ async function inflated(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/// The chunks of the picture before, with what changed.
+/// The chunks of the frame before, with what changed.
 function merged(before, list) {
   const view = new DataView(list.buffer, list.byteOffset, list.byteLength);
   const chunks = [];
@@ -234,8 +234,8 @@ onmessage = ({ data }) => {
     if (data.canvas) {
       show = new Show(data.canvas);
       data.canvas.addEventListener('webglcontextlost', () => postMessage({ lost: true }));
-    } else if (data.picture) {
-      show?.take(data.picture);
+    } else if (data.frame) {
+      show?.take(data.frame);
     } else {
       show?.forget(data.connection);
     }

@@ -7,7 +7,7 @@ use super::textures::Textures;
 
 /// A frame, with all that is needed to draw it.
 #[derive(Clone, Default)]
-pub struct Picture {
+pub struct Frame {
     /// Width and height \[points\].
     pub size: [f32; 2],
     /// Pixels of a point.
@@ -22,7 +22,7 @@ pub struct Picture {
     pub typing: Option<Typing>,
 }
 
-impl Picture {
+impl Frame {
     /// Whether it looks the same.
     pub fn is_same(&self, other: &Self) -> bool {
         self.size == other.size
