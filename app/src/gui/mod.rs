@@ -1,7 +1,8 @@
 //! The window of the workbench.
 //!
-//! Data flows in one direction: workers report events, [`App`] changes the model, panes draw the model and return
-//! commands, which [`App`] applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps or solves.
+//! Data flows in one direction: workers report events, [`App`](crate::app::App) changes the model, panes draw the
+//! model and return commands, which it applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps
+//! or solves.
 
 mod actions;
 mod args;
