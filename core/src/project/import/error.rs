@@ -29,7 +29,7 @@ pub enum ImportError {
     AlreadyADataset(PathBuf),
     /// There is nothing that could be robot poses.
     #[error(
-        "{}: no series of at least {need} poses was found (tables, JSON, YAML, npz and rosbag2 are read): {seen}",
+        "{}: no series of at least {need} poses was found (tables, JSON, YAML, npz and bags of ROS are read): {seen}",
         folder.display()
     )]
     NoPoses {

@@ -36,7 +36,7 @@ pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>), ImportError> 
     if let Some(only) = only {
         // Beside a file that was named only what it may refer to counts: images, the description of a camera.
         let is_series =
-            |f: &Path| ["csv", "txt", "tsv", "json", "samples", "npz", "npy", "mcap", "db3"].contains(&&*ending(f));
+            |f: &Path| is_bag(f) || ["csv", "txt", "tsv", "json", "samples", "npz", "npy"].contains(&&*ending(f));
         files.retain(|file| {
             let is_others = ending(file) == "calib" && file.file_stem() != only.file_stem();
             *file == only || !(is_series(file) || is_others)
@@ -85,6 +85,15 @@ pub(super) fn ending(path: &Path) -> String {
 
 pub(super) fn is_image(path: &Path) -> bool {
     IMAGES.contains(&&*ending(path))
+}
+
+/// Whether a file is one of a bag of ROS.
+pub(super) fn is_bag(path: &Path) -> bool {
+    match &*ending(path) {
+        "mcap" | "db3" | "bag" => true,
+        "zstd" => matches!(&*ending(&path.with_extension("")), "mcap" | "db3"),
+        _ => false,
+    }
 }
 
 /// The bytes of a file that is not too large.

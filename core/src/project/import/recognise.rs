@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::error::ImportError;
 use super::folder;
 use super::formats::tree::{self, LEAST_POSES};
-use super::formats::{easy_handeye, industrial_calibration, intrinsics, moveit, npz, rosbag2, table, visp};
+use super::formats::{easy_handeye, industrial_calibration, intrinsics, moveit, npz, rosbag, table, visp};
 use super::recording::{FoundTarget, Recording, Sample, Stated, Track};
 use super::value::{self, Value};
 use crate::project::files::own_folder::{DESCRIPTION, is_session};
@@ -37,10 +37,12 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
         ));
     }
     let mut reader = Reader { root: &root, recording, documents: 0 };
-    let text_files: Vec<PathBuf> = files.iter().filter(|file| !folder::is_image(file)).cloned().collect();
-    for members in folder::groups(&text_files, true) {
+    let (bags, others): (Vec<PathBuf>, Vec<PathBuf>) =
+        files.iter().filter(|file| !folder::is_image(file)).cloned().partition(|file| folder::is_bag(file));
+    for members in folder::groups(&others, true) {
         reader.group(&members);
     }
+    reader.bags(&bags);
     let mut recording = reader.recording;
     if moveit::know(&mut recording.tracks) {
         recording.beliefs.push("the poses are samples of MoveIt calibration, by their names".into());
@@ -115,7 +117,6 @@ impl Reader<'_> {
             "json" | "yaml" | "yml" | "samples" | "calib" => self.documents(members),
             "csv" | "txt" | "tsv" | "dat" | "" | "log" => self.tables(members),
             "npz" | "npy" => self.arrays(members),
-            "mcap" | "db3" => self.bags(members),
             "xml" => self.each(members, |reader, file, text| {
                 let camera = visp::camera(text, &file.display().to_string());
                 reader.recording.cameras.extend(camera);
@@ -137,17 +138,31 @@ impl Reader<'_> {
         }
     }
 
-    /// Files of a bag with its description beside them are one; others are each a bag.
-    fn bags(&mut self, members: &[(PathBuf, Option<u64>)]) {
-        let folder = members[0].0.parent().unwrap_or(Path::new(""));
-        let mut bags: Vec<Vec<&Path>> = members.iter().map(|(file, _)| vec![file.as_path()]).collect();
-        if self.root.join(folder).join("metadata.yaml").is_file() {
-            bags = vec![bags.concat()];
+    /// Files of a bag of ROS 2 with its description beside them are one, compressed or not; others are each a bag.
+    fn bags(&mut self, files: &[PathBuf]) {
+        let folder_of = |file: &Path| file.parent().unwrap_or(Path::new("")).to_path_buf();
+        let has_description = |file: &Path| {
+            folder::ending(file) != "bag" && self.root.join(folder_of(file)).join("metadata.yaml").is_file()
+        };
+        let mut bags: Vec<Vec<&Path>> = Vec::new();
+        for file in files {
+            // Whoever plays a compressed bag leaves its files unpacked beside it.
+            if folder::ending(file) == "zstd" && files.contains(&file.with_extension("")) {
+                continue;
+            }
+            let open = bags.iter_mut().find(|bag| {
+                has_description(file) && folder::ending(bag[0]) != "bag" && folder_of(bag[0]) == folder_of(file)
+            });
+            match open {
+                Some(bag) => bag.push(file),
+                None => bags.push(vec![file]),
+            }
         }
         for files in bags {
             let parts: Vec<PathBuf> = files.iter().map(|file| self.root.join(file)).collect();
-            let name = if files.len() > 1 { folder } else { files[0] };
-            let read = rosbag2::read(&name.display().to_string(), &parts, &mut self.recording);
+            let folder = folder_of(files[0]);
+            let name = if files.len() > 1 { &folder } else { files[0] };
+            let read = rosbag::read(&name.display().to_string(), &parts, &mut self.recording);
             if let Err(why) = read {
                 self.warn(files[0], format_args!("is not used: {why}"));
             }

@@ -5,7 +5,7 @@ pub(super) mod industrial_calibration;
 pub(super) mod intrinsics;
 pub(super) mod moveit;
 pub(super) mod npz;
-pub(super) mod rosbag2;
+pub(super) mod rosbag;
 pub(super) mod table;
 pub(super) mod tree;
 pub(super) mod visp;
