@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use super::error::ImportError;
 use super::folder;
 use super::formats::tree::{self, LEAST_POSES};
-use super::formats::{easy_handeye, industrial_calibration, intrinsics, moveit, npz, rosbag, table, visp};
+use super::formats::{
+    easy_handeye, industrial_calibration, intrinsics, joints, moveit, npz, program, rosbag, table, visp,
+};
 use super::recording::{FoundTarget, Recording, Sample, Stated, Track};
 use super::value::{self, Value};
 use crate::project::files::own_folder::{DESCRIPTION, is_session};
@@ -57,6 +59,13 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
         };
         recording.beliefs.push(format!("{} poses in {}: {kind}{with}", track.samples.len(), track.name));
     }
+    for series in &recording.joints {
+        let names = if series.joints.is_empty() { String::new() } else { format!(" ({})", series.joints.join(", ")) };
+        let count = series.samples.len();
+        recording
+            .beliefs
+            .push(format!("{count} rows of joint values in {}{names}: arm=… makes poses of them", series.name));
+    }
     for camera in &recording.cameras {
         recording.beliefs.push(format!("a camera in {}: {}", camera.name, camera.why));
     }
@@ -99,8 +108,13 @@ impl Reader<'_> {
     fn document(&mut self, file: &Path) -> Option<Value> {
         let text = self.text(file)?;
         let parsed = match folder::ending(file).as_str() {
-            "json" => value::json(&text),
-            _ => value::yaml(&text).map(|documents| documents.into_iter().next().unwrap_or(Value::Other)),
+            "json" | "jsonl" => value::json(&text),
+            _ => value::yaml(&text).map(|mut documents| match documents.len() {
+                // A document to a message, as `ros2 topic echo` writes them.
+                LEAST_POSES.. => Value::List(documents),
+                1.. => documents.swap_remove(0),
+                0 => Value::Other,
+            }),
         };
         match parsed {
             Ok(value) => Some(value),
@@ -114,12 +128,19 @@ impl Reader<'_> {
     /// Files of one naming.
     fn group(&mut self, members: &[(PathBuf, Option<u64>)]) {
         match folder::ending(&members[0].0).as_str() {
-            "json" | "yaml" | "yml" | "samples" | "calib" => self.documents(members),
+            "json" | "jsonl" | "yaml" | "yml" | "samples" | "calib" => self.documents(members),
             "csv" | "txt" | "tsv" | "dat" | "" | "log" => self.tables(members),
+            // Programs of robots.
+            "script" | "src" | "mod" | "ls" => self.each(members, |reader, file, text| {
+                reader.recording.tracks.extend(program::read(&file.display().to_string(), text));
+            }),
             "npz" | "npy" => self.arrays(members),
             "xml" => self.each(members, |reader, file, text| {
-                let camera = visp::camera(text, &file.display().to_string());
-                reader.recording.cameras.extend(camera);
+                let name = file.display().to_string();
+                reader.recording.cameras.extend(visp::camera(text, &name));
+                if let Some(value) = value::opencv_xml(text) {
+                    reader.single(file, &value);
+                }
             }),
             "cameramodel" => self.each(members, |reader, file, text| {
                 let camera = intrinsics::mrcal(text, &file.display().to_string());
@@ -227,7 +248,21 @@ impl Reader<'_> {
             }
             self.recording.tracks.push(track);
         }
-        self.recording.tracks.len() > before
+        if self.recording.tracks.len() > before {
+            return true;
+        }
+        let values = read.iter().filter_map(|(file, number, value)| {
+            let fields = tree::fields(value);
+            let place = file.display().to_string();
+            let has_alone = fields.poses.is_empty() && !fields.joints.is_empty();
+            has_alone.then(|| joints::sample(place, fields.image, number.or(fields.number), fields.joints))
+        });
+        let values: Vec<_> = values.collect();
+        let series =
+            joints::series(files, Vec::new(), None, values).filter(|series| 2 * series.samples.len() >= read.len());
+        let is_series = series.is_some();
+        self.recording.joints.extend(series);
+        is_series
     }
 
     /// A document by itself.
@@ -262,6 +297,7 @@ impl Reader<'_> {
         }
         if found.is_empty() {
             found = tree::series(value, &name);
+            self.recording.joints.extend(joints::of_document(value, &name));
         }
         self.recording.tracks.extend(found);
         self.recording.cameras.extend(intrinsics::of_document(value, &name));
@@ -292,7 +328,15 @@ impl Reader<'_> {
         for (file, _, text) in texts {
             let name = file.display().to_string();
             self.recording.targets.extend(visp::target(&text, &name));
-            self.recording.tracks.extend(table::read(&name, &text));
+            if let Some(track) = program::read(&name, &text) {
+                self.recording.tracks.push(track);
+                continue;
+            }
+            let tracks = table::read(&name, &text);
+            if tracks.is_empty() {
+                self.recording.joints.extend(table::joints(&name, &text));
+            }
+            self.recording.tracks.extend(tracks);
         }
     }
 
@@ -318,6 +362,9 @@ impl Reader<'_> {
     }
 
     fn arrays(&mut self, members: &[(PathBuf, Option<u64>)]) {
+        if members.len() >= LEAST_POSES && self.one_pose_to_an_array(members) {
+            return;
+        }
         for (file, _) in members {
             let name = file.display().to_string();
             match folder::bytes(&self.root.join(file)) {
@@ -331,5 +378,29 @@ impl Reader<'_> {
                 },
             }
         }
+    }
+
+    /// A pose to a file of NumPy; whether it is so.
+    fn one_pose_to_an_array(&mut self, members: &[(PathBuf, Option<u64>)]) -> bool {
+        // Files of many poses are large, and looked at by themselves.
+        const LARGEST: u64 = 1 << 16;
+        let one = |(file, number): &(PathBuf, Option<u64>)| {
+            let path = self.root.join(file);
+            if std::fs::metadata(&path).ok()?.len() > LARGEST {
+                return None;
+            }
+            let numbers = npz::pose(&folder::bytes(&path).ok()?)?;
+            let place = file.display().to_string();
+            Some(Sample { image: None, number: *number, place, numbers, joints: Vec::new() })
+        };
+        let samples: Vec<Sample> = members.iter().filter_map(one).collect();
+        if 2 * samples.len() < members.len() {
+            return false;
+        }
+        let (naming, _) = folder::naming(&members[0].0, true);
+        let name = naming.shown();
+        let Some(track) = tree::track(name.clone(), &name, Stated::default(), samples) else { return false };
+        self.recording.tracks.push(track);
+        true
     }
 }

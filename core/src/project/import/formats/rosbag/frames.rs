@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
 
-use super::contents::{MOST_MESSAGES, Timed, nearest};
+use super::contents::{MOST_MESSAGES, Timed, between, nearest};
 
 /// Frames of the largest robots, many times over; and most of them that may be the tip.
 const MOST_FRAMES: usize = 10_000;
@@ -58,18 +58,44 @@ impl Frames {
 
     /// Where a frame is in the root, by the transforms nearest in time; `None` where one is not near, and in a circle.
     pub fn root_from(&self, name: &str, stamp: i64, within_ns: i64) -> Option<Isometry3<f64>> {
+        self.composed(name, |poses| nearest(poses, stamp, within_ns).copied())
+    }
+
+    /// As [`root_from`](Self::root_from), of a frame that moves: turned evenly and moved straight between the transforms before
+    /// and after.
+    pub fn root_from_in_motion(&self, name: &str, stamp: i64, within_ns: i64) -> Option<Isometry3<f64>> {
+        self.composed(name, |poses| interpolated(poses, stamp, within_ns))
+    }
+
+    fn composed(
+        &self,
+        name: &str,
+        of: impl Fn(&Timed<Isometry3<f64>>) -> Option<Isometry3<f64>>,
+    ) -> Option<Isometry3<f64>> {
         let mut pose = Isometry3::identity();
         for (count, (_, frame)) in self.upwards(name).enumerate() {
             // More frames than there are: a circle.
             if count == self.0.len() {
                 return None;
             }
-            let poses = &frame.parent_from_frame;
-            let own =
-                if frame.is_static { poses.last().map(|(_, pose)| pose) } else { nearest(poses, stamp, within_ns) };
+            let own = if frame.is_static {
+                frame.parent_from_frame.last().map(|(_, pose)| *pose)
+            } else {
+                of(&frame.parent_from_frame)
+            };
             pose = own? * pose;
         }
         Some(pose)
+    }
+
+    /// When something is said of a frame that moves: by the stamps of the one among it and those above it that has most.
+    pub fn stamps_of(&self, name: &str) -> Vec<i64> {
+        let moving =
+            self.upwards(name).filter(|(_, frame)| !frame.is_static).map(|(_, frame)| &frame.parent_from_frame);
+        let most = moving.max_by_key(|poses| poses.len());
+        let mut stamps: Vec<i64> = most.into_iter().flatten().map(|(stamp, _)| *stamp).collect();
+        stamps.dedup();
+        stamps
     }
 
     fn moves(&self, name: &str) -> bool {
@@ -96,4 +122,16 @@ impl Frames {
         let called = of(&is_called);
         if called.is_empty() { of(&is_last) } else { called }
     }
+}
+
+fn interpolated(poses: &[(i64, Isometry3<f64>)], stamp: i64, within_ns: i64) -> Option<Isometry3<f64>> {
+    let near = between(poses, stamp.saturating_sub(within_ns), stamp.saturating_add(within_ns));
+    let next = near.partition_point(|(other, _)| *other < stamp);
+    let (after_ns, after) = near.get(next)?;
+    if *after_ns == stamp {
+        return Some(*after);
+    }
+    let (before_ns, before) = near.get(next.checked_sub(1)?)?;
+    let part = (stamp - before_ns) as f64 / (after_ns - before_ns) as f64;
+    before.try_lerp_slerp(after, part, 1e-9)
 }

@@ -15,7 +15,8 @@ pub(super) fn name(topic: &str, stamp: i64) -> String {
     format!("{topic}_{stamp}.png")
 }
 
-/// Writes the chosen images into a folder of this machine's temporary files, which goes with the recording.
+/// Writes the chosen images into a folder of this machine's temporary files, which goes with the recording. Those of a robot that
+/// moves keep their stamps.
 ///
 /// # Errors
 /// A sentence, where nothing can be written there.
@@ -23,8 +24,12 @@ pub(super) fn unpack(
     file: &str,
     parts: &[PathBuf],
     chosen: &BTreeMap<String, Vec<i64>>,
+    with_stamps: bool,
     recording: &mut Recording,
 ) -> Result<(), String> {
+    if chosen.is_empty() {
+        return Ok(());
+    }
     let scratch = tempfile::tempdir().map_err(|e| e.to_string())?;
     let mut streams: BTreeMap<String, Stream> = BTreeMap::new();
     let mut troubles = Vec::new();
@@ -44,7 +49,12 @@ pub(super) fn unpack(
                         size: (image.width(), image.height()),
                         is_depth: matches!(image, DynamicImage::ImageLuma16(_)),
                     });
-                    stream.images.push(ImageFile { path, number: None, same_as: None });
+                    stream.images.push(ImageFile {
+                        path,
+                        number: None,
+                        same_as: None,
+                        stamp_ns: with_stamps.then_some(stamp),
+                    });
                 }
                 Err(why) => troubles.push(format!("{file}: an image on {} is not used: {why}", message.topic)),
             }

@@ -2,11 +2,13 @@
 //! messages of poses, joint values, cameras.
 //!
 //! Frames of the tree are composed by the stamps of their transforms; an instant is at rest when nothing that moves in the bag
-//! moves around it. Of each rest one image is taken.
+//! moves around it. Of each rest one image is taken. Where there are too few rests, images of the moving robot are, with their
+//! stamps, and the robot's poses as they come.
 
 mod contents;
 mod frames;
 mod images;
+mod motion;
 mod storage;
 mod wire;
 
@@ -15,16 +17,18 @@ use std::path::PathBuf;
 
 use nalgebra::Isometry3;
 
-use super::tree;
-use crate::project::import::conventions::{Direction, LengthUnit, RotationForm};
-use crate::project::import::recording::{Known, Numbers, Recording, Role, Sample, Stated, Track};
-use contents::{Bag, nearest};
+use super::{joints, tree};
+use crate::project::import::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
+use crate::project::import::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Stated, Track};
+use contents::{Bag, Timed, nearest};
 
 /// Half of the time around an instant in which nothing may move.
 const REST_NS: i64 = 250_000_000;
 /// What counts as no motion: metres, radians (and metres of prismatic joints).
 const STILL_M: f64 = 5e-4;
 const STILL_RAD: f64 = 2e-3;
+/// Rests with which views can be told apart: with fewer the motion between them says more.
+const ENOUGH_RESTS: usize = 6;
 /// Most images that are taken out of a bag.
 const MOST_IMAGES: usize = 1000;
 
@@ -38,7 +42,9 @@ pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording:
     if bag.images.is_empty() {
         return Err("has no images".into());
     }
-    let mut chosen: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+    let motions = motion::motions(&bag, file);
+    let mut at_rest: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+    let mut moving: BTreeMap<String, Vec<i64>> = BTreeMap::new();
     for (topic, stamps) in &bag.images {
         let rests = rests(&bag, stamps);
         recording.beliefs.push(format!(
@@ -46,16 +52,32 @@ pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording:
             stamps.len(),
             rests.len()
         ));
-        if rests.len() >= tree::LEAST_POSES {
-            chosen.insert(topic.clone(), rests);
+        let in_motion = motion::chosen(stamps, &motions);
+        if rests.len() < ENOUGH_RESTS && !in_motion.is_empty() {
+            recording.beliefs.push(format!(
+                "{file}: {} images on {topic} of a robot that moves are looked at, to be given poses by their stamps",
+                in_motion.len()
+            ));
+            moving.insert(topic.clone(), in_motion);
+        } else if rests.len() >= tree::LEAST_POSES {
+            at_rest.insert(topic.clone(), rests);
         }
     }
-    if chosen.is_empty() {
-        return Err("has no three instants at which the robot stood still, by its transforms or joint values".into());
+    if at_rest.is_empty() && moving.is_empty() {
+        return Err(
+            "has no three instants at which the robot stood still, by its transforms or joint values, and not enough \
+                    images of one that moves"
+                .into(),
+        );
     }
-    images::unpack(file, &parts, &chosen, recording)?;
-    for (topic, stamps) in &chosen {
+    images::unpack(file, &parts, &at_rest, false, recording)?;
+    images::unpack(file, &parts, &moving, true, recording)?;
+    for (topic, stamps) in &at_rest {
         recording.tracks.extend(tracks(&bag, file, topic, stamps));
+        recording.joints.extend(joints(&bag, file, topic, stamps));
+    }
+    if !moving.is_empty() {
+        recording.motions.extend(motions);
     }
     recording.cameras.extend(bag.cameras.into_values());
     Ok(())
@@ -101,6 +123,21 @@ fn tracks(bag: &Bag, file: &str, topic: &str, stamps: &[i64]) -> Vec<Track> {
         out.extend(track);
     }
     out
+}
+
+/// The joint values at these times, of every topic and robot.
+fn joints(bag: &Bag, file: &str, topic: &str, stamps: &[i64]) -> Vec<JointSeries> {
+    let of = |((name, names), values): (&(String, Vec<String>), &Timed<Vec<f64>>)| {
+        let sample = |stamp: &i64| {
+            let values = nearest(values, *stamp, REST_NS)?.clone();
+            let place = format!("{file}, {name} at {:.3} s", *stamp as f64 * 1e-9);
+            Some(joints::sample(place, Some(images::name(topic, *stamp)), None, values))
+        };
+        let unit = Some(Known::by("ROS has radians", AngleUnit::Radian));
+        let samples = stamps.iter().filter_map(sample).collect();
+        joints::series(format!("{file}:{name}"), names.clone(), unit, samples)
+    };
+    bag.joints.iter().filter_map(of).collect()
 }
 
 fn track(
