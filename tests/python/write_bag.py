@@ -1,22 +1,28 @@
-"""Records a folder of images with a table of poses as a robot would that goes from view to view, as a bag of ROS 2.
+"""Records a folder of images with a table of poses as a robot would that goes from view to view, as a bag of ROS.
 
-The robot rests at every view for a second and then moves on; images come all the time. The writer is the one of `rosbags`.
+The robot rests at every view for a second and then moves on; images come all the time. The writers are those of `rosbags`.
 
-usage: write_bag.py FOLDER BAG sqlite3|mcap
+usage: write_bag.py FOLDER BAG sqlite3|mcap [file|message|storage]
+       write_bag.py FOLDER BAG.bag ros1 [bz2|lz4]
 """
 
 import sys
 from pathlib import Path
 
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from read_recordings import table
 
 TF, JOINTS, IMAGE = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState", "sensor_msgs/msg/CompressedImage"
 STEP_NS = 50_000_000
-store = get_typestore(Stores.ROS2_HUMBLE)
+is_ros1 = sys.argv[3] == "ros1"
+store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
+if TF not in store.types:
+    # The list of ROS 1 does not have it.
+    store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", TF))
 types = store.types
 
 
@@ -34,7 +40,7 @@ def quaternion(r):
 
 def header(time, frame):
     stamp = types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
-    return types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
+    return types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame, **({"seq": 1} if is_ros1 else {}))
 
 
 def transform(time, parent, child, m):
@@ -47,9 +53,19 @@ def transform(time, parent, child, m):
 
 
 folder, bag, kind = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
+compression = sys.argv[4] if len(sys.argv) > 4 else ""
 poses, _ = table(folder)
-plugin = {"sqlite3": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}[kind]
-with Writer(bag, version=8 if kind == "sqlite3" else 9, storage_plugin=plugin) as writer:
+if is_ros1:
+    writer = Writer1(bag)
+    if compression:
+        writer.set_compression(Writer1.CompressionFormat[compression.upper()])
+else:
+    plugin = {"sqlite3": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}[kind]
+    writer = Writer(bag, version=8 if kind == "sqlite3" else 9, storage_plugin=plugin)
+    if compression:
+        writer.set_compression(CompressionMode[compression.upper()], CompressionFormat.ZSTD)
+serialize = store.serialize_ros1 if is_ros1 else store.serialize_cdr
+with writer:
 
     def channel(topic, message):
         return writer.add_connection(topic, message, typestore=store)
@@ -58,7 +74,7 @@ with Writer(bag, version=8 if kind == "sqlite3" else 9, storage_plugin=plugin) a
     joints, images = channel("/joint_states", JOINTS), channel("/camera/image/compressed", IMAGE)
 
     def put(connection, time, message, kind):
-        writer.write(connection, time, store.serialize_cdr(message, kind))
+        writer.write(connection, time, serialize(message, kind))
 
     time = 1_700_000_000 * 10**9
     flange = np.eye(4)

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::anyhow;
 use clap::Args;
@@ -80,7 +81,7 @@ pub fn run(args: &ImportArgs) -> Result<(), Failure> {
         write::check_out(folder).map_err(Failure::unusable)?;
     }
     let given = args.target.as_deref().map(target::of_text).transpose().map_err(Failure::unusable)?;
-    let recording = import::open(&args.path).map_err(Failure::unusable)?;
+    let recording = Arc::new(import::open(&args.path).map_err(Failure::unusable)?);
     let mut told = Told { text: found(&recording), notes: Vec::new() };
     let outcome = import(args, &recording, given, &settings, &mut told, &cancel);
     // What was found is said in any case: it is what a refusal is about.
@@ -144,7 +145,7 @@ impl Told {
 
 fn import(
     args: &ImportArgs,
-    recording: &Recording,
+    recording: &Arc<Recording>,
     given: Option<TargetSpec>,
     settings: &Settings,
     told: &mut Told,
@@ -162,7 +163,11 @@ fn import(
         told.line(format_args!("{target} found in {seen} of {images} images {stream}"));
     }
     looked.notes.iter().for_each(|note| told.note(note.say(English)));
-    let judgement = looked.judge(recording, settings, cancel).map_err(refused)?;
+    let recording = &*looked.recording;
+    for clocks in &recording.clocks {
+        told.line(format_args!("Clocks: {}", understand::clocks_said(clocks).say(English)));
+    }
+    let judgement = looked.judge(settings, cancel).map_err(refused)?;
     told.text.push_str(&listed(recording, &judgement));
     let mut findings = as_json(recording, &judgement);
     let refuse = |failure: Failure, findings: serde_json::Value| Refused { failure, findings: Some(findings) };
@@ -172,7 +177,7 @@ fn import(
         Err(failure) => return Err(refuse(failure, findings)),
     };
     let h = &judgement.hypotheses[index];
-    let known = looked.context(recording, &judgement, settings, h, is_taken);
+    let known = looked.context(&judgement, settings, h, is_taken);
     if args.link {
         // Names are relative to the folder, which has to be there to be a place.
         std::fs::create_dir_all(folder).map_err(|e| Failure::unusable(anyhow!("{}: {e}", folder.display())))?;
@@ -337,6 +342,12 @@ fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
         "verdict": verdict,
         "tried": judgement.tried,
         "distance_mm": judgement.distance_m * 1e3,
+        "clocks": recording.clocks.iter().map(|clocks| json!({
+            "images": clocks.images,
+            "poses": clocks.poses,
+            "offset_s": clocks.offset.offset_s,
+            "sigma_s": clocks.offset.sigma_s,
+        })).collect::<Vec<_>>(),
         "hypotheses": judgement.hypotheses.iter().enumerate().map(one).collect::<Vec<_>>(),
     })
 }

@@ -12,6 +12,7 @@ use egui::{
 use handeye_core::image::RgbImage;
 use handeye_core::project::import::{Hypothesis, Numbers, Source, Stream, Track, Verdict};
 
+use super::understand;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, TITLE, Tone};
@@ -38,6 +39,9 @@ pub fn import_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             images_ui(ui, import, found, language);
         }
         target_ui(ui, import, language, outbox);
+        if import.found.as_deref().is_some_and(|found| !found.opened.joints.is_empty()) {
+            arm_ui(ui, import, language, outbox);
+        }
         meaning_ui(ui, import, language, outbox);
     });
     buttons_ui(ui, model, import, language, outbox);
@@ -49,6 +53,9 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     parts::section_ui(ui, tr!(language, "What is there"));
     let streams = recording.streams.iter().map(of_stream);
     let tracks = recording.tracks.iter().map(of_track);
+    let joints = recording.joints.iter().map(|series| {
+        text!("{count} rows of joint values in {name}", count = series.samples.len(), name = &series.name)
+    });
     let cameras = recording
         .cameras
         .iter()
@@ -57,7 +64,7 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
         .targets
         .iter()
         .map(|target| text!("A target in {file}: {target}", file = &target.file, target = target.target));
-    for line in streams.chain(tracks).chain(cameras).chain(targets) {
+    for line in streams.chain(tracks).chain(joints).chain(cameras).chain(targets) {
         ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
     }
     if let Some(looked) = found.looked.as_deref() {
@@ -69,6 +76,9 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
                 stream = stream
             );
             ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
+        }
+        for clocks in &recording.clocks {
+            ui.label(RichText::new(understand::clocks_said(clocks).say(language)).color(Palette::of(ui).text));
         }
         for note in &looked.notes {
             parts::hint_ui(ui, &note.say(language));
@@ -167,6 +177,28 @@ fn target_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut
             language,
             "Inner corners and the square in mm; or kind=charuco,columns=4,rows=6,square=33,marker=20,dictionary=6x6_250"
         ),
+    );
+}
+
+/// The arm that makes poses of joint values.
+fn arm_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
+    let id = Id::new(("arm of the recording", &import.path));
+    let known = || import.fixed.get("arm").cloned().unwrap_or_default();
+    let mut typed: String = ui.data_mut(|data| data.get_temp(id)).unwrap_or_else(known);
+    parts::row_ui(ui, tr!(language, "Arm"), |ui| {
+        let field = TextEdit::singleline(&mut typed).desired_width(260.0).char_limit(400).hint_text("ur5e, robot.urdf");
+        let response = ui.add(field);
+        response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, tr!(language, "Arm")));
+        let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if ui.button(tr!(language, "Compute poses")).clicked() || entered {
+            let value = (!typed.trim().is_empty()).then(|| typed.trim().to_owned());
+            outbox.send(Command::FixConvention { key: "arm".to_owned(), value });
+        }
+    });
+    ui.data_mut(|data| data.insert_temp(id, typed));
+    parts::hint_ui(
+        ui,
+        tr!(language, "Poses are computed from joint values by the chain of this arm, built in or in a URDF file."),
     );
 }
 

@@ -52,12 +52,18 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
         numbers: Numbers::Quaternion([0.4, 0.1 * k as f64, 0.3, 0.0, 0.0, 0.0, 1.0]),
         joints: Vec::new(),
     };
-    let image = |k: usize| ImageFile { path: format!("image{k}.png").into(), number: Some(k as u64), same_as: None };
+    let image = |k: usize| ImageFile {
+        path: format!("image{k}.png").into(),
+        number: Some(k as u64),
+        same_as: None,
+        stamp_ns: None,
+    };
     let stream =
         Stream { name: "image#.png".into(), images: (0..4).map(image).collect(), size: (640, 480), is_depth: false };
     let track = Track {
         name: "poses.txt".into(),
         role: TrackRole::Robot,
+        reading_of: None,
         stated: Stated::default(),
         samples: (0..4).map(sample).collect(),
     };
@@ -69,8 +75,10 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
         ..Recording::default()
     };
     let judgement = Judgement { hypotheses, tried: 912, distance_m: 0.4, verdict };
+    let recording = Arc::new(recording);
     Found {
-        recording: Arc::new(recording),
+        opened: Arc::clone(&recording),
+        recording,
         looked: None,
         settings: Settings::default(),
         judgement: Some(judgement),

@@ -46,6 +46,8 @@ pub enum ImportWork {
 #[derive(Debug)]
 pub struct Found {
     /// Its files.
+    pub opened: Arc<Recording>,
+    /// It, with what was made of it when the images were looked at.
     pub recording: Arc<Recording>,
     /// What the images show; `None` where nothing could be looked for.
     pub looked: Option<Arc<Looked>>,

@@ -1,11 +1,13 @@
 //! From the files of a recording to the hypotheses about it: what the command line and the window both do.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use handeye_core::estimate::CameraKnowledge;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::import::{
-    self, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Role, Settings, Sight, Sights, Source, write,
+    self, Clocks, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Role, Settings, Sight, Sights, Source,
+    write,
 };
 use handeye_core::targets::{AprilTag, TargetSpec};
 use handeye_core::wording::English;
@@ -31,6 +33,8 @@ pub enum NotUnderstood {
 /// What the images of a recording show.
 #[derive(Debug)]
 pub struct Looked {
+    /// The recording with what was made of it: poses by the chain of an arm, and at the times of images of a moving robot.
+    pub recording: Arc<Recording>,
     /// The target, and who says so; `None` where only its poses are known.
     pub target: Option<(TargetSpec, String)>,
     /// By stream: its name, in how many images the target was found, and of how many.
@@ -44,24 +48,18 @@ pub struct Looked {
 
 impl Looked {
     /// Tries every hypothesis that the files and the settings leave open. Settings that say what to look at
-    /// ([`Settings::images`], [`Settings::target_poses`], [`Settings::camera`]) have to be those of [`look`].
+    /// ([`looks`]) have to be those of [`look`].
     ///
     /// # Errors
     /// [`NotUnderstood`].
-    pub fn judge(
-        &self,
-        recording: &Recording,
-        settings: &Settings,
-        cancel: &CancelToken,
-    ) -> Result<Judgement, NotUnderstood> {
-        let judgement = import::judge(recording, &self.sights, settings, cancel)?;
+    pub fn judge(&self, settings: &Settings, cancel: &CancelToken) -> Result<Judgement, NotUnderstood> {
+        let judgement = import::judge(&self.recording, &self.sights, settings, cancel)?;
         if cancel.is_cancelled() { Err(ObserveError::Cancelled.into()) } else { Ok(judgement) }
     }
 
     /// What goes into the data set beside a hypothesis; `is_taken`: a person took it out of several.
     pub fn context<'a>(
-        &self,
-        recording: &'a Recording,
+        &'a self,
         judgement: &'a Judgement,
         settings: &'a Settings,
         hypothesis: &Hypothesis,
@@ -71,8 +69,28 @@ impl Looked {
             Source::Stream(i) => self.cameras.get(i).cloned().flatten(),
             Source::Track(_) => None,
         };
+        let recording = &*self.recording;
         write::Context { recording, judgement, settings, target: self.target.clone(), camera, is_taken }
     }
+}
+
+/// How far clocks are apart.
+pub fn clocks_said(clocks: &Clocks) -> Text {
+    text!(
+        "{offset} ± {sigma} ms are added to the stamps of {count} images {images} to have them by the clock of {poses}",
+        offset = format!("{:.1}", clocks.offset.offset_s * 1e3),
+        sigma = format!("{:.1}", clocks.offset.sigma_s * 1e3),
+        count = clocks.count,
+        images = &clocks.images,
+        poses = &clocks.poses
+    )
+}
+
+/// Whether a setting says what to look at, and not only what it means: where it is made anew the images are looked at again.
+pub fn looks(key: &str, recording: &Recording) -> bool {
+    // The offset of clocks is estimated for what a person has said of the poses.
+    let is_about_clocks = matches!(key, "mode" | "pose" | "poses" | "clock_offset") && !recording.motions.is_empty();
+    is_about_clocks || matches!(key, "images" | "camera" | "target_poses" | "arm")
 }
 
 /// Finds the target in the images. `given` is a target that a person names; without it the one that files describe is taken.
@@ -80,16 +98,25 @@ impl Looked {
 /// # Errors
 /// [`NotUnderstood`].
 pub fn look(
-    recording: &Recording,
+    recording: &Arc<Recording>,
     given: Option<TargetSpec>,
     settings: &Settings,
     progress: Progress<'_>,
     cancel: &CancelToken,
 ) -> Result<Looked, NotUnderstood> {
-    let mut look = Look { recording, settings, progress, cancel, notes: Vec::new(), seen: Vec::new() };
+    let recording = match &settings.arm {
+        Some(arm) => Arc::new(import::with_arm(recording, arm)?),
+        None => Arc::clone(recording),
+    };
+    let mut look = Look { recording: &recording, settings, progress, cancel, notes: Vec::new(), seen: Vec::new() };
     let target = look.target(given)?;
-    let (sights, cameras) = look.sights(target.as_ref().map(|(target, _)| *target))?;
-    Ok(Looked { target, seen: look.seen, notes: look.notes, sights, cameras })
+    let (mut sights, cameras) = look.sights(target.as_ref().map(|(target, _)| *target))?;
+    let Look { notes, seen, .. } = look;
+    let recording = match import::timed(&recording, &mut sights, settings, cancel) {
+        Err(_) if cancel.is_cancelled() => return Err(ObserveError::Cancelled.into()),
+        timed => timed?.map_or(recording, Arc::new),
+    };
+    Ok(Looked { recording, target, seen, notes, sights, cameras })
 }
 
 struct Look<'a> {

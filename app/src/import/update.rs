@@ -6,6 +6,7 @@ use std::sync::Arc;
 use handeye_core::project::import::Settings;
 
 use super::state::{Converted, Found, ImportState, ImportWork};
+use super::understand;
 use super::worker::{ImportJob, ImportTask};
 use crate::app::App;
 use crate::cli::target::of_text;
@@ -49,8 +50,7 @@ impl App {
     /// Fixes a convention, or leaves it to the data again.
     pub(crate) fn fix_convention(&mut self, key: String, value: Option<String>) {
         let Some(import) = self.model.import.as_deref_mut() else { return };
-        // These say what is looked at.
-        let is_about_images = matches!(key.as_str(), "images" | "camera" | "target_poses");
+        let is_about_images = import.found.as_ref().is_none_or(|found| understand::looks(&key, &found.opened));
         match value {
             Some(value) => import.fixed.insert(key, value),
             None => import.fixed.remove(&key),

@@ -111,28 +111,20 @@ fn look(
     cancel: &CancelToken,
     outlet: &Outlet,
 ) -> Answer {
-    let read = || -> Result<_, NotUnderstood> {
-        if let Some(known) = known {
-            return Ok((Arc::clone(&known.recording), Arc::clone(&known.previews)));
-        }
-        let recording = Arc::new(import::open(path)?);
-        let previews = Arc::new(previews(&recording));
-        Ok((recording, previews))
-    };
-    let (recording, previews) = match read() {
-        Ok(read) => read,
-        Err(error) => return (None, Some(said(error))),
-    };
-    let mut found = Found {
-        recording: Arc::clone(&recording),
-        looked: None,
-        settings: settings.clone(),
-        judgement: None,
-        previews,
+    let opened = match known.map(|known| Arc::clone(&known.opened)).map_or_else(|| import::open(path).map(Arc::new), Ok)
+    {
+        Ok(opened) => opened,
+        Err(error) => return (None, Some(said(error.into()))),
     };
     let progress = |done, of| outlet.report(Event::ImportProgress { number, work: ImportWork::Looking(done, of) });
-    let outcome = understand::look(&recording, target, settings, &progress, cancel).and_then(|looked| {
-        let judgement = looked.judge(&recording, settings, cancel);
+    let looked = understand::look(&opened, target, settings, &progress, cancel);
+    let recording = looked.as_ref().map_or_else(|_| Arc::clone(&opened), |looked| Arc::clone(&looked.recording));
+    // Of images of a moving robot only some are left.
+    let known = known.filter(|known| Arc::ptr_eq(&known.recording, &recording));
+    let previews = known.map_or_else(|| Arc::new(previews(&recording)), |known| Arc::clone(&known.previews));
+    let mut found = Found { opened, recording, looked: None, settings: settings.clone(), judgement: None, previews };
+    let outcome = looked.and_then(|looked| {
+        let judgement = looked.judge(settings, cancel);
         found.looked = Some(Arc::new(looked));
         found.judgement = Some(judgement?);
         Ok(())
@@ -141,14 +133,15 @@ fn look(
 }
 
 fn judged(known: &Found, settings: &Settings, cancel: &CancelToken) -> Answer {
-    let Found { recording, looked, previews, .. } = known;
-    let (recording, looked, previews) = (Arc::clone(recording), looked.clone(), Arc::clone(previews));
-    let judgement = looked.as_ref().map(|looked| looked.judge(&recording, settings, cancel)).transpose();
+    let Found { opened, recording, looked, previews, .. } = known;
+    let (opened, recording, previews) = (Arc::clone(opened), Arc::clone(recording), Arc::clone(previews));
+    let looked = looked.clone();
+    let judgement = looked.as_ref().map(|looked| looked.judge(settings, cancel)).transpose();
     let (judgement, trouble) = match judgement {
         Ok(judgement) => (judgement, None),
         Err(error) => (None, Some(said(error))),
     };
-    (Some(Found { recording, looked, settings: settings.clone(), judgement, previews }), trouble)
+    (Some(Found { opened, recording, looked, settings: settings.clone(), judgement, previews }), trouble)
 }
 
 fn previews(recording: &Recording) -> Vec<Vec<Arc<RgbImage>>> {
@@ -171,7 +164,7 @@ fn convert(known: &Found, hypothesis: usize, is_taken: bool, number: u64, outlet
              calibrate” solve it"
         ));
     }
-    let plan = import::plan(chosen, &looked.context(recording, judgement, settings, chosen, is_taken), None);
+    let plan = import::plan(chosen, &looked.context(judgement, settings, chosen, is_taken), None);
     let said = |error: &dyn std::fmt::Display| Text::verbatim(error.to_string());
     let folder = tempfile::tempdir().map_err(|e| said(&e))?;
     let progress = |done, of| outlet.report(Event::ImportProgress { number, work: ImportWork::Writing(done, of) });

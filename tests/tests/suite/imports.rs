@@ -251,7 +251,7 @@ fn squares_counted_for_corners_and_a_target_not_named_are_said_with_what_is_seen
     }
 }
 
-/// A bag of a writer that is not ours, of a robot that goes from view to view, in both kinds of file.
+/// A bag of a writer that is not ours, of a robot that goes from view to view, in every kind of file that it writes.
 #[test]
 fn a_bag_gives_the_images_where_the_robot_rested_with_its_poses_there() {
     let Some(data) = data_folder() else { return };
@@ -265,12 +265,25 @@ fn a_bag_gives_the_images_where_the_robot_rested_with_its_poses_there() {
         .expect("Python runs");
     let truth: Value = serde_json::from_slice(&read.stdout).expect("JSON");
     let robot = matrices(&truth["robot"]);
-    for kind in ["sqlite3", "mcap"] {
-        let (bag, out) = (home.path().join(kind), home.path().join(format!("{kind}_set")));
+    for kind in [
+        "sqlite3",
+        "sqlite3 file",
+        "sqlite3 message",
+        "mcap",
+        "mcap file",
+        "mcap message",
+        "mcap storage",
+        "ros1",
+        "ros1 bz2",
+        "ros1 lz4",
+    ] {
+        let name = kind.replace(' ', "_");
+        let ending = if kind.starts_with("ros1") { ".bag" } else { "" };
+        let (bag, out) = (home.path().join(format!("{name}{ending}")), home.path().join(format!("{name}_set")));
         let wrote = Command::new(&python)
             .arg(workspace_root().join("tests/python/write_bag.py"))
             .args([&folder, &bag])
-            .arg(kind)
+            .args(kind.split(' '))
             .output()
             .expect("Python runs");
         assert!(wrote.status.success(), "{}", text(&wrote.stderr));

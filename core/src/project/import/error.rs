@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::estimate::clock_offset::ClockOffsetError;
+
 /// Why a recording cannot be read or a data set not be written. One line each: what, where, and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -29,7 +31,7 @@ pub enum ImportError {
     AlreadyADataset(PathBuf),
     /// There is nothing that could be robot poses.
     #[error(
-        "{}: no series of at least {need} poses was found (tables, JSON, YAML, npz and rosbag2 are read): {seen}",
+        "{}: no series of at least {need} poses was found (tables, JSON, YAML, npz and bags of ROS are read): {seen}",
         folder.display()
     )]
     NoPoses {
@@ -39,6 +41,24 @@ pub enum ImportError {
         need: usize,
         /// What was found instead.
         seen: String,
+    },
+    /// Poses cannot be made of joint values.
+    #[error("arm = {arm:?}: {why}")]
+    Arm {
+        /// As it was named.
+        arm: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// Images of a moving robot have stamps of a clock that cannot be related to the robot's.
+    #[error("the images {images} were taken while {poses} moved, and their clocks cannot be related: {why}")]
+    Clocks {
+        /// The stream of images.
+        images: String,
+        /// The robot's poses.
+        poses: String,
+        /// Why not.
+        why: ClockOffsetError,
     },
     /// A choice that is none.
     #[error("{key} = {value:?} is not a choice here: {choices}")]

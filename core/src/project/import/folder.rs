@@ -35,8 +35,9 @@ pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>), ImportError> 
     walk(&root, Path::new(""), if only.is_some() { 0 } else { MAX_DEPTH }, &mut files)?;
     if let Some(only) = only {
         // Beside a file that was named only what it may refer to counts: images, the description of a camera.
-        let is_series =
-            |f: &Path| ["csv", "txt", "tsv", "json", "samples", "npz", "npy", "mcap", "db3"].contains(&&*ending(f));
+        let is_series = |f: &Path| {
+            is_bag(f) || ["csv", "txt", "tsv", "json", "jsonl", "samples", "npz", "npy"].contains(&&*ending(f))
+        };
         files.retain(|file| {
             let is_others = ending(file) == "calib" && file.file_stem() != only.file_stem();
             *file == only || !(is_series(file) || is_others)
@@ -85,6 +86,15 @@ pub(super) fn ending(path: &Path) -> String {
 
 pub(super) fn is_image(path: &Path) -> bool {
     IMAGES.contains(&&*ending(path))
+}
+
+/// Whether a file is one of a bag of ROS.
+pub(super) fn is_bag(path: &Path) -> bool {
+    match &*ending(path) {
+        "mcap" | "db3" | "bag" => true,
+        "zstd" => matches!(&*ending(&path.with_extension("")), "mcap" | "db3"),
+        _ => false,
+    }
 }
 
 /// The bytes of a file that is not too large.
@@ -240,7 +250,12 @@ fn take(root: &Path, members: Vec<(PathBuf, Option<u64>)>, streams: &mut Vec<Str
         match image_file::image_size(&root.join(&path)) {
             Ok(size) => {
                 let is_depth = is_sixteen_bits_of_grey(&root.join(&path));
-                by_size.entry((size, is_depth)).or_default().push(ImageFile { path, number, same_as: None });
+                by_size.entry((size, is_depth)).or_default().push(ImageFile {
+                    path,
+                    number,
+                    same_as: None,
+                    stamp_ns: None,
+                });
             }
             Err(why) => warnings.push(format!("{}: {why}", path.display())),
         }

@@ -9,6 +9,7 @@
 //! pairing that images contradict is never one that explains.
 
 mod camera;
+mod chain;
 mod conventions;
 mod error;
 mod folder;
@@ -20,15 +21,19 @@ mod recognise;
 mod recording;
 mod settings;
 mod sight;
+mod timing;
 mod value;
 pub mod write;
 
 #[cfg(all(test, feature = "opencv"))]
 mod golden_tests;
 #[cfg(test)]
+mod layout_tests;
+#[cfg(test)]
 mod tests;
 
 pub use camera::chosen as chosen_camera;
+pub use chain::with_arm;
 pub use conventions::{AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm};
 pub use error::ImportError;
 pub use hypothesis::{Convention, Fit, Hypothesis, Source};
@@ -36,8 +41,10 @@ pub use judge::{Judgement, NEED, Sights, TIMES, Verdict, judge};
 pub use pairing::Pairing;
 pub use recognise::open;
 pub use recording::{
-    FoundCamera, FoundTarget, ImageFile, Known, Numbers, Recording, Role, Sample, Stated, Stream, Track,
+    Clocks, FoundCamera, FoundTarget, ImageFile, JointSample, JointSeries, Known, Motion, Numbers, Recording, Role,
+    Sample, Stated, Stream, Track,
 };
 pub use settings::{KEYS, Settings};
 pub use sight::Sight;
+pub use timing::timed;
 pub use write::{Plan, plan};

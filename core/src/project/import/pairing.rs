@@ -243,7 +243,10 @@ mod tests {
 
     fn images(names: &[&str]) -> Vec<ImageFile> {
         let number = |name: &str| name.chars().filter(char::is_ascii_digit).collect::<String>().parse().ok();
-        names.iter().map(|n| ImageFile { path: PathBuf::from(n), number: number(n), same_as: None }).collect()
+        names
+            .iter()
+            .map(|n| ImageFile { path: PathBuf::from(n), number: number(n), same_as: None, stamp_ns: None })
+            .collect()
     }
 
     fn rows(count: usize) -> Vec<Sample> {

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use super::error::ImportError;
 use super::folder;
 use super::formats::tree::{self, LEAST_POSES};
-use super::formats::{easy_handeye, industrial_calibration, intrinsics, moveit, npz, rosbag2, table, visp};
+use super::formats::{
+    easy_handeye, industrial_calibration, intrinsics, joints, moveit, npz, program, rosbag, table, visp,
+};
 use super::recording::{FoundTarget, Recording, Sample, Stated, Track};
 use super::value::{self, Value};
 use crate::project::files::own_folder::{DESCRIPTION, is_session};
@@ -37,10 +39,12 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
         ));
     }
     let mut reader = Reader { root: &root, recording, documents: 0 };
-    let text_files: Vec<PathBuf> = files.iter().filter(|file| !folder::is_image(file)).cloned().collect();
-    for members in folder::groups(&text_files, true) {
+    let (bags, others): (Vec<PathBuf>, Vec<PathBuf>) =
+        files.iter().filter(|file| !folder::is_image(file)).cloned().partition(|file| folder::is_bag(file));
+    for members in folder::groups(&others, true) {
         reader.group(&members);
     }
+    reader.bags(&bags);
     let mut recording = reader.recording;
     if moveit::know(&mut recording.tracks) {
         recording.beliefs.push("the poses are samples of MoveIt calibration, by their names".into());
@@ -54,6 +58,13 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
             super::Numbers::Matrix(_) => "matrices",
         };
         recording.beliefs.push(format!("{} poses in {}: {kind}{with}", track.samples.len(), track.name));
+    }
+    for series in &recording.joints {
+        let names = if series.joints.is_empty() { String::new() } else { format!(" ({})", series.joints.join(", ")) };
+        let count = series.samples.len();
+        recording
+            .beliefs
+            .push(format!("{count} rows of joint values in {}{names}: arm=… makes poses of them", series.name));
     }
     for camera in &recording.cameras {
         recording.beliefs.push(format!("a camera in {}: {}", camera.name, camera.why));
@@ -97,8 +108,13 @@ impl Reader<'_> {
     fn document(&mut self, file: &Path) -> Option<Value> {
         let text = self.text(file)?;
         let parsed = match folder::ending(file).as_str() {
-            "json" => value::json(&text),
-            _ => value::yaml(&text).map(|documents| documents.into_iter().next().unwrap_or(Value::Other)),
+            "json" | "jsonl" => value::json(&text),
+            _ => value::yaml(&text).map(|mut documents| match documents.len() {
+                // A document to a message, as `ros2 topic echo` writes them.
+                LEAST_POSES.. => Value::List(documents),
+                1.. => documents.swap_remove(0),
+                0 => Value::Other,
+            }),
         };
         match parsed {
             Ok(value) => Some(value),
@@ -112,13 +128,19 @@ impl Reader<'_> {
     /// Files of one naming.
     fn group(&mut self, members: &[(PathBuf, Option<u64>)]) {
         match folder::ending(&members[0].0).as_str() {
-            "json" | "yaml" | "yml" | "samples" | "calib" => self.documents(members),
+            "json" | "jsonl" | "yaml" | "yml" | "samples" | "calib" => self.documents(members),
             "csv" | "txt" | "tsv" | "dat" | "" | "log" => self.tables(members),
+            // Programs of robots.
+            "script" | "src" | "mod" | "ls" => self.each(members, |reader, file, text| {
+                reader.recording.tracks.extend(program::read(&file.display().to_string(), text));
+            }),
             "npz" | "npy" => self.arrays(members),
-            "mcap" | "db3" => self.bags(members),
             "xml" => self.each(members, |reader, file, text| {
-                let camera = visp::camera(text, &file.display().to_string());
-                reader.recording.cameras.extend(camera);
+                let name = file.display().to_string();
+                reader.recording.cameras.extend(visp::camera(text, &name));
+                if let Some(value) = value::opencv_xml(text) {
+                    reader.single(file, &value);
+                }
             }),
             "cameramodel" => self.each(members, |reader, file, text| {
                 let camera = intrinsics::mrcal(text, &file.display().to_string());
@@ -137,17 +159,31 @@ impl Reader<'_> {
         }
     }
 
-    /// Files of a bag with its description beside them are one; others are each a bag.
-    fn bags(&mut self, members: &[(PathBuf, Option<u64>)]) {
-        let folder = members[0].0.parent().unwrap_or(Path::new(""));
-        let mut bags: Vec<Vec<&Path>> = members.iter().map(|(file, _)| vec![file.as_path()]).collect();
-        if self.root.join(folder).join("metadata.yaml").is_file() {
-            bags = vec![bags.concat()];
+    /// Files of a bag of ROS 2 with its description beside them are one, compressed or not; others are each a bag.
+    fn bags(&mut self, files: &[PathBuf]) {
+        let folder_of = |file: &Path| file.parent().unwrap_or(Path::new("")).to_path_buf();
+        let has_description = |file: &Path| {
+            folder::ending(file) != "bag" && self.root.join(folder_of(file)).join("metadata.yaml").is_file()
+        };
+        let mut bags: Vec<Vec<&Path>> = Vec::new();
+        for file in files {
+            // Whoever plays a compressed bag leaves its files unpacked beside it.
+            if folder::ending(file) == "zstd" && files.contains(&file.with_extension("")) {
+                continue;
+            }
+            let open = bags.iter_mut().find(|bag| {
+                has_description(file) && folder::ending(bag[0]) != "bag" && folder_of(bag[0]) == folder_of(file)
+            });
+            match open {
+                Some(bag) => bag.push(file),
+                None => bags.push(vec![file]),
+            }
         }
         for files in bags {
             let parts: Vec<PathBuf> = files.iter().map(|file| self.root.join(file)).collect();
-            let name = if files.len() > 1 { folder } else { files[0] };
-            let read = rosbag2::read(&name.display().to_string(), &parts, &mut self.recording);
+            let folder = folder_of(files[0]);
+            let name = if files.len() > 1 { &folder } else { files[0] };
+            let read = rosbag::read(&name.display().to_string(), &parts, &mut self.recording);
             if let Err(why) = read {
                 self.warn(files[0], format_args!("is not used: {why}"));
             }
@@ -212,7 +248,21 @@ impl Reader<'_> {
             }
             self.recording.tracks.push(track);
         }
-        self.recording.tracks.len() > before
+        if self.recording.tracks.len() > before {
+            return true;
+        }
+        let values = read.iter().filter_map(|(file, number, value)| {
+            let fields = tree::fields(value);
+            let place = file.display().to_string();
+            let has_alone = fields.poses.is_empty() && !fields.joints.is_empty();
+            has_alone.then(|| joints::sample(place, fields.image, number.or(fields.number), fields.joints))
+        });
+        let values: Vec<_> = values.collect();
+        let series =
+            joints::series(files, Vec::new(), None, values).filter(|series| 2 * series.samples.len() >= read.len());
+        let is_series = series.is_some();
+        self.recording.joints.extend(series);
+        is_series
     }
 
     /// A document by itself.
@@ -247,6 +297,7 @@ impl Reader<'_> {
         }
         if found.is_empty() {
             found = tree::series(value, &name);
+            self.recording.joints.extend(joints::of_document(value, &name));
         }
         self.recording.tracks.extend(found);
         self.recording.cameras.extend(intrinsics::of_document(value, &name));
@@ -277,7 +328,15 @@ impl Reader<'_> {
         for (file, _, text) in texts {
             let name = file.display().to_string();
             self.recording.targets.extend(visp::target(&text, &name));
-            self.recording.tracks.extend(table::read(&name, &text));
+            if let Some(track) = program::read(&name, &text) {
+                self.recording.tracks.push(track);
+                continue;
+            }
+            let tracks = table::read(&name, &text);
+            if tracks.is_empty() {
+                self.recording.joints.extend(table::joints(&name, &text));
+            }
+            self.recording.tracks.extend(tracks);
         }
     }
 
@@ -303,6 +362,9 @@ impl Reader<'_> {
     }
 
     fn arrays(&mut self, members: &[(PathBuf, Option<u64>)]) {
+        if members.len() >= LEAST_POSES && self.one_pose_to_an_array(members) {
+            return;
+        }
         for (file, _) in members {
             let name = file.display().to_string();
             match folder::bytes(&self.root.join(file)) {
@@ -316,5 +378,29 @@ impl Reader<'_> {
                 },
             }
         }
+    }
+
+    /// A pose to a file of NumPy; whether it is so.
+    fn one_pose_to_an_array(&mut self, members: &[(PathBuf, Option<u64>)]) -> bool {
+        // Files of many poses are large, and looked at by themselves.
+        const LARGEST: u64 = 1 << 16;
+        let one = |(file, number): &(PathBuf, Option<u64>)| {
+            let path = self.root.join(file);
+            if std::fs::metadata(&path).ok()?.len() > LARGEST {
+                return None;
+            }
+            let numbers = npz::pose(&folder::bytes(&path).ok()?)?;
+            let place = file.display().to_string();
+            Some(Sample { image: None, number: *number, place, numbers, joints: Vec::new() })
+        };
+        let samples: Vec<Sample> = members.iter().filter_map(one).collect();
+        if 2 * samples.len() < members.len() {
+            return false;
+        }
+        let (naming, _) = folder::naming(&members[0].0, true);
+        let name = naming.shown();
+        let Some(track) = tree::track(name.clone(), &name, Stated::default(), samples) else { return false };
+        self.recording.tracks.push(track);
+        true
     }
 }

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use nalgebra::Matrix4;
+use nalgebra::{Isometry3, Matrix4};
 use tempfile::TempDir;
 
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
+use crate::estimate::clock_offset::ClockOffset;
 use crate::estimate::handeye::Mode;
 use crate::geometry::camera::Intrinsics;
 use crate::targets::TargetSpec;
@@ -22,6 +23,13 @@ pub struct Recording {
     pub streams: Vec<Stream>,
     /// Series of poses.
     pub tracks: Vec<Track>,
+    /// Joint values, of which the chain of the arm makes poses.
+    pub joints: Vec<JointSeries>,
+    /// Poses of a robot that moves, as densely as they were recorded: what images of a stream with stamps are given poses of
+    /// ([`timed`](super::timed)).
+    pub motions: Vec<Motion>,
+    /// How far clocks are apart, where poses were given to images by their stamps.
+    pub clocks: Vec<Clocks>,
     /// Cameras that files describe.
     pub cameras: Vec<FoundCamera>,
     /// Targets that files describe.
@@ -63,6 +71,8 @@ pub struct ImageFile {
     pub number: Option<u64>,
     /// An earlier image of the stream with the same bytes, by its index.
     pub same_as: Option<usize>,
+    /// When it was taken by the camera's clock, nanoseconds; of images of a moving robot.
+    pub stamp_ns: Option<i64>,
 }
 
 impl ImageFile {
@@ -92,6 +102,8 @@ pub struct Track {
     pub role: Role,
     /// What the file says of its conventions.
     pub stated: Stated,
+    /// The series of which it is another reading: the same numbers in another order.
+    pub reading_of: Option<String>,
     /// In the order of the file, or of the files' numbers.
     pub samples: Vec<Sample>,
 }
@@ -109,6 +121,58 @@ pub struct Sample {
     pub numbers: Numbers,
     /// Joint values that stand with it, in the unit of the file.
     pub joints: Vec<f64>,
+}
+
+/// A series of joint values.
+#[derive(Debug, Clone)]
+pub struct JointSeries {
+    /// As it is told of.
+    pub name: String,
+    /// Names of the joints in the order of the values, where they are said.
+    pub joints: Vec<String>,
+    /// Of the values of revolute joints, where it is said.
+    pub unit: Option<Known<AngleUnit>>,
+    /// In the order of the file.
+    pub samples: Vec<JointSample>,
+}
+
+/// Poses of a robot that moves.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// As `--set poses=` names the series that is made of it.
+    pub name: String,
+    /// What they are of.
+    pub role: Role,
+    /// Which way they map, where it is known.
+    pub direction: Option<Known<Direction>>,
+    /// By the robot's clock in nanoseconds, rising; metres.
+    pub poses: Arc<Vec<(i64, Isometry3<f64>)>>,
+}
+
+/// How far the clock of a camera and that of a robot are apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clocks {
+    /// The images.
+    pub images: String,
+    /// The robot's poses.
+    pub poses: String,
+    /// What is added to stamps of the images to have them by the robot's clock.
+    pub offset: ClockOffset,
+    /// Images that say so.
+    pub count: usize,
+}
+
+/// The joint values of one pose.
+#[derive(Debug, Clone)]
+pub struct JointSample {
+    /// The image that they name.
+    pub image: Option<String>,
+    /// Their number in the file, or the number of their file.
+    pub number: Option<u64>,
+    /// Where they stand, for messages.
+    pub place: String,
+    /// The values.
+    pub values: Vec<f64>,
 }
 
 /// The numbers of a pose.

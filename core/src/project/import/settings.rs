@@ -21,7 +21,12 @@ pub const KEYS: &str = "\
   target_length_unit=m|mm|cm            of the target's poses
   target_rotation=NAME                  of the target's poses
   camera=FILE|none                      which camera is taken as known
-  joint_unit=rad|deg                    takes over the joint values that stand with the poses";
+  joint_unit=rad|deg                    takes over the joint values that stand with the poses
+  clock_offset=SECONDS                  what is added to stamps of images to have them by the robot's clock, roughly, where the
+                                        clocks of a bag are apart by more than 2 s
+  arm=NAME|FILE.urdf[,base=LINK][,tip=LINK]
+                                        makes poses of joint values by this chain: ur3, ur5, ur10, ur3e, ur5e, ur10e, ur16e,
+                                        ur5_coppeliasim or one in a URDF file";
 
 /// Choices that were made; `None` where all are tried.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -54,6 +59,10 @@ pub struct Settings {
     pub camera: Option<String>,
     /// Of the joint values, which are taken over when it is given.
     pub joint_unit: Option<AngleUnit>,
+    /// About what is added to stamps of images to have them by the robot's clock, seconds.
+    pub clock_offset_s: Option<f64>,
+    /// The arm that makes poses of joint values, as [`with_arm`](super::with_arm) has it.
+    pub arm: Option<String>,
 }
 
 impl Settings {
@@ -110,12 +119,17 @@ impl Settings {
             "poses" => self.poses = Some(text()?),
             "target_poses" => self.target_poses = Some(text()?),
             "camera" => self.camera = Some(text()?),
+            "clock_offset" => {
+                let seconds = value.parse().ok().filter(|seconds: &f64| seconds.is_finite());
+                self.clock_offset_s = Some(seconds.ok_or_else(|| bad("seconds, such as -12.5"))?);
+            }
+            "arm" => self.arm = Some(text()?),
             _ => {
                 return Err(ImportError::BadChoice {
                     key: "a key of --set".into(),
                     value: key.to_owned(),
                     choices: "mode, length_unit, angle_unit, rotation, pose, pairing, images, poses, target_poses, \
-                              target_pose, target_length_unit, target_rotation, camera or joint_unit"
+                              target_pose, target_length_unit, target_rotation, camera, joint_unit, clock_offset or arm"
                         .into(),
                 });
             }

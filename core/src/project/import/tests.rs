@@ -22,15 +22,15 @@ use crate::project::dataset::Dataset;
 use crate::project::files::image_file;
 use crate::testing::faulty;
 
-fn observed(mode: Mode, views: usize, seed: u64) -> Observations {
+pub(super) fn observed(mode: Mode, views: usize, seed: u64) -> Observations {
     faulty::session(&faulty::Setup::new(mode, views, seed))
 }
 
-fn pose_of(session: &Observations, view: usize) -> Isometry3<f64> {
+pub(super) fn pose_of(session: &Observations, view: usize) -> Isometry3<f64> {
     *session.views[view].base_from_tip.expect("a pose").isometry()
 }
 
-fn save_image(path: &Path, view: usize) {
+pub(super) fn save_image(path: &Path, view: usize) {
     let mut image = GrayImage::new(16, 12);
     image.put_pixel(0, 0, Luma([view as u8]));
     fs::create_dir_all(path.parent().expect("a folder")).expect("made");
@@ -57,14 +57,14 @@ fn sights(recording: &Recording, session: &Observations) -> Sights {
     Sights { streams: recording.streams.iter().map(of).collect(), target: Some(session.target) }
 }
 
-fn judged(folder: &Path, session: &Observations, settings: &Settings) -> (Recording, Judgement) {
+pub(super) fn judged(folder: &Path, session: &Observations, settings: &Settings) -> (Recording, Judgement) {
     let recording = open(folder).expect("a recording");
     let judgement =
         judge(&recording, &sights(&recording, session), settings, &CancelToken::default()).expect("hypotheses");
     (recording, judgement)
 }
 
-fn in_hand() -> Settings {
+pub(super) fn in_hand() -> Settings {
     Settings { mode: Some(Mode::EyeInHand), ..Settings::default() }
 }
 
@@ -134,7 +134,11 @@ fn table_folder(session: &Observations, written: Written) -> TempDir {
 }
 
 /// Pairs of view of the image and view of the pose that a hypothesis writes, and how far its poses are from the truth.
-fn written_pairs(recording: &Recording, h: &Hypothesis, session: &Observations) -> Vec<(usize, Option<usize>)> {
+pub(super) fn written_pairs(
+    recording: &Recording,
+    h: &Hypothesis,
+    session: &Observations,
+) -> Vec<(usize, Option<usize>)> {
     let Source::Stream(stream) = h.source else { panic!("images were there") };
     let left_out: Vec<usize> = h.fit.iter().flat_map(|fit| fit.disagreeing.iter().map(|(s, _)| *s)).collect();
     let samples = &recording.tracks[h.robot].samples;

@@ -84,12 +84,51 @@ fn collect(value: &Value, most: usize, numbers: &mut Vec<f64>) -> Option<()> {
     }
 }
 
-/// Reads JSON.
+/// Reads JSON; several values one after the other, as a line to a record, are a list.
 pub(super) fn json(text: &str) -> Result<Value, String> {
-    // serde_json refuses more than 128 levels by itself.
-    let value: serde_json::Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
     let mut left = MAX_VALUES;
-    of_json(value, 0, &mut left)
+    let mut values = Vec::new();
+    // serde_json refuses more than 128 levels by itself.
+    for value in serde_json::Deserializer::from_str(text).into_iter::<serde_json::Value>() {
+        values.push(of_json(value.map_err(|e| e.to_string())?, 0, &mut left)?);
+    }
+    match values.len() {
+        0 => Err("is empty".into()),
+        1 => Ok(values.swap_remove(0)),
+        _ => Ok(Value::List(values)),
+    }
+}
+
+/// The values of OpenCV's storage in XML; `None` where it is none.
+pub(super) fn opencv_xml(text: &str) -> Option<Value> {
+    let document = roxmltree::Document::parse(text).ok()?;
+    let root = document.root_element();
+    let mut left = MAX_VALUES;
+    root.has_tag_name("opencv_storage").then(|| of_xml(root, 0, &mut left)).flatten()
+}
+
+fn of_xml(node: roxmltree::Node<'_, '_>, depth: usize, left: &mut usize) -> Option<Value> {
+    *left = left.checked_sub(1)?;
+    if depth > MAX_DEPTH {
+        return None;
+    }
+    let inner: Vec<_> = node.children().filter(roxmltree::Node::is_element).collect();
+    if inner.is_empty() {
+        let words: Vec<&str> = node.text().unwrap_or_default().split_whitespace().collect();
+        let value = |word: &&str| number(word).map_or_else(|| Value::Text((*word).to_owned()), Value::Number);
+        *left = left.checked_sub(words.len())?;
+        return Some(match words.as_slice() {
+            [] => Value::Other,
+            [one] => value(one),
+            many => Value::List(many.iter().map(value).collect()),
+        });
+    }
+    let is_list = inner.iter().all(|node| node.has_tag_name("_"));
+    let mut entries = Vec::with_capacity(inner.len());
+    for node in inner {
+        entries.push((node.tag_name().name().to_owned(), of_xml(node, depth + 1, left)?));
+    }
+    Some(if is_list { Value::List(entries.into_iter().map(|(_, value)| value).collect()) } else { Value::Map(entries) })
 }
 
 fn of_json(value: serde_json::Value, depth: usize, left: &mut usize) -> Result<Value, String> {
@@ -220,6 +259,25 @@ mod tests {
         let matrix = documents[0].get("T1_0").expect("there").numbers(16);
         assert_eq!(matrix, Some(vec![1.0, 0.25, -3.0, 0.5]));
         assert_eq!(documents[0].get("framecount").and_then(Value::whole), Some(2));
+    }
+
+    #[test]
+    fn opencv_writes_the_same_in_xml() {
+        let text = "<?xml version=\"1.0\"?>\n<opencv_storage>\n<frameCount>2</frameCount>\n<T1_0 type_id=\"opencv-matrix\">\n  \
+                    <rows>2</rows>\n<cols>2</cols>\n<dt>d</dt>\n  <data>\n    1. 2.5e-01 -3.\n    .5</data></T1_0>\n<list><_>\n  1 \
+                    2</_><_>3 4</_></list></opencv_storage>";
+        let value = opencv_xml(text).expect("read");
+        assert_eq!(value.get("T1_0").expect("there").numbers(16), Some(vec![1.0, 0.25, -3.0, 0.5]));
+        assert_eq!(value.get("frameCount").and_then(Value::whole), Some(2));
+        assert_eq!(value.get("list").map(|list| list.list().len()), Some(2));
+        assert_eq!(opencv_xml("<root><a>1</a></root>"), None);
+    }
+
+    #[test]
+    fn a_record_to_a_line_is_a_list() {
+        let records = json("{\"a\": 1}\n{\"a\": 2}\n").expect("read");
+        assert_eq!(records.list().len(), 2);
+        assert!(json("{\"a\": 1}\n{\"a\": ").is_err() && json("").is_err());
     }
 
     #[test]

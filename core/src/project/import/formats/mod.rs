@@ -3,9 +3,11 @@
 pub(super) mod easy_handeye;
 pub(super) mod industrial_calibration;
 pub(super) mod intrinsics;
+pub(super) mod joints;
 pub(super) mod moveit;
 pub(super) mod npz;
-pub(super) mod rosbag2;
+pub(super) mod program;
+pub(super) mod rosbag;
 pub(super) mod table;
 pub(super) mod tree;
 pub(super) mod visp;

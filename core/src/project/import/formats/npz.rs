@@ -4,7 +4,7 @@
 use std::io::{Cursor, Read as _};
 
 use super::tree::{self, Part};
-use crate::project::import::recording::{Sample, Stated, Track};
+use crate::project::import::recording::{Numbers, Sample, Stated, Track};
 
 /// Most arrays of a file, and most numbers of one.
 const MOST_ARRAYS: usize = 64;
@@ -44,6 +44,12 @@ pub(in crate::project::import) fn read(file: &str, bytes: &[u8]) -> Result<(Vec<
         arrays.push(array("", bytes)?);
     }
     Ok((series(file, &arrays), warnings))
+}
+
+/// The pose that a file is alone.
+pub(in crate::project::import) fn pose(bytes: &[u8]) -> Option<Numbers> {
+    let Content::Numbers(numbers) = array("", bytes).ok()?.content else { return None };
+    tree::of_numbers(&numbers, "").map(|(numbers, _)| numbers)
 }
 
 fn series(file: &str, arrays: &[Array]) -> Vec<Track> {

@@ -265,6 +265,8 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
         return;
     }
     match value {
+        // Joint values are no poses, however many they are.
+        Value::List(items) if is_about_joints(path) && items.iter().all(|item| item.numbers(12).is_some()) => {}
         Value::List(items) if value.numbers(16).is_none() && items.len() >= LEAST_POSES => {
             let named = items.iter().enumerate().map(|(i, item)| (format!("{file}, entry {}", i + 1), None, item));
             let found = of_elements(path, file, named.collect());
@@ -360,7 +362,7 @@ pub(in crate::project::import) fn track(
     samples.retain(|sample| std::mem::discriminant(&sample.numbers) == kind);
     // A rigid transform that never changes is a setting.
     let moves = samples.iter().any(|sample| sample.numbers != samples[0].numbers);
-    (samples.len() >= LEAST_POSES && moves).then(|| Track { role: role(path), name, stated, samples })
+    (samples.len() >= LEAST_POSES && moves).then(|| Track { role: role(path), name, stated, reading_of: None, samples })
 }
 
 /// What poses of this name are of.

@@ -103,7 +103,10 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
             } else {
                 target.role != Role::Robot || settings.poses.is_some()
             };
-            if i != robot && is_target {
+            let is_itself = |a: &Track, b: &Track| a.reading_of.as_ref() == Some(&b.name);
+            let robot_track = &recording.tracks[robot];
+            let is_same = i == robot || is_itself(target, robot_track) || is_itself(robot_track, target);
+            if !is_same && is_target {
                 pair(Source::Track(i), robot, &as_images(target));
             }
         }
@@ -113,7 +116,14 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
             let choices = rules.join(", ");
             return Err(ImportError::BadChoice { key: "pairing".into(), value: rule.clone(), choices });
         }
-        let seen = if recording.tracks.is_empty() {
+        let seen = if let (true, Some(series)) =
+            (recording.tracks.iter().all(|t| t.role == Role::Target), recording.joints.first())
+        {
+            format!(
+                "{} has joint values alone: name the arm that they are of with arm=NAME, or its URDF file",
+                series.name
+            )
+        } else if recording.tracks.is_empty() {
             "no file has poses of 6, 7, 12 or 16 numbers".to_owned()
         } else if with_images {
             "none of the series of poses has as many as images".to_owned()
@@ -136,6 +146,7 @@ fn as_images(track: &Track) -> Vec<ImageFile> {
         path: sample.image.clone().unwrap_or_else(|| format!("{:06}", i + 1)).into(),
         number: sample.number,
         same_as: None,
+        stamp_ns: None,
     };
     track.samples.iter().enumerate().map(image).collect()
 }

@@ -1,13 +1,23 @@
-//! The encoding of ROS 2's messages (CDR, XCDR1): numbers at multiples of their size, texts and lists with their length before
-//! them. Only the messages that a recording of a calibration has.
+//! The encodings of messages: of ROS 2 (CDR, XCDR1), with numbers at multiples of their size, and of ROS 1, without gaps;
+//! texts and lists with their length before them in both. Only the messages that a recording of a calibration has.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit};
+
+/// How messages are encoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Encoding {
+    /// That of ROS 2.
+    Cdr,
+    /// That of ROS 1: little end first, headers with a number of their own.
+    Ros1,
+}
 
 /// Reads one message; every method gives `None` past its end.
 pub(super) struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
     is_little: bool,
+    encoding: Encoding,
 }
 
 /// When and in which frame.
@@ -18,15 +28,18 @@ pub(super) struct Header {
 }
 
 impl<'a> Reader<'a> {
-    /// Behind the four bytes that say how the rest is encoded.
-    pub fn new(message: &'a [u8]) -> Option<Self> {
+    /// In CDR behind the four bytes that say how the rest is encoded.
+    pub fn new(encoding: Encoding, message: &'a [u8]) -> Option<Self> {
+        if encoding == Encoding::Ros1 {
+            return Some(Self { bytes: message, at: 0, is_little: true, encoding });
+        }
         let (head, bytes) = message.split_at_checked(4)?;
         let is_little = match head[1] {
             0 => false,
             1 => true,
             _ => return None,
         };
-        Some(Self { bytes, at: 0, is_little })
+        Some(Self { bytes, at: 0, is_little, encoding })
     }
 
     fn take(&mut self, count: usize) -> Option<&'a [u8]> {
@@ -37,7 +50,9 @@ impl<'a> Reader<'a> {
     }
 
     fn number<const N: usize>(&mut self) -> Option<[u8; N]> {
-        self.at = self.at.checked_next_multiple_of(N)?;
+        if self.encoding == Encoding::Cdr {
+            self.at = self.at.checked_next_multiple_of(N)?;
+        }
         let mut bytes: [u8; N] = self.take(N)?.try_into().ok()?;
         if !self.is_little {
             bytes.reverse();
@@ -79,6 +94,9 @@ impl<'a> Reader<'a> {
     }
 
     pub fn header(&mut self) -> Option<Header> {
+        if self.encoding == Encoding::Ros1 {
+            let _seq = self.u32()?;
+        }
         let sec = self.number().map(i32::from_le_bytes)?;
         let nanosec = self.u32()?;
         let stamp_ns = i64::from(sec) * 1_000_000_000 + i64::from(nanosec);

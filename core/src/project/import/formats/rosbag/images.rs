@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use image::{DynamicImage, GrayImage, RgbImage};
 
-use super::cdr::Reader;
-use super::storage::visit;
+use super::storage::{Message, visit};
 use crate::project::import::recording::{ImageFile, Recording, Stream};
 
 /// The file of the image of a topic with a stamp.
@@ -16,7 +15,8 @@ pub(super) fn name(topic: &str, stamp: i64) -> String {
     format!("{topic}_{stamp}.png")
 }
 
-/// Writes the chosen images into a folder of this machine's temporary files, which goes with the recording.
+/// Writes the chosen images into a folder of this machine's temporary files, which goes with the recording. Those of a robot that
+/// moves keep their stamps.
 ///
 /// # Errors
 /// A sentence, where nothing can be written there.
@@ -24,19 +24,23 @@ pub(super) fn unpack(
     file: &str,
     parts: &[PathBuf],
     chosen: &BTreeMap<String, Vec<i64>>,
+    with_stamps: bool,
     recording: &mut Recording,
 ) -> Result<(), String> {
+    if chosen.is_empty() {
+        return Ok(());
+    }
     let scratch = tempfile::tempdir().map_err(|e| e.to_string())?;
     let mut streams: BTreeMap<String, Stream> = BTreeMap::new();
     let mut troubles = Vec::new();
     for part in parts {
         visit(part, &mut |message| {
             let Some(stamps) = chosen.get(message.topic) else { return };
-            let found = stamp_of(message.data, message.log_ns).filter(|stamp| stamps.binary_search(stamp).is_ok());
+            let found = stamp_of(&message).filter(|stamp| stamps.binary_search(stamp).is_ok());
             let Some(stamp) = found else { return };
             let path = scratch.path().join(name(message.topic, stamp));
-            let saved = decoded(message.kind, message.data)
-                .and_then(|image| image.save(&path).map(|()| image).map_err(|e| e.to_string()));
+            let saved =
+                decoded(&message).and_then(|image| image.save(&path).map(|()| image).map_err(|e| e.to_string()));
             match saved {
                 Ok(image) => {
                     let stream = streams.entry(message.topic.to_owned()).or_insert_with(|| Stream {
@@ -45,7 +49,12 @@ pub(super) fn unpack(
                         size: (image.width(), image.height()),
                         is_depth: matches!(image, DynamicImage::ImageLuma16(_)),
                     });
-                    stream.images.push(ImageFile { path, number: None, same_as: None });
+                    stream.images.push(ImageFile {
+                        path,
+                        number: None,
+                        same_as: None,
+                        stamp_ns: with_stamps.then_some(stamp),
+                    });
                 }
                 Err(why) => troubles.push(format!("{file}: an image on {} is not used: {why}", message.topic)),
             }
@@ -62,16 +71,17 @@ pub(super) fn unpack(
     Ok(())
 }
 
-fn stamp_of(data: &[u8], log_ns: i64) -> Option<i64> {
-    let stamp = Reader::new(data)?.header()?.stamp_ns;
-    Some(if stamp == 0 { log_ns } else { stamp })
+/// When an image was taken. Drivers without a clock leave the stamp at zero.
+pub(super) fn stamp_of(message: &Message) -> Option<i64> {
+    let stamp = message.reader()?.header()?.stamp_ns;
+    Some(if stamp == 0 { message.log_ns } else { stamp })
 }
 
-fn decoded(kind: &str, data: &[u8]) -> Result<DynamicImage, String> {
+fn decoded(message: &Message) -> Result<DynamicImage, String> {
     let short = || "its message ends early".to_owned();
-    let mut reader = Reader::new(data).ok_or_else(short)?;
+    let mut reader = message.reader().ok_or_else(short)?;
     reader.header().ok_or_else(short)?;
-    if kind.ends_with("CompressedImage") {
+    if message.kind.ends_with("CompressedImage") {
         reader.text().ok_or_else(short)?;
         let bytes = reader.blob().ok_or_else(short)?;
         return crate::project::files::image_file::decode_bytes(bytes).map_err(|e| e.to_string());

@@ -1,22 +1,24 @@
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Cursor;
+use std::io::{Cursor, Read as _, Write as _};
 use std::path::Path;
 
 use mcap::records::MessageHeader;
 
+use super::wire::Encoding;
 use super::*;
 
 /// A message of a bag: topic, type, time, bytes.
 type Recorded = (&'static str, &'static str, i64, Vec<u8>);
 
-/// Writes CDR, little endian.
-#[derive(Default)]
-struct Message(Vec<u8>);
+/// Writes CDR, little endian, or what ROS 1 has.
+struct Message(Vec<u8>, Encoding);
 
 impl Message {
     fn number<const N: usize>(mut self, bytes: [u8; N]) -> Self {
-        self.0.resize(self.0.len().next_multiple_of(N), 0);
+        if self.1 == Encoding::Cdr {
+            self.0.resize(self.0.len().next_multiple_of(N), 0);
+        }
         self.0.extend_from_slice(&bytes);
         self
     }
@@ -30,14 +32,16 @@ impl Message {
     }
 
     fn text(self, text: &str) -> Self {
-        let mut out = self.u32(text.len() as u32 + 1);
+        let end: &[u8] = if self.1 == Encoding::Cdr { &[0] } else { &[] };
+        let mut out = self.u32((text.len() + end.len()) as u32);
         out.0.extend_from_slice(text.as_bytes());
-        out.0.push(0);
+        out.0.extend_from_slice(end);
         out
     }
 
     fn header(self, stamp_ns: i64, frame: &str) -> Self {
-        self.u32((stamp_ns / 1_000_000_000) as u32).u32((stamp_ns % 1_000_000_000) as u32).text(frame)
+        let this = if self.1 == Encoding::Ros1 { self.u32(7) } else { self };
+        this.u32((stamp_ns / 1_000_000_000) as u32).u32((stamp_ns % 1_000_000_000) as u32).text(frame)
     }
 
     fn transform(self, pose: &Isometry3<f64>) -> Self {
@@ -46,16 +50,22 @@ impl Message {
     }
 
     fn done(self) -> Vec<u8> {
-        [vec![0, 1, 0, 0], self.0].concat()
+        let head: &[u8] = if self.1 == Encoding::Cdr { &[0, 1, 0, 0] } else { &[] };
+        [head, &self.0].concat()
     }
 }
 
 /// A robot that goes from pose to pose and rests at each for a second; images come all the time.
 fn messages(poses: &[Isometry3<f64>]) -> Vec<Recorded> {
+    encoded(poses, Encoding::Cdr)
+}
+
+fn encoded(poses: &[Isometry3<f64>], encoding: Encoding) -> Vec<Recorded> {
+    let begin = || Message(Vec::new(), encoding);
     const STEP_NS: i64 = 50_000_000;
     const FRAMES: &str = "tf2_msgs/msg/TFMessage";
     let flange = Isometry3::translation(0.0, 0.0, 0.1);
-    let static_tf = Message::default().u32(1).header(0, "link6").text("tool0").transform(&flange).done();
+    let static_tf = begin().u32(1).header(0, "link6").text("tool0").transform(&flange).done();
     let mut out = vec![("/tf_static", FRAMES, 0, static_tf)];
     let mut time = 10_000_000_000i64;
     for (view, pose) in poses.iter().enumerate() {
@@ -64,13 +74,12 @@ fn messages(poses: &[Isometry3<f64>]) -> Vec<Recorded> {
             // The second half of the time it moves.
             let part = f64::from(step - 20).max(0.0) / 20.0;
             let link6 = pose.lerp_slerp(next, part) * flange.inverse();
-            let frames = Message::default().u32(1).header(time, "base_link").text("link6").transform(&link6).done();
+            let frames = begin().u32(1).header(time, "base_link").text("link6").transform(&link6).done();
             out.push(("/tf", FRAMES, time, frames));
             let mut pixels = vec![0u8; 16 * 12];
             // A moving image is of no view; after the last pose nothing moves.
             pixels[0] = if step <= 20 || view + 1 == poses.len() { view as u8 } else { 255 };
-            let mut image =
-                Message::default().header(time, "camera").u32(12).u32(16).text("mono8").number([0u8]).u32(16);
+            let mut image = begin().header(time, "camera").u32(12).u32(16).text("mono8").number([0u8]).u32(16);
             image = image.u32(pixels.len() as u32);
             image.0.extend_from_slice(&pixels);
             out.push(("/camera/image_raw", "sensor_msgs/msg/Image", time + 3_000_000, image.done()));
@@ -123,6 +132,54 @@ fn write_db3(file: &Path, messages: &[Recorded]) {
     bag.execute_batch("COMMIT").expect("written");
 }
 
+/// A bag of ROS 1, as its recorder writes them: connections and messages in chunks, an index behind each.
+fn ros1_of(messages: &[Recorded], compression: &str) -> Vec<u8> {
+    let header = |fields: &[(&str, &[u8])]| -> Vec<u8> {
+        let fields = fields.iter().map(|(name, value)| [name.as_bytes(), b"=", value].concat());
+        let fields: Vec<u8> = fields.flat_map(|f| [&(f.len() as u32).to_le_bytes()[..], &f].concat()).collect();
+        [&(fields.len() as u32).to_le_bytes()[..], &fields].concat()
+    };
+    let with_data = |header: Vec<u8>, data: &[u8]| [&header[..], &(data.len() as u32).to_le_bytes(), data].concat();
+    let mut out = b"#ROSBAG V2.0\n".to_vec();
+    out.extend(with_data(header(&[("op", &[3]), ("index_pos", &[0; 8])]), &[b' '; 4027]));
+    let mut topics: Vec<&str> = Vec::new();
+    for part in messages.chunks(50) {
+        let mut chunk = Vec::new();
+        for (topic, kind, time, data) in part {
+            let known = topics.iter().position(|known| known == topic);
+            let id = (known.unwrap_or(topics.len()) as u32).to_le_bytes();
+            if known.is_none() {
+                topics.push(topic);
+                let kind = kind.replacen("/msg/", "/", 1);
+                let about = header(&[("topic", topic.as_bytes()), ("type", kind.as_bytes()), ("md5sum", b"*")]);
+                chunk.extend(header(&[("op", &[7]), ("conn", &id), ("topic", topic.as_bytes())]));
+                chunk.extend(about);
+            }
+            let (sec, nanosec) = ((time / 1_000_000_000) as u32, (time % 1_000_000_000) as u32);
+            let time = [sec.to_le_bytes(), nanosec.to_le_bytes()].concat();
+            chunk.extend(with_data(header(&[("op", &[2]), ("conn", &id), ("time", &time)]), data));
+        }
+        let size = (chunk.len() as u32).to_le_bytes();
+        let packed = match compression {
+            "bz2" => {
+                let mut packer = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::best());
+                packer.write_all(&chunk).expect("written");
+                packer.finish().expect("packed")
+            }
+            "lz4" => {
+                let mut packer = lz4::EncoderBuilder::new().build(Vec::new()).expect("begun");
+                packer.write_all(&chunk).expect("written");
+                packer.finish().0
+            }
+            _ => chunk,
+        };
+        let fields: [(&str, &[u8]); 3] = [("op", &[5]), ("compression", compression.as_bytes()), ("size", &size)];
+        out.extend(with_data(header(&fields), &packed));
+        out.extend(with_data(header(&[("op", &[4]), ("ver", &[1, 0, 0, 0])]), &[0; 12]));
+    }
+    out
+}
+
 fn poses() -> Vec<Isometry3<f64>> {
     let pose = |i: usize| {
         let angle = i as f64 * 0.7;
@@ -158,6 +215,58 @@ fn one_image_is_taken_of_every_rest_with_the_pose_of_the_tip_there() {
     is_read_rightly(&[db3]);
 }
 
+#[test]
+fn a_bag_of_ros_1_is_read_like_one_of_ros_2_however_it_is_compressed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for compression in ["none", "bz2", "lz4"] {
+        let file = folder.path().join(format!("{compression}.bag"));
+        fs::write(&file, ros1_of(&encoded(&poses(), Encoding::Ros1), compression)).expect("written");
+        is_read_rightly(&[file]);
+    }
+}
+
+/// As a recorder leaves it that was killed: the last chunk ends early and there is no index.
+#[test]
+fn a_bag_of_ros_1_that_breaks_off_has_what_came_before() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("killed.bag");
+    let twice = [poses(), poses()].concat();
+    let whole = ros1_of(&encoded(&twice, Encoding::Ros1), "lz4");
+    fs::write(&file, &whole[..whole.len() * 3 / 4]).expect("written");
+    let mut recording = Recording::default();
+    read("bag", &[file], &mut recording).expect("read");
+    assert!((8..11).contains(&recording.streams[0].images.len()), "{:?}", recording.beliefs);
+}
+
+#[test]
+fn files_and_messages_that_rosbag2_compresses_are_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (db3, packed) = (folder.path().join("bag.db3"), folder.path().join("bag.db3.zstd"));
+    write_db3(&db3, &messages(&poses()));
+    fs::write(&packed, zstd::encode_all(&*fs::read(&db3).expect("written"), 1).expect("packed")).expect("written");
+    is_read_rightly(&[packed]);
+    let mcap = folder.path().join("bag.mcap.zstd");
+    fs::write(&mcap, zstd::encode_all(&*mcap_of(&messages(&poses())), 1).expect("packed")).expect("written");
+    is_read_rightly(&[mcap]);
+    let mut each = messages(&poses());
+    each.iter_mut().for_each(|(.., data)| *data = zstd::encode_all(&**data, 1).expect("packed"));
+    let file = folder.path().join("messages.db3");
+    write_db3(&file, &each);
+    is_read_rightly(&[file]);
+}
+
+/// A few bytes that become as many as one likes must not fill the disk.
+#[test]
+fn a_file_that_never_stops_growing_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("bomb.db3.zstd");
+    let packed = zstd::encode_all(std::io::repeat(0).take(1 << 28), 3).expect("packed");
+    assert!(packed.len() < 1 << 17, "{} bytes", packed.len());
+    fs::write(&file, packed).expect("written");
+    let why = read("bag", &[file], &mut Recording::default()).expect_err("refused");
+    assert!(why.contains("zstd -d"), "{why}");
+}
+
 /// Frames that never change are in the first file alone.
 #[test]
 fn a_bag_that_was_cut_into_several_files_is_one() {
@@ -177,7 +286,18 @@ fn a_broken_bag_is_no_danger() {
     let (mcap, db3) = (folder.path().join("bag.mcap"), folder.path().join("bag.db3"));
     let all = messages(&poses()[..2]);
     write_db3(&db3, &all);
-    for (file, whole) in [(mcap, mcap_of(&all)), (db3.clone(), fs::read(&db3).expect("written"))] {
+    let db3_bytes = fs::read(&db3).expect("written");
+    let packed = zstd::encode_all(&*db3_bytes, 1).expect("packed");
+    let ros1 = |compression| ros1_of(&encoded(&poses()[..2], Encoding::Ros1), compression);
+    let named = |name: &str| folder.path().join(name);
+    for (file, whole) in [
+        (mcap, mcap_of(&all)),
+        (db3.clone(), db3_bytes),
+        (named("bag.db3.zstd"), packed),
+        (named("none.bag"), ros1("none")),
+        (named("bz2.bag"), ros1("bz2")),
+        (named("lz4.bag"), ros1("lz4")),
+    ] {
         for cut in (0..whole.len()).step_by(whole.len() / 100) {
             let mut bent = whole.clone();
             bent[cut] ^= 0x55;

@@ -1,0 +1,163 @@
+//! Poses out of joint values, where a recording has no others and the chain of the arm is known.
+
+use std::path::Path;
+
+use super::conventions::{Direction, LengthUnit, angles_for};
+use super::error::ImportError;
+use super::formats::tree;
+use super::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Stated, Track};
+use crate::geometry::arm::urdf::Urdf;
+use crate::geometry::arm::{Arm, ArmKind, JointKind};
+
+/// What ROS calls the joints of Universal Robots, from the base to the tip. Its messages have them in the order of letters.
+const ROS_NAMES_OF_UR: [&str; 6] =
+    ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
+
+/// A recording with poses of the arm in place of joint values. Recorded poses of a robot are no longer among them: who names
+/// the arm wants those of its chain.
+///
+/// `arm` is the name of one that is built in, or a URDF file, followed by `,base=LINK` and `,tip=LINK` where the file leaves a
+/// choice. A relative path is looked for from where the program runs, and then in the recording.
+///
+/// # Errors
+/// [`ImportError::Arm`].
+pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportError> {
+    let fail = |why: String| ImportError::Arm { arm: arm.to_owned(), why };
+    let chain = Chain::of(arm, &recording.root).map_err(fail)?;
+    if recording.joints.is_empty() {
+        return Err(fail("there are no joint values in this recording, leave `arm` out".into()));
+    }
+    let mut out = recording.clone();
+    out.tracks.retain(|track| track.role == Role::Target);
+    let mut troubles = Vec::new();
+    for series in &recording.joints {
+        match chain.tracks(series) {
+            Ok(tracks) => out.tracks.extend(tracks),
+            Err(why) => troubles.push(why),
+        }
+    }
+    if out.tracks.iter().all(|track| track.role == Role::Target) {
+        return Err(fail(troubles.join("; ")));
+    }
+    out.beliefs.push(format!("poses are computed from joint values by the chain of {}", chain.name));
+    out.warnings.extend(troubles);
+    Ok(out)
+}
+
+struct Chain {
+    /// As it is told of.
+    name: String,
+    arm: Arm,
+    /// What files call its joints, from the base to the tip; one of these lists.
+    joint_names: Vec<Vec<String>>,
+}
+
+impl Chain {
+    fn of(text: &str, root: &Path) -> Result<Self, String> {
+        let own = |arm: &Arm| -> Vec<String> { arm.joints().iter().map(|joint| joint.name.clone()).collect() };
+        if let Some(kind) = ArmKind::ALL.into_iter().find(|kind| kind.name() == text) {
+            let arm = kind.arm();
+            let ros = ROS_NAMES_OF_UR.map(str::to_owned).to_vec();
+            return Ok(Self { name: kind.name().to_owned(), joint_names: vec![own(&arm), ros], arm });
+        }
+        let mut parts = text.split(',');
+        let file = parts.next().unwrap_or_default();
+        let (mut base, mut tip) = (None, None);
+        for part in parts {
+            match part.split_once('=') {
+                Some(("base", link)) => base = Some(link),
+                Some(("tip", link)) => tip = Some(link),
+                _ => return Err(format!("{part:?} is neither base=LINK nor tip=LINK")),
+            }
+        }
+        let path = [Path::new(file).to_path_buf(), root.join(file)].into_iter().find(|path| path.is_file());
+        let Some(path) = path else {
+            let built_in: Vec<&str> = ArmKind::ALL.into_iter().map(ArmKind::name).collect();
+            return Err(format!("there is no such URDF file, and built in are {}", built_in.join(", ")));
+        };
+        let arm = Urdf::read(&path).and_then(|urdf| urdf.arm(base, tip)).map_err(|e| e.to_string())?;
+        Ok(Self { name: text.to_owned(), joint_names: vec![own(&arm)], arm })
+    }
+
+    /// The poses that a series of joint values means, in every unit that they may have.
+    fn tracks(&self, series: &JointSeries) -> Result<Vec<Track>, String> {
+        let order = self.order(series)?;
+        let revolute = |i: usize| self.arm.joints()[i].kind == JointKind::Revolute;
+        let angles = series.samples.iter().flat_map(|sample| {
+            order.iter().enumerate().filter(|(i, _)| revolute(*i)).filter_map(|(_, from)| sample.values.get(*from))
+        });
+        let largest = angles.map(|angle| angle.abs()).fold(0.0, f64::max);
+        let units = match &series.unit {
+            Some(known) => vec![known.value],
+            None => angles_for(largest),
+        };
+        let mut tracks = Vec::new();
+        for unit in &units {
+            let name =
+                if units.len() == 1 { series.name.clone() } else { format!("{} ({})", series.name, unit.name()) };
+            let samples = series.samples.iter().filter_map(|sample| {
+                let values: Vec<f64> = order
+                    .iter()
+                    .enumerate()
+                    .map(|(i, from)| Some(sample.values.get(*from)? * if revolute(i) { unit.radians() } else { 1.0 }))
+                    .collect::<Option<_>>()?;
+                let pose = self.arm.forward(&values).ok()?;
+                Some(Sample {
+                    image: sample.image.clone(),
+                    number: sample.number,
+                    place: sample.place.clone(),
+                    numbers: Numbers::Matrix(pose.matrix()),
+                    joints: sample.values.clone(),
+                })
+            });
+            let by = |what: &str| format!("{what} by the chain of {} from joint values in {}", self.name, unit.name());
+            let stated = Stated {
+                length: Some(Known::by(by("computed"), LengthUnit::Metre)),
+                direction: Some(Known::by(by("the tip in the base"), Direction::Forward)),
+                ..Stated::default()
+            };
+            if let Some(mut track) = tree::track(name, "robot", stated, samples.collect()) {
+                track.role = Role::Robot;
+                tracks.push(track);
+            }
+        }
+        if tracks.is_empty() {
+            return Err(format!("{} has no three different configurations of its joints", series.name));
+        }
+        Ok(tracks)
+    }
+
+    /// For every joint of the chain its place among the values: by the names that stand with them, or as they come.
+    fn order(&self, series: &JointSeries) -> Result<Vec<usize>, String> {
+        let count = self.arm.joint_count();
+        let has = series.samples.first().map_or(0, |sample| sample.values.len());
+        if series.joints.is_empty() {
+            return if has == count {
+                Ok((0..count).collect())
+            } else {
+                Err(format!("{} has {has} joint values and the arm {count}", series.name))
+            };
+        }
+        // Drivers put what a robot is called before the names of its joints.
+        let is = |given: &str, wanted: &str| given == wanted || given.ends_with(&format!("_{wanted}"));
+        let found = self.joint_names.iter().find_map(|names| {
+            names
+                .iter()
+                .map(|wanted| {
+                    let exact = series.joints.iter().position(|given| given == wanted);
+                    let mut near = series.joints.iter().enumerate().filter(|(_, given)| is(given, wanted));
+                    let only = near.next().map(|(i, _)| i).filter(|_| near.next().is_none());
+                    exact.or(only)
+                })
+                .collect::<Option<Vec<usize>>>()
+        });
+        found.ok_or_else(|| {
+            let wanted = self.joint_names.last().map(|names| names.join(", ")).unwrap_or_default();
+            format!("{} has the joints {}, and the arm has {wanted}", series.name, series.joints.join(", "))
+        })
+    }
+}
+
+#[cfg(test)]
+#[path = "chain_tests.rs"]
+mod tests;

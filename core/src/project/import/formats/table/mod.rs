@@ -1,0 +1,60 @@
+//! Tables of poses: with or without a header, any delimiter, names of images or not, one row or four to a pose.
+
+mod bare;
+mod cells;
+mod header;
+
+use super::tree::is_image_name;
+use crate::project::import::recording::{JointSeries, Numbers, Sample, Track};
+use crate::project::import::value::number;
+use cells::Line;
+
+/// The series of poses in a text, which may be none.
+pub(in crate::project::import) fn read(file: &str, text: &str) -> Vec<Track> {
+    let lines = cells::lines(text);
+    if let Some(tracks) = header::with_header(file, &lines) {
+        return tracks;
+    }
+    // Six joint values are no pose.
+    if header::joints(file, &lines).is_some() {
+        return Vec::new();
+    }
+    let rows: Vec<&Line> = lines.iter().filter(|line| line.is_numeric()).collect();
+    if let Some(track) = bare::blocks(file, &rows) {
+        return vec![track];
+    }
+    bare::without_header(file, &rows)
+}
+
+/// The joint values of a text that has no poses.
+pub(in crate::project::import) fn joints(file: &str, text: &str) -> Option<JointSeries> {
+    header::joints(file, &cells::lines(text))
+}
+
+fn sample(
+    file: &str,
+    line: &Line,
+    image: Option<String>,
+    number: Option<u64>,
+    numbers: Numbers,
+    joints: Vec<f64>,
+) -> Sample {
+    Sample { image, number, place: format!("{file}, row {}", line.row), numbers, joints }
+}
+
+/// The name of an image in a row.
+fn image_of(line: &Line) -> Option<String> {
+    line.cells.iter().find(|cell| is_image_name(cell)).cloned()
+}
+
+/// A name in a row that is neither a number nor has an ending; it may be the stem of an image's.
+fn name_of(line: &Line) -> Option<String> {
+    image_of(line).or_else(|| line.cells.iter().find(|cell| !cell.is_empty() && number(cell).is_none()).cloned())
+}
+
+fn whole(value: f64) -> Option<u64> {
+    (value >= 0.0 && value.fract() == 0.0 && value < 1e15).then_some(value as u64)
+}
+
+#[cfg(test)]
+mod tests;
