@@ -76,10 +76,13 @@ impl Looked {
 
 /// How far clocks are apart.
 pub fn clocks_said(clocks: &Clocks) -> Text {
+    let (offset_ms, sigma_ms) = (clocks.offset.offset_s * 1e3, clocks.offset.sigma_s * 1e3);
+    // Two digits of the standard deviation, and no more of the offset.
+    let decimals = (1.0 - sigma_ms.max(1e-6).log10().floor()).clamp(0.0, 6.0) as usize;
     text!(
         "{offset} ± {sigma} ms are added to the stamps of {count} images {images} to have them by the clock of {poses}",
-        offset = format!("{:.1}", clocks.offset.offset_s * 1e3),
-        sigma = format!("{:.1}", clocks.offset.sigma_s * 1e3),
+        offset = format!("{offset_ms:.decimals$}"),
+        sigma = format!("{sigma_ms:.decimals$}"),
         count = clocks.count,
         images = &clocks.images,
         poses = &clocks.poses
@@ -186,7 +189,8 @@ impl Look<'_> {
         let mut sights = Sights { streams: vec![None; recording.streams.len()], target };
         let mut cameras = vec![None; recording.streams.len()];
         let wanted = self.streams();
-        if self.settings.target_poses.is_some() || wanted.is_empty() || recording.tracks.is_empty() {
+        let has_robot = !recording.tracks.is_empty() || !recording.motions.is_empty();
+        if self.settings.target_poses.is_some() || wanted.is_empty() || !has_robot {
             return Ok((sights, cameras));
         }
         let mut troubles: Vec<Text> = Vec::new();

@@ -128,14 +128,14 @@ fn copied(data: &Path, files: &[&str]) -> (TempDir, PathBuf) {
 }
 
 fn matrices(value: &Value) -> BTreeMap<String, Matrix4<f64>> {
-    let number = |value: &Value| value.as_f64().expect("a number");
-    let matrix = |value: &Value| {
-        let rows =
-            value.as_array().expect("rows").iter().flat_map(|row| row.as_array().expect("a row").iter().map(number));
-        Matrix4::from_row_iterator(rows)
-    };
     let entries = value.as_object().expect("an object");
     entries.iter().map(|(key, value)| (key.clone(), matrix(value))).collect()
+}
+
+fn matrix(value: &Value) -> Matrix4<f64> {
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let rows = value.as_array().expect("rows").iter().flat_map(|row| row.as_array().expect("a row").iter().map(number));
+    Matrix4::from_row_iterator(rows)
 }
 
 /// Hypotheses that the list shows; what is left out is counted.
@@ -331,4 +331,50 @@ fn a_recording_becomes_a_session_in_the_window_once_a_person_has_said_what_the_f
     let said = std::fs::read_to_string(session.join("imported.toml")).expect("how it was understood");
     assert!(said.contains("rotation = euler_zyx_321") && said.contains("given with --set"), "{said}");
     assert!(bench.model().import.is_none(), "nothing is left open");
+}
+
+/// The images of a robot that never rests, by a camera whose clock is behind by 44 ms: every view has to get the pose that
+/// the robot had when it was taken, and the calibration what the camera really is at.
+#[test]
+fn a_bag_of_a_moving_robot_gives_poses_by_the_clocks_of_both_and_a_calibration() {
+    let Some(python) = python() else { return };
+    let home = TempDir::new().expect("a folder");
+    let (bag, out) = (home.path().join("bag"), home.path().join("set"));
+    let wrote = Command::new(&python)
+        .arg(workspace_root().join("tests/python/write_moving_bag.py"))
+        .arg(&bag)
+        .output()
+        .expect("Python runs");
+    assert!(wrote.status.success(), "{}", text(&wrote.stderr));
+    let truth: Value = serde_json::from_slice(&wrote.stdout).expect("JSON");
+    let run = command()
+        .args(["import", "--quiet", "--target", "8x6x25", "--json", "-", "--out"])
+        .args([&out, &bag])
+        .output()
+        .expect("it runs");
+    let what = format!("{}\n{}", text(&run.stdout), text(&run.stderr));
+    assert!(run.status.success(), "{what}");
+    let report: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+    let clocks = &report["judgement"]["clocks"][0];
+    let of = |key: &str| clocks[key].as_f64().expect("a number");
+    let off = of("offset_s") - truth["offset_s"].as_f64().expect("a number");
+    assert!(off.abs() < 4.0 * of("sigma_s") && of("sigma_s") < 2e-3, "{off} of {clocks}");
+
+    let poses = matrices(&truth["base_from_tip"]);
+    let dataset = Dataset::read(&out).expect("a data set");
+    assert!(dataset.entries.len() > 40, "{what}");
+    for entry in &dataset.entries {
+        let name = entry.image_path.as_ref().expect("an image").to_string_lossy().into_owned();
+        let (_, true_pose) = poses.iter().find(|(stamp, _)| name.contains(*stamp)).expect("an image of the bag");
+        let off = (entry.base_from_tip.expect("a pose").matrix() - true_pose).amax();
+        // The robot is at some 0.2 m/s: at the stamps as they are it would be 9 mm off.
+        assert!(off < 2e-3, "{name}: {off}");
+    }
+    let run = command().args(["calibrate", "--quiet", "--json", "-"]).arg(&out).output().expect("it runs");
+    let solved: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+    let place = solved["hand_eye"]["translation_m"].as_array().expect("a place");
+    let true_pose = matrix(&truth["tip_from_camera"]);
+    let off_m = place.iter().enumerate().map(|(i, value)| value.as_f64().expect("a number") - true_pose[(i, 3)]);
+    let off_mm = off_m.map(|off| off * off).sum::<f64>().sqrt() * 1e3;
+    assert!(off_mm < 0.1, "{off_mm} mm off: {solved}");
 }

@@ -71,7 +71,7 @@ pub fn timed(
             let (images, poses) = (stream.name.clone(), motion.name.clone());
             out.clocks.push(Clocks { images, poses, offset: *offset, count: seen.len() });
             out.beliefs.push(format!(
-                "{:.1} ± {:.1} ms are added to the stamps of {} images {} to have them by the clock of {}",
+                "{:.3} ± {:.3} ms are added to the stamps of {} images {} to have them by the clock of {}",
                 offset.offset_s * 1e3,
                 offset.sigma_s * 1e3,
                 seen.len(),

@@ -11,7 +11,7 @@ const MOST_FRAMES: usize = 10_000;
 const MOST_TIPS: usize = 8;
 
 /// A frame in its parent.
-struct Frame {
+struct Link {
     parent: String,
     is_static: bool,
     parent_from_frame: Timed<Isometry3<f64>>,
@@ -19,7 +19,7 @@ struct Frame {
 
 /// Frames by their name.
 #[derive(Default)]
-pub(super) struct Frames(BTreeMap<String, Frame>);
+pub(super) struct Frames(BTreeMap<String, Link>);
 
 impl Frames {
     pub fn add(&mut self, parent: &str, child: &str, is_static: bool, stamp: i64, parent_from_child: Isometry3<f64>) {
@@ -27,7 +27,7 @@ impl Frames {
         if self.0.len() >= MOST_FRAMES && !self.0.contains_key(child) {
             return;
         }
-        let new = || Frame { parent: parent.to_owned(), is_static, parent_from_frame: Vec::new() };
+        let new = || Link { parent: parent.to_owned(), is_static, parent_from_frame: Vec::new() };
         let frame = self.0.entry(child.to_owned()).or_insert_with(new);
         parent.clone_into(&mut frame.parent);
         if frame.parent_from_frame.len() < MOST_MESSAGES {
@@ -47,7 +47,7 @@ impl Frames {
     }
 
     /// A frame and those above it, up to the root, which has none; they end where a tree that is none goes in a circle.
-    fn upwards<'a>(&'a self, name: &'a str) -> impl Iterator<Item = (&'a str, &'a Frame)> {
+    fn upwards<'a>(&'a self, name: &'a str) -> impl Iterator<Item = (&'a str, &'a Link)> {
         let of = |name: &'a str| self.0.get(name).map(|frame| (name, frame));
         std::iter::successors(of(name), move |(_, frame)| of(&frame.parent)).take(self.0.len() + 1)
     }

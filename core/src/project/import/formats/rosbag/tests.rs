@@ -61,9 +61,9 @@ fn messages(poses: &[Isometry3<f64>]) -> Vec<Recorded> {
 }
 
 fn encoded(poses: &[Isometry3<f64>], encoding: Encoding) -> Vec<Recorded> {
-    let begin = || Message(Vec::new(), encoding);
     const STEP_NS: i64 = 50_000_000;
     const FRAMES: &str = "tf2_msgs/msg/TFMessage";
+    let begin = || Message(Vec::new(), encoding);
     let flange = Isometry3::translation(0.0, 0.0, 0.1);
     let static_tf = begin().u32(1).header(0, "link6").text("tool0").transform(&flange).done();
     let mut out = vec![("/tf_static", FRAMES, 0, static_tf)];
@@ -249,7 +249,9 @@ fn files_and_messages_that_rosbag2_compresses_are_read() {
     fs::write(&mcap, zstd::encode_all(&*mcap_of(&messages(&poses())), 1).expect("packed")).expect("written");
     is_read_rightly(&[mcap]);
     let mut each = messages(&poses());
-    each.iter_mut().for_each(|(.., data)| *data = zstd::encode_all(&**data, 1).expect("packed"));
+    for (.., data) in &mut each {
+        *data = zstd::encode_all(&**data, 1).expect("packed");
+    }
     let file = folder.path().join("messages.db3");
     write_db3(&file, &each);
     is_read_rightly(&[file]);
