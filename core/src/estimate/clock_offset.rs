@@ -85,26 +85,31 @@ pub enum ClockOffsetError {
     HandEye(#[from] HandEyeError),
 }
 
-/// Poses of a stream that are needed.
+/// Poses of a stream that are needed. Six numbers each, less the thirteen of two links and the offset, leave a hundred degrees
+/// of freedom: the standard deviation of the offset is then itself known to a fifteenth.
 const NEED: usize = 20;
 /// Length of the intervals over which angles are compared \[s\]: arms change their motion within less.
 const WINDOW_S: f64 = 0.3;
-/// Intervals and pairs that are looked at.
+/// Intervals and pairs that are looked at: a bound on the time it takes, which decides nothing. Four times as many would
+/// halve a standard deviation that is a small part of the time between two images by then.
 const MOST: usize = 400;
-/// Part of the intervals that has to agree: the others may be of wrong poses.
+/// Part of the intervals that has to agree: a tenth of the poses may be wrong, each the end of two intervals.
 const AGREEING: f64 = 0.8;
-/// Offsets that are refined: those at which the angles agree nearly as well as at the best, by this factor, and no more than
-/// so many.
+/// Offsets that are refined: those at which the mean square of the disagreement is no more than so many times that at the best
+/// one, and no more than so many. They are chosen generously, since refining one costs some time and nothing else: which of
+/// them is right is decided by their likelihoods, see [`BEATS`].
 const NEARLY: f64 = 4.0;
 const CANDIDATES: usize = 16;
-/// A pair is left out beyond so many times the median misfit.
+/// A pair is left out beyond so many times the median misfit. Of six Gaussian numbers that is eleven standard deviations, where
+/// no right pair is; a pair of two different moments is off by as far as the robot goes in between.
 const OUTLIER: f64 = 5.0;
 /// Gauss–Newton steps.
 const MAX_STEPS: usize = 20;
 /// An offset beats another one when the likelihood of a pair is larger on the average by so many of its standard errors: by
 /// chance once in a thousand (Vuong 1989, "Likelihood ratio tests for model selection and non-nested hypotheses").
 const BEATS: f64 = 3.09;
-/// A pair counts no more than one that is off by so many standard deviations.
+/// A pair counts no more than one that is off by so many standard deviations: one wrong pair among a hundred that are right must
+/// not outvote them, and right ones, of which one in 4·10⁷ is as far, count in full.
 const MOST_OFF: f64 = 7.0;
 
 /// Estimates the offset between the clocks of `robot` (anchor_from_mount) and `camera`, when it is within `within_s` seconds of

@@ -18,12 +18,10 @@ use crate::estimate::residuals::squared_residuals;
 use crate::estimate::uncertainty::widening::Widening;
 use crate::estimate::uncertainty::{quality, widening};
 use crate::geometry::frames::{Camera, Pose, Target};
+use crate::geometry::statistics::better_by_chance;
 use crate::progress::Work;
 use crate::targets::TargetSpec;
 use crate::targets::observation::View;
-
-/// Joint offsets are taken when they lower the error on held-out views by so much of it.
-const JOINTS_GAIN: f64 = 0.05;
 
 /// A joint estimate and what was decided on the way.
 #[derive(Clone)]
@@ -212,7 +210,7 @@ fn bent(
     Ok(deflection.is_shown().then_some(solution))
 }
 
-/// Tries joint offsets and takes them when held-out views say so.
+/// Tries joint offsets and takes them when held-out views are predicted better by them, by more than chance.
 fn offsets(
     problem: &JointProblem<'_>,
     screened: &mut Screened,
@@ -226,17 +224,18 @@ fn offsets(
     let with = JointProblem { free: Free { joints: true, ..without.free }, ..without };
     let fit = joint::fit(&with, &screened.solution.as_start(), work.cancel);
     let Some(solution) = determined(fit)? else { return Ok(None) };
-    let held_out =
-        |problem: &JointProblem<'_>, solution: &JointSolution| quality::held_out_rms_px(problem, solution, work.cancel);
-    let before = held_out(&without, &screened.solution)?;
-    let after = held_out(&with, &solution)?;
-    let (Some(before_px), Some(after_px)) = (before, after) else { return Ok(None) };
-    let accepted = after_px < before_px * (1.0 - JOINTS_GAIN);
+    let before = quality::held_out_squares_px(&without, &screened.solution, work.cancel)?;
+    let after = quality::held_out_squares_px(&with, &solution, work.cancel)?;
+    let (Some(before), Some(after)) = (before, after) else { return Ok(None) };
+    let gains: Vec<f64> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
+    let accepted = gains.iter().sum::<f64>() > 0.0 && better_by_chance(&gains) < quality::BY_CHANCE;
+    let corners: usize = views.iter().map(|view| view.corners.len()).sum();
+    let rms_px = |squares: &[f64]| (squares.iter().sum::<f64>() / corners as f64).sqrt();
     let found = JointOffsets {
         offsets_rad: solution.joint_offsets_rad.clone(),
         sigma_rad: solution.joint_offsets_sigma(),
-        heldout_before_px: before_px,
-        heldout_after_px: after_px,
+        heldout_before_px: rms_px(&before),
+        heldout_after_px: rms_px(&after),
         accepted,
     };
     if accepted {

@@ -6,20 +6,14 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
 use super::screen::{Candidate, view_score};
+use crate::estimate::uncertainty::quality::BY_CHANCE;
 use crate::geometry::statistics::{better_by_chance, outliers};
 
 /// Probability of a false alarm per hypothesis, after allowance for the alternatives among which the best was picked.
 /// One in ten thousand, because noise of real robots has longer tails than a Gaussian.
 const ALPHA: f64 = 1e-4;
-/// Probability that a hypothesis predicts views left out better by chance, after the same allowance. It is asked for
-/// besides the one above, whose law of the noise may be wrong. Eight views that all gain come about
-/// by chance four times in a thousand: with fewer nothing is shown so.
-const HELD_OUT_ALPHA: f64 = 5e-3;
 /// Parts that views are left out in, one at a time; as for the held-out error of a calibration.
 const FOLDS: usize = 5;
-/// An offset of a joint must predict held-out views better by this part: an arm has many ways to be wrong, and one more
-/// number always fits a little of them.
-const HELD_OUT_GAIN: f64 = 0.02;
 /// Two explanations count as equally good when the noise that they leave the robot, position times orientation, differs by
 /// less than this factor: it is known to a quarter or so in a session of ten views.
 const AS_GOOD: f64 = 1.5;
@@ -66,13 +60,14 @@ pub(super) struct HeldOut {
 }
 
 impl HeldOut {
-    /// Whether views are predicted better than by another model, by more than chance: a test of the signed ranks of the gains.
+    /// Whether views are predicted better than by another model, by more than chance: a test of the signed ranks of the gains,
+    /// with an allowance for the alternatives. It is asked for besides [`ALPHA`], whose law of the noise may be wrong.
     /// Without an effect a gain is as likely a loss of that size, whatever the law of the noise. With one, a few views
     /// gain most; a test of the mean against their scatter never gets beyond `√views` over the relative scatter, however large
     /// the effect.
     fn is_better_than(&self, other: &Self, ln_alternatives: f64) -> bool {
         let gains: Vec<f64> = self.scores.iter().zip(&other.scores).map(|(with, without)| with - without).collect();
-        better_by_chance(&gains) * ln_alternatives.exp() < HELD_OUT_ALPHA
+        better_by_chance(&gains) * ln_alternatives.exp() < BY_CHANCE
     }
 }
 
@@ -83,9 +78,6 @@ impl Judged {
             // Corners say it themselves, each of hundreds; views are left out, not modelled.
             (Candidate::Effect(Effect::Warp | Effect::Lens) | Candidate::Views(_), _) => true,
             (Candidate::Effect(_), None) => false,
-            (Candidate::Effect(Effect::Joint(_)), Some((without, with))) => {
-                with.is_better_than(without, self.ln_alternatives) && with.rms_m < (1.0 - HELD_OUT_GAIN) * without.rms_m
-            }
             (Candidate::Effect(_), Some((without, with))) => with.is_better_than(without, self.ln_alternatives),
         };
         // A bend too small to be reported is still there, and what it leaves must not be taken for something else.

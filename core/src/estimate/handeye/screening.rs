@@ -37,8 +37,11 @@ const HIDING: f64 = 0.6;
 /// A view that far from the start, in terms of the median view, may lead a fit astray. Healthy views seldom reach it, and
 /// beginning with a core costs them a fit and nothing else.
 const TIMES_MEDIAN: f64 = 5.0;
-/// Part of its limit from which the farthest view in a fit is judged once more by a fit without it.
-const SUSPECT: f64 = 0.3;
+/// Part of its limit from which the farthest view in a fit is judged once more by a fit without it. A view that is far off in
+/// place or in turn alone has all of the estimated noise of that kind to itself, and `T²` ends at the degrees of freedom of
+/// that level, `3N − 6`. Of seven views, the fewest that are judged so, that is a quarter of the limit (15 of 61, with as many
+/// degrees of freedom), and more of more views: half at ten.
+const SUSPECT: f64 = 0.25;
 /// Rounds of fitting and judging.
 const ROUNDS: usize = 8;
 
