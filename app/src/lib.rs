@@ -12,6 +12,7 @@ pub mod gui;
 pub mod guided;
 mod http;
 pub mod import;
+mod jpeg;
 pub mod keep_out;
 pub mod limits;
 pub mod live;

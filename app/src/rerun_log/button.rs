@@ -1,9 +1,9 @@
 //! The button that opens the recording in Rerun.
 
-use egui::{Button, RichText, Ui, Vec2};
+use egui::{Button, RichText, Ui};
 
 use crate::command::{Command, Outbox};
-use crate::gui::style::theme::Palette;
+use crate::gui::style::theme::{self, Palette};
 use crate::model::{RerunState, ViewerState};
 use crate::text::Language;
 use crate::{text, tr};
@@ -26,7 +26,7 @@ pub fn rerun_button_ui(ui: &mut Ui, rerun: &RerunState, language: Language, outb
         ViewerState::Opening => tr!(language, "Rerun…"),
         _ => tr!(language, "Rerun"),
     };
-    let button = Button::new(RichText::new(words).color(ink)).min_size(Vec2::new(0.0, HEIGHT)).frame(false);
+    let button = Button::new(RichText::new(words).color(ink)).min_size(theme::least(ui, 0.0, HEIGHT)).frame(false);
     let response = ui.add_enabled(rerun.on && rerun.viewer != ViewerState::Opening, button);
     let response = response.on_hover_ui(|ui| hint_ui(ui, rerun, language));
     let response = response.on_disabled_hover_ui(|ui| hint_ui(ui, rerun, language));

@@ -11,9 +11,9 @@ use egui::epaint::textures::TexturesDelta;
 use egui::{ColorImage, ImageData, TextureFilter, TextureOptions};
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
-use image::codecs::jpeg::JpegEncoder;
 
 use super::chunks;
+use crate::jpeg::{self, ColorType};
 
 /// From this width and height on an image without transparency is sent as JPEG.
 const JPEG_FROM: usize = 128;
@@ -62,22 +62,12 @@ impl Part {
             && width.min(height) >= JPEG_FROM
             && !is_seen_closely
             && self.image.pixels.iter().all(|pixel| pixel.a() == 255)
-            && let Some(bytes) = jpeg(&self.image)
+            && let Ok(bytes) = jpeg::encoded(self.image.as_raw(), ColorType::Rgba, (width, height), JPEG_QUALITY)
         {
             return Encoded { jpeg: true, bytes: bytes.into() };
         }
         Encoded { jpeg: false, bytes: deflated(self.image.as_raw()).into() }
     }
-}
-
-fn jpeg(image: &ColorImage) -> Option<Vec<u8>> {
-    let rgb: Vec<u8> = image.pixels.iter().flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()]).collect();
-    let [width, height] = image.size.map(|pixels| u32::try_from(pixels).ok());
-    let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY)
-        .encode(&rgb, width?, height?, image::ExtendedColorType::Rgb8)
-        .ok()?;
-    Some(bytes)
 }
 
 /// Deflated without a header, as browsers call `deflate-raw`.

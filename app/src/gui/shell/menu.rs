@@ -6,7 +6,7 @@ use egui::{Button, PopupCloseBehavior, Ui, Vec2, WidgetInfo, WidgetType};
 use super::title;
 use crate::command::{Command, Outbox};
 use crate::gui::style::icons::{self, Icon};
-use crate::gui::style::theme::Palette;
+use crate::gui::style::theme::{self, Palette};
 use crate::model::{Dialog, Model, Pane, ThemeChoice};
 use crate::text::Language;
 use crate::tr;
@@ -15,7 +15,7 @@ use crate::tr;
 pub fn menu_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
-    let button = Button::new("").min_size(Vec2::new(34.0, 30.0)).frame(false);
+    let button = Button::new("").min_size(theme::least(ui, 34.0, 30.0)).frame(false);
     let (response, _) = MenuButton::from_button(button).config(config).ui(ui, |ui| content_ui(ui, model, outbox));
     let palette = Palette::of(ui);
     if response.hovered() || response.has_focus() {

@@ -1,13 +1,13 @@
 //! The bar at the bottom: the robot in numbers, the age of the images, what is under way.
 
-use egui::{Button, Label, RichText, Sense, Ui, Vec2};
+use egui::{Button, Label, RichText, Sense, Ui};
 
 use handeye_core::geometry::arm::{JointKind, MAX_JOINTS};
 
 use crate::command::{Command, Outbox};
 use crate::gui::status::STALE_AFTER_S;
 use crate::gui::style::numbers;
-use crate::gui::style::theme::{CAPTION, Palette};
+use crate::gui::style::theme::{self, CAPTION, Palette};
 use crate::guided;
 use crate::live::pane::waiting;
 use crate::model::{CellSource, FollowStatus, Model, Motion, RobotState, RotationFormat, Severity};
@@ -16,6 +16,8 @@ use crate::{text, tr};
 
 /// Shown where a number is not known.
 const UNKNOWN: &str = "–";
+/// Height of a caption and its value.
+const LINES: f32 = 34.0;
 /// As wide as a joint value gets.
 const WIDEST_ANGLE: &str = "−888.8";
 
@@ -114,8 +116,10 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
         field_ui(ui, caption, &value, sample, colour);
         let button = ui
             .vertical(|ui| {
-                ui.add_space(6.0);
-                ui.add(Button::new(RichText::new(name).size(CAPTION)).min_size(Vec2::new(34.0, 22.0)).small())
+                let size = theme::least(ui, 34.0, 22.0);
+                // In the middle of the two lines of text.
+                ui.add_space((LINES - size.y).max(0.0) / 2.0);
+                ui.add(Button::new(RichText::new(name).size(CAPTION)).min_size(size).small())
             })
             .inner
             .on_hover_text(match next {

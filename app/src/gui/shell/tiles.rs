@@ -10,7 +10,7 @@ use crate::connect::pane::connect_ui;
 use crate::export::pane::export_ui;
 use crate::gui::shell::layout::{Layout, Slot};
 use crate::gui::style::fonts;
-use crate::gui::style::theme::{CARD_RADIUS, GAP, Palette};
+use crate::gui::style::theme::{self, CARD_RADIUS, GAP, Palette};
 use crate::live::pane::colour_ui;
 use crate::live::pane::depth_ui;
 use crate::live::textures::Textures;
@@ -117,7 +117,7 @@ impl Behavior<Slot> for Panes<'_> {
         let width = {
             let heavy = FontId::new(13.0, fonts::semibold());
             let galley = ui.painter().layout_no_wrap(galley.text().to_owned(), heavy, palette.text);
-            galley.size().x + 2.0 * TAB_MARGIN
+            (galley.size().x + 2.0 * TAB_MARGIN).max(theme::least(ui, 0.0, 0.0).x)
         };
         let (_, rect) = ui.allocate_space(Vec2::new(width, ui.available_height()));
         let response = ui.interact(rect, id, Sense::click_and_drag());

@@ -104,7 +104,7 @@ fn session_ui(ui: &mut Ui, session: &SessionFacts, language: Language) {
 /// A button with a sign instead of words.
 pub fn icon_button_ui(ui: &mut Ui, icon: Icon, name: &str, enabled: bool) -> egui::Response {
     let palette = Palette::of(ui);
-    let response = ui.add_enabled(enabled, Button::new("").min_size(Vec2::new(34.0, HEIGHT)).frame(false));
+    let response = ui.add_enabled(enabled, Button::new("").min_size(theme::least(ui, 34.0, HEIGHT)).frame(false));
     let ink = match (enabled, response.hovered() || response.has_focus()) {
         (false, _) => palette.weak.gamma_multiply(0.45),
         (true, true) => palette.text,

@@ -5,7 +5,7 @@ use egui::{
     Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType,
 };
 
-use crate::gui::style::theme::{CAPTION, Palette, Tone};
+use crate::gui::style::theme::{self, CAPTION, Palette, Tone};
 use crate::text::Language;
 use crate::tr;
 
@@ -174,7 +174,11 @@ pub enum Sign {
 /// A button with a sign, which has a name for those who cannot see it.
 pub fn sign_ui(ui: &mut Ui, sign: Sign, name: &str, enabled: bool) -> Response {
     let sense = if sign == Sign::Grip { Sense::drag() } else { Sense::click() };
-    let button = Button::new("").frame_when_inactive(false).sense(sense).min_size(Vec2::splat(SIGN_BUTTON)).small();
+    let button = Button::new("")
+        .frame_when_inactive(false)
+        .sense(sense)
+        .min_size(theme::least(ui, SIGN_BUTTON, SIGN_BUTTON))
+        .small();
     let response = ui.add_enabled(enabled, button);
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, enabled, name));
     let palette = Palette::of(ui);

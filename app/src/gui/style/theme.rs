@@ -16,7 +16,9 @@ pub const GAP: f32 = 8.0;
 
 /// Height of what is pressed with a pointer \[points\].
 const POINTER: f32 = 26.0;
-/// Height of what is pressed with a finger \[points\].
+/// Between the edge of a button and its words \[points\].
+const PADDING: Vec2 = Vec2::new(10.0, 4.0);
+/// Least width and height of what is pressed with a finger \[points\].
 const FINGER: f32 = 40.0;
 
 /// Colours with a meaning.
@@ -187,10 +189,10 @@ pub fn install(ctx: &egui::Context) {
 
 /// Makes what is pressed large enough for fingers, or as large as a pointer needs it.
 pub fn for_fingers(ctx: &egui::Context, fingers: bool) {
-    let (height, padding) = if fingers { (FINGER, 12.0) } else { (POINTER, 4.0) };
+    let (height, padding) = if fingers { (FINGER, Vec2::splat(12.0)) } else { (POINTER, PADDING) };
     ctx.all_styles_mut(|style| {
         style.spacing.interact_size.y = height;
-        style.spacing.button_padding.y = padding;
+        style.spacing.button_padding = padding;
     });
 }
 
@@ -200,6 +202,17 @@ pub fn choose(ctx: &egui::Context, theme: ThemeChoice) {
         ThemeChoice::Dark => egui::ThemePreference::Dark,
         ThemeChoice::Light => egui::ThemePreference::Light,
     });
+}
+
+/// Whether what is pressed is made for fingers now.
+pub fn is_for_fingers(ui: &egui::Ui) -> bool {
+    ui.ctx().global_style().spacing.interact_size.y >= FINGER
+}
+
+/// The least size of something that is pressed: this one with a pointer, and never less than a finger hits.
+pub fn least(ui: &egui::Ui, width: f32, height: f32) -> Vec2 {
+    let finger = if is_for_fingers(ui) { FINGER } else { 0.0 };
+    Vec2::new(width, height).max(Vec2::splat(finger))
 }
 
 fn shape(style: &mut egui::Style, visuals: Visuals, palette: &Palette) {
@@ -212,7 +225,7 @@ fn shape(style: &mut egui::Style, visuals: Visuals, palette: &Palette) {
     ]
     .into();
     style.spacing.item_spacing = Vec2::new(8.0, 4.0);
-    style.spacing.button_padding = Vec2::new(10.0, 4.0);
+    style.spacing.button_padding = PADDING;
     style.spacing.interact_size.y = POINTER;
     style.spacing.window_margin = Margin::same(16);
     style.spacing.menu_margin = Margin::same(6);

@@ -16,7 +16,11 @@ pub fn readout_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>) {
     let language = model.view.language;
     let found = model.cursor.and_then(|point| Some((point, shown.images.rgb_at(point)?)));
     let Some((point, rgb)) = found else {
-        let hint = tr!(language, "Point at an image to read a pixel; the wheel zooms, a double click fits");
+        let hint = if theme::is_for_fingers(ui) {
+            tr!(language, "Touch an image to read a pixel; two fingers zoom, a double tap fits")
+        } else {
+            tr!(language, "Point at an image to read a pixel; the wheel zooms, a double click fits")
+        };
         ui.add(egui::Label::new(RichText::new(hint).color(palette.weak)).truncate());
         return;
     };

@@ -1,6 +1,6 @@
 //! The joints: where each is, where it is sent, and buttons that jog it.
 
-use egui::{Id, RichText, Shape, Slider, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
+use egui::{Id, RichText, Shape, Slider, Stroke, Ui, WidgetInfo, WidgetType};
 use handeye_core::geometry::arm::{JointKind, JointValues};
 
 use super::blocked::Blocked;
@@ -8,7 +8,7 @@ use super::hold::{self, Hold};
 use crate::command::{Command, Outbox};
 use crate::gui::style::numbers;
 use crate::gui::style::parts;
-use crate::gui::style::theme::Palette;
+use crate::gui::style::theme::{self, Palette};
 use crate::model::{Jog, Model, Motion, MotionGoal};
 use crate::{text, tr};
 
@@ -83,7 +83,8 @@ fn row_ui(
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.label(RichText::new(format!("J{joint}")).color(palette.weak));
         for (sign, forward) in [("−", false), ("+", true)] {
-            let response = ui.add(hold::button(RichText::new(sign).strong()).min_size(Vec2::new(26.0, 24.0)).small());
+            let response =
+                ui.add(hold::button(RichText::new(sign).strong()).min_size(theme::least(ui, 26.0, 24.0)).small());
             let name = text!("Jog joint {joint} {sign}", joint = joint, sign = sign).say(language);
             let enabled = ui.is_enabled();
             response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, enabled, &name));

@@ -1,12 +1,12 @@
 //! Jogging along and about the axes of a frame, with buttons and keys.
 
-use egui::{Color32, Id, Key, RichText, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
+use egui::{Color32, Id, Key, RichText, Stroke, Ui, WidgetInfo, WidgetType};
 
 use super::blocked::Blocked;
 use super::hold::{self, Hold};
 use super::settings::frame_name;
 use crate::gui::style::parts;
-use crate::gui::style::theme::Palette;
+use crate::gui::style::theme::{self, Palette};
 use crate::model::{Axis, Jog, JogFrame, Model};
 use crate::text::Language;
 use crate::{text, tr};
@@ -43,7 +43,7 @@ pub fn pad_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, hold: &mut Hold) {
                         let sign = if is_forward { "+" } else { "−" };
                         let face = RichText::new(sign).strong().color(colour);
                         let button = hold::button(face)
-                            .min_size(Vec2::new(wide, 28.0))
+                            .min_size(theme::least(ui, wide, 28.0))
                             .stroke(Stroke::new(1.0, colour.gamma_multiply(0.5)));
                         let name = name(axis, is_forward, turn, language);
                         let response = ui.add(button);

@@ -1,11 +1,11 @@
 //! How the tip is jogged: whose axes, how far, how fast.
 
-use egui::{RichText, Slider, Ui, WidgetInfo, WidgetType};
+use egui::{Button, RichText, Slider, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::cell::{JOG_JOINT_SPEED_RAD_S, JOG_LINE_SPEED_M_S, JOG_TURN_SPEED_RAD_S};
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
-use crate::gui::style::theme::Palette;
+use crate::gui::style::theme::{self, Palette};
 use crate::model::{JogFrame, JogSettings, JogStep, Model, Moves};
 use crate::text::Language;
 use crate::{text, tr};
@@ -62,7 +62,7 @@ fn step_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         });
         for (step, name, what) in Some(hold).filter(|_| can_be_held).into_iter().chain(steps) {
             let chosen = model.jog_step() == step;
-            let response = ui.selectable_label(chosen, &name);
+            let response = ui.add(Button::selectable(chosen, &name).min_size(theme::least(ui, 0.0, 0.0)));
             let label = if step == JogStep::Hold { &name } else { &what };
             response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, chosen, label));
             if response.on_hover_text(&what).clicked() && !chosen {

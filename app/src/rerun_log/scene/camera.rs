@@ -3,9 +3,8 @@
 use handeye_core::depth::{DepthImage, DepthSample};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::image::codecs::jpeg::JpegEncoder;
 use handeye_core::image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use handeye_core::image::{ExtendedColorType, ImageEncoder as _, ImageError, RgbImage};
+use handeye_core::image::{ExtendedColorType, ImageEncoder as _, RgbImage};
 use handeye_core::targets::TargetSpec;
 use nalgebra::Vector2;
 use rerun::{Color, EncodedDepthImage, EncodedImage, MediaType, Points3D, Radius};
@@ -15,6 +14,7 @@ use super::error::RecordError;
 use super::paths::{self, below};
 use super::pen::Pen;
 use super::style;
+use crate::jpeg::{self, ColorType};
 use crate::scene::Known;
 
 /// No loss that an eye sees, at a tenth of the bytes.
@@ -33,14 +33,13 @@ pub(super) fn lens(known: &Known) -> String {
 /// A colour image, compressed.
 pub(super) fn write_image(pen: Pen<'_>, known: &Known, rgb: &RgbImage) -> Result<(), RecordError> {
     let path = below(&lens(known), paths::IMAGE);
-    let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY)
-        .encode_image(rgb)
+    let size = (rgb.width() as usize, rgb.height() as usize);
+    let bytes = jpeg::encoded(rgb.as_raw(), ColorType::Rgb, size, JPEG_QUALITY)
         .map_err(|error| not_compressed(&path, rgb.dimensions(), &error))?;
     pen.write(&path, &EncodedImage::from_file_contents(bytes).with_media_type(MediaType::jpeg()))
 }
 
-fn not_compressed(path: &str, (width, height): (u32, u32), error: &ImageError) -> RecordError {
+fn not_compressed(path: &str, (width, height): (u32, u32), error: &dyn std::error::Error) -> RecordError {
     RecordError::Image { path: path.to_owned(), width, height, reason: error.to_string() }
 }
 

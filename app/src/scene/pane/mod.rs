@@ -24,7 +24,7 @@ use crate::capture::rows::CaptureTable;
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks;
 use crate::gui::style::parts;
-use crate::gui::style::theme::Palette;
+use crate::gui::style::theme::{self, Palette};
 use crate::keep_out;
 use crate::keep_out::state::with_drawn;
 use crate::model::{Model, SceneView};
@@ -83,8 +83,12 @@ fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
     keep_out::pane::header_ui(ui, model);
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        let hint = tr!(language, "Drag to turn, Shift-drag to shift, wheel to zoom");
-        let hint = RichText::new(hint).size(crate::gui::style::theme::CAPTION).color(Palette::of(ui).weak);
+        let hint = if theme::is_for_fingers(ui) {
+            tr!(language, "One finger turns, two shift and zoom")
+        } else {
+            tr!(language, "Drag to turn, Shift-drag to shift, wheel to zoom")
+        };
+        let hint = RichText::new(hint).size(theme::CAPTION).color(Palette::of(ui).weak);
         ui.add(egui::Label::new(hint).truncate());
     });
 }
@@ -184,7 +188,7 @@ fn spots_ui(
     pointed
 }
 
-/// Wheel, drag and double click.
+/// Wheel, drag, two fingers and double click.
 fn navigate(ui: &Ui, response: &Response, room: Rect, model: &Model, outbox: &mut Outbox) {
     let now = model.scene;
     let mut next = now;
@@ -196,7 +200,10 @@ fn navigate(ui: &Ui, response: &Response, room: Rect, model: &Model, outbox: &mu
         }
     }
     let drag = response.drag_delta();
-    if response.dragged() && drag != Vec2::ZERO {
+    let fingers = ui.input(egui::InputState::multi_touch).filter(|touch| room.contains(touch.center_pos));
+    if let Some(fingers) = fingers {
+        next = eye::panned(next, fingers.translation_delta, room);
+    } else if response.dragged() && drag != Vec2::ZERO {
         let shifts = ui.input(|input| input.modifiers.shift) || !response.dragged_by(PointerButton::Primary);
         next = if shifts { eye::panned(next, drag, room) } else { eye::orbited(next, drag) };
     }
