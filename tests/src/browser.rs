@@ -221,6 +221,12 @@ impl Browser {
         self.devtools.borrow().said.clone()
     }
 
+    /// Freezes a page, as a browser does when it is put aside or the lid is closed, or lets it go on.
+    pub fn freeze(&self, tab: &Tab, is_frozen: bool) {
+        let state = if is_frozen { "frozen" } else { "active" };
+        self.call(Some(tab), "Page.setWebLifecycleState", &json!({"state": state}));
+    }
+
     /// Stops all its processes where they are, or lets them go on.
     ///
     /// # Panics

@@ -1,6 +1,7 @@
 //! The window as a person has it before him: on a screen of its own (Xvfb), pressed by a real mouse and keyboard (xdotool),
 //! or in a browser, pressed by its events.
 
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -109,6 +110,20 @@ impl Desktop {
     /// # Panics
     /// When one of them does not start.
     pub fn in_browser(size: (u32, u32), touch: bool, shots: &Path, arguments: &[&str]) -> Self {
+        Self::in_browser_over(size, touch, shots, arguments, |address| address)
+    }
+
+    /// The same, of which the browser sees another address: that of what lies between the two.
+    ///
+    /// # Panics
+    /// When one of them does not start.
+    pub fn in_browser_over(
+        size: (u32, u32),
+        touch: bool,
+        shots: &Path,
+        arguments: &[&str],
+        through: impl FnOnce(SocketAddr) -> SocketAddr,
+    ) -> Self {
         let home = tempfile::tempdir().expect("a folder");
         let watch = Watch::folder(home.path());
         let mut window = handeye("serve", home.path())
@@ -120,9 +135,11 @@ impl Desktop {
         let mut line = String::new();
         let stdout = window.stdout.take().expect("its output");
         std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut line).expect("a line");
-        let url = line.trim().strip_prefix("the workbench is at ").expect("an address").to_owned();
+        let address =
+            line.trim().strip_prefix("the workbench is at http://").expect("an address").trim_end_matches('/');
+        let address = through(address.parse().expect("an address"));
         let browser = Browser::start();
-        let tab = browser.open(&url, size, touch);
+        let tab = browser.open(&format!("http://{address}/"), size, touch);
         // What is pressed before there is a frame is pressed beside it.
         browser.until(&tab, &format!("show.frame?.size[0] === {}", size.0));
         std::fs::create_dir_all(shots).expect("a folder");
@@ -279,8 +296,8 @@ impl Desktop {
         (status, asked.elapsed())
     }
 
-    /// An image of the screen, `NAME.png`; the pointer is moved out of the way first, and what it opened closes.
-    pub fn photograph(&self, name: &str) {
+    /// An image of the screen, `NAME.png`, and where it is; the pointer is moved out of the way first, and what it opened closes.
+    pub fn photograph(&self, name: &str) -> PathBuf {
         match &self.surface {
             Surface::Screen { display, .. } => xdotool(display, &["mousemove", "700", "12"]),
             Surface::Page { browser, tab, touch: false } => browser.point(tab, (700.0, 12.0)),
@@ -305,6 +322,7 @@ impl Desktop {
                 std::fs::write(&file, browser.photograph(tab)).expect("written");
             }
         }
+        file
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod browser;
 pub mod desktop;
 pub mod hostile;
+pub mod network;
 pub mod process;
 pub mod watch;
 pub mod workbench;

@@ -8,6 +8,7 @@ use handeye_sim_link::client::cell::{Arm, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::CellProcess;
 use handeye_tests::desktop::{self, Desktop};
+use handeye_tests::network::{Network, Quality};
 use serde_json::Value;
 
 /// From the last sign of a held button to an arm at rest.
@@ -94,6 +95,37 @@ fn a_first_user_gets_to_exported_files_with_fingers_on_a_tablet() {
     first_user(&mut desktop);
 }
 
+/// The desktop window and the page are drawn by different programs out of the same triangles. What may differ is the last
+/// bit of a colour, and words about the time that has passed or the folder of the user.
+#[test]
+fn the_page_shows_what_the_desktop_window_shows_pixel_for_pixel() {
+    if !desktop::is_possible_in_browser() || !desktop::is_possible() {
+        return;
+    }
+    let _alone = alone();
+    // A simulation that stands makes no images: nothing moves.
+    let cell = CellProcess::start(&[]);
+    let address = Endpoint::local(cell.port()).to_string();
+    let arguments = ["--rerun", "off", "--connect", &address];
+    let mut window = Desktop::start((1440, 900), &shots("served"), &arguments, &[]);
+    let mut page = Desktop::in_browser((1440, 900), false, &shots("served"), &arguments);
+    for pane in ["Connect", "Target", "3D", "Result"] {
+        let [window, page] = [(&mut window, "window"), (&mut page, "page")].map(|(surface, name)| {
+            surface.until_seen("The simulation is stopped");
+            surface.click(pane);
+            image::open(surface.photograph(&format!("{name}-{pane}"))).expect("an image").into_rgb8()
+        });
+        assert_eq!(window.dimensions(), page.dimensions());
+        let apart = |(window, page): (&image::Rgb<u8>, &image::Rgb<u8>)| {
+            window.0.iter().zip(&page.0).any(|(window, page)| window.abs_diff(*page) > 2)
+        };
+        let count = window.pixels().zip(page.pixels()).filter(|pair| apart(*pair)).count();
+        println!("{pane}: {count} of {} pixels differ", 1440 * 900);
+        // Three such words are no more than 5,000 pixels with all that is around their letters.
+        assert!(count < 5_000, "{pane}: {count} pixels differ");
+    }
+}
+
 /// The first place of the tip in the bar at the bottom.
 fn tip(desktop: &mut Desktop) -> String {
     desktop.label("Tip in base, x y z [mm]:")
@@ -161,6 +193,65 @@ fn a_browser_that_stands_still_lets_go_of_the_arm_and_comes_back() {
     desktop.click("Poses");
     desktop.until_seen("No captures yet");
     assert_eq!(arm.joint_values().expect("a call"), rested, "it goes on by itself");
+}
+
+/// One megabit in a second, 200 ms to and fro, two packets lost of a hundred; then none at all.
+#[test]
+fn over_a_bad_network_the_arm_rests_when_it_goes_and_the_page_comes_back() {
+    if !desktop::is_possible_in_browser() {
+        return;
+    }
+    let _alone = alone();
+    let cell = CellProcess::start(&[]);
+    let endpoint = Endpoint::local(cell.port());
+    let mut arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
+    arm.sim().start_simulation().expect("it starts");
+    let address = endpoint.to_string();
+    let quality = Quality { bits_per_s: 1e6, round_trip: Duration::from_millis(200), loss: 0.02, seed: 1 };
+    let mut network = None;
+    let through = |program| network.insert(Network::to(program, quality)).address();
+    let arguments = ["--connect", &address];
+    let mut desktop = Desktop::in_browser_over((1440, 900), false, &shots("served"), &arguments, through);
+    let network = network.expect("a network");
+    hold_a_jog(&mut desktop);
+    network.cut();
+    let took = moves_for(&mut arm);
+    println!("a network that is gone: the arm at rest after {:.0} ms", took.as_secs_f64() * 1e3);
+    assert!(took < 4 * AT_REST, "{took:?}");
+    let rested = arm.joint_values().expect("a call");
+    // Longer than a page waits for a word.
+    let (browser, tab) = desktop.page();
+    browser.until(tab, "!document.getElementById('note').hidden");
+    network.mend();
+    browser.until(tab, "show.frame && document.getElementById('note').hidden && people.you");
+    desktop.click("Poses");
+    desktop.until_seen("No captures yet");
+    assert_eq!(arm.joint_values().expect("a call"), rested, "it goes on by itself");
+}
+
+/// A closed lid, or another page in front: the page is not run any more.
+#[test]
+fn a_page_that_is_frozen_lets_go_of_the_arm_and_comes_back() {
+    if !desktop::is_possible_in_browser() {
+        return;
+    }
+    let _alone = alone();
+    let cell = CellProcess::start(&[]);
+    let endpoint = Endpoint::local(cell.port());
+    let mut arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
+    arm.sim().start_simulation().expect("it starts");
+    let address = endpoint.to_string();
+    let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &["--connect", &address]);
+    hold_a_jog(&mut desktop);
+    let (browser, tab) = desktop.page();
+    browser.freeze(tab, true);
+    let took = moves_for(&mut arm);
+    println!("a page that is frozen: the arm at rest after {:.0} ms", took.as_secs_f64() * 1e3);
+    assert!(took < 4 * AT_REST, "{took:?}");
+    browser.freeze(tab, false);
+    browser.until(tab, "show.frame && document.getElementById('note').hidden && people.you");
+    desktop.click("Poses");
+    desktop.until_seen("No captures yet");
 }
 
 #[test]

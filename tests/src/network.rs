@@ -1,0 +1,156 @@
+//! A bad network between a program and who talks to it: slow, far, losing packets, and at times gone.
+//!
+//! TCP hides a lost packet: what came after it waits until it was sent again. So every segment here takes its turn on a
+//! line of limited rate, is under way for half of a round trip, and one that is lost holds up all behind it for as long as
+//! Linux waits before it sends it again (RFC 6298: a round trip and four times its variation, at least 200 ms).
+
+use std::io::{Read as _, Write as _};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+/// Most bytes of a segment on Ethernet.
+const SEGMENT: usize = 1460;
+/// Segments that are under way at most, as with a usual buffer of a router.
+const UNDER_WAY: usize = 64;
+/// Least time before something lost is sent again.
+const AGAIN: Duration = Duration::from_millis(200);
+
+/// What a network is like.
+#[derive(Debug, Clone, Copy)]
+pub struct Quality {
+    /// Bits in a second, in each direction.
+    pub bits_per_s: f64,
+    /// To the other end and back.
+    pub round_trip: Duration,
+    /// Part of the segments that is lost.
+    pub loss: f64,
+    /// Of the choice of those.
+    pub seed: u64,
+}
+
+/// A network with a program behind it.
+pub struct Network {
+    address: SocketAddr,
+    link: Arc<Link>,
+}
+
+struct Link {
+    quality: Quality,
+    /// Cut through: nothing arrives, and nobody is told.
+    is_cut: Mutex<bool>,
+    mended: Condvar,
+    has_ended: AtomicBool,
+    /// When the line of each direction is free again.
+    free: [Mutex<Instant>; 2],
+}
+
+impl Network {
+    /// Listens on an address of its own, for connections to a program.
+    ///
+    /// # Panics
+    /// When no port is free.
+    pub fn to(program: SocketAddr, quality: Quality) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("an address");
+        let now = Instant::now();
+        let link = Arc::new(Link {
+            quality,
+            is_cut: Mutex::new(false),
+            mended: Condvar::new(),
+            has_ended: AtomicBool::new(false),
+            free: [Mutex::new(now), Mutex::new(now)],
+        });
+        let shared = Arc::clone(&link);
+        std::thread::spawn(move || {
+            for (number, near) in (0..).zip(listener.incoming().map_while(Result::ok)) {
+                if shared.has_ended.load(Ordering::Relaxed) {
+                    break;
+                }
+                let Ok(far) = TcpStream::connect(program) else { continue };
+                for (direction, from, to) in [(0, &near, &far), (1, &far, &near)] {
+                    if let (Ok(from), Ok(to)) = (from.try_clone(), to.try_clone()) {
+                        carry(&shared, 2 * number + direction, from, to);
+                    }
+                }
+            }
+        });
+        Self { address, link }
+    }
+
+    /// Where the program is, over this network.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Nothing arrives any more, without a word to either end.
+    pub fn cut(&self) {
+        *self.link.is_cut.lock().unwrap_or_else(PoisonError::into_inner) = true;
+    }
+
+    /// All that was under way arrives.
+    pub fn mend(&self) {
+        *self.link.is_cut.lock().unwrap_or_else(PoisonError::into_inner) = false;
+        self.link.mended.notify_all();
+    }
+}
+
+impl Drop for Network {
+    fn drop(&mut self) {
+        self.link.has_ended.store(true, Ordering::Relaxed);
+        self.mend();
+        // The one that waits for connections sees it by one more.
+        let _woken = TcpStream::connect(self.address).is_ok();
+    }
+}
+
+/// Carries what one end says to the other, on threads of its own.
+fn carry(link: &Arc<Link>, number: u64, from: TcpStream, to: TcpStream) {
+    let (sender, receiver) = sync_channel(UNDER_WAY);
+    let (sending, delivering) = (Arc::clone(link), Arc::clone(link));
+    std::thread::spawn(move || sending.send(number, from, &sender));
+    std::thread::spawn(move || delivering.deliver(to, &receiver));
+}
+
+impl Link {
+    fn send(&self, number: u64, mut from: TcpStream, sender: &SyncSender<(Instant, Vec<u8>)>) {
+        let Quality { bits_per_s, round_trip, loss, seed } = self.quality;
+        let mut random = ChaCha8Rng::seed_from_u64(seed ^ number);
+        let mut segment = [0; SEGMENT];
+        let mut last = Instant::now();
+        while let Ok(count @ 1..) = from.read(&mut segment) {
+            let takes = Duration::from_secs_f64(8.0 * count as f64 / bits_per_s);
+            let gone = {
+                let mut free = self.free[(number % 2) as usize].lock().unwrap_or_else(PoisonError::into_inner);
+                *free = (*free).max(Instant::now()) + takes;
+                *free
+            };
+            let mut arrives = gone + round_trip / 2;
+            if random.random::<f64>() < loss {
+                arrives += (round_trip * 3 / 2).max(AGAIN);
+            }
+            last = arrives.max(last);
+            if sender.send((last, segment[..count].to_vec())).is_err() {
+                break;
+            }
+        }
+    }
+
+    fn deliver(&self, mut to: TcpStream, receiver: &Receiver<(Instant, Vec<u8>)>) {
+        for (arrives, segment) in receiver {
+            std::thread::sleep(arrives.saturating_duration_since(Instant::now()));
+            let cut = self.is_cut.lock().unwrap_or_else(PoisonError::into_inner);
+            let whole = self.mended.wait_while(cut, |cut| *cut).unwrap_or_else(PoisonError::into_inner);
+            drop(whole);
+            if to.write_all(&segment).is_err() {
+                break;
+            }
+        }
+        let _closed = to.shutdown(Shutdown::Both).is_ok();
+    }
+}
