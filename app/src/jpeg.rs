@@ -3,7 +3,8 @@
 pub use jpeg_encoder::{ColorType, EncodingError};
 use jpeg_encoder::{Encoder, SamplingFactor};
 
-/// A JPEG of these pixels, row by row; colours keep the resolution of the light, since depth is told by them.
+/// A JPEG of these pixels, row by row. Colours have half the resolution of the light, as cameras keep them: that is half of the
+/// work, and what is measured is measured in the pixels themselves.
 ///
 /// # Errors
 /// An image without pixels, or with more than 65 535 in a row or column.
@@ -17,7 +18,7 @@ pub fn encoded(
     let side = |length: usize| u16::try_from(length).unwrap_or(u16::MAX);
     let mut bytes = Vec::with_capacity(pixels.len() / 16);
     let mut encoder = Encoder::new(&mut bytes, quality);
-    encoder.set_sampling_factor(SamplingFactor::F_1_1);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
     encoder.encode(pixels, side(width), side(height), colours)?;
     Ok(bytes)
 }

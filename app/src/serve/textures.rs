@@ -61,13 +61,18 @@ impl Part {
         if self.at.is_none()
             && width.min(height) >= JPEG_FROM
             && !is_seen_closely
-            && self.image.pixels.iter().all(|pixel| pixel.a() == 255)
+            && is_opaque(&self.image)
             && let Ok(bytes) = jpeg::encoded(self.image.as_raw(), ColorType::Rgba, (width, height), JPEG_QUALITY)
         {
             return Encoded { jpeg: true, bytes: bytes.into() };
         }
         Encoded { jpeg: false, bytes: deflated(self.image.as_raw()).into() }
     }
+}
+
+/// Without a way out of the loop, so that many pixels are looked at in one instruction.
+fn is_opaque(image: &ColorImage) -> bool {
+    image.pixels.iter().fold(u8::MAX, |all, pixel| all & pixel.a()) == u8::MAX
 }
 
 /// Deflated without a header, as browsers call `deflate-raw`.
