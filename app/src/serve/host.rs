@@ -11,6 +11,7 @@ use super::frame::{Frame, Typing, cursor_name};
 use super::hub::{Errand, Hub, Words};
 use super::input::{Held, Screen};
 use super::memory::Memory;
+use super::reading;
 use super::textures::Textures;
 use crate::app::InBrowser;
 use crate::command::Command;
@@ -23,6 +24,9 @@ use crate::tr;
 
 /// Between two frames: a screen shows no more.
 const PERIOD: Duration = Duration::from_millis(16);
+
+/// Screen readers are told no more often what there is: nobody hears faster.
+const TELL: Duration = Duration::from_millis(400);
 
 /// Between two frames when something was done.
 const PERIOD_OF_INPUT: Duration = Duration::from_millis(8);
@@ -58,6 +62,8 @@ pub struct Host {
     drawn: Option<Instant>,
     collected: Instant,
     remembered: Instant,
+    /// When screen readers were told what there is.
+    told: Instant,
     screen: Option<Screen>,
     held: Held,
     /// Something is held at a page that was not heard for too long.
@@ -107,6 +113,7 @@ impl Host {
             drawn: None,
             collected: now,
             remembered: now,
+            told: now,
             screen: None,
             held: Held::default(),
             is_silent: false,
@@ -239,9 +246,24 @@ impl Host {
             sooner(&self.due, Duration::ZERO);
         }
         let window = &mut self.window;
+        let is_read = self.hub.is_read_at_all();
+        if is_read {
+            self.ctx.enable_accesskit();
+        } else {
+            self.ctx.disable_accesskit();
+        }
         let mut output = self.ctx.run_ui(input, |ui| window.window_ui(ui));
         self.textures.change(&mut output.textures_delta);
         let platform = output.platform_output;
+        if is_read && let Some(update) = &platform.accesskit_update {
+            let next = self.told + TELL;
+            if Instant::now() >= next {
+                self.told = Instant::now();
+                self.hub.tell(reading::controls(update));
+            } else {
+                sooner(&self.due, next.saturating_duration_since(Instant::now()));
+            }
+        }
         for command in platform.commands {
             match command {
                 OutputCommand::CopyText(text) => self.hub.send(Errand::Copy { text }),
@@ -333,5 +355,6 @@ fn words(language: Language) -> Words {
         lost: say(tr!(language, "The connection is lost; trying again…")),
         uploading: say(tr!(language, "Uploading…")),
         not_uploaded: say(tr!(language, "The files could not be uploaded")),
+        reads: say(tr!(language, "Controls for a screen reader")),
     }
 }

@@ -12,6 +12,7 @@ use tokio::sync::watch;
 
 use super::frame::Frame;
 use super::input::{Done, Screen};
+use super::reading::Control;
 
 /// Pages at a time.
 pub const MOST_PAGES: usize = 32;
@@ -30,6 +31,7 @@ pub struct Hub {
     frames: watch::Sender<(u64, Arc<Frame>)>,
     people: watch::Sender<People>,
     words: watch::Sender<Words>,
+    controls: watch::Sender<Arc<[Control]>>,
 }
 
 /// Who is there.
@@ -60,6 +62,8 @@ pub struct Words {
     pub uploading: String,
     /// Files did not arrive.
     pub not_uploaded: String,
+    /// The button for those who have a screen reader.
+    pub reads: String,
 }
 
 /// What the window is to do for the page that drives, outside of what is drawn.
@@ -106,6 +110,8 @@ struct Page {
     /// What its person sees.
     screen: Option<Screen>,
     visible: bool,
+    /// A screen reader reads it.
+    reads: bool,
     /// Whether it has the latest frame and takes another.
     ready: bool,
     errands: tokio::sync::mpsc::Sender<Errand>,
@@ -127,6 +133,7 @@ impl Hub {
             frames: watch::Sender::default(),
             people: watch::Sender::default(),
             words: watch::Sender::default(),
+            controls: watch::Sender::new(Arc::default()),
         };
         (hub, wakes)
     }
@@ -161,7 +168,10 @@ impl Hub {
         let id = state.next;
         state.next += 1;
         let (errands, errands_here) = tokio::sync::mpsc::channel(MOST_ERRANDS);
-        state.pages.insert(id, Page { name: name.to_owned(), screen: None, visible: true, ready: true, errands });
+        state.pages.insert(
+            id,
+            Page { name: name.to_owned(), screen: None, visible: true, reads: false, ready: true, errands },
+        );
         if drove || state.driver.is_none() {
             state.take_over(id);
         }
@@ -263,6 +273,43 @@ impl Hub {
         if waits && !waited {
             self.wake();
         }
+    }
+
+    /// A screen reader reads a page, or no more.
+    pub fn reads(&self, id: PageId, reads: bool) {
+        let mut state = self.state();
+        let Some(page) = state.pages.get_mut(&id) else { return };
+        page.reads = reads;
+        drop(state);
+        // What there is, for the page that has just begun.
+        self.controls.send_modify(|_controls| {});
+        self.wake();
+    }
+
+    /// Whether a screen reader reads a page.
+    pub fn is_read(&self, id: PageId) -> bool {
+        self.state().pages.get(&id).is_some_and(|page| page.reads)
+    }
+
+    /// Whether a screen reader reads any page.
+    pub fn is_read_at_all(&self) -> bool {
+        self.state().pages.values().any(|page| page.reads)
+    }
+
+    /// Tells screen readers what there is.
+    pub fn tell(&self, controls: Vec<Control>) {
+        self.controls.send_if_modified(|before| {
+            let is_new = **before != *controls;
+            if is_new {
+                *before = controls.into();
+            }
+            is_new
+        });
+    }
+
+    /// What there is, for screen readers.
+    pub fn controls(&self) -> watch::Receiver<Arc<[Control]>> {
+        self.controls.subscribe()
     }
 
     /// An upload is to be opened; only at the page that drives.

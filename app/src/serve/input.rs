@@ -5,6 +5,8 @@ use egui::{
 };
 use serde::Deserialize;
 
+use super::reading;
+
 /// Sizes of a page that are drawn for \[points\].
 const SIZES: std::ops::RangeInclusive<f32> = 100.0..=8192.0;
 
@@ -31,6 +33,11 @@ pub enum Said {
     Visible {
         /// It can.
         visible: bool,
+    },
+    /// A screen reader reads the page, or no more.
+    Reads {
+        /// It does.
+        reads: bool,
     },
     /// A button, key or finger is still down.
     Held,
@@ -143,6 +150,13 @@ pub enum Done {
     Copy,
     /// The selection is to be cut.
     Cut,
+    /// A control was reached by a screen reader, or pressed.
+    Control {
+        /// Its number.
+        id: String,
+        /// It was pressed.
+        press: bool,
+    },
     /// The page has the keyboard, or has not.
     Focus {
         /// It has.
@@ -191,6 +205,7 @@ impl Done {
                 events.push(Event::PointerButton { pos, button, pressed: down, modifiers: modifiers(bits) });
             }
             Self::Leave => events.push(Event::PointerGone),
+            Self::Control { id, press } => events.extend(reading::event(&id, press)),
             Self::Wheel { by: [x, y], lines, modifiers: bits } => {
                 if x.is_finite() && y.is_finite() {
                     events.push(Event::MouseWheel {

@@ -16,6 +16,7 @@ mod host;
 mod hub;
 mod input;
 mod memory;
+mod reading;
 mod site;
 mod socket;
 mod textures;

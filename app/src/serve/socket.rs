@@ -18,6 +18,7 @@ use tokio_tungstenite::tungstenite::protocol::{Message, Role, WebSocketConfig};
 use super::difference::Shown;
 use super::hub::{Errand, Hub, PageId, People, Words};
 use super::input::Said;
+use super::reading::Control;
 use super::upload::Uploads;
 
 /// Longest message of a page \[bytes\]: what is pasted is in it.
@@ -48,6 +49,8 @@ enum Told<'a> {
         #[serde(flatten)]
         words: &'a Words,
     },
+    /// What there is, for a screen reader.
+    Controls { controls: &'a [Control] },
 }
 
 /// Talks to a page until it has gone.
@@ -101,6 +104,7 @@ async fn read(
                 shown.send_replace(number);
             }
             Said::Visible { visible } => hub.sees(id, Some(visible), None),
+            Said::Reads { reads } => hub.reads(id, reads),
             Said::Held => hub.held(id),
             Said::Stop => hub.stop(),
             Said::Drive => hub.drive(id),
@@ -124,6 +128,7 @@ async fn write(
     frames.mark_changed();
     people.mark_changed();
     words.mark_changed();
+    let mut controls = hub.controls();
     let mut pings = interval(PING);
     let mut page = Shown::default();
     let (mut sent, mut last) = (0, 0);
@@ -149,6 +154,16 @@ async fn write(
                 }
                 let words = words.borrow_and_update();
                 json(&Told::Words { words: &words })
+            }
+            changed = controls.changed() => {
+                if changed.is_err() {
+                    return "ended";
+                }
+                let controls = Arc::clone(&controls.borrow_and_update());
+                if !hub.is_read(id) {
+                    continue;
+                }
+                json(&Told::Controls { controls: &controls })
             }
             Some(errand) = errands.recv() => json(&errand),
             changed = acknowledged.changed() => {

@@ -92,6 +92,7 @@ class Connection {
       sayNote('');
       sayScreen();
       this.send({ t: 'visible', visible: !document.hidden });
+      if (reader.on) reader.say();
     };
     socket.onmessage = ({ data }) => {
       if (socket !== this.socket) return;
@@ -137,7 +138,10 @@ function heard(told) {
   } else if (told.t === 'words') {
     words = told;
     document.documentElement.lang = told.language;
+    reader.button.textContent = words.reads;
     sayBar();
+  } else if (told.t === 'controls') {
+    reader.show(told.controls);
   } else if (told.t === 'copy') {
     copy(told.text);
   } else if (told.t === 'visit') {
@@ -340,6 +344,63 @@ document.addEventListener('visibilitychange', () => {
 addEventListener('blur', () => { letGo(); done({ e: 'focus', focused: false }); });
 addEventListener('focus', () => { done({ e: 'focus', focused: true }); if (!touched) typing.focus(); });
 addEventListener('resize', () => { sayScreen(); fit(); });
+
+// ---------------------------------------------------------------- screen readers
+
+/// The controls of the window as elements, for a screen reader to read and to press.
+const reader = {
+  on: false,
+  button: element('reads'),
+  list: element('controls'),
+  /// Elements by the number of their control.
+  elements: new Map(),
+
+  say() {
+    this.button.setAttribute('aria-pressed', String(this.on));
+    connection.send({ t: 'reads', reads: this.on });
+    if (!this.on) this.show([]);
+  },
+
+  show(controls) {
+    const wanted = new Set(controls.map(({ id }) => id));
+    for (const [id, shown] of this.elements) {
+      if (!wanted.has(id)) { shown.remove(); this.elements.delete(id); }
+    }
+    let last = null;
+    for (const control of controls) {
+      const shown = this.element(control);
+      // One that stays where it is keeps the keyboard.
+      const next = last ? last.nextSibling : this.list.firstChild;
+      if (shown !== next) this.list.insertBefore(shown, next);
+      last = shown;
+    }
+  },
+
+  element({ id, role, label, enabled, pressed }) {
+    let shown = this.elements.get(id);
+    if (!shown || shown.dataset.role !== String(role)) {
+      shown?.remove();
+      shown = document.createElement(role ? 'button' : 'p');
+      shown.dataset.role = String(role);
+      if (role) {
+        shown.type = 'button';
+        if (role !== 'button') shown.setAttribute('role', role);
+        shown.addEventListener('click', () => done({ e: 'control', id, press: true }));
+        shown.addEventListener('focus', () => done({ e: 'control', id, press: false }));
+      }
+      this.elements.set(id, shown);
+    }
+    if (shown.textContent !== label) shown.textContent = label;
+    if (role) {
+      shown.setAttribute('aria-disabled', String(!enabled));
+      const state = role === 'button' || role === 'combobox' || role === 'link' ? 'aria-pressed' : 'aria-checked';
+      if (pressed === null) shown.removeAttribute(state);
+      else shown.setAttribute(state, String(pressed));
+    }
+    return shown;
+  },
+};
+reader.button.addEventListener('click', () => { reader.on = !reader.on; reader.say(); });
 
 // ---------------------------------------------------------------- files
 

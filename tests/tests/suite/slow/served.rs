@@ -254,6 +254,31 @@ fn a_page_that_is_frozen_lets_go_of_the_arm_and_comes_back() {
     desktop.until_seen("No captures yet");
 }
 
+/// What has a name is there for the screen reader of the browser, and does what it says.
+#[test]
+fn a_screen_reader_finds_the_controls_and_presses_them() {
+    if !desktop::is_possible_in_browser() {
+        return;
+    }
+    let _alone = alone();
+    let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &[]);
+    desktop.until_seen("Board in view");
+    let (browser, tab) = desktop.page();
+    assert_eq!(browser.evaluate(tab, "document.querySelectorAll('#controls *').length"), Value::from(0));
+    browser.evaluate(tab, "document.getElementById('reads').click()");
+    let named = |name: &str| {
+        format!("[...document.querySelectorAll('#controls button')].find((b) => b.textContent === '{name}')")
+    };
+    browser.until(tab, &named("Jog"));
+    browser.until(tab, "document.getElementById('controls').textContent.includes('Board in view')");
+    browser.evaluate(tab, &format!("{}.click()", named("Jog")));
+    browser.until(tab, &named("Move +Z"));
+    browser.until(tab, &format!("{}.getAttribute('aria-pressed') === 'true'", named("Jog")));
+    // What was said of other tabs is gone.
+    browser.evaluate(tab, "document.getElementById('reads').click()");
+    assert_eq!(browser.evaluate(tab, "document.querySelectorAll('#controls *').length"), Value::from(0));
+}
+
 #[test]
 fn others_watch_stop_the_arm_and_take_over_with_one_click() {
     if !desktop::is_possible_in_browser() {
