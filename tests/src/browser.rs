@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::net::TcpStream;
 use std::os::unix::process::CommandExt as _;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -219,6 +220,15 @@ impl Browser {
     /// What pages have said to their consoles, warnings and errors among it.
     pub fn said(&self) -> Vec<String> {
         self.devtools.borrow().said.clone()
+    }
+
+    /// Drops files and folders on a page, as from the file manager.
+    pub fn drop_files(&self, tab: &Tab, (x, y): (f64, f64), files: &[&Path]) {
+        for kind in ["dragEnter", "dragOver", "drop"] {
+            let data = json!({"items": [], "files": files, "dragOperationsMask": 1});
+            let event = json!({"type": kind, "x": x, "y": y, "data": data});
+            self.call(Some(tab), "Input.dispatchDragEvent", &event);
+        }
     }
 
     /// Freezes a page, as a browser does when it is put aside or the lid is closed, or lets it go on.
