@@ -17,10 +17,10 @@ pub fn formats_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     parts::section_with_ui(ui, tr!(language, "Formats"), |ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if ui.small_button(tr!(language, "Choose none")).clicked() {
+            if ui.add(parts::small_button(ui, tr!(language, "Choose none"))).clicked() {
                 outbox.send(Command::ChooseFormats(BTreeSet::new()));
             }
-            if ui.small_button(tr!(language, "Choose all")).clicked() {
+            if ui.add(parts::small_button(ui, tr!(language, "Choose all"))).clicked() {
                 let possible =
                     export::formats().iter().map(|format| format.name()).filter(|name| is_possible(model, name));
                 outbox.send(Command::ChooseFormats(possible.map(str::to_owned).collect()));

@@ -150,7 +150,7 @@ pub fn progress_ui(ui: &mut Ui, part: f32, said: &str, end: &str) -> bool {
 
 /// A button that puts a text on the clipboard; `what` tells it from others.
 pub fn copy_ui(ui: &mut Ui, language: Language, what: &str, text: impl FnOnce() -> String) {
-    let response = ui.add(Button::new(tr!(language, "Copy")).small());
+    let response = ui.add(small_button(ui, tr!(language, "Copy")));
     let said = crate::text!("Copy {what}", what = what).say(language);
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &said));
     if response.on_hover_text(said).clicked() {
@@ -169,6 +169,11 @@ pub enum Sign {
     Cross,
     /// Here it can be dragged.
     Grip,
+}
+
+/// A button that stands in a line of text, and is as large as others where it is pressed with a finger.
+pub fn small_button<'a>(ui: &Ui, words: impl Into<egui::WidgetText>) -> Button<'a> {
+    Button::new(words.into()).small().min_size(theme::least(ui, 0.0, 0.0))
 }
 
 /// A button with a sign, which has a name for those who cannot see it.

@@ -14,6 +14,7 @@ use crate::capture::rows;
 use crate::command::{Command, Outbox};
 use crate::gui::status::STALE_AFTER_S;
 use crate::gui::style::marks::{self, Marks};
+use crate::gui::style::parts;
 use crate::gui::style::theme::{CARD_RADIUS, Palette, Tone};
 use crate::model::{CapturePurpose, CaptureUnderWay, CaptureWait, Model};
 use crate::text::Text;
@@ -127,7 +128,7 @@ pub fn capture_ui(ui: &mut Ui, model: &Model, room: Rect, in_words: bool, outbox
     if let Some(capture) = &model.capture {
         let words = waiting(capture).say(language);
         plate_ui(ui, room, Tone::Busy, &words, |ui| {
-            if ui.small_button(tr!(language, "Cancel")).clicked() {
+            if ui.add(parts::small_button(ui, tr!(language, "Cancel"))).clicked() {
                 outbox.send(Command::CancelCapture);
             }
         });

@@ -19,7 +19,9 @@ pub fn workspace_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let Some((work_box, error)) = model.tip_box.judged else { return };
     parts::section_with_ui(ui, tr!(language, "Expected error over a box"), |ui| {
-        if model.tip_box.chosen.is_some() && ui.small_button(tr!(language, "Box about the board")).clicked() {
+        if model.tip_box.chosen.is_some()
+            && ui.add(parts::small_button(ui, tr!(language, "Box about the board"))).clicked()
+        {
             outbox.send(Command::SetTipBox(None));
         }
     });

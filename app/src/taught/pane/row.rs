@@ -1,6 +1,6 @@
 //! One taught pose.
 
-use egui::{Align, Button, Color32, Id, Key, Layout, Rect, RichText, Sense, Stroke, TextEdit, Ui, Vec2};
+use egui::{Align, Color32, Id, Key, Layout, Rect, RichText, Sense, Stroke, TextEdit, Ui, Vec2};
 use egui::{WidgetInfo, WidgetType};
 use handeye_core::project::taught_poses::{Goal, TaughtPose};
 
@@ -57,7 +57,8 @@ pub fn row_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbo
             if parts::sign_ui(ui, Sign::Up, &earlier, is_free && index > 0).clicked() {
                 outbox.send(Command::ReorderTaught { name: name.clone(), to: index.saturating_sub(1) });
             }
-            let go = parts::gated_ui(ui, immovable(model), Button::new(tr!(language, "Go to")).small());
+            let button = parts::small_button(ui, tr!(language, "Go to"));
+            let go = parts::gated_ui(ui, immovable(model), button);
             let go_name = text!("Go to {name}", name = name).say(language);
             let can_go = immovable(model).is_none();
             go.widget_info(|| WidgetInfo::labeled(WidgetType::Button, can_go, &go_name));

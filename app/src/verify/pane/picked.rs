@@ -30,7 +30,7 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.horizontal(|ui| {
         let pixel = text!("Pixel {column}, {row}", column = picked.pixel.column, row = picked.pixel.row);
         parts::hint_ui(ui, &pixel.say(language));
-        if ui.small_button(tr!(language, "Clear the point")).clicked() {
+        if ui.add(parts::small_button(ui, tr!(language, "Clear the point"))).clicked() {
             outbox.send(Command::Pick(None));
         }
     });
