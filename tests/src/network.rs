@@ -2,7 +2,7 @@
 //!
 //! TCP hides a lost packet: what came after it waits until it was sent again. So every segment here takes its turn on a
 //! line of limited rate, is under way for half of a round trip, and one that is lost holds up all behind it for as long as
-//! Linux waits before it sends it again (RFC 6298: a round trip and four times its variation, at least 200 ms).
+//! a sender waits before it sends it again: one and a half round trips, and at least the 200 ms of Linux (RFC 6298).
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};

@@ -141,7 +141,8 @@ function heard(told) {
     reader.button.textContent = words.reads;
     sayBar();
   } else if (told.t === 'controls') {
-    reader.show(told.controls);
+    // What was on its way when it was switched off.
+    if (reader.on) reader.show(told.controls);
   } else if (told.t === 'copy') {
     copy(told.text);
   } else if (told.t === 'visit') {
@@ -385,7 +386,12 @@ const reader = {
       if (role) {
         shown.type = 'button';
         if (role !== 'button') shown.setAttribute('role', role);
-        shown.addEventListener('click', () => done({ e: 'control', id, press: true }));
+        shown.addEventListener('click', () => {
+          const isTyped = role === 'textbox';
+          done({ e: 'control', id, press: !isTyped });
+          // Keys go to the window from there.
+          if (isTyped) typing.focus({ preventScroll: true });
+        });
         shown.addEventListener('focus', () => done({ e: 'control', id, press: false }));
       }
       this.elements.set(id, shown);

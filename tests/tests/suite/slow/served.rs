@@ -21,6 +21,9 @@ const FRAMES: usize = 20;
 /// An arm that stays where it is for so long is at rest; a pass takes 50 ms.
 const STILL: Duration = Duration::from_millis(400);
 
+/// Where the bar at the bottom begins, in which the latest message may be another one.
+const STATUS_BAR: u32 = 830;
+
 /// A browser without a graphics card keeps a machine busy by itself: one at a time.
 fn alone() -> MutexGuard<'static, ()> {
     static BROWSER: Mutex<()> = Mutex::new(());
@@ -116,13 +119,13 @@ fn the_page_shows_what_the_desktop_window_shows_pixel_for_pixel() {
             image::open(surface.photograph(&format!("{name}-{pane}"))).expect("an image").into_rgb8()
         });
         assert_eq!(window.dimensions(), page.dimensions());
-        let apart = |(window, page): (&image::Rgb<u8>, &image::Rgb<u8>)| {
-            window.0.iter().zip(&page.0).any(|(window, page)| window.abs_diff(*page) > 2)
+        let apart = |((_, row, window), page): &((u32, u32, &image::Rgb<u8>), &image::Rgb<u8>)| {
+            *row < STATUS_BAR && window.0.iter().zip(&page.0).any(|(window, page)| window.abs_diff(*page) > 2)
         };
-        let count = window.pixels().zip(page.pixels()).filter(|pair| apart(*pair)).count();
-        println!("{pane}: {count} of {} pixels differ", 1440 * 900);
-        // Three such words are no more than 5,000 pixels with all that is around their letters.
-        assert!(count < 5_000, "{pane}: {count} pixels differ");
+        let count = window.enumerate_pixels().zip(page.pixels()).filter(apart).count();
+        println!("{pane}: {count} of {} pixels differ", 1440 * STATUS_BAR);
+        // The age of the image and the folder of the user, with all that is around their letters.
+        assert!(count < 2_000, "{pane}: {count} pixels differ");
     }
 }
 
@@ -155,6 +158,30 @@ fn hold_a_jog(desktop: &mut Desktop) {
     panic!("the arm does not move");
 }
 
+/// A cell whose time runs, its address, and its arm as others see it.
+fn running_cell() -> (CellProcess, String, Arm) {
+    let cell = CellProcess::start(&[]);
+    let endpoint = Endpoint::local(cell.port());
+    let mut arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
+    arm.sim().start_simulation().expect("it starts");
+    (cell, endpoint.to_string(), arm)
+}
+
+/// The arm comes to rest in time, and stays there while the page comes back by `back` and is used again.
+fn rests_and_comes_back(what: &str, desktop: &mut Desktop, arm: &mut Arm, back: impl FnOnce(&Desktop)) {
+    let took = moves_for(arm);
+    println!("{what}: the arm at rest after {:.0} ms", took.as_secs_f64() * 1e3);
+    // With half a second as the goal; a machine that builds beside it takes longer to everything.
+    assert!(took < 4 * AT_REST, "{took:?}");
+    let rested = arm.joint_values().expect("a call");
+    back(desktop);
+    let (browser, tab) = desktop.page();
+    browser.until(tab, "show.frame && document.getElementById('note').hidden && people.you");
+    desktop.click("Poses");
+    desktop.until_seen("No captures yet");
+    assert_eq!(arm.joint_values().expect("a call"), rested, "it goes on by itself");
+}
+
 /// How long the arm still moves; it is at rest when it stays where it is for some passes.
 fn moves_for(arm: &mut Arm) -> Duration {
     let began = Instant::now();
@@ -174,25 +201,13 @@ fn a_browser_that_stands_still_lets_go_of_the_arm_and_comes_back() {
         return;
     }
     let _alone = alone();
-    let cell = CellProcess::start(&[]);
-    let endpoint = Endpoint::local(cell.port());
-    let mut arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
-    arm.sim().start_simulation().expect("it starts");
-    let address = endpoint.to_string();
+    let (_cell, address, mut arm) = running_cell();
     let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &["--connect", &address]);
     hold_a_jog(&mut desktop);
     desktop.page().0.signal("STOP");
-    let took = moves_for(&mut arm);
-    println!("a page that stands still: the arm at rest after {:.0} ms", took.as_secs_f64() * 1e3);
-    // With half a second as the goal; a machine that builds beside it takes longer to everything.
-    assert!(took < 4 * AT_REST, "{took:?}");
-    let rested = arm.joint_values().expect("a call");
-    desktop.page().0.signal("CONT");
-    let (browser, tab) = desktop.page();
-    browser.until(tab, "show.frame && document.getElementById('note').hidden && people.you");
-    desktop.click("Poses");
-    desktop.until_seen("No captures yet");
-    assert_eq!(arm.joint_values().expect("a call"), rested, "it goes on by itself");
+    rests_and_comes_back("a page that stands still", &mut desktop, &mut arm, |desktop| {
+        desktop.page().0.signal("CONT");
+    });
 }
 
 /// One megabit in a second, 200 ms to and fro, two packets lost of a hundred; then none at all.
@@ -202,11 +217,7 @@ fn over_a_bad_network_the_arm_rests_when_it_goes_and_the_page_comes_back() {
         return;
     }
     let _alone = alone();
-    let cell = CellProcess::start(&[]);
-    let endpoint = Endpoint::local(cell.port());
-    let mut arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
-    arm.sim().start_simulation().expect("it starts");
-    let address = endpoint.to_string();
+    let (_cell, address, mut arm) = running_cell();
     let quality = Quality { bits_per_s: 1e6, round_trip: Duration::from_millis(200), loss: 0.02, seed: 1 };
     let mut network = None;
     let through = |program| network.insert(Network::to(program, quality)).address();
@@ -215,18 +226,12 @@ fn over_a_bad_network_the_arm_rests_when_it_goes_and_the_page_comes_back() {
     let network = network.expect("a network");
     hold_a_jog(&mut desktop);
     network.cut();
-    let took = moves_for(&mut arm);
-    println!("a network that is gone: the arm at rest after {:.0} ms", took.as_secs_f64() * 1e3);
-    assert!(took < 4 * AT_REST, "{took:?}");
-    let rested = arm.joint_values().expect("a call");
-    // Longer than a page waits for a word.
-    let (browser, tab) = desktop.page();
-    browser.until(tab, "!document.getElementById('note').hidden");
-    network.mend();
-    browser.until(tab, "show.frame && document.getElementById('note').hidden && people.you");
-    desktop.click("Poses");
-    desktop.until_seen("No captures yet");
-    assert_eq!(arm.joint_values().expect("a call"), rested, "it goes on by itself");
+    rests_and_comes_back("a network that is gone", &mut desktop, &mut arm, |desktop| {
+        // The page has to notice it first.
+        let (browser, tab) = desktop.page();
+        browser.until(tab, "!document.getElementById('note').hidden");
+        network.mend();
+    });
 }
 
 /// A closed lid, or another page in front: the page is not run any more.
@@ -236,22 +241,15 @@ fn a_page_that_is_frozen_lets_go_of_the_arm_and_comes_back() {
         return;
     }
     let _alone = alone();
-    let cell = CellProcess::start(&[]);
-    let endpoint = Endpoint::local(cell.port());
-    let mut arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
-    arm.sim().start_simulation().expect("it starts");
-    let address = endpoint.to_string();
+    let (_cell, address, mut arm) = running_cell();
     let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &["--connect", &address]);
     hold_a_jog(&mut desktop);
-    let (browser, tab) = desktop.page();
-    browser.freeze(tab, true);
-    let took = moves_for(&mut arm);
-    println!("a page that is frozen: the arm at rest after {:.0} ms", took.as_secs_f64() * 1e3);
-    assert!(took < 4 * AT_REST, "{took:?}");
-    browser.freeze(tab, false);
-    browser.until(tab, "show.frame && document.getElementById('note').hidden && people.you");
-    desktop.click("Poses");
-    desktop.until_seen("No captures yet");
+    let freeze = |desktop: &Desktop, is_frozen| {
+        let (browser, tab) = desktop.page();
+        browser.freeze(tab, is_frozen);
+    };
+    freeze(&desktop, true);
+    rests_and_comes_back("a page that is frozen", &mut desktop, &mut arm, |desktop| freeze(desktop, false));
 }
 
 /// What has a name is there for the screen reader of the browser, and does what it says.
@@ -274,7 +272,12 @@ fn a_screen_reader_finds_the_controls_and_presses_them() {
     browser.evaluate(tab, &format!("{}.click()", named("Jog")));
     browser.until(tab, &named("Move +Z"));
     browser.until(tab, &format!("{}.getAttribute('aria-pressed') === 'true'", named("Jog")));
-    // What was said of other tabs is gone.
+    // A field that is reached takes what is typed.
+    let field =
+        "[...document.querySelectorAll('#controls button')].find((b) => b.textContent.startsWith('Goal of joint 1'))";
+    browser.evaluate(tab, &format!("{field}.click()"));
+    assert_eq!(browser.evaluate(tab, "document.activeElement.id"), Value::from("typing"));
+    // Switched off, nothing is left, whatever is on its way.
     browser.evaluate(tab, "document.getElementById('reads').click()");
     assert_eq!(browser.evaluate(tab, "document.querySelectorAll('#controls *').length"), Value::from(0));
 }
