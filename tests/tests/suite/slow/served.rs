@@ -21,6 +21,12 @@ const FRAMES: usize = 20;
 /// An arm that stays where it is for so long is at rest; a pass takes 50 ms.
 const STILL: Duration = Duration::from_millis(400);
 
+/// Fewer pixels than this differ in the age of the image and the folder of the user, with all that is around their letters.
+const ALIKE: usize = 2_000;
+
+/// How often a window and a page that do not look alike are looked at again.
+const LOOKS: usize = 60;
+
 /// Where the bar at the bottom begins, in which the latest message may be another one.
 const STATUS_BAR: u32 = 830;
 
@@ -113,20 +119,28 @@ fn the_page_shows_what_the_desktop_window_shows_pixel_for_pixel() {
     let mut window = Desktop::start((1440, 900), &shots("served"), &arguments, &[]);
     let mut page = Desktop::in_browser((1440, 900), false, &shots("served"), &arguments);
     for pane in ["Connect", "Target", "3D", "Result"] {
-        let [window, page] = [(&mut window, "window"), (&mut page, "page")].map(|(surface, name)| {
+        for surface in [&mut window, &mut page] {
             surface.until_seen("The simulation is stopped");
             surface.click(pane);
-            image::open(surface.photograph(&format!("{name}-{pane}"))).expect("an image").into_rgb8()
-        });
-        assert_eq!(window.dimensions(), page.dimensions());
-        let apart = |((_, row, window), page): &((u32, u32, &image::Rgb<u8>), &image::Rgb<u8>)| {
-            *row < STATUS_BAR && window.0.iter().zip(&page.0).any(|(window, page)| window.abs_diff(*page) > 2)
-        };
-        let count = window.enumerate_pixels().zip(page.pixels()).filter(apart).count();
-        println!("{pane}: {count} of {} pixels differ", 1440 * STATUS_BAR);
-        // The age of the image and the folder of the user, with all that is around their letters.
-        assert!(count < 2_000, "{pane}: {count} pixels differ");
+        }
+        // A window on a busy machine shows late what was clicked; what is different for good stays different.
+        let differ = (0..LOOKS).map(|_| differing_pixels(&window, &page, pane)).find(|count| *count < ALIKE);
+        assert!(differ.is_some(), "{pane}: {} pixels differ", differing_pixels(&window, &page, pane));
     }
+}
+
+/// How many pixels above the bar at the bottom are another colour on the page than in the window.
+fn differing_pixels(window: &Desktop, page: &Desktop, pane: &str) -> usize {
+    let [window, page] = [(window, "window"), (page, "page")].map(|(surface, name)| {
+        image::open(surface.photograph(&format!("{name}-{pane}"))).expect("an image").into_rgb8()
+    });
+    assert_eq!(window.dimensions(), page.dimensions());
+    let apart = |((_, row, window), page): &((u32, u32, &image::Rgb<u8>), &image::Rgb<u8>)| {
+        *row < STATUS_BAR && window.0.iter().zip(&page.0).any(|(window, page)| window.abs_diff(*page) > 2)
+    };
+    let count = window.enumerate_pixels().zip(page.pixels()).filter(apart).count();
+    println!("{pane}: {count} of {} pixels differ", 1440 * STATUS_BAR);
+    count
 }
 
 /// The first place of the tip in the bar at the bottom.
