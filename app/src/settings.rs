@@ -35,6 +35,8 @@ pub struct Settings {
     depth_colours: ColourMap,
     /// Which cell to work with at the start; empty is the built-in one.
     connect: String,
+    /// Scene of the built-in cell: a name, or a file; empty is the reference scene.
+    scene: String,
     /// Where new sessions go; empty is `handeye-sessions` in the home folder.
     sessions: String,
     /// Addresses that were connected to, newest first.
@@ -119,7 +121,11 @@ impl Settings {
 
     /// The cell to work with at the start.
     pub fn source(&self) -> CellSource {
-        if self.connect.is_empty() { CellSource::BuiltIn } else { CellSource::Address(self.connect.clone()) }
+        if self.connect.is_empty() {
+            CellSource::BuiltIn(self.scene.clone().into())
+        } else {
+            CellSource::Address(self.connect.clone())
+        }
     }
 
     /// Where new sessions go.

@@ -21,6 +21,7 @@ fn what_was_written_is_read_again() {
         depth_scale: DepthScale::Full,
         depth_colours: ColourMap::Viridis,
         connect: "tcp://a:1".to_owned(),
+        scene: "panda".to_owned(),
         addresses: vec!["tcp://a:1".to_owned(), "tcp://b:2".to_owned()],
         drivers: vec![Drivers { robot: None, camera: Some("python3 camera.py".to_owned()) }],
         sessions: "/data/sessions".to_owned(),

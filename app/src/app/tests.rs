@@ -37,7 +37,7 @@ fn bench_with(connect: Connect) -> Bench {
     let waker: Waker = Arc::new(|| {});
     let sessions = tempfile::tempdir().expect("a folder");
     let start = Start {
-        source: CellSource::BuiltIn,
+        source: CellSource::default(),
         view: ViewSettings::default(),
         addresses: Vec::new(),
         drivers: Vec::new(),

@@ -1,10 +1,9 @@
 //! `handeye cell`: serves the built-in cell.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use handeye_sim_link::cell::scene::{BoardPath, Scene};
+use handeye_sim_link::cell::scene::{BoardPath, Scene, SceneChoice};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 
 use super::{Failure, out, solve};
@@ -64,22 +63,19 @@ impl CellArgs {
 /// The option `--scene`.
 #[derive(Debug, Args)]
 pub struct SceneArg {
-    /// Scene file (TOML); the reference scene if not given.
-    #[arg(long, value_name = "FILE")]
-    scene: Option<PathBuf>,
+    /// Scene file (TOML), or the name of one that comes with the program: reference, realistic, tracking, panda, xarm6; the
+    /// reference scene if not given.
+    #[arg(long, value_name = "FILE|NAME")]
+    scene: Option<SceneChoice>,
 }
 
 impl SceneArg {
     /// Reads the scene.
     pub fn load(&self) -> Result<Scene, Failure> {
-        match &self.scene {
-            Some(file) => Scene::load(file),
-            None => Scene::reference(),
-        }
-        .map_err(Failure::unusable)
+        self.scene.clone().unwrap_or_default().load().map_err(Failure::unusable)
     }
 
-    /// Whether a file was named.
+    /// Whether one was named.
     pub fn is_given(&self) -> bool {
         self.scene.is_some()
     }

@@ -4,6 +4,7 @@ pub(crate) mod dialog;
 pub(crate) mod drivers;
 mod objects;
 pub(crate) mod pane;
+mod scene;
 pub(crate) mod update;
 pub(crate) mod worker;
 
@@ -21,14 +22,15 @@ use drivers::DriverConnector;
 pub fn connector(source: &CellSource, objects: &CellPaths) -> Arc<dyn Connector> {
     match source {
         CellSource::Drivers(drivers) => Arc::new(DriverConnector::new(drivers.clone())),
-        source => Arc::new(LiveConnector::new(source.clone(), objects.clone())),
+        CellSource::Address(address) => Arc::new(LiveConnector::at(address.clone(), objects.clone())),
+        CellSource::BuiltIn(scene) => Arc::new(LiveConnector::built_in(scene.clone())),
     }
 }
 
 /// What is connected, in the user's language where it is part of this program.
 pub(crate) fn server_name(source: &CellSource, server: &str) -> Text {
     match source {
-        CellSource::BuiltIn => text!("built-in cell"),
+        CellSource::BuiltIn(_) => text!("built-in cell"),
         CellSource::Address(_) | CellSource::Drivers(_) => Text::verbatim(server),
     }
 }

@@ -4,7 +4,7 @@ use egui::text::LayoutJob;
 use egui::{Align, Button, ComboBox, FontSelection, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 use handeye_sim_link::client::{BadEndpoint, Endpoint};
 
-use super::{drivers, objects};
+use super::{drivers, objects, scene};
 use crate::command::{Command, Outbox};
 use crate::connect::server_name;
 use crate::gui::status;
@@ -19,6 +19,8 @@ use crate::{text, tr};
 struct Draft {
     /// Which kind of cell is wanted; `None` while the user has chosen nothing.
     kind: Option<Kind>,
+    /// The scene of the built-in cell.
+    scene: scene::Draft,
     /// The address; `None` while nothing was typed.
     address: Option<String>,
     /// Where the scene there has the parts of the cell.
@@ -39,7 +41,7 @@ enum Kind {
 impl Kind {
     fn of(source: &CellSource) -> Self {
         match source {
-            CellSource::BuiltIn => Self::BuiltIn,
+            CellSource::BuiltIn(_) => Self::BuiltIn,
             CellSource::Address(_) => Self::Address,
             CellSource::Drivers(drivers) if drivers.robot.is_none() => Self::Freehand,
             CellSource::Drivers(_) => Self::Driver,
@@ -56,7 +58,7 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         form::heading_ui(ui, tr!(language, "Cell"));
         let kind = draft.kind.unwrap_or_else(|| Kind::of(&model.source));
         let choices = [
-            (Kind::BuiltIn, tr!(language, "Built-in"), tr!(language, "A simulated UR5 cell inside this program")),
+            (Kind::BuiltIn, tr!(language, "Built-in"), tr!(language, "A simulated cell inside this program")),
             (Kind::Address, tr!(language, "CoppeliaSim"), tr!(language, "A CoppeliaSim or a cell that is running")),
             (
                 Kind::Driver,
@@ -69,15 +71,15 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             draft.kind = Some(choice);
         }
         let named = match kind {
-            Kind::BuiltIn | Kind::Address => None,
+            Kind::BuiltIn => Some(scene::scene_ui(ui, model, &mut draft.scene)),
+            Kind::Address => None,
             Kind::Driver => drivers::pane::drivers_ui(ui, model, false, &mut draft.drivers[0]),
             Kind::Freehand => drivers::pane::drivers_ui(ui, model, true, &mut draft.drivers[1]),
         };
         let wanted = ui.horizontal(|ui| {
             let wanted = match kind {
-                Kind::BuiltIn => Ok(Some(CellSource::BuiltIn)),
                 Kind::Address => address_ui(ui, model, &mut draft).map(Some),
-                Kind::Driver | Kind::Freehand => Ok(named),
+                Kind::BuiltIn | Kind::Driver | Kind::Freehand => Ok(named),
             };
             if connect_button_ui(ui, model, wanted.as_ref().ok().and_then(Option::as_ref), outbox) {
                 draft = Draft::default();

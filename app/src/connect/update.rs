@@ -48,7 +48,7 @@ impl App {
 
     /// Tries now what is being tried. A connection that works is made anew, because the scene may be another one.
     pub(crate) fn reconnect(&mut self) {
-        if self.model.control.is_connected() && self.model.source != CellSource::BuiltIn {
+        if self.model.control.is_connected() && !self.model.source.is_built_in() {
             return self.connect(self.model.source.clone());
         }
         let asked = self.workers.reconnect();
@@ -64,7 +64,7 @@ impl App {
     /// Works with another cell. What is open stays open: a session belongs to its captures, not to a connection.
     pub(crate) fn connect(&mut self, source: CellSource) {
         match &source {
-            CellSource::BuiltIn => {}
+            CellSource::BuiltIn(_) => {}
             CellSource::Address(address) => put_first(&mut self.model.addresses, address),
             CellSource::Drivers(drivers) => put_first(&mut self.model.drivers, drivers),
         }

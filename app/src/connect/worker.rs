@@ -81,7 +81,7 @@ pub struct Control {
 impl Control {
     /// For a cell, with the places that it shares with the application.
     pub fn new(source: &CellSource, stop: Arc<StopLine>, robot: Arc<LatestSlot<Option<RobotState>>>) -> Self {
-        Self { stop, robot, is_known: false, start_by_itself: *source == CellSource::BuiltIn, owes_facts: true }
+        Self { stop, robot, is_known: false, start_by_itself: source.is_built_in(), owes_facts: true }
     }
 
     fn stop_if_pressed(&self, port: &mut dyn ControlPort, outlet: &Outlet) -> Result<(), PortError> {

@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn no_two_actions_have_the_same_keys_or_the_same_name_in_a_group() {
-        let model = Model::new(CellSource::BuiltIn, ViewSettings::default());
+        let model = Model::new(CellSource::default(), ViewSettings::default());
         for language in Language::ALL {
             let all = all(&model, language);
             for (index, one) in all.iter().enumerate() {

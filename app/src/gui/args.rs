@@ -1,6 +1,7 @@
 //! `handeye gui`, as the command line has it.
 
 use clap::Args;
+use handeye_sim_link::cell::scene::SceneChoice;
 
 use crate::cli::{ObjectArgs, RerunArg};
 
@@ -10,6 +11,9 @@ pub struct GuiArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
     #[arg(long, value_name = "ADDR")]
     pub connect: Option<String>,
+    /// Scene of the built-in cell: reference, realistic, tracking, panda, xarm6, or a scene file; as in the settings if not given.
+    #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["connect", "driver", "camera_driver"])]
+    pub scene: Option<SceneChoice>,
     /// Driver of the robot, or of robot and camera: a command, or tcp://HOST:PORT.
     #[arg(long, value_name = "DRIVER", conflicts_with = "connect")]
     pub driver: Option<String>,

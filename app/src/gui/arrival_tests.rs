@@ -23,7 +23,7 @@ fn sequence_runs(mut model: Model, purpose: CapturePurpose, done: usize) -> Mode
 
 /// The window while a sequence is under way, with the taught poses in front.
 fn under_way(purpose: CapturePurpose) -> Silent {
-    let mut silent = Silent::new(CellSource::BuiltIn);
+    let mut silent = Silent::new(CellSource::default());
     silent.show(Pane::Taught);
     silent.show_model(sequence_runs(sample::captured(), purpose, 9));
     silent

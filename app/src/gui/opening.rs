@@ -36,15 +36,19 @@ impl Opening {
     /// Reads the settings; what cannot be read there is said in the window.
     ///
     /// # Errors
-    /// When there are boxes that the arm keeps out of and they cannot be read.
+    /// When there are boxes that the arm keeps out of, or a scene that was asked for, and they cannot be read.
     pub fn read(args: GuiArgs) -> anyhow::Result<Self> {
         let (file, settings, warnings) = SettingsFile::open(settings::default_path(), variable);
         let drivers = Drivers { robot: args.driver.clone(), camera: args.camera_driver.clone() };
-        let source = match &args.connect {
-            Some(address) => CellSource::Address(address.clone()),
-            None if drivers != Drivers::default() => CellSource::Drivers(drivers),
-            None => settings.source(),
+        let source = match (&args.connect, &args.scene) {
+            (Some(address), _) => CellSource::Address(address.clone()),
+            (None, Some(scene)) => CellSource::BuiltIn(scene.clone()),
+            (None, None) if drivers != Drivers::default() => CellSource::Drivers(drivers),
+            (None, None) => settings.source(),
         };
+        if let Some(scene) = &args.scene {
+            scene.load()?;
+        }
         let objects = args.objects.paths(settings.objects.clone());
         let file = file.with_objects(&objects);
         if let Some(file) = &args.keep_out {

@@ -167,7 +167,7 @@ mod tests {
     use crate::model::{CellSource, ViewSettings};
 
     fn best(typed: &str, language: Language) -> Option<&'static str> {
-        let model = Model::new(CellSource::BuiltIn, ViewSettings::default());
+        let model = Model::new(CellSource::default(), ViewSettings::default());
         found(&model, language, typed).first().map(|action| action.name)
     }
 

@@ -75,7 +75,7 @@ fn looks_like(name: &str, theme: ThemeChoice, language: Language, state: State) 
         }
     };
     let builder = Harness::builder().with_size(SIZE).renderer(renderer);
-    let mut silent = Silent::built(CellSource::BuiltIn, builder);
+    let mut silent = Silent::built(CellSource::default(), builder);
     let State { mut model, step, panes } = state;
     model.view.theme = theme;
     model.view.language = language;

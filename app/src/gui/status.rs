@@ -107,7 +107,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
         LinkState::StartingCell { why } => {
             let detail = match why {
                 None => {
-                    text!("A simulated UR5 with a depth camera over a chessboard. It needs nothing else installed.")
+                    text!("A simulated arm with a depth camera over a chessboard. It needs nothing else installed.")
                 }
                 Some(why) => sentence(why),
             };
@@ -126,7 +126,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
         }
         LinkState::Connected { address, server } => {
             let title = match model.source {
-                CellSource::BuiltIn => text!("Connected to the built-in cell"),
+                CellSource::BuiltIn(_) => text!("Connected to the built-in cell"),
                 CellSource::Address(_) | CellSource::Drivers(_) => text!("Connected to {server}", server = server),
             };
             status(Tone::Good, title, Text::verbatim(address.clone()), None)
@@ -154,7 +154,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
         }
         LinkState::Failed { why } => {
             let title = match &model.source {
-                CellSource::BuiltIn => text!("The built-in cell did not start"),
+                CellSource::BuiltIn(_) => text!("The built-in cell did not start"),
                 CellSource::Address(address) => text!("Cannot connect to {address}", address = address),
                 CellSource::Drivers(drivers) => text!("Cannot connect to {address}", address = drivers),
             };

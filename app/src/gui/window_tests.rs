@@ -13,7 +13,7 @@ use crate::text::{Language, Text};
 
 #[test]
 fn every_state_of_the_connection_says_what_goes_on() {
-    let mut built_in = Silent::new(CellSource::BuiltIn);
+    let mut built_in = Silent::new(CellSource::default());
     built_in.links(&LinkState::StartingCell { why: None });
     assert!(built_in.sees("Starting the built-in cell…"));
     built_in.links(&LinkState::Failed { why: Text::verbatim("no scene") });
@@ -110,7 +110,7 @@ fn the_robot_is_shown_in_millimetres_and_degrees() {
 
 #[test]
 fn stop_is_one_click_away_in_every_state() {
-    let mut silent = Silent::new(CellSource::BuiltIn);
+    let mut silent = Silent::new(CellSource::default());
     for prepare in [LinkState::StartingCell { why: None }, connected()] {
         silent.links(&prepare);
         silent.harness.get_by_label("STOP").click();
@@ -170,7 +170,7 @@ fn images_that_no_longer_come_are_not_counted_as_a_frame_rate() {
 #[test]
 fn nothing_is_cut_off_at_the_smallest_size() {
     let size = vec2(1024.0, 700.0);
-    let mut silent = Silent::of_size(CellSource::BuiltIn, size);
+    let mut silent = Silent::of_size(CellSource::default(), size);
     silent.links(&connected());
     silent.absorb(Event::Robot(robot(Simulation::Running)));
     silent.absorb(frame(1));
@@ -197,7 +197,7 @@ fn nothing_is_cut_off_at_the_smallest_size() {
 
 #[test]
 fn every_tab_of_the_first_layout_is_wholly_seen_at_the_smallest_size() {
-    let mut silent = Silent::of_size(CellSource::BuiltIn, vec2(1024.0, 700.0));
+    let mut silent = Silent::of_size(CellSource::default(), vec2(1024.0, 700.0));
     let right = silent.harness.get_by_label("Track").rect();
     assert!(right.max.x < 1024.0 - 8.0, "{right:?}");
     silent.click("Track");
@@ -364,7 +364,7 @@ fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
 
 #[test]
 fn the_fonts_have_every_letter_of_every_catalogue() {
-    let alphabet = alphabet(&Silent::new(CellSource::BuiltIn));
+    let alphabet = alphabet(&Silent::new(CellSource::default()));
     for (english, chinese) in crate::text::every_translation() {
         for text in [english, chinese] {
             assert_eq!(missing(&alphabet, text), "", "{text}");

@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn messages_go_by_themselves_but_errors_wait_for_the_user() {
-        let mut model = Model::new(CellSource::BuiltIn, ViewSettings::default());
+        let mut model = Model::new(CellSource::default(), ViewSettings::default());
         for severity in [Severity::Info, Severity::Warning, Severity::Error] {
             model.messages.say_at(Home::Toast, severity, Text::verbatim("so it is"), 10.0);
         }
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn what_a_pane_in_front_or_a_strip_or_the_status_line_says_is_not_said_again() {
-        let mut model = Model::new(CellSource::BuiltIn, ViewSettings::default());
+        let mut model = Model::new(CellSource::default(), ViewSettings::default());
         model.now_s = 10.0;
         let homes = [Home::Pane(Pane::Track), Home::Connection, Home::StatusLine];
         for home in homes {

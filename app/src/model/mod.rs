@@ -19,6 +19,7 @@ use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::verify::Predictor;
+use handeye_sim_link::cell::scene::SceneChoice;
 use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
@@ -58,12 +59,25 @@ use crate::text::{Language, Text};
 /// Which cell the window works with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CellSource {
-    /// The cell inside this program, started by it.
-    BuiltIn,
+    /// The cell inside this program, started by it, with this scene.
+    BuiltIn(SceneChoice),
     /// A server that runs already.
     Address(String),
     /// Programs that speak the driver protocol.
     Drivers(Drivers),
+}
+
+impl CellSource {
+    /// Whether it is the cell inside this program, of any scene.
+    pub fn is_built_in(&self) -> bool {
+        matches!(self, Self::BuiltIn(_))
+    }
+}
+
+impl Default for CellSource {
+    fn default() -> Self {
+        Self::BuiltIn(SceneChoice::default())
+    }
 }
 
 /// Commands or addresses of drivers. Without one for the robot a person types its poses.
@@ -500,13 +514,13 @@ impl Model {
     /// Whether each move of the arm to a chosen pose waits to be confirmed: as the user wants it, or else wherever the cell is not
     /// the built-in one, because behind an address there may be a real arm.
     pub fn confirms_moves(&self) -> bool {
-        self.view.confirm_moves.unwrap_or(self.source != CellSource::BuiltIn)
+        self.view.confirm_moves.unwrap_or(!self.source.is_built_in())
     }
 
     /// Share of its fastest speed at which the arm moves: as the user wants it, or else a quarter, and half in the built-in
     /// cell, because behind an address there may be a real arm.
     pub fn speed(&self) -> f64 {
-        let usual = if self.source == CellSource::BuiltIn { 0.5 } else { 0.25 };
+        let usual = if self.source.is_built_in() { 0.5 } else { 0.25 };
         self.view.jog.speed.unwrap_or(usual)
     }
 
@@ -539,7 +553,7 @@ impl LinkState {
     /// The state before the first try.
     pub fn first(source: &CellSource) -> Self {
         match source {
-            CellSource::BuiltIn => Self::StartingCell { why: None },
+            CellSource::BuiltIn(_) => Self::StartingCell { why: None },
             CellSource::Address(address) => Self::Searching { address: address.clone(), attempt: 1, why: None },
             CellSource::Drivers(drivers) => Self::Searching { address: drivers.to_string(), attempt: 1, why: None },
         }

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::sync::{Mutex, PoisonError};
 
-use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::scene::SceneChoice;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
 use handeye_sim_link::client::{
@@ -12,38 +12,46 @@ use handeye_sim_link::client::{
 
 use super::cell_error::{check, check_arm, port_error};
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
-use crate::model::{BoardMotion, CellFacts, CellSource, RobotState, Simulation};
+use crate::model::{BoardMotion, CellFacts, RobotState, Simulation};
 use crate::motion::live::LiveMotion;
 use crate::text::Text;
 
 /// Connects to the cell that the window was started for.
 pub struct LiveConnector {
-    source: CellSource,
+    cell: Cell,
+    /// Where it has its parts.
     paths: CellPaths,
     /// The built-in cell, once started. It ends with this connector.
     server: Mutex<Option<CellServer>>,
 }
 
+enum Cell {
+    /// Started by this program.
+    BuiltIn(SceneChoice),
+    /// There already.
+    At(String),
+}
+
 impl LiveConnector {
-    /// Nothing is started or connected yet. `objects` is where another scene than the built-in one has its parts.
-    pub fn new(source: CellSource, objects: CellPaths) -> Self {
-        let paths = match source {
-            CellSource::Address(_) => objects,
-            CellSource::BuiltIn | CellSource::Drivers(_) => CellPaths::default(),
-        };
-        Self { source, paths, server: Mutex::new(None) }
+    /// To the built-in cell with a scene; it is started when it is first connected to.
+    pub fn built_in(scene: SceneChoice) -> Self {
+        Self { cell: Cell::BuiltIn(scene), paths: CellPaths::default(), server: Mutex::new(None) }
+    }
+
+    /// To what runs at an address, and has its parts at `objects`.
+    pub fn at(address: String, objects: CellPaths) -> Self {
+        Self { cell: Cell::At(address), paths: objects, server: Mutex::new(None) }
     }
 
     /// Where to connect to. Starts the built-in cell when that is needed; the other workers wait for the first.
     fn endpoint(&self) -> Result<Endpoint, PortError> {
-        let address = match &self.source {
-            CellSource::Address(address) => address.clone(),
-            // Drivers have a connector of their own.
-            CellSource::BuiltIn | CellSource::Drivers(_) => {
+        let address = match &self.cell {
+            Cell::At(address) => address.clone(),
+            Cell::BuiltIn(scene) => {
                 let mut server = self.server.lock().unwrap_or_else(PoisonError::into_inner);
                 match server.as_ref() {
                     Some(server) => server.endpoint(),
-                    None => server.insert(start_built_in()?).endpoint(),
+                    None => server.insert(start_built_in(scene)?).endpoint(),
                 }
             }
         };
@@ -79,7 +87,7 @@ impl LiveConnector {
     }
 
     fn describe(&self, info: &CellInfo) -> String {
-        if self.source == CellSource::BuiltIn {
+        if matches!(self.cell, Cell::BuiltIn(_)) {
             return "built-in cell".to_owned();
         }
         if info.is_handeye_cell {
@@ -200,8 +208,8 @@ impl CameraPort for LiveCamera {
     }
 }
 
-fn start_built_in() -> Result<CellServer, PortError> {
+fn start_built_in(scene: &SceneChoice) -> Result<CellServer, PortError> {
     let hopeless = |error: &dyn Display| PortError::Hopeless(Text::verbatim(error.to_string()));
-    let scene = Scene::reference().map_err(|error| hopeless(&error))?;
+    let scene = scene.load().map_err(|error| hopeless(&error))?;
     CellServer::start(CellConfig::new(scene)).map_err(|error| hopeless(&error))
 }

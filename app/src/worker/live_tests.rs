@@ -47,7 +47,7 @@ fn arm(server: &CellServer) -> Arm {
 impl Live {
     fn new(real_time: bool) -> Self {
         let server = server(real_time);
-        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::new(source(&server), CellPaths::default()));
+        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::at(server.endpoint(), CellPaths::default()));
         Self::with(server, &connector)
     }
 
@@ -114,7 +114,7 @@ fn a_cell_of_this_project_is_called_so_and_its_facts_are_known() {
         range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]),
     };
     assert_eq!(facts.joints, [turn; 6]);
-    let connector = LiveConnector::new(source(&live.server), CellPaths::default());
+    let connector = LiveConnector::at(live.server.endpoint(), CellPaths::default());
     let connected = connector.connect_motion(&CancelToken::default()).expect("it is there");
     assert_eq!(connected.server, "Handeye cell");
 }
@@ -217,7 +217,7 @@ fn a_stop_works_while_the_connection_for_motions_hangs() {
     let server = server(true);
     let (fake, release) = FakeCell::that_never_answers();
     let connector: Arc<dyn Connector> =
-        Arc::new(Half { live: LiveConnector::new(source(&server), CellPaths::default()), fake });
+        Arc::new(Half { live: LiveConnector::at(server.endpoint(), CellPaths::default()), fake });
     let mut live = Live::with(server, &connector);
     live.bench.move_to(1, MotionGoal::Joints([0.0; 6].into()), 1.0);
     let start = live.joints();

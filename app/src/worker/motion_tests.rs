@@ -122,7 +122,7 @@ fn fake(motions: FakeMotions) -> (FakeCell, Bench) {
     let cell = FakeCell::new(1);
     cell.script().motions = motions;
     let connector: Arc<dyn Connector> = Arc::new(cell.clone());
-    let bench = Bench::start(&CellSource::BuiltIn, &connector);
+    let bench = Bench::start(&CellSource::default(), &connector);
     (cell, bench)
 }
 

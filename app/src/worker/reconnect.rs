@@ -82,7 +82,7 @@ impl Reconnect {
 
     fn searching(&self) -> LinkState {
         match &self.source {
-            CellSource::BuiltIn => LinkState::StartingCell { why: self.why.clone() },
+            CellSource::BuiltIn(_) => LinkState::StartingCell { why: self.why.clone() },
             CellSource::Address(address) => {
                 LinkState::Searching { address: address.clone(), attempt: self.attempt, why: self.why.clone() }
             }
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_loss_keeps_the_time_when_it_began_over_all_retries() {
-        let mut reconnect = Reconnect::new(CellSource::BuiltIn);
+        let mut reconnect = Reconnect::new(CellSource::default());
         reconnect.trying();
         reconnect.connected(String::new(), String::new());
         assert!(matches!(reconnect.lost(&gone(), 12.5), LinkState::Lost { since_s: 12.5, .. }));
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn pauses_grow_and_stay_bounded() {
-        let mut reconnect = Reconnect::new(CellSource::BuiltIn);
+        let mut reconnect = Reconnect::new(CellSource::default());
         let mut before = Duration::ZERO;
         for _ in 0..10 {
             reconnect.trying();
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_cell_that_says_when_it_may_be_tried_is_not_tried_before_that_and_its_tries_are_shown() {
-        let mut reconnect = Reconnect::new(CellSource::BuiltIn);
+        let mut reconnect = Reconnect::new(CellSource::default());
         reconnect.trying();
         reconnect.connected(String::new(), String::new());
         reconnect.lost(&gone(), 12.5);
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn whoever_has_had_enough_is_not_bothered_by_further_tries() {
-        let mut reconnect = Reconnect::new(CellSource::BuiltIn);
+        let mut reconnect = Reconnect::new(CellSource::default());
         reconnect.trying();
         let state = reconnect.failed(&PortError::Rests(Text::verbatim("it ends")), 20.0);
         assert_eq!((state, reconnect.pause()), (LinkState::Resting { why: Text::verbatim("it ends") }, None));
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn what_cannot_work_waits_for_the_user() {
-        let mut reconnect = Reconnect::new(CellSource::BuiltIn);
+        let mut reconnect = Reconnect::new(CellSource::default());
         reconnect.trying();
         let state = reconnect.failed(&PortError::Hopeless(Text::verbatim("no memory")), 20.0);
         assert_eq!(state, LinkState::Failed { why: Text::verbatim("no memory") });

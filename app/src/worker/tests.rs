@@ -31,7 +31,7 @@ impl Bench {
     }
 
     fn built_in(cell: &FakeCell) -> Self {
-        Self::start(&CellSource::BuiltIn, cell)
+        Self::start(&CellSource::default(), cell)
     }
 
     /// Collects events until one is as wanted; the next call goes on after it.
@@ -122,7 +122,7 @@ fn the_newest_image_wins_and_the_others_are_counted() {
     let clock: Clock = Arc::new(|| 0.0);
     let connector: Arc<dyn Connector> = Arc::new(cell.clone());
     let workers =
-        Workers::start(&CellSource::BuiltIn, &ViewSettings::default(), &connector, bounded(1).0, &clock, &waker)
+        Workers::start(&CellSource::default(), &ViewSettings::default(), &connector, bounded(1).0, &clock, &waker)
             .expect("threads");
     // Nobody drains until the fifth image has been put; each put wakes.
     let mut robot_or_image = 0;

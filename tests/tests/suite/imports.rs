@@ -309,7 +309,7 @@ fn a_recording_becomes_a_session_in_the_window_once_a_person_has_said_what_the_f
     let Some(data) = data_folder() else { return };
     let (home, folder) = copied(&data, &["importers/table_eye_in_hand"]);
     let sessions = home.path().join("sessions");
-    let mut bench = Workbench::start(CellSource::BuiltIn, &sessions, None);
+    let mut bench = Workbench::start(CellSource::default(), &sessions, None);
     let import = |model: &Model| model.import.clone().filter(|import| import.work.is_none());
     bench.click(AppCommand::Open(folder.clone()));
     bench.until("the question for the target", |model| import(model).is_some_and(|import| import.trouble.is_some()));

@@ -67,7 +67,7 @@ pub fn drivers_ui(ui: &mut Ui, model: &Model, freehand: bool, draft: &mut Draft)
 fn known(model: &Model, freehand: bool) -> Vec<Drivers> {
     let now = match &model.source {
         CellSource::Drivers(drivers) => Some(drivers),
-        CellSource::BuiltIn | CellSource::Address(_) => None,
+        CellSource::BuiltIn(_) | CellSource::Address(_) => None,
     };
     let earlier = model.drivers.iter().filter(|drivers| Some(*drivers) != now);
     now.into_iter().chain(earlier).filter(|drivers| drivers.robot.is_none() == freehand).cloned().collect()

@@ -170,7 +170,7 @@ impl Silent {
 
     /// Connected, with a robot and an image.
     pub fn live() -> Self {
-        let mut silent = Self::new(CellSource::BuiltIn);
+        let mut silent = Self::new(CellSource::default());
         silent.links(&connected());
         silent.absorb(Event::Robot(robot(Simulation::Running)));
         silent.absorb(frame(1));

@@ -113,7 +113,7 @@ pub fn images() -> FrameImages {
 
 /// Connected, with a live image in which the board is seen, and nothing captured.
 pub fn connected() -> Model {
-    let mut model = Model::new(CellSource::BuiltIn, ViewSettings::default());
+    let mut model = Model::new(CellSource::default(), ViewSettings::default());
     model.now_s = 100.0;
     let connected =
         LinkState::Connected { address: "tcp://127.0.0.1:1".to_owned(), server: "built-in cell".to_owned() };

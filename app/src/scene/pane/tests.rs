@@ -48,7 +48,7 @@ fn alike(a: SceneView, b: SceneView) -> bool {
 
 #[test]
 fn before_there_is_anything_the_pane_says_what_will_be_there() {
-    let pane = pane(Model::new(CellSource::BuiltIn, ViewSettings::default()));
+    let pane = pane(Model::new(CellSource::default(), ViewSettings::default()));
     assert!(pane.sees("Nothing to show in 3D yet"));
     assert!(pane.harness.query_by_label(VIEW).is_none());
 }

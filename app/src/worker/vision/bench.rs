@@ -160,7 +160,7 @@ impl CellBench {
         let config = CellConfig { real_time: Some(real_time), ..CellConfig::new(scene) };
         let server = CellServer::start(config).expect("a cell");
         let source = CellSource::Address(server.endpoint());
-        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::new(source.clone(), CellPaths::default()));
+        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::at(server.endpoint(), CellPaths::default()));
         let (wake, woken) = bounded(1);
         let waker: Waker = Arc::new(move || {
             let _full = wake.try_send(()).is_err();

@@ -32,6 +32,9 @@ pub struct UrdfSpec {
     /// The link that is the connection; the only one below the base without a child if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
+    /// What stands in the file, where that is built in.
+    #[serde(skip)]
+    text: Option<&'static str>,
 }
 
 impl Default for ArmSpec {
@@ -48,7 +51,13 @@ impl ArmSpec {
     pub fn arm(&self) -> Result<Arm, UrdfError> {
         match self {
             Self::Kind(kind) => Ok(kind.arm()),
-            Self::Urdf(UrdfSpec { urdf, base, tip }) => Urdf::read(urdf)?.arm(base.as_deref(), tip.as_deref()),
+            Self::Urdf(UrdfSpec { urdf, base, tip, text }) => {
+                let read = match text {
+                    Some(text) => Urdf::parse(text, &urdf.display().to_string())?,
+                    None => Urdf::read(urdf)?,
+                };
+                read.arm(base.as_deref(), tip.as_deref())
+            }
         }
     }
 
@@ -64,6 +73,13 @@ impl ArmSpec {
     pub(super) fn written_in(&mut self, folder: &Path) {
         if let Self::Urdf(spec) = self {
             spec.urdf = folder.join(&spec.urdf);
+        }
+    }
+
+    /// The same with a URDF that is built in.
+    pub(super) fn with_urdf(&mut self, built_in: Option<&'static str>) {
+        if let Self::Urdf(spec) = self {
+            spec.text = built_in;
         }
     }
 }

@@ -11,6 +11,7 @@ mod error;
 mod errors_of_robot;
 mod locate;
 mod resolved;
+mod shipped;
 mod spec;
 mod view_setup;
 
@@ -23,14 +24,11 @@ pub use board_motion::{BoardMotionSpec, BoardPath, UnknownPath};
 pub use error::SceneError;
 pub use errors_of_robot::RobotErrors;
 pub use resolved::{ResolvedScene, ResolvedSolid};
+pub use shipped::{SceneChoice, ShippedScene};
 pub use spec::{
     BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, PoseSpec, RelativeTo, RobotSpec,
     SimulationSpec, SlipSpec, SolidSpec,
 };
-
-const REFERENCE: &str = include_str!("../../../../assets/scenes/reference.toml");
-const REALISTIC: &str = include_str!("../../../../assets/scenes/realistic.toml");
-const TRACKING: &str = include_str!("../../../../assets/scenes/tracking.toml");
 
 /// A scene file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -80,7 +78,7 @@ impl Scene {
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let file = path.display().to_string();
         match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&text, &file, path.parent()),
+            Ok(text) => Self::parse(&text, &file, |model| model.written_in(path.parent().unwrap_or(Path::new("")))),
             Err(source) => Err(SceneError::Read { file, source }),
         }
     }
@@ -90,7 +88,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] names the line and the field.
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
-        Self::parse(text, "scene", None)
+        Self::parse(text, "scene", |_| {})
     }
 
     /// The public UR5 hand-eye scene: exact, without noise or distortion.
@@ -98,7 +96,7 @@ impl Scene {
     /// # Errors
     /// None as long as the file that is built in is valid, which a test asserts.
     pub fn reference() -> Result<Self, SceneError> {
-        Self::parse(REFERENCE, "assets/scenes/reference.toml", None)
+        ShippedScene::Reference.scene()
     }
 
     /// The same cell with the faults of a good real one: a lens, a little noise, a robot that repeats to 0.05 mm.
@@ -106,7 +104,7 @@ impl Scene {
     /// # Errors
     /// None as long as the file that is built in is valid, which a test asserts.
     pub fn realistic() -> Result<Self, SceneError> {
-        Self::parse(REALISTIC, "assets/scenes/realistic.toml", None)
+        ShippedScene::Realistic.scene()
     }
 
     /// The realistic cell with a board that moves in a circle, and images that come as fast as a camera's.
@@ -114,7 +112,7 @@ impl Scene {
     /// # Errors
     /// None as long as the file that is built in is valid, which a test asserts.
     pub fn tracking() -> Result<Self, SceneError> {
-        Self::parse(TRACKING, "assets/scenes/tracking.toml", None)
+        ShippedScene::Tracking.scene()
     }
 
     /// Checks every number, and draws what is random in the scene.
@@ -130,12 +128,10 @@ impl Scene {
         Ok(resolved::resolve(self, arm, seed))
     }
 
-    /// `folder` is what files that the scene names are relative to.
-    fn parse(text: &str, file: &str, folder: Option<&Path>) -> Result<Self, SceneError> {
+    /// `find_files` says where what the scene names is.
+    fn parse(text: &str, file: &str, find_files: impl FnOnce(&mut ArmSpec)) -> Result<Self, SceneError> {
         let mut scene: Self = toml::from_str(text).map_err(|error| SceneError::syntax(file, text, &error))?;
-        if let Some(folder) = folder {
-            scene.robot.model.written_in(folder);
-        }
+        find_files(&mut scene.robot.model);
         let line = || locate::line_of(text, "robot.model");
         let arm = scene.robot.model.arm().map_err(|source| SceneError::arm(file, line(), source))?;
         check::check(&scene, arm).map_err(|found| {

@@ -166,7 +166,7 @@ fn a_session_is_opened_again_as_it_was_and_solves_to_the_same_bits_as_the_comman
 #[test]
 fn a_stop_ends_the_sequence_and_keeps_what_was_captured() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut bench = Workbench::start(CellSource::BuiltIn, folder.path(), None);
+    let mut bench = Workbench::start(CellSource::default(), folder.path(), None);
     bench.until("a cell", connected);
     bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("two captures", |model| model.document().captures.len() >= 2);
