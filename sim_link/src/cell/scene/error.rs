@@ -2,14 +2,14 @@
 
 use handeye_core::geometry::arm::urdf::UrdfError;
 
-use super::locate;
+use super::{ShippedScene, locate};
 
 /// Why a scene cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
-    #[error("the scene file cannot be read: {source}. File: {file}")]
+    #[error("the scene file {file} cannot be read{}", or_a_name(file))]
     Read {
         /// Path as given.
         file: String,
@@ -52,6 +52,15 @@ pub enum SceneError {
         /// What it must be.
         need: String,
     },
+}
+
+/// Who names no folder and no ending may have meant a scene that comes with the program.
+fn or_a_name(file: &str) -> String {
+    if file.contains(['/', '\\', '.']) {
+        return String::new();
+    }
+    let names: Vec<&str> = ShippedScene::ALL.into_iter().map(ShippedScene::name).collect();
+    format!(" (scenes that come with the program: {})", names.join(", "))
 }
 
 fn in_field(field: &str) -> String {

@@ -161,4 +161,11 @@ mod tests {
             assert_eq!(choice.to_string().parse::<SceneChoice>().unwrap(), choice);
         }
     }
+
+    #[test]
+    fn a_name_that_no_scene_has_is_answered_with_those_that_there_are() {
+        let said = |choice: &str| choice.parse::<SceneChoice>().unwrap().load().unwrap_err().to_string();
+        assert!(said("Panda").contains("reference, realistic, tracking, panda, xarm6"), "{}", said("Panda"));
+        assert!(!said("no/such.toml").contains("panda"), "{}", said("no/such.toml"));
+    }
 }
