@@ -11,7 +11,7 @@ use crate::tr;
 /// The scene as it is chosen; `None` while nothing was.
 pub(super) type Draft = Option<SceneChoice>;
 
-/// The scenes that come with the program, and the file that it was started with.
+/// The scenes that come with the program, and the file of the cell that runs, if it has one.
 pub(super) fn scene_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> CellSource {
     let language = model.view.language;
     let now = match &model.source {
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_file_of_the_command_line_is_there_to_come_back_to() {
+    fn a_scene_file_that_is_in_use_is_among_the_scenes() {
         let mut model = sample::connected();
         model.source = CellSource::BuiltIn(SceneChoice::File("cells/mine.toml".into()));
         let mut pane = Driven::new(connect_ui, model);
