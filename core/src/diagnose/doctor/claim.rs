@@ -9,6 +9,7 @@ use super::screen::Candidate;
 use super::select::Selection;
 use crate::estimate::claim::{Alternative, Claim};
 use crate::estimate::{Calibration, ViewStatus};
+use crate::geometry::frames::{Camera, Mount, Pose};
 use crate::geometry::se3;
 
 /// What may be stated for a calibration beside what was judged.
@@ -42,14 +43,15 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Cla
     if !missed && others.is_empty() {
         return Claim::AsModelled;
     }
-    let Some(without) = model.fit(&base, selection.fit.levels) else { return Claim::Nothing };
+    let Some(answer) = &calibration.hand_eye else { return Claim::Nothing };
+    let to = |fit: &Fit| alternative(&answer.mount_from_camera(), &model.solution.mount_from_camera, fit);
     let mut alternatives = Vec::new();
     if missed {
         // With so much left out nothing determines the answer.
         let Some(fit) = model.fit(&with, selection.fit.levels) else { return Claim::Nothing };
-        alternatives.push(between(&without, &fit));
+        alternatives.push(to(&fit));
     }
-    alternatives.extend(others.into_iter().map(|judged| between(&without, &judged.fit)));
+    alternatives.extend(others.into_iter().map(|judged| to(&judged.fit)));
     Claim::Moved(alternatives)
 }
 
@@ -82,10 +84,12 @@ fn is_out(calibration: &Calibration, name: &str) -> bool {
     calibration.views.iter().any(|view| view.name == name && view.status != ViewStatus::Used)
 }
 
-fn between(without: &Fit, with: &Fit) -> Alternative {
-    let step = |fit: &Fit| se3::exp(&Vector6::from_iterator(fit.theta.rows(0, 6).iter().copied()));
+/// Where a fit of the linear model at `linear_at` has the hand-eye transform that the calibration has at `answer`.
+fn alternative(answer: &Pose<Mount, Camera>, linear_at: &Pose<Mount, Camera>, fit: &Fit) -> Alternative {
+    let step = Vector6::from_iterator(fit.theta.rows(0, 6).iter().copied());
+    let explained = linear_at.perturbed(&step);
     Alternative {
-        shift: se3::log(&(step(without).inverse() * step(with))),
-        covariance: Matrix6::from_iterator(with.covariance.view((0, 0), (6, 6)).iter().copied()),
+        shift: se3::log(&(answer.isometry().inverse() * explained.isometry())),
+        covariance: Matrix6::from_iterator(fit.covariance.view((0, 0), (6, 6)).iter().copied()),
     }
 }

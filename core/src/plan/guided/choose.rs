@@ -10,6 +10,7 @@ use crate::estimate::handeye::joint::{ExpectedView, ViewModel};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::plan::clearance::{Arm, travel};
+use crate::plan::contact::Guard;
 use crate::plan::pace::Pace;
 use crate::plan::surroundings::Surroundings;
 use crate::progress::CancelToken;
@@ -130,8 +131,8 @@ impl Chooser<'_> {
     ///
     /// Greedy, view by view, each the one of all candidates after which the expected error is least; then one view after
     /// the other is taken out of the plan for the best one in its place, while that helps. Of the plan that view comes
-    /// first which lowers the error most per second, of those that the arm can be driven to on a straight path in joint
-    /// space.
+    /// first which lowers the error most over the square root of its time, of those that the arm can be driven to on a
+    /// straight path in joint space.
     pub fn plan(&self, design: &Design, options: &ChooseOptions<'_>) -> Plan {
         let mut pool = self.pool(design, options);
         let mut ways = 0;
@@ -264,8 +265,8 @@ impl Chooser<'_> {
         }
     }
 
-    /// The view to begin with: of the plan the one that gains most per second on a free path; where none has a free path,
-    /// the best of all others that has.
+    /// The view to begin with: of the plan the one that gains most over the square root of its time, on a free path; where none
+    /// has a free path, the best of all others that has. By the second alone, short ways to views that say little come first.
     fn first(
         &self,
         pool: &mut [Candidate],
@@ -279,7 +280,8 @@ impl Chooser<'_> {
             .iter()
             .map(|&k| {
                 let travel_s = self.way(&mut pool[k], ways).map_or(0.0, |(_, travel_s)| travel_s);
-                ((now_m - design.error_with_m(&pool[k].view)) / (travel_s + options.dwell_s), k)
+                let gain_m = now_m - design.error_with_m(&pool[k].view);
+                (gain_m / (travel_s + options.dwell_s).sqrt(), k)
             })
             .collect();
         by_rate.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -313,9 +315,12 @@ impl Robot {
         }
     }
 
-    /// Whether the arm can be driven there on a straight path in joint space without touching anything.
+    /// Whether the arm can be driven there on a straight path in joint space without touching anything. What it is nearer to than
+    /// allowed where it stands it may go away from: the arm is there, and where the camera sits is an estimate that can be off
+    /// by centimetres after the first turns.
     pub fn path_is_free(&self, joints: &JointValues) -> bool {
-        self.arm.path_is_free(&self.joints, joints, &self.around, self.clearance_m)
+        let guard = Guard::from(&self.arm, &self.around, &self.joints, self.clearance_m);
+        guard.contact_on_path(&self.joints, joints).is_none()
     }
 
     /// How long the arm takes from one configuration to another: up to speed, along, and down again, by the joint that has

@@ -2,7 +2,7 @@
 //!
 //! # How
 //! Before there is a first estimate the tip is turned a little about its own axes ([`fan`]). From then on every view is the
-//! one of many possible ones that lowers the expected error of the tip over a box most, per second of travel ([`choose`]),
+//! one of many possible ones that lowers the expected error of the tip over a box most for its travel ([`choose`]),
 //! by the same information matrix as the estimate ([`ViewModel`]). A view is possible where the whole board is in the image
 //! in spite of what is not known yet, so moves are small at first and grow with what is known.
 //!
@@ -28,7 +28,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::estimate::claim::Claim;
 use crate::estimate::handeye::HandEye;
-use crate::estimate::handeye::joint::{ExpectedView, Noise, ViewModel};
+use crate::estimate::handeye::joint::{ExpectedView, FIELD_VIEWS, Noise, ViewModel};
 use crate::estimate::uncertainty::quality::TipBox;
 use crate::estimate::{Calibration, Observations, ViewStatus};
 use crate::geometry::arm::JointValues;
@@ -41,8 +41,9 @@ use candidates::ViewRange;
 use choose::{ChooseOptions, Chooser, Plan, Proposal, Robot};
 use design::Design;
 
-/// Views from which on an end is possible: with fewer the noise levels are hardly known.
-pub const LEAST_VIEWS: usize = 8;
+/// Views from which on an end is possible: from as many on errors of the robot that depend on where it stands are looked for,
+/// and with fewer the noise levels are hardly known.
+pub const LEAST_VIEWS: usize = FIELD_VIEWS;
 /// Gain of the best view \[part of the error\] below which more views are not worth their time.
 pub const LEAST_GAIN: f64 = 0.03;
 /// Captures that check the answer afterwards, where nobody says how many.
@@ -53,7 +54,7 @@ const IN_A_ROW: usize = 2;
 const LEVEL_SURE: f64 = 0.8;
 /// How far the tip turns from the nearest view so far, per view there is: a first estimate from small turns is not trusted
 /// with large ones. From six views on there is no limit.
-const TURN_PER_VIEW_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
+const TURN_PER_VIEW_RAD: f64 = 40.0 * std::f64::consts::PI / 180.0;
 /// Views with a limit of that.
 const CAREFUL_VIEWS: usize = 6;
 /// Part of that which is left after each pose that somebody leaves out.

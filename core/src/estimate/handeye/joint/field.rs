@@ -22,8 +22,9 @@ use crate::targets::observation::View;
 pub(crate) const SLOPES: usize = 18;
 /// Slopes of position, and of orientation.
 pub(crate) const HALF: usize = SLOPES / 2;
-/// Least views. With fewer there are not twice as many numbers as unknowns and slopes, and the slopes are the noise.
-const NEED: usize = 10;
+/// Views from which on a field is looked for. With fewer there are not twice as many numbers as unknowns and slopes, and the
+/// slopes are the noise.
+pub const FIELD_VIEWS: usize = 10;
 /// Least spread of the places, RMS, metres: an arm that turns on the spot has no field.
 const LEAST_SPREAD_M: f64 = 1e-3;
 
@@ -49,7 +50,7 @@ impl Places {
 
     /// The same where the poses are enough to show a field.
     pub fn for_field<'a>(poses: impl Iterator<Item = &'a Pose<Base, Tip>> + Clone) -> Option<Self> {
-        if poses.clone().count() < NEED { None } else { Self::of(poses) }
+        if poses.clone().count() < FIELD_VIEWS { None } else { Self::of(poses) }
     }
 
     /// Where a pose is, in the base's axes; over the session of mean zero and RMS one. A pose beyond the reach of the

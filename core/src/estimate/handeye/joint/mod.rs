@@ -64,7 +64,7 @@ use crate::targets::observation::Corner;
 
 pub use chain::{MAX_JOINTS, base_from_tip_by_joints, camera_from_target};
 pub use expected_view::{ExpectedView, ViewModel};
-pub use field::{RobotField, corrected_base_from_tip};
+pub use field::{FIELD_VIEWS, RobotField, corrected_base_from_tip};
 pub use integrated::SmallSample;
 pub use weights::CornerWeights;
 
