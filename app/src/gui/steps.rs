@@ -2,7 +2,6 @@
 
 use handeye_core::estimate::GOOD_VIEWS;
 use handeye_core::estimate::handeye::motion::MIN_VIEWS;
-use handeye_core::plan::guided::LEAST_VIEWS;
 use handeye_core::project::session::Role;
 
 use super::status::STALE_AFTER_S;
@@ -54,8 +53,6 @@ pub struct Facts {
     pub solved: bool,
     /// Its expected error \[m\], 95 %.
     pub expected_error_m: Option<f64>,
-    /// That is good enough.
-    pub goal_reached: bool,
     /// The arm visits poses by itself.
     pub sequence_runs: bool,
     /// Captures for verification.
@@ -91,7 +88,6 @@ impl Facts {
             solving: model.solve.is_running(),
             solved: current.is_some(),
             expected_error_m,
-            goal_reached: expected_error_m.is_some_and(|error_m| error_m <= model.view.goal.0),
             sequence_runs: model.sequence_runs,
             verifying: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
             verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
@@ -154,7 +150,7 @@ fn target(facts: &Facts) -> (StepState, Text) {
 
 fn capture(facts: &Facts) -> (StepState, Text) {
     let Facts { captures_in_use: count, .. } = *facts;
-    if count >= GOOD_VIEWS || (count >= LEAST_VIEWS && facts.goal_reached) {
+    if count >= GOOD_VIEWS {
         (StepState::Done, text!("{count} poses", count = count))
     } else if count > 0 || facts.board_in_view || facts.board_captured {
         (StepState::Now, text!("{count} of {wanted} poses", count = count, wanted = GOOD_VIEWS))
@@ -230,8 +226,6 @@ mod tests {
         assert_eq!(said(&facts)[3].0, StepState::Now, "three poses are enough to solve");
         facts.captures_in_use = 10;
         assert_eq!(said(&facts)[2], (StepState::Done, "10 poses".to_owned()));
-        let enough = Facts { captures_in_use: 9, solved: true, goal_reached: true, ..facts };
-        assert_eq!(said(&enough)[2], (StepState::Done, "9 poses".to_owned()), "the goal needs no more");
     }
 
     #[test]

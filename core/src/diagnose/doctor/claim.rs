@@ -15,29 +15,32 @@ use crate::geometry::se3;
 /// What may be stated for a calibration beside what was judged.
 ///
 /// The linear model is fitted with what the calibration counts on already (a bent board, a size, joint offsets, outlier
-/// views) and with the accepted hypotheses besides; between both fits the hand-eye transform moves by what the
-/// calibration misses. Explanations that are as good as the first are alternatives of their own.
+/// views) and with the accepted hypotheses besides; from the answer to that fit the hand-eye transform moves by what the
+/// calibration misses. A fit of the linear model without the hypotheses is not the answer: where the model is wrong, pose by
+/// pose and all corners together are wrong in different ways. Explanations that are as good as the first are alternatives of
+/// their own.
 pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Claim {
     let model = &selection.model;
     let counted = |effect: Effect| counts_on(calibration, effect);
     let out: Vec<usize> =
         (0..model.sight.views.len()).filter(|i| is_out(calibration, &model.sight.views[*i].name)).collect();
-    let mut base = State { effects: Vec::new(), aside: out };
-    let mut with = base.clone();
+    let mut with = State { effects: Vec::new(), aside: out };
+    let mut missed = false;
     for judged in &selection.taken {
         match &judged.candidate {
             Candidate::Effect(effect) => {
                 with.effects.push(*effect);
                 // What is too small to be reported moves no claim: nobody could mend it.
-                if counted(*effect) || !judged.matters {
-                    base.effects.push(*effect);
-                }
+                missed |= !counted(*effect) && judged.matters;
             }
-            Candidate::Views(views) => with.aside.extend(views.iter().filter(|i| !base.aside.contains(i))),
+            Candidate::Views(views) => {
+                let more: Vec<usize> = views.iter().copied().filter(|i| !with.aside.contains(i)).collect();
+                missed |= !more.is_empty();
+                with.aside.extend(more);
+            }
         }
     }
     let as_good = || selection.others.iter().filter(|judged| judged.as_good);
-    let missed = with.effects.len() > base.effects.len() || with.aside.len() > base.aside.len();
     let others: Vec<&Judged> =
         as_good().filter(|j| !matches!(j.candidate, Candidate::Effect(e) if counted(e))).collect();
     if !missed && others.is_empty() {
