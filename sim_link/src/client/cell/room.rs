@@ -151,7 +151,8 @@ impl ArmKinematics {
     /// The nearest place from which the whole board is seen, also when it is elsewhere within `reach` at once, and the arm has
     /// room to go along with it over half as much again as `reach`; where there is none, over `reach`; where there is none either,
     /// one from which the board is seen where it is now, and where none has enough room the one with most. Following keeps clear of
-    /// what it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around.
+    /// what it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around, and where the arm begins too near to one of
+    /// them, comes no nearer.
     ///
     /// # Errors
     /// [`NoPlace`].
@@ -181,7 +182,8 @@ impl ArmKinematics {
             let mut views = planning::views_of_board(&setup, &options);
             views.sort_by(|a, b| travel(a).total_cmp(&travel(b)));
             tried = views.len();
-            let is_free = |joints: &JointValues| setup.path_is_free(from, joints, options.clearance_m);
+            let way = Guard::from(&setup.arm, &setup.around, from, options.clearance_m);
+            let is_free = |joints: &JointValues| way.contact_on_path(from, joints).is_none();
             let place =
                 |view: &PlannedView, room| FollowPlace { joints: view.joints, base_from_tip: view.base_from_tip, room };
             for reach in [&reach.wider(), reach] {

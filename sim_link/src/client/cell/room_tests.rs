@@ -258,3 +258,18 @@ fn a_board_out_of_reach_has_no_place() {
     let none = arm.place_to_follow(&FollowLimits::default(), &board, &BoardReach::default(), from, &arm.plane(), None);
     assert!(matches!(none, Err(NoPlace { .. })), "{none:?}");
 }
+
+/// Moved along a line to its first view, from where a check pose of guided capture had left it, the arm touches its camera by the
+/// model of its links.
+#[test]
+fn an_arm_that_begins_too_near_to_itself_gets_to_a_place_with_room() {
+    let (scene, arm, board, _) = after_the_sequence();
+    let folded = JointValues::from([4.882, 0.257, -0.977, 0.243, -3.332, -0.47]);
+    let (limits, reach) = (FollowLimits::default(), BoardReach::default());
+    let setup = arm.view_setup(&board, &folded, &arm.plane());
+    assert!(!setup.is_free(&folded, ViewOptions::default().clearance_m), "it touches nothing: nothing is asserted");
+    let place = arm.place_to_follow(&limits, &board, &reach, &folded, &arm.plane(), None).expect("there is room");
+    assert!(setup.is_free(&place.joints, ViewOptions::default().clearance_m));
+    let worst = followed((&scene, &arm), None, place.joints, &moving(BoardPath::Circle, 0.05), 0.0, 60.0);
+    assert!(worst.is_ok(), "it ended after {worst:?} s");
+}
