@@ -151,8 +151,8 @@ impl ArmKinematics {
     /// The nearest place from which the whole board is seen, also when it is elsewhere within `reach` at once, and the arm has
     /// room to go along with it over half as much again as `reach`; where there is none, over `reach`; where there is none either,
     /// one from which the board is seen where it is now, and where none has enough room the one with most. Following keeps clear of
-    /// what it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around, and where the arm begins too near to one of
-    /// them, comes no nearer.
+    /// what it is `among`; the way there, straight for the joints, touches neither arm, board nor what stands around, and comes no
+    /// nearer to one of them that the arm begins too near to.
     ///
     /// # Errors
     /// [`NoPlace`].
