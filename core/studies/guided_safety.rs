@@ -5,7 +5,8 @@
 //! cargo run --release -p handeye_core --example guided_safety -- 2000
 //! ```
 //!
-//! The second row is the same without the planner knowing of the boxes: what the judgement sees when something is touched.
+//! The second row is the same with a lens that has to be found, so that less is known at the beginning. The third one is the
+//! first without the planner knowing of the boxes: what the judgement sees when something is touched.
 
 #![expect(clippy::expect_used, clippy::print_stdout, reason = "a study prints, and stops at what cannot be")]
 
@@ -24,17 +25,19 @@ const BATCH: u64 = 12;
 
 fn main() {
     let moves: usize = env::args().nth(1).map_or(2000, |n| n.parse().expect("a number of moves"));
-    row("boxes known", moves, true);
-    row("boxes unknown", moves / 10, false);
+    row("boxes known", moves, true, false);
+    row("boxes known, lens not", moves, true, true);
+    row("boxes unknown", moves / 10, false, false);
 }
 
-fn row(name: &str, moves: usize, is_known: bool) {
+fn row(name: &str, moves: usize, is_known: bool, free_lens: bool) {
     let mut tally = Tally::default();
     let mut next = 0;
     while tally.moves < moves {
         let batch: Vec<u64> = (next..next + BATCH).collect();
         next += BATCH;
-        let of_batch: Vec<Tally> = batch.into_par_iter().map(|seed| session(setup(seed), VIEWS, is_known)).collect();
+        let of_batch: Vec<Tally> =
+            batch.into_par_iter().map(|seed| session(setup(seed, free_lens), VIEWS, is_known)).collect();
         tally = of_batch.into_iter().fold(tally, Tally::and);
     }
     let Tally { sessions, moves, contacts, self_contacts, out_of_range, too_fast, cut, nearest_m } = tally;
@@ -45,8 +48,8 @@ fn row(name: &str, moves: usize, is_known: bool) {
     );
 }
 
-fn setup(seed: u64) -> CellSetup {
+fn setup(seed: u64, free_lens: bool) -> CellSetup {
     let arm = CellArm::ALL[(seed % 3) as usize];
     let mode = if (seed / 3).is_multiple_of(2) { Mode::EyeInHand } else { Mode::EyeToHand };
-    CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: Untold::NOTHING, seed }
+    CellSetup { arm, mode, noise: REALISTIC, free_lens, straight: None, untold: Untold::NOTHING, seed }
 }

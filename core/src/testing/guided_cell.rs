@@ -13,7 +13,7 @@ use crate::estimate::handeye::joint::{Noise, RobotField, ViewModel};
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::estimate::{Calibration, CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView, calibrate};
 use crate::geometry::arm::{Arm, ArmKind, JointValues};
-use crate::geometry::camera::Intrinsics;
+use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use crate::plan::guided::choose::Robot;
 use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, LEAST_VIEWS, Next, Step};
@@ -90,6 +90,23 @@ impl Untold {
     pub const NOTHING: Self = Self { bend_m: [0.0; 2], focal: 1.0 };
 }
 
+/// Where everything is in a cell, and what its arm must not touch.
+#[derive(Debug, Clone)]
+pub struct Places {
+    /// The arm, with nothing on its tip.
+    pub arm: plan::Arm,
+    /// Where its joints are at the first view, radians; of a prismatic joint metres.
+    pub joints: JointValues,
+    /// What stands around, besides camera and board.
+    pub around: Surroundings,
+    /// The camera on its mount.
+    pub mount_from_camera: Pose<Mount, Camera>,
+    /// The board.
+    pub anchor_from_target: Pose<Anchor, Target>,
+    /// The lens.
+    pub intrinsics: Intrinsics,
+}
+
 /// From the first pose to where errors of the robot that depend on the place have the size of the noise, metres: about
 /// the RMS spread of the tip in a guided session.
 const FIELD_SPREAD_M: f64 = 0.15;
@@ -97,6 +114,7 @@ const FIELD_SPREAD_M: f64 = 0.15;
 const FIELD_REACH_M: f64 = 2.0;
 
 /// The cell.
+#[derive(Debug, Clone)]
 pub struct GuidedCell {
     setup: CellSetup,
     rng: ChaCha8Rng,
@@ -146,7 +164,8 @@ impl GuidedCell {
     /// When there are no such places: a mistake in the setup.
     pub fn new(setup: CellSetup) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
-        let mut cell = (0..1000).find_map(|_| Self::drawn(setup, &mut rng)).expect("most places are good");
+        let cell = |places| Self::within_reach(setup, places);
+        let mut cell = (0..1000).find_map(|_| cell(drawn(setup, &mut rng)?)).expect("most places are good");
         let Noise { field_m, field_rad, .. } = setup.noise;
         if field_m > 0.0 || field_rad > 0.0 {
             let mut slopes = |size: f64| Matrix3::from_fn(|_, _| noise_twist(&mut rng, size, 0.0).x / FIELD_SPREAD_M);
@@ -157,80 +176,37 @@ impl GuidedCell {
         cell
     }
 
-    fn drawn(setup: CellSetup, rng: &mut ChaCha8Rng) -> Option<Self> {
-        let mut about = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
-        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        // The middle of the board over the table, a little tilted, its printed side up; z of a target points into it.
-        let in_front = Vector3::new(0.42 + about(0.05), about(0.12), 0.06 + about(0.03));
-        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0));
-        let lying = Isometry3::from_parts(in_front.into(), yaw * down * tilt(about(0.15), about(0.15)))
-            * Translation3::from(-BOARD.centre().coords);
-        let beside = Isometry3::from_parts(
-            Vector3::new(0.06 + about(0.02), about(0.03), 0.04 + about(0.02)).into(),
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0)) * tilt(about(0.2), about(0.2)),
-        );
-        let distance_m = 0.38 + about(0.06);
-        let seen_first = Isometry3::from_parts(
-            Vector3::new(about(0.03), about(0.03), distance_m).into(),
-            tilt(about(0.2), about(0.2)) * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.5)),
-        ) * Translation3::from(-BOARD.centre().coords);
-        let lens = setup.straight.map_or_else(camera, |focal_px| Intrinsics::pinhole(640, 480, focal_px));
-        let seen_first = match setup.straight {
-            // Some 40 px from the edge of the image of 640 px; BOARD is 135 mm wide.
-            Some(focal_px) => {
-                Isometry3::translation(280.0 * distance_m / focal_px - 0.0675, 0.0, distance_m)
-                    * Translation3::from(-BOARD.centre().coords)
-            }
-            None => seen_first,
-        };
-        let (mount_from_camera, anchor_from_target, first_tip) = match setup.mode {
-            Mode::EyeInHand => {
-                let first_tip = lying * seen_first.inverse() * beside.inverse();
-                (beside, lying, first_tip)
-            }
-            Mode::EyeToHand => {
-                // The camera stands on the far side and looks at the board that the arm holds up in front of it.
-                let board_at = Vector3::new(0.45 + about(0.05), about(0.1), 0.45 + about(0.05));
-                let facing = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2);
-                let camera_turn = facing * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.3));
-                let base_from_camera =
-                    Isometry3::from_parts((board_at + Vector3::x() * distance_m).into(), camera_turn);
-                let on_tip = Isometry3::from_parts(
-                    Vector3::new(about(0.02), about(0.02), 0.05).into(),
-                    down * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0)),
-                ) * Translation3::from(-BOARD.centre().coords);
-                (base_from_camera, on_tip, base_from_camera * seen_first * on_tip.inverse())
-            }
-        };
-        let chain = setup.arm.chain();
+    /// With places that are given, for which `arm`, `straight` and errors that depend on the place are left out of the setup;
+    /// `None` where the arm touches something at the first view, or the board is not wholly in it.
+    pub fn placed(setup: CellSetup, places: Places) -> Option<Self> {
+        let cell = Self::within_reach(setup, places)?;
+        cell.clone().view(&cell.base_from_tip()).map(|_| cell)
+    }
+
+    /// `None` where the arm touches something at the first view.
+    fn within_reach(setup: CellSetup, places: Places) -> Option<Self> {
+        let Places { mut arm, joints, around, mount_from_camera, anchor_from_target, intrinsics: lens } = places;
         let (carried, beside) = match setup.mode {
             Mode::EyeInHand => {
-                let board = plan::sheet(&BOARD, &Pose::from_isometry(anchor_from_target), 0.0);
-                (Carried::camera(&mount_from_camera), board)
+                let board = plan::sheet(&BOARD, &Pose::from_isometry(*anchor_from_target.isometry()), 0.0);
+                (Carried::camera(mount_from_camera.isometry()), board)
             }
             Mode::EyeToHand => {
-                let camera = plan::housing(&Pose::from_isometry(mount_from_camera), 0.0);
-                (Carried::board(&BOARD, &Pose::from_isometry(anchor_from_target), 0.0), camera)
+                let camera = plan::housing(&Pose::from_isometry(*mount_from_camera.isometry()), 0.0);
+                (Carried::board(&BOARD, &Pose::from_isometry(*anchor_from_target.isometry()), 0.0), camera)
             }
         };
-        let home = setup.arm.home();
-        let arm = plan::Arm {
-            body: ArmBody::of(&chain),
-            chain,
-            world_from_arm: Isometry3::identity(),
-            connection_from_tip: Isometry3::identity(),
-            carried: vec![carried],
-        };
-        let table = Obstacle::new("table", Isometry3::translation(0.0, 0.0, -TABLE[2] / 2.0 - 0.01), TABLE);
-        let mut around = Surroundings::of(vec![table, beside]);
-        let joints = arm.reach(&Pose::from_isometry(first_tip), &home)?;
-        if !arm.is_free(&joints, &around, CLEARANCE_M) {
+        arm.carried = vec![carried];
+        // Where the other of camera and board is the guide has to find out.
+        let all = around.clone().and(Surroundings::of(vec![beside]));
+        if !arm.is_free(&joints, &all, CLEARANCE_M) {
             return None;
         }
-        // Where the other of camera and board is the guide has to find out.
-        around.obstacles.pop();
-        // With all that is estimated of a lens by default, of which it has none.
-        let free = Intrinsics { distortion: DEFAULT_MODEL, ..lens };
+        // With all that is estimated of a lens by default, of which it may have none.
+        let free = match lens.distortion {
+            Distortion::None => Intrinsics { distortion: DEFAULT_MODEL, ..lens },
+            _ => lens,
+        };
         let focal = setup.untold.focal;
         let said = Intrinsics { fx: lens.fx / focal, fy: lens.fy / focal, ..lens };
         let shape = BoardShape { warp_m: setup.untold.bend_m, ..BoardShape::FLAT };
@@ -240,8 +216,8 @@ impl GuidedCell {
             setup,
             rng: ChaCha8Rng::seed_from_u64(setup.seed ^ 0x5eed),
             intrinsics,
-            mount_from_camera: Pose::from_isometry(mount_from_camera),
-            anchor_from_target: Pose::from_isometry(anchor_from_target),
+            mount_from_camera,
+            anchor_from_target,
             robot: Robot { arm, around, clearance_m: CLEARANCE_M, joints, pace: PACE },
             observations: Observations {
                 mode: Some(setup.mode),
@@ -389,6 +365,71 @@ impl GuidedCell {
             }
         }
     }
+}
+
+/// Places at random, with the board in view of an arm that gets there; `None` where it does not.
+fn drawn(setup: CellSetup, rng: &mut ChaCha8Rng) -> Option<Places> {
+    let mut about = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    // The middle of the board over the table, a little tilted, its printed side up; z of a target points into it.
+    let in_front = Vector3::new(0.42 + about(0.05), about(0.12), 0.06 + about(0.03));
+    let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0));
+    let lying = Isometry3::from_parts(in_front.into(), yaw * down * tilt(about(0.15), about(0.15)))
+        * Translation3::from(-BOARD.centre().coords);
+    let beside = Isometry3::from_parts(
+        Vector3::new(0.06 + about(0.02), about(0.03), 0.04 + about(0.02)).into(),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0)) * tilt(about(0.2), about(0.2)),
+    );
+    let distance_m = 0.38 + about(0.06);
+    let seen_first = Isometry3::from_parts(
+        Vector3::new(about(0.03), about(0.03), distance_m).into(),
+        tilt(about(0.2), about(0.2)) * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.5)),
+    ) * Translation3::from(-BOARD.centre().coords);
+    let lens = setup.straight.map_or_else(camera, |focal_px| Intrinsics::pinhole(640, 480, focal_px));
+    let seen_first = match setup.straight {
+        // Some 40 px from the edge of the image of 640 px; BOARD is 135 mm wide.
+        Some(focal_px) => {
+            Isometry3::translation(280.0 * distance_m / focal_px - 0.0675, 0.0, distance_m)
+                * Translation3::from(-BOARD.centre().coords)
+        }
+        None => seen_first,
+    };
+    let (mount_from_camera, anchor_from_target, first_tip) = match setup.mode {
+        Mode::EyeInHand => {
+            let first_tip = lying * seen_first.inverse() * beside.inverse();
+            (beside, lying, first_tip)
+        }
+        Mode::EyeToHand => {
+            // The camera stands on the far side and looks at the board that the arm holds up in front of it.
+            let board_at = Vector3::new(0.45 + about(0.05), about(0.1), 0.45 + about(0.05));
+            let facing = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2);
+            let camera_turn = facing * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.3));
+            let base_from_camera = Isometry3::from_parts((board_at + Vector3::x() * distance_m).into(), camera_turn);
+            let on_tip = Isometry3::from_parts(
+                Vector3::new(about(0.02), about(0.02), 0.05).into(),
+                down * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0)),
+            ) * Translation3::from(-BOARD.centre().coords);
+            (base_from_camera, on_tip, base_from_camera * seen_first * on_tip.inverse())
+        }
+    };
+    let chain = setup.arm.chain();
+    let arm = plan::Arm {
+        body: ArmBody::of(&chain),
+        chain,
+        world_from_arm: Isometry3::identity(),
+        connection_from_tip: Isometry3::identity(),
+        carried: Vec::new(),
+    };
+    let table = Obstacle::new("table", Isometry3::translation(0.0, 0.0, -TABLE[2] / 2.0 - 0.01), TABLE);
+    let joints = arm.reach(&Pose::from_isometry(first_tip), &setup.arm.home())?;
+    Some(Places {
+        arm,
+        joints,
+        around: Surroundings::of(vec![table]),
+        mount_from_camera: Pose::from_isometry(mount_from_camera),
+        anchor_from_target: Pose::from_isometry(anchor_from_target),
+        intrinsics: lens,
+    })
 }
 
 fn tilt(about_x: f64, about_y: f64) -> UnitQuaternion<f64> {

@@ -1,12 +1,12 @@
 //! Views of a board at random: wholly in the image, near enough to be found, as tilted as a detector bears.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Rotation3, SMatrix, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
+use crate::estimate::handeye::joint::ExpectedPixels;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Camera, Pose, Target};
-use crate::geometry::se3::skew;
 use crate::targets::TargetSpec;
 
 /// Standard deviations of where the board is expected that it stays in the image by: one view in eighty is cut on a side.
@@ -73,31 +73,34 @@ impl ViewRange {
         Some(Pose::from_isometry(Isometry3::from_parts(at, turn) * Translation3::from(-target.centre().coords)))
     }
 
-    /// Whether the board is wholly in the image and large enough there. `spread` is the covariance of its pose (right
-    /// perturbation `[t; r]`, m and rad) where that is not known exactly.
+    /// Whether the board is wholly in the image and large enough there.
     pub fn shows(
         &self,
         intrinsics: &Intrinsics,
         target: &TargetSpec,
         camera_from_target: &Pose<Camera, Target>,
-        spread: Option<&Matrix6<f64>>,
     ) -> bool {
         let pose = camera_from_target.isometry();
-        let rotation = pose.rotation.to_rotation_matrix();
         let inside = |point: &Point3<f64>| {
-            let Ok(seen) = intrinsics.project_with_jacobians(&(pose * point)) else { return false };
-            let unsure = spread.map_or_else(Vector2::zeros, |spread| {
-                let mut by_pose = SMatrix::<f64, 3, 6>::zeros();
-                by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation.matrix());
-                by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&(rotation.matrix() * -skew(&point.coords)));
-                let by_pose = seen.px_by_point * by_pose;
-                (by_pose * spread * by_pose.transpose()).diagonal().map(|v| SURE * v.max(0.0).sqrt())
-            });
-            let free = unsure.map(|px| px + self.margin_px - 0.5);
-            let (px, last) = (seen.px, [f64::from(intrinsics.width) - 1.0, f64::from(intrinsics.height) - 1.0]);
-            (0..2).all(|axis| px[axis] >= free[axis] && px[axis] <= last[axis] - free[axis])
+            intrinsics.project(&(pose * point)).is_ok_and(|px| self.holds(intrinsics, &px, &Vector2::zeros()))
         };
         outline(target).iter().all(inside) && self.is_large(intrinsics, target, pose)
+    }
+
+    /// Whether it is in spite of what is not known, with `doubts` times the usual margin for that.
+    pub fn surely_shows(&self, target: &TargetSpec, expected: &ExpectedPixels<'_>, doubts: f64) -> bool {
+        let intrinsics = expected.intrinsics();
+        let inside = |point: &Point3<f64>| {
+            expected.of(point).is_some_and(|(px, sigma_px)| self.holds(intrinsics, &px, &(sigma_px * SURE * doubts)))
+        };
+        outline(target).iter().all(inside) && self.is_large(intrinsics, target, expected.camera_from_target())
+    }
+
+    /// Whether a pixel that is known to within so much is in the image, with the margin.
+    fn holds(&self, intrinsics: &Intrinsics, px: &Vector2<f64>, within_px: &Vector2<f64>) -> bool {
+        let last = [f64::from(intrinsics.width) - 1.0, f64::from(intrinsics.height) - 1.0];
+        let free = within_px.map(|px| px + self.margin_px - 0.5);
+        (0..2).all(|axis| px[axis] >= free[axis] && px[axis] <= last[axis] - free[axis])
     }
 
     fn is_large(&self, intrinsics: &Intrinsics, target: &TargetSpec, pose: &Isometry3<f64>) -> bool {

@@ -1,6 +1,5 @@
 //! Which views to take next: of many at random those that together lower the error most, and that the arm gets to.
 
-use nalgebra::Matrix6;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
@@ -58,6 +57,8 @@ pub struct ChooseOptions<'a> {
     pub failed: &'a [Pose<Base, Tip>],
     /// How far the tip may turn from the nearest view so far, radians.
     pub turn_rad: f64,
+    /// Factor on how unsure it is where the board will be in the image; 1 as long as it was where it was expected.
+    pub doubts: f64,
 }
 
 /// A view that is proposed.
@@ -176,18 +177,18 @@ impl Chooser<'_> {
                 break;
             }
             let Some(drawn) = self.range.draw(&mut rng, intrinsics, target) else { continue };
-            if !self.range.shows(intrinsics, target, &drawn, None) {
+            if !self.range.shows(intrinsics, target, &drawn) {
                 continue;
             }
             let base_from_tip = self.model.base_from_tip(&drawn);
             if !self.is_wanted(&base_from_tip, options) {
                 continue;
             }
-            let camera_from_target = self.model.camera_from_target(&base_from_tip);
-            let spread: Matrix6<f64> = self.model.pose_covariance(&base_from_tip, design.covariance());
-            if !self.range.shows(intrinsics, target, &camera_from_target, Some(&spread)) {
+            let pixels = self.model.pixels(&base_from_tip, design.covariance());
+            if !self.range.surely_shows(target, &pixels, options.doubts) {
                 continue;
             }
+            let camera_from_target = Pose::from_isometry(*pixels.camera_from_target());
             let Some(view) = self.model.expected(&base_from_tip, &all) else { continue };
             pool.push(Candidate { camera_from_target, base_from_tip, view, way: Way::Unknown });
         }

@@ -71,8 +71,10 @@ const MOST_FAILURES: usize = 5;
 const MOST_FAN: usize = 24;
 /// Views at random among which a check finds one that the arm gets to.
 const CHECK_CANDIDATES: usize = 200;
-/// Noise levels below which a plan does not reckon: an estimate from few views may be nothing.
-const LEAST_NOISE: Noise = Noise { corner_px: 0.02, robot_m: 2e-5, robot_rad: 5e-5, ..Noise::EXACT };
+/// Noise levels below which a plan does not reckon: far below those of any robot and any camera.
+const LEAST_NOISE: Noise = Noise { corner_px: 2e-3, robot_m: 2e-6, robot_rad: 5e-6, ..Noise::EXACT };
+/// The same while there are few views: what they say of the levels may be nothing.
+const CAREFUL_NOISE: Noise = Noise { corner_px: 0.02, robot_m: 2e-5, robot_rad: 5e-5, ..Noise::EXACT };
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -372,8 +374,12 @@ impl Guide {
         let target = &known.observations.target;
         let model = known.calibration.and_then(|calibration| ViewModel::new(calibration, target));
         let Some(model) = model else { return self.without_answer(known, cancel) };
-        let noise = at_least(model.noise(), &LEAST_NOISE);
+        let least = if used.len() < CAREFUL_VIEWS { &CAREFUL_NOISE } else { &LEAST_NOISE };
+        let noise = at_least(model.noise(), least);
         let model = model.with_noise(noise);
+        if self.range.is_none() && known.calibration.is_none_or(|it| camera_unsure_m(it) > CAREFUL_ROOM_M) {
+            return self.first_poses(known, cancel);
+        }
         match self.plan(known, &model, used, cancel) {
             None => self.without_answer(known, cancel),
             Some((plan, modelled_m)) if plan.candidates > 0 => {
@@ -415,6 +421,7 @@ impl Guide {
             } else {
                 turn_after(self.skips)
             },
+            doubts: self.doubts(),
         };
         let chooser = ground.chooser(model, &known.observations.target);
         Some((chooser.plan(&ground.design, &options), modelled_m))
@@ -436,6 +443,7 @@ impl Guide {
             dwell_s: self.options.dwell_s,
             failed: &self.failed,
             turn_rad: turn_after(skips),
+            doubts: 1.0,
         };
         ground.chooser(&model, target).at_random(&ground.design, &options)
     }
@@ -450,8 +458,7 @@ impl Guide {
     ) -> Option<Ground<'c>> {
         let joint = known.calibration?.joint.as_ref()?;
         let target = &known.observations.target;
-        let views: Vec<ExpectedView> =
-            used.iter().filter_map(|(pose, corners)| model.expected(pose, corners)).collect();
+        let views = expected_views(model, used);
         let weight = match &self.options.tool_box {
             None => design::weight_about(&joint.reference_point, target),
             Some(tool_box) => design::weight_over(&tool_box.corners_and_middle()),
@@ -464,6 +471,11 @@ impl Guide {
         let room_m = if used.len() < CAREFUL_VIEWS { CAREFUL_ROOM_M } else { 0.0 };
         let robot = known.robot.map(|robot| with_board(robot, model.hand_eye(), known.observations, room_m));
         Some(Ground { design, range, robot, taken, cancel })
+    }
+
+    /// What failed was expected to be in the image: the estimate is worse than it says.
+    fn doubts(&self) -> f64 {
+        1.0 + self.failures as f64
     }
 
     fn judged(&self, plan: Plan, modelled_m: f64, views: usize, is_sound: bool) -> Next {
@@ -562,6 +574,11 @@ pub fn error_at_upper_levels(calibration: &Calibration, tool_box: Option<&TipBox
     })
 }
 
+/// How far the camera may be from where the estimate has it on its mount, 95 %, metres.
+fn camera_unsure_m(calibration: &Calibration) -> f64 {
+    calibration.modelled_error_95_at(&Point3::origin()).unwrap_or(f64::INFINITY)
+}
+
 /// The error by the noise alone where the goal is judged, metres.
 fn modelled_error_m(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
     worst(calibration, tool_box, |point| calibration.modelled_error_95_at(point))
@@ -603,6 +620,11 @@ fn used_views(observations: &Observations, calibration: Option<&Calibration>) ->
         Some((view.base_from_tip?, corners.iter().map(|corner| corner.index).collect()))
     };
     observations.views.iter().enumerate().filter_map(of_view).collect()
+}
+
+/// What views that were taken say by a model.
+fn expected_views(model: &ViewModel, used: &[(Pose<Base, Tip>, Vec<usize>)]) -> Vec<ExpectedView> {
+    used.iter().filter_map(|(pose, corners)| model.expected(pose, corners)).collect()
 }
 
 fn at_least(noise: &Noise, least: &Noise) -> Noise {

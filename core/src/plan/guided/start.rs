@@ -8,37 +8,34 @@
 //! a tilt turns the tip about that place. What comes out wrong is where the camera sits: it is not what is kept clear of things,
 //! the camera at the tip still is.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
 use super::choose::{Plan, Proposal, Robot};
+use super::design::Design;
 use super::{
-    CAREFUL_ROOM_M, Ending, Guide, Known, LARGEST_FAN_WAY_RAD, MOST_FAN, Next, ViewRange, Why, fan, with_board,
+    CAREFUL_NOISE, CAREFUL_ROOM_M, Ending, Guide, Known, LARGEST_FAN_WAY_RAD, MOST_FAN, Next, ViewRange, Why, at_least,
+    expected_views, fan, used_views, with_board,
 };
 use crate::estimate::handeye::Mode;
+use crate::estimate::handeye::joint::ViewModel;
 use crate::estimate::{CameraKnowledge, Method, Observations, calibrate};
 use crate::geometry::arm::JointValues;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::plan::clearance::travel;
 use crate::progress::CancelToken;
+use crate::targets::TargetSpec;
 use crate::targets::observation::Corner;
 
-/// Views that a rough answer takes: the first one and turns about two axes, one of them in both directions.
-const ROUGH_VIEWS: usize = 4;
-/// Tilts of the camera about the board, in their order: axis in the camera and degrees. An estimate of a lens takes 20° and more
-/// about two axes; the first ones are smaller, because the answer that they go by is rough.
-const TILTS: [([f64; 3], f64); 10] = [
-    ([1.0, 0.0, 0.0], 10.0),
-    ([0.0, 1.0, 0.0], 10.0),
-    ([-1.0, 0.0, 0.0], 20.0),
-    ([0.0, -1.0, 0.0], 20.0),
-    ([1.0, 0.0, 0.0], 28.0),
-    ([0.0, 1.0, 0.0], 28.0),
-    ([-1.0, 0.0, 0.0], 28.0),
-    ([0.0, -1.0, 0.0], 28.0),
-    ([0.7, 0.7, 0.0], 28.0),
-    ([-0.7, -0.7, 0.0], 28.0),
-];
+/// Views that a rough answer takes: the first one and turns about two axes.
+const ROUGH_VIEWS: usize = 3;
+/// Axes in the camera that it is tilted about, in their order, twice at the most.
+const AXES: [[f64; 3]; 6] =
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.7, 0.7, 0.0], [-0.7, -0.7, 0.0]];
+/// Tilts, degrees: of each axis the largest one that surely shows the board. An estimate of a lens takes 20° and more about two.
+const TILTS_DEG: [f64; 4] = [28.0, 20.0, 14.0, 10.0];
+/// The tilt where none surely shows it, degrees, less after a view that did not.
+const UNSURE_TILT_DEG: f64 = 10.0;
 /// Distances from the board that a tilt is tried at, as parts of the first: what is tilted takes more room in the image.
 const DISTANCES: [f64; 4] = [1.0, 1.1, 1.25, 1.5];
 
@@ -83,37 +80,74 @@ impl Guide {
 
     /// A tilt about the board; `None` where no rough answer is found, or all were tried.
     fn tilt(&mut self, known: &Known<'_>, first: &Pose<Base, Tip>, cancel: &CancelToken) -> Option<Next> {
-        if self.tilts_tried >= TILTS.len() {
-            return None;
-        }
+        let rough = RoughAnswer::new(known, first, self.doubts(), cancel)?;
+        let left = self.tilts_tried..2 * AXES.len();
+        let axis = |index: usize| AXES[index % AXES.len()];
+        let sure = left.clone().find_map(|index| {
+            let largest = TILTS_DEG.iter().find_map(|deg| rough.tilted(axis(index), *deg, true))?;
+            Some((index, largest))
+        });
+        let (index, next) = sure.or_else(|| {
+            let deg = UNSURE_TILT_DEG / rough.doubts;
+            left.clone().find_map(|index| Some((index, rough.tilted(axis(index), deg, false)?)))
+        })?;
+        self.tilts_tried = index + 1;
+        Some(next)
+    }
+}
+
+/// Where everything is by the views so far and a lens that is guessed.
+struct RoughAnswer {
+    model: ViewModel,
+    target: TargetSpec,
+    design: Design,
+    range: ViewRange,
+    seen_first: Pose<Camera, Target>,
+    robot: Option<Robot>,
+    doubts: f64,
+}
+
+impl RoughAnswer {
+    fn new(known: &Known<'_>, first: &Pose<Base, Tip>, doubts: f64, cancel: &CancelToken) -> Option<Self> {
         let observations = known.observations;
-        let (target, lens) = (&observations.target, lens(observations));
-        let rough = Observations { camera: CameraKnowledge::Fixed(lens), ..observations.clone() };
-        let hand_eye = calibrate(&rough, Method::Joint, cancel).ok()?.hand_eye?;
+        let target = observations.target;
+        let fixed = Observations { camera: CameraKnowledge::Fixed(lens(observations)), ..observations.clone() };
+        let calibration = calibrate(&fixed, Method::Joint, cancel).ok()?;
+        let model = ViewModel::new(&calibration, &target)?;
+        let noise = at_least(model.noise(), &CAREFUL_NOISE);
+        let model = model.with_noise(noise);
+        let views = expected_views(&model, &used_views(&fixed, Some(&calibration)));
+        let design = Design::new(model.prior(), &views, Matrix6::identity())?;
         let robot = known.robot.map(|robot| {
-            let mut around = with_board(robot, &hand_eye, observations, CAREFUL_ROOM_M);
-            if hand_eye.mode() == Mode::EyeInHand {
+            let mut around = with_board(robot, model.hand_eye(), observations, CAREFUL_ROOM_M);
+            if model.mode() == Mode::EyeInHand {
                 around.arm.carried.clone_from(&robot.arm.carried);
             }
             around
         });
-        let seen_first = hand_eye.camera_from_target(first);
-        let middle = (seen_first.isometry() * target.centre()).coords;
-        let range = ViewRange::about([middle.norm()].into_iter())?;
-        for (offset, (axis, deg)) in TILTS[self.tilts_tried..].iter().enumerate() {
-            let turn_rad = deg.to_radians();
-            let about = UnitQuaternion::from_scaled_axis(Vector3::from(*axis).normalize() * turn_rad);
-            let tilted =
-                DISTANCES.iter().map(|distance| about_board(&seen_first, &about, &(middle * *distance), target));
-            for camera_from_target in tilted.filter(|view| range.shows(&lens, target, view, None)) {
-                let base_from_tip = hand_eye.base_from_tip(&camera_from_target);
-                if let Some(joints) = reached(robot.as_ref(), &base_from_tip) {
-                    self.tilts_tried += offset + 1;
-                    return Some(go(base_from_tip, camera_from_target, joints, Why::FirstTilts { turn_rad }));
-                }
-            }
-        }
-        None
+        let seen_first = model.hand_eye().camera_from_target(first);
+        let range = ViewRange::about([(seen_first.isometry() * target.centre()).coords.norm()].into_iter())?;
+        Some(Self { model, target, design, range, seen_first, robot, doubts })
+    }
+
+    /// The camera tilted about the board, from the nearest distance from which that is in the image, surely or as far as is
+    /// known, and that the arm gets to.
+    fn tilted(&self, axis: [f64; 3], deg: f64, surely: bool) -> Option<Next> {
+        let turn_rad = deg.to_radians();
+        let about = UnitQuaternion::from_scaled_axis(Vector3::from(axis).normalize() * turn_rad);
+        let middle = (self.seen_first.isometry() * self.target.centre()).coords;
+        DISTANCES.iter().find_map(|distance| {
+            let camera_from_target = about_board(&self.seen_first, &about, &(middle * *distance), &self.target);
+            let base_from_tip = self.model.base_from_tip(&camera_from_target);
+            let is_shown = if surely {
+                let pixels = self.model.pixels(&base_from_tip, self.design.covariance());
+                self.range.surely_shows(&self.target, &pixels, self.doubts)
+            } else {
+                self.range.shows(self.model.intrinsics(), &self.target, &camera_from_target)
+            };
+            let joints = is_shown.then(|| reached(self.robot.as_ref(), &base_from_tip))??;
+            Some(go(base_from_tip, camera_from_target, joints, Why::FirstTilts { turn_rad }))
+        })
     }
 }
 
@@ -134,7 +168,7 @@ fn about_board(
     seen: &Pose<Camera, Target>,
     about: &UnitQuaternion<f64>,
     middle: &Vector3<f64>,
-    target: &crate::targets::TargetSpec,
+    target: &TargetSpec,
 ) -> Pose<Camera, Target> {
     let turned = Isometry3::from_parts(Translation3::from(*middle), about * seen.rotation());
     Pose::from_isometry(turned * Translation3::from(-target.centre().coords))

@@ -288,15 +288,53 @@ fn an_end_is_judged_at_the_upper_limit_of_the_noise_levels() {
 fn a_board_that_may_lie_partly_outside_the_image_is_not_surely_seen() {
     let cell = GuidedCell::new(setup(CellArm::Ur5e, Mode::EyeInHand, 1));
     let truth = cell.truth();
-    let seen = truth.camera_from_target(&cell.base_from_tip());
+    let tip = cell.base_from_tip();
+    let seen = truth.camera_from_target(&tip);
     let target = &cell.observations.target;
     let range = ViewRange::about([seen.translation().norm()].into_iter()).expect("in front of the camera");
-    let surely = |sigma_rad: f64| {
-        let spread = nalgebra::Matrix6::identity() * sigma_rad.powi(2);
-        range.shows(truth.intrinsics(), target, &seen, Some(&spread))
+    let surely = |sigma_rad: f64, doubts: f64| {
+        let covariance = nalgebra::DMatrix::identity(truth.unknowns(), truth.unknowns()) * sigma_rad.powi(2);
+        range.surely_shows(target, &truth.pixels(&tip, &covariance), doubts)
     };
-    assert!(range.shows(truth.intrinsics(), target, &seen, None));
-    assert!(surely(1e-4) && !surely(0.3));
+    assert!(range.shows(truth.intrinsics(), target, &seen));
+    assert!(surely(1e-4, 1.0) && !surely(0.3, 1.0));
+    assert!(!surely(1e-4, 1000.0), "with doubts it is not");
+}
+
+/// Where an estimate was wrong about what it was sure of, it is less sure of the next one.
+#[test]
+fn after_views_without_the_board_the_next_are_chosen_with_more_room_about_it() {
+    let mut cell = GuidedCell::new(CellSetup { free_lens: true, ..setup(CellArm::Ur5e, Mode::EyeInHand, 4) });
+    let _begun = cell.run(GuidedOptions { most_views: 5, ..options(1e-9) });
+    let calibration = cell.calibrate().expect("five good views");
+    let known = cell.known(Some(&calibration), 0.0);
+    let target = &cell.observations.target;
+    let model = ViewModel::new(&calibration, target).expect("a joint estimate");
+    let views = expected_views(&model, &used_views(&cell.observations, Some(&calibration)));
+    let design = Design::new(model.prior(), &views, nalgebra::Matrix6::identity()).expect("it is determined");
+    let mut guide = Guide::new(options(1e-9));
+    for failed in 0..4 {
+        let next = guide.next(&known, &CancelToken::default());
+        let Next::Go { plan, .. } = next else { panic!("{next:?}") };
+        let range = guide.range.expect("there was a choice");
+        let pixels = model.pixels(&plan.proposals[0].base_from_tip, design.covariance());
+        assert!(range.surely_shows(target, &pixels, 1.0 + f64::from(failed)), "after {failed}");
+        guide.failed();
+    }
+}
+
+/// An unknown lens takes two turns and one or two tilts before poses are chosen, and none of that loses the board.
+#[test]
+fn with_an_unknown_lens_poses_are_chosen_from_the_sixth_view_on_at_the_latest() {
+    for (arm, mode) in CellArm::ALL.into_iter().flat_map(|arm| [(arm, Mode::EyeInHand), (arm, Mode::EyeToHand)]) {
+        for seed in 1..4 {
+            let mut cell = GuidedCell::new(CellSetup { free_lens: true, ..setup(arm, mode, seed) });
+            let run = cell.run(GuidedOptions { most_views: 7, ..options(1e-9) });
+            let chosen = run.steps.iter().position(|step| matches!(step.why, Why::Gain { .. }));
+            assert!(chosen.is_some_and(|index| index <= 4), "{arm:?} {mode:?} {seed}: {chosen:?}");
+            assert_eq!(run.failed, 0, "{arm:?} {mode:?} {seed}");
+        }
+    }
 }
 
 /// What a plan is made from in the middle of a session.

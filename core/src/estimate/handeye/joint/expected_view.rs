@@ -10,6 +10,7 @@
 use nalgebra::{Cholesky, DMatrix, Matrix6, Vector2, Vector6};
 
 use super::chain::Chain;
+use super::expected_pixels::ExpectedPixels;
 use super::field::{HALF, RobotField, SLOPES};
 use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight, whitened};
 use super::{Free, Noise};
@@ -185,16 +186,12 @@ impl ViewModel {
         Some(ExpectedView { rows })
     }
 
-    /// How well the pose of the target in a view is foretold with shared unknowns of that covariance: covariance of the
-    /// right perturbation `[t; r]` of `camera_from_target`, m and rad. Nothing of lens, shape and the robot's field is in it.
-    pub fn pose_covariance(&self, base_from_tip: &Pose<Base, Tip>, covariance: &DMatrix<f64>) -> Matrix6<f64> {
+    /// Where the points of the target are expected in a view from a reported tip pose, with shared unknowns of that covariance.
+    pub fn pixels<'a>(&'a self, base_from_tip: &Pose<Base, Tip>, covariance: &'a DMatrix<f64>) -> ExpectedPixels<'a> {
+        let lens = if self.free.intrinsics { self.intrinsics.parameter_count() } else { 0 };
+        let field = self.field.as_ref().map(|field| (field, base_from_tip));
         let chain = self.chain(base_from_tip);
-        let mut by_links = nalgebra::SMatrix::<f64, 6, 12>::zeros();
-        by_links.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
-        by_links.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
-        let spread = Matrix6::from_diagonal(&prior_weight(&self.noise).map(f64::recip));
-        by_links * covariance.fixed_view::<12, 12>(0, 0) * by_links.transpose()
-            + chain.by_correction * spread * chain.by_correction.transpose()
+        ExpectedPixels::new(&self.intrinsics, &chain, (self.layout, lens), field, &self.noise, covariance)
     }
 }
 

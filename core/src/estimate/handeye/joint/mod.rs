@@ -26,6 +26,7 @@
 
 pub(crate) mod chain;
 mod curvature;
+mod expected_pixels;
 mod expected_view;
 pub(crate) mod field;
 mod information;
@@ -63,6 +64,7 @@ use crate::progress::{CancelToken, Stage, Work};
 use crate::targets::observation::Corner;
 
 pub use chain::{MAX_JOINTS, base_from_tip_by_joints, camera_from_target};
+pub use expected_pixels::ExpectedPixels;
 pub use expected_view::{ExpectedView, ViewModel};
 pub use field::{FIELD_VIEWS, RobotField, corrected_base_from_tip};
 pub use integrated::SmallSample;

@@ -41,7 +41,7 @@ pub fn view(
         let place = Translation3::new(0.0, 0.0, distance_m * farther);
         let pose = Isometry3::from_parts(place, tilt * roll) * Translation3::from(-centre.coords);
         let pose = Pose::from_isometry(pose);
-        range.shows(intrinsics, target, &pose, None).then_some(pose)
+        range.shows(intrinsics, target, &pose).then_some(pose)
     })
 }
 

@@ -5,12 +5,13 @@ use std::path::Path;
 use handeye_core::estimate::handeye::joint::{ExpectedView, ViewModel};
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::geometry::se3;
 use handeye_core::nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 use handeye_core::plan::guided::GuidedOptions;
 use handeye_core::plan::guided::candidates::ViewRange;
 use handeye_core::plan::guided::design::{Design, weight_about};
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
-use handeye_core::testing::guided_cell::{CellSetup, GuidedCell};
+use handeye_core::testing::guided_cell::GuidedCell;
 use handeye_core::testing::sessions::BOARD;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -30,6 +31,16 @@ const REFERENCE_POSES: &str = include_str!("../../../assets/poses/seed10.toml");
 pub struct Way {
     /// By number of views from 1 on: expected error \[m\] and time \[s\].
     pub after: Vec<(f64, f64)>,
+    /// True error of the answer from as many views as each of [`COUNTS`] has, metres; `None` where there are not so many, or no
+    /// answer.
+    pub truth_m: [Option<f64>; COUNTS.len()],
+}
+
+/// A view on a way, and when it is taken, seconds.
+struct Visit {
+    base_from_tip: Pose<Base, Tip>,
+    view: ExpectedView,
+    time_s: f64,
 }
 
 /// All ways of one session.
@@ -54,7 +65,9 @@ struct Reachable {
 
 /// What all ways of a session share.
 pub struct Bench {
-    setup: CellSetup,
+    /// Before its first view.
+    cell: GuidedCell,
+    seed: u64,
     truth: ViewModel,
     weight: Matrix6<f64>,
     pool: Vec<Reachable>,
@@ -62,22 +75,22 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new(setup: CellSetup) -> Self {
-        let cell = GuidedCell::new(setup);
+    /// Of a cell before its first view.
+    pub fn new(cell: GuidedCell, seed: u64) -> Self {
         let truth = cell.truth();
         let first_tip = cell.base_from_tip();
         let centre = truth.camera_from_target(&first_tip).isometry() * BOARD.centre();
         let weight = weight_about(&centre, &BOARD);
         let all: Vec<usize> = (0..BOARD.len()).collect();
         let range = ViewRange::about([centre.coords.norm()].into_iter()).expect("it is in front of the camera");
-        let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut pool = Vec::new();
         for _ in 0..CANDIDATES * 60 {
             if pool.len() == CANDIDATES {
                 break;
             }
             let Some(drawn) = range.draw(&mut rng, truth.intrinsics(), &BOARD) else { continue };
-            if !range.shows(truth.intrinsics(), &BOARD, &drawn, None) {
+            if !range.shows(truth.intrinsics(), &BOARD, &drawn) {
                 continue;
             }
             let base_from_tip = truth.base_from_tip(&drawn);
@@ -89,47 +102,72 @@ impl Bench {
             pool.push(Reachable { joints, base_from_tip, view });
         }
         let first = truth.expected(&first_tip, &all).expect("it is in view");
-        Self { setup, truth, weight, pool, first }
+        Self { cell, seed, truth, weight, pool, first }
     }
 
     /// All ways, from the same first view.
     pub fn ways(&self) -> Ways {
-        let cell = GuidedCell::new(self.setup);
+        let cell = &self.cell;
         let (guided, views) = self.guided();
         let first = &views[..FIRST_VIEWS.min(views.len())];
         Ways {
-            of: [guided, self.farthest(&cell), self.random(&cell), self.easy_handeye(&cell), self.reference(&cell)],
+            of: [guided, self.farthest(cell), self.random(cell), self.easy_handeye(cell), self.reference(cell)],
             optimum: COUNTS.map(|count| self.optimum(&[], count)).to_vec(),
             optimum_after: COUNTS.map(|count| self.optimum(first, count)).to_vec(),
         }
     }
 
-    /// Errors along a list of views, with the times at which they were taken.
-    fn along<'a>(&self, views: impl Iterator<Item = (&'a ExpectedView, f64)>) -> Way {
+    /// Errors along a list of views.
+    fn along(&self, visits: &[Visit]) -> Way {
         let mut design = Design::new(self.truth.prior(), [], self.weight).expect("the prior is one");
-        let after = views.map(|(view, time_s)| {
-            design = design.with(view);
-            (design.error_m(), time_s)
+        let after = visits.iter().map(|visit| {
+            design = design.with(&visit.view);
+            (design.error_m(), visit.time_s)
         });
-        Way { after: after.collect() }
+        let after = after.collect();
+        let mut cell = self.cell.clone();
+        for visit in visits {
+            // The board may be cut off by noise at the edge of the image: a view less.
+            cell.capture_at(&visit.base_from_tip);
+        }
+        Way { after, truth_m: self.truth_m(&cell) }
+    }
+
+    /// True errors of the answers from the first views of a session.
+    fn truth_m(&self, cell: &GuidedCell) -> [Option<f64>; COUNTS.len()] {
+        COUNTS.map(|count| {
+            let mut cell = cell.clone();
+            if cell.observations.views.len() < count {
+                return None;
+            }
+            cell.observations.views.truncate(count);
+            let estimated = cell.calibrate()?.hand_eye?.mount_from_camera();
+            let off = se3::log((cell.mount_from_camera.inverse() * estimated).isometry());
+            Some(off.dot(&(self.weight * off)).sqrt())
+        })
     }
 
     /// Through views of the pool, after the first one.
     fn through(&self, cell: &GuidedCell, chosen: &[usize]) -> Way {
         let mut at = cell.robot.joints;
         let mut time_s = DWELL_S;
-        let mut views = vec![(&self.first, time_s)];
+        let mut visits = vec![self.first_visit()];
         for &k in chosen {
             let next = &self.pool[k];
             time_s += cell.robot.travel_s(&at, &next.joints) + DWELL_S;
             at = next.joints;
-            views.push((&next.view, time_s));
+            visits.push(Visit { base_from_tip: next.base_from_tip, view: next.view.clone(), time_s });
         }
-        self.along(views.into_iter())
+        self.along(&visits)
+    }
+
+    /// The first view of all ways that begin with it.
+    fn first_visit(&self) -> Visit {
+        Visit { base_from_tip: self.cell.base_from_tip(), view: self.first.clone(), time_s: DWELL_S }
     }
 
     fn guided(&self) -> (Way, Vec<ExpectedView>) {
-        let mut cell = GuidedCell::new(self.setup);
+        let mut cell = self.cell.clone();
         let most = *COUNTS.last().expect("some");
         // A goal that is never reached, and gains that are always worth it: the choice alone is looked at.
         let options = GuidedOptions {
@@ -137,18 +175,19 @@ impl Bench {
             most_views: most,
             least_gain: 0.0,
             dwell_s: DWELL_S,
-            seed: self.setup.seed,
+            seed: self.seed,
             ..GuidedOptions::default()
         };
         let run = cell.run(options);
         let all: Vec<usize> = (0..BOARD.len()).collect();
-        let views: Vec<ExpectedView> = cell
-            .observations
-            .views
-            .iter()
-            .map(|view| self.truth.expected(&view.base_from_tip.expect("a robot"), &all).expect("it was seen"))
-            .collect();
-        (self.along(views.iter().zip(run.times_s.iter().copied())), views)
+        let visited = cell.observations.views.iter().zip(&run.times_s).map(|(view, &time_s)| {
+            let base_from_tip = view.base_from_tip.expect("a robot");
+            Visit { base_from_tip, view: self.truth.expected(&base_from_tip, &all).expect("it was seen"), time_s }
+        });
+        let visits: Vec<Visit> = visited.collect();
+        // What it saw itself, not the same places seen once more.
+        let way = Way { truth_m: self.truth_m(&cell), ..self.along(&visits) };
+        (way, visits.into_iter().map(|visit| visit.view).collect())
     }
 
     /// Each time the view whose rotation is farthest from all before it.
@@ -219,21 +258,21 @@ impl Bench {
     fn at(&self, cell: &GuidedCell, with_first: bool, poses: impl Iterator<Item = Pose<Base, Tip>>) -> Way {
         let all: Vec<usize> = (0..BOARD.len()).collect();
         let (mut at, mut time_s) = (cell.robot.joints, 0.0);
-        let mut views = Vec::new();
+        let mut visits = Vec::new();
         if with_first {
             time_s += DWELL_S;
-            views.push((self.first.clone(), time_s));
+            visits.push(self.first_visit());
         }
-        for pose in poses {
-            let seen = self.is_seen(&pose);
-            let joints = cell.robot.arm.reach(&pose, &at);
-            if let (true, Some(joints), Some(view)) = (seen, joints, self.truth.expected(&pose, &all)) {
+        for base_from_tip in poses {
+            let seen = self.is_seen(&base_from_tip);
+            let joints = cell.robot.arm.reach(&base_from_tip, &at);
+            if let (true, Some(joints), Some(view)) = (seen, joints, self.truth.expected(&base_from_tip, &all)) {
                 time_s += cell.robot.travel_s(&at, &joints) + DWELL_S;
                 at = joints;
-                views.push((view, time_s));
+                visits.push(Visit { base_from_tip, view, time_s });
             }
         }
-        self.along(views.iter().map(|(view, time_s)| (view, *time_s)))
+        self.along(&visits)
     }
 
     /// Whether all corners are in the image.

@@ -1,24 +1,29 @@
 //! Guided capture against other ways to choose poses, and whether it is honest when it stops.
 //!
 //! ```text
-//! cargo run --release -p handeye_core --example guided_capture -- choice 200
-//! cargo run --release -p handeye_core --example guided_capture -- stop 1000
-//! cargo run --release -p handeye_core --example guided_capture -- speed 20
-//! cargo run --release -p handeye_core --example guided_capture -- hand 100
-//! cargo run --release -p handeye_core --example guided_capture -- straight 6
+//! cargo run --release -p handeye_sim_link --example guided_capture -- choice 200
+//! cargo run --release -p handeye_sim_link --example guided_capture -- scenes 200
+//! cargo run --release -p handeye_sim_link --example guided_capture -- stop 1000
+//! cargo run --release -p handeye_sim_link --example guided_capture -- speed 20
+//! cargo run --release -p handeye_sim_link --example guided_capture -- hand 100
+//! cargo run --release -p handeye_sim_link --example guided_capture -- straight 6
 //! ```
 //!
 //! `choice`: the expected error of the tip over the box about the board, by the true model and the poses that were taken, in
 //! sessions that begin with one view of the board. Farthest rotation and random views know from the beginning where camera
 //! and board are; guided capture does not. The optimum is the best set of so many views out of the same thousand, by
-//! exchange, once of all and once of those that begin with the first three views of guided capture. `stop`: what is true when guided capture ends by itself; a word behind the number picks rows. `speed`: how long the choice of a pose takes, on one
-//! thread, with a thousand candidates and six poses ahead. `hand`: a robot that a person moves. `straight`: the first poses
+//! exchange, once of all and once of those that begin with the first three views of guided capture. And the true error of the
+//! answers. `scenes`: the same in the scenes of the cell, each arm in the reference and in the realistic one, with the camera
+//! where the scene has it, and with camera and board changed over. `stop`: what is true when guided capture ends by itself. A
+//! word behind the number picks rows of both. `speed`: how long the choice of a pose takes, on one thread, with a thousand
+//! candidates and six poses ahead. `hand`: a robot that a person moves. `straight`: the first poses
 //! where small turns determine no lens.
 
 #![expect(clippy::expect_used, clippy::print_stdout, reason = "a study prints, and stops at what cannot be")]
 
 mod bench;
 mod choice;
+mod scenes;
 mod stop;
 
 use std::env;
@@ -42,11 +47,12 @@ fn main() {
     let sessions: u64 = args.next().map_or(200, |n| n.parse().expect("a number of sessions"));
     match what.as_str() {
         "choice" => choice::choice(sessions),
+        "scenes" => choice::in_scenes(sessions, &args.next().unwrap_or_default()),
         "stop" => stop::stop(sessions, &args.next().unwrap_or_default()),
         "speed" => speed(sessions),
         "hand" => by_hand(sessions),
         "straight" => straight(sessions),
-        other => println!("{other:?} is none of choice, stop, speed, hand, straight"),
+        other => println!("{other:?} is none of choice, scenes, stop, speed, hand, straight"),
     }
 }
 

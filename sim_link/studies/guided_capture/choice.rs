@@ -1,38 +1,73 @@
 //! How good poses are that are chosen in different ways.
 
-use handeye_core::testing::guided_cell::{CellSetup, Untold};
+use handeye_core::testing::guided_cell::{CellSetup, GuidedCell, Untold};
 use handeye_core::testing::sessions::REALISTIC;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use super::bench::{Bench, NAMES, Way, Ways};
+use super::scenes::{self, CellFaults};
 use super::{COUNTS, SETUPS};
 
 /// Times at which the error is compared, seconds.
 const TIMES_S: [f64; 6] = [15.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 
+/// Among places of the study's own.
 pub fn choice(sessions: u64) {
-    println!("expected error in mm, mean (90th percentile) of {sessions} sessions; lens known, 0.1 px, 0.1 mm, 0.02°");
+    println!("errors in mm, mean (90th percentile) of {sessions} sessions; lens known, 0.1 px, 0.1 mm, 0.02°");
     for (arm, mode) in SETUPS {
-        println!("\n{arm:?}, {mode:?}");
-        let all: Vec<Ways> = (0..sessions)
-            .into_par_iter()
-            .map(|seed| {
-                Bench::new(CellSetup {
-                    arm,
-                    mode,
-                    noise: REALISTIC,
-                    free_lens: false,
-                    straight: None,
-                    untold: Untold::NOTHING,
-                    seed,
-                })
-                .ways()
+        let cell = |seed| {
+            GuidedCell::new(CellSetup {
+                arm,
+                mode,
+                noise: REALISTIC,
+                free_lens: false,
+                straight: None,
+                untold: Untold::NOTHING,
+                seed,
             })
-            .collect();
-        by_views(&all);
-        by_time(&all);
-        with_all(&all);
-        against_random(&all);
+        };
+        compare(&format!("{arm:?}, {mode:?}"), sessions, cell);
+    }
+}
+
+/// In the scenes of the cell, with a lens that is estimated.
+pub fn in_scenes(sessions: u64, only: &str) {
+    println!("errors in mm, mean (90th percentile) of {sessions} sessions; lens estimated");
+    for faults in CellFaults::ALL {
+        for (arm, mode) in SETUPS {
+            let name = format!("{faults:?}, {arm:?}, {mode:?}");
+            if name.contains(only) {
+                compare(&name, sessions, |seed| scenes::cell(faults, arm, mode, seed));
+            }
+        }
+    }
+}
+
+fn compare(name: &str, sessions: u64, cell: impl Fn(u64) -> GuidedCell + Sync) {
+    println!("\n{name}");
+    let of_session = |seed| Bench::new(cell(seed), seed).ways();
+    let all: Vec<Ways> = (0..sessions).into_par_iter().map(of_session).collect();
+    by_views(&all);
+    true_errors(&all);
+    by_time(&all);
+    with_all(&all);
+    against_random(&all);
+}
+
+/// What the answers are off by, where there are answers.
+fn true_errors(all: &[Ways]) {
+    println!("true error");
+    for (k, name) in NAMES.into_iter().enumerate() {
+        let at = |place: usize| {
+            let known: Vec<f64> = all.iter().filter_map(|ways| Some(ways.of[k].truth_m[place]? * 1e3)).collect();
+            let some = if known.len() < all.len() && !known.is_empty() {
+                format!(" of {}", known.len())
+            } else {
+                String::new()
+            };
+            format!("{}{some}", spread(known))
+        };
+        println!("{name:22}{}", [0, 1, 2, 3, 4, 5].map(at).concat());
     }
 }
 
