@@ -5,6 +5,7 @@ use handeye_core::estimate::handeye::motion::MIN_VIEWS;
 use handeye_core::project::session::Role;
 
 use super::status::STALE_AFTER_S;
+use crate::gui::style::numbers;
 use crate::model::{Model, Step};
 use crate::text;
 use crate::text::Text;
@@ -167,7 +168,7 @@ fn solve(facts: &Facts) -> (StepState, Text) {
         (true, ..) => (StepState::Now, text!("At work…")),
         (false, false, _) => (StepState::Now, text!("Ready to solve")),
         (false, true, Some(error_m)) => {
-            (StepState::Done, text!("±{error} mm (95 %)", error = format!("{:.2}", error_m * 1e3)))
+            (StepState::Done, text!("±{error} mm (95 %)", error = numbers::error_mm(error_m)))
         }
         (false, true, None) => (StepState::Done, text!("Solved")),
     }

@@ -21,6 +21,12 @@ pub fn row(values: &[f64], decimals: usize, width: usize) -> String {
     values.iter().map(|&value| fixed(value, decimals, width)).collect::<Vec<_>>().join(&between)
 }
 
+/// An error in millimetres: hundredths, and thousandths of what is below a tenth.
+pub fn error_mm(metres: f64) -> String {
+    let mm = metres * 1e3;
+    if mm < 0.1 { format!("{mm:.3}") } else { format!("{mm:.2}") }
+}
+
 /// Translation in millimetres.
 pub fn translation_mm<Src>(pose: &Pose<Base, Src>) -> String {
     let translation = pose.translation() * 1e3;
@@ -54,6 +60,11 @@ mod tests {
         assert_eq!(plain(&fixed(-12.34, 1, 7)), "  −12.3");
         assert_eq!(plain(&fixed(-0.001, 1, 5)), "  0.0", "no negative zero");
         assert_eq!(fixed(123456.0, 1, 3), "123456.0", "never cut");
+    }
+
+    #[test]
+    fn a_small_error_does_not_look_like_none() {
+        assert_eq!([4e-6, 4.2e-4, 1.5e-3].map(error_mm), ["0.004", "0.42", "1.50"]);
     }
 
     #[test]

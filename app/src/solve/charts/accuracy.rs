@@ -7,6 +7,7 @@ use handeye_core::estimate::handeye::joint::prediction::{ErrorCurve, ErrorPoint}
 use super::axes::{self, Scale};
 use super::instead_ui;
 use crate::gui::style::marks::Marks;
+use crate::gui::style::numbers;
 use crate::gui::style::theme::{CAPTION, Palette};
 use crate::model::{CapturePurpose, Model};
 use crate::text::{Language, Text};
@@ -37,7 +38,7 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
 
 /// Where we are and what the goal takes.
 pub fn verdict(curve: &ErrorCurve, (views, error_m): (usize, f64), goal_mm: f64) -> Text {
-    let (error, goal) = (format!("{:.2}", error_m * 1e3), format!("{goal_mm:.2}"));
+    let (error, goal) = (numbers::error_mm(error_m), format!("{goal_mm:.2}"));
     if error_m * 1e3 <= goal_mm {
         return text!(
             "{error} mm (95 %) with {views} poses: the goal of {goal} mm is reached",
@@ -140,7 +141,7 @@ impl Chart {
         }
         painter.circle_filled(here, 5.0, colour);
         painter.circle_stroke(here, 5.0, Stroke::new(1.5, palette.card));
-        let words = text!("Now {error} mm", error = format!("{:.2}", now.1 * 1e3)).say(language);
+        let words = text!("Now {error} mm", error = numbers::error_mm(now.1)).say(language);
         let at = here + egui::vec2(7.0, -7.0);
         painter.text(at, Align2::LEFT_BOTTOM, words, FontId::proportional(CAPTION), palette.text);
     }
