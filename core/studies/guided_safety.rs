@@ -14,8 +14,7 @@ use std::env;
 
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::testing::clutter::{Tally, session};
-use handeye_core::testing::guided_cell::{CellArm, CellSetup, Untold};
-use handeye_core::testing::sessions::REALISTIC;
+use handeye_core::testing::guided_cell::{CellArm, CellSetup};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 /// Views of a session.
@@ -51,5 +50,5 @@ fn row(name: &str, moves: usize, is_known: bool, free_lens: bool) {
 fn setup(seed: u64, free_lens: bool) -> CellSetup {
     let arm = CellArm::ALL[(seed % 3) as usize];
     let mode = if (seed / 3).is_multiple_of(2) { Mode::EyeInHand } else { Mode::EyeToHand };
-    CellSetup { arm, mode, noise: REALISTIC, free_lens, straight: None, untold: Untold::NOTHING, seed }
+    CellSetup { free_lens, ..CellSetup::new(arm, mode, seed) }
 }

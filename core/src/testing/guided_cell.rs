@@ -5,7 +5,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::arms;
-use super::sessions::{BOARD, camera, noise_twist, reported, seen};
+use super::sessions::{BOARD, REALISTIC, camera, noise_twist, reported, seen};
 use crate::diagnose::doctor;
 use crate::diagnose::findings::FindingOptions;
 use crate::estimate::handeye::joint::chain::correction_transform;
@@ -74,6 +74,13 @@ pub struct CellSetup {
     pub untold: Untold,
     /// Seed of places and noise.
     pub seed: u64,
+}
+
+impl CellSetup {
+    /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and all as it is said to be.
+    pub fn new(arm: CellArm, mode: Mode, seed: u64) -> Self {
+        Self { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: Untold::NOTHING, seed }
+    }
 }
 
 /// What a guide is not told, and what its estimate has to find out.

@@ -15,7 +15,7 @@ use handeye_core::plan::guided::GuidedOptions;
 use handeye_core::progress::CancelToken;
 use handeye_core::testing::faulty::{self, Fault, Setup, session};
 use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
-use handeye_core::testing::sessions::{GRID, REALISTIC, camera};
+use handeye_core::testing::sessions::{GRID, camera};
 use handeye_core::wording::Catalogue;
 
 use handeye_core::targets::TargetSpec;
@@ -110,7 +110,7 @@ fn the_error_beside_a_lens_that_was_given_wrongly_is_that_of_the_answer() {
     for seed in 1000..1006 {
         let untold = Untold { focal: 0.99, ..Untold::NOTHING };
         let (arm, mode) = (CellArm::ALL[seed as usize % 3], Mode::EyeInHand);
-        let setup = CellSetup { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold, seed };
+        let setup = CellSetup { untold, ..CellSetup::new(arm, mode, seed) };
         let options = GuidedOptions { goal_m: 5e-4, candidates: 300, most_views: 18, ..GuidedOptions::default() };
         let run = GuidedCell::new(setup).run(options);
         let (views, stated_m, true_m) = *run.history.last().expect("one cause explains it");

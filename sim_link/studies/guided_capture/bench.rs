@@ -4,15 +4,16 @@ use std::path::Path;
 
 use handeye_core::estimate::handeye::joint::{ExpectedView, ViewModel};
 use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3;
-use handeye_core::nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
+use handeye_core::nalgebra::{Matrix6, Point3, UnitQuaternion, Vector3};
 use handeye_core::plan::guided::GuidedOptions;
 use handeye_core::plan::guided::candidates::ViewRange;
 use handeye_core::plan::guided::design::{Design, weight_about};
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_core::testing::guided_cell::GuidedCell;
 use handeye_core::testing::sessions::BOARD;
+use handeye_sim_link::cell::scene::Scene;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
@@ -237,21 +238,12 @@ impl Bench {
     /// camera's image and that this arm gets to. Somebody has taught them, so that no first view comes before.
     fn reference(&self, cell: &GuidedCell) -> Way {
         let taught = TaughtPoses::parse(Path::new("seed10.toml"), REFERENCE_POSES).expect("a file of this project");
-        let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
-        let tip_from_camera = Isometry3::from_parts(Translation3::new(0.05, 0.0, 0.0), quarter);
-        let base_from_target = reference_board();
+        let scene = Scene::reference().and_then(|scene| scene.resolve(scene.seed)).expect("a scene of this project");
         let views = taught.poses.iter().filter_map(|pose| match &pose.goal {
-            Goal::Tip(base_from_tip) => Some((base_from_tip.isometry() * tip_from_camera).inverse() * base_from_target),
+            Goal::Tip(base_from_tip) => Some(scene.camera_from_target(base_from_tip)),
             Goal::Joints(_) => None,
         });
-        self.at(
-            cell,
-            false,
-            views.map(|view| {
-                let view: Pose<Camera, Target> = Pose::from_isometry(view);
-                self.truth.base_from_tip(&view)
-            }),
-        )
+        self.at(cell, false, views.map(|view| self.truth.base_from_tip(&view)))
     }
 
     /// Through tip poses that nobody has checked: those that show the board and that the arm gets to.
@@ -318,15 +310,4 @@ impl Bench {
         }
         now_m
     }
-}
-
-/// The board of the reference scene in its base: the sheet stands upright, its first corner at the top of the printed side.
-fn reference_board() -> Isometry3<f64> {
-    let plane = Pose::<Base, Target>::from_translation_xyzw(
-        [-0.125, -0.4, 0.802],
-        [0.0, std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2, 0.0],
-    );
-    // z of a target points into the board and y along its rows, those of the sheet out of it and against them.
-    let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    plane.isometry() * turned * Translation3::from(-BOARD.centre().coords)
 }

@@ -1,7 +1,6 @@
 //! How good poses are that are chosen in different ways.
 
-use handeye_core::testing::guided_cell::{CellSetup, GuidedCell, Untold};
-use handeye_core::testing::sessions::REALISTIC;
+use handeye_core::testing::guided_cell::{CellSetup, GuidedCell};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use super::bench::{Bench, NAMES, Way, Ways};
@@ -15,17 +14,7 @@ const TIMES_S: [f64; 6] = [15.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 pub fn choice(sessions: u64) {
     println!("errors in mm, mean (90th percentile) of {sessions} sessions; lens known, 0.1 px, 0.1 mm, 0.02°");
     for (arm, mode) in SETUPS {
-        let cell = |seed| {
-            GuidedCell::new(CellSetup {
-                arm,
-                mode,
-                noise: REALISTIC,
-                free_lens: false,
-                straight: None,
-                untold: Untold::NOTHING,
-                seed,
-            })
-        };
+        let cell = |seed| GuidedCell::new(CellSetup::new(arm, mode, seed));
         compare(&format!("{arm:?}, {mode:?}"), sessions, cell);
     }
 }

@@ -33,9 +33,8 @@ use handeye_core::estimate::handeye::Mode;
 use handeye_core::plan::guided::by_hand::{HandGuide, HandNext};
 use handeye_core::plan::guided::{Ending, Guide, GuidedOptions};
 use handeye_core::progress::CancelToken;
-use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
+use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
 use handeye_core::testing::hand;
-use handeye_core::testing::sessions::REALISTIC;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 /// Numbers of views that are compared.
@@ -66,15 +65,7 @@ fn by_hand(sessions: u64) {
         let (mut took_s, mut refused, mut skipped) = (Vec::new(), 0, 0);
         let (mut stated_mm, mut below, mut solved) = (0.0, 0, 0);
         for seed in 0..sessions {
-            let setup = CellSetup {
-                arm: CellArm::Ur5e,
-                mode,
-                noise: REALISTIC,
-                free_lens: false,
-                straight: None,
-                untold: Untold::NOTHING,
-                seed,
-            };
+            let setup = CellSetup::new(CellArm::Ur5e, mode, seed);
             let mut cell = GuidedCell::new(setup);
             let run = hand::session(&mut cell, GuidedOptions { goal_m: 1e-9, ..GuidedOptions::default() }, 10, seed);
             took_s.extend(run.took_s);
@@ -111,15 +102,8 @@ fn straight(sessions: u64) {
                 .collect::<Vec<_>>()
                 .into_par_iter()
                 .map(|(arm, seed)| {
-                    let setup = CellSetup {
-                        arm,
-                        mode,
-                        noise: REALISTIC,
-                        free_lens: true,
-                        straight: Some(focal_px),
-                        untold: Untold::NOTHING,
-                        seed: 21 + seed,
-                    };
+                    let setup =
+                        CellSetup { free_lens: true, straight: Some(focal_px), ..CellSetup::new(arm, mode, 21 + seed) };
                     let run = GuidedCell::new(setup).run(GuidedOptions { goal_m: 1.5e-3, ..GuidedOptions::default() });
                     (matches!(run.ending, Ending::GoalReached { .. }), run.failed)
                 })
@@ -146,15 +130,7 @@ fn speed(sessions: u64) {
         for free_lens in [false, true] {
             let mut times: Vec<f64> = (0..sessions)
                 .map(|seed| {
-                    let mut cell = GuidedCell::new(CellSetup {
-                        arm,
-                        mode,
-                        noise: REALISTIC,
-                        free_lens,
-                        straight: None,
-                        untold: Untold::NOTHING,
-                        seed,
-                    });
+                    let mut cell = GuidedCell::new(CellSetup { free_lens, ..CellSetup::new(arm, mode, seed) });
                     let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
                     let calibration = cell.calibrate();
                     let known = cell.known(calibration.as_ref(), 0.0);
@@ -178,15 +154,7 @@ fn speed(sessions: u64) {
 fn looks(arm: CellArm, mode: Mode, sessions: u64) {
     let mut times: Vec<f64> = Vec::new();
     for seed in 0..sessions {
-        let mut cell = GuidedCell::new(CellSetup {
-            arm,
-            mode,
-            noise: REALISTIC,
-            free_lens: false,
-            straight: None,
-            untold: Untold::NOTHING,
-            seed,
-        });
+        let mut cell = GuidedCell::new(CellSetup::new(arm, mode, seed));
         let _ended = cell.run(GuidedOptions { goal_m: 0.0, most_views: 10, ..GuidedOptions::default() });
         let calibration = cell.calibrate();
         let truth = cell.truth();

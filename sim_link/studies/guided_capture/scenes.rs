@@ -8,7 +8,7 @@ use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_core::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use handeye_core::plan::{Arm, Obstacle, Surroundings, ViewSetup};
-use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Places, Untold};
+use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Places};
 use handeye_core::testing::sessions::BOARD;
 use handeye_sim_link::cell::scene::{BoardSpec, RelativeTo, RobotSpec, Scene, ShippedScene};
 use rand::{RngExt as _, SeedableRng as _};
@@ -62,8 +62,7 @@ impl CellFaults {
 pub fn cell(faults: CellFaults, arm: CellArm, mode: Mode, seed: u64) -> GuidedCell {
     let scene = faults.scene(arm);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let setup =
-        CellSetup { arm, mode, noise: faults.noise(), free_lens: true, straight: None, untold: Untold::NOTHING, seed };
+    let setup = CellSetup { noise: faults.noise(), free_lens: true, ..CellSetup::new(arm, mode, seed) };
     (0..1000)
         .find_map(|_| {
             let views = ViewSetup::from(&scene.resolve(rng.random()).expect("a scene of this project"));

@@ -38,16 +38,8 @@ pub fn stop(sessions: u64, only: &str) {
                 .into_par_iter()
                 .map(|seed| {
                     let arm = CellArm::ALL[seed as usize % 3];
-                    GuidedCell::new(CellSetup {
-                        arm,
-                        mode,
-                        noise,
-                        free_lens,
-                        straight: None,
-                        untold,
-                        seed: 1000 + seed,
-                    })
-                    .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
+                    GuidedCell::new(CellSetup { noise, free_lens, untold, ..CellSetup::new(arm, mode, 1000 + seed) })
+                        .run(GuidedOptions { goal_m, seed, ..GuidedOptions::default() })
                 })
                 .collect();
             // Of those whose last answer states an error.

@@ -6,8 +6,8 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::testing::sessions::{BOARD, REALISTIC, camera, trial};
 
-/// Where a model has the middle of the board in a view.
-fn middle(model: &ViewModel, base_from_tip: &Pose<Base, Tip>, point: &Point3<f64>) -> nalgebra::Vector2<f64> {
+/// Where a model has a point of the board in a view.
+fn pixel(model: &ViewModel, base_from_tip: &Pose<Base, Tip>, point: &Point3<f64>) -> nalgebra::Vector2<f64> {
     let seen = model.camera_from_target(base_from_tip).isometry() * point;
     model.intrinsics().project(&seen).expect("in front of the camera")
 }
@@ -44,7 +44,7 @@ fn a_pixel_is_as_unsure_as_it_moves_with_what_is_unsure() {
                     model(&links, &trial.intrinsics.with_parameters(&parameters))
                 }
             };
-            let way = (middle(&moved, &base_from_tip, &point) - px).abs();
+            let way = (pixel(&moved, &base_from_tip, &point) - px).abs();
             assert!((way - sigma_px).norm() < 1e-3 * way.norm().max(1e-9), "{mode:?} {unknown}: {way} {sigma_px}");
         }
     }

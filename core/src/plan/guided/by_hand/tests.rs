@@ -1,23 +1,14 @@
 use super::*;
 use crate::estimate::handeye::Mode;
-use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
+use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
 use crate::testing::hand;
-use crate::testing::sessions::REALISTIC;
 
 fn options() -> GuidedOptions {
     GuidedOptions { goal_m: 1e-9, candidates: 300, ..GuidedOptions::default() }
 }
 
 fn cell(mode: Mode, seed: u64, free_lens: bool) -> GuidedCell {
-    GuidedCell::new(CellSetup {
-        arm: CellArm::Ur5e,
-        mode,
-        noise: REALISTIC,
-        free_lens,
-        straight: None,
-        untold: Untold::NOTHING,
-        seed,
-    })
+    GuidedCell::new(CellSetup { free_lens, ..CellSetup::new(CellArm::Ur5e, mode, seed) })
 }
 
 #[test]
