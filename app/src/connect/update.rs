@@ -7,7 +7,7 @@ use handeye_sim_link::client::cell::CellPaths;
 
 use crate::app::App;
 use crate::connect::server_name;
-use crate::model::{BoardMotion, CellFacts, CellSource, Home, Link, LinkState, Motion, Severity, Trail};
+use crate::model::{ArmDoubt, BoardMotion, CellFacts, CellSource, Home, Link, LinkState, Motion, Severity, Trail};
 use crate::text::Text;
 use crate::worker::{CameraTask, ControlTask, Request, Workers};
 use crate::{shortfall, text};
@@ -119,7 +119,27 @@ impl App {
         if let Some(shortfall) = shortfall::of(facts.support, facts.arm.is_some()) {
             self.say(Severity::Warning, shortfall);
         }
+        let doubted = self.model.cell.as_ref().and_then(|before| before.arm_doubt);
+        match facts.arm_doubt {
+            Some(ArmDoubt::Foreign { distance_m, angle_rad }) => self.say(
+                Severity::Warning,
+                text!(
+                    "By its joints the tip of the robot is {distance} mm and {angle}° from where its driver reports it, so its chain of \
+                     joints is not driven by. Look at arm and base_from_arm of the driver and at the tool that is set on the controller, \
+                     and connect again",
+                    distance = format!("{:.1}", distance_m * 1e3),
+                    angle = format!("{:.2}", angle_rad.to_degrees())
+                ),
+            ),
+            None if doubted.is_some() && facts.arm.is_some() => self.say(
+                Severity::Info,
+                text!("Joints and poses of the robot belong together: Calibrate for me can drive it, once it is allowed to"),
+            ),
+            _ => {}
+        }
         self.model.cell = Some(facts);
+        // Where the arm is known it keeps out of boxes.
+        self.send_keep_out();
         self.prepare_session();
         self.send_intrinsics();
     }

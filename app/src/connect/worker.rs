@@ -122,7 +122,7 @@ impl Duty for Control {
 
     fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
         self.stop_if_pressed(port.as_mut(), outlet)?;
-        if std::mem::take(&mut self.owes_facts) {
+        if std::mem::take(&mut self.owes_facts) || port.facts_differ() {
             outlet.report(Event::Cell(Box::new(port.facts()?)));
         }
         for (severity, words) in port.heard() {

@@ -8,15 +8,15 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::marks::Marks;
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
-use crate::model::{Model, Motion, Moves, Pane, PoseSequence};
+use crate::model::{Model, Motion, Pane, PoseSequence};
+use crate::motion::pane::unknown_arm;
 use crate::taught::pane::immovable;
 use crate::text::Text;
 use crate::{text, tr};
 
 /// The button, where nothing is under way.
 pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, height: f32, outbox: &mut Outbox) {
-    if model.moves() != Moves::Freely {
-        // Behind a driver nobody knows where the chain of the arm stands.
+    if !model.takes_chosen_poses() {
         return;
     }
     let language = model.view.language;
@@ -44,8 +44,8 @@ fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static st
     let language = model.view.language;
     if let Some(why) = hindrance.or_else(|| immovable(model)) {
         Some(why)
-    } else if model.cell.as_ref().is_none_or(|cell| cell.arm.is_none()) {
-        Some(tr!(language, "This arm's kinematics is not known, so no poses can be chosen: move it yourself"))
+    } else if let Some(why) = unknown_arm(model) {
+        Some(why)
     } else if model.motion != Motion::Idle {
         Some(tr!(language, "The arm is moving: wait until it stands, or stop it"))
     } else if model.board_seen_s.is_none() && model.document().captures.is_empty() {

@@ -6,11 +6,13 @@ use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    self, BoxState, CapturePurpose, CellSource, Jog, Model, Motion, PoseSequence, StopOutcome, WorkBox,
+    self, ArmDoubt, BoxState, CapturePurpose, CellFacts, CellSource, Jog, Model, Motion, Moves, PoseSequence,
+    StopOutcome, WorkBox,
 };
 use crate::text::Language;
 
 const BUTTON: &str = "Calibrate for me";
+const FOREIGN: ArmDoubt = ArmDoubt::Foreign { distance_m: 0.074, angle_rad: 0.1 };
 
 fn pane(model: Model) -> Driven {
     Driven::new(
@@ -66,6 +68,24 @@ fn it_is_offered_where_it_can_begin() {
     let mut unseen = sample::connected();
     unseen.board_seen_s = None;
     assert!(!self::pane(unseen).is_enabled(BUTTON), "there is no board to begin with");
+}
+
+#[test]
+fn behind_a_driver_it_is_offered_where_the_chain_of_joints_is_named_and_can_begin_where_that_is_known() {
+    let behind = |change: fn(&mut CellFacts)| {
+        let mut model = ready();
+        let cell = model.cell.as_mut().expect("connected");
+        cell.moves = Moves::OnceArmed { joints: true, tip: true };
+        change(cell);
+        self::pane(model)
+    };
+    assert_eq!(behind(|_| ()).click(BUTTON), [Command::CalibrateForMe]);
+    let open = behind(|cell| (cell.arm, cell.arm_doubt) = (None, Some(ArmDoubt::Open)));
+    assert!(!open.is_enabled(BUTTON) && open.nothing_is_cut_off());
+    assert!(!behind(|cell| (cell.arm, cell.arm_doubt) = (None, Some(FOREIGN))).is_enabled(BUTTON));
+    assert!(!behind(|cell| cell.arm = None).sees(BUTTON), "no chain is named");
+    assert!(!behind(|cell| cell.moves = Moves::OnceArmed { joints: false, tip: true }).sees(BUTTON));
+    assert!(!behind(|cell| cell.moves = Moves::Never).sees(BUTTON));
 }
 
 #[test]

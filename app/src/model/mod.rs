@@ -35,8 +35,8 @@ pub use crate::live::state::{
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{
-    Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal, MotionId, MotionOutcome,
-    MotionRequest, Moves, Truth,
+    ArmDoubt, Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal, MotionId,
+    MotionOutcome, MotionRequest, Moves, Truth,
 };
 pub use crate::rerun_log::state::{RerunState, ViewerState};
 pub use crate::session::state::{
@@ -527,6 +527,17 @@ impl Model {
     /// How the arm may be moved; freely as long as that is not known.
     pub fn moves(&self) -> Moves {
         self.cell.as_ref().map_or(Moves::Freely, |cell| cell.moves)
+    }
+
+    /// Whether the program may choose poses and drive the arm to them, once its chain of joints is known.
+    pub fn takes_chosen_poses(&self) -> bool {
+        match self.moves() {
+            Moves::Freely => true,
+            Moves::OnceArmed { joints, .. } => {
+                joints && self.cell.as_ref().is_some_and(|cell| cell.arm.is_some() || cell.arm_doubt.is_some())
+            }
+            Moves::Never => false,
+        }
     }
 
     /// Whether the arm may be moved, as far as a person has to allow it.

@@ -17,7 +17,7 @@ use crate::worker::port::{JogRequest, MotionPort, PortError, Room, ViewsRequest}
 use crate::{limits, text};
 
 /// Seed of the views that are compared for a plan: the same question gets the same plan.
-const VIEWS_SEED: u64 = 1;
+pub(crate) const VIEWS_SEED: u64 = 1;
 
 /// A connection that moves the arm.
 pub(crate) struct LiveMotion {
@@ -207,7 +207,7 @@ impl MotionPort for LiveMotion {
 }
 
 /// Why no poses can be planned.
-fn no_views(why: &PlanError) -> Text {
+pub(crate) fn no_views(why: &PlanError) -> Text {
     match why {
         PlanError::StartBlocked { by } => {
             text!("Where it stands the arm is {there}: move it into free space first", there = by.here())
@@ -358,7 +358,7 @@ fn obstacle_text(obstacle: &JogObstacle) -> Text {
 }
 
 /// What the arm would come too near to.
-fn contact_text(contact: &Contact) -> Text {
+pub(crate) fn contact_text(contact: &Contact) -> Text {
     match contact {
         Contact::Box { name } => {
             text!("The arm, or what it carries, would come too near to “{name}”: go another way", name = name)

@@ -19,6 +19,9 @@ pub struct CellFacts {
     /// The arm as it was measured. Where that is not known, goals are not checked before anything moves, and it is not
     /// drawn.
     pub arm: Option<ArmKinematics>,
+    /// Why that is not known of a chain of joints that a driver names.
+    #[serde(default)]
+    pub arm_doubt: Option<ArmDoubt>,
     /// What works with the server's version.
     pub support: Support,
     /// What a simulated cell publishes for comparison; never read by a solver.
@@ -29,6 +32,20 @@ pub struct CellFacts {
     pub moves: Moves,
     /// Whether a person types the pose of the robot, because nothing reports it.
     pub poses_are_typed: bool,
+}
+
+/// Why the chain of joints that a driver names is not driven by.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum ArmDoubt {
+    /// The arm has not stood at enough places to tell where the chain stands and what tool it carries.
+    Open,
+    /// By the joints the tip or the flange is not where the driver reports it.
+    Foreign {
+        /// So far from there \[m\].
+        distance_m: f64,
+        /// And turned by so much \[rad\].
+        angle_rad: f64,
+    },
 }
 
 /// How an arm may be moved from the workbench.
@@ -54,6 +71,7 @@ impl CellFacts {
             joints: info.joints.iter().map(JointFacts::from).collect(),
             nominal_intrinsics: Some(info.camera_intrinsics_nominal()),
             arm: arm.cloned(),
+            arm_doubt: None,
             support: info.support(),
             truth: truth.map(Truth::from),
             has_depth: true,

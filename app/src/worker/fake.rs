@@ -178,6 +178,7 @@ impl ControlPort for FakeCell {
             nominal_intrinsics: Some(Intrinsics::pinhole(width, height, 60.0)),
             arm: ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges())
                 .ok(),
+            arm_doubt: None,
             support: Support::Whole,
             truth: None,
             has_depth: true,

@@ -89,11 +89,16 @@ pub trait Connector: Send + Sync {
 
 /// The robot and the simulation.
 pub trait ControlPort: Send {
-    /// What does not change while the connection lasts.
+    /// What does not change while the connection lasts, or hardly.
     ///
     /// # Errors
     /// [`PortError`].
     fn facts(&mut self) -> Result<CellFacts, PortError>;
+
+    /// Whether the facts are others than when they were asked for last.
+    fn facts_differ(&mut self) -> bool {
+        false
+    }
 
     /// Reads the robot; `None` while nothing is known of it.
     ///

@@ -19,6 +19,7 @@ use super::link::Link;
 use super::log::LogLine;
 use super::message::{Ability, DepthMessage, Hello, ImageMessage, PROTOCOL, ToDriver};
 use super::options::DriverOptions;
+use super::placement::ChainPlacement;
 use super::shared::{FrameRequest, Inner, QUEUE, Shared};
 use super::spec::DriverSpec;
 use super::states::{NoPose, Reading, RobotAt};
@@ -131,6 +132,11 @@ impl Driver {
     /// The chain of its joints, where it says which.
     pub fn chain(&self) -> Option<&Arm> {
         self.owner.arm.as_deref()
+    }
+
+    /// Where that stands and what tool it carries, as far as its states tell.
+    pub fn chain_placement(&self) -> ChainPlacement {
+        self.owner.shared.lock().chain.placement().clone()
     }
 
     /// The clock that its stamps are related to.
@@ -327,6 +333,7 @@ fn no_hello() -> Hello {
         can: Vec::new(),
         joints: Vec::new(),
         arm: None,
+        base_from_arm: None,
         camera: None,
         depth_limits_m: None,
     }

@@ -13,6 +13,7 @@ use super::message::{
     Ability, AnswerMessage, DepthMessage, FromDriver, Hello, ImageMessage, LogLevel, LogMessage, PongMessage,
     StateMessage,
 };
+use super::placement::ChainWatch;
 use super::states::{Reading, States};
 use super::wire::WireProblem;
 
@@ -95,6 +96,8 @@ pub struct Trial {
 pub struct Inner {
     pub hello: Option<Arc<Hello>>,
     pub arm: Option<Arc<Arm>>,
+    /// What its states say of it.
+    pub chain: ChainWatch,
     /// Why it is over.
     pub ending: Option<Ending>,
     pub read_up: ReadUp,
@@ -173,7 +176,10 @@ impl Inner {
         if self.hello.is_some() {
             return Err(misplaced("a second hello"));
         }
-        self.arm = chain::arm_of(&hello).map_err(|why| misplaced(format!("arm: {why}")))?.map(Arc::new);
+        let wrong = |why| misplaced(format!("arm: {why}"));
+        let arm = chain::arm_of(&hello).map_err(wrong)?;
+        self.chain = ChainWatch::new(&hello, arm.as_ref()).map_err(wrong)?;
+        self.arm = arm.map(|arm| Arc::new(self.chain.standing(arm)));
         self.hello = Some(Arc::new(hello));
         self.last_heard_s = arrived_s;
         Ok(())
@@ -200,6 +206,7 @@ impl Inner {
         }
         let reading = Reading::of(state, joints, self.arm.as_deref())?;
         self.states.add(reading)?;
+        self.chain.take(state, &reading);
         self.state_count += 1;
         Ok(())
     }

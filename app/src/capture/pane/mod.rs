@@ -66,7 +66,7 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
                 "With the whole board in the image, Calibrate for me moves the arm from pose to pose, and Guide me says how \
                  to move it yourself. Or press Space at ten poses with the board tilted and turned to all sides."
             );
-            let detail = if model.moves() == Moves::Freely { by_itself } else { by_hand };
+            let detail = if model.takes_chosen_poses() { by_itself } else { by_hand };
             marks::nothing_yet_ui(ui, tr!(language, "No captures yet"), detail);
         } else {
             table::table_ui(ui, model, &table, row, thumbnails, outbox);

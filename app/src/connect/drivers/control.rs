@@ -2,23 +2,25 @@
 
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::client::cell::Support;
+use handeye_sim_link::client::cell::{ArmKinematics, Support};
 use handeye_sim_link::driver::message::Ability;
-use handeye_sim_link::driver::{Driver, DriverCell, LogLevel};
+use handeye_sim_link::driver::{ChainPlacement, Driver, DriverCell, LogLevel};
 
 use super::{TypedPose, port_error};
-use crate::model::{BoardMotion, CellFacts, JointFacts, Moves, RobotState, Severity, Simulation};
+use crate::model::{ArmDoubt, BoardMotion, CellFacts, JointFacts, Moves, RobotState, Severity, Simulation};
 use crate::text;
 use crate::worker::{ControlPort, PortError};
 
 pub(super) struct DriverControl {
     cell: DriverCell,
     typed: Option<TypedPose>,
+    /// As it was told last.
+    placement: ChainPlacement,
 }
 
 impl DriverControl {
     pub fn new(cell: DriverCell, typed: Option<TypedPose>) -> Self {
-        Self { cell, typed }
+        Self { cell, typed, placement: ChainPlacement::Unnamed }
     }
 
     fn simulated() -> PortError {
@@ -28,6 +30,7 @@ impl DriverControl {
 
 impl ControlPort for DriverControl {
     fn facts(&mut self) -> Result<CellFacts, PortError> {
+        self.placement = self.cell.robot().chain_placement();
         let robot = self.cell.robot().hello();
         let camera = self.cell.camera().map(Driver::hello);
         let joints = robot
@@ -41,8 +44,15 @@ impl ControlPort for DriverControl {
                 let camera = hello.camera?;
                 camera.intrinsics?.intrinsics(camera.width, camera.height).ok()
             }),
-            // One state does not tell where the chain stands and what tool it carries, and a wrong guess would drive it astray.
-            arm: None,
+            arm: match &self.placement {
+                ChainPlacement::Known(kinematics) => Some(ArmKinematics::clone(kinematics)),
+                _ => None,
+            },
+            arm_doubt: match self.placement {
+                ChainPlacement::Unnamed | ChainPlacement::Known(_) => None,
+                ChainPlacement::Open { .. } => Some(ArmDoubt::Open),
+                ChainPlacement::Foreign { distance_m, angle_rad } => Some(ArmDoubt::Foreign { distance_m, angle_rad }),
+            },
             support: Support::Whole,
             truth: None,
             has_depth: camera.is_some_and(|hello| hello.can(Ability::Depth)),
@@ -52,6 +62,10 @@ impl ControlPort for DriverControl {
             },
             poses_are_typed: self.typed.is_some(),
         })
+    }
+
+    fn facts_differ(&mut self) -> bool {
+        std::mem::discriminant(&self.placement) != std::mem::discriminant(&self.cell.robot().chain_placement())
     }
 
     fn state(&mut self) -> Result<Option<RobotState>, PortError> {

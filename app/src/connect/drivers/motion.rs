@@ -1,28 +1,99 @@
-//! Motions through a driver: goals and steps, by the controller's own planning.
+//! Motions through a driver: goals and steps, by the controller's own planning. Where the chain of joints is known they are
+//! checked beforehand, and poses are planned.
+
+use std::sync::Arc;
 
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::choose::Robot;
+use handeye_core::plan::{Contact, Surroundings};
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish};
+use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
 use handeye_sim_link::driver::message::Ability;
-use handeye_sim_link::driver::{Driver, DriverCell, DriverError, Goal, MoveEnd, Reading};
+use handeye_sim_link::driver::{ChainPlacement, Driver, DriverCell, DriverError, Goal, MoveEnd, Reading};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::port_error;
+use crate::limits;
 use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
+use crate::motion::live::{VIEWS_SEED, contact_text, no_views};
 use crate::text;
 use crate::text::Text;
 use crate::worker::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
 
 pub(super) struct DriverMotion {
     cell: DriverCell,
+    /// What a person keeps the arm out of.
+    keep_out: Surroundings,
+}
+
+/// The arm where it stands now, where its chain of joints is known.
+struct Placed {
+    kinematics: Arc<ArmKinematics>,
+    joints: JointValues,
+    around: Surroundings,
 }
 
 impl DriverMotion {
     pub fn new(cell: DriverCell) -> Self {
-        Self { cell }
+        Self { cell, keep_out: Surroundings::default() }
+    }
+
+    fn kinematics(&self) -> Result<Arc<ArmKinematics>, Text> {
+        match self.robot().chain_placement() {
+            ChainPlacement::Known(kinematics) => Ok(kinematics),
+            ChainPlacement::Unnamed => Err(text!(
+                "The robot's driver names no chain of joints, so no poses can be planned: use “Guide me”, or taught poses"
+            )),
+            ChainPlacement::Open { .. } => Err(text!(
+                "It is not known yet where the robot's joints begin and what tool it carries: let it stand at four places, each \
+                 turned by 15° or more, about two axes"
+            )),
+            ChainPlacement::Foreign { distance_m, angle_rad } => Err(text!(
+                "By its joints the tip of the robot is {distance} mm and {angle}° from where its driver reports it: its chain of joints \
+                 is not driven by",
+                distance = format!("{:.1}", distance_m * 1e3),
+                angle = format!("{:.2}", angle_rad.to_degrees())
+            )),
+        }
+    }
+
+    fn placed(&self) -> Result<Result<Placed, Text>, PortError> {
+        let reading = match self.now()? {
+            Ok(reading) => reading,
+            Err(why) => return Ok(Err(why)),
+        };
+        let Some(joints) = reading.joints else { return Ok(Err(text!("The robot does not report its joints"))) };
+        Ok(self.kinematics().map(|kinematics| {
+            let around = self.around(&kinematics, &joints);
+            Placed { kinematics, joints, around }
+        }))
+    }
+
+    /// What is known to stand around: what a person says, and the plane under the arm while it is above that, because an arm on a
+    /// pedestal reaches below its foot.
+    fn around(&self, kinematics: &ArmKinematics, joints: &JointValues) -> Surroundings {
+        let plane = kinematics.among(kinematics.plane(), None);
+        let is_below = matches!(plane.arm.contact(joints, &plane.around, 0.0), Some(Contact::Box { .. }));
+        let around = self.keep_out.clone();
+        if is_below { around } else { plane.around.and(around) }
+    }
+
+    /// What is in the way of a motion that is about straight in joint space; nothing where that is not known.
+    fn obstacle(&self, goal: &Goal) -> Result<Option<Text>, PortError> {
+        let Ok(Placed { kinematics, joints, around }) = self.placed()? else { return Ok(None) };
+        let goal = match goal {
+            Goal::Joints(goal) => *goal,
+            // Whether it is in reach is for the controller to say, whose limits count.
+            Goal::Tip(pose) => match kinematics.reach(pose, &joints) {
+                Ok(goal) => goal,
+                Err(_) => return Ok(None),
+            },
+        };
+        let among = kinematics.among(around, None);
+        let guard = among.guard(&joints);
+        let contact = guard.contact(&goal).or_else(|| guard.contact_on_path(&joints, &goal));
+        Ok(contact.as_ref().map(contact_text))
     }
 
     fn robot(&self) -> &Driver {
@@ -38,6 +109,9 @@ impl DriverMotion {
     }
 
     fn drive(&self, goal: &Goal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
+        if let Some(why) = self.obstacle(goal)? {
+            return Ok(MotionOutcome::Refused(why));
+        }
         match self.robot().move_to(goal, speed, cancel) {
             Ok(MoveEnd::Arrived) => Ok(MotionOutcome::Arrived),
             Ok(MoveEnd::Stopped(_)) if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
@@ -95,19 +169,29 @@ impl MotionPort for DriverMotion {
         Ok(Room::Nowhere(cannot_follow()))
     }
 
-    fn views(&mut self, _request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
-        Ok(Err(no_chain()))
+    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
+        let ViewsRequest { board, taken, count } = request;
+        Ok(self.placed()?.and_then(|Placed { kinematics, joints, around }| {
+            let views = kinematics.views_unlike(board, taken, &joints, &around, *count, VIEWS_SEED);
+            views.map_err(|why| no_views(&why))
+        }))
     }
 
-    fn robot(&mut self, _speed: f64) -> Result<Result<Robot, Text>, PortError> {
-        Ok(Err(no_chain()))
+    fn robot(&mut self, speed: f64) -> Result<Result<Robot, Text>, PortError> {
+        Ok(self.placed()?.map(|Placed { kinematics, joints, around }| {
+            kinematics.guided_robot(&joints, limits::pace(&limits::SEQUENCE, speed), &around)
+        }))
     }
 
-    fn keep_out(&mut self, _keep_out: &Surroundings) -> Result<Surroundings, Text> {
-        Err(text!(
-            "A robot behind a driver goes the ways of its own controller: set its safety planes there, boxes of the workbench do \
-             not hold for it"
-        ))
+    fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text> {
+        self.keep_out = keep_out.clone();
+        let known = self.kinematics().map(|_known| Surroundings::default());
+        known.map_err(|_unknown| {
+            text!(
+                "A robot behind a driver goes the ways of its own controller, and as long as its chain of joints is not known they \
+                 cannot be checked: set its safety planes there"
+            )
+        })
     }
 
     fn follow(&mut self, _wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
@@ -156,10 +240,6 @@ fn step(request: &JogRequest, length: f64, reading: &Reading) -> Result<Goal, Te
 
 fn read_only() -> Text {
     text!("The robot is only read: press “Let the workbench move it” in Jog first")
-}
-
-fn no_chain() -> Text {
-    text!("Poses are not planned for a robot behind a driver: use “Guide me”, or taught poses")
 }
 
 fn cannot_follow() -> Text {

@@ -5,12 +5,15 @@ use std::sync::Arc;
 use std::thread;
 
 use handeye_core::geometry::frames::Pose;
+use handeye_core::plan::{Obstacle, Surroundings};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::CancelToken;
+use handeye_sim_link::client::cell::ArmKinematics;
 use handeye_sim_link::driver::fake::{Fake, FakeOptions, FakePart};
 
 use super::*;
 use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome, Moves, RobotState};
+use crate::text::Language;
 use crate::worker::{JogRequest, RawFrame};
 
 /// Serves one part of a cell to everybody who connects; the address.
@@ -86,6 +89,47 @@ fn a_cell_behind_a_driver_is_seen_read_and_moved_once_somebody_allows_it() {
     control.arm(false).expect("taken back");
     assert!(matches!(motion.move_to(&back, 0.5, &shutdown), Ok(MotionOutcome::Refused(_))));
     control.stop().expect("a stop is always heard");
+}
+
+/// The arm as the workbench drives it, once it has stood.
+fn known_arm(control: &mut dyn ControlPort) -> ArmKinematics {
+    loop {
+        if let Some(arm) = control.facts().expect("connected").arm {
+            return arm;
+        }
+        while !control.facts_differ() {
+            thread::yield_now();
+        }
+    }
+}
+
+#[test]
+fn an_arm_whose_flange_is_reported_beside_its_tip_is_planned_for_and_keeps_out_of_boxes() {
+    let connector = connector(Some(served(FakePart::Both)), None);
+    let shutdown = CancelToken::default();
+    let mut control = connector.connect_control(&shutdown).expect("connected").port;
+    let mut motion = connector.connect_motion(&shutdown).expect("connected").port;
+    let arm = known_arm(control.as_mut());
+    let here = first_state(control.as_mut());
+    assert!(arm.fits(&here.joints_rad, &here.base_from_tip));
+    let robot = motion.robot(0.5).expect("connected").expect("its chain is known");
+    assert_eq!(robot.joints.len(), 6);
+    assert!(robot.arm.is_free(&robot.joints, &robot.around, 0.0), "the plane under the arm is kept clear");
+
+    control.arm(true).expect("allowed");
+    let mut there = here.joints_rad;
+    there[0] += 0.5;
+    let goal = MotionGoal::Joints(there);
+    let at = *arm.tip(&there).isometry();
+    let wall = Surroundings::of(vec![Obstacle::new("wall", at, [0.05, 0.05, 0.05])]);
+    assert!(motion.keep_out(&wall).is_ok());
+    for goal in [goal, MotionGoal::Tip(arm.tip(&there))] {
+        let refused = motion.move_to(&goal, 0.5, &shutdown).expect("connected");
+        let MotionOutcome::Refused(why) = &refused else { panic!("{refused:?}") };
+        assert!(why.say(Language::English).contains("wall"), "{why:?}");
+    }
+    assert!(motion.keep_out(&Surroundings::default()).is_ok());
+    assert_eq!(motion.move_to(&goal, 0.5, &shutdown), Ok(MotionOutcome::Arrived));
 }
 
 #[test]

@@ -137,6 +137,7 @@ pub fn connected() -> Model {
         ],
         nominal_intrinsics: Some(intrinsics()),
         arm: Some(arm()),
+        arm_doubt: None,
         support: Support::Whole,
         truth: Some(Truth {
             tip_from_camera: tip_from_camera(),

@@ -17,6 +17,7 @@ use crate::gui::style::parts;
 use crate::model::{Model, Moves};
 use crate::tr;
 use blocked::Blocked;
+pub use blocked::unknown_arm;
 use hold::Hold;
 
 /// The pane.

@@ -6,7 +6,8 @@ use handeye_core::estimate::handeye::Mode;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
-use crate::model::{CapturePurpose, Model, Motion, Moves, Pane, PoseSequence, StopOutcome};
+use crate::model::{CapturePurpose, Model, Motion, Pane, PoseSequence, StopOutcome};
+use crate::motion::pane::unknown_arm;
 use crate::taught::pane::immovable;
 use crate::taught::pane::sequence;
 use crate::{text, tr};
@@ -14,7 +15,7 @@ use crate::{text, tr};
 /// The button that begins, or how far it is; and how it went.
 pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    if model.moves() != Moves::Freely {
+    if !model.takes_chosen_poses() {
         return;
     }
     let verifies = |sequence: &&PoseSequence| sequence.purpose == Some(CapturePurpose::Verify);
@@ -61,11 +62,8 @@ fn blocked(model: &Model) -> Option<&'static str> {
         Some(tr!(language, "There is no calibration to verify yet."))
     } else if is_hand {
         Some(tr!(language, "Poses are planned for a camera on the tip only: take these captures yourself"))
-    } else if model.cell.as_ref().is_none_or(|cell| cell.arm.is_none()) {
-        Some(tr!(
-            language,
-            "This arm's kinematics is not known, so no poses can be planned: take these captures yourself"
-        ))
+    } else if let Some(why) = unknown_arm(model) {
+        Some(why)
     } else if model.capture.is_some() {
         Some(tr!(language, "A capture is under way"))
     } else if model.motion != Motion::Idle {

@@ -37,6 +37,14 @@ pub struct UrdfSpec {
     text: Option<&'static str>,
 }
 
+impl UrdfSpec {
+    /// The text of a URDF that is built in, the path of any other file from the root on.
+    pub(crate) fn source(&self) -> String {
+        let path = || std::path::absolute(&self.urdf).unwrap_or_else(|_| self.urdf.clone());
+        self.text.map_or_else(|| path().display().to_string(), str::to_owned)
+    }
+}
+
 impl Default for ArmSpec {
     fn default() -> Self {
         Self::Kind(ArmKind::Ur5Coppeliasim)

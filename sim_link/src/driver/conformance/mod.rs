@@ -76,10 +76,11 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn all(&self, report: &mut Report) -> Result<(), ()> {
-        let checks: [(&'static str, Checked<'a>); 7] = [
+        let checks: [(&'static str, Checked<'a>); 8] = [
             ("hello", Self::hello),
             ("clock", Self::clock),
             ("states", Self::states),
+            ("chain", Self::chain),
             ("images", Self::images),
             ("later versions", Self::later_versions),
             ("read-only", Self::read_only),

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::super::message::Ability;
+use super::super::placement::{ChainPlacement, NEED as PLACES_NEEDED};
 use super::super::shared::Inner;
 use super::super::states::Reading;
 use super::{Check, Run, gone, passed, skipped, warning, wrong};
@@ -83,6 +84,36 @@ impl Run<'_> {
             return Ok(warning(NAME, format!("{text}: 500 are enough")));
         }
         Ok(passed(NAME, text))
+    }
+
+    /// Whether joints and poses belong together, as far as one place of the arm tells.
+    pub(super) fn chain(&self) -> Result<Check, Check> {
+        const NAME: &str = "chain";
+        let placement = self.driver.chain_placement();
+        let flange = "send `base_from_flange` beside it, and the first state at rest tells";
+        match placement {
+            ChainPlacement::Unnamed => Ok(skipped(
+                NAME,
+                "no `arm` in hello, or no joints: poses are not chosen and driven to by the workbench",
+            )),
+            ChainPlacement::Open { places: 0 } => Ok(skipped(NAME, "the arm moves: let it stand to have it compared")),
+            ChainPlacement::Open { .. } => Ok(passed(
+                NAME,
+                format!(
+                    "{PLACES_NEEDED} places turned about two axes are needed to compare it with the poses; {flange}"
+                ),
+            )),
+            ChainPlacement::Known(_) => Ok(passed(NAME, "it has the flange where the states have it")),
+            ChainPlacement::Foreign { distance_m, angle_rad } => Err(wrong(
+                NAME,
+                format!(
+                    "by joints_rad the flange is {:.1} mm and {:.2}° from where the states have it: look at `arm`, at \
+                     `base_from_arm` and at the units of the joints",
+                    distance_m * 1e3,
+                    angle_rad.to_degrees()
+                ),
+            )),
+        }
     }
 
     /// Joint values within what `hello` says; degrees are the usual reason for others.

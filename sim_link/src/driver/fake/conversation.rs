@@ -4,6 +4,7 @@ use std::io::{BufRead, Read, Write};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 use serde::Serialize;
 
@@ -293,10 +294,14 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
                     stamps.next(shown.sim_time_s)
                 };
                 if self.can(Ability::State) {
+                    let flange = self.fake.flange_from_tip.map(|flange_from_tip| {
+                        let tip = shown.base_from_tip.isometry();
+                        PoseMessage::of(&Pose::<Base, Tip>::from_isometry(tip * flange_from_tip.inverse()))
+                    });
                     let state = StateMessage {
                         stamp,
                         joints_rad: Some(shown.joints),
-                        base_from_flange: None,
+                        base_from_flange: flange,
                         flange_from_tcp: None,
                         base_from_tip: Some(PoseMessage::of(&shown.base_from_tip)),
                         moving: Some(moving),

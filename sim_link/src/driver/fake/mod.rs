@@ -10,13 +10,15 @@ use std::io::{BufRead, Write};
 use std::sync::Mutex;
 
 use handeye_core::geometry::arm::ArmKind;
+use handeye_core::geometry::frames::Base;
+use nalgebra::Isometry3;
 
-use crate::cell::scene::{Scene, SceneError};
+use crate::cell::scene::{ArmSpec, RobotSpec, Scene, SceneError};
 use crate::cell::server::{CellConfig, CellError, CellServer};
-use crate::client::cell::{Arm, CameraFeed, CellPaths};
+use crate::client::cell::{Arm, ArmKinematics, CameraFeed, CellPaths};
 use crate::client::{BadEndpoint, ConnectionOptions, Endpoint, LinkError, SimulationState};
 
-use super::message::{Ability, ArmMessage, CameraMessage, Hello, JointMessage, LensMessage, PROTOCOL};
+use super::message::{Ability, ArmMessage, CameraMessage, Hello, JointMessage, LensMessage, PROTOCOL, PoseMessage};
 use conversation::Conversation;
 use stamps::Stamps;
 
@@ -90,6 +92,8 @@ pub struct Fake {
     endpoint: Endpoint,
     paths: CellPaths,
     hello: Hello,
+    /// Where the tip is on the flange that it reports beside the tip; of a chain that it names.
+    flange_from_tip: Option<Isometry3<f64>>,
     stamps: Mutex<Stamps>,
     _server: Option<CellServer>,
 }
@@ -101,9 +105,11 @@ impl Fake {
     /// [`FakeError`].
     pub fn start(options: FakeOptions) -> Result<Self, FakeError> {
         let FakeOptions { mut scene, seed, connect, part, clock_s } = options;
+        let mut chain = None;
         let (server, endpoint, paths) = if let Some(endpoint) = connect {
             (None, endpoint, CellPaths::default())
         } else {
+            chain = Some(Chain::of(&scene));
             scene.simulation.time_step_s = TIME_STEP_S;
             let paths = CellPaths::below(&scene.robot.name);
             let server = CellServer::start(CellConfig { seed, ..CellConfig::new(scene) })?;
@@ -118,8 +124,18 @@ impl Fake {
         if arm.sim().get_simulation_state()? != SimulationState::Running {
             arm.sim().start_simulation()?;
         }
-        let hello = hello(&mut arm, part)?;
-        Ok(Self { endpoint, paths, hello, stamps: Mutex::new(Stamps::new(clock_s)), _server: server })
+        if chain.is_none() {
+            chain = arm.kinematics()?.ok().filter(ArmKinematics::is_ur5).map(|kinematics| Chain {
+                arm: ArmMessage::Name(ArmKind::Ur5Coppeliasim.name().to_owned()),
+                base_from_arm: *kinematics.base_from_arm(),
+                flange_from_tip: *kinematics.connection_from_tip(),
+            });
+        }
+        let chain = chain.filter(|_| part != FakePart::Camera);
+        let flange_from_tip = chain.as_ref().map(|chain| chain.flange_from_tip);
+        let hello = hello(&mut arm, part, chain)?;
+        let stamps = Mutex::new(Stamps::new(clock_s));
+        Ok(Self { endpoint, paths, hello, flange_from_tip, stamps, _server: server })
     }
 
     /// Serves one workbench until it leaves or is gone. The arm is then at rest.
@@ -139,7 +155,27 @@ impl Fake {
     }
 }
 
-fn hello(arm: &mut Arm, part: FakePart) -> Result<Hello, LinkError> {
+/// The chain of the arm of the cell.
+struct Chain {
+    arm: ArmMessage,
+    base_from_arm: Isometry3<f64>,
+    flange_from_tip: Isometry3<f64>,
+}
+
+impl Chain {
+    fn of(scene: &Scene) -> Self {
+        let RobotSpec { model, arm, tip, .. } = &scene.robot;
+        let model = match model {
+            ArmSpec::Kind(kind) => ArmMessage::Name(kind.name().to_owned()),
+            ArmSpec::Urdf(spec) => {
+                ArmMessage::Urdf { urdf: spec.source(), base_link: spec.base.clone(), tip_link: spec.tip.clone() }
+            }
+        };
+        Self { arm: model, base_from_arm: arm.isometry(), flange_from_tip: tip.isometry() }
+    }
+}
+
+fn hello(arm: &mut Arm, part: FakePart, chain: Option<Chain>) -> Result<Hello, LinkError> {
     let (robot, camera) = (part != FakePart::Camera, part != FakePart::Robot);
     let mut can = Vec::new();
     if robot {
@@ -148,7 +184,6 @@ fn hello(arm: &mut Arm, part: FakePart) -> Result<Hello, LinkError> {
     if camera {
         can.extend([Ability::Image, Ability::Depth]);
     }
-    let kinematics = arm.kinematics()?.ok().filter(|kinematics| robot && kinematics.is_ur5());
     let joints = arm.info().joints.iter().enumerate().map(|(i, joint)| JointMessage {
         name: format!("joint {}", i + 1),
         kind: joint.kind,
@@ -165,7 +200,8 @@ fn hello(arm: &mut Arm, part: FakePart) -> Result<Hello, LinkError> {
         clock: "monotonic".to_owned(),
         can,
         joints,
-        arm: kinematics.map(|_| ArmMessage::Name(ArmKind::Ur5Coppeliasim.name().to_owned())),
+        base_from_arm: chain.as_ref().map(|chain| PoseMessage::of::<Base, Base>(&chain.base_from_arm.into())),
+        arm: chain.map(|chain| chain.arm),
         camera: camera.then_some(CameraMessage {
             width: lens.width,
             height: lens.height,

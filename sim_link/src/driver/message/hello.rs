@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::PROTOCOL;
 use super::error::BadMessage;
 use super::images::check_size;
+use super::robot::PoseMessage;
 
 /// What a driver can do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -150,6 +151,9 @@ pub struct Hello {
     /// Which chain the joints are, where known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmMessage>,
+    /// Where that chain stands in the base that poses are in; there where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_from_arm: Option<PoseMessage>,
     /// The camera; with `image` in `can`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraMessage>,

@@ -107,6 +107,7 @@ impl Device for Folder {
             can,
             joints: (1..=count).map(joint).collect(),
             arm: None,
+            base_from_arm: None,
             camera: Some(CameraMessage { width, height, intrinsics: None }),
             depth_limits_m: None,
         };

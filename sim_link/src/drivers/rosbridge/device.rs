@@ -230,6 +230,7 @@ impl Rosbridge {
             can,
             joints,
             arm: options.arm.clone().filter(|_| options.joints.is_some()),
+            base_from_arm: None,
             camera,
             depth_limits_m: None,
         })

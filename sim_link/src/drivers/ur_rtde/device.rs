@@ -54,6 +54,7 @@ impl Device for UrRtde {
             can: vec![Ability::State, Ability::Joints],
             joints: JOINTS.iter().map(joint).collect(),
             arm: self.options.arm.clone(),
+            base_from_arm: None,
             camera: None,
             depth_limits_m: None,
         })

@@ -130,6 +130,7 @@ impl Device for V4l {
             can: vec![Ability::Image],
             joints: Vec::new(),
             arm: None,
+            base_from_arm: None,
             camera: Some(camera),
             depth_limits_m: None,
         })

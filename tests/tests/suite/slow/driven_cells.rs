@@ -4,11 +4,13 @@ use std::path::Path;
 use std::process::Command as Program;
 
 use handeye_app::command::Command;
+use handeye_app::guided::state::Waits;
 use handeye_app::limits;
 use handeye_app::model::{CapturePurpose, CellSource, Drivers, LinkState, Model, Motion, SolveStatus};
 use handeye_core::geometry::frames::{Camera, Pose, Tip};
+use handeye_core::plan::guided::CHECKS;
 use handeye_core::project::taught_poses::Goal;
-use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::scene::{Scene, ShippedScene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint};
@@ -96,6 +98,40 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
 
     bench.click(Command::Export);
     bench.until("the exports", |model| model.export.written.is_some());
+}
+
+/// A driver with a cell of its own: its truth is that of the scene.
+#[test]
+fn the_arm_behind_a_driver_calibrates_itself_once_it_is_allowed_to_move_whatever_arm_it_is() {
+    for (scene, joints) in [(ShippedScene::Reference, 6), (ShippedScene::Panda, 7)] {
+        let name = scene.name();
+        let folder = tempfile::tempdir().expect("a folder");
+        let robot = format!("'{}' driver fake --scene {name}", handeye_binary().display());
+        let mut bench = bench(Some(robot), None, folder.path());
+        bench.until("a chain that fits", |model| model.cell.as_ref().is_some_and(|cell| cell.arm.is_some()));
+        bench.until("the board", |model| model.board_seen_s.is_some());
+        assert_eq!(bench.model().cell.as_ref().expect("a cell").joints.len(), joints);
+        bench.click(Command::Arm(true));
+        bench.until("the permission", Model::is_armed);
+        assert!(bench.model().confirms_moves(), "a real arm goes step by step");
+        bench.click(Command::CalibrateForMe);
+        let waits = |model: &Model| {
+            let guided = model.sequence.as_ref().and_then(|sequence| sequence.guided.as_deref());
+            guided.is_some_and(|guided| guided.waits == Waits::Confirmation)
+        };
+        bench.until("the first move that waits", |model| waits(model) && model.document().captures.len() == 1);
+        bench.click(Command::ConfirmMove);
+        bench.until("the second", |model| waits(model) && model.document().captures.len() == 2);
+        bench.click(Command::SetConfirmMoves(false));
+        bench.until("the end", |model| !model.sequence_runs && model.capture.is_none());
+        let model = bench.model();
+        let guided = model.sequence.as_ref().and_then(|sequence| sequence.guided.as_deref()).expect("guided");
+        let ending = guided.ending.as_ref().unwrap_or_else(|| panic!("{name}: {}", bench.said()));
+        assert!(ending.is_success() && guided.checked == CHECKS, "{name}: {ending:?}, {}", bench.said());
+        let truth = scene.scene().and_then(|scene| scene.resolve(0)).expect("it is shipped").tip_from_camera;
+        let mm = error_mm(&bench, &truth);
+        assert!(mm < model.view.goal.0 * 1e3, "{name}: {mm} mm");
+    }
 }
 
 #[test]
