@@ -152,7 +152,7 @@ fn import(
     cancel: &CancelToken,
 ) -> Result<Done, Refused> {
     let refused = |error: NotUnderstood| match error {
-        NotUnderstood::Import(ImportError::NoPoses { .. }) => Failure::failed(error),
+        NotUnderstood::Import(ImportError::NoPoses { .. } | ImportError::NoViews { .. }) => Failure::failed(error),
         NotUnderstood::Import(error) => Failure::unusable(error),
         NotUnderstood::Target(_) => Failure::failed(anyhow!("nothing was written: {error}; --target gives it")),
         NotUnderstood::Observe(error) => Failure::failed(error),
@@ -212,6 +212,11 @@ fn choose(judgement: &Judgement, take: Option<Take>) -> Result<(usize, bool), Fa
             None => nothing(format!("there are {} hypotheses", judgement.hypotheses.len())),
         },
         (Some(Take::Best), Verdict::Ambiguous(_)) => Ok((0, true)),
+        (None, Verdict::Ambiguous(1)) => nothing(
+            "which pose belongs to which image was found from the images themselves: check the pairing, then take it with \
+             --take 1"
+                .into(),
+        ),
         (None, Verdict::Ambiguous(count)) => nothing(format!(
             "{count} hypotheses explain the recording and differ: fix what you know with --set KEY=VALUE, or take one with \
              --take N or --take best"
@@ -263,7 +268,10 @@ fn listed(recording: &Recording, judgement: &Judgement) -> String {
         }
     }
     line(String::new());
-    line(format!("{} hypotheses tried; what each leaves, the best first:", judgement.tried));
+    line(format!(
+        "{} hypotheses tried; the error that each leaves (median distance and angle), the best first:",
+        judgement.tried
+    ));
     for (number, (h, conventions)) in shown.iter().zip(&all).enumerate() {
         let fit = h.fit.as_ref().map_or_else(
             || "no solution".to_owned(),
@@ -300,12 +308,30 @@ fn listed(recording: &Recording, judgement: &Judgement) -> String {
     line(String::new());
     line(match &judgement.verdict {
         Verdict::Decided => "The first is the only one that explains the recording.".into(),
+        Verdict::Ambiguous(1) => {
+            "The first alone explains the recording, with a pairing that was found from the images \
+                                  themselves: check it before it is taken."
+                .into()
+        }
         Verdict::Ambiguous(count) => {
-            format!("The first {count} explain the recording; nothing here tells which is true.")
+            format!(
+                "The first {count} explain the recording; the data do not tell which is true.{}",
+                by_mode(judgement)
+            )
         }
         Verdict::Unexplained => "None explains the recording.".into(),
     });
     text
+}
+
+/// What decides between a camera on the robot and one beside it, where nothing else is open.
+fn by_mode(judgement: &Judgement) -> &'static str {
+    match &judgement.hypotheses[..] {
+        [first, second, ..] if judgement.verdict == Verdict::Ambiguous(2) && first.mode != second.mode => {
+            " Is the camera on the robot? Add --set mode=eye_in_hand; beside it: --set mode=eye_to_hand."
+        }
+        _ => "",
+    }
 }
 
 fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {

@@ -135,7 +135,12 @@ pub fn of_text(text: &str) -> anyhow::Result<TargetSpec> {
     }
     let parsed = TextTarget::try_parse_from(words)
         .map_err(|e| anyhow!("--target {text}: {}", e.to_string().lines().next().unwrap_or_default()))?;
-    target(&parsed.target)
+    let is_open = parsed.target.layout.is_none();
+    Ok(match target(&parsed.target)? {
+        // A board that is printed has today's layout where nobody says another; of one in images these tell.
+        TargetSpec::Charuco(board) if is_open => TargetSpec::Charuco(Charuco { layout: None, ..board }),
+        target => target,
+    })
 }
 
 /// To read a described target by itself.

@@ -48,6 +48,8 @@ pub const LEAST_VIEWS: usize = FIELD_VIEWS;
 pub const LEAST_GAIN: f64 = 0.03;
 /// Captures that check the answer afterwards, where nobody says how many.
 pub const CHECKS: usize = 3;
+/// Part of the goal by which explanations that the answer does not count on may move it.
+const SMALL_PART: f64 = 0.1;
 /// Solves in a row in which the error has to be below the goal.
 const IN_A_ROW: usize = 2;
 /// Probability that the noise levels are below what the end is judged by.
@@ -383,7 +385,7 @@ impl Guide {
         match self.plan(known, &model, used, cancel) {
             None => self.without_answer(known, cancel),
             Some((plan, modelled_m)) if plan.candidates > 0 => {
-                self.judged(plan, modelled_m, used.len(), is_sound(known.calibration))
+                self.judged(plan, modelled_m, used.len(), self.is_sound(known.calibration))
             }
             // So little is known that no view is surely in the image: more of the first poses.
             Some(_) => self.first_poses(known, cancel),
@@ -478,6 +480,20 @@ impl Guide {
         1.0 + self.failures as f64
     }
 
+    /// Whether nothing was found that speaks against the answer. An explanation that it does not count on, and that moves it by a
+    /// small part of the goal, is none that has to be resolved for this goal.
+    fn is_sound(&self, calibration: Option<&Calibration>) -> bool {
+        let Some(calibration) = calibration else { return false };
+        match &calibration.claim {
+            Claim::AsModelled => true,
+            Claim::Nothing => false,
+            claim @ Claim::Moved(_) => {
+                let moved_m = worst(calibration, self.options.tool_box.as_ref(), |point| Some(claim.moved_m(point)));
+                moved_m.is_some_and(|moved_m| moved_m <= SMALL_PART * self.options.goal_m)
+            }
+        }
+    }
+
     fn judged(&self, plan: Plan, modelled_m: f64, views: usize, is_sound: bool) -> Next {
         let Some(first) = plan.proposals.first() else {
             return Next::End(Ending::NothingInReach { candidates: plan.candidates });
@@ -498,7 +514,7 @@ impl Guide {
             let error_m = worst(calibration, tool_box, |point| calibration.error_95_m(point));
             let is_below =
                 error_at_upper_levels(calibration, tool_box).is_some_and(|error_m| error_m <= self.options.goal_m);
-            self.below = if is_below && is_sound(known.calibration) { self.below + 1 } else { 0 };
+            self.below = if is_below && self.is_sound(known.calibration) { self.below + 1 } else { 0 };
             if let (true, Some(error_m)) = (self.below >= IN_A_ROW, error_m) {
                 return Some(Ending::GoalReached { error_m });
             }
@@ -555,11 +571,6 @@ impl Ground<'_> {
 /// where the arm has been it gets to again.
 fn turn_after(skips: usize) -> f64 {
     (std::f64::consts::PI * NEARER_PER_SKIP.powf(skips as f64)).max(LEAST_TURN_RAD)
-}
-
-/// Whether nothing was found that speaks against the answer.
-fn is_sound(calibration: Option<&Calibration>) -> bool {
-    calibration.is_some_and(|calibration| calibration.claim == Claim::AsModelled)
 }
 
 /// The error that is stated, at the upper limit of the noise levels, metres: where the camera saw the board, or at the worst point

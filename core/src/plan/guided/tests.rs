@@ -1,6 +1,7 @@
 use nalgebra::Isometry3;
 
 use super::*;
+use crate::estimate::claim::Alternative;
 use crate::estimate::handeye::Mode;
 use crate::testing::clutter::{Tally, session};
 use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
@@ -246,7 +247,11 @@ fn the_arm_is_driven_around_what_stands_in_the_way_and_within_its_ranges() {
 fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error() {
     let mut cell = GuidedCell::new(CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 1));
     let _begun = cell.run(GuidedOptions { most_views: 12, least_gain: 0.0, ..options(1e-9) });
-    let endings = [Claim::AsModelled, Claim::Nothing].map(|claim| {
+    let moved = |metres: f64| {
+        let shift = nalgebra::Vector6::new(metres, 0.0, 0.0, 0.0, 0.0, 0.0);
+        Claim::Moved(vec![Alternative { shift, covariance: nalgebra::Matrix6::identity() * 1e-12 }])
+    };
+    let endings = [Claim::AsModelled, Claim::Nothing, moved(5e-5), moved(2e-4)].map(|claim| {
         let mut guide = Guide::new(GuidedOptions { least_gain: 1.0, ..options(1e-3) });
         let all = cell.observations.views.clone();
         let mut ending = None;
@@ -264,6 +269,8 @@ fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error
     });
     assert!(matches!(endings[0], Some(Ending::GoalReached { .. })), "{endings:?}");
     assert_eq!(endings[1], Some(Ending::Doubted));
+    assert!(matches!(endings[2], Some(Ending::GoalReached { .. })), "it moves by a twentieth of the goal: {endings:?}");
+    assert_eq!(endings[3], Some(Ending::Doubted), "it moves by a fifth of the goal");
 }
 
 /// From ten views the noise levels are known to a quarter, and an end that waits for a small estimate has to allow for that.

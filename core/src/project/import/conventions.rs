@@ -15,7 +15,7 @@ const FARTHEST_M: f64 = 20.0;
 const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
 
 /// The unit of lengths.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LengthUnit {
     /// Metres.
     Metre,
@@ -49,7 +49,7 @@ impl LengthUnit {
 }
 
 /// The unit of angles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum AngleUnit {
     /// Radians.
     Radian,
@@ -79,7 +79,7 @@ impl AngleUnit {
 }
 
 /// Which way a transform maps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// `base_from_tip`, or `camera_from_target`.
     Forward,
@@ -101,7 +101,7 @@ impl Direction {
 }
 
 /// How numbers of a rotation are meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RotationForm {
     /// Axis times angle.
     Vector,
@@ -116,7 +116,7 @@ pub enum RotationForm {
 }
 
 /// `R = R_a(α) · R_b(β) · R_c(γ)`: the axes from left to right and which of the three numbers turns about each.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Euler {
     axes: [u8; 3],
     columns: [u8; 3],
@@ -253,7 +253,7 @@ impl fmt::Display for RotationForm {
 }
 
 /// What the numbers of a series mean.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Reading {
     /// Of lengths.
     pub length: LengthUnit,

@@ -42,6 +42,18 @@ pub enum ImportError {
         /// What was found instead.
         seen: String,
     },
+    /// No way to put the files together has views to solve with.
+    #[error(
+        "{}: no pairing has {need} views with a pose of the robot and the target in sight, turned differently: look at the \
+         target, at `images` and at `poses`",
+        folder.display()
+    )]
+    NoViews {
+        /// The folder.
+        folder: PathBuf,
+        /// How many views a solution needs.
+        need: usize,
+    },
     /// Poses cannot be made of joint values.
     #[error("arm = {arm:?}: {why}")]
     Arm {

@@ -3,6 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::conventions::{Direction, Reading};
+use super::judge::{EXPLAINED, EXPLAINED_RAD};
 use super::pairing::Pairing;
 use super::recording::{Recording, Sample};
 use crate::estimate::handeye::Mode;
@@ -74,6 +75,14 @@ impl Hypothesis {
         Some(direction.of(&reading.transform(&sample.numbers)?))
     }
 
+    /// The series that the poses of the target come from; `None` with images.
+    pub fn target_series<'a>(&self, recording: &'a Recording) -> Option<&'a str> {
+        match self.source {
+            Source::Track(i) => recording.tracks.get(i).map(|track| track.name.as_str()),
+            Source::Stream(_) => None,
+        }
+    }
+
     /// Where the camera sits, as `--set mode=` has it.
     pub fn mode_name(&self) -> &'static str {
         match self.mode {
@@ -129,7 +138,8 @@ impl Hypothesis {
 
     /// Whether most views agree with it, well enough for their distance from the camera, and none says that it is wrong.
     pub fn explains(&self) -> bool {
-        self.contradictions.is_empty() && self.fit.as_ref().is_some_and(|fit| fit.relative < super::judge::EXPLAINED)
+        let is_near = |fit: &Fit| fit.relative < EXPLAINED && fit.median_rad < EXPLAINED_RAD;
+        self.contradictions.is_empty() && self.fit.as_ref().is_some_and(is_near)
     }
 }
 

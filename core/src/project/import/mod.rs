@@ -28,6 +28,8 @@ pub mod write;
 #[cfg(all(test, feature = "opencv"))]
 mod golden_tests;
 #[cfg(test)]
+mod judge_tests;
+#[cfg(test)]
 mod layout_tests;
 #[cfg(test)]
 mod tests;

@@ -28,6 +28,9 @@ pub struct Recording {
     /// Poses of a robot that moves, as densely as they were recorded: what images of a stream with stamps are given poses of
     /// ([`timed`](super::timed)).
     pub motions: Vec<Motion>,
+    /// Poses where a moving robot stood, too few to be taken where the motion tells more: what is left where its clock cannot be
+    /// related to that of the images.
+    pub at_rest: Vec<Track>,
     /// How far clocks are apart, where poses were given to images by their stamps.
     pub clocks: Vec<Clocks>,
     /// Cameras that files describe.

@@ -42,7 +42,7 @@ fn view_of(path: &Path) -> usize {
 }
 
 /// What the camera saw in the images that are there.
-fn sights(recording: &Recording, session: &Observations) -> Sights {
+pub(super) fn sights(recording: &Recording, session: &Observations) -> Sights {
     let CameraKnowledge::Fixed(camera) = session.camera else { panic!("the camera is known") };
     let of = |stream: &Stream| {
         let corners: Vec<_> = stream
@@ -70,7 +70,7 @@ pub(super) fn in_hand() -> Settings {
 
 /// Ways to write a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Written {
+pub(super) enum Written {
     RpyRadM,
     RpyDegMm,
     KukaDegMm,
@@ -96,7 +96,7 @@ const WRITTEN: [Written; 10] = [
     Written::InverseXyzw,
 ];
 
-fn numbers(written: Written, pose: &Isometry3<f64>) -> Vec<f64> {
+pub(super) fn numbers(written: Written, pose: &Isometry3<f64>) -> Vec<f64> {
     let degrees = |angles: [f64; 3]| angles.map(f64::to_degrees);
     let (roll, pitch, yaw) = pose.rotation.euler_angles();
     let vector: [f64; 3] = se3::rotation_vector(&pose.rotation).into();
@@ -117,12 +117,12 @@ fn numbers(written: Written, pose: &Isometry3<f64>) -> Vec<f64> {
     }
 }
 
-fn row(numbers: &[f64], by: &str) -> String {
+pub(super) fn row(numbers: &[f64], by: &str) -> String {
     numbers.iter().map(|n| format!("{n:?}")).collect::<Vec<_>>().join(by)
 }
 
 /// A table without a header, and images from 0.
-fn table_folder(session: &Observations, written: Written) -> TempDir {
+pub(super) fn table_folder(session: &Observations, written: Written) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let mut table = String::new();
     for view in 0..session.views.len() {

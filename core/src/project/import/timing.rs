@@ -1,13 +1,15 @@
 //! Poses of a moving robot at the times of images: how far the clocks of the two are apart is estimated from what both saw of
 //! the motion, and refused where that does not tell.
 
+use std::collections::HashSet;
+
 use nalgebra::Isometry3;
 
 use super::conventions::{Direction, LengthUnit, RotationForm};
 use super::error::ImportError;
 use super::formats::tree;
 use super::judge::{Sights, TIMES};
-use super::recording::{Clocks, Known, Motion, Numbers, Recording, Role, Sample, Stated, Stream, Track};
+use super::recording::{Clocks, ImageFile, Known, Motion, Numbers, Recording, Role, Sample, Stated, Stream, Track};
 use super::settings::Settings;
 use super::sight::Sight;
 use crate::diagnose::doctor::agreement::agreement;
@@ -27,10 +29,12 @@ const SPEED_S: f64 = 0.02;
 
 /// Gives images of a moving robot their poses, and keeps of the images those in which the robot was slowest.
 ///
+/// Where the offset of the clocks cannot be told, the images at which the robot stood are kept, if there are three and more.
+///
 /// `None` where no stream has stamps; `sights` are those of the recording that comes back.
 ///
 /// # Errors
-/// [`ImportError::Clocks`] where the offset of the clocks cannot be told.
+/// [`ImportError::Clocks`] where the offset of the clocks cannot be told and the robot hardly stood.
 pub fn timed(
     recording: &Recording,
     sights: &mut Sights,
@@ -38,6 +42,7 @@ pub fn timed(
     cancel: &CancelToken,
 ) -> Result<Option<Recording>, ImportError> {
     let mut out = recording.clone();
+    let mut is_timed = false;
     for i in 0..recording.streams.len() {
         let stream = &recording.streams[i];
         let Some(sight) = sights.streams.get(i).and_then(Option::as_ref) else { continue };
@@ -60,11 +65,14 @@ pub fn timed(
         }
         let Some((motion, offset)) = found.first() else {
             // Without a robot there is nothing to be timed by, which is said later.
-            match refusal {
-                Some(refusal) => return Err(refusal),
-                None => continue,
+            let Some(refusal) = refusal else { continue };
+            if !stood(recording, &mut out, sights, i, &refusal) {
+                return Err(refusal);
             }
+            is_timed = true;
+            continue;
         };
+        is_timed = true;
         let chosen = slowest(&seen, &anchor_from_mount(motion, Direction::Forward, first_ns), offset, sight.distance_m);
         for (motion, offset) in &found {
             out.tracks.extend(track(motion, stream, offset, &chosen, first_ns));
@@ -84,14 +92,45 @@ pub fn timed(
         let sight = Sight { seen: chosen.iter().map(|index| sight.seen[*index]).collect(), ..sight.clone() };
         sights.streams[i] = Some(sight);
     }
-    Ok((!out.clocks.is_empty()).then_some(out))
+    Ok(is_timed.then_some(out))
+}
+
+/// Keeps of a stream the images at which the robot stood, with their poses; whether there are enough.
+fn stood(recording: &Recording, out: &mut Recording, sights: &mut Sights, i: usize, refusal: &ImportError) -> bool {
+    let stream = &recording.streams[i];
+    let Some(sight) = sights.streams.get(i).and_then(Option::as_ref) else { return false };
+    let name = |image: &ImageFile| image.path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let names: HashSet<String> = stream.images.iter().filter_map(name).collect();
+    let is_of_stream = |track: &&Track| {
+        let images = track.samples.iter().filter(|it| it.image.as_ref().is_some_and(|image| names.contains(image)));
+        images.count() >= tree::LEAST_POSES
+    };
+    let tracks: Vec<Track> = recording.at_rest.iter().filter(is_of_stream).cloned().collect();
+    let at_rest: HashSet<&String> =
+        tracks.iter().flat_map(|track| &track.samples).filter_map(|it| it.image.as_ref()).collect();
+    let is_at_rest = |image: &usize| name(&stream.images[*image]).is_some_and(|name| at_rest.contains(&name));
+    let kept: Vec<usize> = (0..stream.images.len()).filter(is_at_rest).collect();
+    if tracks.is_empty() || kept.iter().filter(|image| sight.seen[**image].is_some()).count() < tree::LEAST_POSES {
+        return false;
+    }
+    out.warnings.push(format!(
+        "{refusal}. Of {} only the {} images at which the robot stood are used, which are few",
+        stream.name,
+        kept.len()
+    ));
+    out.streams[i].images =
+        kept.iter().map(|image| ImageFile { stamp_ns: None, ..stream.images[*image].clone() }).collect();
+    let seen = kept.iter().map(|image| sight.seen[*image]).collect();
+    sights.streams[i] = Some(Sight { seen, ..sight.clone() });
+    out.tracks.extend(tracks);
+    true
 }
 
 /// An image in which the target was seen: its place in the stream, its time in seconds after the first image, what was seen.
 type Seen = (usize, f64, Isometry3<f64>);
 
 fn seen(stream: &Stream, sight: &Sight, first_ns: i64) -> Vec<Seen> {
-    let one = |(index, image): (usize, &super::recording::ImageFile)| {
+    let one = |(index, image): (usize, &ImageFile)| {
         Some((index, seconds(image.stamp_ns?, first_ns), (*sight.seen.get(index)?)?))
     };
     let mut seen: Vec<Seen> = stream.images.iter().enumerate().filter_map(one).collect();

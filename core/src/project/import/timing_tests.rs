@@ -1,7 +1,7 @@
 use nalgebra::Vector3;
 
 use super::*;
-use crate::project::import::{ImageFile, Source, Verdict, judge};
+use crate::project::import::{Source, Verdict, judge};
 use crate::targets::{Grid, TargetSpec};
 
 const OFFSET_S: f64 = 0.0437;
@@ -91,6 +91,43 @@ fn clocks_that_are_far_apart_need_to_be_told_roughly() {
 fn a_motion_that_tells_no_time_is_refused() {
     let even = |time_s: f64| Isometry3::new(Vector3::new(0.4, 0.0, 0.5), Vector3::new(0.0, 0.0, 0.2 * time_s));
     let (recording, mut sights) = recorded(Mode::EyeInHand, 20.0, even);
+    let refused = timed(&recording, &mut sights, &Settings::default(), &CancelToken::default());
+    assert!(matches!(refused, Err(ImportError::Clocks { .. })), "{refused:?}");
+}
+
+/// It turned evenly, which tells no time, and stood five times.
+#[test]
+fn where_the_motion_tells_no_time_the_images_at_rest_are_kept() {
+    let even = |time_s: f64| Isometry3::new(Vector3::new(0.4, 0.0, 0.5), Vector3::new(0.0, 0.0, 0.2 * time_s));
+    let (mut recording, mut sights) = recorded(Mode::EyeInHand, 20.0, even);
+    let rests = [20, 70, 120, 180, 240];
+    let sample = |index: usize| {
+        let stamp_ns = recording.streams[0].images[index].stamp_ns.expect("a stamp");
+        let (t, q) = {
+            let pose = arm(seconds(stamp_ns, START_NS));
+            (pose.translation.vector, pose.rotation.coords)
+        };
+        Sample {
+            image: Some(recording.streams[0].images[index].shown()),
+            number: None,
+            place: format!("bag at rest {index}"),
+            numbers: Numbers::Quaternion([t.x, t.y, t.z, q.x, q.y, q.z, q.w]),
+            joints: Vec::new(),
+        }
+    };
+    let samples: Vec<Sample> = rests.map(sample).into();
+    recording.at_rest =
+        vec![tree::track("bag:tf:base->tool0".into(), "robot", Stated::default(), samples).expect("five")];
+    let out = timed(&recording, &mut sights, &Settings::default(), &CancelToken::default());
+    let out = out.expect("rests are there").expect("stamps");
+    assert!(out.clocks.is_empty() && out.tracks.len() == 1 && out.warnings.len() == 1, "{:?}", out.warnings);
+    assert!(out.warnings[0].contains("5 images at which the robot stood"), "{:?}", out.warnings);
+    let names: Vec<String> = out.streams[0].images.iter().map(ImageFile::shown).collect();
+    assert_eq!(names, rests.map(|index| recording.streams[0].images[index].shown()));
+    assert_eq!(sights.streams[0].as_ref().expect("seen").seen.len(), rests.len());
+    // Two are not enough.
+    recording.at_rest[0].samples.truncate(2);
+    let (_, mut sights) = recorded(Mode::EyeInHand, 20.0, even);
     let refused = timed(&recording, &mut sights, &Settings::default(), &CancelToken::default());
     assert!(matches!(refused, Err(ImportError::Clocks { .. })), "{refused:?}");
 }

@@ -124,6 +124,7 @@ fn the_arm_behind_a_driver_calibrates_itself_once_it_is_allowed_to_move_whatever
         bench.until("the second", |model| waits(model) && model.document().captures.len() == 2);
         bench.click(Command::SetConfirmMoves(false));
         bench.until("the end", |model| !model.sequence_runs && model.capture.is_none());
+        bench.until("a solution", is_solved);
         let model = bench.model();
         let guided = model.sequence.as_ref().and_then(|sequence| sequence.guided.as_deref()).expect("guided");
         let ending = guided.ending.as_ref().unwrap_or_else(|| panic!("{name}: {}", bench.said()));

@@ -8,21 +8,30 @@
 //! are listed; the one that puts the camera nearer to what carries it than the target is comes first.
 
 mod cases;
+mod scale;
 mod trial;
+mod turns;
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use super::error::ImportError;
-use super::hypothesis::Hypothesis;
+use super::formats::tree::LEAST_POSES;
+use super::hypothesis::{Hypothesis, Source};
 use super::recording::Recording;
 use super::settings::Settings;
 use super::sight::Sight;
 use crate::estimate::handeye::Mode;
+use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use trial::Judge;
 
 /// A hypothesis that explains the views leaves less than this part of the target's distance.
 pub(in crate::project::import) const EXPLAINED: f64 = 0.05;
+/// And at the median a smaller angle \[rad\] than this: the same part of a turn by one radian.
+pub(in crate::project::import) const EXPLAINED_RAD: f64 = 0.05;
 /// And another one is ruled out when it leaves so many times more.
 pub const TIMES: f64 = 3.0;
 /// Views with which hypotheses can be told apart: with three any of them fits.
@@ -35,8 +44,11 @@ const MOST_QUICK: usize = 20;
 const MOST_JUDGED: usize = 40;
 /// Hypotheses that are kept for the list.
 const MOST_LISTED: usize = 24;
-/// Within this factor two hypotheses explain the same, and the commoner one comes first.
-const TIE: f64 = 1.05;
+/// Within this factor two hypotheses explain the same, and the commoner one comes first: a median of a dozen views is known no
+/// better.
+const TIE: f64 = 1.25;
+/// Poses of two series that differ by less than this [m, rad] are copies of each other, rounded otherwise.
+const COPY: f64 = 1e-4;
 
 /// What was seen in each source: streams by their corners, series by themselves.
 #[derive(Debug, Default)]
@@ -75,7 +87,7 @@ pub enum Verdict {
 ///
 /// # Errors
 /// [`ImportError::NoPoses`] without a series to try, [`ImportError::NothingLeft`] where settings exclude all,
-/// [`ImportError::BadChoice`] for a name that there is not.
+/// [`ImportError::BadChoice`] for a name that there is not, [`ImportError::NoViews`] where nothing has a solution.
 pub fn judge(
     recording: &Recording,
     sights: &Sights,
@@ -83,12 +95,13 @@ pub fn judge(
     cancel: &CancelToken,
 ) -> Result<Judgement, ImportError> {
     let paired = cases::sources(recording, sights, settings)?;
-    let cases = cases::cases(recording, &paired, settings);
+    let mut cases = cases::cases(recording, &paired, settings);
     if cases.is_empty() {
         return Err(ImportError::NothingLeft("these settings".into()));
     }
-    let judge = Judge { recording, sights, paired: &paired, settings };
+    let judge = Judge { recording, sights, paired: &paired, settings, read: RefCell::default() };
     let tried = cases.len();
+    turns::keep_alike(&judge, &mut cases);
     let mut quick: Vec<(f64, usize)> = Vec::with_capacity(tried);
     for robust in [false, true] {
         // A pairing of which a part is wrong spoils a plain solution: then each hypothesis is given the chance to leave
@@ -117,10 +130,14 @@ pub fn judge(
         }
     }
     let mut hypotheses: Vec<Hypothesis> = chosen.iter().flat_map(|i| judge.judged(&cases[*i])).collect();
+    if hypotheses.iter().all(|h| h.fit.is_none()) && !cancel.is_cancelled() {
+        return Err(ImportError::NoViews { folder: recording.root.clone(), need: LEAST_POSES });
+    }
     sort(recording, &mut hypotheses);
     let mended = judge.mended(&hypotheses);
     hypotheses.extend(mended);
     merge_equal(recording, &mut hypotheses);
+    scale::contradict(&judge, &mut hypotheses);
     sort(recording, &mut hypotheses);
     hypotheses.truncate(MOST_LISTED);
     let distance_m = hypotheses.first().map_or(0.0, |h| judge.sight_distance(h));
@@ -187,26 +204,67 @@ fn merge_equal(recording: &Recording, hypotheses: &mut Vec<Hypothesis>) {
     let mut out: Vec<Hypothesis> = Vec::new();
     for h in hypotheses.drain(..) {
         let same = out.iter_mut().find(|known| {
-            known.source == h.source
-                && known.robot == h.robot
-                && known.mode == h.mode
-                && known.pairing.image_of == h.pairing.image_of
-                && known.target_reading == h.target_reading
-                && recording.tracks[h.robot].samples.iter().all(|sample| {
-                    match (known.base_from_tip(sample), h.base_from_tip(sample)) {
-                        (Some(a), Some(b)) => {
-                            let (metres, radians) = a.distance_to(&b);
-                            metres < 1e-9 && radians < 1e-7
-                        }
-                        (a, b) => a.is_none() && b.is_none(),
-                    }
-                })
+            known.mode == h.mode && sees_the_same(recording, known, &h) && poses_are_equal(recording, known, &h)
         });
         match same {
+            Some(known) if known.robot != h.robot || known.source != h.source => {
+                let (of, from) = (&recording.tracks[h.robot].name, h.target_series(recording));
+                let name = from.map_or_else(|| of.clone(), |from| format!("{of} with {from}"));
+                if !known.same_as.contains(&name) {
+                    known.same_as.push(name);
+                }
+            }
             Some(known) if known.reading == h.reading && known.direction == h.direction => {}
             Some(known) => known.same_as.push(h.reading.rotation.to_string()),
             None => out.push(h),
         }
     }
     *hypotheses = out;
+}
+
+/// Whether what the camera saw is the same: the same images, or poses of the target that are the same numbers or copies.
+fn sees_the_same(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> bool {
+    if a.source == b.source {
+        return a.target_reading == b.target_reading;
+    }
+    let (Source::Track(of_a), Source::Track(of_b)) = (a.source, b.source) else { return false };
+    let (of_a, of_b) = (&recording.tracks[of_a].samples, &recording.tracks[of_b].samples);
+    of_a.len() == of_b.len()
+        && of_a.iter().zip(of_b).all(|(of_a, of_b)| match (a.camera_from_target(of_a), b.camera_from_target(of_b)) {
+            (Some(a), Some(b)) => {
+                let (a, b) = (Pose::<Camera, Target>::from_isometry(a), Pose::<Camera, Target>::from_isometry(b));
+                is_copy(a.distance_to(&b))
+            }
+            (a, b) => a.is_none() && b.is_none(),
+        })
+}
+
+/// Whether every image has the same pose of the robot under both, however it is written and wherever it stands.
+fn poses_are_equal(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> bool {
+    let by_image = |h: &Hypothesis| -> BTreeMap<usize, Option<Pose<Base, Tip>>> {
+        let samples = &recording.tracks[h.robot].samples;
+        let pose = |(sample, image): (usize, &Option<usize>)| Some(((*image)?, h.base_from_tip(samples.get(sample)?)));
+        h.pairing.image_of.iter().enumerate().filter_map(pose).collect()
+    };
+    let is_same_series = a.robot == b.robot;
+    if is_same_series && a.pairing.image_of != b.pairing.image_of {
+        return false;
+    }
+    let (of_a, of_b) = (by_image(a), by_image(b));
+    of_a.len() == of_b.len()
+        && of_a.iter().zip(&of_b).all(|((image_a, a), (image_b, b))| {
+            image_a == image_b
+                && match (a, b) {
+                    (Some(a), Some(b)) if is_same_series => {
+                        let (metres, radians) = a.distance_to(b);
+                        metres < 1e-9 && radians < 1e-7
+                    }
+                    (Some(a), Some(b)) => is_copy(a.distance_to(b)),
+                    (a, b) => a.is_none() && b.is_none(),
+                }
+        })
+}
+
+fn is_copy((metres, radians): (f64, f64)) -> bool {
+    metres < COPY && radians < COPY
 }

@@ -1,11 +1,14 @@
 //! A hypothesis against the views: a robust closed form, what it leaves, and images that contradict it.
 
-use std::borrow::Cow;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::ops::Deref;
+use std::rc::Rc;
 
 use nalgebra::Isometry3;
 
 use super::cases::{Case, Paired};
-use super::{EXPLAINED, Sights, TIMES};
+use super::{EXPLAINED, EXPLAINED_RAD, Sights, TIMES};
 use crate::diagnose::doctor::agreement::{self, agreement};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::{Mode, PosePair, subset};
@@ -18,12 +21,15 @@ use crate::project::import::pairing::{self, Pairing};
 use crate::project::import::recording::Recording;
 use crate::project::import::settings::Settings;
 use crate::project::import::sight::Sight;
+use crate::targets::{AprilGrid, AprilTag, TargetSpec};
 
 /// A view disagrees beyond so many times the median, and beyond this part of the distance.
 const DISAGREES: f64 = 5.0;
 const DISAGREES_OF_DISTANCE: f64 = 3e-3;
 /// And to judge the best of them.
 const MOST_VIEWS: usize = 400;
+/// Views by which the size of the target is looked at.
+const MOST_SCALED: usize = 30;
 
 /// What hypotheses are tried with.
 pub(super) struct Judge<'a> {
@@ -31,6 +37,25 @@ pub(super) struct Judge<'a> {
     pub sights: &'a Sights,
     pub paired: &'a [Paired],
     pub settings: &'a Settings,
+    /// Series of the target that were read already: many cases share them.
+    pub read: RefCell<HashMap<(usize, Reading, Direction), Rc<Sight>>>,
+}
+
+/// What the camera saw.
+enum SightOf<'a> {
+    Images(&'a Sight),
+    Series(Rc<Sight>),
+}
+
+impl Deref for SightOf<'_> {
+    type Target = Sight;
+
+    fn deref(&self) -> &Sight {
+        match self {
+            Self::Images(sight) => sight,
+            Self::Series(sight) => sight,
+        }
+    }
 }
 
 /// A pose of the robot with what the camera saw there.
@@ -41,16 +66,18 @@ struct View {
 }
 
 impl Judge<'_> {
-    fn sight_of(&self, source: Source, target_reading: Option<&(Reading, Direction)>) -> Option<Cow<'_, Sight>> {
-        match source {
-            Source::Stream(i) => self.sights.streams.get(i)?.as_ref().map(Cow::Borrowed),
-            Source::Track(i) => {
-                let (reading, direction) = target_reading?;
-                let samples = &self.recording.tracks[i].samples;
-                let seen = samples.iter().map(|s| Some(direction.of(&reading.transform(&s.numbers)?))).collect();
-                Some(Cow::Owned(Sight::of_poses(self.sights.target.as_ref(), seen)))
-            }
-        }
+    fn sight_of(&self, source: Source, target_reading: Option<&(Reading, Direction)>) -> Option<SightOf<'_>> {
+        let (track, (reading, direction)) = match source {
+            Source::Stream(i) => return self.sights.streams.get(i)?.as_ref().map(SightOf::Images),
+            Source::Track(i) => (i, *target_reading?),
+        };
+        let read = || {
+            let samples = &self.recording.tracks[track].samples;
+            let seen = samples.iter().map(|s| Some(direction.of(&reading.transform(&s.numbers)?))).collect();
+            Rc::new(Sight::of_poses(self.sights.target.as_ref(), seen))
+        };
+        let mut known = self.read.borrow_mut();
+        Some(SightOf::Series(Rc::clone(known.entry((track, reading, direction)).or_insert_with(read))))
     }
 
     pub fn distance_of(&self, case: &Case) -> f64 {
@@ -67,16 +94,16 @@ impl Judge<'_> {
     }
 
     fn views(&self, case: &Case, pairing: &Pairing, sight: &Sight) -> Vec<View> {
-        let view = |(sample, image): (usize, &Option<usize>)| {
-            let image = (*image)?;
-            let seen = (*sight.seen.get(image)?)?;
-            let pair = PosePair {
-                anchor_from_mount: Pose::from_isometry(self.anchor_from_mount(case, sample)?),
-                camera_from_target: Pose::from_isometry(seen),
-            };
-            Some(View { sample, image, pair })
-        };
+        let view = |(sample, image): (usize, &Option<usize>)| self.view(case, sight, sample, (*image)?);
         pairing.image_of.iter().enumerate().filter_map(view).collect()
+    }
+
+    fn view(&self, case: &Case, sight: &Sight, sample: usize, image: usize) -> Option<View> {
+        let pair = PosePair {
+            anchor_from_mount: Pose::from_isometry(self.anchor_from_mount(case, sample)?),
+            camera_from_target: Pose::from_isometry((*sight.seen.get(image)?)?),
+        };
+        Some(View { sample, image, pair })
     }
 
     /// A solution and its median misfit.
@@ -92,10 +119,51 @@ impl Judge<'_> {
         robust: bool,
     ) -> Option<(ClosedFormSolution, f64)> {
         let sight = self.sight_of(case.source, case.target_reading.as_ref())?;
-        let views = self.views(case, pairing, &sight);
-        let chosen: Vec<PosePair> = subset::spread(views.len(), most).into_iter().map(|i| views[i].pair).collect();
+        let is_seen = |image: usize| matches!(sight.seen.get(image), Some(Some(_)));
+        let seen: Vec<(usize, usize)> = pairing
+            .image_of
+            .iter()
+            .enumerate()
+            .filter_map(|(sample, image)| image.filter(|image| is_seen(*image)).map(|image| (sample, image)))
+            .collect();
+        let chosen = subset::spread(seen.len(), most).into_iter().map(|i| seen[i]);
+        let chosen: Vec<PosePair> =
+            chosen.filter_map(|(sample, image)| Some(self.view(case, &sight, sample, image)?.pair)).collect();
         let found = agreement(&sight.outer, &chosen, robust).ok()?;
         Some((found.solution, found.median_m))
+    }
+
+    /// What is left at the median where the target is so many times as large, by the size that was said, metres.
+    pub fn misfit_of_scaled(&self, h: &Hypothesis, scale: f64) -> Option<f64> {
+        let case = Case::of(h);
+        let sight = self.sight_of(h.source, h.target_reading.as_ref())?;
+        let views = self.views(&case, &h.pairing, &sight);
+        let is_wrong =
+            |sample: usize| h.fit.as_ref().is_some_and(|fit| fit.disagreeing.iter().any(|(it, _)| *it == sample));
+        let right: Vec<&View> = views.iter().filter(|view| !is_wrong(view.sample)).collect();
+        let scaled = |i: usize| {
+            let PosePair { anchor_from_mount, camera_from_target } = right[i].pair;
+            let mut seen = *camera_from_target.isometry();
+            seen.translation.vector *= scale;
+            PosePair { anchor_from_mount, camera_from_target: Pose::from_isometry(seen) }
+        };
+        let pairs: Vec<PosePair> = subset::spread(right.len(), MOST_SCALED).into_iter().map(scaled).collect();
+        let outer = sight.outer.map(|point| point * scale);
+        Some(agreement(&outer, &pairs, false).ok()?.median_m / scale)
+    }
+
+    /// What the size of the target would be called.
+    pub fn size_of_target(&self, scale: f64) -> Option<String> {
+        match self.sights.target? {
+            TargetSpec::Chessboard(grid) => Some(format!("squares of {:.2} mm", grid.square_m * scale * 1e3)),
+            TargetSpec::Charuco(board) => Some(format!("squares of {:.2} mm", board.square_m * scale * 1e3)),
+            TargetSpec::Circles(grid) | TargetSpec::AsymmetricCircles(grid) => {
+                Some(format!("dots {:.2} mm apart", grid.square_m * scale * 1e3))
+            }
+            TargetSpec::AprilGrid(AprilGrid { tag_m, .. }) | TargetSpec::AprilTag(AprilTag { tag_m, .. }) => {
+                Some(format!("tags of {:.2} mm", tag_m * scale * 1e3))
+            }
+        }
     }
 
     /// A case with all its views, under each of its names.
@@ -130,14 +198,20 @@ impl Judge<'_> {
         let median_rad = median(misfits.iter().map(|m| m.1)).unwrap_or(f64::INFINITY);
         let limit = (DISAGREES * median_m).max(DISAGREES_OF_DISTANCE * sight.distance_m);
         let mut disagreeing = Vec::new();
-        let mut contradictions = Vec::new();
+        let mut contradictions: Vec<String> = are_of_the_target(sight, solution).into_iter().collect();
+        let agrees = |sample: usize| {
+            views.iter().zip(&misfits).any(|(view, (misfit_m, _))| view.sample == sample && *misfit_m <= limit)
+        };
         for (view, (misfit_m, _)) in views.iter().zip(&misfits) {
             if *misfit_m <= limit {
                 continue;
             }
             disagreeing.push((view.sample, *misfit_m));
+            // Views that were exchanged or shifted leave the other pose without its image. Where that has it, this view's own
+            // pose is wrong, or its image a copy: one view less, which says nothing of the others.
             if contradictions.len() < 3
                 && let Some((other, other_m)) = self.better(case, sight, solution, view, *misfit_m, limit)
+                && !agrees(other)
             {
                 let samples = &self.recording.tracks[case.robot].samples;
                 contradictions.push(format!(
@@ -233,6 +307,19 @@ impl Judge<'_> {
         }
         out
     }
+}
+
+/// Poses with which camera and target would both sit where the robot's frames are: they are those of the target in the camera,
+/// in the place of the robot's.
+fn are_of_the_target(sight: &Sight, solution: &ClosedFormSolution) -> Option<String> {
+    let is_none = |pose: &Isometry3<f64>| {
+        pose.translation.vector.norm() < EXPLAINED * sight.distance_m && pose.rotation.angle() < EXPLAINED_RAD
+    };
+    let both = [solution.mount_from_camera.isometry(), solution.anchor_from_target.isometry()];
+    both.into_iter().all(is_none).then(|| {
+        "these poses are those of the target in the camera, as calibrateCamera and solvePnP give them, and none of a robot"
+            .to_owned()
+    })
 }
 
 /// How far a solution puts the target from where it was seen, metres and radians; of a target that looks the same after half

@@ -45,6 +45,7 @@ pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording:
     let motions = motion::motions(&bag, file);
     let mut at_rest: BTreeMap<String, Vec<i64>> = BTreeMap::new();
     let mut moving: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+    let mut few_rests: BTreeMap<String, Vec<i64>> = BTreeMap::new();
     for (topic, stamps) in &bag.images {
         let rests = rests(&bag, stamps);
         recording.beliefs.push(format!(
@@ -58,7 +59,14 @@ pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording:
                 "{file}: {} images on {topic} of a robot that moves are looked at, to be given poses by their stamps",
                 in_motion.len()
             ));
-            moving.insert(topic.clone(), in_motion);
+            let mut looked_at = in_motion;
+            if rests.len() >= tree::LEAST_POSES {
+                looked_at.extend(&rests);
+                looked_at.sort_unstable();
+                looked_at.dedup();
+                few_rests.insert(topic.clone(), rests);
+            }
+            moving.insert(topic.clone(), looked_at);
         } else if rests.len() >= tree::LEAST_POSES {
             at_rest.insert(topic.clone(), rests);
         }
@@ -75,6 +83,9 @@ pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording:
     for (topic, stamps) in &at_rest {
         recording.tracks.extend(tracks(&bag, file, topic, stamps));
         recording.joints.extend(joints(&bag, file, topic, stamps));
+    }
+    for (topic, stamps) in &few_rests {
+        recording.at_rest.extend(tracks(&bag, file, topic, stamps));
     }
     if !moving.is_empty() {
         recording.motions.extend(motions);
