@@ -1,6 +1,6 @@
 //! Tables of poses: with or without a header, any delimiter, names of images or not, one row or four to a pose.
 
-mod bare;
+pub(in crate::project::import::formats) mod bare;
 mod cells;
 mod header;
 
