@@ -25,6 +25,8 @@ pub struct Recording {
     pub tracks: Vec<Track>,
     /// Joint values, of which the chain of the arm makes poses.
     pub joints: Vec<JointSeries>,
+    /// Rows of numbers without names. They are joint values only for whoever names the arm.
+    pub rows: Vec<JointSeries>,
     /// Poses of a robot that moves, as densely as they were recorded: what images of a stream with stamps are given poses of
     /// ([`timed`](super::timed)).
     pub motions: Vec<Motion>,

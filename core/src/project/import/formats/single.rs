@@ -48,7 +48,7 @@ pub(in crate::project::import) fn tracks<'a>(
 }
 
 /// The numbers of a text that has nothing else, whatever stands between them; brackets and calls of Python's are nothing.
-fn numbers(text: &str) -> Option<Vec<f64>> {
+pub(in crate::project::import) fn numbers(text: &str) -> Option<Vec<f64>> {
     let is_sign = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '[' | ']' | '(' | ')');
     let words = text.split(is_sign).filter(|word| !word.is_empty() && !is_call(word));
     words.take(MOST_NUMBERS + 1).map(number).collect::<Option<Vec<f64>>>().filter(|n| n.len() <= MOST_NUMBERS)

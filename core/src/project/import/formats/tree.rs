@@ -47,7 +47,8 @@ fn walk(value: &Value, path: &str, fields: &mut Fields, depth: usize) {
     }
     if let Some(numbers) = value.numbers(16) {
         if is_about_joints(path) {
-            if numbers.len() >= 4 && numbers.len() <= 12 && fields.joints.is_empty() {
+            let is_angles = !is_about_motion(path);
+            if is_angles && numbers.len() >= 4 && numbers.len() <= 12 && fields.joints.is_empty() {
                 fields.joints = numbers;
             }
         } else if let Some(found) = of_numbers(&numbers, last_of(path)) {
@@ -94,6 +95,18 @@ pub(in crate::project::import) fn is_about_joints(name: &str) -> bool {
     let name = name.to_lowercase();
     let last = last_of(&name);
     last.contains("joint") || matches!(last, "q" | "qpos" | "actual_q" | "angles" | "axes")
+}
+
+/// Whether joint values of this name are of how the joints move or are driven, not of where they are.
+fn is_about_motion(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let last = last_of(&name);
+    // `current_joint_values` are those of now.
+    let is_current = last.ends_with("current") || last.ends_with("currents");
+    is_current
+        || ["torque", "effort", "veloc", "accel", "speed", "temperature", "force"]
+            .iter()
+            .any(|word| last.contains(word))
 }
 
 fn is_counting(key: &str) -> bool {

@@ -101,13 +101,14 @@ impl<'a> Reader<'a> {
 
     /// What lies beside a file that was named: cameras and targets, and no series.
     pub fn companions(&mut self, files: &[PathBuf]) {
-        let Recording { tracks, joints, .. } = &self.recording;
-        let (tracks, joints) = (tracks.len(), joints.len());
+        let Recording { tracks, joints, rows, .. } = &self.recording;
+        let (tracks, joints, rows) = (tracks.len(), joints.len(), rows.len());
         for file in files {
             self.group(&[(file.clone(), None)]);
         }
         self.recording.tracks.truncate(tracks);
         self.recording.joints.truncate(joints);
+        self.recording.rows.truncate(rows);
     }
 
     /// Files of a bag of ROS 2 with its description beside them are one, compressed or not; others are each a bag.
@@ -247,6 +248,7 @@ impl<'a> Reader<'a> {
                 }
                 self.recording.joints.extend(joints);
             }
+            self.recording.rows.extend(table::unnamed(&name, &text));
             self.recording.tracks.extend(tracks);
         }
     }

@@ -96,6 +96,11 @@ impl Reader<'_> {
     /// A pose to a file of text; whether it is so.
     pub(super) fn one_pose_to_a_text(&mut self, texts: &[(PathBuf, Option<u64>, String)]) -> bool {
         let name = folder::shown(texts.iter().map(|(file, ..)| file.as_path()));
+        let rows = texts.iter().filter_map(|(file, number, text)| {
+            Some((None, *number, file.display().to_string(), single::numbers(text)?))
+        });
+        let rows = joints::unnamed(&name, rows).filter(|series| 2 * series.samples.len() >= texts.len());
+        self.recording.rows.extend(rows);
         let tracks = single::texts(&name, self.role_of(&name), texts);
         if !tracks.is_empty() {
             self.recording.tracks.extend(tracks);

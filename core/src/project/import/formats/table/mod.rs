@@ -4,6 +4,7 @@ pub(in crate::project::import::formats) mod bare;
 mod cells;
 mod header;
 
+use super::joints;
 use super::tree::is_image_name;
 use crate::project::import::recording::{JointSeries, Numbers, Sample, Track};
 use crate::project::import::value::number;
@@ -29,6 +30,19 @@ pub(in crate::project::import) fn read(file: &str, text: &str) -> Vec<Track> {
 /// The joint values of a text that has no poses.
 pub(in crate::project::import) fn joints(file: &str, text: &str) -> Option<JointSeries> {
     header::joints(file, &cells::lines(text))
+}
+
+/// The rows of a text without a header, which may be joint values.
+pub(in crate::project::import) fn unnamed(file: &str, text: &str) -> Option<JointSeries> {
+    let lines = cells::lines(text);
+    if header::with_header(file, &lines).is_some() || header::joints(file, &lines).is_some() {
+        return None;
+    }
+    let rows = lines.iter().filter(|line| line.is_numeric()).map(|line| {
+        let place = format!("{file}, row {}", line.row);
+        (name_of(line), None, place, line.numbers())
+    });
+    joints::unnamed(file, rows)
 }
 
 fn sample(
