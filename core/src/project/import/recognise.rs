@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::error::ImportError;
 use super::folder;
 use super::formats::moveit;
+use super::nothing;
 use super::reader::Reader;
 use super::recording::{FoundTarget, Recording};
 use crate::project::files::own_folder::{DESCRIPTION, is_session};
@@ -45,6 +46,9 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
     let mut recording = reader.recording;
     if moveit::know(&mut recording.tracks) {
         recording.beliefs.push("the poses are samples of MoveIt calibration, by their names".into());
+    }
+    if recording.tracks.is_empty() && recording.joints.is_empty() && recording.motions.is_empty() {
+        recording.nothing = nothing::reasons(&root, &files);
     }
     for track in &recording.tracks {
         let joints = track.samples.iter().filter(|s| !s.joints.is_empty()).count();

@@ -38,6 +38,8 @@ pub struct Recording {
     pub targets: Vec<FoundTarget>,
     /// Where the camera sits, when a file says so, and which one.
     pub mode: Option<Known<Mode>>,
+    /// Where no series was found, what the files have instead, one sentence each.
+    pub nothing: Vec<String>,
     /// What a person should know of the files: doubled ones, some that cannot be read.
     pub warnings: Vec<String>,
     /// Where images lie that were unpacked; they go with the recording.

@@ -4,6 +4,8 @@ pub(in crate::project::import::formats) mod bare;
 mod cells;
 mod header;
 
+use std::collections::BTreeMap;
+
 use super::joints;
 use super::tree::is_image_name;
 use crate::project::import::recording::{JointSeries, Numbers, Sample, Track};
@@ -30,6 +32,15 @@ pub(in crate::project::import) fn read(file: &str, text: &str) -> Vec<Track> {
 /// The joint values of a text that has no poses.
 pub(in crate::project::import) fn joints(file: &str, text: &str) -> Option<JointSeries> {
     header::joints(file, &cells::lines(text))
+}
+
+/// How many rows of a text have how many numbers.
+pub(in crate::project::import) fn widths(text: &str) -> BTreeMap<usize, usize> {
+    let mut widths = BTreeMap::new();
+    for line in cells::lines(text).iter().filter(|line| line.is_numeric()) {
+        *widths.entry(line.numbers().len()).or_default() += 1;
+    }
+    widths
 }
 
 /// The rows of a text without a header, which may be joint values.
