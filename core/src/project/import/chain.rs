@@ -24,15 +24,30 @@ const ROS_NAMES_OF_UR: [&str; 6] =
 pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportError> {
     let fail = |why: String| ImportError::Arm { arm: arm.to_owned(), why };
     let chain = Chain::of(arm, &recording.root).map_err(fail)?;
-    if recording.joints.is_empty() {
-        return Err(fail("there are no joint values in this recording, leave `arm` out".into()));
+    let is_of_arm = |series: &JointSeries| chain.row_of(series).is_some();
+    // Joint values by name say what they are; numbers without names are looked at where there are no others.
+    let (named, rows): (Vec<_>, Vec<_>) =
+        (recording.joints.iter().collect(), recording.rows.iter().filter(|s| is_of_arm(s)).collect());
+    if named.is_empty() && rows.is_empty() {
+        let count = chain.arm.joint_count();
+        return Err(fail(format!(
+            "there are no joint values in this recording, nor rows of {count} numbers: leave `arm` out"
+        )));
     }
     let mut out = recording.clone();
     out.tracks.retain(|track| track.role == Role::Target);
     let mut troubles = Vec::new();
-    for series in &recording.joints {
+    let mut is_found = false;
+    for (series, is_named) in named.into_iter().map(|s| (s, true)).chain(rows.into_iter().map(|s| (s, false))) {
+        if !is_named && is_found {
+            break;
+        }
         match chain.tracks(series) {
-            Ok(tracks) => out.tracks.extend(tracks),
+            Ok(tracks) => {
+                out.beliefs.extend(chain.left_out(series));
+                out.tracks.extend(tracks);
+                is_found |= is_named;
+            }
             Err(why) => troubles.push(why),
         }
     }
@@ -127,12 +142,40 @@ impl Chain {
         Ok(tracks)
     }
 
+    /// Where the values of the arm stand in rows that have as many, or a number that counts before them.
+    fn row_of(&self, series: &JointSeries) -> Option<std::ops::Range<usize>> {
+        let count = self.arm.joint_count();
+        let first: Vec<f64> = series.samples.iter().filter_map(|sample| sample.values.first().copied()).collect();
+        let counts = || first.windows(2).all(|pair| matches!(pair, [a, b] if b - a == 1.0));
+        match series.samples.first()?.values.len() {
+            has if has == count => Some(0..count),
+            has if has == count + 1 && counts() => Some(1..has),
+            _ => None,
+        }
+    }
+
+    /// What is said of values that the arm has no joints for.
+    fn left_out(&self, series: &JointSeries) -> Option<String> {
+        let (count, has) = (self.arm.joint_count(), series.samples.first()?.values.len());
+        let is_open = series.joints.is_empty() && has > count && self.row_of(series).is_none();
+        is_open.then(|| {
+            format!(
+                "{} has {has} values a row: the first {count} are taken for the joints of {}",
+                series.name, self.name
+            )
+        })
+    }
+
     /// For every joint of the chain its place among the values: by the names that stand with them, or as they come.
     fn order(&self, series: &JointSeries) -> Result<Vec<usize>, String> {
         let count = self.arm.joint_count();
         let has = series.samples.first().map_or(0, |sample| sample.values.len());
         if series.joints.is_empty() {
-            return if has == count {
+            if let Some(order) = self.row_of(series) {
+                return Ok(order.collect());
+            }
+            // Fingers are told of behind the joints of the arm; as many again would be those of another arm.
+            return if has > count && has < 2 * count {
                 Ok((0..count).collect())
             } else {
                 Err(format!("{} has {has} joint values and the arm {count}", series.name))

@@ -101,3 +101,38 @@ fn joint_values_without_a_chain_are_refused_with_what_to_give() {
     let why = with_arm(&recording, &missing).expect_err("no such file").to_string();
     assert!(why.contains("ur5e"), "what is built in is named: {why}");
 }
+
+#[test]
+fn rows_without_a_header_are_joint_values_for_an_arm_of_as_many_joints() {
+    let rows = |first: &dyn Fn(usize) -> String| {
+        (0..5).map(|row| format!("{}{}", first(row), angles(row).map(|a| a.to_string()).join(", "))).collect::<Vec<_>>()
+    };
+    for text in [rows(&|_| String::new()), rows(&|row| format!("{}, ", row + 3)), rows(&|row| format!("{row}.png, "))] {
+        let recording = poses("angles.txt", &text.join("\n"), "ur5e").expect("poses");
+        let track = recording.tracks.iter().find(|track| track.name.contains("rad")).expect("in radians");
+        let truth = ArmKind::Ur5e.arm().forward(&angles(4)).expect("a pose").matrix();
+        let Numbers::Matrix(m) = track.samples[4].numbers else { panic!("{track:?}") };
+        assert!((m - truth).amax() < 1e-12, "{text:?}");
+        assert!(recording.tracks.iter().all(|track| matches!(track.samples[0].numbers, Numbers::Matrix(_))));
+    }
+    let why =
+        poses("angles.txt", &rows(&|_| String::new()).join("\n"), "arm.urdf").expect_err("two joints").to_string();
+    assert!(why.contains("rows of 2 numbers"), "{why}");
+}
+
+/// Drivers of arms with a gripper report its fingers with the joints.
+#[test]
+fn of_more_values_than_the_arm_has_joints_the_first_are_taken_and_it_is_said() {
+    let row = |row: usize| {
+        let values: Vec<String> =
+            angles(row).iter().map(f64::to_string).chain(["0.04".into(), "0.04".into()]).collect();
+        format!("{{\"joint_torques\": [9, 9, 9, 9, 9, {row}], \"joint_values\": [{}]}}", values.join(", "))
+    };
+    let text = format!("[{}]", (0..4).map(row).collect::<Vec<_>>().join(","));
+    let recording = poses("states.json", &text, "ur5e").expect("poses");
+    let truth = ArmKind::Ur5e.arm().forward(&angles(2)).expect("a pose").matrix();
+    let Numbers::Matrix(m) = recording.tracks[0].samples[2].numbers else { panic!("{:?}", recording.tracks) };
+    assert!((m - truth).amax() < 1e-12, "torques are no angles");
+    let said = |text: &str| recording.beliefs.iter().any(|belief| belief.contains(text));
+    assert!(said("8 values a row: the first 6 are taken"), "{:?}", recording.beliefs);
+}

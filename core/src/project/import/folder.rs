@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ImportError;
+pub(super) use super::naming::{groups, naming, shown};
 use super::recording::{ImageFile, Stream};
 use crate::natural_order;
 use crate::project::files::image_file::{self, one_line};
@@ -19,11 +20,15 @@ const MAX_TEXT_BYTES: u64 = 1 << 26;
 /// Images of one naming that make a stream.
 const LEAST_IMAGES: usize = 3;
 
+/// How files are called that have series of poses and nothing that another file needs.
+const SERIES: [&str; 15] =
+    ["csv", "txt", "tsv", "dat", "log", "", "json", "jsonl", "samples", "npz", "npy", "script", "src", "mod", "ls"];
+
 const IMAGES: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
 
 /// The files of a folder and of those in it, in natural order, as paths below it. Hidden ones are none. Of a file that was
-/// named, it and what lies beside it.
-pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>), ImportError> {
+/// named, which comes last, it and what lies beside it.
+pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>, Option<PathBuf>), ImportError> {
     let found = fs::metadata(path).map_err(|e| unreadable(path, &e))?;
     let (root, only) = if found.is_dir() {
         (path.to_path_buf(), None)
@@ -33,18 +38,15 @@ pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>), ImportError> 
     };
     let mut files = Vec::new();
     walk(&root, Path::new(""), if only.is_some() { 0 } else { MAX_DEPTH }, &mut files)?;
-    if let Some(only) = only {
+    if let Some(only) = &only {
         // Beside a file that was named only what it may refer to counts: images, the description of a camera.
-        let is_series = |f: &Path| {
-            is_bag(f) || ["csv", "txt", "tsv", "json", "jsonl", "samples", "npz", "npy"].contains(&&*ending(f))
-        };
         files.retain(|file| {
             let is_others = ending(file) == "calib" && file.file_stem() != only.file_stem();
-            *file == only || !(is_series(file) || is_others)
+            file == only || !(is_bag(file) || SERIES.contains(&&*ending(file)) || is_others)
         });
     }
     files.sort_by(|a, b| natural_order::compare(&a.to_string_lossy(), &b.to_string_lossy()));
-    Ok((root, files))
+    Ok((root, files, only))
 }
 
 fn walk(root: &Path, below: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), ImportError> {
@@ -119,75 +121,6 @@ pub(super) fn text(path: &Path) -> Result<String, ImportError> {
         _ => String::from_utf8_lossy(&bytes).into_owned(),
     };
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
-}
-
-/// A name as its parts: what is the same in all files of a series, and the numbers.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Naming {
-    folder: PathBuf,
-    template: String,
-    runs: usize,
-}
-
-impl Naming {
-    /// The name without its numbers and without its folder.
-    pub fn template(&self) -> &str {
-        &self.template
-    }
-
-    /// As a person reads it: `#` stands for a number.
-    pub fn shown(&self) -> String {
-        self.folder.join(&self.template).display().to_string()
-    }
-}
-
-/// The naming of a file and the numbers in its name.
-pub(super) fn naming(path: &Path, with_ending: bool) -> (Naming, Vec<u64>) {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let (mut template, mut numbers) = (String::new(), Vec::new());
-    let mut rest = stem.as_str();
-    while let Some(c) = rest.chars().next() {
-        let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
-        if digits > 0 {
-            // More digits than a number has are a hash, which counts nothing.
-            numbers.push(rest[..digits].parse().unwrap_or(u64::MAX));
-            template.push('#');
-            rest = &rest[digits..];
-        } else {
-            template.push(c);
-            rest = &rest[c.len_utf8()..];
-        }
-    }
-    if with_ending {
-        template.push('.');
-        template.push_str(&ending(path));
-    }
-    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    (Naming { folder, template, runs: numbers.len() }, numbers)
-}
-
-/// Files of one naming, each with the number that differs among them; `None` where none or several do.
-pub(super) fn groups(files: &[PathBuf], with_ending: bool) -> Vec<Vec<(PathBuf, Option<u64>)>> {
-    let mut by_naming: BTreeMap<Naming, Vec<(PathBuf, Vec<u64>)>> = BTreeMap::new();
-    for file in files {
-        let (naming, numbers) = naming(file, with_ending);
-        by_naming.entry(naming).or_default().push((file.clone(), numbers));
-    }
-    by_naming
-        .into_values()
-        .map(|members| {
-            let runs = members.first().map_or(0, |(_, numbers)| numbers.len());
-            let varying: Vec<usize> =
-                (0..runs).filter(|run| members.iter().any(|(_, n)| n[*run] != members[0].1[*run])).collect();
-            // Of one file alone the last number is taken, as most programs count at the end.
-            let counting = match varying.as_slice() {
-                [run] => Some(*run),
-                [] => runs.checked_sub(1),
-                _ => None,
-            };
-            members.into_iter().map(|(file, numbers)| (file, counting.map(|run| numbers[run]))).collect()
-        })
-        .collect()
 }
 
 /// The streams of images in a list of files, the largest first, and what is odd about them.
@@ -268,17 +201,12 @@ fn take(root: &Path, members: Vec<(PathBuf, Option<u64>)>, streams: &mut Vec<Str
             continue;
         }
         find_doubled(root, &mut images, warnings);
-        let mut name = stream_name(&images);
+        let mut name = shown(images.iter().map(|image| image.path.as_path()));
         if sizes > 1 {
             name = format!("{name} ({}×{})", size.0, size.1);
         }
         streams.push(Stream { name, images, size, is_depth });
     }
-}
-
-fn stream_name(images: &[ImageFile]) -> String {
-    let (naming, _) = naming(&images[0].path, true);
-    naming.shown()
 }
 
 /// Depth is kept so by cameras that have both; only the header is read.
@@ -314,31 +242,5 @@ fn find_doubled(root: &Path, images: &mut [ImageFile], warnings: &mut Vec<String
                 }
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn numbers(names: &[&str]) -> Vec<Vec<(String, Option<u64>)>> {
-        let files: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
-        groups(&files, false)
-            .into_iter()
-            .map(|group| group.into_iter().map(|(path, n)| (path.display().to_string(), n)).collect())
-            .collect()
-    }
-
-    #[test]
-    fn the_number_that_counts_is_the_one_that_differs() {
-        let found = numbers(&["cam0_3.png", "cam0_12.png", "other.png"]);
-        assert_eq!(found[0], [("cam0_3.png".into(), Some(3)), ("cam0_12.png".into(), Some(12))]);
-        assert_eq!(found[1], [("other.png".into(), None)]);
-    }
-
-    #[test]
-    fn names_with_several_numbers_that_differ_count_nothing() {
-        let found = numbers(&["10-01-55.png", "10-02-03.png"]);
-        assert!(found[0].iter().all(|(_, number)| number.is_none()), "{found:?}");
     }
 }

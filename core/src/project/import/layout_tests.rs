@@ -32,6 +32,15 @@ fn rotation_first(folder: &Path, poses: &[Isometry3<f64>]) {
     });
 }
 
+fn a_number_to_a_line_rotation_first(folder: &Path, poses: &[Isometry3<f64>]) {
+    for (i, pose) in poses.iter().enumerate() {
+        let turn = pose.rotation.euler_angles();
+        let degrees = [turn.0, turn.1, turn.2].map(f64::to_degrees);
+        let text = joined(degrees.into_iter().chain(pose.translation.vector.iter().map(|v| v * 1e3)), "\n");
+        fs::write(folder.join(format!("image_{i}.txt")), text + "\n").expect("written");
+    }
+}
+
 fn translation_and_matrix(folder: &Path, poses: &[Isometry3<f64>]) {
     lines(folder, "poses.txt", poses, |_, pose| {
         let turn = pose.rotation.to_rotation_matrix();
@@ -46,16 +55,69 @@ fn matrix_by_columns_and_translation(folder: &Path, poses: &[Isometry3<f64>]) {
     });
 }
 
+fn npy(shape: &str, numbers: impl IntoIterator<Item = f64>) -> Vec<u8> {
+    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({shape}), }}").into_bytes();
+    header.resize(117, b' ');
+    header.push(b'\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header);
+    bytes.extend(numbers.into_iter().flat_map(f64::to_le_bytes));
+    bytes
+}
+
 fn an_array_to_a_pose(folder: &Path, poses: &[Isometry3<f64>]) {
     for (i, pose) in poses.iter().enumerate() {
-        let mut header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (4, 4), }".to_vec();
-        header.resize(117, b' ');
-        header.push(b'\n');
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend((header.len() as u16).to_le_bytes());
-        bytes.extend(header);
-        bytes.extend(pose.to_homogeneous().transpose().iter().flat_map(|v| v.to_le_bytes()));
+        let bytes = npy("4, 4", pose.to_homogeneous().transpose().iter().copied());
         fs::write(folder.join(format!("pose_{i}.npy")), bytes).expect("written");
+    }
+}
+
+/// Writes arrays as `numpy.savez` does.
+fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) {
+    let mut zip = zip::ZipWriter::new(fs::File::create(path).expect("made"));
+    for (name, bytes) in arrays {
+        zip.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default()).expect("begun");
+        std::io::Write::write_all(&mut zip, bytes).expect("written");
+    }
+    zip.finish().expect("written");
+}
+
+fn vectors_in_a_file_of_arrays(folder: &Path, poses: &[Isometry3<f64>]) {
+    for (i, pose) in poses.iter().enumerate() {
+        let turn: [f64; 3] = se3::rotation_vector(&pose.rotation).into();
+        let arrays = [("rvec", npy("3, 1", turn)), ("tvec", npy("3, 1", pose.translation.vector.iter().copied()))];
+        npz(&folder.join(format!("robot_{i}.npz")), &arrays);
+    }
+}
+
+fn matrix_and_vector_in_a_file_of_arrays(folder: &Path, poses: &[Isometry3<f64>]) {
+    for (i, pose) in poses.iter().enumerate() {
+        let turn = pose.rotation.to_rotation_matrix();
+        let place = npy("3", pose.translation.vector.iter().map(|v| v * 1e3));
+        let arrays = [("R", npy("3, 3", turn.matrix().transpose().iter().copied())), ("t", place)];
+        npz(&folder.join(format!("pose_{i:03}.npz")), &arrays);
+    }
+}
+
+fn blocks_with_names(folder: &Path, poses: &[Isometry3<f64>]) {
+    lines(folder, "poses.txt", poses, |i, pose| {
+        let turn: [f64; 3] = se3::rotation_vector(&pose.rotation).into();
+        let place = joined(pose.translation.vector.iter().copied(), ", ");
+        format!("{i}:\nRotation:\n[{}]\nTranslation:\n[{place}]\n", joined(turn, ", "))
+    });
+}
+
+fn a_folder_to_a_pose(folder: &Path, poses: &[Isometry3<f64>]) {
+    for (i, pose) in poses.iter().enumerate() {
+        let path = folder.join(format!("view_{i:02}"));
+        fs::create_dir_all(&path).expect("made");
+        fs::rename(folder.join(format!("image_{i}.png")), path.join("image.png")).expect("moved");
+        let column = |[a, b, c]: [f64; 3]| format!("[[{a:?}], [{b:?}], [{c:?}]]");
+        let vector = column(se3::rotation_vector(&pose.rotation).into());
+        let place = column((pose.translation.vector * 1e3).into());
+        let text = format!("{{\"tcp_position_mm\": {place}, \"tcp_rvec\": {vector}}}");
+        fs::write(path.join("data.json"), text).expect("written");
     }
 }
 
@@ -125,13 +187,18 @@ fn a_program(folder: &Path, poses: &[Isometry3<f64>]) {
 
 #[test]
 fn layouts_of_other_repositories_give_every_image_its_pose() {
-    let writers: [(&str, Writer); 9] = [
+    let writers: [(&str, Writer); 14] = [
         ("rotation first", rotation_first),
         ("translation and matrix", translation_and_matrix),
         ("matrix by columns", matrix_by_columns_and_translation),
+        ("a number to a line", a_number_to_a_line_rotation_first),
         ("npy", an_array_to_a_pose),
+        ("npz of vectors", vectors_in_a_file_of_arrays),
+        ("npz of a matrix", matrix_and_vector_in_a_file_of_arrays),
         ("ros2 topic echo", messages_echoed),
         ("rostopic echo -p", messages_echoed_as_a_table),
+        ("blocks", blocks_with_names),
+        ("folders", a_folder_to_a_pose),
         ("jsonl", a_record_to_a_line),
         ("OpenCV XML", opencv_in_xml),
         ("KRL", a_program),

@@ -25,6 +25,8 @@ pub struct Recording {
     pub tracks: Vec<Track>,
     /// Joint values, of which the chain of the arm makes poses.
     pub joints: Vec<JointSeries>,
+    /// Rows of numbers without names. They are joint values only for whoever names the arm.
+    pub rows: Vec<JointSeries>,
     /// Poses of a robot that moves, as densely as they were recorded: what images of a stream with stamps are given poses of
     /// ([`timed`](super::timed)).
     pub motions: Vec<Motion>,
@@ -39,6 +41,8 @@ pub struct Recording {
     pub targets: Vec<FoundTarget>,
     /// Where the camera sits, when a file says so, and which one.
     pub mode: Option<Known<Mode>>,
+    /// Where no series was found, what the files have instead, one sentence each.
+    pub nothing: Vec<String>,
     /// What a person should know of the files: doubled ones, some that cannot be read.
     pub warnings: Vec<String>,
     /// Where images lie that were unpacked; they go with the recording.

@@ -469,6 +469,8 @@ fn samples_of_formats(session: &Observations) -> Vec<(&'static str, Vec<u8>)> {
     let samples = "samples:\n- robot: {translation: {x: 1, y: 2, z: 3}, rotation: {x: 0, y: 0, z: 0, w: 1}}\n  tracking: {translation: {x: 1, y: 2, z: 3}, rotation: {x: 0, y: 0, z: 0, w: 1}}\n\
         - robot: {translation: {x: 2, y: 2, z: 3}, rotation: {x: 0, y: 0, z: 0, w: 1}}\n  tracking: {translation: {x: 2, y: 2, z: 3}, rotation: {x: 0, y: 0, z: 0, w: 1}}\n\
         - robot: {translation: {x: 3, y: 2, z: 3}, rotation: {x: 0, y: 0, z: 0, w: 1}}\n  tracking: {translation: {x: 3, y: 2, z: 3}, rotation: {x: 0, y: 0, z: 0, w: 1}}\n";
+    let blocks = "0:\nRotation:\n[[1. 0. 0.]\n [0. 1. 0.]\n [0. 0. 1.]]\nTranslation: [1, 2, 3]\nPose 1\nrvec = 1 2 3, tvec = 4 5 6\na.png\n\
+        2:\nRotation:\n[1, 2, 3]\nTranslation:\nnp.array([[1.], [2.], [4.]]) 10:28:59\n";
     let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 6), }\n";
     let mut npy = b"\x93NUMPY\x01\x00".to_vec();
     npy.extend_from_slice(&(header.len() as u16).to_le_bytes());
@@ -478,6 +480,7 @@ fn samples_of_formats(session: &Observations) -> Vec<(&'static str, Vec<u8>)> {
     let mut out = vec![
         ("a.txt", rows(" ")),
         ("a.csv", named.as_bytes().to_vec()),
+        ("blocks.txt", blocks.as_bytes().to_vec()),
         ("a.json", json.as_bytes().to_vec()),
         ("a.yaml", opencv.as_bytes().to_vec()),
         ("a.samples", samples.as_bytes().to_vec()),

@@ -71,6 +71,19 @@ impl Value {
         collect(whole, most, &mut numbers)?;
         (!numbers.is_empty()).then_some(numbers)
     }
+
+    /// The rows of a matrix as OpenCV writes it that is a table, with the channels of an entry beside each other; of four rows or
+    /// fewer it is one by itself.
+    pub fn matrix_rows(&self) -> Option<Value> {
+        const MOST_ROWS_OF_A_MATRIX: u64 = 4;
+        let rows = self.get("rows")?.whole().filter(|rows| *rows > MOST_ROWS_OF_A_MATRIX)?;
+        let data = self.get("cols").and(self.get("data"))?.list();
+        let rows = usize::try_from(rows).ok().filter(|rows| data.len().is_multiple_of(*rows))?;
+        let width = data.len() / rows;
+        (3..=16)
+            .contains(&width)
+            .then(|| Value::List(data.chunks_exact(width).map(|row| Value::List(row.to_vec())).collect()))
+    }
 }
 
 fn collect(value: &Value, most: usize, numbers: &mut Vec<f64>) -> Option<()> {

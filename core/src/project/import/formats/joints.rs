@@ -7,6 +7,8 @@ use crate::project::import::value::Value;
 
 /// Joints of the largest robots that are calibrated.
 const MOST_JOINTS: usize = 64;
+/// Numbers of a row without names that may be joint values, with one that counts before them.
+const ROW: std::ops::RangeInclusive<usize> = 4..=16;
 
 /// The joint values of a document, which may be none.
 pub(in crate::project::import) fn of_document(value: &Value, file: &str) -> Option<JointSeries> {
@@ -51,6 +53,20 @@ fn listed(value: &Value, file: &str) -> Option<JointSeries> {
         Some(sample(format!("{file}, entry {}", i + 1), fields.image, fields.number, values))
     });
     series(name, Vec::new(), None, samples.collect())
+}
+
+/// Rows of numbers without names, each with its image, its number and where it stands, as joint values that they may be.
+pub(in crate::project::import) fn unnamed(
+    name: &str,
+    rows: impl Iterator<Item = (Option<String>, Option<u64>, String, Vec<f64>)>,
+) -> Option<JointSeries> {
+    let samples = rows.filter(|(.., numbers)| ROW.contains(&numbers.len()));
+    series(
+        name.to_owned(),
+        Vec::new(),
+        None,
+        samples.map(|(image, n, place, row)| sample(place, image, n, row)).collect(),
+    )
 }
 
 pub(in crate::project::import) fn sample(

@@ -3,12 +3,16 @@
 
 use std::io::{Cursor, Read as _};
 
-use super::tree::{self, Part};
-use crate::project::import::recording::{Numbers, Sample, Stated, Track};
+use super::parts::{self, Part};
+use super::tree;
+use crate::project::import::recording::{Sample, Stated, Track};
+use crate::project::import::value::Value;
 
 /// Most arrays of a file, and most numbers of one.
 const MOST_ARRAYS: usize = 64;
 const MOST_NUMBERS: usize = 4_000_000;
+/// Numbers of an array that may be one pose, joint values or a camera.
+const MOST_OF_A_POSE: usize = 64;
 
 /// An array.
 struct Array {
@@ -24,6 +28,33 @@ enum Content {
 
 /// The series of poses in a file, and what of it was not read.
 pub(in crate::project::import) fn read(file: &str, bytes: &[u8]) -> Result<(Vec<Track>, Vec<String>), String> {
+    let (arrays, warnings) = arrays(file, bytes)?;
+    Ok((series(file, &arrays), warnings))
+}
+
+/// The arrays of a small file as fields by their names; an array that is alone without a name is the whole of it.
+pub(in crate::project::import) fn document(bytes: &[u8]) -> Option<Value> {
+    let (arrays, _) = arrays("", bytes).ok()?;
+    let mut entries: Vec<(String, Value)> = Vec::new();
+    for array in arrays {
+        let value = match array.content {
+            Content::Numbers(numbers) => match numbers.as_slice() {
+                [one] if array.shape.is_empty() => Value::Number(*one),
+                _ if numbers.len() <= MOST_OF_A_POSE => Value::List(numbers.into_iter().map(Value::Number).collect()),
+                _ => Value::Other,
+            },
+            Content::Texts(mut texts) if texts.len() == 1 => Value::Text(texts.swap_remove(0)),
+            Content::Texts(_) => Value::Other,
+        };
+        entries.push((array.name, value));
+    }
+    match entries.as_slice() {
+        [(name, _)] if name.is_empty() => entries.pop().map(|(_, value)| value),
+        _ => Some(Value::Map(entries)),
+    }
+}
+
+fn arrays(file: &str, bytes: &[u8]) -> Result<(Vec<Array>, Vec<String>), String> {
     let mut warnings = Vec::new();
     let mut arrays = Vec::new();
     if bytes.starts_with(b"PK") {
@@ -43,13 +74,7 @@ pub(in crate::project::import) fn read(file: &str, bytes: &[u8]) -> Result<(Vec<
     } else {
         arrays.push(array("", bytes)?);
     }
-    Ok((series(file, &arrays), warnings))
-}
-
-/// The pose that a file is alone.
-pub(in crate::project::import) fn pose(bytes: &[u8]) -> Option<Numbers> {
-    let Content::Numbers(numbers) = array("", bytes).ok()?.content else { return None };
-    tree::of_numbers(&numbers, "").map(|(numbers, _)| numbers)
+    Ok((arrays, warnings))
 }
 
 fn series(file: &str, arrays: &[Array]) -> Vec<Track> {
@@ -85,7 +110,8 @@ fn series(file: &str, arrays: &[Array]) -> Vec<Track> {
         let samples: Vec<Sample> = samples.collect();
         tracks.extend(tree::track(tree::track_name(file, &array.name), &array.name, stated, samples));
     }
-    tracks.extend(tree::of_parts(&parts, file));
+    tracks.extend(parts::series(&parts, file));
+    tree::call_after_files(&mut tracks, file, tree::role_of_document(file));
     tracks
 }
 

@@ -107,7 +107,7 @@ pub(in crate::project::import) fn read(file: &str, text: &str) -> Option<Track> 
             });
         }
         let mut track = tree::track(file.to_owned(), file, language.stated(), samples)?;
-        track.role = if tree::role(file) == Role::Target { Role::Target } else { Role::Robot };
+        track.role = if tree::is_of_target(file) { Role::Target } else { Role::Robot };
         Some(track)
     })
 }

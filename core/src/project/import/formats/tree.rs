@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Matrix4, Vector3};
-
-use crate::project::import::conventions::{Euler, RotationForm, is_rotation, is_unit, rigid};
+use super::named;
+use super::parts::{self, Part};
+use crate::project::import::conventions::{Euler, RotationForm, is_unit, rigid};
 use crate::project::import::recording::{Known, Numbers, Role, Sample, Stated, Track};
 use crate::project::import::value::Value;
 
@@ -25,6 +25,15 @@ pub(in crate::project::import) struct Fields {
     pub number: Option<u64>,
 }
 
+impl Fields {
+    /// A pose that may stand in several ways has one of them.
+    fn add(&mut self, path: String, numbers: Numbers, stated: Stated) {
+        if self.poses.iter().all(|(known, ..)| *known != path) {
+            self.poses.push((path, numbers, stated));
+        }
+    }
+}
+
 /// Everything in a value that may be a pose, with where it stands.
 pub(in crate::project::import) fn fields(value: &Value) -> Fields {
     let mut fields = Fields::default();
@@ -38,18 +47,19 @@ fn walk(value: &Value, path: &str, fields: &mut Fields, depth: usize) {
     }
     if let Some(numbers) = value.numbers(16) {
         if is_about_joints(path) {
-            if numbers.len() >= 4 && numbers.len() <= 12 && fields.joints.is_empty() {
+            let is_angles = !is_about_motion(path);
+            if is_angles && numbers.len() >= 4 && numbers.len() <= 12 && fields.joints.is_empty() {
                 fields.joints = numbers;
             }
         } else if let Some(found) = of_numbers(&numbers, last_of(path)) {
-            fields.poses.push((path.to_owned(), found.0, found.1));
+            fields.add(path.to_owned(), found.0, found.1);
         }
         return;
     }
     match value {
         Value::Map(entries) => {
-            if let Some((numbers, stated)) = of_map(value) {
-                fields.poses.push((path.to_owned(), numbers, stated));
+            for (name, numbers, stated) in named::poses(value) {
+                fields.add(joined(path, &name), numbers, stated);
             }
             for (key, inner) in entries {
                 match inner {
@@ -73,10 +83,10 @@ fn walk(value: &Value, path: &str, fields: &mut Fields, depth: usize) {
 }
 
 fn joined(path: &str, key: &str) -> String {
-    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+    if path.is_empty() || key.is_empty() { format!("{path}{key}") } else { format!("{path}.{key}") }
 }
 
-fn last_of(path: &str) -> &str {
+pub(super) fn last_of(path: &str) -> &str {
     path.rsplit('.').next().unwrap_or(path)
 }
 
@@ -85,6 +95,18 @@ pub(in crate::project::import) fn is_about_joints(name: &str) -> bool {
     let name = name.to_lowercase();
     let last = last_of(&name);
     last.contains("joint") || matches!(last, "q" | "qpos" | "actual_q" | "angles" | "axes")
+}
+
+/// Whether joint values of this name are of how the joints move or are driven, not of where they are.
+fn is_about_motion(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let last = last_of(&name);
+    // `current_joint_values` are those of now.
+    let is_current = last.ends_with("current") || last.ends_with("currents");
+    is_current
+        || ["torque", "effort", "veloc", "accel", "speed", "temperature", "force"]
+            .iter()
+            .any(|word| last.contains(word))
 }
 
 fn is_counting(key: &str) -> bool {
@@ -123,125 +145,9 @@ pub(in crate::project::import) fn of_numbers(numbers: &[f64], name: &str) -> Opt
     }
 }
 
-fn roll_pitch_yaw(name: &str) -> Known<Vec<RotationForm>> {
+pub(super) fn roll_pitch_yaw(name: &str) -> Known<Vec<RotationForm>> {
     let forms = Euler::of_roll_pitch_yaw().into_iter().map(RotationForm::Euler).collect();
     Known::by(format!("the name {name:?}: numbers about x, y and z"), forms)
-}
-
-/// The pose of named fields.
-fn of_map(value: &Value) -> Option<(Numbers, Stated)> {
-    let translation = translation(value)?;
-    let (rotation, stated) = rotation(value)?;
-    Some((joined_numbers(translation, &rotation)?, stated))
-}
-
-/// A pose of a translation and numbers of a rotation.
-fn joined_numbers([x, y, z]: [f64; 3], rotation: &[f64]) -> Option<Numbers> {
-    if rotation.iter().chain(&[x, y, z]).any(|n| !n.is_finite()) {
-        return None;
-    }
-    match *rotation {
-        [a, b, c] => Some(Numbers::Angles([x, y, z, a, b, c])),
-        [a, b, c, d] if is_unit(rotation) => Some(Numbers::Quaternion([x, y, z, a, b, c, d])),
-        _ if rotation.len() == 9 => {
-            let turn = Matrix3::from_row_slice(rotation);
-            is_rotation(&turn).then(|| {
-                let mut matrix = Matrix4::identity();
-                matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-                matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&Vector3::new(x, y, z));
-                Numbers::Matrix(matrix)
-            })
-        }
-        _ => None,
-    }
-}
-
-fn three(value: &Value, keys: [&str; 3]) -> Option<[f64; 3]> {
-    let [a, b, c] = keys.map(|key| value.get(key).and_then(Value::number));
-    Some([a?, b?, c?])
-}
-
-fn translation(value: &Value) -> Option<[f64; 3]> {
-    for keys in [["x", "y", "z"], ["tx", "ty", "tz"], ["px", "py", "pz"], ["pos_x", "pos_y", "pos_z"]] {
-        if let Some(found) = three(value, keys) {
-            return Some(found);
-        }
-    }
-    for key in ["translation", "position", "trans", "xyz", "tvec", "t", "pos", "location", "p"] {
-        let Some(inner) = value.get(key) else { continue };
-        if let Some(found) = three(inner, ["x", "y", "z"]) {
-            return Some(found);
-        }
-        if let Some([x, y, z]) = inner.numbers(3).as_deref() {
-            return Some([*x, *y, *z]);
-        }
-    }
-    None
-}
-
-/// Numbers of a rotation, with its meaning as far as the names say it.
-fn rotation(value: &Value) -> Option<(Vec<f64>, Stated)> {
-    let named = |why: &str, forms: Vec<RotationForm>| Stated {
-        rotation: Some(Known::by(format!("the names {why}"), forms)),
-        ..Stated::default()
-    };
-    let four = |value: &Value, keys: [&str; 4]| -> Option<Vec<f64>> {
-        keys.iter().map(|key| value.get(key).and_then(Value::number)).collect()
-    };
-    for keys in [["qx", "qy", "qz", "qw"], ["q_x", "q_y", "q_z", "q_w"], ["rot_x", "rot_y", "rot_z", "rot_w"]] {
-        if let Some(found) = four(value, keys) {
-            return Some((found, named(&keys.join(" "), vec![RotationForm::Xyzw])));
-        }
-    }
-    if let Some(found) = three(value, ["roll", "pitch", "yaw"]) {
-        let stated = Stated { rotation: Some(roll_pitch_yaw("roll pitch yaw")), ..Stated::default() };
-        return Some((found.to_vec(), stated));
-    }
-    for keys in [["rx", "ry", "rz"], ["a", "b", "c"], ["w", "p", "r"], ["alpha", "beta", "gamma"], ["u", "v", "w"]] {
-        if let Some(found) = three(value, keys) {
-            return Some((found.to_vec(), Stated::default()));
-        }
-    }
-    let keys = [
-        "rotation",
-        "orientation",
-        "quaternion",
-        "quat",
-        "rot",
-        "rpy",
-        "euler",
-        "rvec",
-        "rotvec",
-        "rotation_vector",
-        "r",
-        "rotation_matrix",
-        "q",
-        "o",
-    ];
-    for key in keys {
-        let Some(inner) = value.get(key) else { continue };
-        for keys in [["x", "y", "z", "w"], ["i", "j", "k", "w"], ["qx", "qy", "qz", "qw"]] {
-            if let Some(found) = four(inner, keys) {
-                return Some((found, named(&keys.join(" "), vec![RotationForm::Xyzw])));
-            }
-        }
-        if let Some(found) = three(inner, ["roll", "pitch", "yaw"]) {
-            let stated = Stated { rotation: Some(roll_pitch_yaw("roll pitch yaw")), ..Stated::default() };
-            return Some((found.to_vec(), stated));
-        }
-        if let Some(found) = three(inner, ["x", "y", "z"]).or_else(|| three(inner, ["rx", "ry", "rz"])) {
-            return Some((found.to_vec(), Stated::default()));
-        }
-        let Some(found) = inner.numbers(9) else { continue };
-        let stated = match (key, found.len()) {
-            ("rvec" | "rotvec" | "rotation_vector", 3) => named(key, vec![RotationForm::Vector]),
-            ("rpy", 3) => Stated { rotation: Some(roll_pitch_yaw("rpy")), ..Stated::default() },
-            (_, 3 | 4 | 9) => Stated::default(),
-            _ => continue,
-        };
-        return Some((found, stated));
-    }
-    None
 }
 
 /// Every series of poses in a document. `file` names it in messages.
@@ -249,15 +155,10 @@ pub(in crate::project::import) fn series(value: &Value, file: &str) -> Vec<Track
     let mut tracks = Vec::new();
     let mut parts = Vec::new();
     look(value, "", file, &mut tracks, &mut parts, 0);
-    tracks.extend(of_parts(&parts, file));
+    tracks.extend(parts::series(&parts, file));
     tracks.truncate(MOST_SERIES);
+    call_after_files(&mut tracks, file, role_of_document(file));
     tracks
-}
-
-/// A list of rotations or of translations, which are a series together.
-pub(in crate::project::import) struct Part {
-    pub name: String,
-    pub rows: Vec<Vec<f64>>,
 }
 
 fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &mut Vec<Part>, depth: usize) {
@@ -271,7 +172,7 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
             let named = items.iter().enumerate().map(|(i, item)| (format!("{file}, entry {}", i + 1), None, item));
             let found = of_elements(path, file, named.collect());
             if found.is_empty() {
-                parts.extend(part(path, items));
+                parts.extend(Part::of(path, items));
                 for (i, item) in items.iter().take(MOST_LOOKED_INTO).enumerate() {
                     look(item, &joined(path, &format!("[{i}]")), file, tracks, parts, depth + 1);
                 }
@@ -279,9 +180,14 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
             tracks.extend(found);
         }
         Value::List(items) => {
-            parts.extend(part(path, items));
+            parts.extend(Part::of(path, items));
             for (i, item) in items.iter().take(MOST_LOOKED_INTO).enumerate() {
                 look(item, &joined(path, &format!("[{i}]")), file, tracks, parts, depth + 1);
+            }
+        }
+        Value::Map(_) if value.matrix_rows().is_some() => {
+            if let Some(rows) = value.matrix_rows() {
+                look(&rows, path, file, tracks, parts, depth + 1);
             }
         }
         Value::Map(entries) => {
@@ -339,8 +245,7 @@ fn of_elements(path: &str, file: &str, elements: Vec<(String, Option<u64>, &Valu
         if samples.len() < LEAST_POSES || 2 * samples.len() < count {
             continue;
         }
-        let inner =
-            if path.is_empty() || inner.is_empty() { format!("{path}{inner}") } else { format!("{path}.{inner}") };
+        let inner = joined(path, &inner);
         tracks.extend(track(track_name(file, &inner), &inner, stated, samples));
     }
     tracks
@@ -362,7 +267,13 @@ pub(in crate::project::import) fn track(
     samples.retain(|sample| std::mem::discriminant(&sample.numbers) == kind);
     // A rigid transform that never changes is a setting.
     let moves = samples.iter().any(|sample| sample.numbers != samples[0].numbers);
-    (samples.len() >= LEAST_POSES && moves).then(|| Track { role: role(path), name, stated, reading_of: None, samples })
+    (samples.len() >= LEAST_POSES && moves).then(|| Track {
+        role: by_path(path),
+        name,
+        stated,
+        reading_of: None,
+        samples,
+    })
 }
 
 /// What poses of this name are of.
@@ -376,6 +287,7 @@ pub(in crate::project::import) fn role(name: &str) -> Role {
         "board",
         "tracking",
         "tag",
+        "aruco",
         "checker",
         "chess",
         "pattern",
@@ -386,90 +298,67 @@ pub(in crate::project::import) fn role(name: &str) -> Role {
     ]) {
         return Role::Target;
     }
+    let is_end = || name.split(|c: char| !c.is_ascii_alphanumeric()).any(|word| word == "ee");
     if has(&[
         "robot", "effector", "eef", "gripper", "hand", "tcp", "flange", "tool", "tip", "rpe", "fme", "wme", "base",
         "arm", "end",
-    ]) {
+    ]) || is_end()
+    {
         return Role::Robot;
     }
     if has(&["target", "cam"]) { Role::Target } else { Role::Unknown }
 }
 
-fn part(path: &str, items: &[Value]) -> Option<Part> {
-    let rows: Vec<Vec<f64>> = items.iter().map(|item| item.numbers(9)).collect::<Option<_>>()?;
-    (!rows.is_empty()).then(|| Part { name: path.to_owned(), rows })
-}
-
-/// Series of which rotations and translations stand apart, as `calibrateHandEye` takes them.
-pub(in crate::project::import) fn of_parts(parts: &[Part], file: &str) -> Vec<Track> {
-    let mut tracks = Vec::new();
-    let of_size = |part: &&Part, size: &[usize]| part.rows.iter().all(|row| size.contains(&row.len()));
-    for rotations in parts.iter().filter(|part| of_size(part, &[9, 4, 3])) {
-        let whose = whose(&rotations.name);
-        let beside = |part: &&Part| {
-            part.rows.len() == rotations.rows.len() && of_size(part, &[3]) && part.name != rotations.name
-        };
-        let mut candidates = parts.iter().filter(beside).filter(|part| self::whose(&part.name) == whose);
-        let Some(translations) = candidates.next() else { continue };
-        let is_rotation = |part: &Part| {
-            let name = last_of(&part.name).to_lowercase();
-            part.rows[0].len() != 3 || name.starts_with('r') || name.contains("rot") || name.contains("euler")
-        };
-        if !is_rotation(rotations) || rotations.rows.len() < LEAST_POSES {
-            continue;
-        }
-        let samples = rotations.rows.iter().zip(&translations.rows).enumerate().filter_map(|(i, (r, t))| {
-            let numbers = joined_numbers([t[0], t[1], t[2]], r)?;
-            let place = format!("{file}, entry {}", i + 1);
-            Some(Sample { image: None, number: None, place, numbers, joints: Vec::new() })
-        });
-        let name = format!("{}+{}", rotations.name, translations.name);
-        let stated = if last_of(&rotations.name).to_lowercase().contains("vec") {
-            let why = format!("the name {:?}", rotations.name);
-            Stated { rotation: Some(Known::by(why, vec![RotationForm::Vector])), ..Stated::default() }
-        } else {
-            Stated::default()
-        };
-        tracks.extend(track(track_name(file, &name), &name, stated, samples.collect()));
+/// What poses at a path of a document are of; of names that OpenCV gives them, the target's.
+fn by_path(path: &str) -> Role {
+    match role(path) {
+        Role::Unknown if named::is_of_solve_pnp(path) => Role::Target,
+        role => role,
     }
-    tracks
 }
 
-/// What a part is of, by its name without what says which part it is.
-fn whose(name: &str) -> String {
-    let name = name.to_lowercase();
-    let last = last_of(&name);
-    let words = last.split(['_', '-', ' ']).filter(|word| {
-        !matches!(
-            *word,
-            "r" | "t"
-                | "rot"
-                | "rotation"
-                | "rotations"
-                | "trans"
-                | "translation"
-                | "translations"
-                | "rvec"
-                | "rvecs"
-                | "tvec"
-                | "tvecs"
-                | "rotvec"
-                | "position"
-                | "positions"
-                | "orientation"
-                | "orientations"
-                | "quat"
-                | "quaternion"
-                | "quaternions"
-                | "euler"
-                | "xyz"
-                | "rpy"
-                | "mat"
-                | "matrix"
-                | "vec"
-        )
-    });
-    words.collect::<Vec<_>>().join("_")
+/// What poses in files of this name are of. Many are called after the calibration, whose hand is not the robot's.
+pub(in crate::project::import) fn role_of_files(name: &str) -> Role {
+    let mut name = name.to_lowercase();
+    for by in ["", "_", "-", " "] {
+        for words in [
+            ["eye", "in", "hand"],
+            ["eye", "to", "hand"],
+            ["eye", "on", "hand"],
+            ["eye", "on", "base"],
+            ["hand", "to", "eye"],
+            ["hand", "2", "eye"],
+            ["eye", "2", "hand"],
+        ] {
+            name = name.replace(&words.join(by), "");
+        }
+        name = name.replace(&["hand", "eye"].join(by), "").replace(&["eye", "hand"].join(by), "");
+    }
+    role(&name)
+}
+
+/// Gives the only series of a document or of files, or the one that is all of them, the role that their name says, where its
+/// own path says none. Of several series some are of another thing than the file is called after.
+pub(in crate::project::import) fn call_after_files(tracks: &mut [Track], files: &str, of_files: Role) {
+    let is_alone = tracks.len() == 1;
+    for track in tracks.iter_mut().filter(|_| of_files != Role::Unknown) {
+        let path = track.name.strip_prefix(files).unwrap_or_default();
+        if path.is_empty() || (is_alone && role(path) == Role::Unknown) {
+            track.role = of_files;
+        }
+    }
+}
+
+/// Whether a table or a program is of the target by its name or that of its folder, which may be one of images of it.
+pub(in crate::project::import) fn is_of_target(file: &str) -> bool {
+    let stem = std::path::Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
+    role(file) == Role::Target && role(&stem) != Role::Robot
+}
+
+/// What poses in a document of this name are of; those of a camera may be of what carries it.
+pub(in crate::project::import) fn role_of_document(file: &str) -> Role {
+    let stem = std::path::Path::new(file).file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    role_of_files(&stem.replace("cam", ""))
 }
 
 #[cfg(test)]

@@ -60,3 +60,19 @@ fn lists_of_nothing_are_no_series() {
     let text = r#"{"topic": {"rotations": [], "translations": []}, "rotation": {"a": [], "b": []}}"#;
     assert!(found(text).is_empty());
 }
+
+#[test]
+fn a_matrix_of_opencv_with_many_rows_is_a_table() {
+    let rows = |of: &dyn Fn(usize) -> String| (0..5).map(of).collect::<Vec<_>>().join(", ");
+    let text = format!(
+        r#"{{"rvecs": {{"rows": 5, "cols": 1, "dt": "3d", "data": [{}]}},
+            "tvecs": {{"rows": 5, "cols": 3, "dt": "d", "data": [{}]}}, "poses": {{"rows": 5, "cols": 6, "dt": "d", "data": [{}]}}}}"#,
+        rows(&|i| format!("0.1, 0.2, 0.{i}")),
+        rows(&|i| format!("1, 2, {i}")),
+        rows(&|i| format!("{i}, 2, 3, 4, 5, 6"))
+    );
+    let tracks = found(&text);
+    let names: Vec<_> = tracks.iter().map(|track| (track.name.as_str(), track.samples.len(), track.role)).collect();
+    assert_eq!(names, [("a.json:poses", 5, Role::Unknown), ("a.json:rvecs+tvecs", 5, Role::Target)]);
+    assert_eq!(tracks[1].samples[4].numbers, Numbers::Angles([1.0, 2.0, 4.0, 0.1, 0.2, 0.4]));
+}

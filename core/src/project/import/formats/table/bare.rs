@@ -1,5 +1,7 @@
 //! Tables without a header: what the numbers themselves say of where a pose stands.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
 use super::cells::Line;
@@ -25,15 +27,50 @@ pub(super) fn blocks(file: &str, rows: &[&Line]) -> Option<Track> {
     tree::track(file.to_owned(), file, Stated::default(), samples?)
 }
 
-pub(super) fn without_header(file: &str, rows: &[&Line]) -> Vec<Track> {
-    // The number of numbers that most rows have; a row with another number is a remark.
-    let mut counts = std::collections::BTreeMap::new();
-    for row in rows {
-        *counts.entry(row.numbers().len()).or_insert(0usize) += 1;
+/// Of the rows those that a pose may be, in a report among whose rows others stand, are at least one in so many: a matrix is
+/// often printed below its pose.
+const MOST_ROWS_TO_A_POSE: usize = 8;
+
+/// Numbers that belong together, a row of a table or a file, and what stands with them.
+pub(in crate::project::import::formats) struct Row {
+    pub image: Option<String>,
+    pub number: Option<u64>,
+    pub place: String,
+    pub numbers: Vec<f64>,
+}
+
+pub(super) fn without_header(file: &str, lines: &[&Line]) -> Vec<Track> {
+    let mut by_width: BTreeMap<usize, Vec<Row>> = BTreeMap::new();
+    for line in lines {
+        let (numbers, place) = (line.numbers(), format!("{file}, row {}", line.row));
+        let row = Row { image: name_of(line), number: None, place, numbers };
+        by_width.entry(row.numbers.len()).or_default().push(row);
     }
-    let Some((&width, _)) = counts.iter().max_by_key(|(_, count)| **count) else { return Vec::new() };
-    let rows: Vec<&Line> = rows.iter().filter(|row| row.numbers().len() == width).copied().collect();
-    let numbers: Vec<Vec<f64>> = rows.iter().map(|row| row.numbers()).collect();
+    // The number of numbers that most rows have, or most of those that a pose may have; rows with another number are remarks.
+    let mut widths: Vec<Vec<Row>> = by_width.into_values().rev().collect();
+    widths.sort_by_key(|rows| std::cmp::Reverse(rows.len()));
+    widths.retain(|rows| MOST_ROWS_TO_A_POSE * rows.len() >= lines.len());
+    let mut found = widths.into_iter().map(|mut rows| {
+        // What stands in all rows is no name of one.
+        let first = rows.first().and_then(|row| row.image.clone());
+        if rows.len() > 1 && rows.iter().all(|row| row.image == first) {
+            for row in &mut rows {
+                row.image = None;
+            }
+        }
+        tracks(file, &rows)
+    });
+    let mut tracks = found.find(|tracks| !tracks.is_empty()).unwrap_or_default();
+    for track in &mut tracks {
+        // A table is not named after what it is of as often as a field is.
+        track.role = if tree::is_of_target(file) { Role::Target } else { Role::Unknown };
+    }
+    tracks
+}
+
+/// The series of poses in rows of as many numbers each, in every order that the numbers leave open.
+pub(in crate::project::import::formats) fn tracks(name: &str, rows: &[Row]) -> Vec<Track> {
+    let numbers: Vec<&[f64]> = rows.iter().map(|row| row.numbers.as_slice()).collect();
     if rows.len() < LEAST_POSES {
         return Vec::new();
     }
@@ -41,21 +78,20 @@ pub(super) fn without_header(file: &str, rows: &[&Line]) -> Vec<Track> {
     let layouts = layouts(&numbers);
     let places = layouts.iter().filter(|layout| layout.order == Order::Plain).count();
     for layout in &layouts {
-        let samples = rows.iter().zip(&numbers).filter_map(|(line, numbers)| {
-            let pose = layout.pose(numbers)?;
-            let counted = layout.index.and_then(|i| whole(numbers[i]));
-            let joints = layout.joints.clone().map(|range| numbers[range].to_vec()).unwrap_or_default();
-            Some(sample(file, line, name_of(line), counted, pose, joints))
+        let samples = rows.iter().filter_map(|row| {
+            let pose = layout.pose(&row.numbers)?;
+            let counted = layout.index.and_then(|i| whole(*row.numbers.get(i)?));
+            let joints = layout.joints.clone().and_then(|range| row.numbers.get(range)).unwrap_or_default().to_vec();
+            let (image, place) = (row.image.clone(), row.place.clone());
+            Some(Sample { image, number: row.number.or(counted), place, numbers: pose, joints })
         });
         let place = if places <= 1 {
-            file.to_owned()
+            name.to_owned()
         } else {
-            format!("{file}:numbers {}-{}", layout.first + 1, layout.first + layout.width)
+            format!("{name}:numbers {}-{}", layout.first + 1, layout.first + layout.width)
         };
-        let name = layout.order.named(&place);
-        if let Some(mut track) = tree::track(name, file, Stated::default(), samples.collect()) {
-            // A table is not named after what it is of as often as a field is.
-            track.role = if tree::role(file) == Role::Target { Role::Target } else { Role::Unknown };
+        let named = layout.order.named(&place);
+        if let Some(mut track) = tree::track(named, name, Stated::default(), samples.collect()) {
             track.reading_of = (layout.order != Order::Plain).then_some(place);
             tracks.push(track);
         }
@@ -132,7 +168,7 @@ fn rotation(numbers: &[f64]) -> Option<Matrix3<f64>> {
 }
 
 /// Where poses may stand: matrices and quaternions are known by their numbers, six numbers are what is left.
-fn layouts(rows: &[Vec<f64>]) -> Vec<Layout> {
+fn layouts(rows: &[&[f64]]) -> Vec<Layout> {
     let width = rows[0].len();
     let most = |test: &dyn Fn(&[f64]) -> bool| 10 * rows.iter().filter(|row| test(row)).count() >= 9 * rows.len();
     let index = (width > 6 && counts(rows, 0)).then_some(0);
@@ -190,7 +226,7 @@ fn layouts(rows: &[Vec<f64>]) -> Vec<Layout> {
     }
 }
 
-fn counts(rows: &[Vec<f64>], column: usize) -> bool {
+fn counts(rows: &[&[f64]], column: usize) -> bool {
     let mut values: Vec<f64> = rows.iter().map(|row| row[column]).collect();
     let are_whole = values.iter().all(|v| whole(*v).is_some());
     values.sort_by(f64::total_cmp);
@@ -199,6 +235,6 @@ fn counts(rows: &[Vec<f64>], column: usize) -> bool {
     are_whole && 5 * values.len() >= 4 * rows.len()
 }
 
-fn grows(rows: &[Vec<f64>]) -> bool {
+fn grows(rows: &[&[f64]]) -> bool {
     rows.windows(2).all(|pair| pair[0][0] < pair[1][0])
 }

@@ -142,7 +142,7 @@ pub(super) fn with_header(file: &str, lines: &[Line]) -> Option<Vec<Track>> {
         samples.push(sample(file, line, named, counted, pose, joints.unwrap_or_default()));
     }
     let mut track = tree::track(file.to_owned(), file, stated, samples)?;
-    track.role = if tree::role(file) == Role::Target { Role::Target } else { Role::Unknown };
+    track.role = if tree::is_of_target(file) { Role::Target } else { Role::Unknown };
     Some(vec![track])
 }
 

@@ -1,9 +1,12 @@
 //! Tables of poses: with or without a header, any delimiter, names of images or not, one row or four to a pose.
 
-mod bare;
+pub(in crate::project::import::formats) mod bare;
 mod cells;
 mod header;
 
+use std::collections::BTreeMap;
+
+use super::joints;
 use super::tree::is_image_name;
 use crate::project::import::recording::{JointSeries, Numbers, Sample, Track};
 use crate::project::import::value::number;
@@ -29,6 +32,28 @@ pub(in crate::project::import) fn read(file: &str, text: &str) -> Vec<Track> {
 /// The joint values of a text that has no poses.
 pub(in crate::project::import) fn joints(file: &str, text: &str) -> Option<JointSeries> {
     header::joints(file, &cells::lines(text))
+}
+
+/// How many rows of a text have how many numbers.
+pub(in crate::project::import) fn widths(text: &str) -> BTreeMap<usize, usize> {
+    let mut widths = BTreeMap::new();
+    for line in cells::lines(text).iter().filter(|line| line.is_numeric()) {
+        *widths.entry(line.numbers().len()).or_default() += 1;
+    }
+    widths
+}
+
+/// The rows of a text without a header, which may be joint values.
+pub(in crate::project::import) fn unnamed(file: &str, text: &str) -> Option<JointSeries> {
+    let lines = cells::lines(text);
+    if header::with_header(file, &lines).is_some() || header::joints(file, &lines).is_some() {
+        return None;
+    }
+    let rows = lines.iter().filter(|line| line.is_numeric()).map(|line| {
+        let place = format!("{file}, row {}", line.row);
+        (name_of(line), None, place, line.numbers())
+    });
+    joints::unnamed(file, rows)
 }
 
 fn sample(
