@@ -42,8 +42,7 @@ pub use chain::with_arm;
 pub use conventions::{AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm};
 pub use error::ImportError;
 pub use hypothesis::{Convention, Fit, Hypothesis, Source};
-pub use judge::{Judgement, NEED, Sights, TIMES, Verdict};
-pub use nothing::judge;
+pub use judge::{Judgement, NEED, Sights, TIMES, Verdict, judge};
 pub use pairing::Pairing;
 pub use recognise::open;
 pub use recording::{

@@ -3,40 +3,15 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use super::error::ImportError;
 use super::folder;
 use super::formats::{blocks, npz, table, tree};
-use super::judge::{self, Judgement, Sights};
-use super::recording::Recording;
-use super::settings::Settings;
 use super::value::{self, Value};
-use crate::progress::CancelToken;
 
 /// Files of text that are told of.
 const MOST_TOLD: usize = 5;
 /// Groups of files among which those are looked for, and the bytes of one: a person waits for the answer.
 const MOST_LOOKED_AT: usize = 200;
 const LARGEST: u64 = 1 << 20;
-
-/// Tries every hypothesis that the files and the settings leave open. Of a recording without any series it is said what its files
-/// have instead.
-///
-/// # Errors
-/// [`ImportError::NoPoses`] without a series to try, [`ImportError::NothingLeft`] where settings exclude all,
-/// [`ImportError::BadChoice`] for a name that there is not.
-pub fn judge(
-    recording: &Recording,
-    sights: &Sights,
-    settings: &Settings,
-    cancel: &CancelToken,
-) -> Result<Judgement, ImportError> {
-    judge::judge(recording, sights, settings, cancel).map_err(|error| match error {
-        ImportError::NoPoses { folder, need, .. } if recording.tracks.is_empty() && !recording.nothing.is_empty() => {
-            ImportError::NoPoses { folder, need, seen: recording.nothing.join("; ") }
-        }
-        other => other,
-    })
-}
 
 /// Why nothing came of each of the files that are likeliest to have poses, and what to do with those that are not read.
 pub(super) fn reasons(root: &Path, files: &[PathBuf]) -> Vec<String> {
@@ -130,8 +105,8 @@ fn of_text(text: &str) -> (Likely, String) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::open;
-    use super::*;
+    use crate::progress::CancelToken;
+    use crate::project::import::{Settings, Sights, judge, open};
     use std::fs;
 
     fn said(files: &[(&str, &str)]) -> String {

@@ -123,6 +123,8 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
                 "{} has joint values alone: name the arm that they are of with arm=NAME, or its URDF file",
                 series.name
             )
+        } else if recording.tracks.is_empty() && !recording.nothing.is_empty() {
+            recording.nothing.join("; ")
         } else if recording.tracks.is_empty() {
             "no file has poses of 6, 7, 12 or 16 numbers".to_owned()
         } else if with_images {
