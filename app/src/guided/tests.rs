@@ -80,6 +80,10 @@ fn behind_a_driver_it_is_offered_where_the_chain_of_joints_is_named_and_can_begi
         self::pane(model)
     };
     assert_eq!(behind(|_| ()).click(BUTTON), [Command::CalibrateForMe]);
+    let mut read_only = ready();
+    read_only.cell.iter_mut().for_each(|cell| cell.moves = Moves::OnceArmed { joints: true, tip: true });
+    read_only.robot.iter_mut().for_each(|robot| robot.is_armed = false);
+    assert!(!self::pane(read_only).is_enabled(BUTTON), "nobody has allowed it to move");
     let open = behind(|cell| (cell.arm, cell.arm_doubt) = (None, Some(ArmDoubt::Open)));
     assert!(!open.is_enabled(BUTTON) && open.nothing_is_cut_off());
     assert!(!behind(|cell| (cell.arm, cell.arm_doubt) = (None, Some(FOREIGN))).is_enabled(BUTTON));

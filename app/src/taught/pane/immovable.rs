@@ -10,6 +10,8 @@ pub fn immovable(model: &Model) -> Option<&'static str> {
         Some(tr!(language, "Not connected: the arm cannot be moved until the connection is there"))
     } else if model.resting_simulation().is_some() {
         Some(tr!(language, "The arm moves only while the simulation runs"))
+    } else if !model.is_armed() {
+        Some(tr!(language, "The robot is only read until you let the workbench move it, in Jog"))
     } else if model.sequence_runs || model.planning {
         Some(tr!(language, "A sequence is under way"))
     } else {
