@@ -210,9 +210,9 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
 
 /// How many captures there are of each kind that there is.
 fn counted(table: &CaptureTable, language: Language) -> String {
-    let fit = table.count(Standing::Fit);
+    let (fit, aside) = (table.count(Standing::Fit), table.count(Standing::Aside));
     let others = [
-        (table.count(Standing::Aside), tr!(language, "outliers")),
+        (aside, if aside == 1 { tr!(language, "outlier") } else { tr!(language, "outliers") }),
         (table.count(Standing::Verification), tr!(language, "for verification")),
         (table.count(Standing::Excluded), tr!(language, "excluded")),
     ];

@@ -29,14 +29,14 @@ pub enum SceneError {
         message: String,
     },
     /// The file of the arm is missing, is none, or has no such chain.
-    #[error("robot.model: {source}. Name a built-in arm, or a URDF file with its base and tip links. {}", place(file, *line))]
+    #[error("robot.model: {why}. Name a built-in arm, or a URDF file with its base and tip links. {}", place(file, *line))]
     Arm {
         /// Path of the scene as given.
         file: String,
         /// Line, counted from 1, where known.
         line: Option<usize>,
-        /// What is wrong with the arm.
-        source: Box<UrdfError>,
+        /// What is wrong with the arm. It stands in the sentence, so it is no source that is said once more.
+        why: Box<UrdfError>,
     },
     /// A number out of its range.
     #[error("{field} is {value}, it must be {need}. {}", place(file, *line))]
@@ -75,8 +75,8 @@ fn place(file: &str, line: Option<usize>) -> String {
 }
 
 impl SceneError {
-    pub(super) fn arm(file: &str, line: Option<usize>, source: UrdfError) -> Self {
-        Self::Arm { file: file.to_owned(), line, source: Box::new(source) }
+    pub(super) fn arm(file: &str, line: Option<usize>, why: UrdfError) -> Self {
+        Self::Arm { file: file.to_owned(), line, why: Box::new(why) }
     }
 
     pub(super) fn syntax(file: &str, text: &str, error: &toml::de::Error) -> Self {

@@ -1,6 +1,7 @@
 //! One file a format. Each turns files into series of poses, or says that they are none of its.
 
 pub(super) mod blocks;
+pub(super) mod board_words;
 pub(super) mod easy_handeye;
 pub(super) mod industrial_calibration;
 pub(super) mod intrinsics;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::folder;
 use super::formats::tree::{self, LEAST_POSES};
 use super::formats::{
-    blocks, easy_handeye, industrial_calibration, intrinsics, joints, npz, program, rosbag, table, visp,
+    blocks, board_words, easy_handeye, industrial_calibration, intrinsics, joints, npz, program, rosbag, table, visp,
 };
 use super::recording::{FoundTarget, Known, Recording, Track};
 use super::value::{self, Value};
@@ -205,6 +205,9 @@ impl<'a> Reader<'a> {
         }
         self.recording.tracks.extend(found);
         self.recording.cameras.extend(intrinsics::of_document(value, &name));
+        if self.recording.targets.is_empty() {
+            self.recording.beliefs.extend(board_words::told(value, &name));
+        }
     }
 
     /// Two files that say different things leave it open.
