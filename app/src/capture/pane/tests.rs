@@ -150,7 +150,7 @@ fn a_capture_that_was_set_aside_says_so_with_how_far_it_is_off_and_what_to_do() 
     assert_eq!(table.rows[first].id, sample::OUTLIER, "it is worth looking at before all others");
     let mut pane = pane(model);
     assert!(pane.sees("3: Outlier") && !pane.sees("4: Outlier"));
-    assert!(pane.sees("9 in the fit · 1 outliers · 2 for verification"));
+    assert!(pane.sees("9 in the fit · 1 outlier · 2 for verification"));
     assert!(pane.sees("Capture 3 · pose 3, outlier, 18.000 px"));
     change(pane.model(), |captures| captures[2].excluded = true);
     pane.steps();

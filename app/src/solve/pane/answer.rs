@@ -45,7 +45,9 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     parts::hint_ui(ui, meaning);
     let law = solved.calibration.joint.as_ref().map_or(SmallSample::KNOWN, |joint| joint.small_sample);
     // With something found that is not in the model the covariance is no error of the answer.
-    let covariance = solved.calibration.hand_eye_covariance().filter(|_| solved.calibration.claim == Claim::AsModelled);
+    let covariance = solved.calibration.hand_eye_covariance();
+    let covariance_withheld = covariance.is_some() && solved.calibration.claim != Claim::AsModelled;
+    let covariance = covariance.filter(|_| !covariance_withheld);
     let within = covariance.map(|c| Within95::new(&pose, c, law));
     let deg = |radians: [f64; 3]| radians.map(f64::to_degrees);
     parts::stated_ui(ui, "x y z [mm]", &numbers::row(translation_mm.as_slice(), 3, 9));
@@ -65,6 +67,9 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
         Some(within) => {
             parts::stated_ui(ui, "± 95 % [°]", &numbers::row(&deg(within.rotation_rad), 4, 9))
                 .on_hover_text(tr!(language, "About the x, y and z axis of the camera"));
+        }
+        None if covariance_withheld => {
+            parts::hint_ui(ui, tr!(language, "With what was found below no ± can be stated for each axis."));
         }
         None => parts::hint_ui(ui, tr!(language, "A closed form states no uncertainty.")),
     }

@@ -1,5 +1,6 @@
 use handeye_core::diagnose::doctor;
 use handeye_core::diagnose::findings::{self, FindingCode, FindingOptions};
+use handeye_core::estimate::claim::Claim;
 use handeye_core::estimate::handeye::screening::Distance;
 use handeye_core::estimate::handeye::{HandEyeError, Mode};
 use handeye_core::estimate::uncertainty::widening::{Evidence, Widening};
@@ -80,6 +81,13 @@ fn the_camera_in_the_tip_is_in_millimetres_with_its_uncertainty() {
     assert!(pane.sees("Focal length off by: 0.050 %"));
     assert!(pane.sees("Within the stated 95 %"));
     assert!(pane.nothing_is_cut_off());
+}
+
+#[test]
+fn with_something_found_no_uncertainty_is_stated_for_an_axis_and_the_reason_is_not_the_method() {
+    let pane = driven(sample::with_answer(|solved| solved.calibration.claim = Claim::Moved(Vec::new())));
+    assert!(pane.sees("With what was found below no ± can be stated for each axis."));
+    assert!(!pane.sees("A closed form states no uncertainty.") && !pane.sees("± 95 % [mm]"));
 }
 
 #[test]
