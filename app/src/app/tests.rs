@@ -15,9 +15,9 @@ use crate::by_hand::state::HandWaits;
 use crate::gui::testing::sample;
 use crate::guided::state::{Choice, ChosenStep, Waits};
 use crate::model::{
-    ByHand, CapturePurpose, CaptureRefused, DepthScale, Dialog, FollowStatus, FollowWish, Home, Jog, Link, LinkState,
-    LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind, SolveStatus, StopOutcome,
-    ThemeChoice, WorkBox,
+    ArmDoubt, ByHand, CapturePurpose, CaptureRefused, CellFacts, DepthScale, Dialog, FollowStatus, FollowWish, Home,
+    Jog, Link, LinkState, LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind,
+    SolveStatus, StopOutcome, ThemeChoice, WorkBox,
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
@@ -349,6 +349,23 @@ fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
     choose(app);
     app.apply(Command::SetConfirmMoves(false));
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
+}
+
+/// As when another tool is set on the controller while a pose waits.
+#[test]
+fn a_pose_that_was_chosen_by_a_chain_that_does_not_fit_any_more_is_not_driven_to() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(sample::solved());
+    app.apply(Command::SetConfirmMoves(true));
+    app.apply(Command::CalibrateForMe);
+    choose(app);
+    let cell = app.model().cell.clone().expect("connected");
+    let doubt = ArmDoubt::Foreign { distance_m: 0.05, angle_rad: 0.0 };
+    app.absorb(Event::Cell(Box::new(CellFacts { arm: None, arm_doubt: Some(doubt), ..cell })));
+    assert!(!app.model().sequence_runs);
+    app.apply(Command::ConfirmMove);
+    assert_eq!(app.model().motion, Motion::Idle);
 }
 
 /// A person is led, with a view that is wanted.

@@ -137,7 +137,12 @@ impl App {
             ),
             _ => {}
         }
+        let is_foreign = matches!(facts.arm_doubt, Some(ArmDoubt::Foreign { .. }));
         self.model.cell = Some(facts);
+        // Poses that were chosen by that chain are not driven to, neither the one under way nor one that waits.
+        if is_foreign && self.model.sequence.as_ref().is_some_and(|sequence| sequence.planned.is_some()) {
+            self.stop_sequence();
+        }
         // Where the arm is known it keeps out of boxes.
         self.send_keep_out();
         self.prepare_session();

@@ -41,9 +41,9 @@ pub enum ArmDoubt {
     Open,
     /// By the joints the tip or the flange is not where the driver reports it.
     Foreign {
-        /// So far from there \[m\].
+        /// Distance between both \[m\].
         distance_m: f64,
-        /// And turned by so much \[rad\].
+        /// Angle between both \[rad\].
         angle_rad: f64,
     },
 }
