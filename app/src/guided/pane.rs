@@ -40,7 +40,7 @@ pub fn is_wanted(model: &Model) -> bool {
 }
 
 /// Why it cannot begin.
-fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static str> {
+pub fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static str> {
     let language = model.view.language;
     if let Some(why) = hindrance.or_else(|| immovable(model)) {
         Some(why)
@@ -172,4 +172,7 @@ pub fn error_ui(ui: &mut Ui, model: &Model, guide: &Guide, left: Option<Text>) {
     };
     let said = std::iter::once(error).chain(left).map(|text| text.say(language));
     ui.label(said.collect::<Vec<_>>().join(" · "));
+    if let Some(hold) = guide.hold() {
+        parts::hint_ui(ui, &hold.text().say(language));
+    }
 }

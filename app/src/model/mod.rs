@@ -16,6 +16,7 @@ use handeye_core::estimate::handeye::HandEye;
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
+use handeye_core::plan::guided::GuidedOptions;
 use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::verify::Predictor;
@@ -273,9 +274,9 @@ pub struct ViewSettings {
 pub struct Goal(pub f64);
 
 impl Default for Goal {
-    /// What most picking needs.
+    /// That of guided capture, in the window and on the command line.
     fn default() -> Self {
-        Self(0.5e-3)
+        Self(GuidedOptions::default().goal_m)
     }
 }
 

@@ -82,6 +82,9 @@ impl<'a, 's> GuidedSequence<'a, 's> {
                 Next::End(ending) => break (ending, observations, calibration),
                 Next::Go { plan, why } => {
                     tracing::info!("{}", why.text().say(Language::English));
+                    if let Some(hold) = self.guide.hold() {
+                        tracing::info!("{}", hold.text().say(Language::English));
+                    }
                     plan
                 }
             };

@@ -19,9 +19,12 @@ pub mod candidates;
 pub mod choose;
 pub mod design;
 pub mod fan;
+mod hold;
 pub mod outlook;
 pub mod record;
 mod start;
+
+pub use hold::Hold;
 
 use nalgebra::Point3;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -265,6 +268,7 @@ pub struct Guide {
     /// Views that somebody left out, one less for each that was taken.
     skips: usize,
     steps: Vec<Step>,
+    hold: Option<Hold>,
     ended: Option<Ending>,
 }
 
@@ -282,6 +286,7 @@ impl Guide {
             failures: 0,
             skips: 0,
             steps: Vec::new(),
+            hold: None,
             ended: None,
         }
     }
@@ -343,6 +348,7 @@ impl Guide {
                 self.failed.push(step.base_from_tip);
             }
         }
+        self.hold = self.hold_of(known, used.len());
         let next = self.found(known, &used, cancel);
         if cancel.is_cancelled() {
             return next;

@@ -273,6 +273,34 @@ fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error
     assert_eq!(endings[3], Some(Ending::Doubted), "it moves by a fifth of the goal");
 }
 
+#[test]
+fn below_the_goal_it_says_why_it_goes_on() {
+    let mut cell = GuidedCell::new(CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 1));
+    let _begun = cell.run(GuidedOptions { most_views: 12, least_gain: 0.0, ..options(1e-9) });
+    let all = cell.observations.views.clone();
+    let mut hold = |views: usize, goal_m: f64, claim: Claim| {
+        cell.observations.views = all[..views].to_vec();
+        let mut calibration = cell.calibrate().expect("good views");
+        calibration.claim = claim;
+        let mut guide = Guide::new(options(goal_m));
+        let _next = guide.next(&cell.known(Some(&calibration), 0.0), &CancelToken::default());
+        (guide.hold(), calibration.tip_error_95_m().expect("stated"), error_at_upper_levels(&calibration, None))
+    };
+    let far_m = 1e-3;
+    assert_eq!(hold(LEAST_VIEWS - 1, far_m, Claim::AsModelled).0, Some(Hold::FewViews));
+    assert_eq!(hold(12, far_m, Claim::AsModelled).0, Some(Hold::Confirmation));
+    let shift = nalgebra::Vector6::new(2e-4, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let moved = Claim::Moved(vec![Alternative { shift, covariance: nalgebra::Matrix6::identity() * 1e-12 }]);
+    assert_eq!(hold(12, far_m, moved).0, Some(Hold::Doubted));
+    let (above, stated_m, upper_m) = hold(12, 1e-9, Claim::AsModelled);
+    assert_eq!(above, None, "it is above the goal, which explains itself");
+    let upper_m = upper_m.expect("known");
+    assert_eq!(
+        hold(12, f64::midpoint(stated_m, upper_m), Claim::AsModelled).0,
+        Some(Hold::NoiseLevels { error_m: upper_m })
+    );
+}
+
 /// From ten views the noise levels are known to a quarter, and an end that waits for a small estimate has to allow for that.
 #[test]
 fn an_end_is_judged_at_the_upper_limit_of_the_noise_levels() {
