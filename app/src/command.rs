@@ -33,6 +33,8 @@ use crate::text::{Language, Text};
 
 /// What the user wants.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(strum::EnumDiscriminants))]
+#[cfg_attr(test, strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {
     /// Have the arm stay where it is, now.
     Stop,

@@ -27,7 +27,8 @@ pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, hei
     }
 }
 
-fn blocked(model: &Model) -> Option<&'static str> {
+/// Why it cannot begin.
+pub fn blocked(model: &Model) -> Option<&'static str> {
     let language = model.view.language;
     if model.intrinsics().is_none() {
         Some(tr!(language, "Nothing is known of the lens yet: connect a cell or solve once"))

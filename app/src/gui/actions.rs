@@ -4,7 +4,9 @@
 use egui::{Key, KeyboardShortcut, Modifiers};
 
 use crate::command::Command;
-use crate::model::{CapturePurpose, CellSource, Dialog, Model, Pane, Step, ThemeChoice};
+use crate::model::{
+    CapturePurpose, CellSource, Dialog, FollowStatus, Model, Motion, Moves, Pane, SolveStatus, Step, ThemeChoice,
+};
 use crate::text::Language;
 use crate::tr;
 
@@ -47,8 +49,10 @@ pub struct Action {
     pub group: Group,
     /// The keys that do it; the first one is shown.
     pub keys: &'static [KeyboardShortcut],
-    /// What it does; `None` while it cannot be done.
-    pub command: Option<Command>,
+    /// What it does.
+    pub command: Command,
+    /// Whether it can be done now.
+    pub available: bool,
 }
 
 const fn plain(key: Key) -> KeyboardShortcut {
@@ -86,85 +90,155 @@ const STEPS: [&[KeyboardShortcut]; 7] = [
 
 /// All of it, in the order of the help.
 pub fn all(model: &Model, language: Language) -> Vec<Action> {
-    let action = |name, group, keys, command| Action { name, group, keys, command: Some(command) };
-    let dialog = |name, keys, dialog| action(name, Group::Session, keys, Command::SetDialog(Some(dialog)));
-    let session = crate::session::facts::of(model);
-    let connected = model.control.is_connected() && model.camera.is_connected();
-    let mut all = vec![
-        action(tr!(language, "Stop the arm"), Group::Work, STOP, Command::Stop),
-        Action {
-            name: tr!(language, "Capture"),
-            group: Group::Work,
-            keys: CAPTURE,
-            command: connected.then_some(Command::Capture(CapturePurpose::Calibrate)),
-        },
-        Action {
-            name: tr!(language, "Capture for verification"),
-            group: Group::Work,
-            keys: &[],
-            command: connected.then_some(Command::Capture(CapturePurpose::Verify)),
-        },
-        Action {
-            name: tr!(language, "Delete the selected captures"),
-            group: Group::Work,
-            keys: DELETE,
-            command: (!model.selection.is_empty()).then(|| Command::Delete(model.selection.clone())),
-        },
-        Action {
-            name: tr!(language, "Verify at planned poses"),
-            group: Group::Work,
-            keys: &[],
-            command: (connected && model.calibrated().is_some()).then_some(Command::VerifyAtPlanned),
-        },
-        action(tr!(language, "Solve"), Group::Work, &[], Command::Solve),
-        action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation),
-        action(tr!(language, "Try to connect now"), Group::Work, &[], Command::Reconnect),
-        Action {
-            name: tr!(language, "Stop trying"),
-            group: Group::Work,
-            keys: &[],
-            command: (matches!(model.source, CellSource::Drivers(_)) && !model.control.is_connected())
-                .then_some(Command::StopTrying),
-        },
-        Action {
-            name: tr!(language, "Undo"),
-            group: Group::Session,
-            keys: UNDO,
-            command: session.undo.map(|_| Command::Undo),
-        },
-        Action {
-            name: tr!(language, "Redo"),
-            group: Group::Session,
-            keys: REDO,
-            command: session.redo.map(|_| Command::Redo),
-        },
+    let mut all = work(model, language);
+    all.extend(session(model, language));
+    all.extend(window(model, language));
+    all
+}
+
+fn action(
+    name: &'static str,
+    group: Group,
+    keys: &'static [KeyboardShortcut],
+    command: Command,
+    available: bool,
+) -> Action {
+    Action { name, group, keys, command, available }
+}
+
+/// The arm, captures, the answer and what is done with it.
+fn work(model: &Model, language: Language) -> Vec<Action> {
+    let with = |name, keys, command, available| action(name, Group::Work, keys, command, available);
+    let plain = |name, command, available| with(name, &[], command, available);
+    let hindrance = crate::capture::pane::hindrance(model);
+    let takes = hindrance.is_none();
+    let moves = crate::taught::pane::immovable(model).is_none();
+    let has_poses = !model.document().taught.is_empty();
+    let run = |name, purpose| plain(name, Command::RunSequence { purpose }, moves && has_poses);
+    let sequence = model.sequence.as_ref().filter(|_| model.sequence_runs);
+    let asks = sequence.is_some_and(|sequence| {
+        sequence.guided.as_deref().is_some_and(|guided| guided.waits == crate::guided::state::Waits::Confirmation)
+    });
+    let hand = model.by_hand.as_ref();
+    let blocked = crate::track::pane::Blocked::of(model);
+    let may_move = model.is_armed();
+    let asks_to_move = matches!(model.moves(), Moves::OnceArmed { .. }) && model.control.is_connected();
+    vec![
+        with(tr!(language, "Stop the arm"), STOP, Command::Stop, true),
+        with(tr!(language, "Capture"), CAPTURE, Command::Capture(CapturePurpose::Calibrate), takes),
+        plain(tr!(language, "Capture for verification"), Command::Capture(CapturePurpose::Verify), takes),
+        plain(tr!(language, "Cancel capture"), Command::CancelCapture, model.capture.is_some()),
+        plain(
+            tr!(language, "Calibrate for me"),
+            Command::CalibrateForMe,
+            crate::guided::pane::blocked(model, hindrance).is_none() && model.takes_chosen_poses(),
+        ),
+        plain(
+            tr!(language, "Guide me"),
+            Command::GuideByHand,
+            takes && hand.is_none() && crate::by_hand::pane::blocked(model).is_none(),
+        ),
+        run(tr!(language, "Capture at each taught pose"), Some(CapturePurpose::Calibrate)),
+        run(tr!(language, "Verify at each taught pose"), Some(CapturePurpose::Verify)),
+        run(tr!(language, "Move to each taught pose"), None),
+        plain(
+            tr!(language, "Verify at planned poses"),
+            Command::VerifyAtPlanned,
+            moves && model.calibrated().is_some(),
+        ),
+        plain(
+            tr!(language, "Continue the sequence"),
+            Command::ContinueSequence,
+            moves && model.sequence.as_ref().is_some_and(|sequence| sequence.current().is_some()),
+        ),
+        plain(tr!(language, "Stop the sequence"), Command::StopSequence, sequence.is_some()),
+        plain(tr!(language, "Move there"), Command::ConfirmMove, asks && may_move && model.motion == Motion::Idle),
+        plain(tr!(language, "Skip this pose"), Command::SkipMove, asks),
+        plain(
+            tr!(language, "Skip this view"),
+            Command::SkipView,
+            hand.is_some_and(|hand| hand.waits == crate::by_hand::state::HandWaits::View),
+        ),
+        plain(tr!(language, "Stop guiding"), Command::StopGuiding, hand.is_some()),
+        with(
+            tr!(language, "Delete the selected captures"),
+            DELETE,
+            Command::Delete(model.selection.clone()),
+            !model.selection.is_empty(),
+        ),
+        plain(tr!(language, "Back to live"), Command::BackToLive, !model.selection.is_empty()),
+        plain(tr!(language, "Teach here"), Command::Teach { name: None }, model.robot.is_some()),
+        plain(tr!(language, "Reference poses"), Command::TeachReference, sequence.is_none()),
+        plain(tr!(language, "Let the workbench move it"), Command::Arm(true), asks_to_move && !may_move),
+        plain(tr!(language, "Only read the robot"), Command::Arm(false), asks_to_move && may_move),
+        plain(tr!(language, "Solve"), Command::Solve, true),
+        plain(
+            tr!(language, "Cancel solving"),
+            Command::CancelSolve,
+            matches!(model.solve.status, SolveStatus::Running { .. }),
+        ),
+        plain(
+            tr!(language, "Export the chosen formats"),
+            Command::Export,
+            crate::export::pane::why_not(model).is_none(),
+        ),
+        plain(
+            tr!(language, "Start tracking"),
+            Command::SetTracking(true),
+            !model.track.on && blocked.tracking.is_none(),
+        ),
+        plain(tr!(language, "Stop tracking"), Command::SetTracking(false), model.track.on),
+        plain(
+            tr!(language, "Stop following"),
+            Command::SetFollow(None),
+            !matches!(model.track.follow, FollowStatus::Off | FollowStatus::Ended(_)),
+        ),
+        plain(tr!(language, "Start simulation"), Command::StartSimulation, model.resting_simulation().is_some()),
+        plain(tr!(language, "Try to connect now"), Command::Reconnect, true),
+        plain(
+            tr!(language, "Stop trying"),
+            Command::StopTrying,
+            matches!(model.source, CellSource::Drivers(_)) && !model.control.is_connected(),
+        ),
+    ]
+}
+
+/// Undo, and the files of the session.
+fn session(model: &Model, language: Language) -> Vec<Action> {
+    let with = |name, keys, command, available| action(name, Group::Session, keys, command, available);
+    let dialog = |name, keys, dialog| with(name, keys, Command::SetDialog(Some(dialog)), true);
+    let facts = crate::session::facts::of(model);
+    vec![
+        with(tr!(language, "Undo"), UNDO, Command::Undo, facts.undo.is_some()),
+        with(tr!(language, "Redo"), REDO, Command::Redo, facts.redo.is_some()),
         dialog(tr!(language, "New session…"), NEW, Dialog::New),
         dialog(tr!(language, "Open session…"), OPEN, Dialog::Open),
         dialog(tr!(language, "Save session…"), SAVE, Dialog::SaveAs),
-    ];
+    ]
+}
+
+/// Steps, panes and how the window looks.
+fn window(model: &Model, language: Language) -> Vec<Action> {
+    let mut all = Vec::new();
     for (step, keys) in Step::ALL.into_iter().zip(STEPS) {
-        all.push(action(shell::step_name(step, language), Group::Steps, keys, Command::GoToStep(step)));
+        all.push(action(shell::step_name(step, language), Group::Steps, keys, Command::GoToStep(step), true));
     }
+    let with = |name, keys, command, available| action(name, Group::Window, keys, command, available);
     let open = |dialog| Command::SetDialog(Some(dialog));
     all.extend([
-        action(tr!(language, "All commands"), Group::Window, PALETTE, open(Dialog::Palette)),
-        action(tr!(language, "Keyboard"), Group::Window, KEYS, open(Dialog::Help)),
-        action(tr!(language, "Light theme"), Group::Window, &[], Command::SetTheme(ThemeChoice::Light)),
-        action(tr!(language, "Dark theme"), Group::Window, &[], Command::SetTheme(ThemeChoice::Dark)),
-        action(tr!(language, "Reset layout"), Group::Window, &[], Command::ResetLayout),
-        Action {
-            name: tr!(language, "Open the recording in Rerun"),
-            group: Group::Window,
-            keys: &[],
-            command: model.rerun.on.then_some(Command::OpenRerun),
-        },
-        action(tr!(language, "About"), Group::Window, &[], open(Dialog::About)),
+        with(tr!(language, "All commands"), PALETTE, open(Dialog::Palette), true),
+        with(tr!(language, "Keyboard"), KEYS, open(Dialog::Help), true),
+        with(tr!(language, "Light theme"), &[], Command::SetTheme(ThemeChoice::Light), true),
+        with(tr!(language, "Dark theme"), &[], Command::SetTheme(ThemeChoice::Dark), true),
+        with(tr!(language, "Reset layout"), &[], Command::ResetLayout, true),
+        with(tr!(language, "Open the recording in Rerun"), &[], Command::OpenRerun, model.rerun.on),
+        with(tr!(language, "About"), &[], open(Dialog::About), true),
     ]);
     for other in Language::ALL {
-        all.push(action(other.own_name(), Group::Window, &[], Command::SetLanguage(other)));
+        all.push(with(other.own_name(), &[], Command::SetLanguage(other), true));
     }
     for pane in Pane::ALL {
-        all.push(action(shell::title(pane, language), Group::Panes, &[], Command::ShowPane(pane)));
+        all.push(action(shell::title(pane, language), Group::Panes, &[], Command::ShowPane(pane), true));
     }
     all
 }
@@ -206,10 +280,8 @@ pub fn pressed(ctx: &egui::Context, model: &Model) -> Vec<Command> {
     for action in actions {
         let keys = action.keys.iter().filter(|keys| keys.logical_key != STOP_KEY);
         let mut keys = keys.filter(|keys| !(focused && keys.modifiers.is_none() && keys.logical_key == Key::Space));
-        if keys.any(|keys| ctx.input_mut(|input| input.consume_shortcut(keys)))
-            && let Some(command) = action.command
-        {
-            commands.push(command);
+        if keys.any(|keys| ctx.input_mut(|input| input.consume_shortcut(keys))) && action.available {
+            commands.push(action.command);
         }
     }
     commands
@@ -217,8 +289,87 @@ pub fn pressed(ctx: &egui::Context, model: &Model) -> Vec<Command> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
+    use strum::IntoEnumIterator as _;
+
     use super::*;
+    use crate::command::CommandKind;
     use crate::model::{CellSource, ViewSettings};
+
+    /// Commands with a value that only the place has where it is chosen: a pose in a row, a number that is typed, a point of an
+    /// image, a file, a key that is held.
+    const ONLY_IN_PLACE: &[CommandKind] = {
+        use CommandKind::*;
+        &[
+            ChooseFormats,
+            ChooseHypothesis,
+            Connect,
+            ConvertRecording,
+            DismissMessage,
+            ExportKeepOut,
+            ExportTaught,
+            FixConvention,
+            GoToCapture,
+            GoToTaught,
+            HideBoard,
+            ImportKeepOut,
+            ImportTaught,
+            Jog,
+            JogHeld,
+            JogReleased,
+            ListFolder,
+            Move,
+            MoveBoard,
+            NewSession,
+            Open,
+            OpenFolder,
+            Pick,
+            PointAt,
+            RemoveTaught,
+            RenameTaught,
+            ReorderTaught,
+            SaveAs,
+            Select,
+            SetCamera,
+            SetCaptureOptions,
+            SetConfirmMoves,
+            SetDepthColours,
+            SetDepthScale,
+            SetExcluded,
+            SetExportFolder,
+            SetExportNames,
+            SetGoal,
+            SetImportTarget,
+            SetJog,
+            SetKeepOut,
+            SetKeepOutliers,
+            SetMethod,
+            SetMode,
+            SetObjects,
+            SetOutlierLine,
+            SetOverlays,
+            SetPurpose,
+            SetRotationFormat,
+            SetSceneView,
+            SetTarget,
+            SetTipBox,
+            SetViewport,
+            ShowFormat,
+            TypePose,
+        ]
+    };
+
+    #[test]
+    fn every_command_that_needs_no_value_of_its_place_is_in_the_palette() {
+        let model = Model::new(CellSource::default(), ViewSettings::default());
+        let there: BTreeSet<_> =
+            all(&model, Language::English).iter().map(|it| CommandKind::from(&it.command)).collect();
+        for kind in CommandKind::iter() {
+            let elsewhere = ONLY_IN_PLACE.contains(&kind);
+            assert_ne!(there.contains(&kind), elsewhere, "{kind:?}: in the palette, or listed here with what it needs");
+        }
+    }
 
     #[test]
     fn no_two_actions_have_the_same_keys_or_the_same_name_in_a_group() {

@@ -50,9 +50,9 @@ impl CommandPalette {
         let outside = dialogs::pressed_outside(ctx, shown.response.rect);
         let choice = if enter { Some(self.chosen) } else { clicked };
         if let Some(action) = choice.and_then(|index| found.get(index)) {
-            if let Some(command) = &action.command {
+            if action.available {
                 outbox.send(Command::SetDialog(None));
-                outbox.send(command.clone());
+                outbox.send(action.command.clone());
             }
         } else if outside {
             outbox.send(Command::SetDialog(None));
@@ -96,12 +96,12 @@ impl CommandPalette {
 fn row_ui(ui: &mut Ui, action: &Action, is_chosen: bool, language: Language) -> egui::Response {
     let palette = Palette::of(ui);
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW), Sense::click());
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, action.command.is_some(), action.name));
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, action.available, action.name));
     if is_chosen || response.hovered() {
         let fill = if is_chosen { palette.card.lerp_to_gamma(palette.accent, 0.18) } else { palette.raised() };
         ui.painter().rect(rect, CornerRadius::same(5), fill, Stroke::NONE, egui::StrokeKind::Inside);
     }
-    let colour = if action.command.is_some() { palette.text } else { palette.weak };
+    let colour = if action.available { palette.text } else { palette.weak };
     let left = rect.left_center() + Vec2::new(10.0, 0.0);
     let name = ui.painter().text(left, Align2::LEFT_CENTER, action.name, FontId::proportional(13.0), colour);
     let small = FontId::proportional(CAPTION);
@@ -119,7 +119,7 @@ fn found(model: &Model, language: Language, typed: &str) -> Vec<Action> {
     let mut found: Vec<_> = actions::all(model, language)
         .into_iter()
         .zip(english)
-        .filter(|(action, _)| action.command != Some(Command::SetDialog(Some(crate::model::Dialog::Palette))))
+        .filter(|(action, _)| action.command != Command::SetDialog(Some(crate::model::Dialog::Palette)))
         .filter_map(|(action, english)| {
             let score = fit(action.name, typed).into_iter().chain(fit(english.name, typed)).max()?;
             Some((score, action))

@@ -146,7 +146,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
 }
 
 /// Why no capture can be taken now.
-fn hindrance(model: &Model) -> Option<&'static str> {
+pub fn hindrance(model: &Model) -> Option<&'static str> {
     let language = model.view.language;
     if model.capture.is_some() {
         Some(tr!(language, "A capture is under way"))

@@ -5,6 +5,8 @@ mod names;
 mod preview;
 mod written;
 
+pub use written::why_not;
+
 use egui::Ui;
 
 use crate::command::Outbox;

@@ -24,15 +24,7 @@ pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.add(Label::new(RichText::new(&folder).monospace().size(12.0).color(palette.text)).wrap());
     ui.horizontal_wrapped(|ui| {
         let chosen = formats::chosen(model).len();
-        let reason = blocked(model).or_else(|| {
-            if model.export.writing {
-                Some(tr!(language, "Files are being written"))
-            } else if chosen == 0 {
-                Some(tr!(language, "Choose a format first"))
-            } else {
-                None
-            }
-        });
+        let reason = why_not(model);
         let name = text!("Export {count} {count|format|formats}", count = chosen).say(language);
         if parts::gated_ui(ui, reason, Button::new(RichText::new(name).strong())).clicked() {
             outbox.send(Command::Export);
@@ -55,6 +47,20 @@ pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui.add(Spinner::new().size(16.0));
         }
     });
+}
+
+/// Why nothing is written when the button is pressed.
+pub fn why_not(model: &Model) -> Option<&'static str> {
+    let language = model.view.language;
+    blocked(model).or_else(|| {
+        if model.export.writing {
+            Some(tr!(language, "Files are being written"))
+        } else if formats::chosen(model).is_empty() {
+            Some(tr!(language, "Choose a format first"))
+        } else {
+            None
+        }
+    })
 }
 
 /// The files that were written, or why there are none.

@@ -14,7 +14,7 @@ use crate::gui::style::parts;
 use crate::gui::style::theme::Tone;
 use crate::model::{Model, Moves};
 use crate::tr;
-use blocked::Blocked;
+pub use blocked::Blocked;
 
 /// What stands beside the numbers has at least this width: its buttons and plots need it.
 const LEAST_BESIDE: f32 = 300.0;
