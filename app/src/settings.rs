@@ -29,7 +29,7 @@ pub const ADDRESSES: usize = 8;
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     theme: ThemeChoice,
-    language: Language,
+    language: LanguageChoice,
     rotation: RotationFormat,
     depth_scale: DepthScale,
     depth_colours: ColourMap,
@@ -45,6 +45,40 @@ pub struct Settings {
     pub drivers: Vec<Drivers>,
     /// Where a scene other than the built-in one has the parts of the cell.
     pub objects: CellPaths,
+}
+
+/// The language of the window, as it is wished.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+enum LanguageChoice {
+    /// That of the system.
+    #[default]
+    #[serde(rename = "system")]
+    System,
+    /// English.
+    #[serde(rename = "en")]
+    English,
+    /// Simplified Chinese.
+    #[serde(rename = "zh-CN")]
+    Chinese,
+}
+
+impl LanguageChoice {
+    fn language(self) -> Language {
+        match self {
+            Self::System => sys_locale::get_locale().map_or(Language::English, |locale| Language::of_locale(&locale)),
+            Self::English => Language::English,
+            Self::Chinese => Language::Chinese,
+        }
+    }
+}
+
+impl From<Language> for LanguageChoice {
+    fn from(language: Language) -> Self {
+        match language {
+            Language::English => Self::English,
+            Language::Chinese => Self::Chinese,
+        }
+    }
 }
 
 /// Something in the settings that was left out, and where.
@@ -116,6 +150,7 @@ impl Settings {
     /// How the window looks at the start; what is not kept here has its default.
     pub fn view(&self) -> ViewSettings {
         let Self { theme, language, rotation, depth_scale, depth_colours, .. } = *self;
+        let language = language.language();
         ViewSettings { depth_colours, theme, language, rotation, depth_scale, ..ViewSettings::default() }
     }
 
@@ -213,7 +248,7 @@ impl SettingsFile {
         let ViewSettings { theme, language, rotation, depth_scale, depth_colours, .. } = view;
         let (before, kept) = (self.last_view, &mut self.in_file);
         keep(&mut kept.theme, before.theme, theme);
-        keep(&mut kept.language, before.language, language);
+        keep(&mut kept.language, before.language.into(), language.into());
         keep(&mut kept.rotation, before.rotation, rotation);
         keep(&mut kept.depth_scale, before.depth_scale, depth_scale);
         keep(&mut kept.depth_colours, before.depth_colours, depth_colours);

@@ -16,7 +16,7 @@ fn said(warnings: &[Warning]) -> Vec<String> {
 fn what_was_written_is_read_again() {
     let settings = Settings {
         theme: ThemeChoice::Light,
-        language: Language::Chinese,
+        language: LanguageChoice::Chinese,
         rotation: RotationFormat::Quaternion,
         depth_scale: DepthScale::Full,
         depth_colours: ColourMap::Viridis,
@@ -45,7 +45,7 @@ fn a_bad_value_is_told_with_its_line_and_key_and_the_others_are_taken() {
     );
     assert!(warnings.iter().any(|text| text.contains("line 5") && text.contains("depth_scale")));
     assert!(warnings.iter().any(|text| text.contains("line 6") && text.contains("`depth_colours`")));
-    assert_eq!(settings.language, Language::Chinese);
+    assert_eq!(settings.language, LanguageChoice::Chinese);
     assert_eq!(settings.theme, ThemeChoice::Dark);
 }
 
@@ -86,11 +86,11 @@ fn the_environment_goes_before_the_file_and_does_not_get_into_it() {
     let variable = |name: &str| (name == "HANDEYE_LANGUAGE").then(|| "zh-CN".to_owned());
     let (mut file, settings, warnings) = SettingsFile::open(Some(path.clone()), variable);
     assert_eq!(warnings, []);
-    assert_eq!((settings.theme, settings.language), (ThemeChoice::Light, Language::Chinese));
+    assert_eq!((settings.theme, settings.language), (ThemeChoice::Light, LanguageChoice::Chinese));
     write(file.keep(ViewSettings { theme: ThemeChoice::Dark, ..settings.view() }, &[], &[], &CellPaths::default()))
         .expect("it can be written");
     let (_, again, _) = SettingsFile::open(Some(path), nothing);
-    assert_eq!((again.theme, again.language), (ThemeChoice::Dark, Language::English));
+    assert_eq!((again.theme, again.language), (ThemeChoice::Dark, LanguageChoice::English));
 }
 
 #[test]
@@ -145,4 +145,31 @@ fn a_file_that_cannot_be_written_is_told() {
 fn the_file_keeps_its_place_in_the_folders_of_the_system() {
     let path = default_path().expect("there is a home");
     assert!(path.is_absolute() && path.ends_with("handeye-workbench/settings.toml"), "{}", path.display());
+}
+
+#[test]
+fn the_language_is_that_of_the_system_until_one_is_chosen() {
+    for (locale, language) in [
+        ("zh_CN.UTF-8", Language::Chinese),
+        ("zh-Hans-CN", Language::Chinese),
+        ("ZH", Language::Chinese),
+        ("de_DE.UTF-8", Language::English),
+        ("C", Language::English),
+        ("", Language::English),
+    ] {
+        assert_eq!(Language::of_locale(locale), language, "{locale}");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("settings.toml");
+    let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
+    assert_eq!(settings.language, LanguageChoice::System);
+    let view = ViewSettings { theme: ThemeChoice::Light, ..settings.view() };
+    write(file.keep(view, &[], &[], &CellPaths::default())).expect("it can be written");
+    let (mut file, settings, _) = SettingsFile::open(Some(path.clone()), nothing);
+    assert_eq!(settings.language, LanguageChoice::System, "another setting was changed, not the language");
+    let other = Language::ALL.into_iter().find(|it| *it != settings.view().language).expect("two languages");
+    write(file.keep(ViewSettings { language: other, ..settings.view() }, &[], &[], &CellPaths::default()))
+        .expect("it can be written");
+    let (_, settings, _) = SettingsFile::open(Some(path), nothing);
+    assert_eq!(settings.language, LanguageChoice::from(other));
 }

@@ -114,6 +114,14 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             folder = folder.display()
         )
     };
+    if let (None, Some(last)) = (&model.session.folder, model.recent.first()) {
+        let name = last.folder.file_name().unwrap_or(last.folder.as_os_str()).to_string_lossy();
+        let words = text!("Open {name} again, {count} {count|capture|captures}", name = name, count = last.captures);
+        let button = Button::new(words.say(language)).wrap_mode(egui::TextWrapMode::Truncate);
+        if ui.add(button).on_hover_text(last.folder.display().to_string()).clicked() {
+            outbox.send(Command::Open(last.folder.clone()));
+        }
+    }
     parts::hint_ui(ui, &said.say(language));
     ui.horizontal(|ui| {
         let words =

@@ -8,6 +8,8 @@ mod actions;
 mod args;
 mod arrival;
 mod dialogs;
+#[cfg(feature = "window")]
+mod fit;
 mod help;
 pub(crate) mod opening;
 mod palette;

@@ -78,6 +78,9 @@ pub struct Window {
     signals: Option<Arc<Signals>>,
     #[cfg(feature = "window")]
     leaving: bool,
+    /// Whether it was looked at whether the window fits the screen.
+    #[cfg(feature = "window")]
+    is_fitted: bool,
 }
 
 impl Window {
@@ -97,6 +100,8 @@ impl Window {
             signals: None,
             #[cfg(feature = "window")]
             leaving: false,
+            #[cfg(feature = "window")]
+            is_fitted: false,
         }
     }
 
@@ -278,6 +283,7 @@ impl eframe::App for Window {
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        self.is_fitted = self.is_fitted || super::fit::fit(ui.ctx());
         self.window_ui(ui);
     }
 

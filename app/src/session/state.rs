@@ -118,6 +118,8 @@ pub enum FolderKind {
     Session,
     /// Recorded images and poses.
     Dataset,
+    /// Images without a description of a data set: a recording to look at.
+    Images,
     /// Something else.
     Plain,
     /// No folder but a file of taught poses.

@@ -208,6 +208,8 @@ pub fn kind_of(folder: &Path) -> FolderKind {
         FolderKind::Session
     } else if folder.join(dataset::DESCRIPTION).is_file() {
         FolderKind::Dataset
+    } else if dataset::holds_images(folder) {
+        FolderKind::Images
     } else {
         FolderKind::Plain
     }

@@ -23,6 +23,7 @@ fn driven(dialog: Dialog) -> Driven {
         entries: Ok(vec![
             entry("monday", FolderKind::Session),
             entry("recorded", FolderKind::Dataset),
+            entry("flash drive", FolderKind::Images),
             entry("more", FolderKind::Plain),
             entry("poses.toml", FolderKind::File),
         ]),
@@ -59,6 +60,25 @@ fn a_session_of_before_is_opened() {
     assert!(pane.sees("12 captures"));
     pane.click("tuesday");
     assert_eq!(first(pane.click("Open")), Command::Open(PathBuf::from("/data/tuesday")));
+}
+
+#[test]
+fn return_opens_what_was_clicked() {
+    let mut pane = driven(Dialog::Open);
+    pane.click("tuesday");
+    assert_eq!(first(pane.press(Key::Enter)), Command::Open(PathBuf::from("/data/tuesday")));
+    let mut pane = driven(Dialog::Open);
+    pane.click("flash drive, images");
+    assert_eq!(first(pane.press(Key::Enter)), Command::Open(PathBuf::from("/data/flash drive")));
+}
+
+#[test]
+fn what_is_typed_goes_on_behind_the_path() {
+    let mut pane = driven(Dialog::Open);
+    pane.steps();
+    pane.harness.input_mut().events.push(egui::Event::Text("/x".to_owned()));
+    pane.steps();
+    assert_eq!(first(pane.click("Open")), Command::Open(PathBuf::from("/data/x")));
 }
 
 #[test]

@@ -147,7 +147,9 @@ impl Archive {
     fn open(&mut self, folder: &Path) {
         match kind_of(folder) {
             FolderKind::Dataset => return self.import(folder),
-            FolderKind::Plain if folder.exists() => return self.outlet.report(Event::NoSession(folder.to_path_buf())),
+            FolderKind::Images | FolderKind::Plain if folder.exists() => {
+                return self.outlet.report(Event::NoSession(folder.to_path_buf()));
+            }
             _ => {}
         }
         if self.store.as_ref().is_some_and(|store| store.folder() == folder) {

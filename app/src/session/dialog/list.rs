@@ -33,7 +33,7 @@ pub fn recent_ui(ui: &mut Ui, model: &Model, state: &mut State, outbox: &mut Out
             let captures = text!("{count} {count|capture|captures}", count = recent.captures).say(language);
             parts::caption_ui(ui, &captures);
             if response.clicked() {
-                state.selected = None;
+                (state.selected, state.is_chosen) = (None, true);
                 state.typed.clone_from(&path);
             }
             if response.double_clicked() {
@@ -94,7 +94,7 @@ fn entry_ui(
             if purpose.is_named() && entry.kind != FolderKind::File {
                 go(purpose, state, folder.join(&entry.name), outbox);
             } else {
-                state.selected = Some(at);
+                (state.selected, state.is_chosen) = (Some(at), false);
                 state.typed = purpose::joined(folder, &entry.name);
             }
         }
@@ -115,6 +115,7 @@ fn mark(kind: FolderKind, language: Language) -> &'static str {
     match kind {
         FolderKind::Session => tr!(language, "session"),
         FolderKind::Dataset => tr!(language, "data set"),
+        FolderKind::Images => tr!(language, "images"),
         FolderKind::File => tr!(language, "poses"),
         FolderKind::Plain => "",
     }

@@ -5,6 +5,7 @@ mod purpose;
 
 use std::path::{Path, PathBuf};
 
+use egui::text::{CCursor, CCursorRange};
 use egui::{Align, Button, Context, Id, Key, Layout, Modifiers, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use crate::command::{Command, Outbox};
@@ -22,6 +23,8 @@ struct State {
     typed: String,
     /// The entry that the arrow keys have reached.
     selected: Option<usize>,
+    /// The path is that of a session of before, which was clicked.
+    is_chosen: bool,
     asked: Option<Asked>,
 }
 
@@ -88,7 +91,7 @@ fn keys(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, outbox
     if pressed(ui, Key::Enter) {
         match state.selected.and_then(|at| shown.get(at)) {
             Some(entry) => activate(model, purpose, state, entry, outbox),
-            None if purpose.enters_typed() && Path::new(state.typed.trim()) != current(model) => {
+            None if purpose.enters_typed() && !state.is_chosen && Path::new(state.typed.trim()) != current(model) => {
                 go(purpose, state, PathBuf::from(state.typed.trim()), outbox);
             }
             None => act(model, purpose, state, outbox),
@@ -105,7 +108,7 @@ fn current(model: &Model) -> PathBuf {
 fn activate(model: &Model, purpose: &Purpose, state: &mut State, entry: &FolderEntry, outbox: &mut Outbox) {
     let path = current(model).join(&entry.name);
     let is_goal = match entry.kind {
-        FolderKind::Session | FolderKind::Dataset => purpose.dialog == Dialog::Open,
+        FolderKind::Session | FolderKind::Dataset | FolderKind::Images => purpose.dialog == Dialog::Open,
         FolderKind::File => true,
         FolderKind::Plain => false,
     };
@@ -119,7 +122,7 @@ fn activate(model: &Model, purpose: &Purpose, state: &mut State, entry: &FolderE
 
 /// Lists another folder.
 fn go(purpose: &Purpose, state: &mut State, folder: PathBuf, outbox: &mut Outbox) {
-    state.selected = None;
+    (state.selected, state.is_chosen) = (None, false);
     state.typed = purpose.path_in(&folder, &state.typed);
     outbox.send(Command::ListFolder(folder));
 }
@@ -164,13 +167,18 @@ fn path_ui(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, is_
             .desired_width(ui.available_width() - 120.0)
             .char_limit(4096)
             .hint_text(purpose.empty_hint);
-        let response = ui.add(field);
+        let mut shown = field.show(ui);
+        let response = &shown.response.response;
         response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, tr!(language, "Path")));
         if is_new {
             response.request_focus();
+            // Behind the last letter: a path is gone on with, or its last part replaced.
+            let end = CCursorRange::one(CCursor::new(state.typed.chars().count()));
+            shown.state.cursor.set_char_range(Some(end));
+            shown.state.store(ui.ctx(), response.id);
         }
         if response.changed() {
-            state.selected = None;
+            (state.selected, state.is_chosen) = (None, false);
             state.asked = None;
         }
         if ui.button(tr!(language, "Folder above")).clicked() {

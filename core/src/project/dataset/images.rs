@@ -13,6 +13,23 @@ const ENDINGS: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
 /// Where sessions keep their images.
 const SUBFOLDER: &str = "images";
 
+/// Entries of a folder that are looked at to say whether it holds images.
+const LOOKED_AT: usize = 1000;
+
+/// Whether there is an image in a folder or in its folder `images`, by the ending of its name. Of a folder that cannot be read, or
+/// of an image behind more than a thousand other files, it says that there is none.
+pub fn holds_images(folder: &Path) -> bool {
+    let holds = |folder: &Path| {
+        std::fs::read_dir(folder).is_ok_and(|entries| entries.take(LOOKED_AT).flatten().any(|it| is_image(&it.path())))
+    };
+    holds(folder) || holds(&folder.join(SUBFOLDER))
+}
+
+fn is_image(path: &Path) -> bool {
+    let is_hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    !is_hidden && path.extension().is_some_and(|it| ENDINGS.iter().any(|ending| it.eq_ignore_ascii_case(ending)))
+}
+
 /// The images in a folder and in its folder `images`, in natural order; hidden files are none.
 pub(super) fn list(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     let mut paths = list_one(folder, Path::new(""))?;
@@ -29,9 +46,7 @@ fn list_one(folder: &Path, sub: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     let mut paths = Vec::new();
     for entry in std::fs::read_dir(&here).map_err(unreadable)? {
         let path = sub.join(entry.map_err(unreadable)?.file_name());
-        let is_image = path.extension().is_some_and(|e| ENDINGS.iter().any(|ending| e.eq_ignore_ascii_case(ending)));
-        let is_hidden = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
-        if is_image && !is_hidden && folder.join(&path).is_file() {
+        if is_image(&path) && folder.join(&path).is_file() {
             paths.push(path);
         }
     }

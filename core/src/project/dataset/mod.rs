@@ -35,6 +35,7 @@ mod value;
 pub mod write;
 
 pub use entry::Entry;
+pub use images::holds_images;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
