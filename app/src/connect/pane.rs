@@ -244,6 +244,7 @@ mod tests {
     use super::*;
     use crate::gui::testing::driven::Driven;
     use crate::gui::testing::sample;
+    use crate::model::RecentSession;
 
     #[test]
     fn it_is_said_where_captures_are_kept_and_the_folder_is_opened() {
@@ -259,5 +260,21 @@ mod tests {
         assert!(pane.sees("Captures and results are kept in /home/me/handeye-sessions/2026-11-22"));
         assert_eq!(pane.click("Open the folder"), [Command::OpenFolder(session)]);
         assert!(pane.nothing_is_cut_off());
+    }
+
+    #[test]
+    fn the_session_that_was_open_last_is_offered_until_one_is_open() {
+        let mut model = sample::connected();
+        let last = PathBuf::from("/home/me/handeye-sessions/2026-11-22");
+        model.recent = vec![
+            RecentSession { folder: last.clone(), captures: 12 },
+            RecentSession { folder: PathBuf::from("/home/me/older"), captures: 3 },
+        ];
+        let mut pane = Driven::new(connect_ui, model);
+        assert_eq!(pane.click("Open 2026-11-22 again, 12 captures"), [Command::Open(last.clone())]);
+        assert!(pane.nothing_is_cut_off());
+        pane.model().session.folder = Some(last);
+        pane.steps();
+        assert!(!pane.sees("again"));
     }
 }

@@ -94,3 +94,25 @@ pub(super) fn common_size(
     }
     Ok(Some(need))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_are_told_by_their_endings_and_looked_for_where_sessions_keep_them() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let touch = |name: &str| {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            std::fs::write(path, "").expect("written");
+        };
+        let holds = |name: &str| holds_images(&folder.path().join(name));
+        touch("plain/poses.csv");
+        touch("plain/.hidden.png");
+        touch("flat/001.JPG");
+        touch("below/images/001.tiff");
+        touch("deeper/left/001.png");
+        assert_eq!(["plain", "flat", "below", "deeper", "nowhere"].map(holds), [false, true, true, false, false]);
+    }
+}
