@@ -95,19 +95,34 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // `--help` and `--version` are answers, not errors; clap prints each to its proper stream.
-            let printed = error.print().and_then(|()| std::io::stdout().flush());
-            if error.use_stderr() {
-                return ExitCode::from(2);
+            if !error.use_stderr() {
+                let printed = error.print().and_then(|()| std::io::stdout().flush());
+                return ended(out::finished(printed, "standard output"));
             }
-            return ended(out::finished(printed, "standard output"));
+            // In an error there is what was typed, or what a pattern of the shell stood for.
+            let words = error.render().to_string();
+            if out::shown(&words) == words {
+                let _said = error.print().is_ok();
+            } else {
+                out::note(words.trim_end());
+            }
+            return ExitCode::from(2);
         }
     };
     start_logging(cli.quiet);
     let result = match cli.command.unwrap_or_else(|| Command::Gui(GuiArgs::default())) {
         Command::Gui(args) => args.rerun.check().and_then(|()| crate::gui::run(args).map_err(Failure::failed)),
         Command::Serve(args) => {
-            // Nobody may listen to it any more: it is served all the same.
+            let is_local = args.bind.is_loopback();
             let announce = |url: &str| {
+                if !is_local {
+                    // Even when quiet: nobody should learn of it from somebody else.
+                    out::note(
+                        "warning: everybody on the network who has the address with its key can move the arm and see \
+                         its images, and nothing is encrypted; --bind 127.0.0.1 serves this machine alone",
+                    );
+                }
+                // Nobody may listen to it any more: it is served all the same.
                 let _told = out::line(format_args!("the workbench is at {url}")).is_ok();
             };
             args.gui.rerun.check().and_then(|()| crate::serve::run(args, announce).map_err(Failure::failed))
@@ -142,10 +157,11 @@ fn start_logging(quiet: bool) {
     let default =
         if quiet { "error" } else { "warn,handeye_app=info,handeye_core=info,handeye_sim_link=info,re_=error" };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
+    let is_coloured = std::io::stderr().is_terminal();
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(|| out::Log)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(move || out::Log { is_coloured })
+        .with_ansi(is_coloured)
         .with_target(false)
         .without_time()
         .compact()

@@ -82,7 +82,7 @@ impl Output {
     /// When it cannot be opened.
     pub fn open(&self) -> io::Result<Box<dyn Write>> {
         Ok(match self {
-            Self::Standard => Box::new(io::stdout()),
+            Self::Standard => Box::new(out::Results),
             Self::Direct(path) => Box::new(open(path)?),
             Self::File(path) => Box::new(atomic_file::create(path)?),
         })

@@ -6,7 +6,7 @@
 
 use std::convert::Infallible;
 use std::io;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
@@ -153,8 +153,8 @@ where
     let mut guests: Vec<Guest> = Vec::new();
     let mut tasks = JoinSet::new();
     loop {
-        let client = match listener.accept().await {
-            Ok((client, _)) => client,
+        let (client, from) = match listener.accept().await {
+            Ok(accepted) => accepted,
             Err(error) => {
                 tracing::debug!(%error, "a viewer was not let in");
                 tokio::time::sleep(PAUSE).await;
@@ -172,14 +172,19 @@ where
             guests.remove(idle).task.abort();
         }
         let (sender, activity) = watch::channel(Activity::default());
-        let task = tasks.spawn(attend(client, limits, Arc::new(sender), answer.clone()));
+        let task = tasks.spawn(attend(client, from.ip(), limits, Arc::new(sender), answer.clone()));
         guests.push(Guest { task, activity });
     }
 }
 
 /// Serves a connection until it ends or is given up.
-async fn attend<A, F>(client: TcpStream, limits: Limits, activity: Arc<watch::Sender<Activity>>, answer: A)
-where
+async fn attend<A, F>(
+    client: TcpStream,
+    from: IpAddr,
+    limits: Limits,
+    activity: Arc<watch::Sender<Activity>>,
+    answer: A,
+) where
     A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
     F: Future<Output = Response<Body>> + Send + 'static,
 {
@@ -187,7 +192,8 @@ where
     let _set = client.set_nodelay(true).is_ok();
     let given_up = is_given_up(limits, activity.subscribe());
     let watched = Watched { client, activity: Arc::clone(&activity) };
-    let service = service_fn(move |request: Request<Incoming>| {
+    let service = service_fn(move |mut request: Request<Incoming>| {
+        request.extensions_mut().insert(Peer(from));
         let busy = Busy::new(&activity);
         let answered = tokio::time::timeout(limits.answer, answer(request));
         async move {
@@ -238,6 +244,15 @@ async fn is_given_up(limits: Limits, mut activity: watch::Receiver<Activity>) {
             Ok(Err(_)) | Err(_) => return,
         }
     }
+}
+
+/// The other end of the connection of a request.
+#[derive(Debug, Clone, Copy)]
+struct Peer(IpAddr);
+
+/// The address from which a request came.
+pub fn asked_from<B>(request: &Request<B>) -> IpAddr {
+    request.extensions().get::<Peer>().map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |peer| peer.0)
 }
 
 /// A short answer.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Steps of a calibration.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Step {
     /// Reach robot and camera.
     #[default]

@@ -12,6 +12,7 @@
 //! robot) is only of interest while it is new: what cannot be written in time is left out and counted.
 //! `docs/rerun_viewers.md` has the bounds.
 
+mod arrangement;
 pub mod blueprint;
 mod browser;
 pub(crate) mod button;

@@ -1,17 +1,17 @@
 //! Streams of a recording: where entries go, and how far that is trusted.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use rerun::blueprint::BlueprintActivation;
 use rerun::log::{ChunkBatcherConfig, LogMsg};
 use rerun::sink::{FileSink, FileSinkError, LogSink, SinkFlushError};
 use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamError};
 
 use super::lasting::Recording;
 use super::scene::{RecordError, SceneWriter};
-use super::{APPLICATION_ID, Entry, blueprint, file};
+use super::{APPLICATION_ID, Entry, arrangement, file};
 use crate::model::Step;
 
 /// Rows of a file are gathered for so long: many small chunks make a large file, and its index a large memory.
@@ -75,6 +75,8 @@ pub struct Stream {
     /// Whether nothing live is written now.
     pub lasting_only: bool,
     step: Option<Step>,
+    /// Steps whose arrangement it has.
+    arranged: BTreeSet<Step>,
 }
 
 /// Why there is no stream.
@@ -124,7 +126,15 @@ impl Stream {
                 }
             }
         };
-        Ok(Self { lasting, live, writer: SceneWriter::new(), file, lasting_only: false, step: None })
+        Ok(Self {
+            lasting,
+            live,
+            writer: SceneWriter::new(),
+            file,
+            lasting_only: false,
+            step: None,
+            arranged: BTreeSet::new(),
+        })
     }
 
     /// Writes what never changes.
@@ -160,9 +170,9 @@ impl Stream {
             return;
         }
         self.step = Some(step);
-        let activation = BlueprintActivation { make_active: true, make_default: true };
-        if let Err(error) = blueprint::of(step).send(&self.lasting, activation) {
-            tracing::debug!(%error, "the layout of the viewer stays as it was");
+        match arrangement::of(step) {
+            Ok(arrangement) => arrangement.send(&self.lasting, self.arranged.insert(step)),
+            Err(error) => tracing::debug!(%error, "the layout of the viewer stays as it was"),
         }
     }
 

@@ -23,6 +23,9 @@ const MOST_EVENTS: usize = 10_000;
 /// Number of a page.
 pub type PageId = u64;
 
+/// Number of the first page.
+const FIRST: PageId = 1;
+
 /// Between the pages and the window.
 pub struct Hub {
     state: Mutex<State>,
@@ -99,6 +102,8 @@ struct State {
     next: PageId,
     pages: BTreeMap<PageId, Page>,
     driver: Option<PageId>,
+    /// The name of the page that drove last, and is gone.
+    drove: Option<String>,
     news: News,
     /// When the page that drives was last heard.
     heard: Instant,
@@ -124,8 +129,8 @@ impl Hub {
     /// Nobody is there; what wakes the window comes out of the second.
     pub fn new() -> (Self, Receiver<()>) {
         let (wake, wakes) = crossbeam_channel::bounded(1);
-        let state =
-            State { next: 1, pages: BTreeMap::new(), driver: None, news: News::default(), heard: Instant::now() };
+        let (pages, news) = (BTreeMap::new(), News::default());
+        let state = State { next: FIRST, pages, driver: None, drove: None, news, heard: Instant::now() };
         let hub = Self {
             state: Mutex::new(state),
             wake,
@@ -153,7 +158,8 @@ impl Hub {
         self.people.send_if_modified(|before| std::mem::replace(before, people) != people);
     }
 
-    /// A page has come. It drives when nobody does, or when it did before its connection was lost.
+    /// A page has come. It drives when it is the first one, that of whoever has started this, or when it did before its
+    /// connection was lost and nobody has since. Others drive when their person asks for it.
     pub fn join(&self, name: &str) -> Option<(PageId, tokio::sync::mpsc::Receiver<Errand>)> {
         let mut state = self.state();
         // The same page once more: its old connection is of no more use.
@@ -172,7 +178,8 @@ impl Hub {
             id,
             Page { name: name.to_owned(), screen: None, visible: true, reads: false, ready: true, errands },
         );
-        if drove || state.driver.is_none() {
+        let comes_back = state.driver.is_none() && state.drove.as_deref() == Some(name);
+        if drove || comes_back || id == FIRST {
             state.take_over(id);
         }
         self.tell_people(&state);
@@ -184,9 +191,10 @@ impl Hub {
     /// A page has gone.
     pub fn leave(&self, id: PageId) {
         let mut state = self.state();
-        state.pages.remove(&id);
+        let name = state.pages.remove(&id).map(|page| page.name);
         if state.driver == Some(id) {
             state.driver = None;
+            state.drove = name;
             state.news.done.clear();
             state.news.changed_hands = true;
         }
@@ -443,6 +451,26 @@ mod tests {
         hub.leave(again);
         assert_eq!(driver(&hub), None);
         assert!(hub.news().0.changed_hands);
+    }
+
+    #[test]
+    fn a_page_that_joins_while_nobody_drives_watches_until_its_person_asks() {
+        let hub = hub();
+        let first = join(&hub, "a");
+        hub.leave(first);
+        let other = join(&hub, "b");
+        assert_eq!(driver(&hub), None);
+        hub.done(other, vec![Done::Leave]).expect("ignored");
+        assert!(hub.news().0.done.is_empty());
+        // The one whose connection was gone for a while, and since when nobody has driven.
+        let again = join(&hub, "a");
+        assert_eq!(driver(&hub), Some(again));
+        hub.leave(again);
+        hub.drive(other);
+        assert_eq!(driver(&hub), Some(other));
+        hub.leave(other);
+        join(&hub, "a");
+        assert_eq!(driver(&hub), None, "somebody else has driven since");
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod args;
 mod chunks;
 mod difference;
 mod frame;
+mod guesses;
 mod host;
 mod hub;
 mod input;

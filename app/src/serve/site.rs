@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 use futures_util::StreamExt as _;
-use http_body_util::{Full, StreamBody};
+use http_body_util::{BodyExt as _, Full, StreamBody};
 use hyper::body::{Bytes, Frame, Incoming};
 use hyper::header::{
     CACHE_CONTROL, CONNECTION, CONTENT_DISPOSITION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderValue, LOCATION,
@@ -13,16 +14,18 @@ use hyper::header::{
 };
 use hyper::{Method, Request, Response, StatusCode};
 use percent_encoding::percent_decode_str;
-use tokio::io::AsyncReadExt as _;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio_stream::wrappers::ReceiverStream;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 use tonic::body::Body;
 
 use super::access::{Access, Verdict};
+use super::archive::{Contents, Pieces};
 use super::hub::Hub;
+use super::socket;
 use super::upload::{UploadError, Uploads};
-use super::{archive, socket};
 use crate::app::InBrowser;
-use crate::http::door::plain;
+use crate::http::door::{asked_from, plain};
 use crate::rerun_log::Relay;
 
 /// What the browser may load and where it may connect to: this server, and nothing else.
@@ -32,8 +35,11 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; 
 /// A header that no form of another site can send.
 const OURS: &str = "x-handeye";
 
-/// Bytes of a download at a time.
-const PIECE: usize = 256 * 1024;
+/// Folders that are downloaded at a time: each keeps a thread and the disk busy.
+const DOWNLOADS: usize = 1;
+
+/// What is read of a recording at a time. A viewer has two that last; of the connections most are left for pages.
+const RECORDINGS: usize = 16;
 
 /// All that is served.
 pub struct Site {
@@ -41,12 +47,16 @@ pub struct Site {
     hub: Arc<Hub>,
     shown: InBrowser,
     uploads: Arc<Uploads>,
+    downloads: Arc<Semaphore>,
+    recordings: Arc<Semaphore>,
 }
 
 impl Site {
     /// For a window, with uploads into a folder of the sessions.
     pub fn new(access: Access, hub: Arc<Hub>, shown: InBrowser, sessions: &Path) -> Self {
-        Self { access, hub, shown, uploads: Arc::new(Uploads::new(sessions)) }
+        let uploads = Arc::new(Uploads::new(sessions));
+        let [downloads, recordings] = [DOWNLOADS, RECORDINGS].map(|places| Arc::new(Semaphore::new(places)));
+        Self { access, hub, shown, uploads, downloads, recordings }
     }
 
     /// What a person opens.
@@ -56,7 +66,7 @@ impl Site {
 
     /// Answers a request.
     pub async fn answer(&self, request: Request<Incoming>) -> Response<Body> {
-        let mut response = match self.access.judge(&request) {
+        let mut response = match self.access.judge(&request, asked_from(&request), Instant::now()) {
             Verdict::Enter => self.enter(request).await,
             Verdict::Refuse(status, why) => plain(status, why),
             Verdict::Welcome(cookie) => {
@@ -81,7 +91,10 @@ impl Site {
 
     async fn enter(&self, request: Request<Incoming>) -> Response<Body> {
         if Relay::is_for(&request) {
-            return self.shown.recording.answer(request).await;
+            let Ok(place) = Arc::clone(&self.recordings).try_acquire_owned() else {
+                return plain(StatusCode::SERVICE_UNAVAILABLE, "The recording is read by too many already.\n");
+            };
+            return until_its_end(self.shown.recording.answer(request).await, place);
         }
         let path = request.uri().path().to_owned();
         match (request.method(), path.as_str()) {
@@ -155,6 +168,11 @@ impl Site {
                 match error {
                     UploadError::Name => plain(StatusCode::BAD_REQUEST, "The name of a file may not lead out.\n"),
                     UploadError::TooMuch => plain(StatusCode::PAYLOAD_TOO_LARGE, "That is too much.\n"),
+                    UploadError::Busy => plain(
+                        StatusCode::SERVICE_UNAVAILABLE,
+                        "Other files are coming; try again when they are here.\n",
+                    ),
+                    UploadError::Stalled => plain(StatusCode::REQUEST_TIMEOUT, "Nothing came of the file.\n"),
                     UploadError::Io(_) => plain(StatusCode::INTERNAL_SERVER_ERROR, "The file could not be kept.\n"),
                 }
             }
@@ -166,27 +184,30 @@ impl Site {
         else {
             return plain(StatusCode::FORBIDDEN, "This folder is not for browsers.\n");
         };
+        let Ok(place) = Arc::clone(&self.downloads).try_acquire_owned() else {
+            let why = "Another folder is being downloaded; try again when it is done.\n";
+            return plain(StatusCode::SERVICE_UNAVAILABLE, why);
+        };
         let name = archive_name(&folder);
-        let made = tokio::task::spawn_blocking(move || archive::of(&folder)).await;
-        let file = match made.map_err(std::io::Error::other).flatten() {
-            Ok(file) => tokio::fs::File::from_std(file),
+        let listed = tokio::task::spawn_blocking(move || Contents::of(&folder)).await;
+        let contents = match listed.map_err(std::io::Error::other).flatten() {
+            Ok(contents) => contents,
             Err(error) => {
                 tracing::warn!(%error, "a folder could not be downloaded");
                 return plain(StatusCode::INTERNAL_SERVER_ERROR, "The folder could not be read.\n");
             }
         };
-        let pieces = futures_util::stream::unfold(file, |mut file| async move {
-            let mut piece = vec![0; PIECE];
-            match file.read(&mut piece).await {
-                Ok(0) => None,
-                Ok(count) => {
-                    piece.truncate(count);
-                    Some((Ok(Frame::data(Bytes::from(piece))), file))
-                }
-                Err(error) => Some((Err(error), file)),
+        let (mut pieces, taken) = Pieces::new();
+        // Not waited for: it ends with the last piece, or when nobody takes any more.
+        drop(tokio::task::spawn_blocking(move || {
+            let _until_then = place;
+            if let Err(error) = contents.write(&mut pieces) {
+                tracing::debug!(%error, "a download has ended early");
+                pieces.fail(error);
             }
-        });
-        let mut response = Response::new(Body::new(StreamBody::new(pieces.boxed())));
+        }));
+        let frames = ReceiverStream::new(taken).map(|piece| piece.map(Frame::data));
+        let mut response = Response::new(Body::new(StreamBody::new(frames.boxed())));
         let headers = response.headers_mut();
         headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/zip"));
         if let Ok(value) = HeaderValue::from_str(&format!("attachment; filename=\"{name}\"")) {
@@ -194,6 +215,16 @@ impl Site {
         }
         response
     }
+}
+
+/// Keeps a place until the last of an answer was made.
+fn until_its_end(response: Response<Body>, place: OwnedSemaphorePermit) -> Response<Body> {
+    response.map(|body| {
+        Body::new(body.map_frame(move |frame| {
+            let _until_then = &place;
+            frame
+        }))
+    })
 }
 
 /// The name of a folder's archive, with letters that every system takes.

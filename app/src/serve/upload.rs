@@ -1,13 +1,19 @@
 //! Files that are dropped on a page: they come one by one into a new folder of the sessions, which is then opened.
+//!
+//! What is remembered of uploads is bounded, and so are the files that come at a time, so that neither many uploads nor
+//! slow ones keep anybody out.
 
 use std::collections::HashMap;
 use std::io;
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use http_body_util::BodyExt as _;
 use hyper::body::Incoming;
 use tokio::io::AsyncWriteExt as _;
+use tokio::sync::Semaphore;
+use tokio::time::timeout;
 
 /// Largest file \[bytes\].
 const MOST_OF_A_FILE: u64 = 2 << 30;
@@ -18,8 +24,14 @@ const MOST_OF_ALL: u64 = 8 << 30;
 /// Files of an upload.
 const MOST_FILES: usize = 20_000;
 
-/// Uploads that are remembered.
+/// Uploads that are remembered; that which was heard of longest ago makes room for another.
 const MOST_UPLOADS: usize = 64;
+
+/// Files that come at a time. A page sends one after the other; of the connections most are left for other things.
+const MOST_AT_A_TIME: usize = 8;
+
+/// Longest wait for the next piece of a file.
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Name of the folder in that of the sessions.
 const FOLDER: &str = "uploads";
@@ -27,13 +39,40 @@ const FOLDER: &str = "uploads";
 /// The uploads of this process.
 pub struct Uploads {
     folder: PathBuf,
-    begun: Mutex<HashMap<String, Begun>>,
+    state: Mutex<State>,
+    places: Semaphore,
+}
+
+#[derive(Default)]
+struct State {
+    begun: HashMap<String, Begun>,
+    /// Files of all uploads so far.
+    files: u64,
 }
 
 struct Begun {
     folder: PathBuf,
     bytes: u64,
     files: usize,
+    /// Files that are on their way.
+    coming: usize,
+    /// Number of its latest file among all.
+    latest: u64,
+}
+
+/// A file that is on its way.
+struct Coming<'a> {
+    uploads: &'a Uploads,
+    upload: &'a str,
+    folder: PathBuf,
+}
+
+impl Drop for Coming<'_> {
+    fn drop(&mut self) {
+        if let Some(begun) = self.uploads.state().begun.get_mut(self.upload) {
+            begun.coming -= 1;
+        }
+    }
 }
 
 /// Why a file was not taken.
@@ -45,6 +84,12 @@ pub enum UploadError {
     /// There is too much.
     #[error("an upload holds up to 20,000 files, 2 GiB in one file and 8 GiB in all")]
     TooMuch,
+    /// Others come already.
+    #[error("{MOST_AT_A_TIME} files are coming already")]
+    Busy,
+    /// Nothing comes any more.
+    #[error("nothing came of a file for {} s", PATIENCE.as_secs())]
+    Stalled,
     /// The connection or the disk failed.
     #[error("a file could not be kept: {0}")]
     Io(#[from] io::Error),
@@ -53,7 +98,11 @@ pub enum UploadError {
 impl Uploads {
     /// Into a folder of that of the sessions.
     pub fn new(sessions: &Path) -> Self {
-        Self { folder: sessions.join(FOLDER), begun: Mutex::default() }
+        Self { folder: sessions.join(FOLDER), state: Mutex::default(), places: Semaphore::new(MOST_AT_A_TIME) }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Takes a file; the name of its upload is chosen by the page.
@@ -62,15 +111,18 @@ impl Uploads {
     /// See [`UploadError`]; what was written of the file is then removed.
     pub async fn take(&self, upload: &str, path: &str, mut body: Incoming) -> Result<(), UploadError> {
         let relative = harmless(path).ok_or(UploadError::Name)?;
-        let folder = self.begun(upload)?;
-        let file = folder.join(&relative);
+        let Ok(_place) = self.places.try_acquire() else { return Err(UploadError::Busy) };
+        let coming = self.begun(upload)?;
+        let file = coming.folder.join(&relative);
         if let Some(parent) = file.parent() {
             tokio::fs::create_dir_all(parent).await?;
         }
         let mut written = tokio::fs::OpenOptions::new().write(true).create_new(true).open(&file).await?;
         let outcome = async {
             let mut bytes = 0;
-            while let Some(frame) = body.frame().await {
+            loop {
+                let Ok(frame) = timeout(PATIENCE, body.frame()).await else { return Err(UploadError::Stalled) };
+                let Some(frame) = frame else { break };
                 let frame = frame.map_err(io::Error::other)?;
                 let Some(data) = frame.data_ref() else { continue };
                 bytes += data.len() as u64;
@@ -89,19 +141,33 @@ impl Uploads {
         outcome
     }
 
-    /// The folder of an upload, made when its first file comes.
-    fn begun(&self, upload: &str) -> Result<PathBuf, UploadError> {
+    /// One more file of an upload, whose folder is made when the first one comes.
+    fn begun<'a>(&'a self, upload: &'a str) -> Result<Coming<'a>, UploadError> {
         if upload.is_empty() || upload.len() > 40 || !upload.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
             return Err(UploadError::Name);
         }
-        let mut begun = self.begun.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(begun) = begun.get_mut(upload) {
-            begun.files += 1;
-            return if begun.files > MOST_FILES { Err(UploadError::TooMuch) } else { Ok(begun.folder.clone()) };
+        let mut state = self.state();
+        state.files += 1;
+        let latest = state.files;
+        if let Some(begun) = state.begun.get_mut(upload) {
+            if begun.files >= MOST_FILES {
+                return Err(UploadError::TooMuch);
+            }
+            (begun.files, begun.coming, begun.latest) = (begun.files + 1, begun.coming + 1, latest);
+            return Ok(Coming { uploads: self, upload, folder: begun.folder.clone() });
         }
-        if begun.len() >= MOST_UPLOADS {
-            return Err(UploadError::TooMuch);
+        if state.begun.len() >= MOST_UPLOADS {
+            let idle = state.begun.iter().filter(|(_, begun)| begun.coming == 0);
+            let oldest = idle.min_by_key(|(_, begun)| begun.latest).map(|(name, _)| name.clone());
+            state.begun.remove(&oldest.ok_or(UploadError::Busy)?);
         }
+        let folder = self.new_folder()?;
+        let begun = Begun { folder: folder.clone(), bytes: 0, files: 1, coming: 1, latest };
+        state.begun.insert(upload.to_owned(), begun);
+        Ok(Coming { uploads: self, upload, folder })
+    }
+
+    fn new_folder(&self) -> Result<PathBuf, UploadError> {
         std::fs::create_dir_all(&self.folder)?;
         let name = crate::worker::timestamp();
         // Two uploads in one second are two folders.
@@ -115,14 +181,11 @@ impl Uploads {
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => None,
                 Err(error) => Some(Err(error)),
             });
-        let folder = folder.ok_or(UploadError::TooMuch)??;
-        begun.insert(upload.to_owned(), Begun { folder: folder.clone(), bytes: 0, files: 1 });
-        Ok(folder)
+        Ok(folder.ok_or(UploadError::TooMuch)??)
     }
 
     fn grew(&self, upload: &str, bytes: u64) -> u64 {
-        let mut begun = self.begun.lock().unwrap_or_else(PoisonError::into_inner);
-        begun.get_mut(upload).map_or(0, |begun| {
+        self.state().begun.get_mut(upload).map_or(0, |begun| {
             begun.bytes += bytes;
             begun.bytes
         })
@@ -130,7 +193,7 @@ impl Uploads {
 
     /// What is to be opened of an upload: the one folder or file that was dropped, or all files that were.
     pub fn finished(&self, upload: &str) -> Option<PathBuf> {
-        let folder = self.begun.lock().unwrap_or_else(PoisonError::into_inner).get(upload)?.folder.clone();
+        let folder = self.state().begun.get(upload)?.folder.clone();
         let mut entries = std::fs::read_dir(&folder).ok()?.filter_map(Result::ok);
         match (entries.next(), entries.next()) {
             (Some(only), None) => Some(only.path()),
@@ -169,15 +232,34 @@ mod tests {
         let sessions = tempfile::tempdir().expect("a folder");
         let uploads = Uploads::new(sessions.path());
         assert_eq!(uploads.finished("nothing"), None);
-        let folder = uploads.begun("one").expect("begun");
+        let folder = uploads.begun("one").expect("begun").folder.clone();
         std::fs::create_dir(folder.join("my set")).expect("made");
         assert_eq!(uploads.finished("one"), Some(folder.join("my set")));
-        let folder = uploads.begun("two").expect("begun");
+        let folder = uploads.begun("two").expect("begun").folder.clone();
         std::fs::write(folder.join("poses.csv"), "x").expect("written");
         std::fs::write(folder.join("a.png"), "x").expect("written");
         assert_eq!(uploads.finished("two"), Some(folder));
         for name in ["", "../x", "a/b", &"x".repeat(41)] {
             assert!(uploads.begun(name).is_err(), "{name}");
         }
+    }
+
+    #[test]
+    fn however_many_uploads_there_were_another_is_taken_and_those_that_come_are_not_forgotten() {
+        let sessions = tempfile::tempdir().expect("a folder");
+        let uploads = Uploads::new(sessions.path());
+        let coming = uploads.begun("first").expect("begun");
+        for number in 0..3 * MOST_UPLOADS {
+            assert!(uploads.begun(&number.to_string()).is_ok(), "{number}");
+        }
+        assert!(uploads.finished("first").is_some(), "a file of it is on its way");
+        assert!(uploads.finished("0").is_none());
+        assert!(uploads.finished(&(3 * MOST_UPLOADS - 1).to_string()).is_some());
+        assert_eq!(uploads.state().begun.len(), MOST_UPLOADS);
+        drop(coming);
+        for number in 0..MOST_UPLOADS {
+            assert!(uploads.begun(&format!("more{number}")).is_ok(), "{number}");
+        }
+        assert!(uploads.finished("first").is_none(), "nothing of it comes any more");
     }
 }

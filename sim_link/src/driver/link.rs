@@ -10,6 +10,7 @@ use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
 use super::error::DriverError;
+use super::family::{Family, Process};
 use super::spec::DriverSpec;
 
 /// Longest wait for a TCP connection, and for a driver that does not take what is sent to it.
@@ -32,8 +33,8 @@ pub struct Link {
 /// Ends a driver.
 #[derive(Debug)]
 pub enum LinkEnd {
-    /// A process, the first of its group.
-    Process(Child),
+    /// A process, the first of its group, and all that come from it.
+    Process(Child, Family),
     /// A connection.
     Tcp(TcpStream),
 }
@@ -53,16 +54,11 @@ impl Link {
     fn start(words: &[String]) -> Result<Self, DriverError> {
         let failed = |why: String| DriverError::Start { command: words.join(" "), why };
         let (program, arguments) = words.split_first().ok_or_else(|| failed("no program is named".to_owned()))?;
-        // A group of its own: killing it ends what the driver has started too, and Ctrl-C in a terminal is for the
-        // workbench, which brakes the arm before it ends the driver.
-        let mut child = Command::new(program)
-            .args(arguments)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .process_group(0)
-            .spawn()
-            .map_err(|error| failed(error.to_string()))?;
+        let mut command = Command::new(program);
+        // A group of its own: Ctrl-C in a terminal is for the workbench, which brakes the arm before it ends the driver.
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
+        let family = Family::of(&mut command);
+        let mut child = command.spawn().map_err(|error| failed(error.to_string()))?;
         let (input, output, errors) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (Some(input), Some(output)) = (input, output) else {
             return Err(failed("it has no pipes".to_owned()));
@@ -71,7 +67,7 @@ impl Link {
             output: Box::new(output),
             input: Box::new(input),
             errors: errors.map(|errors| Box::new(errors) as Box<dyn Read + Send>),
-            end: LinkEnd::Process(child),
+            end: LinkEnd::Process(child, family),
         })
     }
 
@@ -100,7 +96,7 @@ impl Link {
 impl LinkEnd {
     /// How the process ended, if it has within this time; never over TCP.
     pub fn ended_within(&mut self, patience: Duration) -> Option<ExitStatus> {
-        let Self::Process(child) = self else { return None };
+        let Self::Process(child, _) = self else { return None };
         let until = Instant::now() + patience;
         loop {
             match child.try_wait() {
@@ -111,15 +107,23 @@ impl LinkEnd {
         }
     }
 
-    /// Ends it now, with all that it has started.
-    pub fn kill(&mut self) {
+    /// What comes from a process that still runs; none over TCP.
+    pub fn living(&mut self) -> Vec<Process> {
+        let Self::Process(child, family) = self else { return Vec::new() };
+        let is_running = matches!(child.try_wait(), Ok(None));
+        family.living(is_running.then_some(child.id().cast_signed()))
+    }
+
+    /// Ends it now, with all that it has started, and with these.
+    pub fn kill(&mut self, living: Vec<Process>) {
         match self {
-            Self::Process(child) => {
+            Self::Process(child, family) => {
                 if let Ok(id) = i32::try_from(child.id()) {
                     // Nobody is left in the group: that is what was wanted.
                     let _gone_already = killpg(Pid::from_raw(id), Signal::SIGKILL).is_err();
                 }
                 let _reaped = child.wait().is_ok();
+                family.kill(living);
             }
             Self::Tcp(stream) => {
                 let _closed_already = stream.shutdown(Shutdown::Both).is_err();

@@ -33,6 +33,7 @@ pub mod clock;
 pub mod conformance;
 mod error;
 pub mod fake;
+mod family;
 mod host;
 mod images;
 mod inner;

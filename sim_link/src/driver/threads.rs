@@ -135,6 +135,8 @@ fn how_ended(shared: &Shared, end: &mut LinkEnd) -> Ending {
 
 /// Tells the driver to brake and end, closes its input, and kills it when it does not end by itself.
 fn bury(shared: &Shared, end: &mut LinkEnd) {
+    // Looked for while their parents live, below whom some of them are found.
+    let living = end.living();
     if !shared.lock().trial.leaves_without_bye {
         let _full_or_closed = shared.enqueue(Out::Bye).is_err();
     }
@@ -147,11 +149,11 @@ fn bury(shared: &Shared, end: &mut LinkEnd) {
             }
             if shared.wait_for_output(patience) { Burial::Closed } else { Burial::LeftOpen }
         }
-        LinkEnd::Process(_) => match end.ended_within(patience) {
+        LinkEnd::Process(..) => match end.ended_within(patience) {
             Some(status) => Burial::Ended { status: status.to_string(), is_success: status.success() },
             None => Burial::Killed,
         },
     };
-    end.kill();
+    end.kill(living);
     shared.update(|inner| inner.burial = Some(burial));
 }

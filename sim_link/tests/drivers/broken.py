@@ -155,6 +155,16 @@ def hello():
         message["arm"] = "ur5e"
     elif fault == "bytes after hello":
         message["bytes"] = 4
+    if fault == "children leave":
+        # One with a session of its own, one below a parent that has gone, one that does not know where it is from.
+        null = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        sleep = [sys.executable, "-c", "import time; time.sleep(600)"]
+        one = subprocess.Popen(sleep, start_new_session=True, **null).pid
+        leave = f"import subprocess; print(subprocess.Popen({sleep!r}, start_new_session=True, **{null!r}).pid)"
+        two = int(subprocess.run([sys.executable, "-c", leave], stdout=subprocess.PIPE, check=True).stdout)
+        three = subprocess.Popen(sleep, start_new_session=True, env={}, **null).pid
+        with open(mark, "w") as file:
+            file.write(f"{one} {two} {three}")
     send(message)
     greeted = True
     if fault == "two hellos":

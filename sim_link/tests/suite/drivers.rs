@@ -172,6 +172,37 @@ fn a_driver_that_is_killed_is_noticed_and_one_that_was_left_is_ended_with_all_it
 }
 
 #[test]
+fn what_a_driver_has_started_ends_with_it_also_when_it_has_left_the_group() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("children");
+    let spec = command(&python, "tests/drivers/broken.py", &["children leave", &file.display().to_string()]);
+    let is_alive = |id: &str| {
+        let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
+        stat.rsplit_once(')').is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
+    };
+    let kill = |id: &str| assert!(Command::new("kill").args(["-s", "KILL", id]).status().unwrap().success());
+    for is_killed in [false, true] {
+        let driver = start(&spec).unwrap();
+        let ids = std::fs::read_to_string(&file).unwrap();
+        let mut ids: Vec<&str> = ids.split_whitespace().collect();
+        assert!(ids.len() == 3 && ids.iter().all(|id| is_alive(id)), "{ids:?}");
+        if is_killed {
+            kill(driver.hello().name.rsplit(' ').next().unwrap());
+            assert!(matches!(ending(&driver), Ending::Exited { .. }));
+            // It does not know where it is from, and its parent was gone before anybody looked.
+            ids.pop().into_iter().for_each(kill);
+        }
+        drop(driver);
+        let until = Instant::now() + PATIENCE;
+        while ids.iter().any(|id| is_alive(id)) {
+            assert!(Instant::now() < until, "{ids:?} outlive their driver");
+            std::thread::yield_now();
+        }
+    }
+}
+
+#[test]
 fn a_driver_that_does_not_stop_the_arm_loses_its_connection() {
     let Some(python) = python() else { return };
     let driver = start(&broken(&python, "ignores stop")).unwrap();

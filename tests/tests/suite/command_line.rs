@@ -287,3 +287,32 @@ fn poses_are_planned_for_a_recorded_session_from_which_the_whole_board_is_seen()
     let table = text(&handeye(&["--quiet", "plan", utf8(&session)]).stdout);
     assert!(table.contains("whether the arm reaches them is not checked"), "{table}");
 }
+
+#[test]
+fn names_and_messages_of_strangers_command_no_terminal() {
+    let home = tempfile::tempdir().expect("a folder");
+    let evil = "set\u{1b}]0;title\u{7}\u{1b}[2J\u{9b}31m\rdone\u{202e}";
+    let folder = home.path().join(evil);
+    std::fs::create_dir(&folder).expect("made");
+    std::fs::write(folder.join(format!("{evil}.csv")), "x,y\n1,2\n").expect("written");
+    let driver = format!("python3 -c 'print(\"{evil}\")'");
+    let commands: [&[&str]; 8] = [
+        &["calibrate", utf8(&folder)],
+        &["doctor", utf8(&folder)],
+        &["import", utf8(&folder)],
+        &["import", utf8(&folder), "--out", utf8(&home.path().join(format!("out{evil}")))],
+        &["export", utf8(&folder.join("none"))],
+        &["driver", "test", &driver],
+        &["track", "--calibration", utf8(&folder), "--connect", evil],
+        &[evil],
+    ];
+    for command in commands {
+        let output = handeye(command);
+        for said in [text(&output.stdout), text(&output.stderr)] {
+            let obeyed: Vec<char> =
+                said.chars().filter(|letter| letter.is_control() && !"\n\t".contains(*letter)).collect();
+            assert!(obeyed.is_empty() && !said.contains('\u{202e}'), "{command:?}: {said:?}");
+        }
+        assert!(text(&output.stderr).contains("\\u{1b}"), "{command:?}: {:?}", text(&output.stderr));
+    }
+}

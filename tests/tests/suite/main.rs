@@ -31,6 +31,7 @@ mod slow {
     mod guided;
     mod interrupted;
     mod leaving;
+    mod many_sessions;
     mod official_client;
     mod python_module;
     mod rerun_recording;

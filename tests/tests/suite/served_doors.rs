@@ -28,12 +28,14 @@ impl Served {
         let mut child = Command::new(handeye_tests::handeye_binary())
             .args(["serve", "--quiet", "--port", "0", "--rerun", "off"])
             .args(arguments)
+            .env("RUST_LOG", "warn,re_=error")
             .env("HOME", home.path())
             .env("XDG_CONFIG_HOME", home.path().join("config"))
             .env("XDG_DATA_HOME", home.path().join("data"))
             .env_remove("DISPLAY")
             .env_remove("WAYLAND_DISPLAY")
             .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
             .spawn()
             .expect("it starts");
         let mut line = String::new();
@@ -189,4 +191,105 @@ fn broken_messages_and_a_thousand_silent_connections_leave_the_driving_page_alon
     let grown = served.megabytes() - before;
     println!("1,000 silent connections and 8 broken pages: {grown:.0} MB more");
     assert!(grown < 100.0, "{grown} MB");
+}
+
+#[test]
+fn however_many_uploads_there_were_another_is_taken_and_slow_ones_lock_no_page_out() {
+    let served = Served::start(&[]);
+    let post = |upload: &str, length: usize, body: &str| {
+        format!(
+            "POST /upload/{upload}/x.txt HTTP/1.1\r\nHost: ADDRESS\r\nX-Handeye: 1\r\nContent-Length: {length}\r\n\r\n{body}"
+        )
+    };
+    for number in 0..80 {
+        let answer = served.ask(&post(&format!("quick{number}"), 1, "x"));
+        assert!(answer.starts_with("HTTP/1.1 204"), "{number}: {answer}");
+    }
+    // More than there are connections; of each the beginning.
+    let slow: Vec<TcpStream> = (0..100)
+        .filter_map(|number| {
+            let mut socket = TcpStream::connect(&served.address).ok()?;
+            let request = post(&format!("slow{number}"), 1000, "x").replace("ADDRESS", &served.address);
+            socket.write_all(request.as_bytes()).ok()?;
+            Some(socket)
+        })
+        .collect();
+    assert!(slow.len() >= 64, "{}", slow.len());
+    assert!(served.ask("GET / HTTP/1.1\r\nHost: ADDRESS\r\n\r\n").starts_with("HTTP/1.1 200"));
+    let mut page = served.page("new");
+    let screen = json!({"t": "screen", "width": 1440.0, "height": 900.0, "scale": 1.0, "touch": false});
+    page.send(Message::text(screen.to_string())).expect("sent");
+    frame(&mut page);
+    drop(slow);
+}
+
+#[test]
+fn a_folder_is_downloaded_by_one_at_a_time_and_for_no_other_site() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // More than the system keeps for somebody who does not read.
+    std::fs::write(folder.path().join("large.png"), vec![7; 64 << 20]).expect("written");
+    std::fs::write(folder.path().join("result.json"), "{}").expect("written");
+    let name = folder.path().display().to_string();
+    let served = Served::start(&["--allow", &name]);
+    let get = |more: &str| {
+        format!("GET /download?folder={name} HTTP/1.1\r\nHost: ADDRESS\r\nConnection: close\r\n{more}\r\n")
+    };
+    for site in ["cross-site", "same-site"] {
+        for mode in ["no-cors", "navigate"] {
+            let answer = served.ask(&get(&format!("Sec-Fetch-Site: {site}\r\nSec-Fetch-Mode: {mode}\r\n")));
+            assert!(answer.starts_with("HTTP/1.1 403"), "{site} {mode}: {answer}");
+        }
+    }
+    let before = served.megabytes();
+    let mut first = TcpStream::connect(&served.address).expect("it listens");
+    first.set_read_timeout(Some(SOON)).expect("set");
+    first
+        .write_all(get("Sec-Fetch-Site: same-origin\r\n").replace("ADDRESS", &served.address).as_bytes())
+        .expect("sent");
+    let mut begun = vec![0; 4096];
+    let count = first.read(&mut begun).expect("an answer");
+    assert!(begun[..count].starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&begun[..count]));
+    assert!(served.ask(&get("")).starts_with("HTTP/1.1 503"), "another while the first is under way");
+    let grown = served.megabytes() - before;
+    assert!(grown < 32.0, "{grown} MB are kept of 64 that nobody takes");
+    let mut rest = Vec::new();
+    first.read_to_end(&mut rest).expect("the whole archive");
+    assert!(rest.len() > 64 << 20, "{} bytes", rest.len());
+    // Its place is free when the last of it was taken.
+    let deadline = std::time::Instant::now() + SOON;
+    while !served.ask(&get("")).starts_with("HTTP/1.1 200") {
+        assert!(std::time::Instant::now() < deadline, "its place is not given back");
+    }
+}
+
+#[test]
+fn wrong_keys_are_looked_at_no_more_after_some_and_an_open_port_is_warned_of() {
+    let mut served = Served::start(&["--bind", "0.0.0.0"]);
+    let key = served.url.split("handeye_key=").nth(1).expect("a key in the address").to_owned();
+    let guess = |key: &str| served.ask(&format!("GET /?handeye_key={key} HTTP/1.1\r\nHost: ADDRESS\r\n\r\n"));
+    let answers: Vec<String> = (0..30).map(|number| guess(&format!("{number:032x}"))).collect();
+    assert!(answers[0].starts_with("HTTP/1.1 401"), "{}", answers[0]);
+    assert!(answers[29].starts_with("HTTP/1.1 429"), "{}", answers[29]);
+    assert!(guess(&key).starts_with("HTTP/1.1 429"), "one who waits learns nothing");
+    served.child.kill().expect("it runs");
+    let mut said = String::new();
+    served.child.stderr.take().expect("its messages").read_to_string(&mut said).expect("text");
+    assert!(said.contains("warning: everybody on the network"), "{said}");
+}
+
+#[test]
+fn it_ends_soon_after_it_was_asked_to_and_warns_of_nothing() {
+    let mut served = Served::start(&[]);
+    let mut page = served.page("driver");
+    let screen = json!({"t": "screen", "width": 1440.0, "height": 900.0, "scale": 1.0, "touch": false});
+    page.send(Message::text(screen.to_string())).expect("sent");
+    frame(&mut page);
+    let asked = std::time::Instant::now();
+    handeye_tests::process::signal(&served.child, "INT");
+    let status = handeye_tests::process::end_of(&mut served.child);
+    println!("ended by SIGINT after {:.2?}", asked.elapsed());
+    let mut said = String::new();
+    served.child.stderr.take().expect("its messages").read_to_string(&mut said).expect("text");
+    assert!(status.success(), "{status}: {said}");
+    assert!(!said.contains("WARN") && !said.contains("ERROR"), "{said}");
 }

@@ -1,0 +1,117 @@
+//! What a program holds after many sessions: threads and memory end with the session that they were for.
+//!
+//! Threads are counted of a whole process, so each count has a process of its own, which is this program again.
+
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use handeye_app::command::Command as Click;
+use handeye_app::model::{CellSource, Step, ViewerState};
+use handeye_app::rerun_log::RerunChoice;
+use handeye_tests::workbench::Workbench;
+
+/// Set for the process in which threads are counted.
+const COUNTED: &str = "HANDEYE_TEST_COUNTED";
+
+/// Until everything that is made once is there.
+const FIRST: usize = 10;
+
+/// Sessions after those.
+const SESSIONS: usize = 100;
+
+/// What may be made of a session that is over: names, entries of the log, parts of pages that the allocator keeps \[MB\].
+const MOST_MB: f64 = 20.0;
+
+/// Longer than threads take to end on a busy machine.
+const SOON: Duration = Duration::from_mins(2);
+
+fn threads() -> usize {
+    std::fs::read_dir("/proc/self/task").expect("the system says").count()
+}
+
+fn names() -> Vec<String> {
+    let tasks = std::fs::read_dir("/proc/self/task").expect("the system says").flatten();
+    let mut names: Vec<_> = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("comm")).ok()).collect();
+    names.sort();
+    names.iter().map(|name| name.trim().to_owned()).collect()
+}
+
+fn megabytes() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").expect("the system says");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("its memory");
+    line.split_whitespace().next().and_then(|kilobytes| kilobytes.parse::<f64>().ok()).expect("a number") / 1024.0
+}
+
+/// Runs a test of this program alone.
+fn alone(test: &str) {
+    let run = Command::new(std::env::current_exe().expect("this program"))
+        .args(["--exact", test, "--nocapture", "--test-threads", "1"])
+        .env(COUNTED, "1")
+        // Nobody's browser is opened.
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .expect("it runs");
+    let said = String::from_utf8_lossy(&run.stdout);
+    println!("{said}");
+    assert!(run.status.success(), "{said}{}", String::from_utf8_lossy(&run.stderr));
+    assert!(said.contains("sessions: "), "{said}");
+}
+
+/// One more session, in which the person goes through all steps.
+fn go_through(bench: &mut Workbench, folder: std::path::PathBuf) {
+    bench.click(Click::NewSession(Some(folder.clone())));
+    bench.until("the new session", |model| model.session.folder.as_ref() == Some(&folder));
+    for step in Step::ALL {
+        bench.click(Click::GoToStep(step));
+        bench.until("the step", |model| model.step == step);
+    }
+}
+
+/// Waits until there are no more threads than this; how many there are at last.
+fn settled(bench: &mut Workbench, most: usize) -> usize {
+    let deadline = Instant::now() + SOON;
+    while threads() > most && Instant::now() < deadline {
+        // Time is part of the model: this waits for the next look.
+        let now_s = bench.model().now_s;
+        bench.until("a moment", |model| model.now_s > now_s);
+    }
+    threads()
+}
+
+fn count(rerun: RerunChoice) {
+    let home = tempfile::tempdir().expect("a folder");
+    let viewer = matches!(rerun, RerunChoice::Web);
+    let mut bench = Workbench::start_recording(CellSource::default(), &home.path().join("sessions"), None, rerun);
+    bench.until("an image", |model| model.frame.is_some() && model.control.is_connected());
+    if viewer {
+        bench.until("the servers of the viewer", |model| matches!(model.rerun.viewer, ViewerState::Web { .. }));
+    }
+    for number in 0..FIRST {
+        go_through(&mut bench, home.path().join(format!("first-{number}")));
+    }
+    let (before, before_mb) = (threads(), megabytes());
+    for number in 0..SESSIONS {
+        go_through(&mut bench, home.path().join(number.to_string()));
+    }
+    let (after, grown_mb) = (settled(&mut bench, before), megabytes() - before_mb);
+    println!("{SESSIONS} sessions: {before} threads before, {after} after; {before_mb:.0} MB, {grown_mb:+.0} MB");
+    assert!(after <= before, "{} threads have been left behind: {:?}", after - before, names());
+    assert!(grown_mb < MOST_MB, "{grown_mb:.0} MB have been left behind");
+}
+
+#[test]
+fn threads_and_memory_end_with_their_sessions() {
+    if std::env::var_os(COUNTED).is_none() {
+        return alone("slow::many_sessions::threads_and_memory_end_with_their_sessions");
+    }
+    count(RerunChoice::Record);
+}
+
+#[test]
+fn threads_and_memory_end_with_their_sessions_while_a_viewer_is_served() {
+    if std::env::var_os(COUNTED).is_none() {
+        return alone("slow::many_sessions::threads_and_memory_end_with_their_sessions_while_a_viewer_is_served");
+    }
+    count(RerunChoice::Web);
+}
