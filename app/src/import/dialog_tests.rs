@@ -90,6 +90,7 @@ fn driven(found: Option<Found>, chosen: Option<usize>) -> Driven {
     let mut model = sample::captured();
     model.dialog = Some(Dialog::Import);
     model.import = Some(Box::new(ImportState {
+        time: std::time::Duration::from_secs(20),
         path: PathBuf::from("/data/tuesday"),
         number: 1,
         target: String::new(),

@@ -24,6 +24,11 @@ const MOST_UPLOADS: usize = 64;
 /// Name of the folder in that of the sessions.
 const FOLDER: &str = "uploads";
 
+/// The folder of all uploads, in that of the sessions.
+pub fn folder(sessions: &Path) -> PathBuf {
+    sessions.join(FOLDER)
+}
+
 /// The uploads of this process.
 pub struct Uploads {
     folder: PathBuf,
@@ -53,7 +58,7 @@ pub enum UploadError {
 impl Uploads {
     /// Into a folder of that of the sessions.
     pub fn new(sessions: &Path) -> Self {
-        Self { folder: sessions.join(FOLDER), begun: Mutex::default() }
+        Self { folder: folder(sessions), begun: Mutex::default() }
     }
 
     /// Takes a file; the name of its upload is chosen by the page.
