@@ -78,8 +78,13 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
     };
     let mut out = Vec::new();
     let mut rules = Vec::new();
+    let mut still = None;
     let mut pair = |source: Source, robot: usize, images: &[ImageFile]| {
         for pairing in pairings(&recording.tracks[robot].samples, images, LEAST_POSES) {
+            if !moves(recording, robot, source, &pairing) {
+                still = Some(robot);
+                continue;
+            }
             rules.push(pairing.rule.clone());
             // What is found by its content is made after the others.
             if settings.pairing.as_deref().is_none_or(|rule| rule == pairing.rule || rule == "aligned") {
@@ -116,7 +121,12 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
             let choices = rules.join(", ");
             return Err(ImportError::BadChoice { key: "pairing".into(), value: rule.clone(), choices });
         }
-        let seen = if let (true, Some(series)) =
+        let seen = if let Some(robot) = still {
+            format!(
+                "with {} there are not {LEAST_POSES} different poses of the robot and of the target",
+                recording.tracks[robot].name
+            )
+        } else if let (true, Some(series)) =
             (recording.tracks.iter().all(|t| t.role == Role::Target), recording.joints.first())
         {
             format!(
@@ -139,6 +149,31 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
         return Err(ImportError::NoPoses { folder: recording.root.clone(), need, seen });
     }
     Ok(out)
+}
+
+/// Whether a pairing has as many different poses of the robot, and of a target whose poses are recorded, as a recording has at
+/// least: two calibrations that are printed one after the other, some of them again, are none.
+fn moves(recording: &Recording, robot: usize, source: Source, pairing: &Pairing) -> bool {
+    let different = |track: usize, of: &mut dyn Iterator<Item = usize>| {
+        let samples = &recording.tracks[track].samples;
+        let mut known: Vec<&Numbers> = Vec::new();
+        for numbers in of.filter_map(|i| samples.get(i)).map(|sample| &sample.numbers) {
+            if !known.contains(&numbers) {
+                known.push(numbers);
+            }
+            if known.len() >= LEAST_POSES {
+                return true;
+            }
+        }
+        false
+    };
+    let mut robots = pairing.image_of.iter().enumerate().filter(|(_, image)| image.is_some()).map(|(i, _)| i);
+    let of_robot = different(robot, &mut robots);
+    of_robot
+        && match source {
+            Source::Stream(_) => true,
+            Source::Track(target) => different(target, &mut pairing.image_of.iter().copied().flatten()),
+        }
 }
 
 /// Poses of a target stand for the images that they were found in.

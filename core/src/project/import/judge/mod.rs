@@ -72,6 +72,22 @@ pub struct Judgement {
     pub verdict: Verdict,
 }
 
+impl Judgement {
+    /// Whether all that is open is where the camera sits, which no data tell: the same files, pairing and numbers explain the
+    /// recording in both places.
+    pub fn is_open_in_mode_alone(&self) -> bool {
+        match self.hypotheses.as_slice() {
+            [a, b, ..] if self.verdict == Verdict::Ambiguous(2) => {
+                a.mode != b.mode
+                    && (a.source, a.robot, a.reading, a.target_reading)
+                        == (b.source, b.robot, b.reading, b.target_reading)
+                    && a.pairing.image_of == b.pairing.image_of
+            }
+            _ => false,
+        }
+    }
+}
+
 /// What follows from the hypotheses.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
