@@ -193,6 +193,9 @@ fn import(
     let judgement = looked.judge(settings, cancel).map_err(refused)?;
     let is_open_in_mode = settings.mode.is_none() && judgement.is_open_in_mode_alone();
     told.text.push_str(&listed(recording, &judgement, if is_open_in_mode { 2 } else { SHOWN }));
+    if judgement.untried + judgement.sources_untried > 0 {
+        told.note(understand::untried_said(&judgement).say(English));
+    }
     if is_open_in_mode && args.out.is_none() {
         told.line(asked_for_mode(args));
     }
@@ -425,6 +428,8 @@ fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
     json!({
         "verdict": verdict,
         "tried": judgement.tried,
+        "untried": judgement.untried,
+        "series_untried": judgement.sources_untried,
         "distance_mm": judgement.distance_m * 1e3,
         "clocks": recording.clocks.iter().map(|clocks| json!({
             "images": clocks.images,

@@ -249,6 +249,9 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
         ),
     };
     parts::notice_ui(ui, tone, &verdict.say(language), |_| ());
+    if judgement.untried + judgement.sources_untried > 0 {
+        parts::hint_ui(ui, &understand::untried_said(judgement).say(language));
+    }
     conventions::fixed_ui(ui, import, found, language, outbox);
     ui.horizontal_top(|ui| {
         let width = ui.available_width() - places::SIDE - 12.0;

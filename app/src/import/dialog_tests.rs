@@ -74,7 +74,7 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
         warnings: vec!["image7.png is a copy of image3.png, byte by byte".into()],
         ..Recording::default()
     };
-    let judgement = Judgement { hypotheses, tried: 912, distance_m: 0.4, verdict };
+    let judgement = Judgement { hypotheses, tried: 912, untried: 0, sources_untried: 0, distance_m: 0.4, verdict };
     let recording = Arc::new(recording);
     Found {
         opened: Arc::clone(&recording),
