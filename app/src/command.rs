@@ -69,6 +69,8 @@ pub enum Command {
     JogReleased,
     /// The target of the recording that is imported, as it is typed; empty: as its files have it.
     SetImportTarget(String),
+    /// Read the files of the recording again, for so many seconds at the most.
+    SetImportTime(u32),
     /// A convention of that recording, which the data need not tell.
     FixConvention {
         /// Its key, as `handeye import --set` has it.

@@ -67,6 +67,7 @@
 //! Conventions (frames, units, pixel origin, order of tangent vectors) are in `docs/conventions.md`. Results are the same
 //! in every run and on any number of cores: no clock, no hidden seed.
 
+pub mod budget;
 pub mod capture;
 pub mod depth;
 #[cfg(feature = "opencv")]

@@ -7,10 +7,11 @@ mod leave;
 mod reach;
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use handeye_core::project::files::bounds::Bounds;
 use handeye_sim_link::client::cell::CellPaths;
 
 use crate::command::{Command, Event, Outbox};
@@ -175,6 +176,11 @@ impl App {
         }
     }
 
+    /// What files in a folder that is opened may name: anything, where somebody sits at this machine.
+    pub(crate) fn bounds_of(&self, path: &Path) -> Bounds {
+        self.reach.as_ref().map_or(Bounds::ANYWHERE, |reach| reach.bounds_of(path))
+    }
+
     /// Does what the user wants, or has a worker do it. Never waits for a worker.
     pub fn apply(&mut self, command: Command) {
         if let Some(why) = self.reach.as_ref().and_then(|reach| reach.refusal(&command)) {
@@ -253,6 +259,7 @@ impl App {
             Command::NewSession(folder) => self.new_session(folder),
             Command::Open(folder) => self.open(folder),
             Command::SetImportTarget(typed) => self.set_import_target(typed),
+            Command::SetImportTime(seconds) => self.set_import_time(seconds),
             Command::FixConvention { key, value } => self.fix_convention(key, value),
             Command::ChooseHypothesis(place) => self.choose_hypothesis(place),
             Command::ConvertRecording => self.convert_recording(),

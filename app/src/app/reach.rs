@@ -1,6 +1,8 @@
 //! What can be reached from a browser: whoever sits there need not be who started the program.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
+
+use handeye_core::project::files::bounds::Bounds;
 
 use crate::command::Command;
 use crate::model::{CellSource, Drivers};
@@ -10,14 +12,22 @@ use crate::text::Text;
 /// Folders that are read and written for browsers, and programs that are started for them.
 #[derive(Debug, Clone, Default)]
 pub struct Reach {
-    folders: Vec<PathBuf>,
+    folders: Vec<Bounds>,
+    /// In which every folder is an upload of somebody.
+    uploads: Option<PathBuf>,
     drivers: Vec<Drivers>,
 }
 
 impl Reach {
     /// These folders with all that is in them.
     pub fn new(folders: impl IntoIterator<Item = PathBuf>) -> Self {
-        Self { folders: folders.into_iter().map(|folder| real(&folder)).collect(), drivers: Vec::new() }
+        Self { folders: folders.into_iter().map(|folder| Bounds::within(&folder)).collect(), ..Self::default() }
+    }
+
+    /// With a folder of which every folder is an upload: whoever uploads says nothing of what else is here.
+    #[must_use]
+    pub fn with_uploads(self, folder: PathBuf) -> Self {
+        Self { uploads: Some(folder), ..self }
     }
 
     /// Drivers that may be started: those that somebody at this machine has started before.
@@ -28,9 +38,19 @@ impl Reach {
 
     /// Whether a file or folder, which need not exist, is in one of the folders. Links are followed.
     pub fn has(&self, path: &Path) -> bool {
-        let path = real(path);
-        !path.components().any(|part| part == Component::ParentDir)
-            && self.folders.iter().any(|folder| path.starts_with(folder))
+        self.folders.iter().any(|folder| folder.has(path))
+    }
+
+    /// What files in a folder may name: an upload what is in the upload, another one what is in the folder that browsers reach.
+    pub fn bounds_of(&self, path: &Path) -> Bounds {
+        let upload = self.uploads.as_ref().and_then(|uploads| {
+            let own = path.strip_prefix(uploads).ok()?.components().next()?;
+            Some(Bounds::within(&uploads.join(own))).filter(|upload| upload.has(path))
+        });
+        let reached = || self.folders.iter().filter(|folder| folder.has(path));
+        // The innermost.
+        let depth = |bounds: &&Bounds| bounds.folder().map_or(0, |folder| folder.components().count());
+        upload.or_else(|| reached().max_by_key(depth).cloned()).unwrap_or_else(|| Bounds::within(path))
     }
 
     /// Why a command is not carried out; `None` if it may be.
@@ -67,19 +87,6 @@ impl Reach {
     }
 }
 
-/// The path without links, as far as it exists; what does not exist is added as it stands.
-fn real(path: &Path) -> PathBuf {
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    for there in path.ancestors() {
-        if let Ok(real) = there.canonicalize() {
-            let rest = path.strip_prefix(there).unwrap_or_else(|_| Path::new(""));
-            // To add nothing would add a separator, with which a file is none.
-            return if rest.as_os_str().is_empty() { real } else { real.join(rest) };
-        }
-    }
-    path
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,6 +108,23 @@ mod tests {
         assert!(reach.refusal(&Command::Open(PathBuf::from("/etc"))).is_some());
         assert!(reach.refusal(&Command::Open(inside)).is_none());
         assert!(reach.refusal(&Command::Solve).is_none());
+    }
+
+    #[test]
+    fn an_upload_names_what_is_in_it_and_another_folder_what_browsers_reach() {
+        let base = tempfile::tempdir().expect("a folder");
+        let uploads = base.path().join("sessions/uploads");
+        for folder in ["sessions/uploads/1/set", "sessions/uploads/2", "sessions/monday", "data/set", "data/images"] {
+            std::fs::create_dir_all(base.path().join(folder)).expect("made");
+        }
+        let reach = Reach::new(["sessions", "data"].map(|name| base.path().join(name))).with_uploads(uploads.clone());
+        let has = |of: &str, path: &str| reach.bounds_of(&base.path().join(of)).has(&base.path().join(path));
+        assert!(has("sessions/uploads/1/set", "sessions/uploads/1/other.png"));
+        assert!(!has("sessions/uploads/1/set", "sessions/uploads/2/a.png"));
+        assert!(!has("sessions/uploads/1/set", "sessions/monday/images/0001.png"));
+        assert!(has("data/set", "data/images/1.png"), "the folder was allowed with all that is in it");
+        assert!(!has("data/set", "sessions/monday/images/0001.png") && !has("data/set", "private.png"));
+        assert!(!has("elsewhere", "data/set"));
     }
 
     #[test]

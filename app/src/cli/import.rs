@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
 use clap::Args;
+use handeye_core::budget::{Budget, Limits};
 use handeye_core::progress::CancelToken;
+use handeye_core::project::files::bounds::Bounds;
 use handeye_core::project::import::{self, Hypothesis, ImportError, Judgement, Recording, Settings, Verdict, write};
 use handeye_core::targets::TargetSpec;
 use handeye_core::wording::English;
@@ -48,6 +51,13 @@ pub struct ImportArgs {
     /// Leave the images where they are; the data set names them there.
     #[arg(long)]
     link: bool,
+    /// Stop reading the files after so many seconds. Looking at images takes no part of it: its progress is said, and Ctrl-C
+    /// ends it.
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0, value_parser = seconds)]
+    time: f64,
+    /// Stop reading where compressed files unpack to more than so many GiB.
+    #[arg(long, value_name = "GIB", default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    unpack: u64,
     /// Write what was found as JSON to this file; `-` for standard output instead of the text.
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
@@ -81,7 +91,7 @@ pub fn run(args: &ImportArgs) -> Result<(), Failure> {
         write::check_out(folder).map_err(Failure::unusable)?;
     }
     let given = args.target.as_deref().map(target::of_text).transpose().map_err(Failure::unusable)?;
-    let recording = Arc::new(import::open(&args.path).map_err(Failure::unusable)?);
+    let recording = Arc::new(open(args, &cancel).map_err(Failure::unusable)?);
     let mut told = Told { text: found(&recording), notes: Vec::new() };
     let outcome = import(args, &recording, given, &settings, &mut told, &cancel);
     // What was found is said in any case: it is what a refusal is about.
@@ -91,6 +101,19 @@ pub fn run(args: &ImportArgs) -> Result<(), Failure> {
     };
     told.publish(args, &recording, &findings)?;
     outcome.map(|_| ()).map_err(|refused| refused.failure)
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let is_some = |seconds: &f64| (1e-3..=1e6).contains(seconds);
+    text.parse().ok().filter(is_some).ok_or_else(|| "seconds, from 0.001 to 1000000".to_owned())
+}
+
+/// Reads the files within the time and the bytes that are allowed.
+fn open(args: &ImportArgs, cancel: &CancelToken) -> Result<Recording, ImportError> {
+    let begun = Instant::now();
+    let elapsed = || begun.elapsed();
+    let limits = Limits { time: Duration::from_secs_f64(args.time), unpacked_bytes: args.unpack << 30 };
+    import::open_within(&args.path, &Bounds::ANYWHERE, &Budget::new(limits, &elapsed, cancel))
 }
 
 struct Done {
@@ -168,12 +191,22 @@ fn import(
         told.line(format_args!("Clocks: {}", understand::clocks_said(clocks).say(English)));
     }
     let judgement = looked.judge(settings, cancel).map_err(refused)?;
-    told.text.push_str(&listed(recording, &judgement));
+    let is_open_in_mode = settings.mode.is_none() && judgement.is_open_in_mode_alone();
+    told.text.push_str(&listed(recording, &judgement, if is_open_in_mode { 2 } else { SHOWN }));
+    if judgement.untried + judgement.sources_untried > 0 {
+        told.note(understand::untried_said(&judgement).say(English));
+    }
+    if is_open_in_mode && args.out.is_none() {
+        told.line(asked_for_mode(args));
+    }
     let mut findings = as_json(recording, &judgement);
     let refuse = |failure: Failure, findings: serde_json::Value| Refused { failure, findings: Some(findings) };
     let Some(folder) = &args.out else { return Ok(Done { findings }) };
     let (index, is_taken) = match choose(&judgement, args.take) {
         Ok(chosen) => chosen,
+        Err(_) if is_open_in_mode && args.take.is_none() => {
+            return Err(refuse(Failure::failed(anyhow!("nothing was written. {}", asked_for_mode(args))), findings));
+        }
         Err(failure) => return Err(refuse(failure, findings)),
     };
     let h = &judgement.hypotheses[index];
@@ -250,8 +283,8 @@ fn found(recording: &Recording) -> String {
 /// Hypotheses that are shown.
 const SHOWN: usize = 12;
 
-fn listed(recording: &Recording, judgement: &Judgement) -> String {
-    let shown: Vec<&Hypothesis> = judgement.hypotheses.iter().take(SHOWN).collect();
+fn listed(recording: &Recording, judgement: &Judgement, most: usize) -> String {
+    let shown: Vec<&Hypothesis> = judgement.hypotheses.iter().take(most).collect();
     let all: Vec<Vec<import::Convention>> = shown.iter().map(|h| h.conventions(recording)).collect();
     let value = |of: &[import::Convention], key: &str| of.iter().find(|c| c.key == key).map(|c| c.value.clone());
     let differs = |key: &str| all.iter().any(|of| value(of, key) != value(&all[0], key));
@@ -302,8 +335,8 @@ fn listed(recording: &Recording, judgement: &Judgement) -> String {
             line(format!("       contradicted: {why}"));
         }
     }
-    if judgement.hypotheses.len() > SHOWN {
-        line(format!("     and {} more", judgement.hypotheses.len() - SHOWN));
+    if judgement.hypotheses.len() > most && most == SHOWN {
+        line(format!("     and {} more", judgement.hypotheses.len() - most));
     }
     line(String::new());
     line(match &judgement.verdict {
@@ -314,23 +347,51 @@ fn listed(recording: &Recording, judgement: &Judgement) -> String {
                 .into()
         }
         Verdict::Ambiguous(count) => {
-            format!(
-                "The first {count} explain the recording; the data do not tell which is true.{}",
-                by_mode(judgement)
-            )
+            format!("The first {count} explain the recording; the data do not tell which is true.")
         }
         Verdict::Unexplained => "None explains the recording.".into(),
     });
     text
 }
 
-/// What decides between a camera on the robot and one beside it, where nothing else is open.
-fn by_mode(judgement: &Judgement) -> &'static str {
-    match &judgement.hypotheses[..] {
-        [first, second, ..] if judgement.verdict == Verdict::Ambiguous(2) && first.mode != second.mode => {
-            " Is the camera on the robot? Add --set mode=eye_in_hand; beside it: --set mode=eye_to_hand."
+/// Asks for the place of the camera, where nothing else is open, with both commands as they can be run.
+fn asked_for_mode(args: &ImportArgs) -> String {
+    let command = |mode: &str| {
+        let mut words = vec!["handeye".to_owned(), "import".to_owned(), args.path.display().to_string()];
+        let mut option = |name: &str, value: Option<String>| {
+            words.extend(value.into_iter().flat_map(|value| [format!("--{name}"), value]));
+        };
+        option("target", args.target.clone());
+        for assignment in &args.set {
+            option("set", Some(assignment.clone()));
         }
-        _ => "",
+        option("set", Some(format!("mode={mode}")));
+        option("out", args.out.as_ref().map(|folder| folder.display().to_string()));
+        option(
+            "json",
+            args.json.as_ref().map(|output| match output {
+                Output::Standard => "-".to_owned(),
+                Output::Direct(path) | Output::File(path) => path.display().to_string(),
+            }),
+        );
+        words.extend(args.link.then(|| "--link".to_owned()));
+        words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+    };
+    format!(
+        "All is clear but where the camera sits, which no data tell: on the robot, or beside it with the target on the robot?\n  on \
+         the robot:  {}\n  beside it:     {}",
+        command("eye_in_hand"),
+        command("eye_to_hand")
+    )
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_=./,:+@%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
     }
 }
 
@@ -367,6 +428,8 @@ fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
     json!({
         "verdict": verdict,
         "tried": judgement.tried,
+        "untried": judgement.untried,
+        "series_untried": judgement.sources_untried,
         "distance_mm": judgement.distance_m * 1e3,
         "clocks": recording.clocks.iter().map(|clocks| json!({
             "images": clocks.images,

@@ -22,6 +22,8 @@ use crate::{text, tr};
 
 /// Hypotheses that are listed.
 const LISTED: usize = 12;
+/// Times for reading that can be chosen, seconds; the first is what it begins with.
+const READING_S: [u32; 4] = [20, 60, 300, 1800];
 /// Height of the first images.
 const PREVIEW: f32 = 72.0;
 
@@ -215,10 +217,21 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
     if let Some(why) = &import.trouble {
         parts::notice_ui(ui, Tone::Warning, &why.say(language), |_| ());
     }
-    let Some(found) = import.found.as_deref() else { return };
+    let Some(found) = import.found.as_deref() else {
+        if import.trouble.is_some() {
+            time_ui(ui, import, language, outbox);
+        }
+        return;
+    };
     let Some(judgement) = &found.judgement else { return };
     let (tone, verdict) = match &judgement.verdict {
         Verdict::Decided => (Tone::Good, text!("One of {tried} explains the recording.", tried = judgement.tried)),
+        Verdict::Ambiguous(_) if judgement.is_open_in_mode_alone() => (
+            Tone::Warning,
+            text!(
+                "All is clear but where the camera sits, which no data tell: on the robot, or beside it? Choose it below."
+            ),
+        ),
         Verdict::Ambiguous(count) => (
             Tone::Warning,
             text!(
@@ -236,6 +249,9 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
         ),
     };
     parts::notice_ui(ui, tone, &verdict.say(language), |_| ());
+    if judgement.untried + judgement.sources_untried > 0 {
+        parts::hint_ui(ui, &understand::untried_said(judgement).say(language));
+    }
     conventions::fixed_ui(ui, import, found, language, outbox);
     ui.horizontal_top(|ui| {
         let width = ui.available_width() - places::SIDE - 12.0;
@@ -246,6 +262,19 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
         let shown = found.hypotheses().get(import.chosen.unwrap_or(0));
         if let Some(shown) = shown {
             places::places_ui(ui, found, shown, language);
+        }
+    });
+}
+
+/// How long the files may be read, where nothing came of it.
+fn time_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
+    let now = import.time.as_secs();
+    parts::row_ui(ui, tr!(language, "Time for reading"), |ui| {
+        for seconds in READING_S {
+            let said = text!("{seconds} s", seconds = seconds).say(language);
+            if ui.radio(now == u64::from(seconds), said).clicked() {
+                outbox.send(Command::SetImportTime(seconds));
+            }
         }
     });
 }

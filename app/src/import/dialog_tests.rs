@@ -74,7 +74,7 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
         warnings: vec!["image7.png is a copy of image3.png, byte by byte".into()],
         ..Recording::default()
     };
-    let judgement = Judgement { hypotheses, tried: 912, distance_m: 0.4, verdict };
+    let judgement = Judgement { hypotheses, tried: 912, untried: 0, sources_untried: 0, distance_m: 0.4, verdict };
     let recording = Arc::new(recording);
     Found {
         opened: Arc::clone(&recording),
@@ -90,6 +90,7 @@ fn driven(found: Option<Found>, chosen: Option<usize>) -> Driven {
     let mut model = sample::captured();
     model.dialog = Some(Dialog::Import);
     model.import = Some(Box::new(ImportState {
+        time: std::time::Duration::from_secs(20),
         path: PathBuf::from("/data/tuesday"),
         number: 1,
         target: String::new(),

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use handeye_core::image::RgbImage;
 use handeye_core::project::import::{Hypothesis, Judgement, Recording, Settings, Verdict};
@@ -19,6 +20,8 @@ pub struct ImportState {
     pub path: PathBuf,
     /// Of the newest request: answers to earlier ones are of no interest.
     pub number: u64,
+    /// How long its files may be read.
+    pub time: Duration,
     /// The target as it was typed; empty: as the files have it.
     pub target: String,
     /// Conventions that were fixed, by their key.

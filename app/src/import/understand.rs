@@ -89,6 +89,15 @@ pub fn clocks_said(clocks: &Clocks) -> Text {
     )
 }
 
+/// That not everything was tried, and what to do.
+pub fn untried_said(judgement: &Judgement) -> Text {
+    text!(
+        "there are more hypotheses than are tried: {untried} of them and {series} pairs of series were left out. Name the series of          the robot (poses=NAME) and of the target (target_poses=NAME), or keep one recording in the folder",
+        untried = judgement.untried,
+        series = judgement.sources_untried
+    )
+}
+
 /// Whether a setting says what to look at, and not only what it means: where it is made anew the images are looked at again.
 pub fn looks(key: &str, recording: &Recording) -> bool {
     // The offset of clocks is estimated for what a person has said of the poses.

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
+use handeye_core::budget::Limits;
 use handeye_core::project::import::Settings;
 
 use super::state::{Converted, Found, ImportState, ImportWork};
@@ -22,6 +24,7 @@ impl App {
         self.model.import = Some(Box::new(ImportState {
             path,
             number: 0,
+            time: Limits::default().time,
             target: String::new(),
             fixed: std::collections::BTreeMap::new(),
             work: None,
@@ -43,6 +46,13 @@ impl App {
     pub(crate) fn set_import_target(&mut self, typed: String) {
         if let Some(import) = self.model.import.as_deref_mut() {
             import.target = typed;
+            self.look_at_recording();
+        }
+    }
+
+    pub(crate) fn set_import_time(&mut self, seconds: u32) {
+        if let Some(import) = self.model.import.as_deref_mut() {
+            import.time = Duration::from_secs(seconds.into());
             self.look_at_recording();
         }
     }
@@ -96,8 +106,9 @@ impl App {
                 return;
             }
         };
-        let (path, known) = (import.path.clone(), import.found.clone());
-        self.ask_import(ImportWork::Looking(0, 0), ImportTask::Look { path, known, target, settings });
+        let (path, time, known) = (import.path.clone(), import.time, import.found.clone());
+        let bounds = self.bounds_of(&path);
+        self.ask_import(ImportWork::Looking(0, 0), ImportTask::Look { path, bounds, time, known, target, settings });
     }
 
     fn ask_import(&mut self, work: ImportWork, task: ImportTask) {

@@ -1,13 +1,16 @@
 //! Looks at recordings and converts them, away from the window.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
+use handeye_core::budget::{Budget, Limits, Spent};
 use handeye_core::image::RgbImage;
 use handeye_core::progress::CancelToken;
+use handeye_core::project::files::bounds::Bounds;
 use handeye_core::project::files::image_file;
-use handeye_core::project::import::{self, Recording, Settings, Source, write};
+use handeye_core::project::import::{self, ImportError, Recording, Settings, Source, write};
 use handeye_core::targets::TargetSpec;
 
 use super::state::{Converted, Found, ImportWork};
@@ -35,6 +38,10 @@ pub enum ImportTask {
     Look {
         /// The recording.
         path: PathBuf,
+        /// What its files may name.
+        bounds: Bounds,
+        /// How long its files may be read.
+        time: Duration,
         /// What was found in it before.
         known: Option<Arc<Found>>,
         /// The target; `None`: as the files have it.
@@ -74,8 +81,14 @@ pub fn perform(job: &ImportJob, cancel: &CancelToken, outlet: &Outlet) {
             let converted = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(defect(panic)));
             Event::RecordingConverted { number, converted: converted.map(Arc::new) }
         }
-        ImportTask::Look { path, known, target, settings } => {
-            let work = || look(path, known.as_deref(), *target, settings, number, cancel, outlet);
+        ImportTask::Look { path, bounds, time, known, target, settings } => {
+            let open = || {
+                let begun = Instant::now();
+                let elapsed = || begun.elapsed();
+                let limits = Limits::default().with_time(*time);
+                import::open_within(path, bounds, &Budget::new(limits, &elapsed, cancel)).map(Arc::new)
+            };
+            let work = || look(open, known.as_deref(), *target, settings, number, cancel, outlet);
             let (found, trouble) =
                 catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| (None, Some(defect(panic))));
             Event::RecordingLooked { number, found: found.map(Arc::new), trouble }
@@ -98,12 +111,20 @@ type Answer = (Option<Found>, Option<Text>);
 fn said(error: NotUnderstood) -> Text {
     match error {
         NotUnderstood::Target(why) => why,
+        NotUnderstood::Import(ImportError::Stopped { why: Spent::Time(time), .. }) => text!(
+            "Reading was stopped after {seconds} s: open the folder or file of one recording, or allow more time",
+            seconds = time.as_secs()
+        ),
+        NotUnderstood::Import(ImportError::Stopped { why: Spent::Unpacked(bytes), .. }) => text!(
+            "Reading was stopped: its compressed files unpack to more than {size} GiB. Unpack them yourself, or use              “handeye import --unpack”",
+            size = bytes >> 30
+        ),
         error => Text::verbatim(error.to_string()),
     }
 }
 
 fn look(
-    path: &Path,
+    open: impl FnOnce() -> Result<Arc<Recording>, ImportError>,
     known: Option<&Found>,
     target: Option<TargetSpec>,
     settings: &Settings,
@@ -111,8 +132,7 @@ fn look(
     cancel: &CancelToken,
     outlet: &Outlet,
 ) -> Answer {
-    let opened = match known.map(|known| Arc::clone(&known.opened)).map_or_else(|| import::open(path).map(Arc::new), Ok)
-    {
+    let opened = match known.map(|known| Arc::clone(&known.opened)).map_or_else(open, Ok) {
         Ok(opened) => opened,
         Err(error) => return (None, Some(said(error.into()))),
     };

@@ -63,7 +63,8 @@ pub fn run(args: ServeArgs, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
     let mut folders = vec![opening.sessions()];
     folders.extend(opening.session().map(std::path::Path::to_path_buf));
     folders.extend(allow);
-    let shown = InBrowser { reach: Reach::new(folders).with_drivers(opening.drivers()), recording: Arc::default() };
+    let reach = Reach::new(folders).with_uploads(upload::folder(&opening.sessions())).with_drivers(opening.drivers());
+    let shown = InBrowser { reach, recording: Arc::default() };
 
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(THREADS)

@@ -36,6 +36,11 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// Name of the folder in that of the sessions.
 const FOLDER: &str = "uploads";
 
+/// The folder of all uploads, in that of the sessions.
+pub fn folder(sessions: &Path) -> PathBuf {
+    sessions.join(FOLDER)
+}
+
 /// The uploads of this process.
 pub struct Uploads {
     folder: PathBuf,
@@ -98,7 +103,7 @@ pub enum UploadError {
 impl Uploads {
     /// Into a folder of that of the sessions.
     pub fn new(sessions: &Path) -> Self {
-        Self { folder: sessions.join(FOLDER), state: Mutex::default(), places: Semaphore::new(MOST_AT_A_TIME) }
+        Self { folder: folder(sessions), state: Mutex::default(), places: Semaphore::new(MOST_AT_A_TIME) }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

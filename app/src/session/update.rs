@@ -109,7 +109,8 @@ impl App {
     /// Goes on with a session; a data set is copied into one.
     pub(crate) fn open(&mut self, folder: PathBuf) {
         self.model.opening = true;
-        self.ask_archive(ArchiveTask::Open(folder));
+        let bounds = self.bounds_of(&folder);
+        self.ask_archive(ArchiveTask::Open { folder, bounds });
     }
 
     /// Goes on with the session in a folder, or begins one there.

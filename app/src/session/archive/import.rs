@@ -5,6 +5,7 @@ use std::path::Path;
 
 use handeye_core::project::dataset::{DESCRIPTION, Dataset};
 use handeye_core::project::files::atomic_file;
+use handeye_core::project::files::bounds::Bounds;
 use handeye_core::project::session::{Capture, Document, Role, Store};
 
 use super::{Archive, free_folder, timestamp_rfc3339};
@@ -24,15 +25,16 @@ fn said_by(error: impl std::error::Error) -> Text {
 }
 
 impl Archive {
-    pub(super) fn import(&mut self, dataset: &Path) {
+    pub(super) fn import(&mut self, dataset: &Path, bounds: &Bounds) {
         let name = dataset.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        self.import_as(dataset, &name);
+        self.import_as(dataset, &name, bounds);
     }
 
     /// The session keeps how the recording was understood.
     pub(super) fn import_converted(&mut self, converted: &Converted) {
         let described = converted.folder.path().join(DESCRIPTION);
-        let Some(store) = self.import_as(converted.folder.path(), &converted.name) else { return };
+        let bounds = Bounds::within(converted.folder.path());
+        let Some(store) = self.import_as(converted.folder.path(), &converted.name, &bounds) else { return };
         let kept = fs::read(&described).and_then(|bytes| atomic_file::write(&store.folder().join(IMPORTED), &bytes));
         if let Err(error) = kept {
             tracing::warn!(%error, "how the recording was understood was not kept");
@@ -48,8 +50,9 @@ impl Archive {
         }
     }
 
-    fn import_as(&mut self, dataset: &Path, name: &str) -> Option<&Store> {
-        let imported = self.copy(dataset, name).map_err(|why| text!("The data set was not opened: {why}", why = why));
+    fn import_as(&mut self, dataset: &Path, name: &str, bounds: &Bounds) -> Option<&Store> {
+        let imported =
+            self.copy(dataset, name, bounds).map_err(|why| text!("The data set was not opened: {why}", why = why));
         match imported {
             Ok((store, outside)) => {
                 let folder = store.folder().display().to_string();
@@ -75,8 +78,8 @@ impl Archive {
     }
 
     /// The session, and how many files of the data set lie outside of its folder.
-    fn copy(&self, folder: &Path, name: &str) -> Result<(Store, usize), Text> {
-        let dataset = Dataset::read(folder).map_err(said_by)?;
+    fn copy(&self, folder: &Path, name: &str, bounds: &Bounds) -> Result<(Store, usize), Text> {
+        let dataset = Dataset::read_within(folder, bounds).map_err(said_by)?;
         let target_folder = free_folder(&self.sessions, name);
         let mut meta = start::meta(None, timestamp_rfc3339());
         meta.target = dataset.target;
@@ -150,7 +153,7 @@ mod tests {
         }
         let (events, reported) = crossbeam_channel::unbounded();
         let outlet = Outlet { events, waker: Arc::new(|| {}), clock: Arc::new(|| 0.0) };
-        Archive::new(sessions.clone(), outlet).import(&dataset);
+        Archive::new(sessions.clone(), outlet).import(&dataset, &Bounds::ANYWHERE);
         let Ok(Event::SessionFailed { why }) = reported.try_recv() else { panic!("it was opened") };
         assert_eq!(
             why.say(Language::English),
@@ -160,5 +163,46 @@ mod tests {
         let chinese = why.say(Language::Chinese);
         assert!(chinese.contains("第 1 行（1.png）没有图像") && !chinese.contains("has no"), "{chinese}");
         assert!(!sessions.exists(), "nothing was begun");
+    }
+
+    /// Whoever uploads a data set from a browser chooses what its tables say.
+    #[test]
+    fn an_upload_that_names_an_image_outside_of_it_is_refused_by_every_way_and_nothing_is_copied() {
+        let home = tempfile::tempdir().expect("a folder");
+        let (upload, sessions) = (home.path().join("uploads/1"), home.path().join("sessions"));
+        let private = home.path().join("private.png");
+        fs::create_dir_all(&upload).expect("made");
+        handeye_core::image::RgbImage::new(64, 48).save(&private).expect("saved");
+        std::os::unix::fs::symlink(&private, upload.join("linked.png")).expect("linked");
+        let described = "mode = \"eye_in_hand\"\n\
+            [target]\nkind = \"chessboard\"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\n\
+            [robot]\nposes = \"POSES\"\nlength_unit = \"m\"\nrotation = \"quaternion_xyzw\"\npose = \"base_from_tip\"\n";
+        let header = "image,x,y,z,qx,qy,qz,qw\n";
+        fs::write(home.path().join("secret.csv"), "root:secret\n").expect("written");
+        let (events, reported) = crossbeam_channel::unbounded();
+        let outlet = Outlet { events, waker: Arc::new(|| {}), clock: Arc::new(|| 0.0) };
+        let mut archive = Archive::new(sessions.clone(), outlet);
+        let absolute = private.display().to_string();
+        for (poses, image) in [
+            ("poses.csv", "../../private.png"),
+            ("poses.csv", "linked.png"),
+            ("poses.csv", absolute.as_str()),
+            ("poses.csv", "../../not-there.png"),
+            ("../../secret.csv", "own.png"),
+        ] {
+            fs::write(upload.join("dataset.toml"), described.replace("POSES", poses)).expect("written");
+            fs::write(upload.join("poses.csv"), format!("{header}{image},0.4,0,0.3,0,0,0,1\n")).expect("written");
+            archive.open(&upload, &Bounds::within(&upload));
+            let Ok(Event::SessionFailed { why }) = reported.try_recv() else { panic!("{image} was opened") };
+            let why = why.say(Language::English);
+            assert!(why.contains("outside of the folder") || why.contains("not a path relative"), "{image}: {why}");
+            assert!(!why.contains("secret:") && !why.contains("root"), "{why}");
+            assert!(!sessions.exists(), "nothing was begun");
+        }
+        // Somebody at this machine may.
+        fs::write(upload.join("dataset.toml"), described.replace("POSES", "poses.csv")).expect("written");
+        fs::write(upload.join("poses.csv"), format!("{header}../../private.png,0.4,0,0.3,0,0,0,1\n")).expect("written");
+        archive.open(&upload, &Bounds::ANYWHERE);
+        assert!(sessions.exists());
     }
 }

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use crossbeam_channel::{Receiver, select};
 use handeye_core::plan::guided::record::{GUIDED_RECORD, GuidedRecord};
+use handeye_core::project::files::bounds::Bounds;
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::{Document, Edit, SessionError, SessionMeta, Store};
 use handeye_core::project::taught_poses::TaughtPose;
@@ -46,7 +47,12 @@ pub enum ArchiveTask {
         beginning: Box<Beginning>,
     },
     /// Go on with a session, or begin one with the images and poses of a data set.
-    Open(PathBuf),
+    Open {
+        /// Which.
+        folder: PathBuf,
+        /// What its files may name.
+        bounds: Bounds,
+    },
     /// Begin a session with a recording that was made a data set.
     Import(Arc<Converted>),
     /// Go on with the session in a folder, or begin one there when there is none.
@@ -126,13 +132,14 @@ impl Archive {
                 }
             }
             ArchiveTask::New { folder, beginning } => self.begin(folder, *beginning),
-            ArchiveTask::Open(folder) => self.open(&folder),
+            ArchiveTask::Open { folder, bounds } => self.open(&folder, &bounds),
             ArchiveTask::Import(converted) => self.import_converted(&converted),
             ArchiveTask::OpenOrNew { folder, beginning } => {
                 if kind_of(&folder) == FolderKind::Plain {
                     self.begin(Some(folder), *beginning);
                 } else {
-                    self.open(&folder);
+                    // It was named where this program was started.
+                    self.open(&folder, &Bounds::ANYWHERE);
                 }
             }
             ArchiveTask::SaveAs(folder) => self.save_as(&folder),
@@ -144,9 +151,9 @@ impl Archive {
         }
     }
 
-    fn open(&mut self, folder: &Path) {
+    fn open(&mut self, folder: &Path, bounds: &Bounds) {
         match kind_of(folder) {
-            FolderKind::Dataset => return self.import(folder),
+            FolderKind::Dataset => return self.import(folder, bounds),
             FolderKind::Images | FolderKind::Plain if folder.exists() => {
                 return self.outlet.report(Event::NoSession(folder.to_path_buf()));
             }
@@ -155,6 +162,10 @@ impl Archive {
         if self.store.as_ref().is_some_and(|store| store.folder() == folder) {
             self.outlet.report(Event::SessionOpened { exported: exported::is_exported(folder) });
             return;
+        }
+        if let Err(error) = bounds.check_links(folder) {
+            let why = text!("The session was not opened: {error}", error = error);
+            return self.outlet.report(Event::SessionFailed { why });
         }
         let opened = Store::open(folder);
         self.take(opened, |error| text!("The session was not opened: {error}", error = error));

@@ -220,6 +220,11 @@ pub enum DatasetProblem {
         "{0:?} is not inside of the session: a session is complete in its folder, so another program has changed this file"
     )]
     OutsideSession(String),
+    /// A browser has opened the data set, and it names a file that is not in what can be reached from there.
+    #[error(
+        "{0:?} lies outside of the folder that may be read from a browser: put it into the data set, or open it at this machine"
+    )]
+    OutOfReach(String),
     /// The table names an image that is not there.
     #[error("image {0:?} does not exist: names are relative to this file")]
     MissingImage(String),

@@ -47,6 +47,7 @@ use crate::estimate::handeye::Mode;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::natural_order;
+use crate::project::files::bounds::Bounds;
 use crate::project::files::digest::Listing;
 use crate::project::files::image_file::{self, ImageFileError};
 pub use crate::project::files::own_folder::DESCRIPTION;
@@ -100,24 +101,32 @@ pub struct CameraInput {
 }
 
 impl Dataset {
-    /// Reads and checks a dataset folder. Images are only looked at for their size, so that thousands are no burden.
+    /// Reads and checks a dataset folder that somebody at this machine has named. Images are only looked at for their size, so
+    /// that thousands are no burden.
     ///
     /// # Errors
     /// [`DatasetError`] on the first defect, with file and row.
     pub fn read(folder: &Path) -> Result<Self, DatasetError> {
+        Self::read_within(folder, &Bounds::ANYWHERE)
+    }
+
+    /// As [`Self::read`], where the files of the data set may name only what is in `bounds`.
+    ///
+    /// # Errors
+    /// As [`Self::read`]; [`DatasetProblem::OutOfReach`] before anything outside is opened.
+    pub fn read_within(folder: &Path, bounds: &Bounds) -> Result<Self, DatasetError> {
         check_folder(folder)?;
+        let mut outside = Outside::of(folder, bounds);
+        outside.look_at(&folder.join(DESCRIPTION), None, DESCRIPTION, Path::new(DESCRIPTION))?;
         let description = TextFile::read(folder, Path::new(DESCRIPTION))?;
         let config = Config::parse(&description.path, &description.text)?;
-        let table =
-            |name: &Option<String>| name.as_ref().map(|name| read_table(folder, name, &description.path)).transpose();
+        let mut table = |name: &Option<String>| {
+            name.as_ref().map(|name| read_table(folder, name, &description.path, &mut outside)).transpose()
+        };
         let poses_file = table(&config.robot.as_ref().map(|r| r.poses.clone()))?;
         let corners_file = table(&config.corners)?;
         let target_poses_file = table(&config.target_poses)?;
 
-        let mut outside = Outside::of(folder);
-        for file in [&poses_file, &corners_file, &target_poses_file].into_iter().flatten() {
-            outside.look_at(&description.path, None, &file.name.to_string_lossy(), &file.name)?;
-        }
         let views = views(folder, &config, poses_file.as_ref())?;
         let mut corners = corners_file.as_ref().map(|file| corners::read_corners(file, &config.target)).transpose()?;
         let mut entries = EntryList { folder, poses_file: poses_file.as_ref(), views };
@@ -173,7 +182,7 @@ impl Dataset {
             entries: out,
             image_size,
             arm,
-            outside: outside.said(poses_file.as_ref(), folder),
+            outside: outside.said(poses_file.as_ref()),
             pose_table: poses_file.map(|f| f.path),
             sources,
         })
@@ -309,12 +318,18 @@ fn check_folder(folder: &Path) -> Result<(), DatasetError> {
     }
 }
 
-fn read_table(folder: &Path, name: &str, description: &Path) -> Result<TextFile, DatasetError> {
+fn read_table(
+    folder: &Path,
+    name: &str,
+    description: &Path,
+    outside: &mut Outside<'_>,
+) -> Result<TextFile, DatasetError> {
     let path = text::resolve(Path::new(""), name).ok_or_else(|| {
         let value = format!("{:?}", error::shown(name));
         let problem = DatasetProblem::BadValue { key: "the name of a table", value, want: "a path in this folder" };
         DatasetError::new(description, None, problem)
     })?;
+    outside.look_at(description, None, &path.to_string_lossy(), &path)?;
     TextFile::read(folder, &path)
 }
 

@@ -1,6 +1,6 @@
 //! Poses out of joint values, where a recording has no others and the chain of the arm is known.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::conventions::{Direction, LengthUnit, angles_for};
 use super::error::ImportError;
@@ -8,6 +8,7 @@ use super::formats::tree;
 use super::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Stated, Track};
 use crate::geometry::arm::urdf::Urdf;
 use crate::geometry::arm::{Arm, ArmKind, JointKind};
+use crate::project::files::bounds::Bounds;
 
 /// What ROS calls the joints of Universal Robots, from the base to the tip. Its messages have them in the order of letters.
 const ROS_NAMES_OF_UR: [&str; 6] =
@@ -23,7 +24,7 @@ const ROS_NAMES_OF_UR: [&str; 6] =
 /// [`ImportError::Arm`].
 pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportError> {
     let fail = |why: String| ImportError::Arm { arm: arm.to_owned(), why };
-    let chain = Chain::of(arm, &recording.root).map_err(fail)?;
+    let chain = Chain::of(arm, &recording.root, &recording.bounds).map_err(fail)?;
     let is_of_arm = |series: &JointSeries| chain.row_of(series).is_some();
     // Joint values by name say what they are; numbers without names are looked at where there are no others.
     let (named, rows): (Vec<_>, Vec<_>) =
@@ -68,7 +69,7 @@ struct Chain {
 }
 
 impl Chain {
-    fn of(text: &str, root: &Path) -> Result<Self, String> {
+    fn of(text: &str, root: &Path, bounds: &Bounds) -> Result<Self, String> {
         let own = |arm: &Arm| -> Vec<String> { arm.joints().iter().map(|joint| joint.name.clone()).collect() };
         if let Some(kind) = ArmKind::ALL.into_iter().find(|kind| kind.name() == text) {
             let arm = kind.arm();
@@ -85,7 +86,9 @@ impl Chain {
                 _ => return Err(format!("{part:?} is neither base=LINK nor tip=LINK")),
             }
         }
-        let path = [Path::new(file).to_path_buf(), root.join(file)].into_iter().find(|path| path.is_file());
+        // Where files may not be named, it is said of all of them that there are none.
+        let may_be = |path: &PathBuf| bounds.has(path) && path.is_file();
+        let path = [Path::new(file).to_path_buf(), root.join(file)].into_iter().find(may_be);
         let Some(path) = path else {
             let built_in: Vec<&str> = ArmKind::ALL.into_iter().map(ArmKind::name).collect();
             return Err(format!("there is no such URDF file, and built in are {}", built_in.join(", ")));

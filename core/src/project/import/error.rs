@@ -1,7 +1,8 @@
 //! Why a recording cannot be imported.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use crate::budget::Spent;
 use crate::estimate::clock_offset::ClockOffsetError;
 
 /// Why a recording cannot be read or a data set not be written. One line each: what, where, and what to do.
@@ -25,6 +26,14 @@ pub enum ImportError {
         what: &'static str,
         /// What is read.
         limit: u64,
+    },
+    /// It takes more time, or unpacks to more, than a person has allowed.
+    #[error("{}: {why}{}", file.display(), allowing(*why))]
+    Stopped {
+        /// The folder or file.
+        file: PathBuf,
+        /// Why it was stopped.
+        why: Spent,
     },
     /// It is a data set or a session already.
     #[error("{} is a data set or a session already: solve it with `handeye calibrate`", .0.display())]
@@ -96,4 +105,19 @@ pub enum ImportError {
         /// What the system says.
         why: String,
     },
+}
+
+impl ImportError {
+    pub(super) fn stopped(file: &Path, why: Spent) -> Self {
+        Self::Stopped { file: file.to_path_buf(), why }
+    }
+}
+
+/// What to do about it.
+fn allowing(why: Spent) -> &'static str {
+    match why {
+        Spent::Cancelled => "",
+        Spent::Time(_) => ": name the folder or file of one recording, or allow more time with --time SECONDS",
+        Spent::Unpacked(_) => ": unpack them yourself, or allow more with --unpack GIB",
+    }
 }

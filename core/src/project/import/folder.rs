@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use super::error::ImportError;
 pub(super) use super::naming::{groups, naming, shown};
 use super::recording::{ImageFile, Stream};
+use crate::budget::Budget;
 use crate::natural_order;
+use crate::project::files::bounds::Bounds;
 use crate::project::files::image_file::{self, one_line};
 use crate::project::files::own_folder::DESCRIPTION;
 
@@ -28,7 +30,14 @@ const IMAGES: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
 
 /// The files of a folder and of those in it, in natural order, as paths below it. Hidden ones are none. Of a file that was
 /// named, which comes last, it and what lies beside it.
-pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>, Option<PathBuf>), ImportError> {
+///
+/// Links that lead out of the bounds are not among them; they are said in `warnings`.
+pub(super) fn list(
+    path: &Path,
+    bounds: &Bounds,
+    budget: &Budget<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<(PathBuf, Vec<PathBuf>, Option<PathBuf>), ImportError> {
     let found = fs::metadata(path).map_err(|e| unreadable(path, &e))?;
     let (root, only) = if found.is_dir() {
         (path.to_path_buf(), None)
@@ -37,7 +46,15 @@ pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>, Option<PathBuf
         (root.to_path_buf(), path.file_name().map(PathBuf::from))
     };
     let mut files = Vec::new();
-    walk(&root, Path::new(""), if only.is_some() { 0 } else { MAX_DEPTH }, &mut files)?;
+    walk(&root, Path::new(""), if only.is_some() { 0 } else { MAX_DEPTH }, budget, &mut files)?;
+    files.retain(|file| {
+        let is_inside = bounds.has(&root.join(file));
+        if !is_inside {
+            warnings
+                .push(format!("{} leads out of the folder that may be read from here and is not read", file.display()));
+        }
+        is_inside
+    });
     if let Some(only) = &only {
         // Beside a file that was named only what it may refer to counts: images, the description of a camera.
         files.retain(|file| {
@@ -49,10 +66,17 @@ pub(super) fn list(path: &Path) -> Result<(PathBuf, Vec<PathBuf>, Option<PathBuf
     Ok((root, files, only))
 }
 
-fn walk(root: &Path, below: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), ImportError> {
+fn walk(
+    root: &Path,
+    below: &Path,
+    depth: usize,
+    budget: &Budget<'_>,
+    files: &mut Vec<PathBuf>,
+) -> Result<(), ImportError> {
     let here = root.join(below);
     for entry in fs::read_dir(&here).map_err(|e| unreadable(&here, &e))? {
         let entry = entry.map_err(|e| unreadable(&here, &e))?;
+        budget.check().map_err(|why| ImportError::stopped(root, why))?;
         let name = entry.file_name();
         if name.to_string_lossy().starts_with('.') {
             continue;
@@ -65,7 +89,7 @@ fn walk(root: &Path, below: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Re
             if root.join(&path).join(DESCRIPTION).exists() {
                 continue;
             }
-            walk(root, &path, depth - 1, files)?;
+            walk(root, &path, depth - 1, budget, files)?;
         } else if fs::metadata(root.join(&path)).is_ok_and(|m| m.is_file()) {
             files.push(path);
         }
@@ -123,14 +147,14 @@ pub(super) fn text(path: &Path) -> Result<String, ImportError> {
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
-/// The streams of images in a list of files, the largest first, and what is odd about them.
-pub(super) fn streams(root: &Path, files: &[PathBuf], warnings: &mut Vec<String>) -> Vec<Stream> {
+/// The streams of images in a list of files, the largest first, and what is odd about them; of a part where the budget is spent.
+pub(super) fn streams(root: &Path, files: &[PathBuf], budget: &Budget<'_>, warnings: &mut Vec<String>) -> Vec<Stream> {
     let images: Vec<PathBuf> = files.iter().filter(|file| is_image(file)).cloned().collect();
     let mut streams = Vec::new();
     let mut single: BTreeMap<PathBuf, Vec<(PathBuf, Option<u64>)>> = BTreeMap::new();
     for members in merged(&images) {
         if members.len() >= LEAST_IMAGES {
-            take(root, members, &mut streams, warnings);
+            take(root, members, budget, &mut streams, warnings);
         } else {
             for member in members {
                 let folder = member.0.parent().map(Path::to_path_buf).unwrap_or_default();
@@ -150,7 +174,8 @@ pub(super) fn streams(root: &Path, files: &[PathBuf], warnings: &mut Vec<String>
                 names.join(", ")
             ));
         } else {
-            take(root, members.into_iter().map(|(path, _)| (path, None)).collect(), &mut streams, warnings);
+            let members = members.into_iter().map(|(path, _)| (path, None)).collect();
+            take(root, members, budget, &mut streams, warnings);
         }
     }
     streams.sort_by(|a, b| a.is_depth.cmp(&b.is_depth).then(b.images.len().cmp(&a.images.len())));
@@ -177,9 +202,18 @@ fn merged(images: &[PathBuf]) -> Vec<Vec<(PathBuf, Option<u64>)>> {
 }
 
 /// Streams of one size out of images of one naming.
-fn take(root: &Path, members: Vec<(PathBuf, Option<u64>)>, streams: &mut Vec<Stream>, warnings: &mut Vec<String>) {
+fn take(
+    root: &Path,
+    members: Vec<(PathBuf, Option<u64>)>,
+    budget: &Budget<'_>,
+    streams: &mut Vec<Stream>,
+    warnings: &mut Vec<String>,
+) {
     let mut by_size: BTreeMap<((u32, u32), bool), Vec<ImageFile>> = BTreeMap::new();
     for (path, number) in members {
+        if budget.is_spent() {
+            return;
+        }
         match image_file::image_size(&root.join(&path)) {
             Ok(size) => {
                 let is_depth = is_sixteen_bits_of_grey(&root.join(&path));
@@ -200,7 +234,7 @@ fn take(root: &Path, members: Vec<(PathBuf, Option<u64>)>, streams: &mut Vec<Str
             warnings.push(format!("{} has another size ({}×{}) than the others", images[0].shown(), size.0, size.1));
             continue;
         }
-        find_doubled(root, &mut images, warnings);
+        find_doubled(root, &mut images, budget, warnings);
         let mut name = shown(images.iter().map(|image| image.path.as_path()));
         if sizes > 1 {
             name = format!("{name} ({}×{})", size.0, size.1);
@@ -220,7 +254,7 @@ fn is_sixteen_bits_of_grey(path: &Path) -> bool {
         .is_ok_and(|decoder| decoder.color_type() == image::ColorType::L16)
 }
 
-fn find_doubled(root: &Path, images: &mut [ImageFile], warnings: &mut Vec<String>) {
+fn find_doubled(root: &Path, images: &mut [ImageFile], budget: &Budget<'_>, warnings: &mut Vec<String>) {
     use sha2::Digest as _;
     let mut by_length: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
     for (i, image) in images.iter().enumerate() {
@@ -230,6 +264,9 @@ fn find_doubled(root: &Path, images: &mut [ImageFile], warnings: &mut Vec<String
     for same in by_length.into_values().filter(|same| same.len() > 1) {
         let mut seen: BTreeMap<Vec<u8>, usize> = BTreeMap::new();
         for i in same {
+            if budget.is_spent() {
+                return;
+            }
             let Ok(bytes) = fs::read(root.join(&images[i].path)) else { continue };
             match seen.entry(sha2::Sha256::digest(&bytes).to_vec()) {
                 std::collections::btree_map::Entry::Vacant(new) => {

@@ -3,6 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::conventions::{Direction, Reading};
+use super::formats::tree::LEAST_POSES;
 use super::judge::{EXPLAINED, EXPLAINED_RAD};
 use super::pairing::Pairing;
 use super::recording::{Recording, Sample};
@@ -138,7 +139,8 @@ impl Hypothesis {
 
     /// Whether most views agree with it, well enough for their distance from the camera, and none says that it is wrong.
     pub fn explains(&self) -> bool {
-        let is_near = |fit: &Fit| fit.relative < EXPLAINED && fit.median_rad < EXPLAINED_RAD;
+        let is_near =
+            |fit: &Fit| fit.views >= LEAST_POSES && fit.relative < EXPLAINED && fit.median_rad < EXPLAINED_RAD;
         self.contradictions.is_empty() && self.fit.as_ref().is_some_and(is_near)
     }
 }

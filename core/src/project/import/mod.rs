@@ -44,7 +44,7 @@ pub use error::ImportError;
 pub use hypothesis::{Convention, Fit, Hypothesis, Source};
 pub use judge::{Judgement, NEED, Sights, TIMES, Verdict, judge};
 pub use pairing::Pairing;
-pub use recognise::open;
+pub use recognise::{open, open_within};
 pub use recording::{
     Clocks, FoundCamera, FoundTarget, ImageFile, JointSample, JointSeries, Known, Motion, Numbers, Recording, Role,
     Sample, Stated, Stream, Track,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::folder;
 use super::formats::{blocks, npz, table, tree};
 use super::value::{self, Value};
+use crate::budget::Budget;
 
 /// Files of text that are told of.
 const MOST_TOLD: usize = 5;
@@ -14,11 +15,11 @@ const MOST_LOOKED_AT: usize = 200;
 const LARGEST: u64 = 1 << 20;
 
 /// Why nothing came of each of the files that are likeliest to have poses, and what to do with those that are not read.
-pub(super) fn reasons(root: &Path, files: &[PathBuf]) -> Vec<String> {
+pub(super) fn reasons(root: &Path, files: &[PathBuf], budget: &Budget<'_>) -> Vec<String> {
     let mut told: Vec<(Likely, String)> = Vec::new();
     for members in folder::groups(files, true).iter().take(MOST_LOOKED_AT) {
-        let Some((first, _)) = members.first() else { continue };
-        let Some((likely, why)) = reason(&root.join(first)) else { continue };
+        let Some((first, _)) = members.first().filter(|_| !budget.is_spent()) else { continue };
+        let Some((likely, why)) = reason(&root.join(first), budget) else { continue };
         let shown = folder::shown(members.iter().map(|(file, _)| file.as_path()));
         let name = if members.len() == 1 { first.display().to_string() } else { shown };
         told.push((likely, format!("{name} has {why}")));
@@ -51,7 +52,7 @@ fn not_read(file: &Path) -> Option<&'static str> {
 }
 
 /// What a file has in place of a series; `None` of one that is no text and no array.
-fn reason(file: &Path) -> Option<(Likely, String)> {
+fn reason(file: &Path, budget: &Budget<'_>) -> Option<(Likely, String)> {
     let is_small = std::fs::metadata(file).is_ok_and(|found| found.len() <= LARGEST);
     let text = || folder::text(file).ok().filter(|_| is_small);
     let of_document = |value: Result<Value, String>| match value {
@@ -67,7 +68,7 @@ fn reason(file: &Path) -> Option<(Likely, String)> {
         "csv" | "txt" | "tsv" | "dat" | "log" => of_text(&text()?),
         // Programs and licences have no ending either.
         "" => Some(of_text(&text()?)).filter(|(likely, _)| *likely != Likely::Neither)?,
-        "npz" | "npy" if is_small => document(&npz::document(&folder::bytes(file).ok()?)?),
+        "npz" | "npy" if is_small => document(&npz::document(&folder::bytes(file).ok()?, budget)?),
         _ => return None,
     })
 }

@@ -1,6 +1,7 @@
 //! What lies in a folder: which format each file is of, and why it is taken for that.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use super::error::ImportError;
 use super::folder;
@@ -8,20 +9,35 @@ use super::formats::moveit;
 use super::nothing;
 use super::reader::Reader;
 use super::recording::{FoundTarget, Recording};
+use crate::budget::{Budget, Limits};
+use crate::progress::CancelToken;
+use crate::project::files::bounds::Bounds;
 use crate::project::files::own_folder::{DESCRIPTION, is_session};
 
-/// Looks at a folder, or at a file and what lies beside it.
+/// Looks at a folder, or at a file and what lies beside it, without a limit of time.
 ///
 /// # Errors
 /// [`ImportError`] where the folder cannot be listed, or is a data set already. A file that cannot be understood is named in
 /// [`Recording::warnings`].
 pub fn open(path: &Path) -> Result<Recording, ImportError> {
+    let cancel = CancelToken::default();
+    open_within(path, &Bounds::ANYWHERE, &Budget::new(Limits::default(), &|| Duration::ZERO, &cancel))
+}
+
+/// As [`open`], where files may name only what is in `bounds`, and reading is stopped where the budget is spent.
+///
+/// # Errors
+/// As [`open`], and [`ImportError::Stopped`].
+pub fn open_within(path: &Path, bounds: &Bounds, budget: &Budget<'_>) -> Result<Recording, ImportError> {
+    let stopped = |why| ImportError::stopped(path, why);
     if path.join(DESCRIPTION).exists() || is_session(path) {
         return Err(ImportError::AlreadyADataset(path.to_path_buf()));
     }
-    let (root, files, named) = folder::list(path)?;
-    let mut recording = Recording { root: root.clone(), ..Recording::default() };
-    recording.streams = folder::streams(&root, &files, &mut recording.warnings);
+    let mut recording = Recording { bounds: bounds.clone(), ..Recording::default() };
+    let (root, files, named) = folder::list(path, bounds, budget, &mut recording.warnings)?;
+    recording.root.clone_from(&root);
+    recording.streams = folder::streams(&root, &files, budget, &mut recording.warnings);
+    budget.check().map_err(stopped)?;
     for stream in &recording.streams {
         let depth = if stream.is_depth { ", 16 bits in one channel: depth" } else { "" };
         let (first, last) = (stream.images.first(), stream.images.last());
@@ -33,7 +49,7 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
             stream.name
         ));
     }
-    let mut reader = Reader::new(&root, recording);
+    let mut reader = Reader::new(&root, recording, budget);
     let (bags, others): (Vec<PathBuf>, Vec<PathBuf>) =
         files.iter().filter(|file| !folder::is_image(file)).cloned().partition(|file| folder::is_bag(file));
     let (own, beside): (Vec<PathBuf>, Vec<PathBuf>) =
@@ -43,12 +59,14 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
     }
     reader.companions(&beside);
     reader.bags(&bags);
+    budget.check().map_err(stopped)?;
     let mut recording = reader.recording;
     if moveit::know(&mut recording.tracks) {
         recording.beliefs.push("the poses are samples of MoveIt calibration, by their names".into());
     }
     if recording.tracks.is_empty() && recording.joints.is_empty() && recording.motions.is_empty() {
-        recording.nothing = nothing::reasons(&root, &files);
+        recording.nothing = nothing::reasons(&root, &files, budget);
+        budget.check().map_err(stopped)?;
     }
     for track in &recording.tracks {
         let joints = track.samples.iter().filter(|s| !s.joints.is_empty()).count();

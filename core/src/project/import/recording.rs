@@ -10,6 +10,7 @@ use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use crate::estimate::clock_offset::ClockOffset;
 use crate::estimate::handeye::Mode;
 use crate::geometry::camera::Intrinsics;
+use crate::project::files::bounds::Bounds;
 use crate::targets::TargetSpec;
 
 /// A recording as it was found. Nothing of it is interpreted yet: numbers stand as they were written.
@@ -17,6 +18,8 @@ use crate::targets::TargetSpec;
 pub struct Recording {
     /// The folder.
     pub root: PathBuf,
+    /// What its files may name, and whoever chooses what they mean.
+    pub bounds: Bounds,
     /// What is there and why it is taken for that, one sentence each.
     pub beliefs: Vec<String>,
     /// Streams of images: of one naming and one size in one folder, in natural order.

@@ -1,6 +1,11 @@
 //! JSON and YAML as one tree, within bounds: files come from strangers.
 
+use std::cell::Cell;
+use std::fmt;
+
 use saphyr_parser::{Event, Parser, ScalarStyle};
+use serde::Deserialize;
+use serde::de::{self, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
 /// Deepest nesting that is read; recordings have four or five levels.
 const MAX_DEPTH: usize = 32;
@@ -101,9 +106,10 @@ fn collect(value: &Value, most: usize, numbers: &mut Vec<f64>) -> Option<()> {
 pub(super) fn json(text: &str) -> Result<Value, String> {
     let mut left = MAX_VALUES;
     let mut values = Vec::new();
-    // serde_json refuses more than 128 levels by itself.
-    for value in serde_json::Deserializer::from_str(text).into_iter::<serde_json::Value>() {
-        values.push(of_json(value.map_err(|e| e.to_string())?, 0, &mut left)?);
+    for record in serde_json::Deserializer::from_str(text).into_iter::<Record>() {
+        let Record { value, count } = record.map_err(|e| e.to_string())?;
+        left = left.checked_sub(count).ok_or_else(too_many)?;
+        values.push(value);
     }
     match values.len() {
         0 => Err("is empty".into()),
@@ -112,9 +118,26 @@ pub(super) fn json(text: &str) -> Result<Value, String> {
     }
 }
 
+/// A document of XML, within bounds: its parser compares every attribute of an element with all others of it, and keeps the names
+/// of spaces for every element anew.
+pub(super) fn xml(text: &str) -> Result<roxmltree::Document<'_>, String> {
+    const MOST_ATTRIBUTES: usize = 256;
+    const MOST_SPACES: usize = 64;
+    // A tag ends at the next one at the latest; signs of equality in a text are counted with the tag before it.
+    let attributes = |tag: &str| tag.split('>').next().map_or(0, |inside| inside.matches('=').count());
+    if text.split('<').any(|tag| attributes(tag) > MOST_ATTRIBUTES) {
+        return Err(format!("has an element with more than {MOST_ATTRIBUTES} attributes"));
+    }
+    if text.match_indices("xmlns").nth(MOST_SPACES).is_some() {
+        return Err(format!("names more than {MOST_SPACES} spaces of names"));
+    }
+    let options = roxmltree::ParsingOptions { nodes_limit: MAX_VALUES as u32, ..roxmltree::ParsingOptions::default() };
+    roxmltree::Document::parse_with_options(text, options).map_err(|e| e.to_string())
+}
+
 /// The values of OpenCV's storage in XML; `None` where it is none.
 pub(super) fn opencv_xml(text: &str) -> Option<Value> {
-    let document = roxmltree::Document::parse(text).ok()?;
+    let document = xml(text).ok()?;
     let root = document.root_element();
     let mut left = MAX_VALUES;
     root.has_tag_name("opencv_storage").then(|| of_xml(root, 0, &mut left)).flatten()
@@ -144,27 +167,92 @@ fn of_xml(node: roxmltree::Node<'_, '_>, depth: usize, left: &mut usize) -> Opti
     Some(if is_list { Value::List(entries.into_iter().map(|(_, value)| value).collect()) } else { Value::Map(entries) })
 }
 
-fn of_json(value: serde_json::Value, depth: usize, left: &mut usize) -> Result<Value, String> {
-    use serde_json::Value as J;
-    *left = left.checked_sub(1).ok_or_else(too_many)?;
-    if depth > MAX_DEPTH {
-        return Err(too_deep());
+/// A value of JSON with how many there are in it. What is too much is found while it is read, so that it takes no memory.
+struct Record {
+    value: Value,
+    count: usize,
+}
+
+impl<'de> Deserialize<'de> for Record {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let left = Cell::new(MAX_VALUES);
+        let value = Json { depth: 0, left: &left }.deserialize(deserializer)?;
+        Ok(Self { value, count: MAX_VALUES - left.get() })
     }
-    Ok(match value {
-        J::Null => Value::Other,
-        J::Bool(flag) => Value::Flag(flag),
-        J::Number(number) => Value::Number(number.as_f64().unwrap_or(f64::NAN)),
-        J::String(text) => Value::Text(text),
-        J::Array(items) => {
-            Value::List(items.into_iter().map(|item| of_json(item, depth + 1, left)).collect::<Result<_, _>>()?)
+}
+
+/// Reads a value of JSON at some depth, of so many that are left.
+#[derive(Clone, Copy)]
+struct Json<'a> {
+    depth: usize,
+    left: &'a Cell<usize>,
+}
+
+impl Json<'_> {
+    fn inner<E: de::Error>(self) -> Result<Self, E> {
+        let depth = self.depth + 1;
+        if depth > MAX_DEPTH { Err(E::custom(too_deep())) } else { Ok(Self { depth, ..self }) }
+    }
+}
+
+impl<'de> DeserializeSeed<'de> for Json<'_> {
+    type Value = Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
+        let left = self.left.get().checked_sub(1).ok_or_else(|| de::Error::custom(too_many()))?;
+        self.left.set(left);
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Json<'_> {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Other)
+    }
+
+    fn visit_bool<E>(self, flag: bool) -> Result<Value, E> {
+        Ok(Value::Flag(flag))
+    }
+
+    fn visit_i64<E>(self, number: i64) -> Result<Value, E> {
+        Ok(Value::Number(number as f64))
+    }
+
+    fn visit_u64<E>(self, number: u64) -> Result<Value, E> {
+        Ok(Value::Number(number as f64))
+    }
+
+    fn visit_f64<E>(self, number: f64) -> Result<Value, E> {
+        Ok(Value::Number(number))
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+        Ok(Value::Text(text.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let inner = self.inner()?;
+        let mut items = Vec::new();
+        while let Some(item) = access.next_element_seed(inner)? {
+            items.push(item);
         }
-        J::Object(entries) => Value::Map(
-            entries
-                .into_iter()
-                .map(|(key, value)| Ok((key, of_json(value, depth + 1, left)?)))
-                .collect::<Result<_, String>>()?,
-        ),
-    })
+        Ok(Value::List(items))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let inner = self.inner()?;
+        let mut entries = Vec::new();
+        while let Some(key) = access.next_key::<String>()? {
+            entries.push((key, access.next_value_seed(inner)?));
+        }
+        Ok(Value::Map(entries))
+    }
 }
 
 fn too_many() -> String {
@@ -302,6 +390,19 @@ mod tests {
         let laughs = "a: &a [1, 1]\nb: &b [*a, *a]\nc: [*b, *b]\n";
         let documents = yaml(laughs).expect("read");
         assert_eq!(documents[0].get("c"), Some(&Value::List(vec![Value::Other, Value::Other])));
+    }
+
+    /// Were any of these read in time that grows with the square of its length, this test would take hours.
+    #[test]
+    fn what_is_written_to_take_for_ever_is_refused_at_once() {
+        let attributes: String = (0..1_000_000).map(|i| format!(" a{i}=\"\"")).collect();
+        assert!(xml(&format!("<opencv_storage{attributes}/>")).is_err_and(|why| why.contains("attributes")));
+        let spaces: String = (0..100_000).map(|i| format!("<a xmlns:n{i}=\"u{i}\">")).collect();
+        assert!(xml(&spaces).is_err_and(|why| why.contains("spaces of names")));
+        assert!(xml(&format!("<a>{}</a>", "<b/>".repeat(2 * MAX_VALUES))).is_err());
+        for text in [format!("[{}1]", "1,".repeat(2 * MAX_VALUES)), "1 ".repeat(2 * MAX_VALUES)] {
+            assert!(json(&text).is_err_and(|why| why.contains("more than")), "{}", &text[..20]);
+        }
     }
 
     #[test]

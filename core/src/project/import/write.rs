@@ -292,15 +292,16 @@ pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -
     let other = known.judgement.hypotheses.iter().filter_map(|other| {
         let convention = other.conventions(known.recording).into_iter().find(|c| c.key == key)?;
         let (relative, said) = left(other)?;
-        (convention.value != value).then_some((relative, said, convention.value, !other.contradictions.is_empty()))
+        let why = other.contradictions.first().cloned();
+        (convention.value != value).then_some((relative, said, convention.value, why))
     });
     match other.min_by(|a, b| a.0.total_cmp(&b.0)) {
         None => "nothing else is possible with these files, or explains the views nearly as well".into(),
         Some((relative, said, value, _)) if relative > TIMES * own => {
             format!("by the data: it leaves {own_said}, {value} leaves {said}")
         }
-        Some((.., value, true)) => format!("by the data: images contradict {value}"),
-        Some((_, said, value, false)) => {
+        Some((.., value, Some(why))) => format!("by the data: {value} is contradicted: {why}"),
+        Some((_, said, value, None)) => {
             format!("not decided by the data: it leaves {own_said}, {value} leaves {said}")
         }
     }

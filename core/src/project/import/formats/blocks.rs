@@ -1,6 +1,8 @@
 //! Texts in which names stand before numbers, as people have Python print them: `Rotation:` above a matrix, `tvec 1 2 3`,
 //! `R = [[…]]`, once or again and again with a count or the name of an image before them. They are read as fields by those names.
 
+use std::collections::HashSet;
+
 use super::single::is_call;
 use super::tree::is_image_name;
 use crate::project::import::value::{Value, number};
@@ -40,8 +42,9 @@ pub(in crate::project::import) fn document(text: &str) -> Option<Value> {
 #[derive(Default)]
 struct Reader {
     records: Vec<Value>,
-    /// Fields of the record that is being read.
+    /// Fields of the record that is being read, and their names.
     fields: Vec<(String, Value)>,
+    known: HashSet<String>,
     /// The words of the name that is being read, and the numbers that stand behind it.
     name: Vec<String>,
     numbers: Vec<f64>,
@@ -70,7 +73,7 @@ impl Reader {
             if self.fields.iter().any(|(_, value)| matches!(value, Value::Text(_))) {
                 self.end_of_record();
             }
-            self.fields.push(("image".to_owned(), Value::Text(word.to_owned())));
+            self.field("image".to_owned(), Value::Text(word.to_owned()));
             return;
         }
         if let Some((name, rest)) = word.split_once([':', '=']).filter(|_| depth == 0) {
@@ -117,7 +120,7 @@ impl Reader {
 
     fn count(&mut self, count: f64) {
         self.end_of_record();
-        self.fields.push(("number".to_owned(), Value::Number(count)));
+        self.field("number".to_owned(), Value::Number(count));
     }
 
     fn end_of_field(&mut self) {
@@ -126,7 +129,7 @@ impl Reader {
             return;
         }
         let name = std::mem::take(&mut self.name).join("_");
-        if self.fields.iter().any(|(known, _)| *known == name) {
+        if self.known.contains(&name) {
             self.end_of_record();
         }
         let value = match numbers.as_slice() {
@@ -134,6 +137,11 @@ impl Reader {
             many if many.len() > MOST_OF_A_FIELD => Value::Other,
             many => Value::List(many.iter().map(|number| Value::Number(*number)).collect()),
         };
+        self.field(name, value);
+    }
+
+    fn field(&mut self, name: String, value: Value) {
+        self.known.insert(name.clone());
         self.fields.push((name, value));
     }
 
@@ -143,6 +151,7 @@ impl Reader {
         }
         self.name.clear();
         let fields = std::mem::take(&mut self.fields);
+        self.known.clear();
         let has_numbers = fields.iter().any(|(name, value)| name != "number" && !matches!(value, Value::Text(_)));
         if has_numbers {
             self.records.push(Value::Map(fields));

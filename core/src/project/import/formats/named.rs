@@ -9,6 +9,9 @@ use crate::project::import::conventions::{AngleUnit, LengthUnit, RotationForm, i
 use crate::project::import::recording::{Known, Numbers, Stated};
 use crate::project::import::value::Value;
 
+/// Fields of a map that are looked at by their names: each translation is compared with every rotation.
+const MOST_FIELDS: usize = 256;
+
 /// A part of a pose, and what its names say.
 struct Found<T> {
     /// What the fields are of, in lower case; empty where their names say only what they are.
@@ -22,6 +25,7 @@ struct Found<T> {
 /// after what they are alone.
 pub(super) fn poses(value: &Value) -> Vec<(String, Numbers, Stated)> {
     let Value::Map(entries) = value else { return Vec::new() };
+    let entries = entries.get(..MOST_FIELDS).unwrap_or(entries);
     let mut translations: Vec<Found<[f64; 3]>> = translation(value).into_iter().collect();
     let mut rotations: Vec<Found<Vec<f64>>> = rotation(value).into_iter().collect();
     let mut called: Vec<Found<Vec<f64>>> = Vec::new();

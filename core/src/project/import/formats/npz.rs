@@ -5,6 +5,7 @@ use std::io::{Cursor, Read as _};
 
 use super::parts::{self, Part};
 use super::tree;
+use crate::budget::Budget;
 use crate::project::import::recording::{Sample, Stated, Track};
 use crate::project::import::value::Value;
 
@@ -27,14 +28,18 @@ enum Content {
 }
 
 /// The series of poses in a file, and what of it was not read.
-pub(in crate::project::import) fn read(file: &str, bytes: &[u8]) -> Result<(Vec<Track>, Vec<String>), String> {
-    let (arrays, warnings) = arrays(file, bytes)?;
+pub(in crate::project::import) fn read(
+    file: &str,
+    bytes: &[u8],
+    budget: &Budget<'_>,
+) -> Result<(Vec<Track>, Vec<String>), String> {
+    let (arrays, warnings) = arrays(file, bytes, budget)?;
     Ok((series(file, &arrays), warnings))
 }
 
 /// The arrays of a small file as fields by their names; an array that is alone without a name is the whole of it.
-pub(in crate::project::import) fn document(bytes: &[u8]) -> Option<Value> {
-    let (arrays, _) = arrays("", bytes).ok()?;
+pub(in crate::project::import) fn document(bytes: &[u8], budget: &Budget<'_>) -> Option<Value> {
+    let (arrays, _) = arrays("", bytes, budget).ok()?;
     let mut entries: Vec<(String, Value)> = Vec::new();
     for array in arrays {
         let value = match array.content {
@@ -54,7 +59,7 @@ pub(in crate::project::import) fn document(bytes: &[u8]) -> Option<Value> {
     }
 }
 
-fn arrays(file: &str, bytes: &[u8]) -> Result<(Vec<Array>, Vec<String>), String> {
+fn arrays(file: &str, bytes: &[u8], budget: &Budget<'_>) -> Result<(Vec<Array>, Vec<String>), String> {
     let mut warnings = Vec::new();
     let mut arrays = Vec::new();
     if bytes.starts_with(b"PK") {
@@ -65,7 +70,8 @@ fn arrays(file: &str, bytes: &[u8]) -> Result<(Vec<Array>, Vec<String>), String>
             let mut content = Vec::new();
             // What it unpacks to is not believed: no more is read than an array may have.
             let most = 16 * MOST_NUMBERS as u64;
-            entry.take(most).read_to_end(&mut content).map_err(|e| e.to_string())?;
+            let unpacked = entry.take(most).read_to_end(&mut content).map_err(|e| e.to_string())?;
+            budget.unpack(unpacked as u64).map_err(|e| e.to_string())?;
             match array(&name, &content) {
                 Ok(array) => arrays.push(array),
                 Err(why) => warnings.push(format!("{file}: array {name:?} is not used: {why}")),
@@ -230,7 +236,11 @@ fn row_major(numbers: &[f64], shape: &[usize]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
+    use crate::budget::Limits;
+    use crate::progress::CancelToken;
 
     fn npy(kind: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
         let fortran = if fortran { "True" } else { "False" };
@@ -242,26 +252,31 @@ mod tests {
         bytes
     }
 
+    fn read_all(file: &str, bytes: &[u8]) -> Result<(Vec<Track>, Vec<String>), String> {
+        let cancel = CancelToken::default();
+        read(file, bytes, &Budget::new(Limits::default(), &|| Duration::ZERO, &cancel))
+    }
+
     #[test]
     fn numbers_of_every_type_and_order_are_read() {
         let doubles: Vec<u8> = (0..18).flat_map(|i| f64::from(i).to_le_bytes()).collect();
-        let (tracks, _) = read("a.npy", &npy("<f8", false, "3, 6", &doubles)).expect("read");
+        let (tracks, _) = read_all("a.npy", &npy("<f8", false, "3, 6", &doubles)).expect("read");
         let numbers: Vec<_> = tracks[0].samples.iter().map(|s| s.numbers).collect();
         let columns: Vec<u8> = (0..18).flat_map(|i| f32::from((i % 3 * 6 + i / 3) as i16).to_be_bytes()).collect();
-        let (tracks, _) = read("a.npy", &npy(">f4", true, "3, 6", &columns)).expect("read");
+        let (tracks, _) = read_all("a.npy", &npy(">f4", true, "3, 6", &columns)).expect("read");
         assert_eq!(tracks[0].samples.iter().map(|s| s.numbers).collect::<Vec<_>>(), numbers);
     }
 
     #[test]
     fn objects_are_never_unpickled() {
-        let error = read("a.npy", &npy("|O", false, "3,", b"\x80\x04cos\nsystem\n")).expect_err("refused");
+        let error = read_all("a.npy", &npy("|O", false, "3,", b"\x80\x04cos\nsystem\n")).expect_err("refused");
         assert!(error.contains("never unpickled"), "{error}");
     }
 
     #[test]
     fn a_size_that_is_not_there_takes_no_memory() {
         for shape in ["99999999999, 6", "18446744073709551615, 18446744073709551615", "3, 6"] {
-            assert!(read("a.npy", &npy("<f8", false, shape, &[0; 16])).is_err(), "{shape}");
+            assert!(read_all("a.npy", &npy("<f8", false, shape, &[0; 16])).is_err(), "{shape}");
         }
     }
 }

@@ -8,6 +8,9 @@ use crate::project::import::conventions::{RotationForm, is_rotation, rigid};
 use crate::project::import::recording::{Known, Sample, Stated, Track};
 use crate::project::import::value::Value;
 
+/// Lists of one document that are put together: each is compared with all others.
+const MOST_PARTS: usize = 256;
+
 /// A list of rotations or of translations, which are a series together.
 pub(in crate::project::import) struct Part {
     pub name: String,
@@ -35,7 +38,7 @@ impl Part {
 
 /// The series that parts of one document are together.
 pub(in crate::project::import) fn series(parts: &[Part], file: &str) -> Vec<Track> {
-    let parts: Vec<&Part> = parts.iter().filter(|part| !part.is_matrix()).collect();
+    let parts: Vec<&Part> = parts.iter().filter(|part| !part.is_matrix()).take(MOST_PARTS).collect();
     let mut tracks = Vec::new();
     let of_size = |part: &Part, size: &[usize]| part.rows.iter().all(|row| size.contains(&row.len()));
     for rotations in parts.iter().filter(|part| of_size(part, &[9, 4, 3])) {

@@ -92,10 +92,9 @@ pub(in crate::project::import) fn read(file: &str, text: &str) -> Option<Track> 
         let mut row = 1;
         let mut counted_to = 0;
         for (at, _) in text.match_indices(begins).take(MOST_POSES) {
-            // A pose is short: what is long is not read again and again.
-            let end = (at + 1000..text.len()).find(|end| text.is_char_boundary(*end)).unwrap_or(text.len());
-            let line = text[..at].rfind('\n').map_or(0, |i| i + 1);
-            let Some(numbers) = language.pose(&text[line..at], &text[at..end]) else { continue };
+            let (before, rest) = around(text, at);
+            let line = before.rfind('\n').map_or(before, |i| &before[i + 1..]);
+            let Some(numbers) = language.pose(line, rest) else { continue };
             row += text[counted_to..at].matches('\n').count();
             counted_to = at;
             samples.push(Sample {
@@ -112,11 +111,20 @@ pub(in crate::project::import) fn read(file: &str, text: &str) -> Option<Track> 
     })
 }
 
+/// What stands before and behind a place, no more than a pose with its line has: a long line is not read again and again.
+fn around(text: &str, at: usize) -> (&str, &str) {
+    const MOST: usize = 1000;
+    let start = text.ceil_char_boundary(at.saturating_sub(MOST));
+    let end = text.floor_char_boundary(at.saturating_add(MOST));
+    (&text[start..at], &text[at..end])
+}
+
 /// The name of an image on the line of a pose.
 fn image_beside(text: &str, at: usize) -> Option<String> {
-    let start = text[..at].rfind('\n').map_or(0, |i| i + 1);
-    let end = text[at..].find('\n').map_or(text.len(), |i| at + i);
-    let line = &text[start..end];
+    let (before, rest) = around(text, at);
+    let before = before.rfind('\n').map_or(before, |i| &before[i + 1..]);
+    let rest = rest.find('\n').map_or(rest, |i| &rest[..i]);
+    let line = format!("{before}{rest}");
     let words = line.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';' | '"' | '\'' | '(' | ')' | '[' | ']'));
     words.filter(|word| tree::is_image_name(word)).map(str::to_owned).next()
 }

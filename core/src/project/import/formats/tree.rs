@@ -166,6 +166,8 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
         return;
     }
     match value {
+        // What a result says of its own uncertainty is no series of six poses.
+        Value::List(items) if is_covariance(items) => {}
         // Joint values are no poses, however many they are.
         Value::List(items) if is_about_joints(path) && items.iter().all(|item| item.numbers(12).is_some()) => {}
         Value::List(items) if value.numbers(16).is_none() && items.len() >= LEAST_POSES => {
@@ -214,6 +216,14 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
         }
         _ => {}
     }
+}
+
+/// Whether rows of numbers are a matrix that is symmetric, as those of a covariance are, up to how they are printed.
+fn is_covariance(items: &[Value]) -> bool {
+    let rows: Option<Vec<Vec<f64>>> = items.iter().map(|row| row.numbers(16)).collect();
+    let Some(rows) = rows.filter(|rows| rows.len() == 6 && rows.iter().all(|row| row.len() == 6)) else { return false };
+    let is_near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * a.abs().max(b.abs());
+    (0..6).all(|i| rows[i][i] >= 0.0 && (0..i).all(|j| is_near(rows[i][j], rows[j][i])))
 }
 
 /// A key that ends in a number, or is one; an image's name counts as one by its number.

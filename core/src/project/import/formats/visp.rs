@@ -5,7 +5,7 @@ use super::tree;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::project::import::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use crate::project::import::recording::{FoundCamera, FoundTarget, Known, Role, Stated, Track};
-use crate::project::import::value::Value;
+use crate::project::import::value::{self, Value};
 use crate::targets::{AprilTag, Dictionary, Grid, TargetSpec};
 
 /// Whether a document is a vector of six numbers as ViSP saves it.
@@ -38,7 +38,7 @@ pub(in crate::project::import) fn know(track: &mut Track) {
 
 /// A camera from ViSP's XML.
 pub(in crate::project::import) fn camera(text: &str, file: &str) -> Option<FoundCamera> {
-    let document = roxmltree::Document::parse(text).ok()?;
+    let document = value::xml(text).ok()?;
     let camera = document.descendants().find(|node| node.has_tag_name("camera"))?;
     let number = |name: &str| -> Option<f64> {
         camera.descendants().find(|node| node.has_tag_name(name))?.text()?.trim().parse().ok()

@@ -1,5 +1,7 @@
 //! What is tried: every series with every source, in every pairing, under every convention that is left open.
 
+use std::collections::BTreeMap;
+
 use super::Sights;
 use crate::estimate::handeye::Mode;
 use crate::geometry::statistics::median;
@@ -17,6 +19,12 @@ use crate::project::import::settings::Settings;
 const NEAREST_M: f64 = 0.03;
 const FARTHEST_M: f64 = 20.0;
 
+/// Series of the robot with a source each that are paired: of sixteen series of either, all. Where there are more, those come
+/// first that names say to be the robot's and the target's, and that are equally long.
+const MOST_SOURCES: usize = 256;
+/// Hypotheses that are tried; a recording of one robot and one camera has some hundreds.
+const MOST_CASES: usize = 50_000;
+
 /// A hypothesis as it is tried: both places of the camera that give its equations are one.
 pub(super) struct Case {
     pub source: Source,
@@ -28,6 +36,8 @@ pub(super) struct Case {
     pub class: Direction,
     /// The places of the camera and the directions that mean it.
     pub labels: Vec<(Mode, Direction)>,
+    /// By how much the angles of robot and target differ.
+    pub apart_rad: f64,
 }
 
 impl Case {
@@ -46,6 +56,7 @@ impl Case {
             target_reading: h.target_reading,
             class,
             labels: Vec::new(),
+            apart_rad: f64::INFINITY,
         }
     }
 }
@@ -57,8 +68,12 @@ pub(super) struct Paired {
     pub pairing: Pairing,
 }
 
-/// Every pair of a series of the robot and a source of the target, in every pairing.
-pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Settings) -> Result<Vec<Paired>, ImportError> {
+/// Every pair of a series of the robot and a source of the target, in every pairing; and how many such pairs are left out.
+pub(super) fn sources(
+    recording: &Recording,
+    sights: &Sights,
+    settings: &Settings,
+) -> Result<(Vec<Paired>, usize), ImportError> {
     let named = |name: &Option<String>, key: &str, of: Vec<&str>| match name {
         Some(name) if !of.contains(&name.as_str()) => Err(ImportError::BadChoice {
             key: key.into(),
@@ -76,23 +91,13 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
         let named = settings.poses.is_some() && is_wanted(&track.name, &settings.poses);
         named || (track.role != Role::Target && settings.poses.is_none())
     };
-    let mut out = Vec::new();
-    let mut rules = Vec::new();
-    let mut pair = |source: Source, robot: usize, images: &[ImageFile]| {
-        for pairing in pairings(&recording.tracks[robot].samples, images, LEAST_POSES) {
-            rules.push(pairing.rule.clone());
-            // What is found by its content is made after the others.
-            if settings.pairing.as_deref().is_none_or(|rule| rule == pairing.rule || rule == "aligned") {
-                out.push(Paired { source, robot, pairing });
-            }
-        }
-    };
     let with_images = settings.target_poses.is_none() && sights.streams.iter().any(Option::is_some);
+    let mut pairs: Vec<(Source, usize)> = Vec::new();
     for robot in (0..recording.tracks.len()).filter(|i| robots(&recording.tracks[*i])) {
         if with_images {
             for (i, stream) in recording.streams.iter().enumerate() {
                 if sights.streams.get(i).is_some_and(Option::is_some) && is_wanted(&stream.name, &settings.images) {
-                    pair(Source::Stream(i), robot, &stream.images);
+                    pairs.push((Source::Stream(i), robot));
                 }
             }
             continue;
@@ -107,7 +112,36 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
             let robot_track = &recording.tracks[robot];
             let is_same = i == robot || is_itself(target, robot_track) || is_itself(robot_track, target);
             if !is_same && is_target {
-                pair(Source::Track(i), robot, &as_images(target));
+                pairs.push((Source::Track(i), robot));
+            }
+        }
+    }
+    let untried = pairs.len().saturating_sub(MOST_SOURCES);
+    if untried > 0 {
+        pairs.sort_by_key(|(source, robot)| rarity(recording, *source, *robot));
+        pairs.truncate(MOST_SOURCES);
+    }
+    let mut out = Vec::new();
+    let mut rules = Vec::new();
+    let mut still = None;
+    for (source, robot) in pairs {
+        let of_target;
+        let images: &[ImageFile] = match source {
+            Source::Stream(i) => &recording.streams[i].images,
+            Source::Track(i) => {
+                of_target = as_images(&recording.tracks[i]);
+                &of_target
+            }
+        };
+        for pairing in pairings(&recording.tracks[robot].samples, images, LEAST_POSES) {
+            if !moves(recording, robot, source, &pairing) {
+                still = Some(robot);
+                continue;
+            }
+            rules.push(pairing.rule.clone());
+            // What is found by its content is made after the others.
+            if settings.pairing.as_deref().is_none_or(|rule| rule == pairing.rule || rule == "aligned") {
+                out.push(Paired { source, robot, pairing });
             }
         }
     }
@@ -116,7 +150,12 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
             let choices = rules.join(", ");
             return Err(ImportError::BadChoice { key: "pairing".into(), value: rule.clone(), choices });
         }
-        let seen = if let (true, Some(series)) =
+        let seen = if let Some(robot) = still {
+            format!(
+                "with {} there are not {LEAST_POSES} different poses of the robot and of the target",
+                recording.tracks[robot].name
+            )
+        } else if let (true, Some(series)) =
             (recording.tracks.iter().all(|t| t.role == Role::Target), recording.joints.first())
         {
             format!(
@@ -138,7 +177,42 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
         let need = LEAST_POSES;
         return Err(ImportError::NoPoses { folder: recording.root.clone(), need, seen });
     }
-    Ok(out)
+    Ok((out, untried))
+}
+
+/// How unlikely it is that a series is the robot's and a source what the camera saw, by their names and lengths.
+fn rarity(recording: &Recording, source: Source, robot: usize) -> (usize, usize) {
+    let robot = &recording.tracks[robot];
+    let (is_named, count) = match source {
+        Source::Stream(i) => (true, recording.streams[i].images.len()),
+        Source::Track(i) => (recording.tracks[i].role == Role::Target, recording.tracks[i].samples.len()),
+    };
+    (usize::from(robot.role != Role::Robot) + usize::from(!is_named), count.abs_diff(robot.samples.len()))
+}
+
+/// Whether a pairing has as many different poses of the robot, and of a target whose poses are recorded, as a recording has at
+/// least: two calibrations that are printed one after the other, some of them again, are none.
+fn moves(recording: &Recording, robot: usize, source: Source, pairing: &Pairing) -> bool {
+    let different = |track: usize, of: &mut dyn Iterator<Item = usize>| {
+        let samples = &recording.tracks[track].samples;
+        let mut known: Vec<&Numbers> = Vec::new();
+        for numbers in of.filter_map(|i| samples.get(i)).map(|sample| &sample.numbers) {
+            if !known.contains(&numbers) {
+                known.push(numbers);
+            }
+            if known.len() >= LEAST_POSES {
+                return true;
+            }
+        }
+        false
+    };
+    let mut robots = pairing.image_of.iter().enumerate().filter(|(_, image)| image.is_some()).map(|(i, _)| i);
+    let of_robot = different(robot, &mut robots);
+    of_robot
+        && match source {
+            Source::Stream(_) => true,
+            Source::Track(target) => different(target, &mut pairing.image_of.iter().copied().flatten()),
+        }
 }
 
 /// Poses of a target stand for the images that they were found in.
@@ -209,25 +283,39 @@ fn readings(
     out
 }
 
-pub(super) fn cases(recording: &Recording, paired: &[Paired], settings: &Settings) -> Vec<Case> {
-    let mut out = Vec::new();
+/// The hypotheses, as many as are tried, and how many more there are.
+pub(super) fn cases(recording: &Recording, paired: &[Paired], settings: &Settings) -> (Vec<Case>, usize) {
+    let (mut out, mut untried) = (Vec::new(), 0);
+    let mut of_robots: BTreeMap<usize, Vec<Reading>> = BTreeMap::new();
+    let mut of_targets: BTreeMap<usize, Vec<Option<(Reading, Direction)>>> = BTreeMap::new();
     for (number, pair) in paired.iter().enumerate() {
         let track = &recording.tracks[pair.robot];
-        let mut robot_readings = readings(track, settings.length, settings.angle, settings.rotation);
+        let of_robot = of_robots
+            .entry(pair.robot)
+            .or_insert_with(|| readings(track, settings.length, settings.angle, settings.rotation));
+        let mut robot_readings = of_robot.clone();
         if matches!(pair.source, Source::Track(_)) {
             robot_readings = without_centimetres(robot_readings);
         }
-        let target_readings: Vec<Option<(Reading, Direction)>> = match pair.source {
-            Source::Stream(_) => vec![None],
-            Source::Track(i) => target_readings(&recording.tracks[i], settings).into_iter().map(Some).collect(),
+        let images = vec![None];
+        let target_readings: &[Option<(Reading, Direction)>] = match pair.source {
+            Source::Stream(_) => &images,
+            Source::Track(i) => of_targets
+                .entry(i)
+                .or_insert_with(|| target_readings(&recording.tracks[i], settings).into_iter().map(Some).collect()),
         };
         for class in Direction::ALL {
             let labels = labels(recording, track, class, settings);
             if labels.is_empty() {
                 continue;
             }
+            let count = robot_readings.len() * target_readings.len();
+            if out.len() + count > MOST_CASES {
+                untried += count;
+                continue;
+            }
             for reading in &robot_readings {
-                for target_reading in &target_readings {
+                for target_reading in target_readings {
                     out.push(Case {
                         source: pair.source,
                         robot: pair.robot,
@@ -236,12 +324,13 @@ pub(super) fn cases(recording: &Recording, paired: &[Paired], settings: &Setting
                         target_reading: *target_reading,
                         class,
                         labels: labels.clone(),
+                        apart_rad: f64::INFINITY,
                     });
                 }
             }
         }
     }
-    out
+    (out, untried)
 }
 
 /// When both sides are in one unit no data tell which it is, and nobody has recorded both in centimetres: only where it is

@@ -13,7 +13,7 @@ mod trial;
 mod turns;
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use super::error::ImportError;
@@ -40,6 +40,10 @@ pub const NEED: usize = 4;
 const CLEAR: f64 = 0.01;
 /// Views that are looked at to sort hypotheses.
 const MOST_QUICK: usize = 20;
+/// Hypotheses whose equations are solved, and of those the ones that may leave views out, which takes some ten times as long.
+/// Some hundreds of either are what a recording of one robot has; with so many a person waits for some seconds.
+const MOST_SOLVED: usize = 5000;
+const MOST_ROBUST: usize = 500;
 /// Hypotheses that are judged thoroughly.
 const MOST_JUDGED: usize = 40;
 /// Hypotheses that are kept for the list.
@@ -66,10 +70,30 @@ pub struct Judgement {
     pub hypotheses: Vec<Hypothesis>,
     /// How many were tried.
     pub tried: usize,
+    /// How many more there are, which were not: more than one can tell apart. A person who names series leaves fewer.
+    pub untried: usize,
+    /// How many pairs of a series of the robot and of what the camera saw were not looked at.
+    pub sources_untried: usize,
     /// Median distance of the target from the camera under the best, metres.
     pub distance_m: f64,
     /// What follows.
     pub verdict: Verdict,
+}
+
+impl Judgement {
+    /// Whether all that is open is where the camera sits, which no data tell: the same files, pairing and numbers explain the
+    /// recording in both places.
+    pub fn is_open_in_mode_alone(&self) -> bool {
+        match self.hypotheses.as_slice() {
+            [a, b, ..] if self.verdict == Verdict::Ambiguous(2) => {
+                a.mode != b.mode
+                    && (a.source, a.robot, a.reading, a.target_reading)
+                        == (b.source, b.robot, b.reading, b.target_reading)
+                    && a.pairing.image_of == b.pairing.image_of
+            }
+            _ => false,
+        }
+    }
 }
 
 /// What follows from the hypotheses.
@@ -94,20 +118,29 @@ pub fn judge(
     settings: &Settings,
     cancel: &CancelToken,
 ) -> Result<Judgement, ImportError> {
-    let paired = cases::sources(recording, sights, settings)?;
-    let mut cases = cases::cases(recording, &paired, settings);
+    let (paired, sources_untried) = cases::sources(recording, sights, settings)?;
+    let (mut cases, mut untried) = cases::cases(recording, &paired, settings);
     if cases.is_empty() {
         return Err(ImportError::NothingLeft("these settings".into()));
     }
-    let judge = Judge { recording, sights, paired: &paired, settings, read: RefCell::default() };
+    let judge = Judge { recording, sights, paired: &paired, settings, cancel, read: RefCell::default() };
     let tried = cases.len();
-    turns::keep_alike(&judge, &mut cases);
+    untried += turns::keep_alike(&judge, &mut cases, MOST_SOLVED);
     let mut quick: Vec<(f64, usize)> = Vec::with_capacity(tried);
     for robust in [false, true] {
         // A pairing of which a part is wrong spoils a plain solution: then each hypothesis is given the chance to leave
-        // views out.
-        quick.clear();
-        for (i, case) in cases.iter().enumerate() {
+        // views out, those first in which robot and target turn alike, which wrong views do not spoil.
+        let mut chosen: Vec<usize> = (0..cases.len()).collect();
+        if robust && chosen.len() > MOST_ROBUST {
+            chosen.sort_by(|a, b| cases[*a].apart_rad.total_cmp(&cases[*b].apart_rad));
+            chosen.truncate(MOST_ROBUST);
+            let again: BTreeSet<usize> = chosen.iter().copied().collect();
+            quick.retain(|(_, i)| !again.contains(i));
+        } else {
+            quick.clear();
+        }
+        for i in chosen {
+            let case = &cases[i];
             if cancel.is_cancelled() {
                 break;
             }
@@ -123,6 +156,9 @@ pub fn judge(
     let mut chosen: Vec<usize> = quick.iter().take(MOST_JUDGED).map(|(_, i)| *i).collect();
     // The best of every pairing is worth a look, whatever else is better.
     for number in 0..paired.len() {
+        if chosen.len() >= 2 * MOST_JUDGED {
+            break;
+        }
         if let Some((_, i)) = quick.iter().find(|(_, i)| cases[*i].pairing == number)
             && !chosen.contains(i)
         {
@@ -142,7 +178,7 @@ pub fn judge(
     hypotheses.truncate(MOST_LISTED);
     let distance_m = hypotheses.first().map_or(0.0, |h| judge.sight_distance(h));
     let verdict = verdict(&mut hypotheses);
-    Ok(Judgement { hypotheses, tried, distance_m, verdict })
+    Ok(Judgement { hypotheses, tried, untried, sources_untried, distance_m, verdict })
 }
 
 fn verdict(hypotheses: &mut [Hypothesis]) -> Verdict {

@@ -14,6 +14,7 @@ use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::{Mode, PosePair, subset};
 use crate::geometry::frames::Pose;
 use crate::geometry::statistics::median;
+use crate::progress::CancelToken;
 use crate::project::import::conventions::{Direction, Reading};
 use crate::project::import::formats::tree::LEAST_POSES;
 use crate::project::import::hypothesis::{Fit, Hypothesis, Source};
@@ -28,6 +29,8 @@ const DISAGREES: f64 = 5.0;
 const DISAGREES_OF_DISTANCE: f64 = 3e-3;
 /// And to judge the best of them.
 const MOST_VIEWS: usize = 400;
+/// Views that disagree for which a pose that fits better is looked for among all.
+const MOST_LOOKED_FOR: usize = 50;
 /// Views by which the size of the target is looked at.
 const MOST_SCALED: usize = 30;
 
@@ -37,6 +40,7 @@ pub(super) struct Judge<'a> {
     pub sights: &'a Sights,
     pub paired: &'a [Paired],
     pub settings: &'a Settings,
+    pub cancel: &'a CancelToken,
     /// Series of the target that were read already: many cases share them.
     pub read: RefCell<HashMap<(usize, Reading, Direction), Rc<Sight>>>,
 }
@@ -210,6 +214,7 @@ impl Judge<'_> {
             // Views that were exchanged or shifted leave the other pose without its image. Where that has it, this view's own
             // pose is wrong, or its image a copy: one view less, which says nothing of the others.
             if contradictions.len() < 3
+                && disagreeing.len() <= MOST_LOOKED_FOR
                 && let Some((other, other_m)) = self.better(case, sight, solution, view, *misfit_m, limit)
                 && !agrees(other)
             {

@@ -87,21 +87,27 @@ impl Read<'_> {
     }
 }
 
-/// Keeps the cases in which robot and target turn alike.
-pub(super) fn keep_alike(judge: &Judge<'_>, cases: &mut Vec<Case>) {
+/// Keeps the cases in which robot and target turn alike, the most alike where there are more than `most`; how many of them are
+/// left out for that alone.
+pub(super) fn keep_alike(judge: &Judge<'_>, cases: &mut Vec<Case>, most: usize) -> usize {
     let mut read = Read { judge, of_tracks: HashMap::new(), of_streams: HashMap::new() };
     let mut known: HashMap<(usize, Rotations, Option<Rotations>), f64> = HashMap::new();
-    let apart: Vec<f64> = cases
-        .iter()
-        .map(|case| {
-            let target = case.target_reading.as_ref().map(|(reading, _)| rotations(reading));
-            let key = (case.pairing, rotations(&case.reading), target);
-            *known.entry(key).or_insert_with(|| read.apart_rad(case).unwrap_or(f64::INFINITY))
-        })
-        .collect();
-    let best = apart.iter().copied().fold(f64::INFINITY, f64::min);
+    for case in cases.iter_mut() {
+        if judge.cancel.is_cancelled() {
+            return 0;
+        }
+        let target = case.target_reading.as_ref().map(|(reading, _)| rotations(reading));
+        let key = (case.pairing, rotations(&case.reading), target);
+        case.apart_rad = *known.entry(key).or_insert_with(|| read.apart_rad(case).unwrap_or(f64::INFINITY));
+    }
+    let best = cases.iter().map(|case| case.apart_rad).fold(f64::INFINITY, f64::min);
     // Without anything to compare nothing is ruled out.
     let limit = if best.is_finite() { (NEAR * best).max(EXPLAINED_RAD) } else { f64::INFINITY };
-    let mut apart = apart.into_iter();
-    cases.retain(|_| apart.next().is_none_or(|apart_rad| apart_rad <= limit));
+    cases.retain(|case| case.apart_rad <= limit);
+    let left_out = cases.len().saturating_sub(most);
+    if left_out > 0 {
+        cases.sort_by(|a, b| a.apart_rad.total_cmp(&b.apart_rad));
+        cases.truncate(most);
+    }
+    left_out
 }

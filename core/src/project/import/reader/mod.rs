@@ -11,20 +11,26 @@ use super::formats::{
 };
 use super::recording::{FoundTarget, Known, Recording, Track};
 use super::value::{self, Value};
+use crate::budget::Budget;
 use crate::estimate::handeye::Mode;
 
 /// Files of text that are read at the most.
 const MOST_DOCUMENTS: usize = 5000;
+/// Lines of a table, a program or a report: ten times as many poses as are taken by hand or by a robot in a day, or as many rows as
+/// a robot that is asked a hundred times a second writes in half an hour.
+const MOST_LINES: usize = 200_000;
 
 pub(super) struct Reader<'a> {
     root: &'a Path,
     pub recording: Recording,
+    budget: &'a Budget<'a>,
     documents: usize,
 }
 
 impl<'a> Reader<'a> {
-    pub fn new(root: &'a Path, recording: Recording) -> Self {
-        Self { root, recording, documents: 0 }
+    /// Where the budget is spent, files that follow are not read.
+    pub fn new(root: &'a Path, recording: Recording, budget: &'a Budget<'a>) -> Self {
+        Self { root, recording, budget, documents: 0 }
     }
 
     fn warn(&mut self, file: &Path, why: impl std::fmt::Display) {
@@ -36,10 +42,17 @@ impl<'a> Reader<'a> {
 
     fn text(&mut self, file: &Path) -> Option<String> {
         self.documents += 1;
-        if self.documents > MOST_DOCUMENTS {
+        if self.documents > MOST_DOCUMENTS || self.budget.is_spent() {
             return None;
         }
         match folder::text(&self.root.join(file)) {
+            Ok(text) if is_too_long(file, &text) => {
+                self.warn(
+                    file,
+                    format_args!("is not used: it has more than {MOST_LINES} lines, which no table of poses has"),
+                );
+                None
+            }
             Ok(text) => Some(text),
             Err(error) => {
                 self.recording.warnings.push(error.to_string());
@@ -135,7 +148,7 @@ impl<'a> Reader<'a> {
             let parts: Vec<PathBuf> = files.iter().map(|file| self.root.join(file)).collect();
             let folder = folder_of(files[0]);
             let name = if files.len() > 1 { &folder } else { files[0] };
-            let read = rosbag::read(&name.display().to_string(), &parts, &mut self.recording);
+            let read = rosbag::read(&name.display().to_string(), &parts, self.budget, &mut self.recording);
             if let Err(why) = read {
                 self.warn(files[0], format_args!("is not used: {why}"));
             }
@@ -191,7 +204,9 @@ impl<'a> Reader<'a> {
             found = tracks;
         } else {
             let documents = |path: &Path| {
-                let text = folder::text(&self.root.join(path)).ok()?;
+                let path = self.root.join(path);
+                let may_be = !self.budget.is_spent() && self.recording.bounds.has(&path);
+                let text = may_be.then(|| folder::text(&path).ok()).flatten()?;
                 value::yaml(&text).ok()?.into_iter().next()
             };
             if let Some(track) = industrial_calibration::pairs(value, file, documents) {
@@ -261,10 +276,13 @@ impl<'a> Reader<'a> {
             return;
         }
         for (file, _) in members {
+            if self.budget.is_spent() {
+                return;
+            }
             let name = file.display().to_string();
             match folder::bytes(&self.root.join(file)) {
                 Err(error) => self.recording.warnings.push(error.to_string()),
-                Ok(bytes) => match npz::read(&name, &bytes) {
+                Ok(bytes) => match npz::read(&name, &bytes, self.budget) {
                     Err(why) => self.warn(file, format_args!("is not used: {why}")),
                     Ok((tracks, warnings)) => {
                         self.recording.tracks.extend(tracks);
@@ -274,6 +292,12 @@ impl<'a> Reader<'a> {
             }
         }
     }
+}
+
+/// Whether a text is a table, a program or a report of more lines than are read.
+fn is_too_long(file: &Path, text: &str) -> bool {
+    let is_document = matches!(&*folder::ending(file), "json" | "jsonl" | "yaml" | "yml" | "samples" | "calib" | "xml");
+    !is_document && text.bytes().filter(|b| *b == b'\n').nth(MOST_LINES).is_some()
 }
 
 /// The documents of a file of YAML as one value.

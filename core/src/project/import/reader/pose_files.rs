@@ -121,10 +121,10 @@ impl Reader<'_> {
         const LARGEST: u64 = 1 << 16;
         let one = |(file, number): &'_ (PathBuf, Option<u64>)| {
             let path = self.root.join(file);
-            if std::fs::metadata(&path).ok()?.len() > LARGEST {
+            if self.budget.is_spent() || std::fs::metadata(&path).ok()?.len() > LARGEST {
                 return None;
             }
-            Some((file.clone(), *number, npz::document(&folder::bytes(&path).ok()?)?))
+            Some((file.clone(), *number, npz::document(&folder::bytes(&path).ok()?, self.budget)?))
         };
         let read: Vec<(PathBuf, Option<u64>, Value)> = members.iter().filter_map(one).collect();
         if 2 * read.len() < members.len() {

@@ -8,6 +8,7 @@ use nalgebra::Isometry3;
 use super::frames::Frames;
 use super::storage::{self, Message};
 use super::{STILL_M, STILL_RAD, images};
+use crate::budget::Budget;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::project::import::recording::FoundCamera;
 
@@ -36,12 +37,12 @@ impl Bag {
     /// Reads the files of a bag, in order.
     ///
     /// # Errors
-    /// A sentence, where one is no bag.
-    pub fn read(parts: &[PathBuf]) -> Result<Self, String> {
+    /// A sentence, where one is no bag or the budget is spent.
+    pub fn read(parts: &[PathBuf], budget: &Budget<'_>) -> Result<Self, String> {
         let mut bag = Self::default();
         for part in parts {
             // A message that is not as its type says is left out.
-            storage::visit(part, &mut |message| {
+            storage::visit(part, budget, &mut |message| {
                 let _read = bag.take(&message);
             })?;
         }

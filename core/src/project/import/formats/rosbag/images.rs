@@ -7,6 +7,7 @@ use std::sync::Arc;
 use image::{DynamicImage, GrayImage, RgbImage};
 
 use super::storage::{Message, visit};
+use crate::budget::Budget;
 use crate::project::import::recording::{ImageFile, Recording, Stream};
 
 /// The file of the image of a topic with a stamp.
@@ -19,12 +20,13 @@ pub(super) fn name(topic: &str, stamp: i64) -> String {
 /// moves keep their stamps.
 ///
 /// # Errors
-/// A sentence, where nothing can be written there.
+/// A sentence, where nothing can be written there or the budget is spent.
 pub(super) fn unpack(
     file: &str,
     parts: &[PathBuf],
     chosen: &BTreeMap<String, Vec<i64>>,
     with_stamps: bool,
+    budget: &Budget<'_>,
     recording: &mut Recording,
 ) -> Result<(), String> {
     if chosen.is_empty() {
@@ -34,7 +36,7 @@ pub(super) fn unpack(
     let mut streams: BTreeMap<String, Stream> = BTreeMap::new();
     let mut troubles = Vec::new();
     for part in parts {
-        visit(part, &mut |message| {
+        visit(part, budget, &mut |message| {
             let Some(stamps) = chosen.get(message.topic) else { return };
             let found = stamp_of(&message).filter(|stamp| stamps.binary_search(stamp).is_ok());
             let Some(stamp) = found else { return };
@@ -43,6 +45,8 @@ pub(super) fn unpack(
                 decoded(&message).and_then(|image| image.save(&path).map(|()| image).map_err(|e| e.to_string()));
             match saved {
                 Ok(image) => {
+                    // What it takes on the disk is less than this, and not more than it tells.
+                    let _spent = budget.unpack(image.as_bytes().len() as u64);
                     let stream = streams.entry(message.topic.to_owned()).or_insert_with(|| Stream {
                         name: message.topic.to_owned(),
                         images: Vec::new(),

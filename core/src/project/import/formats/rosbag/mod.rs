@@ -18,6 +18,7 @@ use std::path::PathBuf;
 use nalgebra::Isometry3;
 
 use super::{joints, tree};
+use crate::budget::Budget;
 use crate::project::import::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use crate::project::import::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Stated, Track};
 use contents::{Bag, Timed, nearest};
@@ -35,10 +36,15 @@ const MOST_IMAGES: usize = 1000;
 /// Takes what a bag has into a recording; `parts` are its files in order.
 ///
 /// # Errors
-/// A sentence, where it is no bag or its images cannot be unpacked.
-pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording: &mut Recording) -> Result<(), String> {
-    let (parts, _scratch) = storage::plain_parts(parts)?;
-    let bag = Bag::read(&parts)?;
+/// A sentence, where it is no bag, its images cannot be unpacked or the budget is spent.
+pub(in crate::project::import) fn read(
+    file: &str,
+    parts: &[PathBuf],
+    budget: &Budget<'_>,
+    recording: &mut Recording,
+) -> Result<(), String> {
+    let (parts, _scratch) = storage::plain_parts(parts, budget)?;
+    let bag = Bag::read(&parts, budget)?;
     if bag.images.is_empty() {
         return Err("has no images".into());
     }
@@ -47,7 +53,8 @@ pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording:
     let mut moving: BTreeMap<String, Vec<i64>> = BTreeMap::new();
     let mut few_rests: BTreeMap<String, Vec<i64>> = BTreeMap::new();
     for (topic, stamps) in &bag.images {
-        let rests = rests(&bag, stamps);
+        let rests = rests(&bag, stamps, budget);
+        budget.check().map_err(|why| why.to_string())?;
         recording.beliefs.push(format!(
             "{file}: {} images on {topic}, {} of them taken where everything stood still",
             stamps.len(),
@@ -78,8 +85,8 @@ pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording:
                 .into(),
         );
     }
-    images::unpack(file, &parts, &at_rest, false, recording)?;
-    images::unpack(file, &parts, &moving, true, recording)?;
+    images::unpack(file, &parts, &at_rest, false, budget, recording)?;
+    images::unpack(file, &parts, &moving, true, budget, recording)?;
     for (topic, stamps) in &at_rest {
         recording.tracks.extend(tracks(&bag, file, topic, stamps));
         recording.joints.extend(joints(&bag, file, topic, stamps));
@@ -94,11 +101,11 @@ pub(in crate::project::import) fn read(file: &str, parts: &[PathBuf], recording:
     Ok(())
 }
 
-/// Of every rest the image in its middle.
-fn rests(bag: &Bag, stamps: &[i64]) -> Vec<i64> {
+/// Of every rest the image in its middle; of the first rests where the budget is spent.
+fn rests(bag: &Bag, stamps: &[i64], budget: &Budget<'_>) -> Vec<i64> {
     let mut out = Vec::new();
     let mut rest: Vec<i64> = Vec::new();
-    for stamp in stamps {
+    for stamp in stamps.iter().take_while(|_| !budget.is_spent()) {
         let goes_on = rest.first().is_none_or(|first| bag.is_still(*first, *stamp));
         if bag.is_still(stamp.saturating_sub(REST_NS), stamp.saturating_add(REST_NS)) && goes_on {
             rest.push(*stamp);

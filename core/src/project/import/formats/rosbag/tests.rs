@@ -1,12 +1,22 @@
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{Cursor, Read as _, Write as _};
 use std::path::Path;
+use std::time::Duration;
 
 use mcap::records::MessageHeader;
 
 use super::wire::Encoding;
 use super::*;
+use crate::budget::{Limits, Spent};
+use crate::progress::CancelToken;
+
+/// Reads it without a limit of time.
+fn read_all(parts: &[PathBuf], recording: &mut Recording) -> Result<(), String> {
+    let cancel = CancelToken::default();
+    read("bag", parts, &Budget::new(Limits::default(), &|| Duration::ZERO, &cancel), recording)
+}
 
 /// A message of a bag: topic, type, time, bytes.
 type Recorded = (&'static str, &'static str, i64, Vec<u8>);
@@ -192,7 +202,7 @@ fn poses() -> Vec<Isometry3<f64>> {
 /// One image of every rest, and the pose of the tip that belongs to it.
 fn is_read_rightly(parts: &[PathBuf]) {
     let mut recording = Recording::default();
-    read("bag", parts, &mut recording).expect("read");
+    read_all(parts, &mut recording).expect("read");
     assert_eq!(recording.streams[0].images.len(), 6, "{:?}", recording.beliefs);
     let track = recording.tracks.iter().find(|track| track.name == "bag:tf:base_link->tool0").expect("the tip");
     for (image, sample) in recording.streams[0].images.iter().zip(&track.samples) {
@@ -234,7 +244,7 @@ fn a_bag_of_ros_1_that_breaks_off_has_what_came_before() {
     let whole = ros1_of(&encoded(&twice, Encoding::Ros1), "lz4");
     fs::write(&file, &whole[..whole.len() * 3 / 4]).expect("written");
     let mut recording = Recording::default();
-    read("bag", &[file], &mut recording).expect("read");
+    read_all(&[file], &mut recording).expect("read");
     assert!((8..11).contains(&recording.streams[0].images.len()), "{:?}", recording.beliefs);
 }
 
@@ -265,8 +275,83 @@ fn a_file_that_never_stops_growing_is_refused() {
     let packed = zstd::encode_all(std::io::repeat(0).take(1 << 28), 3).expect("packed");
     assert!(packed.len() < 1 << 17, "{} bytes", packed.len());
     fs::write(&file, packed).expect("written");
-    let why = read("bag", &[file], &mut Recording::default()).expect_err("refused");
-    assert!(why.contains("zstd -d"), "{why}");
+    let limits = Limits { unpacked_bytes: 1 << 27, ..Limits::default() };
+    let cancel = CancelToken::default();
+    let budget = Budget::new(limits, &|| Duration::ZERO, &cancel);
+    let why = read("bag", &[file], &budget, &mut Recording::default()).expect_err("refused");
+    assert!(why.contains("unpack to more than 0.1 GiB"), "{why}");
+    assert_eq!(budget.check(), Err(Spent::Unpacked(limits.unpacked_bytes)));
+}
+
+/// A chunk that says that it has more than its frame of LZ4 holds: what waits for the rest waits for ever.
+#[test]
+fn a_chunk_that_is_shorter_than_it_says_ends() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("wait.mcap");
+    let lz4_of = |bytes: &[u8]| {
+        let mut encoder = lz4::EncoderBuilder::new().build(Vec::new()).expect("an encoder");
+        encoder.write_all(bytes).expect("packed");
+        encoder.finish().0
+    };
+    for (name, packed) in
+        [("lz4", lz4_of(b"\x05short")), ("zstd", zstd::encode_all(&b"\x05short"[..], 1).expect("packed"))]
+    {
+        let mut chunk = [[0u8; 16].as_slice(), &1000u64.to_le_bytes(), &0u32.to_le_bytes()].concat();
+        chunk.extend_from_slice(&(name.len() as u32).to_le_bytes());
+        chunk.extend_from_slice(name.as_bytes());
+        chunk.extend_from_slice(&(packed.len() as u64).to_le_bytes());
+        chunk.extend_from_slice(&packed);
+        let record = [&[6u8][..], &(chunk.len() as u64).to_le_bytes(), &chunk].concat();
+        let bytes = [mcap::MAGIC, &record, &[0; 40]].concat();
+        assert!(bytes.len() < 200, "{}", bytes.len());
+        fs::write(&file, bytes).expect("written");
+        assert!(read_all(std::slice::from_ref(&file), &mut Recording::default()).is_err());
+    }
+}
+
+/// A database runs what is written in it as a view, and that need not end.
+#[test]
+fn a_view_in_the_place_of_a_table_is_not_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["messages", "topics"] {
+        let file = folder.path().join(format!("{name}.db3"));
+        write_db3(&file, &messages(&poses()));
+        let bag = rusqlite::Connection::open(&file).expect("opened");
+        bag.execute_batch(&format!(
+            "DROP TABLE {name}; CREATE VIEW {name} AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)
+             SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data, '' AS name, '' AS type, 'cdr' AS
+             serialization_format FROM n WHERE i < 0;"
+        ))
+        .expect("made");
+        drop(bag);
+        assert!(read_all(&[file], &mut Recording::default()).is_err());
+    }
+}
+
+/// By a clock that goes on whenever it is looked at.
+#[test]
+fn a_bag_of_every_kind_is_given_up_when_its_time_is_over_or_a_person_ends_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let named = |name: &str| folder.path().join(name);
+    write_db3(&named("bag.db3"), &messages(&poses()));
+    fs::write(named("bag.mcap"), mcap_of(&messages(&poses()))).expect("written");
+    fs::write(named("lz4.bag"), ros1_of(&encoded(&poses(), Encoding::Ros1), "lz4")).expect("written");
+    for name in ["bag.db3", "bag.mcap", "lz4.bag"] {
+        let looks = Cell::new(0);
+        let elapsed = || {
+            looks.set(looks.get() + 1);
+            Duration::from_secs(looks.get())
+        };
+        let cancel = CancelToken::default();
+        let budget = Budget::new(Limits::default(), &elapsed, &cancel);
+        let mut recording = Recording::default();
+        let why = read("bag", &[named(name)], &budget, &mut recording).expect_err(name);
+        assert!(why.contains("longer than 20 s"), "{name}: {why}");
+        assert!(looks.get() < 30, "{name}: it went on after its time");
+        cancel.cancel();
+        let budget = Budget::new(Limits::default(), &|| Duration::ZERO, &cancel);
+        assert_eq!(read("bag", &[named(name)], &budget, &mut recording), Err("cancelled".to_owned()), "{name}");
+    }
 }
 
 /// Frames that never change are in the first file alone.
@@ -305,7 +390,7 @@ fn a_broken_bag_is_no_danger() {
             bent[cut] ^= 0x55;
             for broken in [&whole[..cut], &bent] {
                 fs::write(&file, broken).expect("written");
-                let _read = read("bag", std::slice::from_ref(&file), &mut Recording::default());
+                let _read = read_all(std::slice::from_ref(&file), &mut Recording::default());
             }
         }
     }

@@ -6,9 +6,12 @@ mod mcap;
 mod ros1;
 mod zstd;
 
+use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::wire::{Encoding, Reader};
+use crate::budget::Budget;
 
 pub(super) use self::zstd::plain_parts;
 
@@ -33,20 +36,38 @@ impl<'a> Message<'a> {
     }
 }
 
-/// Calls with every message of a file, by the ending of its name. A file that breaks off has what came before.
+/// Calls with every message of a file, by the ending of its name, and ends when it is told to. A file that breaks off has what
+/// came before.
 ///
 /// # Errors
-/// A sentence, where it is no bag.
-pub(super) fn visit(file: &Path, each: &mut dyn FnMut(Message)) -> Result<(), String> {
+/// A sentence, where it is no bag or the budget is spent.
+pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut dyn FnMut(Message)) -> Result<(), String> {
     let ends = |with: &str| file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(with));
-    let mut each = |message: Message| zstd::with_plain_data(message, each);
+    let mut each = |message: Message| {
+        zstd::with_plain_data(message, each);
+        if budget.is_spent() { Flow::Break(()) } else { Flow::Continue(()) }
+    };
     if ends("bag") {
-        ros1::visit(file, &mut each)
+        ros1::visit(file, &mut each)?;
     } else if ends("db3") {
-        db3::visit(file, &mut each)
+        db3::visit(file, &mut each)?;
     } else {
-        mcap::visit(file, &mut each)
+        mcap::visit(file, budget, &mut each)?;
     }
+    budget.check().map_err(|why| why.to_string())
+}
+
+/// Whether more messages are wanted.
+type Flow = ControlFlow<()>;
+
+/// What every kind of file calls with its messages.
+type Each<'a> = dyn FnMut(Message) -> Flow + 'a;
+
+/// Reads at the most so many bytes; `None` of more, or of what cannot be read.
+fn bounded(input: impl Read, most: usize) -> Option<Vec<u8>> {
+    let mut data = Vec::new();
+    let read = input.take(most as u64 + 1).read_to_end(&mut data).ok()?;
+    (read <= most).then_some(data)
 }
 
 /// A channel of a file: its topic, its type and how its messages are encoded.

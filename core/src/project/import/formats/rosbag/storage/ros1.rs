@@ -10,7 +10,7 @@ use std::path::Path;
 
 use bzip2::read::BzDecoder;
 
-use super::{Channel, MOST_RECORD_BYTES, Message};
+use super::{Channel, Each, MOST_RECORD_BYTES};
 use crate::project::import::formats::rosbag::wire::Encoding;
 
 const MAGIC: &[u8; 13] = b"#ROSBAG V2.0\n";
@@ -23,7 +23,7 @@ const MESSAGE: u8 = 2;
 const CHUNK: u8 = 5;
 const CONNECTION: u8 = 7;
 
-pub(super) fn visit(file: &Path, each: &mut dyn FnMut(Message)) -> Result<(), String> {
+pub(super) fn visit(file: &Path, each: &mut Each<'_>) -> Result<(), String> {
     let mut input = BufReader::new(File::open(file).map_err(|e| e.to_string())?);
     let mut magic = [0; MAGIC.len()];
     let read = input.read_exact(&mut magic);
@@ -34,7 +34,7 @@ pub(super) fn visit(file: &Path, each: &mut dyn FnMut(Message)) -> Result<(), St
             "is no bag of ROS 1".into()
         });
     }
-    let mut bag = Bag { channels: BTreeMap::new(), each };
+    let mut bag = Bag { channels: BTreeMap::new(), each, is_over: false };
     // What is behind a record that cannot be read is not known to be one.
     let _end = bag.records(&mut input, false);
     Ok(())
@@ -42,14 +42,16 @@ pub(super) fn visit(file: &Path, each: &mut dyn FnMut(Message)) -> Result<(), St
 
 struct Bag<'a> {
     channels: BTreeMap<u32, Channel>,
-    each: &'a mut dyn FnMut(Message),
+    each: &'a mut Each<'a>,
+    /// No more messages are wanted.
+    is_over: bool,
 }
 
 impl Bag<'_> {
     /// Reads records up to the end, or to one that is none.
     fn records(&mut self, input: &mut dyn Read, in_chunk: bool) -> io::Result<()> {
         let (mut header, mut data) = (Vec::new(), Vec::new());
-        loop {
+        while !self.is_over {
             let length = u32_of(input)?;
             if length > MOST_HEADER_BYTES {
                 return Err(io::ErrorKind::InvalidData.into());
@@ -78,6 +80,7 @@ impl Bag<'_> {
                 _ => skip(input, length)?,
             }
         }
+        Ok(())
     }
 
     fn chunk(&mut self, fields: &Fields, body: &mut dyn Read) -> io::Result<()> {
@@ -105,7 +108,7 @@ impl Bag<'_> {
         let Some(channel) = fields.u32("conn").and_then(|id| self.channels.get(&id)) else { return };
         let Some(&[a, b, c, d, e, f, g, h]) = fields.get("time") else { return };
         let [sec, nanosec] = [[a, b, c, d], [e, f, g, h]].map(|part| i64::from(u32::from_le_bytes(part)));
-        (self.each)(channel.message(data, sec * 1_000_000_000 + nanosec));
+        self.is_over = (self.each)(channel.message(data, sec * 1_000_000_000 + nanosec)).is_break();
     }
 }
 
