@@ -369,4 +369,6 @@ impl App {
 }
 
 #[cfg(test)]
+mod reasons_tests;
+#[cfg(test)]
 mod tests;

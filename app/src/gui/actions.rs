@@ -117,7 +117,6 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
             command: (connected && model.calibrated().is_some()).then_some(Command::VerifyAtPlanned),
         },
         action(tr!(language, "Solve"), Group::Work, &[], Command::Solve),
-        action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation),
         action(tr!(language, "Try to connect now"), Group::Work, &[], Command::Reconnect),
         Action {
             name: tr!(language, "Stop trying"),
@@ -142,6 +141,10 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
         dialog(tr!(language, "Open session…"), OPEN, Dialog::Open),
         dialog(tr!(language, "Save session…"), SAVE, Dialog::SaveAs),
     ];
+    // A robot behind a driver is none that could be started.
+    if !matches!(model.source, CellSource::Drivers(_)) {
+        all.push(action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation));
+    }
     for (step, keys) in Step::ALL.into_iter().zip(STEPS) {
         all.push(action(shell::step_name(step, language), Group::Steps, keys, Command::GoToStep(step)));
     }
